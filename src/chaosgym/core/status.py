@@ -1,0 +1,12 @@
+"""How a kernel ended. Kernels return one of these numbers; ``simulation`` turns all but OK into a SimulationError."""
+
+OK = 0
+DIVERGED = 1
+EVENT_BUDGET = 2
+STEP_TOO_COARSE = 3
+
+MESSAGES = {
+    DIVERGED: "the motion grew beyond every bound",
+    EVENT_BUDGET: "one cycle needed more contact events than its budget allows",
+    STEP_TOO_COARSE: "the step is too coarse for the fastest mode in contact",
+}

@@ -1,0 +1,29 @@
+"""What must a machine be able to do, so that simulation, diagnosis, sweeps and environments can use it?"""
+
+from typing import Any, ClassVar, Protocol, runtime_checkable
+
+
+@runtime_checkable
+class Machine(Protocol):
+    """A frozen dataclass of parameters in SI units, with everything that the floors above need to know of it.
+
+    A new machine is one file beside this one, one kernel file in ``core`` and one line in ``simulation``.
+    """
+
+    name: ClassVar[str]
+    """Name on the command line, such as ``impact-beam``."""
+    speed_field: ClassVar[str]
+    """Field that an operator changes while the machine runs."""
+    clearance_field: ClassVar[str]
+    """Field that holds the clearance of the monitored joint."""
+    sides: ClassVar[tuple[str, ...]]
+    """Names of the bearing surfaces whose contact force is recorded."""
+
+    @property
+    def cycle_period(self) -> float:
+        """Duration of one operating cycle [s]."""
+        ...
+
+    def reduce(self) -> Any:
+        """Return the model, a NamedTuple of numbers and arrays, that the kernels integrate."""
+        ...

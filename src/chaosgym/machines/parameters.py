@@ -1,0 +1,103 @@
+"""What is a machine parameter? A number with a unit, an allowed range and a provenance.
+
+A machine is a frozen dataclass whose fields are made by ``parameter``. Default, unit, range and source of a number
+live there and nowhere else; validation, the command line and the documentation read them.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from types import MappingProxyType
+from typing import Any, Literal, TypeVar
+
+from chaosgym.errors import ParameterError
+
+Provenance = Literal["printed", "derived", "calibrated", "assumed"]
+"""printed: in the thesis; derived: follows from printed numbers; calibrated: fitted to printed results; assumed."""
+
+M = TypeVar("M")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Unit, allowed range (both ends included) or choices, and provenance of one machine parameter."""
+
+    unit: str
+    low: float
+    high: float
+    choices: tuple[str, ...]
+    provenance: Provenance
+    source: str
+
+
+def parameter(
+    default: Any,
+    *,
+    unit: str = "-",
+    low: float = -math.inf,
+    high: float = math.inf,
+    choices: tuple[str, ...] = (),
+    provenance: Provenance,
+    source: str,
+) -> Any:
+    """Make a dataclass field that carries its unit, range and provenance."""
+    described = Parameter(unit, low, high, choices, provenance, source)
+    return field(default=default, metadata={"parameter": described})
+
+
+def parameters_of(machine: Any) -> Mapping[str, Parameter]:
+    """Describe every parameter of a machine or machine class, by field name."""
+    return MappingProxyType({f.name: f.metadata["parameter"] for f in fields(machine)})
+
+
+def _is_real(value: Any) -> bool:
+    return not isinstance(value, bool | str) and hasattr(value, "__float__")
+
+
+def check_parameter(owner: Any, name: str, value: Any) -> Any:
+    """Return the value in its field's own type.
+
+    Raises
+    ------
+    ParameterError
+        If it is not a finite number in the allowed range, or not one of the choices. Names field, value and range.
+    """
+    described = parameters_of(owner)[name]
+    if described.choices:
+        if value not in described.choices:
+            raise ParameterError(f"{name} = {value!r} is not one of {', '.join(described.choices)}")
+        return value
+    whole = isinstance(next(f.default for f in fields(owner) if f.name == name), int)
+    unit = "" if described.unit == "-" else f" {described.unit}"
+    allowed = f"allowed: {described.low:g} to {described.high:g}{unit}"
+    if not _is_real(value) or not math.isfinite(value) or not described.low <= value <= described.high:
+        shown = f"{value:g}{unit}" if _is_real(value) else repr(value)
+        raise ParameterError(f"{name} = {shown} is out of range; {allowed}")
+    if whole and value != int(value):
+        raise ParameterError(f"{name} = {value:g} is not a whole number; {allowed}")
+    return int(value) if whole else float(value)
+
+
+def validate(machine: Any) -> None:
+    """Check every field of a machine that is being constructed, and store it in its own type."""
+    for name in parameters_of(machine):
+        object.__setattr__(machine, name, check_parameter(machine, name, getattr(machine, name)))
+
+
+def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
+    """Return the machine with some fields replaced.
+
+    Raises
+    ------
+    ParameterError
+        If a name is no field of the machine (the nearest one is suggested) or a value is not allowed.
+    """
+    known = parameters_of(machine)
+    for name in settings:
+        if name not in known:
+            from difflib import get_close_matches
+
+            near = get_close_matches(name, known, n=1)
+            hint = f"; did you mean {near[0]}?" if near else f"; known fields: {', '.join(known)}"
+            raise ParameterError(f"{type(machine).__name__} has no field {name!r}{hint}")
+    return replace(machine, **settings)  # type: ignore[type-var]

@@ -1,0 +1,326 @@
+"""How does a machine run? Whole operating cycles in, one row of results per cycle out.
+
+    record = simulate(ImpactBeam(excitation_frequency=19.0), cycles=100, transient=200)
+    record.peak_force          # (100, 2) newton, upper and lower surface
+"""
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from tqdm import tqdm
+
+from chaosgym.core import status
+from chaosgym.core.fixed_step import advance_fixed_step
+from chaosgym.core.impact_beam import CycleArrays, Episode, advance
+from chaosgym.errors import ParameterError, SimulationError
+from chaosgym.machines.impact_beam import ImpactBeam
+from chaosgym.machines.machine import Machine
+from chaosgym.machines.parameters import parameters_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ExactEvents:
+    """Exact propagation between contact events; the default.
+
+    Attributes
+    ----------
+    step_phase
+        Angle [rad] by which the fastest mode turns in the shortest step. Accuracy hardly depends on it.
+    event_tolerance
+        Error of the instant of an event, as an angle [rad] of the fastest mode.
+    event_budget
+        Contact events that one cycle may have before the run is given up.
+    """
+
+    step_phase: float = 0.5
+    event_tolerance: float = 1e-9
+    event_budget: int = 20_000
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.step_phase <= 1.0:
+            raise ParameterError(f"step_phase = {self.step_phase:g} rad is out of range; allowed: above 0, up to 1")
+        if not 1e-14 <= self.event_tolerance <= 1e-2:
+            raise ParameterError(f"event_tolerance = {self.event_tolerance:g} is out of range; allowed: 1e-14 to 0.01")
+        if self.event_budget < 1:
+            raise ParameterError(f"event_budget = {self.event_budget} is out of range; allowed: 1 or more")
+
+    def refined(self) -> "ExactEvents":
+        """Half the step and a tenth of the tolerance."""
+        return replace(self, step_phase=self.step_phase / 2, event_tolerance=max(self.event_tolerance / 10, 1e-14))
+
+
+@dataclass(frozen=True)
+class RungeKutta4:
+    """Fixed steps of the classical Runge-Kutta method, without event location; for comparison."""
+
+    steps_per_cycle: int = 4000
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.steps_per_cycle <= 10**9:
+            raise ParameterError(f"steps_per_cycle = {self.steps_per_cycle} is out of range; allowed: 1 to 1e9")
+
+    def refined(self) -> "RungeKutta4":
+        """Half the step."""
+        return replace(self, steps_per_cycle=2 * self.steps_per_cycle)
+
+
+Integrator = ExactEvents | RungeKutta4
+
+
+class MotionState(NamedTuple):
+    """All that a run needs to go on, bit for bit, from the end of a cycle.
+
+    ``coordinates`` (n_states,) are the states of the equations of motion, ``bouncing`` (3,) the side of the current
+    episode of bouncing and the instants of its first and last touch [s] before now.
+    """
+
+    coordinates: Array
+    bouncing: Array
+
+
+@dataclass(frozen=True)
+class CycleRecord:
+    """What happened in each operating cycle; two columns are the two sides of the monitored joint.
+
+    Attributes
+    ----------
+    machine : Machine
+        What was simulated.
+    section : (n_cycles, n_states)
+        Stroboscopic section: the state at the start of each cycle.
+    displacement, velocity : (n_cycles,)
+        Stroboscopic displacement [m] and velocity [m/s] of the monitored joint.
+    peak_force : (n_cycles, 2)
+        Largest contact force of the cycle [N]; 0 without contact.
+    impacts : (n_cycles, 2) int
+        Contacts that began in the cycle.
+    contact_fraction : (n_cycles, 2)
+        Share of the cycle in contact.
+    bounce_duration : (n_cycles, 2)
+        Time [s] from the first touch of a surface to the beginning of its last contact before the other surface is
+        touched: how long the joint bounced before sustained contact (thesis 5.3.2). Stands in the cycle in which the
+        other surface is touched; 0 where no episode ends.
+    final_state : MotionState
+        Where the run ended; pass it as ``initial_state`` to go on.
+    history : (n_cycles, samples_per_cycle, 3) or None
+        Displacement [m], velocity [m/s] and contact force [N] (upper side positive) at equal intervals.
+    """
+
+    machine: Machine
+    section: Array
+    displacement: Array
+    velocity: Array
+    peak_force: Array
+    impacts: NDArray[np.int64]
+    contact_fraction: Array
+    bounce_duration: Array
+    final_state: MotionState
+    history: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.section)
+
+    @property
+    def time(self) -> Array:
+        """Instants [s] of the samples of ``history`` from the first recorded cycle on, (n_cycles * samples,)."""
+        if self.history is None:
+            raise SimulationError("the run kept no time history; simulate with samples_per_cycle above 0")
+        cycles, samples, _ = self.history.shape
+        return np.arange(cycles * samples) * (self.machine.cycle_period / samples)
+
+    def after(self, cycles: int) -> "CycleRecord":
+        """Return the record without its first cycles."""
+        kept = slice(cycles, None)
+        return replace(
+            self,
+            section=self.section[kept],
+            displacement=self.displacement[kept],
+            velocity=self.velocity[kept],
+            peak_force=self.peak_force[kept],
+            impacts=self.impacts[kept],
+            contact_fraction=self.contact_fraction[kept],
+            bounce_duration=self.bounce_duration[kept],
+            history=None if self.history is None else self.history[kept],
+        )
+
+
+def _run_impact_beam(
+    beam: ImpactBeam, state: MotionState, cycles: int, samples: int, integrator: Integrator
+) -> tuple[int, int, CycleRecord]:
+    model = beam.reduce()
+    states = 2 * beam.n_modes
+    arrays = CycleArrays(
+        section=np.empty((cycles, states)),
+        tip=np.empty((cycles, 2)),
+        peak_force=np.empty((cycles, 2)),
+        impacts=np.empty((cycles, 2), dtype=np.int64),
+        contact_time=np.empty((cycles, 2)),
+        bounce_time=np.empty((cycles, 2)),
+        events=np.empty(cycles, dtype=np.int64),
+        history=np.empty((cycles, samples, 3)),
+    )
+    coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
+    episode = Episode(side=bouncing[:1], touch=bouncing[1:])
+    if isinstance(integrator, ExactEvents):
+        outcome, done = advance(
+            model, coordinates, episode, arrays, integrator.step_phase, integrator.event_tolerance,
+            integrator.event_budget,
+        )  # fmt: skip
+    else:
+        outcome, done = advance_fixed_step(model, coordinates, episode, arrays, integrator.steps_per_cycle)
+    record = CycleRecord(
+        machine=beam,
+        section=arrays.section,
+        displacement=arrays.tip[:, 0],
+        velocity=arrays.tip[:, 1],
+        peak_force=arrays.peak_force,
+        impacts=arrays.impacts,
+        contact_fraction=arrays.contact_time / beam.cycle_period,
+        bounce_duration=arrays.bounce_time,
+        final_state=MotionState(coordinates, bouncing),
+        history=arrays.history if samples else None,
+    )
+    return outcome, done, record
+
+
+_Run = Callable[[Any, MotionState, int, int, Integrator], tuple[int, int, CycleRecord]]
+_RUNS: dict[str, tuple[_Run, Callable[[Any], int]]] = {
+    ImpactBeam.name: (_run_impact_beam, lambda beam: 2 * beam.n_modes),
+}
+"""By machine: what runs it, and its number of states. A new machine adds one line."""
+
+
+def rest_state(machine: Machine) -> MotionState:
+    """Return the state of rest in the middle of the gap."""
+    return MotionState(np.zeros(_RUNS[machine.name][1](machine)), np.zeros(3))
+
+
+def _initial(machine: Machine, given: MotionState | ArrayLike | None) -> MotionState:
+    rest = rest_state(machine)
+    if given is None:
+        return rest
+    state = given if isinstance(given, MotionState) else MotionState(np.array(given, dtype=float), rest.bouncing)
+    if state.coordinates.shape != rest.coordinates.shape or not np.all(np.isfinite(state.coordinates)):
+        raise ParameterError(
+            f"initial_state has shape {state.coordinates.shape}; allowed: {rest.coordinates.shape}, all values finite"
+        )
+    return state
+
+
+def _count(name: str, value: int, low: int) -> int:
+    if isinstance(value, bool) or int(value) != value or value < low:
+        raise ParameterError(f"{name} = {value!r} is out of range; allowed: whole numbers from {low} on")
+    return int(value)
+
+
+def simulate(
+    machine: Machine,
+    cycles: int,
+    initial_state: MotionState | ArrayLike | None = None,
+    transient: int = 0,
+    *,
+    samples_per_cycle: int = 0,
+    integrator: Integrator | None = None,
+) -> CycleRecord:
+    """Run a machine for whole operating cycles.
+
+    Same input, same bytes. A run of 100 cycles equals two runs of 50 of which the second starts from the
+    ``final_state`` of the first.
+
+    Parameters
+    ----------
+    machine
+        What to run.
+    cycles
+        Number of cycles to record.
+    initial_state
+        A ``MotionState``, an array (n_states,), or None for rest in the middle of the gap.
+    transient
+        Number of cycles to run first and not to record.
+    samples_per_cycle
+        Samples of the time history to keep in each cycle.
+    integrator
+        ``ExactEvents()`` by default, or ``RungeKutta4(...)``.
+
+    Raises
+    ------
+    ParameterError
+        If a count or the initial state is not usable.
+    SimulationError
+        If the motion diverges, a cycle exhausts the event budget, or a fixed step is too coarse; names the machine's
+        parameters.
+    """
+    cycles = _count("cycles", cycles, 1)
+    transient = _count("transient", transient, 0)
+    samples_per_cycle = _count("samples_per_cycle", samples_per_cycle, 0)
+    integrator = integrator or ExactEvents()
+    state = _initial(machine, initial_state)
+    run, _ = _RUNS[machine.name]
+    first = 0
+    for count, samples in ((transient, 0), (cycles, samples_per_cycle)):
+        if count:
+            outcome, done, record = run(machine, state, count, samples, integrator)
+            if outcome != status.OK:
+                raise _failure(machine, outcome, first + done, integrator)
+            state = record.final_state
+            first += count
+    return record
+
+
+def _failure(machine: Machine, outcome: int, cycle: int, integrator: Integrator) -> SimulationError:
+    settings = ", ".join(f"{name}={getattr(machine, name)!r}" for name in parameters_of(machine))
+    return SimulationError(
+        f"{status.MESSAGES[outcome]} in cycle {cycle} with {integrator}; {type(machine).__name__}({settings})"
+    )
+
+
+def simulate_many(
+    machines: Sequence[Machine],
+    cycles: int,
+    *,
+    transient: int = 0,
+    integrator: Integrator | None = None,
+    workers: int | None = None,
+    progress: bool = False,
+) -> list[CycleRecord]:
+    """Run many machines side by side on threads: the kernels release the interpreter lock.
+
+    Parameters
+    ----------
+    machines
+        What to run, each from rest.
+    cycles, transient, integrator
+        As for ``simulate``.
+    workers
+        Number of threads; all processors by default.
+    progress
+        Show a progress bar on standard error.
+
+    Returns
+    -------
+    list of CycleRecord, in the order of ``machines``.
+    """
+    def one(machine: Machine) -> CycleRecord:
+        return simulate(machine, cycles, transient=transient, integrator=integrator)
+
+    return parallel_map(one, machines, workers=workers, progress="simulate" if progress else None)
+
+
+def parallel_map(
+    function: Callable[[Any], Any], items: Iterable[Any], *, workers: int | None = None, progress: str | None = None
+) -> list[Any]:
+    """Apply a function that spends its time in kernels to every item, on threads; results in order.
+
+    ``progress`` names a progress bar on standard error; None shows none.
+    """
+    items = list(items)
+    with ThreadPoolExecutor(max_workers=workers or os.cpu_count() or 1) as pool:
+        results = pool.map(function, items)
+        return list(tqdm(results, total=len(items), desc=progress, disable=progress is None, unit="machine"))
