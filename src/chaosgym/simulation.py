@@ -1,7 +1,7 @@
 """How does a machine run? Whole operating cycles in, one row of results per cycle out.
 
-    record = simulate(ImpactBeam(excitation_frequency=19.0), cycles=100, transient=200)
-    record.peak_force          # (100, 2) newton, upper and lower surface
+record = simulate(ImpactBeam(excitation_frequency=19.0), cycles=100, transient=200)
+record.peak_force          # (100, 2) newton, upper and lower surface
 """
 
 import os
@@ -133,7 +133,7 @@ class CycleRecord:
         if self.history is None:
             raise SimulationError("the run kept no time history; simulate with samples_per_cycle above 0")
         cycles, samples, _ = self.history.shape
-        return np.arange(cycles * samples) * (self.machine.cycle_period / samples)
+        return np.arange(cycles * samples, dtype=float) * (self.machine.cycle_period / samples)
 
     def after(self, cycles: int) -> "CycleRecord":
         """Return the record without its first cycles."""
@@ -307,6 +307,7 @@ def simulate_many(
     -------
     list of CycleRecord, in the order of ``machines``.
     """
+
     def one(machine: Machine) -> CycleRecord:
         return simulate(machine, cycles, transient=transient, integrator=integrator)
 
