@@ -15,8 +15,11 @@ _digest = hashlib.sha256(b"".join(path.read_bytes() for path in _sources)).hexdi
 _cache_root = os.environ.get("NUMBA_CACHE_DIR") or os.path.join(
     os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "chaosgym", "kernels"
 )
+KERNEL_CACHE = os.path.join(_cache_root, _digest)
+"""Folder of the compiled kernels."""
+
 _previous_cache_folder = config.CACHE_DIR
-config.CACHE_DIR = os.path.join(_cache_root, _digest)
+config.CACHE_DIR = KERNEL_CACHE
 try:
     from chaosgym.core import contact, fixed_step, impact_beam, propagator, status  # noqa: F401
 finally:

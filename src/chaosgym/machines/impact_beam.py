@@ -122,6 +122,11 @@ class ImpactBeam:
         """Duration of one operating cycle [s]."""
         return 1.0 / self.excitation_frequency
 
+    @property
+    def natural_frequencies(self) -> Array:
+        """Natural frequencies [Hz] of the kept modes between the sensors, (n_modes,)."""
+        return np.asarray(np.sqrt(self.reduce().stiffness) / (2.0 * math.pi))
+
     def reduce(self) -> ImpactBeamModel:
         """Return the modal model; machines that differ in frequency, force or clearance share the costly part."""
         structure = _structure(*(getattr(self, field) for field in _STRUCTURE_FIELDS))

@@ -2,6 +2,9 @@
 
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 @runtime_checkable
 class Machine(Protocol):
@@ -22,6 +25,11 @@ class Machine(Protocol):
     @property
     def cycle_period(self) -> float:
         """Duration of one operating cycle [s]."""
+        ...
+
+    @property
+    def natural_frequencies(self) -> NDArray[np.float64]:
+        """Natural frequencies [Hz] of the machine free of contact, those of the kept modes."""
         ...
 
     def reduce(self) -> Any:
