@@ -184,6 +184,133 @@ def show(machine: Any, as_json: bool) -> None:
 
 
 @app.command()
+@machine_command
+@click.option("--transient", type=click.IntRange(0, 10**7), default=200, show_default=True, help="Cycles to skip.")
+@click.option("--cycles", type=click.IntRange(16, 10**7), default=200, show_default=True, help="Cycles to judge.")
+@click.option("--step-check", is_flag=True, help="Repeat with a finer step and say whether the verdict stays.")
+def diagnose(machine: Any, transient: int, cycles: int, step_check: bool, as_json: bool) -> None:
+    """Tell periodic from chaotic by the Two-Step Test."""
+    from chaosgym.diagnosis import two_step_test
+    from chaosgym.diagnosis.step_check import step_check as check
+    from chaosgym.simulation import simulate
+
+    record = simulate(machine, cycles, transient=transient)
+    verdict = two_step_test(record)
+    peaks = record.peak_force[:, 0]
+    summary = {"min": peaks.min(), "max": peaks.max(), "mean": peaks.mean(), "std": peaks.std()}
+    result = {"machine": machine.name, **verdict.as_dict(), "peak_force_summary_N": summary}
+    if step_check:
+        result["step_check"] = check(machine, cycles=cycles, transient=transient).as_dict()
+
+    def lines() -> list[str]:
+        period = f", period {verdict.period}" if verdict.period else ""
+        shown = [
+            f"{machine.name}: {verdict.nature}{period} (margin {verdict.margin:.2f})",
+            f"  {verdict.reason}",
+            f"  peak force {summary['min']:.2f} to {summary['max']:.2f} N, mean {summary['mean']:.2f} N, "
+            f"standard deviation {summary['std']:.2f} N",
+        ]
+        return [*shown, f"  {result['step_check']['summary']}"] if step_check else shown
+
+    _emit(result, as_json, lines)
+
+
+@app.command()
+@machine_command
+@click.option("--model", type=click.Path(exists=True, dir_okay=False), help="Classifier file; default: the shipped one.")
+def classify(machine: Any, model: str | None, as_json: bool) -> None:
+    """Tell the response type (I, II, III) by the learned classifier, without simulating."""
+    from chaosgym.classifier import ResponseClassifier, default_classifier
+
+    classifier = ResponseClassifier.load(model) if model else default_classifier(machine.name)
+    answer = classifier.classify(machine)
+    result = {
+        "machine": machine.name,
+        "response_type": answer.response_type,
+        "probabilities": answer.probabilities,
+    }
+    _emit(result, as_json, lambda: [
+        f"{machine.name}: Type {answer.response_type}",
+        *(f"  Type {name:4s} {'#' * round(40 * chance):40s} {chance:.3f}"
+          for name, chance in answer.probabilities.items()),
+    ])  # fmt: skip
+
+
+@app.command()
+@machine_command
+@click.option("--axis", "axes", multiple=True, metavar="FIELD=LOW:HIGH[:COUNT][:lin|log]", help="Repeatable, in SI.")
+@click.option("--grid", "sampling", flag_value="grid", default="grid", help="All combinations (default).")
+@click.option("--random", "random_size", type=click.IntRange(1), metavar="N", help="N random points.")
+@click.option("--sobol", "sobol_size", type=click.IntRange(1), metavar="N", help="N points of a Sobol sequence.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--transient", type=click.IntRange(0, 10**7), default=200, show_default=True, help="Cycles to skip.")
+@click.option("--cycles", type=click.IntRange(16, 10**7), default=200, show_default=True, help="Cycles to judge.")
+@click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
+@click.option("--out", type=click.Path(file_okay=False), required=True, help="Folder for the labelled points.")
+def sweep(
+    machine: Any,
+    axes: tuple[str, ...],
+    sampling: str,
+    random_size: int | None,
+    sobol_size: int | None,
+    seed: int,
+    transient: int,
+    cycles: int,
+    workers: int | None,
+    out: str,
+    as_json: bool,
+) -> None:
+    """Label many machines and keep them as Parquet; the same command again resumes."""
+    from collections import Counter
+
+    from chaosgym.sweeps import Axis, SweepPlan, run_sweep
+    from chaosgym.sweeps.plan import default_axes
+
+    if random_size and sobol_size:
+        raise click.UsageError("--random and --sobol exclude each other")
+    kind: Any = "random" if random_size else "sobol" if sobol_size else sampling
+    chosen = tuple(Axis.parse(text) for text in axes) or default_axes(machine, kind)
+    plan = SweepPlan(machine, chosen, kind, random_size or sobol_size or 0, seed, transient, cycles)
+    labelled = run_sweep(plan, out, workers=workers, progress=True)
+    counts = {name: dict(Counter(str(value) for value in labelled.column(name)))
+              for name in ("nature", "response_type", "status")}  # fmt: skip
+    result = {"machine": machine.name, "folder": out, "points": len(labelled.table), **counts}
+    _emit(result, as_json, lambda: [
+        f"{machine.name}: {len(labelled.table)} points in {out}",
+        *(f"  {name:14s}" + ", ".join(f"{key} {count}" for key, count in sorted(counts[name].items()))
+          for name in counts),
+    ])  # fmt: skip
+
+
+@app.command("train-classifier")
+@click.option("--data", type=click.Path(exists=True, file_okay=False), required=True, help="Folder of a finished sweep.")
+@click.option("--out", type=click.Path(dir_okay=False), required=True, help="Model file to write (.npz).")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def train_classifier(data: str, out: str, seed: int, as_json: bool) -> None:
+    """Train the classifier on a sweep and judge it beside its baselines (needs the extra [learn])."""
+    from pathlib import Path
+
+    from chaosgym.classifier.train import train_classifier as train
+    from chaosgym.sweeps import read_sweep
+
+    if Path(out).exists():
+        raise click.UsageError(f"--out {out} exists; choose another file")
+    trained = train(read_sweep(data), seed, progress=True)
+    trained.classifier.save(out)
+    _emit({"model": out, **trained.report}, as_json, lambda: classifier_table(trained.report))
+
+
+def classifier_table(report: Mapping[str, Any]) -> list[str]:
+    """Lines of the comparison of classifiers on held-out points."""
+    return [
+        f"held-out points {report['rows']['held_out']} of {sum(report['rows'].values())}   accuracy   balanced",
+        *(f"  {name:28s} {score['accuracy']:12.3f} {score['balanced_accuracy']:10.3f}"
+          for name, score in report["held_out"].items()),
+    ]  # fmt: skip
+
+
+@app.command()
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def info(as_json: bool) -> None:
     """Print versions and folders, for a bug report."""

@@ -12,6 +12,7 @@ P. Gu, Chaotic Vibration in Machine Systems and Its Implications for Design, PhD
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar, NamedTuple
@@ -50,6 +51,10 @@ class ImpactBeam:
     name: ClassVar[str] = "impact-beam"
     speed_field: ClassVar[str] = "excitation_frequency"
     clearance_field: ClassVar[str] = "clearance"
+    usual_ranges: ClassVar[Mapping[str, tuple[float, float]]] = {
+        "excitation_frequency": (4.0, 30.0),
+        "clearance": (0.02e-3, 0.2e-3),
+    }
     sides: ClassVar[tuple[str, ...]] = ("upper", "lower")
 
     excitation_frequency: float = parameter(

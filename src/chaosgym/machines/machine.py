@@ -1,5 +1,6 @@
 """What must a machine be able to do, so that simulation, diagnosis, sweeps and environments can use it?"""
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
@@ -19,6 +20,8 @@ class Machine(Protocol):
     """Field that an operator changes while the machine runs."""
     clearance_field: ClassVar[str]
     """Field that holds the clearance of the monitored joint."""
+    usual_ranges: ClassVar[Mapping[str, tuple[float, float]]]
+    """Ranges of speed and clearance, in the fields' units, that sweeps and environments cover by default."""
     sides: ClassVar[tuple[str, ...]]
     """Names of the bearing surfaces whose contact force is recorded."""
 
