@@ -5,11 +5,11 @@ changes and the motion goes on from the state in which the last step ended.
 """
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
 from chaosgym.envs.drive import SpeedDrive
@@ -94,8 +94,8 @@ class MachineEnv(gym.Env[Observation, Action]):
         self._space = observation_space(
             drive.lowest_speed, drive.highest_speed, FORCE_RANGE * task.force_limit, task.cycles_per_step
         )
-        self.observation_space = self._space
-        self.action_space = Box(-1.0, 1.0, (1,), np.float32)
+        self.observation_space = cast(Space[Observation], self._space)
+        self.action_space = cast(Space[Action], Box(-1.0, 1.0, (1,), np.float32))
         self.machine = self._at_speed(machine, drive.lowest_speed)
         self._job_time = task.job_cycles * self._at_speed(machine, drive.highest_speed).cycle_period
         self._damage = np.zeros(len(machine.sides))
