@@ -118,7 +118,7 @@ class Task:
     """Peak force above which a step costs."""
     load_rating: float = parameter(
         70.0, unit="N", low=1e-6, high=1e9, provenance="derived",
-        source="equivalent force of the beam's worst constant speed (69.1 N at 29 Hz, run up from 4 Hz), rounded up",
+        source="largest equivalent force at constant speed, 66 to 69 N at 26.6 to 29.1 Hz, rounded up",
     )  # fmt: skip
     """Force under which a surface lasts a million cycles."""
     damage_acceleration: float = parameter(
