@@ -3,7 +3,7 @@
 from typing import Any
 
 from chaosgym.envs.drive import SpeedDrive
-from chaosgym.envs.machine_env import MachineEnv
+from chaosgym.envs.machine_env import SENSOR_ERROR, MachineEnv
 from chaosgym.envs.tasks import Task
 from chaosgym.errors import ParameterError
 from chaosgym.machines.impact_beam import THESIS_IMPACT_BEAM, ImpactBeam
@@ -101,7 +101,7 @@ class ImpactBeamEnv(MachineEnv):
     - *Giving up*: an early end costs 10, more than the rest of any job at 4 Hz. A lowest speed below a tenth of the
       highest would change this.
     - *Dithering*: comparing only cycles of equal speed would let small changes of speed wipe out the record, so earlier
-      cycles count at any speed. Alternating by 0.05 to 1 Hz about 24, 26.5, 28 and 29.5 Hz leaves 82 to 99 % of the
+      cycles count at any speed. Alternating by 0.05 to 1 Hz about 24, 26.5, 28 and 29.5 Hz leaves 81 to 99 % of the
       steps marked, as do the constant speeds with 84 to 98 %; speeds drawn at random from 22 to 30 Hz, 96 %.
     - *Crossing chaos quickly* and *holding the response periodic by small corrections* (control of chaos) do reduce the
       cost. Both are what one wants.
@@ -160,14 +160,14 @@ class ImpactBeamEnv(MachineEnv):
     def __init__(
         self,
         *,
-        lowest_speed: float = 4.0,
-        highest_speed: float = 30.0,
+        lowest_speed: float = ImpactBeam.usual_ranges[ImpactBeam.speed_field][0],
+        highest_speed: float = ImpactBeam.usual_ranges[ImpactBeam.speed_field][1],
         slew_limit: float = 1.0,
-        cycles_per_step: int = 5,
-        job_cycles: int = 1000,
-        force_limit: float = 80.0,
+        cycles_per_step: int = Task.cycles_per_step,
+        job_cycles: int = Task.job_cycles,
+        force_limit: float = Task.force_limit,
         tolerance: bool | float = False,
-        sensor_error: float = 3.0,
+        sensor_error: float = SENSOR_ERROR,
         render_mode: str | None = None,
         **parameters: Any,
     ) -> None:
