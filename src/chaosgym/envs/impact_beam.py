@@ -87,8 +87,12 @@ class ImpactBeamEnv(MachineEnv):
     compared with the four that lie 1, 2, ... 8 cycles before them, and the step repeats if one of these comparisons
     agrees within 5 % of the largest peak (the thesis measured less than 5 % in periodic responses, 3.5.2). Earlier
     cycles count whatever the speed was then; the first cycle of the step, disturbed by the change of speed, is not
-    judged. At constant speed this marks nine of ten steps of strongly chaotic responses and none of a periodic response
-    with a period up to 8; chaos whose peaks stay within 5 % passes, and periods above 8 don't.
+    judged.
+
+    How far this agrees with the Two-Step Test on 400 cycles from rest, at constant speeds from 4 to 30 Hz by 0.25 Hz:
+    of the steps after the first 100 cycles it marks 1.4 % where the test says periodic (70 speeds; all of the marks
+    at 20.25 Hz, period 9) and 67 % where it says chaotic (34 speeds). It marks nine of ten steps of strongly chaotic
+    responses; narrow bands, chaos whose peaks stay within 5 %, and what settles after transient chaos pass.
 
     `info["cost"]` is 1 in a step that counts as Type III (`cost_type_iii`), has a peak force above the force limit on
     either sensor (`cost_force`) or fails, and 0 otherwise. `info` also holds `speed` [Hz], `damage`, `status`
@@ -96,7 +100,7 @@ class ImpactBeamEnv(MachineEnv):
 
     Loopholes considered:
 
-    - *Farming*: no term is ever positive, and each is proportional to cycles done, so nothing can be collected twice.
+    - *Farming*: no term is ever positive, and a job has a fixed number of cycles, so there is nothing to collect.
     - *Standing still*: the lowest speed costs 7.5 in time alone, the highest at most 3 without fracture.
     - *Giving up*: an early end costs 10, more than the rest of any job at 4 Hz. A lowest speed below a tenth of the
       highest would change this.
