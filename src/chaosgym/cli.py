@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import click
 
-from chaosgym import __version__
+from chaosgym.version import __version__
 from chaosgym.errors import ChaosgymError, SimulationError
 
 

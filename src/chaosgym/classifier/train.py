@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import trange
 
-from chaosgym import __version__
+from chaosgym.version import __version__
 from chaosgym.classifier.model import RESPONSE_TYPES, ResponseClassifier
 from chaosgym.errors import DatasetError
 from chaosgym.sweeps import LabelledSweep

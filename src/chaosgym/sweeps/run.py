@@ -12,8 +12,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from tqdm import tqdm
 
-from chaosgym import __version__
-from chaosgym.diagnosis import two_step_test, types_on_grid
+from chaosgym.version import __version__
+from chaosgym.diagnosis import two_step_test
+from chaosgym.diagnosis.response_type import types_on_grid
 from chaosgym.errors import DatasetError, SimulationError
 from chaosgym.files import write_atomically
 from chaosgym.machines import Machine
