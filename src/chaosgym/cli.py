@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import click
 
-from chaosgym.version import __version__
 from chaosgym.errors import ChaosgymError, SimulationError
+from chaosgym.version import __version__
 
 
 class OptionOf(NamedTuple):

@@ -117,7 +117,7 @@ def test_other_settings_and_foreign_folders_are_refused(swept, tmp_path):
     """Another plan, or a folder with anything else in it, is left alone."""
     folder, _ = swept
     other = SweepPlan(PLAN.machine, PLAN.axes, transient=51, cycles=60)
-    with pytest.raises(DatasetError, match="another sweep.*transient"):
+    with pytest.raises(DatasetError, match=r"another sweep.*transient"):
         run_sweep(other, folder)
     (tmp_path / "note.txt").write_text("mine")
     with pytest.raises(DatasetError, match="is no run of this sweep"):

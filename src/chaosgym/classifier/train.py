@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import trange
 
-from chaosgym.version import __version__
 from chaosgym.classifier.model import RESPONSE_TYPES, ResponseClassifier
 from chaosgym.errors import DatasetError
 from chaosgym.sweeps import LabelledSweep
+from chaosgym.version import __version__
 
 Array = NDArray[np.float64]
 
