@@ -295,23 +295,27 @@ def train_classifier(data: str, out: str, seed: int, as_json: bool) -> None:
     """Train the classifier on a sweep and judge it beside its baselines (needs the extra [learn])."""
     from pathlib import Path
 
+    from chaosgym.classifier.train import report_table
     from chaosgym.classifier.train import train_classifier as train
     from chaosgym.sweeps import read_sweep
 
-    if Path(out).exists():
-        raise click.UsageError(f"--out {out} exists; choose another file")
+    if Path(out).exists() or not Path(out).absolute().parent.is_dir():
+        raise click.UsageError(f"--out {out} exists already, or its folder does not; choose another file")
     trained = train(read_sweep(data), seed, progress=True)
     trained.classifier.save(out)
-    _emit({"model": out, **trained.report}, as_json, lambda: classifier_table(trained.report))
+    _emit({"model": out, **trained.report}, as_json, lambda: report_table(trained.report))
 
 
-def classifier_table(report: Mapping[str, Any]) -> list[str]:
-    """Lines of the comparison of classifiers on held-out points."""
-    return [
-        f"held-out points {report['rows']['held_out']} of {sum(report['rows'].values())}   accuracy   balanced",
-        *(f"  {name:28s} {score['accuracy']:12.3f} {score['balanced_accuracy']:10.3f}"
-          for name, score in report["held_out"].items()),
-    ]  # fmt: skip
+@app.command()
+@click.option("--out", type=click.Path(file_okay=False), default="chaosgym-demo", show_default=True, help="New folder.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def demo(out: str, seed: int, as_json: bool) -> None:
+    """Simulate, label, train, and compare an agent with constant speed: a few minutes (needs the extra [learn])."""
+    from chaosgym.demo import demo_table, run_demo
+
+    result = run_demo(out, seed, say=lambda line: click.echo(line, err=True))
+    _emit(result, as_json, lambda: demo_table(result))
 
 
 @app.command()
@@ -368,6 +372,6 @@ def main() -> None:
     except click.ClickException as error:
         click.echo(f"Error: {error.format_message()}", err=True)
         sys.exit(error.exit_code)
-    except ChaosgymError as error:
+    except (ChaosgymError, OSError) as error:
         click.echo(f"Error: {error}", err=True)
         sys.exit(1 if isinstance(error, SimulationError) else 2)
