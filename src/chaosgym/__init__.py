@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import chaosgym.envs  # noqa: F401  (registers the environments)
+from chaosgym.version import __version__
 
 if TYPE_CHECKING:
     from chaosgym.classifier import ResponseClassifier, default_classifier
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam
     from chaosgym.simulation import CycleRecord, ExactEvents, RungeKutta4, simulate, simulate_many
     from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
-
-__version__ = "0.1.0.dev0"
 
 _HOME = {
     "chaosgym.classifier": ("ResponseClassifier", "default_classifier"),

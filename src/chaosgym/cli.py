@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import click
 
-from chaosgym import __version__
 from chaosgym.errors import ChaosgymError, SimulationError
+from chaosgym.version import __version__
 
 
 class OptionOf(NamedTuple):
@@ -217,7 +217,9 @@ def diagnose(machine: Any, transient: int, cycles: int, step_check: bool, as_jso
 
 @app.command()
 @machine_command
-@click.option("--model", type=click.Path(exists=True, dir_okay=False), help="Classifier file; default: the shipped one.")
+@click.option(
+    "--model", type=click.Path(exists=True, dir_okay=False), help="Classifier file; default: the shipped one."
+)
 def classify(machine: Any, model: str | None, as_json: bool) -> None:
     """Tell the response type (I, II, III) by the learned classifier, without simulating."""
     from chaosgym.classifier import ResponseClassifier, default_classifier
@@ -283,7 +285,9 @@ def sweep(
 
 
 @app.command("train-classifier")
-@click.option("--data", type=click.Path(exists=True, file_okay=False), required=True, help="Folder of a finished sweep.")
+@click.option(
+    "--data", type=click.Path(exists=True, file_okay=False), required=True, help="Folder of a finished sweep."
+)
 @click.option("--out", type=click.Path(dir_okay=False), required=True, help="Model file to write (.npz).")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")

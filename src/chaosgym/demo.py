@@ -10,7 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
+from gymnasium.wrappers import RescaleObservation
+from tqdm import tqdm
 
 from chaosgym.classifier.train import train_classifier
 from chaosgym.diagnosis import two_step_test
@@ -68,8 +71,9 @@ def run_demo(folder: str | Path, seed: int = 0, say: Callable[[str], None] = pri
 
     say("1/5 simulate three points")
     records = {kind: _run_point(*point) for kind, point in POINTS.items()}
-    say(f"2/5 label a sweep of {np.prod([axis.count for axis in AXES])} points")
-    sweep = run_sweep(SweepPlan(THESIS_IMPACT_BEAM, AXES), folder / "sweep", progress=True)
+    plan = SweepPlan(THESIS_IMPACT_BEAM, AXES)
+    say(f"2/5 label a sweep of {len(plan)} points")
+    sweep = run_sweep(plan, folder / "sweep", progress=True)
     say("3/5 train and test the classifier")
     trained = train_classifier(sweep, seed, progress=True)
     trained.classifier.save(folder / "classifier.npz")
@@ -120,23 +124,31 @@ def _shares(sweep: LabelledSweep) -> dict[str, float]:
     return {str(kind): float(count) / len(sweep.table) for kind, count in zip(kinds, counts, strict=True)}
 
 
+def _environment() -> gym.Env[Any, Any]:
+    """The environment with every entry of the observation on one scale."""
+    return RescaleObservation(gym.make(ENVIRONMENT), np.float32(-1.0), np.float32(1.0))
+
+
 def _train_agent(seed: int) -> Any:
     import torch
     from stable_baselines3 import PPO
     from stable_baselines3.common.env_util import make_vec_env
-    from stable_baselines3.common.vec_env import VecNormalize
 
     torch.set_num_threads(1)
-    envs = make_vec_env(ENVIRONMENT, n_envs=8, seed=seed)
+    envs = make_vec_env(_environment, n_envs=8, seed=seed)
     model = PPO("MlpPolicy", envs, n_steps=200, batch_size=400, gamma=0.98, seed=seed, device="cpu")
-    return model.learn(TRAINING_STEPS, callback=_ProgressBar(TRAINING_STEPS))
+    with tqdm(total=TRAINING_STEPS, desc="train agent", unit="step") as bar:
+
+        def advance(values: dict[str, Any], _: Any) -> bool:
+            bar.update(values["self"].num_timesteps - bar.n)
+            return True
+
+        return model.learn(TRAINING_STEPS, callback=advance)
 
 
 def _compare(model: Any) -> dict[str, Evaluation]:
     """The agent and the lowest, the highest and the best constant speed on the same jobs."""
-    import gymnasium as gym
-
-    env = gym.make(ENVIRONMENT)
+    env = _environment()
     drive: Any = env.get_wrapper_attr("drive")
     speeds = np.linspace(drive.lowest_speed, drive.highest_speed, CONSTANT_SPEEDS)
     constants = {speed: evaluate(env, constant_speed(env, speed), JOBS, TEST_SEED) for speed in speeds}

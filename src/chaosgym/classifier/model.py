@@ -75,7 +75,8 @@ class ResponseClassifier:
 
     def predict(self, values: Array) -> NDArray[np.str_]:
         """Most probable type (n,) for parameter values (n, n_fields) in SI units."""
-        return np.array(RESPONSE_TYPES)[self.predict_proba(values).argmax(axis=1)]
+        predicted: NDArray[np.str_] = np.array(RESPONSE_TYPES)[self.predict_proba(values).argmax(axis=1)]
+        return predicted
 
     def classify(self, machine: Machine) -> Classification:
         """Classify one machine.

@@ -5,16 +5,17 @@ plane: whole rectangles, since a random split would put near-copies of every tes
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import trange
 
-from chaosgym import __version__
 from chaosgym.classifier.model import RESPONSE_TYPES, ResponseClassifier
 from chaosgym.errors import DatasetError
 from chaosgym.sweeps import LabelledSweep
+from chaosgym.version import __version__
 
 Array = NDArray[np.float64]
 
@@ -115,7 +116,7 @@ def _fit_network(
     generator = torch.Generator().manual_seed(seed)
     sizes = (features.shape[1], HIDDEN, HIDDEN, len(RESPONSE_TYPES))
     layers = [torch.nn.Linear(inputs, outputs, dtype=torch.float64)
-              for inputs, outputs in zip(sizes[:-1], sizes[1:], strict=True)]  # fmt: skip
+              for inputs, outputs in pairwise(sizes)]  # fmt: skip
     with torch.no_grad():
         for layer in layers:
             torch.nn.init.xavier_uniform_(layer.weight, gain=5 / 3, generator=generator)

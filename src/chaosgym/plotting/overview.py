@@ -43,8 +43,9 @@ def type_map(sweep: LabelledSweep, ax: Axes) -> Axes:
 def classifier_map(classifier: ResponseClassifier, ax: Axes) -> Axes:
     """Most probable types over the two trained parameters, paler where the classifier is less sure."""
     speed, clearance = classifier.fields[:2]
-    across = np.linspace(*classifier.card["ranges"][speed], 200)
-    up = np.linspace(*classifier.card["ranges"][clearance], 150)
+    ranges: dict[str, tuple[float, float]] = classifier.card["ranges"]
+    across = np.linspace(ranges[speed][0], ranges[speed][1], 200)
+    up = np.linspace(ranges[clearance][0], ranges[clearance][1], 150)
     plane = np.column_stack([grid.ravel() for grid in np.meshgrid(across, up)])
     chances = classifier.predict_proba(plane)
     index = chances.argmax(axis=1).reshape(len(up), len(across))

@@ -12,8 +12,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from tqdm import tqdm
 
-from chaosgym import __version__
-from chaosgym.diagnosis import types_on_grid, two_step_test
+from chaosgym.diagnosis import two_step_test
+from chaosgym.diagnosis.response_type import types_on_grid
 from chaosgym.errors import DatasetError, SimulationError
 from chaosgym.files import write_atomically
 from chaosgym.machines import Machine
@@ -21,6 +21,7 @@ from chaosgym.machines.parameters import parameters_of
 from chaosgym.simulation import simulate
 from chaosgym.sweeps.dataset import DATA_FILE, LabelledSweep, read_sweep, schema
 from chaosgym.sweeps.plan import SweepPlan
+from chaosgym.version import __version__
 
 PLAN_FILE = "plan.json"
 CHUNK_FOLDER = "chunks"
