@@ -17,10 +17,12 @@ from tqdm import tqdm
 from chaosgym.core import status
 from chaosgym.core.fixed_step import advance_fixed_step
 from chaosgym.core.impact_beam import CycleArrays, Episode, advance
+from chaosgym.core.slider_crank import advance as advance_slider_crank
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
+from chaosgym.machines.slider_crank import SliderCrank
 
 Array = NDArray[np.float64]
 
@@ -151,12 +153,8 @@ class CycleRecord:
         )
 
 
-def _run_impact_beam(
-    beam: ImpactBeam, state: MotionState, cycles: int, samples: int, integrator: Integrator
-) -> tuple[int, int, CycleRecord]:
-    model = beam.reduce()
-    states = 2 * beam.n_modes
-    arrays = CycleArrays(
+def _cycle_arrays(cycles: int, states: int, samples: int) -> CycleArrays:
+    return CycleArrays(
         section=np.empty((cycles, states)),
         tip=np.empty((cycles, 2)),
         peak_force=np.empty((cycles, 2)),
@@ -166,6 +164,28 @@ def _run_impact_beam(
         events=np.empty(cycles, dtype=np.int64),
         history=np.empty((cycles, samples, 3)),
     )
+
+
+def _record(machine: Machine, arrays: CycleArrays, final_state: MotionState) -> CycleRecord:
+    return CycleRecord(
+        machine=machine,
+        section=arrays.section,
+        displacement=arrays.tip[:, 0],
+        velocity=arrays.tip[:, 1],
+        peak_force=arrays.peak_force,
+        impacts=arrays.impacts,
+        contact_fraction=arrays.contact_time / machine.cycle_period,
+        bounce_duration=arrays.bounce_time,
+        final_state=final_state,
+        history=arrays.history if arrays.history.shape[1] else None,
+    )
+
+
+def _run_impact_beam(
+    beam: ImpactBeam, state: MotionState, cycles: int, samples: int, integrator: Integrator
+) -> tuple[int, int, CycleRecord]:
+    model = beam.reduce()
+    arrays = _cycle_arrays(cycles, 2 * beam.n_modes, samples)
     coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
     if isinstance(integrator, ExactEvents):
@@ -175,24 +195,28 @@ def _run_impact_beam(
         )  # fmt: skip
     else:
         outcome, done = advance_fixed_step(model, coordinates, episode, arrays, integrator.steps_per_cycle)
-    record = CycleRecord(
-        machine=beam,
-        section=arrays.section,
-        displacement=arrays.tip[:, 0],
-        velocity=arrays.tip[:, 1],
-        peak_force=arrays.peak_force,
-        impacts=arrays.impacts,
-        contact_fraction=arrays.contact_time / beam.cycle_period,
-        bounce_duration=arrays.bounce_time,
-        final_state=MotionState(coordinates, bouncing),
-        history=arrays.history if samples else None,
+    return outcome, done, _record(beam, arrays, MotionState(coordinates, bouncing))
+
+
+def _run_slider_crank(
+    crank: SliderCrank, state: MotionState, cycles: int, samples: int, integrator: Integrator
+) -> tuple[int, int, CycleRecord]:
+    if not isinstance(integrator, ExactEvents):
+        raise ParameterError(f"integrator = {integrator} does not run a slider crank; allowed: ExactEvents(...)")
+    model = crank.reduce(integrator.step_phase)
+    arrays = _cycle_arrays(cycles, 2 * len(crank.degrees_of_freedom), samples)
+    coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
+    episode = Episode(side=bouncing[:1], touch=bouncing[1:])
+    outcome, done = advance_slider_crank(
+        model, coordinates, episode, arrays, integrator.event_tolerance / model.fastest, integrator.event_budget
     )
-    return outcome, done, record
+    return outcome, done, _record(crank, arrays, MotionState(coordinates, bouncing))
 
 
 _Run = Callable[[Any, MotionState, int, int, Integrator], tuple[int, int, CycleRecord]]
 _RUNS: dict[str, tuple[_Run, Callable[[Any], int]]] = {
     ImpactBeam.name: (_run_impact_beam, lambda beam: 2 * beam.n_modes),
+    SliderCrank.name: (_run_slider_crank, lambda crank: 2 * len(crank.degrees_of_freedom)),
 }
 """By machine: what runs it, and its number of states. A new machine adds one line."""
 

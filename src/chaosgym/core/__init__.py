@@ -18,6 +18,6 @@ _cache_root = os.environ.get("NUMBA_CACHE_DIR") or os.path.join(
 _previous_cache_folder = numba.config.CACHE_DIR
 numba.config.CACHE_DIR = os.path.join(_cache_root, _digest)
 try:
-    from chaosgym.core import contact, fixed_step, impact_beam, propagator, status  # noqa: F401
+    from chaosgym.core import contact, crank_propagator, fixed_step, impact_beam, propagator, slider_crank, status  # noqa: F401
 finally:
     numba.config.CACHE_DIR = _previous_cache_folder
