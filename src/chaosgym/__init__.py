@@ -1,3 +1,68 @@
-"""chaosgym: machines with clearance that rattle, bounce and turn chaotic."""
+"""chaosgym: machines with clearance that rattle, bounce and turn chaotic.
+
+    import chaosgym
+    record = chaosgym.simulate(chaosgym.ImpactBeam(excitation_frequency=19.0), cycles=200, transient=200)
+    chaosgym.two_step_test(record).nature
+
+Importing this package registers its Gymnasium environments and nothing else; the rest is loaded when it is used.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import chaosgym.envs  # noqa: F401  (registers the environments)
+
+if TYPE_CHECKING:
+    from chaosgym.classifier import ResponseClassifier, default_classifier
+    from chaosgym.diagnosis import Diagnosis, two_step_test
+    from chaosgym.diagnosis.step_check import step_check
+    from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
+    from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam
+    from chaosgym.simulation import CycleRecord, ExactEvents, RungeKutta4, simulate, simulate_many
+    from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
 
 __version__ = "0.1.0.dev0"
+
+_HOME = {
+    "chaosgym.classifier": ("ResponseClassifier", "default_classifier"),
+    "chaosgym.diagnosis": ("Diagnosis", "two_step_test"),
+    "chaosgym.diagnosis.step_check": ("step_check",),
+    "chaosgym.errors": ("ChaosgymError", "ParameterError", "SimulationError"),
+    "chaosgym.machines": ("THESIS_IMPACT_BEAM", "ImpactBeam"),
+    "chaosgym.simulation": ("CycleRecord", "ExactEvents", "RungeKutta4", "simulate", "simulate_many"),
+    "chaosgym.sweeps": ("Axis", "SweepPlan", "read_sweep", "run_sweep"),
+}
+_MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
+
+__all__ = [
+    "THESIS_IMPACT_BEAM",
+    "Axis",
+    "ChaosgymError",
+    "CycleRecord",
+    "Diagnosis",
+    "ExactEvents",
+    "ImpactBeam",
+    "ParameterError",
+    "ResponseClassifier",
+    "RungeKutta4",
+    "SimulationError",
+    "SweepPlan",
+    "__version__",
+    "default_classifier",
+    "read_sweep",
+    "run_sweep",
+    "simulate",
+    "simulate_many",
+    "step_check",
+    "two_step_test",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'chaosgym' has no attribute {name!r}")
+    return getattr(import_module(_MODULE_OF[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_MODULE_OF})

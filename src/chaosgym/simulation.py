@@ -1,7 +1,7 @@
 """How does a machine run? Whole operating cycles in, one row of results per cycle out.
 
-    record = simulate(ImpactBeam(excitation_frequency=19.0), cycles=100, transient=200)
-    record.peak_force          # (100, 2) newton, upper and lower surface
+record = simulate(ImpactBeam(excitation_frequency=19.0), cycles=100, transient=200)
+record.peak_force          # (100, 2) newton, upper and lower surface
 """
 
 import os
@@ -135,22 +135,26 @@ class CycleRecord:
         if self.history is None:
             raise SimulationError("the run kept no time history; simulate with samples_per_cycle above 0")
         cycles, samples, _ = self.history.shape
-        return np.arange(cycles * samples) * (self.machine.cycle_period / samples)
+        instants: Array = np.arange(cycles * samples) * (self.machine.cycle_period / samples)
+        return instants
 
     def after(self, cycles: int) -> "CycleRecord":
         """Return the record without its first cycles."""
-        kept = slice(cycles, None)
-        return replace(
-            self,
-            section=self.section[kept],
-            displacement=self.displacement[kept],
-            velocity=self.velocity[kept],
-            peak_force=self.peak_force[kept],
-            impacts=self.impacts[kept],
-            contact_fraction=self.contact_fraction[kept],
-            bounce_duration=self.bounce_duration[kept],
-            history=None if self.history is None else self.history[kept],
-        )
+        return self._with_rows(lambda name: getattr(self, name)[cycles:])
+
+    def followed_by(self, later: "CycleRecord") -> "CycleRecord":
+        """Return this record and the one that goes on from its final state, as one."""
+        return later._with_rows(lambda name: np.concatenate([getattr(self, name), getattr(later, name)]))
+
+    def _with_rows(self, rows: Callable[[str], Any]) -> "CycleRecord":
+        names = _PER_CYCLE if self.history is None else (*_PER_CYCLE, "history")
+        changes: dict[str, Any] = {name: rows(name) for name in names}
+        return replace(self, **changes)
+
+
+_PER_CYCLE = (
+    "section", "displacement", "velocity", "peak_force", "impacts", "contact_fraction", "bounce_duration",
+)  # fmt: skip
 
 
 def _cycle_arrays(cycles: int, states: int, samples: int) -> CycleArrays:
@@ -331,6 +335,7 @@ def simulate_many(
     -------
     list of CycleRecord, in the order of ``machines``.
     """
+
     def one(machine: Machine) -> CycleRecord:
         return simulate(machine, cycles, transient=transient, integrator=integrator)
 

@@ -8,16 +8,19 @@ import hashlib
 import os
 from pathlib import Path
 
-import numba
+from numba import config
 
 _sources = sorted(Path(__file__).parent.glob("*.py"))
 _digest = hashlib.sha256(b"".join(path.read_bytes() for path in _sources)).hexdigest()[:16]
 _cache_root = os.environ.get("NUMBA_CACHE_DIR") or os.path.join(
     os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "chaosgym", "kernels"
 )
-_previous_cache_folder = numba.config.CACHE_DIR
-numba.config.CACHE_DIR = os.path.join(_cache_root, _digest)
+KERNEL_CACHE = os.path.join(_cache_root, _digest)
+"""Folder of the compiled kernels."""
+
+_previous_cache_folder = config.CACHE_DIR
+config.CACHE_DIR = KERNEL_CACHE
 try:
     from chaosgym.core import contact, crank_propagator, fixed_step, impact_beam, propagator, slider_crank, status  # noqa: F401
 finally:
-    numba.config.CACHE_DIR = _previous_cache_folder
+    config.CACHE_DIR = _previous_cache_folder

@@ -12,6 +12,7 @@ P. Gu, Chaotic Vibration in Machine Systems and Its Implications for Design, PhD
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar, NamedTuple
@@ -31,6 +32,9 @@ Array = NDArray[np.float64]
 MIN_ELEMENTS = 24
 """Elements of the finest default mesh; more modes take three elements a mode."""
 
+MAX_CONDITION = 1e8
+"""Largest condition number of a usable set of eigenvectors."""
+
 _FIT = "five-mode fit to the printed natures and forces of figures 3.8 to 3.12"
 
 
@@ -47,6 +51,10 @@ class ImpactBeam:
     name: ClassVar[str] = "impact-beam"
     speed_field: ClassVar[str] = "excitation_frequency"
     clearance_field: ClassVar[str] = "clearance"
+    usual_ranges: ClassVar[Mapping[str, tuple[float, float]]] = {
+        "excitation_frequency": (4.0, 30.0),
+        "clearance": (0.02e-3, 0.2e-3),
+    }
     sides: ClassVar[tuple[str, ...]] = ("upper", "lower")
 
     excitation_frequency: float = parameter(
@@ -91,9 +99,7 @@ class ImpactBeam:
     """Moving mass of the shaker and its push rod [kg]."""
     damping_ratio: float = parameter(0.01, low=0.0, high=100.0, provenance="printed", source="thesis 3.5.1 and 5.3.1")
     """Structural damping ratio of the first bending mode."""
-    damping_family: str = parameter(
-        "stiffness", choices=("uniform", "stiffness"), provenance="calibrated", source=_FIT
-    )
+    damping_family: str = parameter("stiffness", choices=("uniform", "stiffness"), provenance="calibrated", source=_FIT)
     """"uniform": the same ratio in every mode; "stiffness": proportional to the mode's frequency."""
     contact_stiffness: float = parameter(
         1.5e7, unit="N/m", low=1e3, high=1e12, provenance="printed", source="thesis 3.3"
@@ -120,6 +126,11 @@ class ImpactBeam:
     def cycle_period(self) -> float:
         """Duration of one operating cycle [s]."""
         return 1.0 / self.excitation_frequency
+
+    @property
+    def natural_frequencies(self) -> Array:
+        """Natural frequencies [Hz] of the kept modes between the sensors, (n_modes,)."""
+        return np.asarray(np.sqrt(self.reduce().stiffness) / (2.0 * math.pi))
 
     def reduce(self) -> ImpactBeamModel:
         """Return the modal model; machines that differ in frequency, force or clearance share the costly part."""
@@ -184,8 +195,11 @@ def modal_analysis(beam: ImpactBeam, elements: int | None = None) -> ModalAnalys
     """
     mass, stiffness, at_force, tip = _assembled(beam, elements or max(MIN_ELEMENTS, 3 * beam.n_modes))
     wanted = max(beam.n_modes, 2)
-    squares, shapes = scipy.linalg.eigh(stiffness, mass, subset_by_index=[0, wanted - 1])
-    angular = np.sqrt(np.maximum(squares, 0.0))
+    # the inverse problem, M s = K s / w^2, keeps the slow rocking mode exact on fine meshes
+    size = len(mass)
+    inverse_squares, shapes = scipy.linalg.eigh(mass, stiffness, subset_by_index=[size - wanted, size - 1])
+    angular = 1.0 / np.sqrt(inverse_squares[::-1])
+    shapes = (shapes / np.sqrt(inverse_squares))[:, ::-1]
     shapes = shapes * np.where(shapes[tip] < 0.0, -1.0, 1.0)
     if beam.damping_family == "uniform":
         ratio = np.full(wanted, beam.damping_ratio)
@@ -209,7 +223,9 @@ def pinned_pinned_frequency(beam: ImpactBeam, length: float) -> float:
     """First natural frequency [Hz] of a beam of the same section, pinned at both ends (thesis table 3.1)."""
     section = beam.width * beam.height
     bending_stiffness = beam.youngs_modulus * beam.width * beam.height**3 / 12.0
-    mass, stiffness = bending_matrices(graded_mesh((0.0, length), MIN_ELEMENTS), bending_stiffness, beam.density * section)
+    mass, stiffness = bending_matrices(
+        graded_mesh((0.0, length), MIN_ELEMENTS), bending_stiffness, beam.density * section
+    )
     free = [i for i in range(len(mass)) if i not in (0, len(mass) - 2)]
     lowest = scipy.linalg.eigh(
         stiffness[np.ix_(free, free)], mass[np.ix_(free, free)], eigvals_only=True, subset_by_index=[0, 0]
@@ -217,14 +233,20 @@ def pinned_pinned_frequency(beam: ImpactBeam, length: float) -> float:
     return float(math.sqrt(lowest[0]) / (2.0 * math.pi))
 
 
-def _first_order(stiffness: Array, damping: Array) -> Array:
+def _modal_blocks(stiffness: Array, damping: Array) -> tuple[Array, Array, Array]:
+    """Real 2 x 2 blocks of q'' + damping q' + stiffness q = 0: (rotates (n,), rate (n, 2), from_modal (2n, 2n)).
+
+    A mode that is critically damped to the last digit has one eigenvector instead of two. Its damping is then moved by
+    a billionth, which separates the pair.
+    """
     n = len(stiffness)
-    return np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
-
-
-def _modal_blocks(system: Array) -> tuple[Array, Array, Array]:
-    """Real 2 x 2 blocks of y' = system y: (rotates (n,), rate (n, 2), from_modal (2n, 2n))."""
-    values, vectors = np.linalg.eig(system)
+    scale = math.sqrt(np.linalg.norm(stiffness, 2))
+    for nudged in (1.0, 1.0 + 1e-9, 1.0 + 1e-8):
+        system = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -nudged * damping]])
+        values, vectors = np.linalg.eig(system)
+        balanced = vectors * np.concatenate([np.full(n, scale), np.ones(n)])[:, None]
+        if np.linalg.cond(balanced / np.linalg.norm(balanced, axis=0)) < MAX_CONDITION:
+            break
     turning = [i for i in np.argsort(np.abs(values)) if values[i].imag > 0.0]
     decaying = [i for i in np.argsort(np.abs(values)) if values[i].imag == 0.0]
     rotates, rate, columns = [], [], []
@@ -241,9 +263,7 @@ def _modal_blocks(system: Array) -> tuple[Array, Array, Array]:
 
 def _derivative(rotates: Array, rate: Array) -> Array:
     """Block-diagonal matrix B of u' = B u."""
-    blocks = [
-        [[a, -b], [b, a]] if turns else [[a, 0.0], [0.0, b]] for turns, (a, b) in zip(rotates, rate, strict=True)
-    ]
+    blocks = [[[a, -b], [b, a]] if turns else [[a, 0.0], [0.0, b]] for turns, (a, b) in zip(rotates, rate, strict=True)]
     return np.asarray(scipy.linalg.block_diag(*blocks))
 
 
@@ -266,8 +286,8 @@ def _structure(*structure: Any) -> ImpactBeamModel:
     load = np.concatenate([np.zeros(n), modes.force_shape])
 
     parts = []
-    for system in (_first_order(np.diag(stiffness), modes.damping), _first_order(pressed_stiffness, pressed_damping)):
-        rotates, rate, from_modal = _modal_blocks(system)
+    for matrices in ((np.diag(stiffness), modes.damping), (pressed_stiffness, pressed_damping)):
+        rotates, rate, from_modal = _modal_blocks(*matrices)
         to_modal = np.linalg.inv(from_modal)
         derivative = _derivative(rotates, rate)
         displacement = tip @ from_modal[:n]

@@ -1,6 +1,10 @@
 """What must a machine be able to do, so that simulation, diagnosis, sweeps and environments can use it?"""
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
 
 
 @runtime_checkable
@@ -16,12 +20,19 @@ class Machine(Protocol):
     """Field that an operator changes while the machine runs."""
     clearance_field: ClassVar[str]
     """Field that holds the clearance of the monitored joint."""
+    usual_ranges: ClassVar[Mapping[str, tuple[float, float]]]
+    """Ranges of speed and clearance, in the fields' units, that sweeps and environments cover by default."""
     sides: ClassVar[tuple[str, ...]]
     """Names of the bearing surfaces whose contact force is recorded."""
 
     @property
     def cycle_period(self) -> float:
         """Duration of one operating cycle [s]."""
+        ...
+
+    @property
+    def natural_frequencies(self) -> NDArray[np.float64]:
+        """Natural frequencies [Hz] of the machine free of contact, those of the kept modes."""
         ...
 
     def reduce(self) -> Any:

@@ -1,0 +1,369 @@
+"""The command line: each command parses, calls one library function, and prints or saves.
+
+Tables for people go to standard output, ``--json`` prints one JSON object there instead; progress and logs go to
+standard error. Exit codes: 0 done, 1 a computation failed, 2 wrong usage.
+"""
+
+import functools
+import json
+import sys
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import click
+
+from chaosgym import __version__
+from chaosgym.errors import ChaosgymError, SimulationError
+
+
+class OptionOf(NamedTuple):
+    """A command-line option that sets one field of a machine: the field, and how many SI units one unit is."""
+
+    field: str
+    unit: str
+    factor: float
+
+
+MACHINE_OPTIONS: Mapping[str, Mapping[str, OptionOf]] = {
+    "impact-beam": {
+        "--frequency-hz": OptionOf("excitation_frequency", "Hz", 1.0),
+        "--clearance-mm": OptionOf("clearance", "mm", 1e-3),
+    },
+}
+"""By machine: the options that set its fields. Every other field is reached by ``--set``."""
+
+
+def _machine_class(name: str) -> Any:
+    from chaosgym.machines import MACHINES
+
+    return MACHINES[name]
+
+
+def _option_value(machine: str, option: str, value: float) -> tuple[str, float]:
+    """Field and SI value of a machine option, checked; the message speaks of the option in its own unit."""
+    from chaosgym.machines.parameters import check_parameter, parameters_of
+
+    known = MACHINE_OPTIONS[machine]
+    if option not in known:
+        raise click.UsageError(f"{option} is no option of {machine}; it takes {', '.join(known)} and --set FIELD=VALUE")
+    field, unit, factor = known[option]
+    owner = _machine_class(machine)
+    try:
+        return field, check_parameter(owner, field, value * factor)
+    except ChaosgymError as error:
+        described = parameters_of(owner)[field]
+        low, high = described.low / factor, described.high / factor
+        raise click.UsageError(f"{option} = {value:g} is out of range; allowed: {low:g} to {high:g} {unit}") from error
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    """Parse FIELD=VALUE."""
+    field, separator, value = text.partition("=")
+    if not separator or not field or not value:
+        raise click.UsageError(f"--set {text!r} is not of the form FIELD=VALUE")
+    try:
+        return field, int(value) if value.lstrip("+-").isdigit() else float(value)
+    except ValueError:
+        return field, value
+
+
+def _build(machine: str, options: Mapping[str, float | None], settings: tuple[str, ...]) -> Any:
+    """Build the machine that a command line describes."""
+    from chaosgym.machines.parameters import with_settings
+
+    fields = dict(_option_value(machine, name, value) for name, value in options.items() if value is not None)
+    for text in settings:
+        field, value = _setting(text)
+        if field in fields:
+            raise click.UsageError(f"{field} is given twice: by an option and by --set")
+        fields[field] = value
+    return with_settings(_machine_class(machine)(), fields)
+
+
+def machine_command(function: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the MACHINE argument, the options of all machines, ``--set`` and ``--json``.
+
+    The function receives ``machine`` (constructed) and ``as_json``.
+    """
+    names = sorted({option for options in MACHINE_OPTIONS.values() for option in options})
+
+    @functools.wraps(function)
+    def wrapped(machine: str, settings: tuple[str, ...], **others: Any) -> None:
+        given = {name: others.pop(_identifier(name)) for name in names}
+        function(machine=_build(machine, given, settings), **others)
+
+    for name in reversed(names):
+        owners = ", ".join(machine for machine, options in MACHINE_OPTIONS.items() if name in options)
+        wrapped = click.option(name, type=float, default=None, help=f"{owners}; default: the thesis' machine.")(wrapped)
+    wrapped = click.option(
+        "--set", "settings", multiple=True, metavar="FIELD=VALUE", help="Any field of the machine, in SI; repeatable."
+    )(wrapped)
+    wrapped = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")(wrapped)
+    return click.argument("machine", type=click.Choice(sorted(MACHINE_OPTIONS)))(wrapped)
+
+
+def _identifier(option: str) -> str:
+    return option.lstrip("-").replace("-", "_")
+
+
+def _emit(result: Mapping[str, Any], as_json: bool, lines: Callable[[], list[str]]) -> None:
+    """Print the result as JSON, or the lines for people."""
+    if as_json:
+        click.echo(json.dumps(result, allow_nan=False))
+    else:
+        for line in lines():
+            click.echo(line)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(__version__, prog_name="chaosgym")
+def app() -> None:
+    """Machines with clearance that rattle: simulate, diagnose, sweep and classify them."""
+
+
+@app.command()
+@machine_command
+@click.option("--cycles", type=click.IntRange(1, 10**7), default=100, show_default=True, help="Cycles to record.")
+@click.option("--transient", type=click.IntRange(0, 10**7), default=0, show_default=True, help="Cycles to skip first.")
+def simulate(machine: Any, cycles: int, transient: int, as_json: bool) -> None:
+    """Run a machine from rest and print the peak force of every cycle."""
+    from chaosgym.bench import timed_run
+
+    record, seconds_per_cycle = timed_run(machine, cycles, transient=transient)
+    peaks = record.peak_force[:, 0]
+    result = {
+        "machine": machine.name,
+        "peak_force_N": peaks.tolist(),
+        "impacts": record.impacts.sum(axis=1).tolist(),
+        "contact_fraction": record.contact_fraction.sum(axis=1).tolist(),
+        "seconds_per_cycle": seconds_per_cycle,
+    }
+    _emit(result, as_json, lambda: [
+        f"{machine.name}: {cycles} cycles after {transient}",
+        f"peak force, {machine.sides[0]} side   {peaks.min():.2f} to {peaks.max():.2f} N, mean {peaks.mean():.2f} N",
+        f"last peaks                {' '.join(f'{peak:.2f}' for peak in peaks[-8:])}",
+        f"impacts per cycle         {record.impacts.sum(axis=1).mean():.1f}",
+        f"share in contact          {record.contact_fraction.sum(axis=1).mean():.2f}",
+        f"computing time            {1e6 * seconds_per_cycle:.0f} us per cycle",
+    ])  # fmt: skip
+
+
+@app.command()
+@machine_command
+def show(machine: Any, as_json: bool) -> None:
+    """Print every parameter of a machine with its unit and where the number comes from."""
+    from chaosgym.machines.parameters import parameters_of
+
+    described = parameters_of(machine)
+    frequencies = machine.natural_frequencies.tolist()
+    default = type(machine)()
+    provenance = {
+        name: {"unit": about.unit, "grade": about.provenance, "source": about.source}
+        if getattr(machine, name) == getattr(default, name)
+        else {"unit": about.unit, "grade": "given", "source": "this command"}
+        for name, about in described.items()
+    }
+    result = {
+        "machine": machine.name,
+        "parameters": {name: getattr(machine, name) for name in described},
+        "natural_frequencies_hz": frequencies,
+        "provenance": provenance,
+    }
+
+    def lines() -> list[str]:
+        rows = []
+        for name, about in described.items():
+            value = getattr(machine, name)
+            shown = value if isinstance(value, str) else f"{value:.6g}"
+            unit = "" if about.unit == "-" else about.unit
+            origin = provenance[name]
+            rows.append(f"{name:30s} {shown:>11s} {unit:8s} {origin['grade']:10s} {origin['source']}")
+        return [*rows, "natural frequencies [Hz]: " + ", ".join(f"{value:.1f}" for value in frequencies)]
+
+    _emit(result, as_json, lines)
+
+
+@app.command()
+@machine_command
+@click.option("--transient", type=click.IntRange(0, 10**7), default=200, show_default=True, help="Cycles to skip.")
+@click.option("--cycles", type=click.IntRange(16, 10**7), default=200, show_default=True, help="Cycles to judge.")
+@click.option("--step-check", is_flag=True, help="Repeat with a finer step and say whether the verdict stays.")
+def diagnose(machine: Any, transient: int, cycles: int, step_check: bool, as_json: bool) -> None:
+    """Tell periodic from chaotic by the Two-Step Test."""
+    from chaosgym.diagnosis import two_step_test
+    from chaosgym.diagnosis.step_check import step_check as check
+    from chaosgym.simulation import simulate
+
+    record = simulate(machine, cycles, transient=transient)
+    verdict = two_step_test(record)
+    peaks = record.peak_force[:, 0]
+    summary = {"min": peaks.min(), "max": peaks.max(), "mean": peaks.mean(), "std": peaks.std()}
+    result = {"machine": machine.name, **verdict.as_dict(), "peak_force_summary_N": summary}
+    if step_check:
+        result["step_check"] = check(machine, cycles=cycles, transient=transient).as_dict()
+
+    def lines() -> list[str]:
+        period = f", period {verdict.period}" if verdict.period else ""
+        shown = [
+            f"{machine.name}: {verdict.nature}{period} (margin {verdict.margin:.2f})",
+            f"  {verdict.reason}",
+            f"  peak force {summary['min']:.2f} to {summary['max']:.2f} N, mean {summary['mean']:.2f} N, "
+            f"standard deviation {summary['std']:.2f} N",
+        ]
+        return [*shown, f"  {result['step_check']['summary']}"] if step_check else shown
+
+    _emit(result, as_json, lines)
+
+
+@app.command()
+@machine_command
+@click.option("--model", type=click.Path(exists=True, dir_okay=False), help="Classifier file; default: the shipped one.")
+def classify(machine: Any, model: str | None, as_json: bool) -> None:
+    """Tell the response type (I, II, III) by the learned classifier, without simulating."""
+    from chaosgym.classifier import ResponseClassifier, default_classifier
+
+    classifier = ResponseClassifier.load(model) if model else default_classifier(machine.name)
+    answer = classifier.classify(machine)
+    result = {
+        "machine": machine.name,
+        "response_type": answer.response_type,
+        "probabilities": answer.probabilities,
+    }
+    _emit(result, as_json, lambda: [
+        f"{machine.name}: Type {answer.response_type}",
+        *(f"  Type {name:4s} {'#' * round(40 * chance):40s} {chance:.3f}"
+          for name, chance in answer.probabilities.items()),
+    ])  # fmt: skip
+
+
+@app.command()
+@machine_command
+@click.option("--axis", "axes", multiple=True, metavar="FIELD=LOW:HIGH[:COUNT][:lin|log]", help="Repeatable, in SI.")
+@click.option("--grid", "sampling", flag_value="grid", default="grid", help="All combinations (default).")
+@click.option("--random", "random_size", type=click.IntRange(1), metavar="N", help="N random points.")
+@click.option("--sobol", "sobol_size", type=click.IntRange(1), metavar="N", help="N points of a Sobol sequence.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--transient", type=click.IntRange(0, 10**7), default=200, show_default=True, help="Cycles to skip.")
+@click.option("--cycles", type=click.IntRange(16, 10**7), default=200, show_default=True, help="Cycles to judge.")
+@click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
+@click.option("--out", type=click.Path(file_okay=False), required=True, help="Folder for the labelled points.")
+def sweep(
+    machine: Any,
+    axes: tuple[str, ...],
+    sampling: str,
+    random_size: int | None,
+    sobol_size: int | None,
+    seed: int,
+    transient: int,
+    cycles: int,
+    workers: int | None,
+    out: str,
+    as_json: bool,
+) -> None:
+    """Label many machines and keep them as Parquet; the same command again resumes."""
+    from collections import Counter
+
+    from chaosgym.sweeps import Axis, SweepPlan, run_sweep
+    from chaosgym.sweeps.plan import default_axes
+
+    if random_size and sobol_size:
+        raise click.UsageError("--random and --sobol exclude each other")
+    kind: Any = "random" if random_size else "sobol" if sobol_size else sampling
+    chosen = tuple(Axis.parse(text) for text in axes) or default_axes(machine, kind)
+    plan = SweepPlan(machine, chosen, kind, random_size or sobol_size or 0, seed, transient, cycles)
+    labelled = run_sweep(plan, out, workers=workers, progress=True)
+    counts = {name: dict(Counter(str(value) for value in labelled.column(name)))
+              for name in ("nature", "response_type", "status")}  # fmt: skip
+    result = {"machine": machine.name, "folder": out, "points": len(labelled.table), **counts}
+    _emit(result, as_json, lambda: [
+        f"{machine.name}: {len(labelled.table)} points in {out}",
+        *(f"  {name:14s}" + ", ".join(f"{key} {count}" for key, count in sorted(counts[name].items()))
+          for name in counts),
+    ])  # fmt: skip
+
+
+@app.command("train-classifier")
+@click.option("--data", type=click.Path(exists=True, file_okay=False), required=True, help="Folder of a finished sweep.")
+@click.option("--out", type=click.Path(dir_okay=False), required=True, help="Model file to write (.npz).")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def train_classifier(data: str, out: str, seed: int, as_json: bool) -> None:
+    """Train the classifier on a sweep and judge it beside its baselines (needs the extra [learn])."""
+    from pathlib import Path
+
+    from chaosgym.classifier.train import train_classifier as train
+    from chaosgym.sweeps import read_sweep
+
+    if Path(out).exists():
+        raise click.UsageError(f"--out {out} exists; choose another file")
+    trained = train(read_sweep(data), seed, progress=True)
+    trained.classifier.save(out)
+    _emit({"model": out, **trained.report}, as_json, lambda: classifier_table(trained.report))
+
+
+def classifier_table(report: Mapping[str, Any]) -> list[str]:
+    """Lines of the comparison of classifiers on held-out points."""
+    return [
+        f"held-out points {report['rows']['held_out']} of {sum(report['rows'].values())}   accuracy   balanced",
+        *(f"  {name:28s} {score['accuracy']:12.3f} {score['balanced_accuracy']:10.3f}"
+          for name, score in report["held_out"].items()),
+    ]  # fmt: skip
+
+
+@app.command()
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def info(as_json: bool) -> None:
+    """Print versions and folders, for a bug report."""
+    import platform
+    from importlib import metadata
+
+    from chaosgym.core import KERNEL_CACHE
+
+    packages: dict[str, str | None] = {}
+    for package in ("numpy", "scipy", "numba", "gymnasium", "pyarrow", "matplotlib", "torch", "stable-baselines3"):
+        try:
+            packages[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            packages[package] = None
+    result = {
+        "version": __version__,
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "machines": sorted(MACHINE_OPTIONS),
+        "packages": packages,
+        "kernel_cache": KERNEL_CACHE,
+    }
+    _emit(result, as_json, lambda: [
+        f"chaosgym {__version__} on Python {result['python']}, {result['platform']}",
+        "machines: " + ", ".join(MACHINE_OPTIONS),
+        *(f"{package:18s} {version or 'not installed'}" for package, version in packages.items()),
+        f"kernel cache: {KERNEL_CACHE}",
+    ])  # fmt: skip
+
+
+@app.command()
+@click.option("--repeats", type=click.IntRange(1, 100), default=5, show_default=True, help="Timed runs per figure.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def bench(repeats: int, as_json: bool) -> None:
+    """Time the simulation on this computer: microseconds per operating cycle, one core."""
+    from chaosgym.bench import benchmark
+
+    result = benchmark(repeats)
+    _emit({"microseconds_per_cycle": result}, as_json, lambda: [
+        f"{name:45s} {value:8.1f} us per cycle {1e6 / value:10.0f} cycles/s" for name, value in result.items()
+    ])  # fmt: skip
+
+
+def main() -> None:
+    """Entry point: one clear line instead of a traceback for every error that chaosgym raises on purpose."""
+    try:
+        app(standalone_mode=False)
+    except click.exceptions.Abort:
+        click.echo("Aborted.", err=True)
+        sys.exit(130)
+    except click.ClickException as error:
+        click.echo(f"Error: {error.format_message()}", err=True)
+        sys.exit(error.exit_code)
+    except ChaosgymError as error:
+        click.echo(f"Error: {error}", err=True)
+        sys.exit(1 if isinstance(error, SimulationError) else 2)

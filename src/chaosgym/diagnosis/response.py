@@ -1,0 +1,70 @@
+"""What is said of a response? Its nature, how sure that is, and why.
+
+The words are those of the thesis: periodic, quasiperiodic, chaotic (2.3, 5.2) and Types I, II, III (5.5).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, Literal
+
+Nature = Literal["periodic", "quasiperiodic", "chaotic", "undetermined"]
+"""Nature of one response; undetermined where the evidence does not decide."""
+
+Type = Literal["I", "II", "III", "undetermined"]
+"""Type of a response over its tolerance neighbourhood."""
+
+Status = Literal["certified", "agreed", "disputed", "transient", "unresolved"]
+"""certified: proven to machine precision; agreed: all tests that speak say the same; disputed: they don't;
+transient: irregular for long before it settled; unresolved: the budget ended first."""
+
+NATURES: tuple[Nature, ...] = ("periodic", "quasiperiodic", "chaotic", "undetermined")
+TYPES: tuple[Type, ...] = ("I", "II", "III", "undetermined")
+STATUSES: tuple[Status, ...] = ("certified", "agreed", "disputed", "transient", "unresolved")
+
+_EMPTY: Mapping[str, Any] = MappingProxyType({})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnosis:
+    """The verdict on one response.
+
+    Attributes
+    ----------
+    nature
+        One of ``NATURES``.
+    period
+        Cycles after which a periodic response (or the motion that transient chaos settles on) repeats; else None.
+    margin
+        Distance of the deciding figure from its threshold: 0 at the threshold, 1 where there is no doubt.
+    reason
+        One sentence for people.
+    evidence
+        Figures of each step; numbers, strings and None only, so that it can be written as JSON.
+    transient
+        True where the response was irregular for long and then settled: transient chaos.
+    status
+        One of ``STATUSES``; None where a single test spoke.
+    horizon
+        Number of cycles, counted from the initial condition, that the verdict rests on.
+    settle_cycle
+        First cycle of the stretch that repeats, counted from the first cycle judged; None if none does.
+    votes
+        Nature according to each test.
+    """
+
+    nature: Nature
+    period: int | None
+    margin: float
+    reason: str
+    evidence: Mapping[str, Any] = field(default_factory=lambda: _EMPTY)
+    transient: bool = False
+    status: Status | None = None
+    horizon: int | None = None
+    settle_cycle: int | None = None
+    votes: Mapping[str, Nature] = field(default_factory=lambda: _EMPTY)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        plain = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return {**plain, "evidence": dict(self.evidence), "votes": dict(self.votes)}

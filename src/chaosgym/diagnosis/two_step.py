@@ -1,0 +1,249 @@
+r"""Periodic, quasiperiodic or chaotic? The Two-Step Test (thesis 5.2.1) on one sample of the motion a cycle.
+
+Step I   Does the time history repeat? Then it is periodic, with the period of the recurrence. A history that
+         approaches a repetition steadily is periodic too.
+Step II  If not: the stroboscopic set and the spectrum. A closed curve gives a few lines and bounded 0-1 walks:
+         quasiperiodic. A fractal or fuzzy set gives a broad band and diffusing walks: chaotic.
+
+Chaos that dies out counts as chaotic, as in the thesis (5.2.3), and is flagged ``transient``. Where the two figures of
+step II disagree, or the record is too short for the verdict, the answer is "undetermined".
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chaosgym.diagnosis.response import Diagnosis
+from chaosgym.diagnosis.spectrum import power_spectrum
+from chaosgym.diagnosis.stroboscopic import (
+    DECAY_FACTOR,
+    MAX_PERIOD,
+    Decay,
+    Recurrence,
+    as_samples,
+    deviations,
+    find_decay,
+    find_recurrence,
+    scales,
+    subtract_bands,
+)
+from chaosgym.diagnosis.zero_one import zero_one_statistic
+from chaosgym.errors import DiagnosisError
+from chaosgym.simulation import CycleRecord
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-5
+"""Half range, as a share of the largest modulus, within which a noise-free motion repeats."""
+
+INITIAL_TRANSIENT = 50
+"""Cycles that the motion may take to come near its final form before it counts as transient chaos (thesis 5.2.3)."""
+
+CHAOTIC_STATISTIC, REGULAR_STATISTIC = 0.5, 0.2
+"""0-1 statistic above which a motion is chaotic, and below which it may be quasiperiodic."""
+
+BROAD_FLOOR, BROAD_FLOOR_SHORT, SHORT_CYCLES = 1e-2, 0.1, 200
+"""Spectral floor above which the band is broad; in records below 200 cycles lines overlap, and it must be higher."""
+
+LINE_FLOOR, MAX_LINES = 1e-3, 16
+"""Spectral floor below which there are only lines, and how many are still few."""
+
+CHAOTIC_CYCLES, QUASIPERIODIC_CYCLES = 50, 1000
+"""Fewest cycles for either verdict of step II."""
+
+NOISE_ALLOWANCE = 2.0
+"""How far the floor may exceed that of the stated sensor error before it counts as a band of its own."""
+
+
+def two_step_test(
+    x: CycleRecord | ArrayLike,
+    *,
+    sensor_error: float = 0.0,
+    tolerance: float = TOLERANCE,
+    max_period: int = MAX_PERIOD,
+    initial_transient: int = INITIAL_TRANSIENT,
+) -> Diagnosis:
+    """Tell the nature of a response.
+
+    Parameters
+    ----------
+    x
+        A ``CycleRecord``, or one sample a cycle: (cycles,) or (cycles, coordinates), measured from a physical zero. A
+        record is judged by its whole state and its peak forces; with a sensor error by its peak forces alone.
+    sensor_error
+        Largest error of a sample, in the unit of x (thesis 3.6: 3 N). Differences within it are no differences.
+    tolerance
+        Half range, as a share of the largest modulus, that counts as repetition on top of the sensor error.
+    max_period
+        Longest period looked for; it must be seen three times in the second half.
+    initial_transient
+        Cycles that the motion may take to come near a periodic motion; if it is irregular for longer, it is transient
+        chaos.
+
+    Raises
+    ------
+    DiagnosisError
+        If the series is too short (16 cycles), holds values that are not finite, or has a wrong shape; if
+        ``sensor_error`` is negative or ``tolerance`` is not positive.
+
+    Notes
+    -----
+    Fails, and says so by "undetermined", on weak chaos in short records (below about 200 cycles in bands), on tori
+    that nearly repeat in fewer than 1000 cycles, and where noise is larger than stated.
+    """
+    if not sensor_error >= 0.0:
+        raise DiagnosisError(f"sensor_error = {sensor_error!r} is out of range; allowed: 0 or more")
+    if not 0.0 < tolerance < 1.0:
+        raise DiagnosisError(f"tolerance = {tolerance!r} is out of range; allowed: above 0, below 1")
+    samples, series = _observables(x, sensor_error)
+    evidence: dict[str, Any] = {"cycles": len(samples)}
+    if isinstance(x, CycleRecord):
+        evidence["contact"] = bool(np.any(x.peak_force > 0.0))
+    elif not np.any(samples):
+        return Diagnosis(
+            nature="undetermined", period=None, margin=0.0, horizon=len(samples), evidence=evidence,
+            reason="the series is zero throughout: there is no contact to judge",
+        )  # fmt: skip
+    scale = scales(samples)
+    scaled = samples / scale
+    allowed = tolerance + sensor_error / scale
+    recurrence = _recurrence(scaled, allowed, max_period, sensor_error)
+    evidence |= {"residual": recurrence.residual, "residual_allowed": float(np.max(allowed))}
+    if recurrence.period is not None:
+        exact = [] if sensor_error > 0.0 else series
+        return _repeating(scaled, exact, recurrence, evidence, initial_transient)
+    decay = find_decay(scaled, max_period) if sensor_error == 0.0 else None
+    if decay is not None:
+        return _approaching(decay, evidence)
+    return _step_two(series, evidence, sensor_error)
+
+
+def _observables(x: CycleRecord | ArrayLike, sensor_error: float) -> tuple[Array, list[Array]]:
+    """Samples that must repeat (cycles, coordinates), and the series (cycles,) that step II looks at."""
+    if not isinstance(x, CycleRecord):
+        samples = as_samples(x)
+        return samples, [column for column in samples.T if np.ptp(column) > 0.0][:4]
+    peaks = x.peak_force[:, np.max(x.peak_force, axis=0) > 0.0]
+    if sensor_error > 0.0:
+        if peaks.shape[1] == 0:
+            raise DiagnosisError("the record has no contact, and a sensor error in newton applies to peak forces only")
+        return as_samples(peaks), list(as_samples(peaks).T)
+    return as_samples(np.column_stack([x.section, peaks])), [x.displacement, *peaks.T]
+
+
+def _recurrence(scaled: Array, allowed: Array, max_period: int, sensor_error: float) -> Recurrence:
+    """Recurrence in the last half, or in the last quarter if values are exact and it holds 32 cycles or more."""
+    found = find_recurrence(scaled, allowed, max_period, noisy=sensor_error > 0.0)
+    half = len(scaled) // 2
+    if found.period is None and sensor_error == 0.0 and half >= 64:
+        later = find_recurrence(scaled[half:], allowed, max_period)
+        if later.period is not None and later.settle_cycle is not None:
+            return Recurrence(later.period, later.residual, half + later.settle_cycle, later.contraction)
+    return found
+
+
+def _repeating(
+    scaled: Array, series: list[Array], recurrence: Recurrence, evidence: dict[str, Any], initial_transient: int
+) -> Diagnosis:
+    period, settle = recurrence.period, recurrence.settle_cycle
+    assert period is not None
+    assert settle is not None
+    evidence["contraction_per_cycle"] = recurrence.contraction
+    common: dict[str, Any] = {"period": period, "horizon": len(scaled), "settle_cycle": settle, "evidence": evidence}
+    irregular = _irregular_cycles(scaled, series, period, settle)
+    evidence["irregular_cycles"] = irregular
+    if irregular > initial_transient:
+        return Diagnosis(
+            nature="chaotic", margin=0.0, transient=True, **common,
+            reason=f"transient chaos: irregular for {irregular} cycles before it settled on period {period}",
+        )  # fmt: skip
+    allowed = evidence["residual_allowed"]
+    margin = _decades(allowed, recurrence.residual)
+    reason = f"repeats every {'cycle' if period == 1 else f'{period} cycles'} within {recurrence.residual:.1e}"
+    if evidence.get("contact") is False:
+        reason += "; there is no contact"
+    return Diagnosis(nature="periodic", margin=margin, reason=reason, **common)
+
+
+def _approaching(decay: Decay, evidence: dict[str, Any]) -> Diagnosis:
+    evidence["contraction_per_cycle"] = decay.contraction
+    common: dict[str, Any] = {"margin": 0.0, "evidence": evidence, "horizon": evidence["cycles"]}
+    if decay.factor >= DECAY_FACTOR:
+        reason = f"approaches period {decay.period} by a factor {decay.contraction:.4g} a cycle"
+        return Diagnosis(nature="periodic", period=decay.period, reason=reason, **common)
+    reason = f"shrinks steadily, but only {decay.factor:.3g} times over the record: too slowly to tell what it ends in"
+    return Diagnosis(nature="undetermined", period=None, reason=reason, **common)
+
+
+def _irregular_cycles(scaled: Array, series: list[Array], period: int, settle: int) -> int:
+    """How long a motion that settles was irregular: 0 if it approached its final form steadily."""
+    deviation = deviations(scaled, period)[:settle]
+    far = np.flatnonzero(deviation > 0.1)
+    end = int(far[-1]) + 1 if len(far) else 0
+    if end < CHAOTIC_CYCLES or _dies_out(scaled[:settle]):
+        return 0
+    statistics = [zero_one_statistic(s[:end]) for s in series if np.ptp(s[:end]) > 0.0]
+    return end if statistics and np.median(statistics) > CHAOTIC_STATISTIC else 0
+
+
+def _dies_out(scaled: Array) -> bool:
+    decay = find_decay(scaled)
+    return decay is not None and decay.factor >= DECAY_FACTOR
+
+
+def _step_two(series: list[Array], evidence: dict[str, Any], sensor_error: float) -> Diagnosis:
+    cycles = evidence["cycles"]
+    figures = [_step_two_figures(s, sensor_error) for s in series]
+    bands, lines = figures[0][2], figures[0][3]
+    floor = float(np.median([f[1] for f in figures]))
+    walks = [f[0] for f in figures if f[0] is not None]
+    statistic = float(np.median(walks)) if walks else None
+    evidence |= {"zero_one": statistic, "spectral_floor": floor, "spectral_lines": lines, "bands": bands}
+    common: dict[str, Any] = {"period": None, "evidence": evidence, "horizon": cycles}
+    threshold = BROAD_FLOOR if cycles >= SHORT_CYCLES else BROAD_FLOOR_SHORT
+    broad = _decades(floor, threshold, over=1.0)
+    diffuses = 1.0 if statistic is None else (statistic - CHAOTIC_STATISTIC) / (1.0 - CHAOTIC_STATISTIC)
+    shown = "0-1 test drowned by noise" if statistic is None else f"0-1 statistic {statistic:.2f}"
+    figures_shown = f"spectral floor {floor:.1e}, {shown}"
+    if floor > threshold and diffuses > 0.0:
+        if cycles < CHAOTIC_CYCLES:
+            reason = f"does not repeat, but {cycles} cycles are too few to tell chaos from a torus"
+            return Diagnosis(nature="undetermined", margin=0.0, reason=reason, **common)
+        margin = min(broad, diffuses, _decades(evidence["residual"], evidence["residual_allowed"]))
+        kind = f"in {bands} bands, " if bands > 1 else ""
+        reason = f"does not repeat, {kind}broad spectrum: {figures_shown}"
+        return Diagnosis(nature="chaotic", margin=float(margin), reason=reason, **common)
+    if statistic is not None and statistic < REGULAR_STATISTIC and floor < LINE_FLOOR and lines <= MAX_LINES:
+        if cycles < QUASIPERIODIC_CYCLES:
+            reason = (
+                f"does not repeat and has {lines} spectral lines, but {cycles} cycles are fewer than the "
+                f"{QUASIPERIODIC_CYCLES} that quasiperiodic asks for"
+            )
+            return Diagnosis(nature="undetermined", margin=0.0, reason=reason, **common)
+        slack = (REGULAR_STATISTIC - statistic) / REGULAR_STATISTIC
+        margin = min(_decades(LINE_FLOOR, floor, over=1.0), slack, 1.0)
+        reason = f"does not repeat, {lines} spectral lines and no band: {figures_shown}"
+        return Diagnosis(nature="quasiperiodic", margin=float(margin), reason=reason, **common)
+    reason = f"does not repeat, and step II does not decide: {figures_shown}"
+    return Diagnosis(nature="undetermined", margin=0.0, reason=reason, **common)
+
+
+def _step_two_figures(series: Array, sensor_error: float) -> tuple[float | None, float, int, int]:
+    """(0-1 statistic or None if noise drowns it, spectral floor beyond the sensor error, bands, lines)."""
+    rest, bands = subtract_bands(series)
+    spectrum = power_spectrum(rest, sensor_error**2 / 3.0)
+    variance = float(spectrum.power.sum())
+    if variance == 0.0:
+        return 0.0, 0.0, bands, 0
+    noise = min(1.0, sensor_error**2 / 3.0 / variance)
+    floor = spectrum.floor if spectrum.floor > NOISE_ALLOWANCE * np.log(2.0) * noise else 0.0
+    drowned = noise * len(series) / 10.0 > 0.05
+    return None if drowned else zero_one_statistic(series), floor, bands, spectrum.lines
+
+
+def _decades(larger: float, smaller: float, over: float = 2.0) -> float:
+    """Log10 of the ratio divided by ``over``, between 0 and 1."""
+    if smaller <= 0.0:
+        return 1.0
+    return float(np.clip(np.log10(max(larger, 1e-300) / smaller) / over, 0.0, 1.0))

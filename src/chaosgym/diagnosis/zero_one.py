@@ -1,0 +1,66 @@
+r"""Regular or chaotic, from a series alone? The 0-1 test on one sample a cycle.
+
+The series drives p(n + 1) = p(n) + x(n) cos(c n), q(n + 1) = q(n) + x(n) sin(c n). Regular motion keeps (p, q)
+bounded, chaos makes it wander like a random walk: K, the correlation of its mean square displacement with time, is
+near 0 or near 1. The median over many c avoids resonances.
+
+Three things make the test fail, and are dealt with or stated: chaos in bands (their means are removed first),
+many samples a cycle (give one), sensor noise (it wanders too; ``two_step`` compares with the stated error instead).
+
+References
+----------
+G. A. Gottwald, I. Melbourne, On the implementation of the 0-1 test for chaos, SIAM J. Appl. Dyn. Syst. 8 (2009).
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chaosgym.diagnosis.stroboscopic import as_samples, subtract_bands
+
+Array = NDArray[np.float64]
+
+MAX_SAMPLES = 2000
+"""Samples used at most, the last ones of the series."""
+
+FREQUENCIES = 100
+"""Values of c."""
+
+
+def zero_one_statistic(series: ArrayLike, *, remove_bands: bool = True) -> float:
+    """K of the 0-1 test: near 0 for regular motion, near 1 for chaos.
+
+    Parameters
+    ----------
+    series : (cycles,)
+        One sample a cycle of a settled motion; 500 and more give a sharp answer, below 100 it means little.
+    remove_bands
+        Remove the mean of each band of a motion that visits up to 24 bands in turn.
+
+    Returns
+    -------
+    float
+        Median of the correlation over 100 values of c between pi/5 and 4 pi/5; 0 for a series that repeats.
+    """
+    x = as_samples(series)[-MAX_SAMPLES:, 0]
+    rounding = 1e-9 * float(np.max(np.abs(x)))
+    x = subtract_bands(x)[0] if remove_bands else x - x.mean()
+    spread = float(np.std(x))
+    if spread <= rounding:
+        return 0.0
+    x = x / spread
+    n = len(x)
+    lags = max(4, n // 10)
+    golden = (np.sqrt(5.0) - 1.0) / 2.0
+    c = np.pi * (0.2 + 0.6 * ((np.arange(FREQUENCIES) * golden) % 1.0))
+    walk = np.cumsum(x * np.exp(1j * np.outer(c, np.arange(1, n + 1))), axis=1)
+    displacement = np.empty((FREQUENCIES, lags))
+    kept = n - lags
+    for lag in range(1, lags + 1):
+        displacement[:, lag - 1] = np.mean(np.abs(walk[:, lag : lag + kept] - walk[:, :kept]) ** 2, axis=1)
+    steps = np.arange(1, lags + 1)
+    oscillation = (x.mean() ** 2) * (1.0 - np.cos(np.outer(c, steps))) / (1.0 - np.cos(c))[:, None]
+    growth = displacement - oscillation
+    growth = growth - growth.mean(axis=1, keepdims=True)
+    time = steps - steps.mean()
+    norms = np.sqrt(np.sum(growth**2, axis=1) * np.sum(time**2))
+    return float(np.median(growth @ time / np.where(norms > 0.0, norms, 1.0)))

@@ -1,0 +1,18 @@
+"""Which Gymnasium environments are there? Importing this registers them, without importing numba or matplotlib."""
+
+from gymnasium.envs.registration import register, registry
+
+ENVIRONMENTS = {
+    "chaosgym/ImpactBeam-v0": "chaosgym.envs.impact_beam:ImpactBeamEnv",
+}
+"""Entry point of each environment by id. A new machine adds one line."""
+
+
+def register_environments() -> None:
+    """Make the environments known to ``gymnasium.make``; calling it again does nothing."""
+    for name, entry_point in ENVIRONMENTS.items():
+        if name not in registry:
+            register(id=name, entry_point=entry_point)
+
+
+register_environments()

@@ -1,0 +1,180 @@
+r"""What is a job worth? Named terms of reward and cost, each a pure function, weighted in one place.
+
+A step of n cycles of a job of N cycles earns
+
+    - w_time     * duration / (duration of the whole job at top speed)
+    - w_damage   * increase of the damage
+    - w_type_iii * n / N                     if the step counts as Type III
+    - w_failure                              on fracture or a failed simulation
+
+Damage follows the basic rating life of a bearing: L = (C / F)^p million cycles with p = 10/3 for line contact, so that
+a cycle with peak force F uses up (F / C)^p / 10^6 of a life. The damage of a joint is that of its worse surface.
+
+References
+----------
+P. Gu, Chaotic Vibration in Machine Systems and Its Implications for Design, PhD thesis, MIT, 1994, 3.5.2 and 5.2.1.
+ISO 281:2007, Rolling bearings - Dynamic load ratings and rating life.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.parameters import parameter, validate
+
+Array = NDArray[np.float64]
+
+LIFE_EXPONENT = 10.0 / 3.0
+"""Exponent p of the basic rating life, line contact."""
+
+LONGEST_PERIOD = 8
+"""Longest period, in cycles, that counts as a repetition."""
+
+LEAST_JUDGED = 4
+"""Fewest cycles that are compared with earlier ones."""
+
+REPEATABILITY = 0.05
+"""Largest deviation, as a share of the largest peak, at which two peak forces count as equal (thesis 3.5.2)."""
+
+
+class Status(IntEnum):
+    """Where the job stands; ``info["status"]``."""
+
+    RUNNING = 0
+    JOB_DONE = 1
+    FRACTURE = 2
+    SIMULATION_FAILED = 3
+
+
+class Step(NamedTuple):
+    """What a task is told of one step.
+
+    ``speed`` in the machine's unit, ``duration`` [s], ``peak_force`` (cycles, sides) true peak forces [N], empty where
+    the simulation failed; ``recent_peaks`` (n,) those of the monitored surface up to now, this step's included.
+    """
+
+    speed: float
+    duration: float
+    peak_force: Array
+    recent_peaks: Array
+
+
+def does_not_repeat(step: Step) -> bool:
+    """Tell whether the peak forces fail to repeat within 5 % after any number of cycles up to ``LONGEST_PERIOD``.
+
+    The last cycles of the step, its first one left out because a change of speed disturbs it, are compared with the
+    cycles 1, 2, ... before them, whatever the speed was then.
+    """
+    judged = judged_cycles(len(step.peak_force))
+    peaks = step.recent_peaks
+    last = peaks[-judged:]
+    tolerance = REPEATABILITY * last.max()
+    for period in range(1, LONGEST_PERIOD + 1):
+        if np.abs(last - peaks[-judged - period : -period]).max() <= tolerance:
+            return False
+    return True
+
+
+def judged_cycles(cycles_per_step: int) -> int:
+    """Return how many cycles ``does_not_repeat`` compares with earlier ones."""
+    return max(cycles_per_step - 1, LEAST_JUDGED)
+
+
+def damage_of(peak_force: Array, load_rating: float, acceleration: float) -> Array:
+    """Share of its life that each surface uses up.
+
+    Parameters
+    ----------
+    peak_force : (cycles, sides)
+        True peak forces [N].
+    load_rating
+        Force under which a surface lasts a million cycles [N].
+    acceleration
+        Lives used up in this test for each one of the law.
+
+    Returns
+    -------
+    (sides,)
+    """
+    shares: Array = ((peak_force / load_rating) ** LIFE_EXPONENT).sum(axis=0)
+    return shares * (acceleration * 1e-6)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """A job and what counts in it."""
+
+    job_cycles: int = parameter(1000, low=1, high=1e9, provenance="assumed", source="200 steps of 5 cycles")
+    """Operating cycles of the job."""
+    cycles_per_step: int = parameter(5, low=1, high=1e4, provenance="assumed", source="one decision in 0.17 to 1.3 s")
+    """Operating cycles in one step."""
+    force_limit: float = parameter(
+        80.0, unit="N", low=1e-6, high=1e9, provenance="assumed", source="just above the beam's largest peaks"
+    )
+    """Peak force above which a step costs."""
+    load_rating: float = parameter(
+        68.4, unit="N", low=1e-6, high=1e9, provenance="derived",
+        source="equivalent force of the beam at 26.8 Hz, its worst constant speed, so that a job takes one life there",
+    )  # fmt: skip
+    """Force under which a surface lasts a million cycles."""
+    damage_acceleration: float = parameter(
+        1000.0, low=0.0, high=1e9, provenance="assumed", source="one life in a job of 1000 cycles at the load rating"
+    )
+    """Lives used up for each one of the life law."""
+    time_weight: float = parameter(1.0, low=0.0, high=1e6, provenance="assumed", source="unit of the reward")
+    """Reward lost over a job at top speed."""
+    damage_weight: float = parameter(1.0, low=0.0, high=1e6, provenance="assumed", source="a life is worth a job")
+    """Reward lost by one life."""
+    type_iii_weight: float = parameter(1.0, low=0.0, high=1e6, provenance="assumed", source="as a life")
+    """Reward lost by a job that is Type III throughout."""
+    failure_weight: float = parameter(10.0, low=0.0, high=1e6, provenance="assumed", source="dearer than any job")
+    """Reward lost by fracture or a failed simulation."""
+
+    def __post_init__(self) -> None:
+        validate(self)
+        if self.job_cycles % self.cycles_per_step:
+            raise ParameterError(
+                f"job_cycles = {self.job_cycles} is out of range; allowed: multiples of cycles_per_step = "
+                f"{self.cycles_per_step}"
+            )
+
+    def damage(self, peak_force: Array) -> Array:
+        """Share of its life that each surface uses up, (sides,)."""
+        return damage_of(peak_force, self.load_rating, self.damage_acceleration)
+
+    def judge(
+        self, step: Step, status: Status, *, type_iii: bool, damage_increase: float, job_time: float
+    ) -> tuple[float, dict[str, float]]:
+        """Return the reward of a step, and its terms and costs by name.
+
+        Parameters
+        ----------
+        step
+            What happened.
+        status
+            Where the job stands after it.
+        type_iii
+            Whether the step counts as Type III.
+        damage_increase
+            By how much the damage of the joint grew.
+        job_time
+            Duration of the whole job at top speed [s].
+        """
+        failed = status == Status.SIMULATION_FAILED
+        overload = not failed and bool(step.peak_force.max() > self.force_limit)
+        terms = {
+            "reward_time": -self.time_weight * step.duration / job_time,
+            "reward_damage": 0.0 - self.damage_weight * damage_increase,
+            "reward_type_iii": 0.0 - self.type_iii_weight * type_iii * self.cycles_per_step / self.job_cycles,
+            "reward_failure": 0.0 - self.failure_weight * (failed or status == Status.FRACTURE),
+        }
+        costs = {
+            "cost": float(type_iii or overload or failed),
+            "cost_type_iii": float(type_iii),
+            "cost_force": float(overload),
+        }
+        return sum(terms.values()), terms | costs

@@ -1,0 +1,111 @@
+"""The beam of the thesis: printed numbers, finite elements, validation."""
+
+import math
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.impact_beam import (
+    THESIS_IMPACT_BEAM,
+    ImpactBeam,
+    modal_analysis,
+    pinned_pinned_frequency,
+    static_tip_deflection,
+)
+from chaosgym.machines.machine import Machine
+from chaosgym.machines.parameters import parameters_of, with_settings
+
+
+def test_pinned_pinned_frequency_is_that_of_table_3_1():
+    """288.2 Hz at 284.0 mm, the surviving row of table 3.1; the other lengths follow as 1 / length squared."""
+    assert pinned_pinned_frequency(THESIS_IMPACT_BEAM, 0.284) == pytest.approx(288.2, abs=0.3)
+    ratio = pinned_pinned_frequency(THESIS_IMPACT_BEAM, 0.279) / pinned_pinned_frequency(THESIS_IMPACT_BEAM, 0.284)
+    assert ratio == pytest.approx((0.284 / 0.279) ** 2, rel=1e-9)
+
+
+def test_pinned_pinned_frequency_has_the_closed_form():
+    """The finite elements give (pi / 2 L^2) sqrt(E I / rho A)."""
+    beam = THESIS_IMPACT_BEAM
+    wave = math.sqrt(beam.youngs_modulus / beam.density)
+    expected = math.pi / 2 * beam.height / math.sqrt(12) * wave / 0.284**2
+    assert pinned_pinned_frequency(beam, 0.284) == pytest.approx(expected, rel=1e-6)
+
+
+def test_static_tip_deflection_is_the_unit_of_clearance():
+    """8.9 N deflect the free tip by 3.175 mm, so that +-0.127 mm is the dimensionless clearance 0.04."""
+    assert static_tip_deflection(THESIS_IMPACT_BEAM) == pytest.approx(3.175e-3, rel=0.005)
+
+
+def test_a_beam_on_a_hard_pivot_has_pinned_free_modes():
+    """Without springs and shaker the bending modes are pinned-free: beta L = 3.9266, 7.0686, 10.2102."""
+    beam = replace(
+        THESIS_IMPACT_BEAM, pivot_translational_stiffness=1e13, pivot_rotational_stiffness=1e-6, shaker_stiffness=0.0,
+        shaker_mass=0.0,
+    )  # fmt: skip
+    radius = beam.height / math.sqrt(12)
+    wave = math.sqrt(beam.youngs_modulus / beam.density)
+    expected = np.array([3.92660231, 7.06858275, 10.21017612]) ** 2 * radius * wave / beam.length**2
+    np.testing.assert_allclose(modal_analysis(beam).angular_frequency[1:4], expected, rtol=2e-4)
+
+
+def test_modes_converge_with_the_mesh():
+    """A finer mesh lowers every kept frequency, and four times the default mesh by less than 1e-4."""
+    coarse = modal_analysis(THESIS_IMPACT_BEAM, elements=12).angular_frequency
+    default = modal_analysis(THESIS_IMPACT_BEAM).angular_frequency
+    fine = modal_analysis(THESIS_IMPACT_BEAM, elements=96).angular_frequency
+    assert np.all(coarse >= default * (1 - 1e-6))
+    assert np.all(default >= fine * (1 - 1e-6))
+    np.testing.assert_allclose(default, fine, rtol=1e-4)
+
+
+def test_default_model_has_five_degrees_of_freedom():
+    """One rocking mode inside the speed range and four bending modes (thesis 5.2.3)."""
+    model = THESIS_IMPACT_BEAM.reduce()
+    hertz = np.sqrt(model.stiffness) / (2 * np.pi)
+    assert len(hertz) == 5
+    assert 10.0 < hertz[0] < 28.0
+    assert hertz[1] > 400.0
+
+
+def test_damping_families():
+    """The ratio of the first bending mode is the given one; "stiffness" grows with frequency, "uniform" does not."""
+    proportional = modal_analysis(THESIS_IMPACT_BEAM)
+    uniform = modal_analysis(replace(THESIS_IMPACT_BEAM, damping_family="uniform"))
+    assert proportional.damping_ratio[1] == pytest.approx(0.01)
+    np.testing.assert_allclose(
+        proportional.damping_ratio / proportional.angular_frequency, 0.01 / proportional.angular_frequency[1]
+    )
+    np.testing.assert_allclose(uniform.damping_ratio, 0.01)
+
+
+def test_beam_is_a_frozen_machine_with_described_parameters():
+    """Every field carries unit, range, provenance and source."""
+    assert isinstance(THESIS_IMPACT_BEAM, Machine)
+    with pytest.raises(FrozenInstanceError):
+        THESIS_IMPACT_BEAM.length = 1.0  # type: ignore[misc]
+    for described in parameters_of(ImpactBeam).values():
+        assert described.provenance in ("printed", "derived", "calibrated", "assumed")
+        assert described.source
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"clearance": -1e-4}, r"clearance = -0\.0001 m is out of range; allowed: 0 to 1 m"),
+        ({"excitation_frequency": 0.0}, r"excitation_frequency = 0 Hz is out of range"),
+        ({"length": math.nan}, r"length = nan m is out of range"),
+        ({"length": "long"}, r"length = 'long' is out of range"),
+        ({"n_modes": 2.5}, r"n_modes = 2\.5 is not a whole number"),
+        ({"n_modes": True}, r"n_modes = True is out of range"),
+        ({"damping_family": "viscous"}, r"damping_family = 'viscous' is not one of uniform, stiffness"),
+        ({"force_position": 0.3}, r"force_position = 0\.3 m lies beyond the tip"),
+        ({"pivot_rotational_stiffness": 0, "shaker_stiffness": 0}, r"without a position of rest"),
+        ({"clearence": 1e-4}, r"no field 'clearence'; did you mean clearance\?"),
+    ],
+)
+def test_bad_parameters_name_field_value_and_range(settings, message):
+    """Nothing out of range is constructed, and the message says what is allowed."""
+    with pytest.raises(ParameterError, match=message):
+        with_settings(THESIS_IMPACT_BEAM, settings)
