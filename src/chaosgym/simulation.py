@@ -207,12 +207,13 @@ def _run_slider_crank(
 ) -> tuple[int, int, CycleRecord]:
     if not isinstance(integrator, ExactEvents):
         raise ParameterError(f"integrator = {integrator} does not run a slider crank; allowed: ExactEvents(...)")
-    model = crank.reduce(integrator.step_phase)
+    # its peaks and events are refined on the exact motion, so its steps may be twice as long as the beam's
+    model = crank.reduce(2.0 * integrator.step_phase)
     arrays = _cycle_arrays(cycles, 2 * len(crank.degrees_of_freedom), samples)
     coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
     outcome, done = advance_slider_crank(
-        model, coordinates, episode, arrays, integrator.event_tolerance / model.fastest, integrator.event_budget
+        model, coordinates, episode, arrays, integrator.event_tolerance / model.contact_rate, integrator.event_budget
     )
     return outcome, done, _record(crank, arrays, MotionState(coordinates, bouncing))
 

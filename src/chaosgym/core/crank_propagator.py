@@ -96,3 +96,15 @@ def propagator_table(acceleration, duration, step, order):
                 for i in range(2 * n):
                     table[s, b, column, i] = moved[i]
     return table
+
+
+@njit(cache=True)
+def propagate(table, z, moved):
+    """Write p and p' one step later into the head of ``moved``; ``table`` is the propagator of one bin and set."""
+    size, states = table.shape
+    for i in range(states):
+        moved[i] = table[0, i] * z[0]
+    for c in range(1, size):
+        factor = z[c]
+        for i in range(states):
+            moved[i] += table[c, i] * factor

@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 
 from chaosgym.core import status
-from chaosgym.core.crank_propagator import FORCING_TERMS, evaluate, expand
+from chaosgym.core.crank_propagator import FORCING_TERMS, evaluate, expand, propagate
 from chaosgym.core.impact_beam import LOWER, UPPER, cubic, cubic_extremum, note_touch
 
 RUNAWAY = 1e3
@@ -38,8 +38,8 @@ class SliderCrankModel(NamedTuple):
         Time [s] in which the crank turns through one bin.
     steps : int
         Exact steps in a bin without events.
-    fastest : float
-        Largest angular frequency with every channel closed [rad/s].
+    contact_rate : float
+        Angular frequency of the masses next to the closed contacts [rad/s].
     order : int
         Order of the Taylor series that sums a step to round-off.
     row : (m, n)
@@ -56,13 +56,15 @@ class SliderCrankModel(NamedTuple):
         Displacement of the monitored joint per unit coordinate.
     acceleration : (radix^m, bins, 2n + 4 + m, n)
         p'' per unit z, by columns, for every contact set and bin.
+    curvature : (radix^m, bins, m, 2n + 4 + m)
+        Second derivative of each channel's displacement per unit z.
     propagator : (radix^m, bins, 2n + 4 + m, 2n)
         p and p' one step later.
     """
 
     bin_duration: float
     steps: int
-    fastest: float
+    contact_rate: float
     order: int
     row: np.ndarray
     gap: np.ndarray
@@ -73,6 +75,7 @@ class SliderCrankModel(NamedTuple):
     reading: np.ndarray
     display: np.ndarray
     acceleration: np.ndarray
+    curvature: np.ndarray
     propagator: np.ndarray
 
 
@@ -212,35 +215,108 @@ def column_of(model, j, side):
 
 
 @njit(cache=True)
-def note_peak(peak, h, fx0, fy0, rx0, ry0, fx1, fy1, rx1, ry1):
-    """Raise ``peak`` (2,) to the largest resultant at the end of a step or in it."""
-    size0, size1 = math.hypot(fx0, fy0), math.hypot(fx1, fy1)
-    column = UPPER if fy1 > 0.0 else LOWER
-    if size1 > peak[column]:
-        peak[column] = size1
-    if size0 == 0.0 or size1 == 0.0:
-        return
-    rate0 = (fx0 * rx0 + fy0 * ry0) / size0
-    rate1 = (fx1 * rx1 + fy1 * ry1) / size1
-    if rate0 > 0.0 and rate1 < 0.0:
-        crest = cubic_extremum(size0, rate0, size1, rate1, h, -1.0)
-        if crest > 0.0:
-            size = cubic(size0, rate0, size1, rate1, h, crest)[0]
-            if size > peak[column]:
-                peak[column] = size
+def note_contact(model, side, time, contact_time):
+    """Add ``time`` to the sides of the record (2,) on which a channel is closed."""
+    upper, lower = False, False
+    for j in range(side.shape[0]):
+        if side[j] != 0.0:
+            if column_of(model, j, side[j]) == UPPER:
+                upper = True
+            else:
+                lower = True
+    if upper:
+        contact_time[UPPER] += time
+    if lower:
+        contact_time[LOWER] += time
 
 
 @njit(cache=True)
-def channel_acceleration(model, a, z, j):
+def note_peak(peak, fx, fy):
+    """Raise ``peak`` (2,) to the resultant."""
+    column = UPPER if fy > 0.0 else LOWER
+    peak[column] = max(peak[column], math.hypot(fx, fy))
+
+
+@njit(cache=True)
+def crest_instant(peak, h, start, end):
+    """Instant in a step at which the resultant may crest above ``peak`` (2,), or -1.
+
+    ``start`` and ``end`` are (F_x, F_y, their rates) at both ends of the step.
+    """
+    size0, size1 = math.hypot(start[0], start[1]), math.hypot(end[0], end[1])
+    if size0 == 0.0 or size1 == 0.0:
+        return -1.0
+    rate0 = (start[0] * start[2] + start[1] * start[3]) / size0
+    rate1 = (end[0] * end[2] + end[1] * end[3]) / size1
+    if rate0 <= 0.0 or rate1 >= 0.0:
+        return -1.0
+    crest = cubic_extremum(size0, rate0, size1, rate1, h, -1.0)
+    column = UPPER if end[1] > 0.0 else LOWER
+    return crest if crest > 0.0 and cubic(size0, rate0, size1, rate1, h, crest)[0] > 0.99 * peak[column] else -1.0
+
+
+@njit(cache=True, inline="always")
+def curve(curvature, z, j):
     """Second derivative of the displacement of channel j."""
     total = 0.0
-    for i in range(model.row.shape[1]):
-        if model.row[j, i] != 0.0:
-            part = 0.0
-            for c in range(a.shape[0]):
-                part += a[c, i] * z[c]
-            total += model.row[j, i] * part
+    for c in range(z.shape[0]):
+        total += curvature[j, c] * z[c]
     return total
+
+
+@njit(cache=True)
+def quiet_steps(model, chosen, b, side, z, moved, y, v, a, time, limit, peak):
+    """Take up to ``limit`` whole steps in which no contact changes and no force passes ``peak`` (2,); how many.
+
+    Stops before a step that could do either, judged by its ends: between them, a cubic exceeds the larger end by no
+    more than 4/27 of the step times the sum of both slopes. z and the channels' motion y, v, a go along.
+    """
+    n2 = 2 * model.row.shape[1]
+    m = side.shape[0]
+    step = model.bin_duration / model.steps
+    table = model.propagator[chosen, b]
+    curvature = model.curvature[chosen, b]
+    swing = 4.0 / 27.0 * step
+    for c in range(n2 + FORCING_TERMS, z.shape[0]):
+        moved[c] = z[c]
+    for count in range(limit):
+        propagate(table, z, moved)
+        put_time(moved, n2 // 2, (time + (count + 1) * step) / model.bin_duration)
+        fy, total = 0.0, 0.0
+        for j in range(m):
+            y1, v1 = 0.0, 0.0
+            for i in range(n2 // 2):
+                y1 += model.row[j, i] * moved[i]
+                v1 += model.row[j, i] * moved[n2 // 2 + i]
+            gap = model.gap[j]
+            if side[j] == 0.0:
+                reach = max(abs(y[j]), abs(y1))
+                if v[j] * v1 < 0.0:
+                    reach += swing * (abs(v[j]) + abs(v1))
+                if reach >= gap:
+                    return count
+                continue
+            k, d, s = model.stiffness[j], model.damping[j], side[j]
+            r0 = s * (k * v[j] + d * a[j])
+            r1 = s * (k * v1 + d * curve(curvature, moved, j))
+            f0, f1 = k * (s * y[j] - gap) + d * s * v[j], k * (s * y1 - gap) + d * s * v1
+            turn = swing * (abs(r0) + abs(r1)) if r0 * r1 < 0.0 else 0.0
+            if min(f0, f1) - turn <= 0.0:
+                return count
+            fy += model.reading[j, 1] * s * f1
+            total += math.hypot(model.reading[j, 0], model.reading[j, 1]) * (max(f0, f1) + turn)
+        if total > peak[UPPER if fy > 0.0 else LOWER]:
+            return count
+        for j in range(m):
+            y[j], v[j] = 0.0, 0.0
+            for i in range(n2 // 2):
+                y[j] += model.row[j, i] * moved[i]
+                v[j] += model.row[j, i] * moved[n2 // 2 + i]
+            if side[j] != 0.0:
+                a[j] = curve(curvature, moved, j)
+        for c in range(n2 + FORCING_TERMS):
+            z[c] = moved[c]
+    return limit
 
 
 @njit(cache=True, nogil=True)
@@ -253,18 +329,17 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
     -------
     (status, cycle) : the cycle is the first one not finished.
     """
-    sets, bins, size, n = model.acceleration.shape
+    _, bins, size, n = model.acceleration.shape
     m = model.row.shape[0]
     duration = model.bin_duration
     step = duration / model.steps
     samples = arrays.history.shape[1]
     period = bins * duration
-    z, moved, at_sample = np.empty(size), np.empty(size), np.empty(size)
+    z, moved, at_sample, at_crest = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
     series = np.empty((model.order + 1, n))
     channel = np.empty(model.order + 1)
     side = np.empty(m)
     y0, v0, a0, y1, v1, a1 = np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m)
-    pressed = np.empty(2)
 
     for cycle in range(arrays.section.shape[0]):
         for i in range(2 * n):
@@ -298,26 +373,29 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
             for j in range(m):
                 if side[j] != 0.0:
                     closed = True
-                    a0[j] = channel_acceleration(model, a, z, j)
-            fx0, fy0, rx0, ry0 = 0.0, 0.0, 0.0, 0.0
-            if closed:
-                fx0, fy0, rx0, ry0 = joint_force(model, side, y0, v0, a0)
+                    a0[j] = curve(model.curvature[chosen, b], z, j)
+            start = joint_force(model, side, y0, v0, a0)
             origin, count = 0.0, 0
             while True:
                 time = origin + count * step
                 left = duration - time
+                whole = int(left / step + 1e-9)
+                if whole > 0 and sample == samples:
+                    quiet = quiet_steps(
+                        model, chosen, b, side, z, moved, y0, v0, a0, time, whole, arrays.peak_force[cycle]
+                    )
+                    if quiet > 0:
+                        note_contact(model, side, quiet * step, arrays.contact_time[cycle])
+                        count += quiet
+                        time = origin + count * step
+                        left = duration - time
+                        start = joint_force(model, side, y0, v0, a0)
                 if left <= 1e-12 * duration:
                     break
                 expanded = False
                 if left >= (1.0 - 1e-9) * step:
                     h = step
-                    table = model.propagator[chosen, b]
-                    for i in range(2 * n):
-                        moved[i] = 0.0
-                    for c in range(size):
-                        factor = z[c]
-                        for i in range(2 * n):
-                            moved[i] += table[c, i] * factor
+                    propagate(model.propagator[chosen, b], z, moved)
                 else:
                     h = left
                     expand(a, z, duration, series)
@@ -332,7 +410,7 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                 first, instant, towards = -1, math.inf, 0.0
                 for j in range(m):
                     if side[j] != 0.0:
-                        a1[j] = channel_acceleration(model, a, moved, j)
+                        a1[j] = curve(model.curvature[chosen, b], moved, j)
                         until = suspect_closed(model, j, side[j], h, y0[j], v0[j], a0[j], y1[j], v1[j], a1[j])
                         if until < 0.0:
                             continue
@@ -362,7 +440,7 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                     read_channels(model, moved, y1, v1)
                     for j in range(m):
                         if side[j] != 0.0:
-                            a1[j] = channel_acceleration(model, a, moved, j)
+                            a1[j] = curve(model.curvature[chosen, b], moved, j)
 
                 # record the step
                 if sample < samples:
@@ -376,15 +454,24 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                         sample += 1
                     read_channels(model, moved, y1, v1)
                 if closed:
-                    fx1, fy1, rx1, ry1 = joint_force(model, side, y1, v1, a1)
-                    note_peak(arrays.peak_force[cycle], h, fx0, fy0, rx0, ry0, fx1, fy1, rx1, ry1)
-                    fx0, fy0, rx0, ry0 = fx1, fy1, rx1, ry1
-                    pressed[0], pressed[1] = 0.0, 0.0
-                    for j in range(m):
-                        if side[j] != 0.0:
-                            pressed[column_of(model, j, side[j])] = h
-                    arrays.contact_time[cycle, 0] += pressed[0]
-                    arrays.contact_time[cycle, 1] += pressed[1]
+                    end = joint_force(model, side, y1, v1, a1)
+                    note_peak(arrays.peak_force[cycle], end[0], end[1])
+                    crest = crest_instant(arrays.peak_force[cycle], h, start, end)
+                    if crest > 0.0:
+                        if not expanded:
+                            expand(a, z, duration, series)
+                        evaluate(series, crest, at_crest)
+                        put_time(at_crest, n, (time + crest) / duration)
+                        for c in range(2 * n + FORCING_TERMS, size):
+                            at_crest[c] = z[c]
+                        read_channels(model, at_crest, y0, v0)
+                        for j in range(m):
+                            if side[j] != 0.0:
+                                a0[j] = curve(model.curvature[chosen, b], at_crest, j)
+                        top = joint_force(model, side, y0, v0, a0)
+                        note_peak(arrays.peak_force[cycle], top[0], top[1])
+                    start = end
+                    note_contact(model, side, h, arrays.contact_time[cycle])
                 z, moved = moved, z
                 y0, y1 = y1, y0
                 v0, v1 = v1, v0
@@ -415,11 +502,9 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                 for j in range(m):
                     if side[j] != 0.0:
                         closed = True
-                        a0[j] = channel_acceleration(model, a, z, j)
-                fx0, fy0, rx0, ry0 = 0.0, 0.0, 0.0, 0.0
-                if closed:
-                    fx0, fy0, rx0, ry0 = joint_force(model, side, y0, v0, a0)
-                    note_peak(arrays.peak_force[cycle], 0.0, 0.0, 0.0, 0.0, 0.0, fx0, fy0, rx0, ry0)
+                        a0[j] = curve(model.curvature[chosen, b], z, j)
+                start = joint_force(model, side, y0, v0, a0)
+                note_peak(arrays.peak_force[cycle], start[0], start[1])
                 origin, count = time + h, 0
 
         arrays.events[cycle] = events

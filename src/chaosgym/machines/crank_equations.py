@@ -1,8 +1,8 @@
 r"""Which equations govern small motions of the planar slider crank about its nominal motion?
 
-Rod coordinates (ends and modes, ``connecting_rod``) and the slider's (x_S, y_S, pitch) follow from as few coordinates p
-as the scene requires, q = R(phi) p. Ball clearance opens the rod's end A in the frame of the rod, slider clearance opens
-the slider across the guide, both in the frames in which the bearing surfaces stand still. With
+Rod coordinates (ends and modes, ``connecting_rod``) and the slider's (x_S, y_S, pitch) follow from as few coordinates
+p as the scene requires, q = R(phi) p. Ball clearance opens the rod's end A in the frame of the rod, slider clearance
+opens the slider across the guide, both in the frames in which the bearing surfaces stand still. With
 
     R' = w phi_1 R_phi,   R'' = w^2 (phi_1^2 R_phiphi + phi_2 R_phi),   Omega = -w phi_1,   Omega' = -w^2 phi_2
 
@@ -122,7 +122,7 @@ def _structural_damping(machine: "SliderCrank", rod: ConnectingRod) -> Array:
     if machine.rod == "rigid":
         return damping
     if machine.damping_family == "stiffness":
-        return rod.stiffness * (2.0 * machine.damping_ratio / rod.mode_frequency[0])
+        return np.asarray(rod.stiffness * 2.0 * machine.damping_ratio / rod.mode_frequency[0])
     modes = slice(MODES, MODES + len(rod.mode_frequency))
     damping[modes, modes] = np.diag(2.0 * machine.damping_ratio * rod.mode_frequency)
     moving = machine.slider_mass + machine.yoke_mass + rod.line_mass * machine.rod_length / 3.0
@@ -159,7 +159,9 @@ def _coordinate_map(machine: "SliderCrank", phi: Array, size: int) -> Array:
         entries[SLIDER_ACROSS] = [(ACROSS_B, sec), (x_slider, tan), (y_slider, one)]
     mapping = np.zeros((3, len(phi), size, len(names)))
     for column, name in enumerate(names):
-        for row, functions in entries.get(name, [(MODES + column - names.index("rod mode 1"), one)] if flexible else []):
+        for row, functions in entries.get(
+            name, [(MODES + column - names.index("rod mode 1"), one)] if flexible else []
+        ):
             for order in range(3):
                 mapping[order, :, row, column] = functions[order]
     return mapping
@@ -171,7 +173,9 @@ def _guide_reaction(load: Array, phi: Array) -> Array:
     return np.asarray(load[..., ACROSS_B] / np.cos(phi) + load[..., x_slider] * np.tan(phi) + load[..., y_slider])
 
 
-def _geometric_stiffness(machine: "SliderCrank", rod: ConnectingRod, phi: Array, motion: _Inertia, load: Array) -> Array:
+def _geometric_stiffness(
+    machine: "SliderCrank", rod: ConnectingRod, phi: Array, motion: _Inertia, load: Array
+) -> Array:
     """K_geo of the rod coordinates from the nominal tension and the offset end bodies: (2, B, m, m)."""
     line, length = rod.line_mass, machine.rod_length
     a, b, spin, centrifugal = motion.along, motion.across, motion.spin, motion.centrifugal
@@ -181,13 +185,13 @@ def _geometric_stiffness(machine: "SliderCrank", rod: ConnectingRod, phi: Array,
     constant -= machine.yoke_mass * (a + (length + x) * centrifugal - y * spin)
     constant -= _guide_reaction(load, phi) * np.sin(phi)
     tension = (constant, line * a * length, 0.5 * line * centrifugal * length**2)
-    stiffness = np.asarray(sum(t[..., None, None] * matrix for t, matrix in zip(tension, rod.tension, strict=True)))
     hx, hy = machine.housing_offset_along, machine.housing_offset_across
     turning = (
         -machine.housing_mass * (hx * a + hy * b + (hx**2 + hy**2) * centrifugal),
         -machine.yoke_mass * (x * (a + length * centrifugal) + y * (b + length * spin) + (x**2 + y**2) * centrifugal),
     )
-    return stiffness + np.asarray(sum(t[..., None, None] * m for t, m in zip(turning, rod.end_rotation, strict=True)))
+    stiffness = np.einsum("pkb,pij->kbij", np.stack(tension), rod.tension)
+    return np.asarray(stiffness + np.einsum("pkb,pij->kbij", np.stack(turning), rod.end_rotation))
 
 
 def _inertia(machine: "SliderCrank", motion: PlanarMotion) -> _Inertia:

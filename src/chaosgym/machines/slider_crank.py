@@ -4,8 +4,8 @@ A motor turns the crank at constant speed. A ball joint drives a slender steel r
 slider that runs along a straight guide (thesis 4.2). Clearance in the slider joint lets the slider rattle across the
 guide, clearance in the ball joint lets the ball rattle in its housing.
 
-Nominal kinematics and rod (``kinematics``, ``connecting_rod``) -> equations of small motions (``crank_equations``), held
-over bins of crank angle -> exact propagators (``core.crank_propagator``) -> SliderCrankModel.
+Nominal kinematics and rod (``kinematics``, ``connecting_rod``) -> equations of small motions (``crank_equations``),
+held over bins of crank angle -> exact propagators (``core.crank_propagator``) -> SliderCrankModel.
 
 Gravity is off by default. With the mechanism's plane upright, the slider's weight keeps it on the guide below about
 360 rpm, so no impact could happen in the slider joint; yet the thesis shows impacts of 35 to 130 N at 190 to 290 rpm
@@ -18,6 +18,7 @@ P. Gu, Chaotic Vibration in Machine Systems and Its Implications for Design, PhD
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, ClassVar, NamedTuple
@@ -36,9 +37,13 @@ from chaosgym.machines.crank_equations import (
     equations,
     rod_of,
 )
+from chaosgym.machines.kinematics import planar_motion
 from chaosgym.machines.parameters import parameter, parameters_of, validate
 
 Array = NDArray[np.float64]
+
+MAX_PHASE = 8.0
+"""Longest step times largest eigenvalue that a Taylor series sums without loss of digits."""
 
 _FIT = "set S: search over the printed natures and forces of figures 4.13 to 4.16"
 _STEEL = "steel"
@@ -57,7 +62,12 @@ class SliderCrank:
     name: ClassVar[str] = "slider-crank"
     speed_field: ClassVar[str] = "crank_speed"
     clearance_field: ClassVar[str] = "slider_clearance"
+    usual_ranges: ClassVar[Mapping[str, tuple[float, float]]] = {
+        "crank_speed": (50.0, 300.0),
+        "slider_clearance": (0.02e-3, 0.3e-3),
+    }
     sides: ClassVar[tuple[str, ...]] = ("upper", "lower")
+    """Surfaces whose force points up and down: on the slider, or on the housing if the ball joint is monitored."""
 
     crank_speed: float = parameter(
         190.0, unit="rpm", low=1.0, high=5000.0, provenance="printed", source="thesis figure 4.14"
@@ -71,9 +81,7 @@ class SliderCrank:
         0.235, unit="m", low=1e-2, high=5.0, provenance="printed", source="thesis figure 4.24a"
     )
     """From the ball centre to the slider pivot, above the crank radius [m]."""
-    rod_diameter: float = parameter(
-        6.35e-3, unit="m", low=1e-3, high=0.1, provenance="printed", source="thesis 4.6"
-    )
+    rod_diameter: float = parameter(6.35e-3, unit="m", low=1e-3, high=0.1, provenance="printed", source="thesis 4.6")
     """Diameter of the round rod [m]."""
     motor_angle: float = parameter(
         0.0, unit="deg", low=0.0, high=25.0, provenance="printed", source="thesis 4.2: 0 to 25 deg"
@@ -85,9 +93,7 @@ class SliderCrank:
     """Bending modes of the flexible rod."""
     damping_ratio: float = parameter(0.027, low=0.0, high=1.0, provenance="calibrated", source=_FIT)
     """Structural damping ratio of the rod's first mode."""
-    damping_family: str = parameter(
-        "stiffness", choices=("uniform", "stiffness"), provenance="calibrated", source=_FIT
-    )
+    damping_family: str = parameter("stiffness", choices=("uniform", "stiffness"), provenance="calibrated", source=_FIT)
     """"uniform": the same ratio in every mode; "stiffness": proportional to the mode's frequency."""
     geometric_stiffness: str = parameter(
         "off", choices=("off", "on"), provenance="calibrated", source="figure 4.18: 2500 N only without it"
@@ -104,9 +110,7 @@ class SliderCrank:
         source="first natural frequency 75.6 Hz, thesis 4.5.5",
     )  # fmt: skip
     """Moment of inertia of the housing about the ball centre [kg m^2]."""
-    housing_offset_along: float = parameter(
-        3e-3, unit="m", low=-0.1, high=0.1, provenance="calibrated", source=_FIT
-    )
+    housing_offset_along: float = parameter(3e-3, unit="m", low=-0.1, high=0.1, provenance="calibrated", source=_FIT)
     """Centre of gravity of the housing from the ball centre towards the slider [m]."""
     housing_offset_across: float = parameter(0.0, unit="m", low=-0.1, high=0.1, provenance="assumed", source="symmetry")
     """Centre of gravity of the housing across the rod [m]."""
@@ -140,11 +144,21 @@ class SliderCrank:
     )
     """"ideal": tight; "spherical": ball in a shell; "instrumented": ball between four tetrahedral sensors."""
     slider_clearance: float = parameter(
-        0.254e-3, unit="m", low=0.0, high=1e-3, provenance="printed", source="thesis figure 4.14; adjustable to 1 mm, 4.2"
+        0.254e-3,
+        unit="m",
+        low=0.0,
+        high=1e-3,
+        provenance="printed",
+        source="thesis figure 4.14; adjustable to 1 mm, 4.2",
     )
     """Half the gap of the slider joint [m]."""
     ball_clearance: float = parameter(
-        0.127e-3, unit="m", low=0.0, high=1e-3, provenance="printed", source="thesis figure 4.8; adjustable to 1 mm, 4.2"
+        0.127e-3,
+        unit="m",
+        low=0.0,
+        high=1e-3,
+        provenance="printed",
+        source="thesis figure 4.8; adjustable to 1 mm, 4.2",
     )
     """Half the gap of the ball joint [m]."""
     sensor_distance: float = parameter(
@@ -165,9 +179,7 @@ class SliderCrank:
         0.0, low=0.0, high=0.5, provenance="printed", source="thesis 4.5.3: 0 and 0.1"
     )
     """Coulomb friction between slider and guide."""
-    friction_ramp: float = parameter(
-        0.02, low=1e-4, high=1.0, provenance="assumed", source="not in print"
-    )
+    friction_ramp: float = parameter(0.02, low=1e-4, high=1.0, provenance="assumed", source="not in print")
     """Slider speed below which friction fades, as a share of the crank pin's speed."""
     gravity: float = parameter(
         0.0, unit="m/s^2", low=0.0, high=100.0, provenance="derived", source="contact loss below 360 rpm, thesis 4.4.2"
@@ -235,12 +247,17 @@ class SliderCrank:
         return "slider" if self.slider_joint != "ideal" else "ball"
 
     @property
+    def natural_frequencies(self) -> Array:
+        """Natural frequencies [Hz] at rest at crank angle zero, every joint tight, (n_modes + 1,)."""
+        return frequencies_at(self, 0.0)
+
+    @property
     def degrees_of_freedom(self) -> tuple[str, ...]:
         """Names of the coordinates that are integrated: only those that the scene requires."""
         return degrees_of_freedom(self)
 
-    def reduce(self, step_phase: float = 0.5) -> SliderCrankModel:
-        """Return the model with propagators for steps in which the fastest mode turns by about ``step_phase`` [rad].
+    def reduce(self, step_phase: float = 1.0) -> SliderCrankModel:
+        """Return the model with propagators for steps in which a closed contact turns by at most ``step_phase`` [rad].
 
         Machines that differ in clearance alone share all of it; those that differ in speed share the assembly.
         """
@@ -264,7 +281,7 @@ SUPERHARMONIC_SLIDER_CRANK = replace(
 """The mechanism of figure 4.18: end bodies whose centres of gravity lie along the rod excite its first mode."""
 
 
-def natural_frequencies(machine: SliderCrank, crank_angle: float = 0.0) -> Array:
+def frequencies_at(machine: SliderCrank, crank_angle: float) -> Array:
     """Natural frequencies [Hz] of the mechanism at rest at a crank angle [deg], every joint tight."""
     bound = replace(machine, slider_joint="clearance", ball_joint="ideal", rod="flexible")
     system = equations(bound, np.array([math.radians(crank_angle)]))
@@ -315,7 +332,8 @@ class _Structure(NamedTuple):
     """Accelerations of all bins by powers of the crank rate, whatever the speed and the clearance.
 
     ``free`` (3, bins, 2n, n) per unit p and p'; ``forcing`` (2, bins, 4, n) of gravity and of squared crank rate;
-    ``push`` (sets, bins, 2n + m, n) what closed contacts add per unit p, p' and clearance; ``fastest`` [rad/s].
+    ``push`` (sets, bins, 2n + m, n) what closed contacts add per unit p, p' and clearance; ``contact`` [rad/s] angular
+    frequency of the masses next to the closed contacts; ``spectrum`` [1/s] largest modulus of an eigenvalue.
     """
 
     channels: _Channels
@@ -324,7 +342,47 @@ class _Structure(NamedTuple):
     free: Array
     forcing: Array
     push: Array
-    fastest: float
+    contact: float
+    spectrum: float
+
+
+def _forcing(inverse_mass: Array, loads: Array) -> Array:
+    """Cubics in the time of each bin through the loads at its nodes, as accelerations: (2, bins, 4, n)."""
+    bins, nodes = len(inverse_mass), FORCING_TERMS - 1
+    at = (np.arange(bins)[:, None] * nodes + np.arange(FORCING_TERMS)) % (bins * nodes)
+    coefficients = np.linalg.inv(np.vander(np.arange(FORCING_TERMS) / nodes, increasing=True))
+    return np.asarray(-np.einsum("bij,kbcj->kbci", inverse_mass, coefficients @ loads[:, at]))
+
+
+def _push(inverse_mass: Array, channels: _Channels, radix: int, friction: Array) -> Array:
+    """Accelerations that the closed contacts of every set add: (sets, bins, 2n + m, n).
+
+    ``friction`` (bins, n) is what one newton of contact force drives along the guide.
+    """
+    bins, n, m = len(inverse_mass), inverse_mass.shape[-1], len(channels.row)
+    push = np.zeros((radix**m, bins, 2 * n + m, n))
+    for chosen in range(radix**m):
+        for j in range(m):
+            digit = chosen // radix**j % radix
+            if digit:
+                row, sign = channels.row[j], 1.0 if digit == 1 else -1.0
+                force = row + sign * channels.slides[j] * friction
+                answer = np.einsum("bij,bj->bi", inverse_mass, force)[:, None, :]
+                push[chosen, :, :n] -= channels.stiffness[j] * row[:, None] * answer
+                push[chosen, :, n : 2 * n] -= channels.damping[j] * row[:, None] * answer
+                push[chosen, :, 2 * n + j] += channels.stiffness[j] * answer[:, 0]
+    return push
+
+
+def _rates(free: Array, pushed: Array, row: Array) -> tuple[float, float]:
+    """(contact, spectrum) of ``_Structure`` from the accelerations (b, 2n, n) of some bins with all contacts closed."""
+    n = free.shape[-1]
+    local = -row @ pushed[:, :n] @ np.linalg.pinv(row)
+    contact = math.sqrt(float(np.max(np.abs(np.linalg.eigvals(local)))))
+    system = np.zeros((len(free), 2 * n, 2 * n))
+    system[:, n:, :n] = np.eye(n)
+    system[:, :, n:] = free + pushed
+    return contact, float(np.max(np.abs(np.linalg.eigvals(system))))
 
 
 @lru_cache(maxsize=64)
@@ -333,49 +391,31 @@ def _structure(*structure: Any) -> _Structure:
     rod = rod_of(machine)
     bins = round(360.0 / machine.matrix_update_interval)
     width = 2.0 * math.pi / bins
-    held = equations(machine, (np.arange(bins) + 0.5) * width, rod)
+    middles = np.array([(b + 0.5) * width for b in range(bins)])
+    held = equations(machine, middles, rod)
     n = held.mass.shape[-1]
-    inverse = np.linalg.inv(held.mass)
-
+    inverse_mass = np.asarray(np.linalg.inv(held.mass), dtype=np.float64)
     free = np.zeros((3, bins, 2 * n, n))
-    free[:, :, :n] = -np.swapaxes(inverse @ held.stiffness, -1, -2)
-    free[:2, :, n:] = -np.swapaxes(inverse @ held.damping, -1, -2)
-
+    free[:, :, :n] = -np.swapaxes(inverse_mass @ held.stiffness, -1, -2)
+    free[:2, :, n:] = -np.swapaxes(inverse_mass @ held.damping, -1, -2)
     nodes = FORCING_TERMS - 1
-    angles = np.arange(bins * nodes) * (width / nodes)
-    load = equations(machine, angles, rod).load
-    at = (np.arange(bins)[:, None] * nodes + np.arange(FORCING_TERMS)) % (bins * nodes)
-    coefficients = np.linalg.inv(np.vander(np.arange(FORCING_TERMS) / nodes, increasing=True))
-    forcing = -np.einsum("bij,kbcj->kbci", inverse, coefficients @ load[:, at])
+    loads = equations(machine, np.array([k * width / nodes for k in range(bins * nodes)]), rod).load
 
     channels = _channels(machine)
-    m = len(channels.row)
     radix = 3 if machine.friction_coefficient > 0.0 else 2
-    push = np.zeros((radix**m, bins, 2 * n + m, n))
-    friction = _friction(machine, (np.arange(bins) + 0.5) * width)[:, None] * held.slider_along
-    for chosen in range(radix**m):
-        for j in range(m):
-            digit = chosen // radix**j % radix
-            if digit:
-                row, sign = channels.row[j], 1.0 if digit == 1 else -1.0
-                force = row + sign * channels.slides[j] * friction
-                answer = np.einsum("bij,bj->bi", inverse, force)[:, None, :]
-                push[chosen, :, :n] -= channels.stiffness[j] * row[:, None] * answer
-                push[chosen, :, n : 2 * n] -= channels.damping[j] * row[:, None] * answer
-                push[chosen, :, 2 * n + j] += channels.stiffness[j] * answer[:, 0]
-    pressed = free[0, :, :n] + push[-1 if radix == 2 else 1, :, :n]
-    fastest = math.sqrt(float(np.max(np.abs(np.linalg.eigvals(pressed[[0, bins // 4]])))))
-    display = channels.row.mean(axis=0)
-    return _Structure(channels, radix, display, free, forcing, push, fastest)
+    push = _push(inverse_mass, channels, radix, _friction(machine, middles)[:, None] * held.slider_along)
+    some = [0, bins // 4]
+    contact, spectrum = _rates(free[0, some], push[-1, some, : 2 * n], channels.row)
+    return _Structure(
+        channels, radix, channels.row.mean(axis=0), free, _forcing(inverse_mass, loads), push, contact, spectrum
+    )
 
 
 def _friction(machine: SliderCrank, crank_angle: Array) -> Array:
     """Friction coefficient with the sign of the nominal slider velocity, ramped through zero."""
-    from chaosgym.machines.kinematics import planar_motion
-
     motion = planar_motion(crank_angle, machine.crank_radius, machine.rod_length)
     speed = motion.slider_rate / (machine.friction_ramp * machine.crank_radius)
-    return machine.friction_coefficient * np.clip(speed, -1.0, 1.0)
+    return np.asarray(machine.friction_coefficient * np.clip(speed, -1.0, 1.0))
 
 
 @lru_cache(maxsize=64)
@@ -391,13 +431,13 @@ def _at_speed(crank_speed: float, step_phase: float, *structure: Any) -> SliderC
     acceleration[:, :, 2 * n : 2 * n + FORCING_TERMS] = parts.forcing[0] + rate**2 * parts.forcing[1]
     acceleration[:, :, : 2 * n] += parts.push[:, :, : 2 * n]
     acceleration[:, :, 2 * n + FORCING_TERMS :] = parts.push[:, :, 2 * n :]
-    steps = max(1, math.ceil(duration * parts.fastest / step_phase))
+    steps = max(1, math.ceil(duration * max(parts.contact / step_phase, parts.spectrum / MAX_PHASE)))
     step = duration / steps
-    order = series_order(parts.fastest * step)
+    order = series_order(parts.spectrum * step)
     return SliderCrankModel(
         bin_duration=duration,
         steps=steps,
-        fastest=parts.fastest,
+        contact_rate=parts.contact,
         order=order,
         row=parts.channels.row,
         gap=np.zeros(m),
@@ -408,5 +448,6 @@ def _at_speed(crank_speed: float, step_phase: float, *structure: Any) -> SliderC
         reading=parts.channels.reading,
         display=parts.display,
         acceleration=acceleration,
+        curvature=np.ascontiguousarray(np.einsum("jn,sbcn->sbjc", parts.channels.row, acceleration)),
         propagator=propagator_table(acceleration, duration, step, order),
     )
