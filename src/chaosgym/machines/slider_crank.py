@@ -20,30 +20,19 @@ P. Gu, Chaotic Vibration in Machine Systems and Its Implications for Design, PhD
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from chaosgym.core.crank_propagator import FORCING_TERMS, propagator_table, series_order
 from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.errors import ParameterError
-from chaosgym.machines.crank_equations import (
-    SLIDER_ACROSS,
-    SLIDER_PITCH,
-    degrees_of_freedom,
-    equations,
-    rod_of,
-)
-from chaosgym.machines.kinematics import planar_motion
-from chaosgym.machines.parameters import parameter, parameters_of, validate
+from chaosgym.machines.crank_equations import SLIDER_ACROSS, degrees_of_freedom, equations
+from chaosgym.machines.crank_model import exact_model
+from chaosgym.machines.parameters import parameter, validate
 
 Array = NDArray[np.float64]
-
-MAX_PHASE = 8.0
-"""Longest step times largest eigenvalue that a Taylor series sums without loss of digits."""
 
 _FIT = "set S: search over the printed natures and forces of figures 4.13 to 4.16"
 _STEEL = "steel"
@@ -165,6 +154,10 @@ class SliderCrank:
         0.040, unit="m", low=1e-3, high=0.5, provenance="assumed", source="bearing length of about 100 mm"
     )
     """From the slider pivot to either station of an instrumented slider joint, along the guide [m]."""
+    ball_sensor_angle: float = parameter(
+        0.0, unit="deg", low=-180.0, high=180.0, provenance="assumed", source="not in print; symmetric to the plane"
+    )
+    """Direction halfway between the two in-plane sensors of an instrumented ball joint, from the rod's axis [deg]."""
     contact_law: str = parameter("linear", choices=("linear",), provenance="printed", source="thesis 3.3")
     """Force of a bearing surface: "linear" spring and damper."""
     contact_stiffness: float = parameter(
@@ -222,8 +215,8 @@ class SliderCrank:
                 )
         if self.motor_angle != 0.0:
             raise ParameterError(f"motor_angle = {self.motor_angle:g} deg is not implemented yet; allowed: 0 deg")
-        if self.ball_joint != "ideal":
-            raise ParameterError(f"ball_joint = {self.ball_joint!r} is not implemented yet; allowed: 'ideal'")
+        if self.ball_joint == "spherical":
+            raise ParameterError("ball_joint = 'spherical' is not implemented yet; allowed: 'ideal', 'instrumented'")
 
     @property
     def cycle_period(self) -> float:
@@ -261,13 +254,8 @@ class SliderCrank:
 
         Machines that differ in clearance alone share all of it; those that differ in speed share the assembly.
         """
-        model = _at_speed(self.crank_speed, step_phase, *(getattr(self, field) for field in _STRUCTURE_FIELDS))
-        return model._replace(gap=_gaps(self))
+        return exact_model(self, step_phase)
 
-
-_STRUCTURE_FIELDS = tuple(
-    name for name in parameters_of(SliderCrank) if name not in ("crank_speed", "slider_clearance", "ball_clearance")
-)
 
 THESIS_SLIDER_CRANK = SliderCrank()
 """The planar mechanism of the thesis; ``parameters_of(SliderCrank)`` says where each number comes from."""
@@ -289,165 +277,3 @@ def frequencies_at(machine: SliderCrank, crank_angle: float) -> Array:
     at = np.ix_(free, free)
     squares = scipy.linalg.eigh(system.stiffness[0, 0][at], system.mass[0][at], eigvals_only=True)
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi))
-
-
-class _Channels(NamedTuple):
-    """Contact channels; see ``SliderCrankModel``. ``slides`` (m,): friction acts along the guide."""
-
-    row: Array
-    stiffness: Array
-    damping: Array
-    two_sided: NDArray[np.bool_]
-    reading: Array
-    slides: NDArray[np.bool_]
-
-
-def _channels(machine: SliderCrank) -> _Channels:
-    names = machine.degrees_of_freedom
-    rows = []
-    stations = (machine.sensor_distance, -machine.sensor_distance) if machine.slider_joint == "instrumented" else (0.0,)
-    for station in stations:
-        row = np.zeros(len(names))
-        row[names.index(SLIDER_ACROSS)] = 1.0
-        if machine.slider_joint == "instrumented":
-            row[names.index(SLIDER_PITCH)] = station
-        rows.append(row)
-    count = len(rows)
-    return _Channels(
-        row=np.array(rows),
-        stiffness=np.full(count, machine.contact_stiffness / count),
-        damping=np.full(count, machine.contact_damping / count),
-        two_sided=np.ones(count, dtype=bool),
-        reading=np.tile([0.0, -1.0], (count, 1)),
-        slides=np.ones(count, dtype=bool),
-    )
-
-
-def _gaps(machine: SliderCrank) -> Array:
-    count = 2 if machine.slider_joint == "instrumented" else 1
-    return np.full(count, machine.slider_clearance)
-
-
-class _Structure(NamedTuple):
-    """Accelerations of all bins by powers of the crank rate, whatever the speed and the clearance.
-
-    ``free`` (3, bins, 2n, n) per unit p and p'; ``forcing`` (2, bins, 4, n) of gravity and of squared crank rate;
-    ``push`` (sets, bins, 2n + m, n) what closed contacts add per unit p, p' and clearance; ``contact`` [rad/s] angular
-    frequency of the masses next to the closed contacts; ``spectrum`` [1/s] largest modulus of an eigenvalue.
-    """
-
-    channels: _Channels
-    radix: int
-    display: Array
-    free: Array
-    forcing: Array
-    push: Array
-    contact: float
-    spectrum: float
-
-
-def _forcing(inverse_mass: Array, loads: Array) -> Array:
-    """Cubics in the time of each bin through the loads at its nodes, as accelerations: (2, bins, 4, n)."""
-    bins, nodes = len(inverse_mass), FORCING_TERMS - 1
-    at = (np.arange(bins)[:, None] * nodes + np.arange(FORCING_TERMS)) % (bins * nodes)
-    coefficients = np.linalg.inv(np.vander(np.arange(FORCING_TERMS) / nodes, increasing=True))
-    return np.asarray(-np.einsum("bij,kbcj->kbci", inverse_mass, coefficients @ loads[:, at]))
-
-
-def _push(inverse_mass: Array, channels: _Channels, radix: int, friction: Array) -> Array:
-    """Accelerations that the closed contacts of every set add: (sets, bins, 2n + m, n).
-
-    ``friction`` (bins, n) is what one newton of contact force drives along the guide.
-    """
-    bins, n, m = len(inverse_mass), inverse_mass.shape[-1], len(channels.row)
-    push = np.zeros((radix**m, bins, 2 * n + m, n))
-    for chosen in range(radix**m):
-        for j in range(m):
-            digit = chosen // radix**j % radix
-            if digit:
-                row, sign = channels.row[j], 1.0 if digit == 1 else -1.0
-                force = row + sign * channels.slides[j] * friction
-                answer = np.einsum("bij,bj->bi", inverse_mass, force)[:, None, :]
-                push[chosen, :, :n] -= channels.stiffness[j] * row[:, None] * answer
-                push[chosen, :, n : 2 * n] -= channels.damping[j] * row[:, None] * answer
-                push[chosen, :, 2 * n + j] += channels.stiffness[j] * answer[:, 0]
-    return push
-
-
-def _rates(free: Array, pushed: Array, row: Array) -> tuple[float, float]:
-    """(contact, spectrum) of ``_Structure`` from the accelerations (b, 2n, n) of some bins with all contacts closed."""
-    n = free.shape[-1]
-    local = -row @ pushed[:, :n] @ np.linalg.pinv(row)
-    contact = math.sqrt(float(np.max(np.abs(np.linalg.eigvals(local)))))
-    system = np.zeros((len(free), 2 * n, 2 * n))
-    system[:, n:, :n] = np.eye(n)
-    system[:, :, n:] = free + pushed
-    return contact, float(np.max(np.abs(np.linalg.eigvals(system))))
-
-
-@lru_cache(maxsize=64)
-def _structure(*structure: Any) -> _Structure:
-    machine = SliderCrank(**dict(zip(_STRUCTURE_FIELDS, structure, strict=True)))
-    rod = rod_of(machine)
-    bins = round(360.0 / machine.matrix_update_interval)
-    width = 2.0 * math.pi / bins
-    middles = np.array([(b + 0.5) * width for b in range(bins)])
-    held = equations(machine, middles, rod)
-    n = held.mass.shape[-1]
-    inverse_mass = np.asarray(np.linalg.inv(held.mass), dtype=np.float64)
-    free = np.zeros((3, bins, 2 * n, n))
-    free[:, :, :n] = -np.swapaxes(inverse_mass @ held.stiffness, -1, -2)
-    free[:2, :, n:] = -np.swapaxes(inverse_mass @ held.damping, -1, -2)
-    nodes = FORCING_TERMS - 1
-    loads = equations(machine, np.array([k * width / nodes for k in range(bins * nodes)]), rod).load
-
-    channels = _channels(machine)
-    radix = 3 if machine.friction_coefficient > 0.0 else 2
-    push = _push(inverse_mass, channels, radix, _friction(machine, middles)[:, None] * held.slider_along)
-    some = [0, bins // 4]
-    contact, spectrum = _rates(free[0, some], push[-1, some, : 2 * n], channels.row)
-    return _Structure(
-        channels, radix, channels.row.mean(axis=0), free, _forcing(inverse_mass, loads), push, contact, spectrum
-    )
-
-
-def _friction(machine: SliderCrank, crank_angle: Array) -> Array:
-    """Friction coefficient with the sign of the nominal slider velocity, ramped through zero."""
-    motion = planar_motion(crank_angle, machine.crank_radius, machine.rod_length)
-    speed = motion.slider_rate / (machine.friction_ramp * machine.crank_radius)
-    return np.asarray(machine.friction_coefficient * np.clip(speed, -1.0, 1.0))
-
-
-@lru_cache(maxsize=64)
-def _at_speed(crank_speed: float, step_phase: float, *structure: Any) -> SliderCrankModel:
-    parts = _structure(*structure)
-    interval = structure[_STRUCTURE_FIELDS.index("matrix_update_interval")]
-    rate = crank_speed * math.pi / 30.0
-    duration = math.radians(interval) / rate
-    m = len(parts.channels.row)
-    sets, bins, _, n = parts.push.shape
-    acceleration = np.zeros((sets, bins, 2 * n + FORCING_TERMS + m, n))
-    acceleration[:, :, : 2 * n] = parts.free[0] + rate * parts.free[1] + rate**2 * parts.free[2]
-    acceleration[:, :, 2 * n : 2 * n + FORCING_TERMS] = parts.forcing[0] + rate**2 * parts.forcing[1]
-    acceleration[:, :, : 2 * n] += parts.push[:, :, : 2 * n]
-    acceleration[:, :, 2 * n + FORCING_TERMS :] = parts.push[:, :, 2 * n :]
-    steps = max(1, math.ceil(duration * max(parts.contact / step_phase, parts.spectrum / MAX_PHASE)))
-    step = duration / steps
-    order = series_order(parts.spectrum * step)
-    return SliderCrankModel(
-        bin_duration=duration,
-        steps=steps,
-        contact_rate=parts.contact,
-        order=order,
-        row=parts.channels.row,
-        gap=np.zeros(m),
-        stiffness=parts.channels.stiffness,
-        damping=parts.channels.damping,
-        two_sided=parts.channels.two_sided,
-        radix=parts.radix,
-        reading=parts.channels.reading,
-        display=parts.display,
-        acceleration=acceleration,
-        curvature=np.ascontiguousarray(np.einsum("jn,sbcn->sbjc", parts.channels.row, acceleration)),
-        propagator=propagator_table(acceleration, duration, step, order),
-    )
