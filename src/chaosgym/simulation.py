@@ -17,6 +17,8 @@ from tqdm import tqdm
 from chaosgym.core import status
 from chaosgym.core.fixed_step import advance_fixed_step
 from chaosgym.core.impact_beam import CycleArrays, Episode, advance
+from chaosgym.core.crank_stepper import SteppedCrankModel
+from chaosgym.core.crank_stepper import advance as advance_stepped_crank
 from chaosgym.core.slider_crank import advance as advance_slider_crank
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines.impact_beam import ImpactBeam
@@ -212,9 +214,9 @@ def _run_slider_crank(
     arrays = _cycle_arrays(cycles, 2 * len(crank.degrees_of_freedom), samples)
     coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
-    outcome, done = advance_slider_crank(
-        model, coordinates, episode, arrays, integrator.event_tolerance / model.contact_rate, integrator.event_budget
-    )
+    tolerance, budget = integrator.event_tolerance / model.contact_rate, integrator.event_budget
+    kernel = advance_stepped_crank if isinstance(model, SteppedCrankModel) else advance_slider_crank
+    outcome, done = kernel(model, coordinates, episode, arrays, tolerance, budget)
     return outcome, done, _record(crank, arrays, MotionState(coordinates, bouncing))
 
 

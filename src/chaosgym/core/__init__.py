@@ -21,6 +21,15 @@ KERNEL_CACHE = os.path.join(_cache_root, _digest)
 _previous_cache_folder = config.CACHE_DIR
 config.CACHE_DIR = KERNEL_CACHE
 try:
-    from chaosgym.core import contact, crank_propagator, fixed_step, impact_beam, propagator, slider_crank, status  # noqa: F401
+    from chaosgym.core import (  # noqa: F401
+        contact,
+        crank_propagator,
+        crank_stepper,
+        fixed_step,
+        impact_beam,
+        propagator,
+        slider_crank,
+        status,
+    )
 finally:
     config.CACHE_DIR = _previous_cache_folder

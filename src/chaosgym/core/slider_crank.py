@@ -209,6 +209,12 @@ def suspect_open(model, j, side, h, y0, v0, y1, v1):
 
 
 @njit(cache=True, inline="always")
+def monitored(model, j):
+    """True if channel j belongs to the joint that is recorded."""
+    return model.reading[j, 0] != 0.0 or model.reading[j, 1] != 0.0
+
+
+@njit(cache=True, inline="always")
 def column_of(model, j, side):
     """Side of the record on which a touch of channel j counts: UPPER where the force points up."""
     return UPPER if model.reading[j, 1] * side > 0.0 else LOWER
@@ -219,7 +225,7 @@ def note_contact(model, side, time, contact_time):
     """Add ``time`` to the sides of the record (2,) on which a channel is closed."""
     upper, lower = False, False
     for j in range(side.shape[0]):
-        if side[j] != 0.0:
+        if side[j] != 0.0 and monitored(model, j):
             if column_of(model, j, side[j]) == UPPER:
                 upper = True
             else:
@@ -490,11 +496,11 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                     side[first] = 0.0
                 else:
                     side[first] = towards
-                    column = column_of(model, first, towards)
-                    arrays.impacts[cycle, column] += 1
-                    note_touch(
-                        episode, 1.0 if column == UPPER else -1.0, b * duration + time + h, arrays.bounce_time[cycle]
-                    )
+                    if monitored(model, first):
+                        column = column_of(model, first, towards)
+                        arrays.impacts[cycle, column] += 1
+                        upward = 1.0 if column == UPPER else -1.0
+                        note_touch(episode, upward, b * duration + time + h, arrays.bounce_time[cycle])
                 put_sides(model, side, z)
                 chosen = contact_set(model, side)
                 a = model.acceleration[chosen, b]

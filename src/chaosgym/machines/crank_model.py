@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.core.crank_propagator import FORCING_TERMS, propagator_table, series_order
+from chaosgym.core.crank_stepper import HERTZ, LINEAR, SteppedCrankModel
 from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.machines.crank_equations import BALL_ACROSS, BALL_ALONG, SLIDER_ACROSS, SLIDER_PITCH, equations, rod_of
 from chaosgym.machines.kinematics import planar_motion
@@ -26,6 +27,9 @@ Array = NDArray[np.float64]
 
 MAX_PHASE = 8.0
 """Longest step times largest eigenvalue that a Taylor series sums without loss of digits."""
+
+STABLE_PHASE = 2.0
+"""Longest Runge-Kutta step times largest eigenvalue; the method is stable up to 2.7."""
 
 KEPT = 64
 """Machines, and machines at one speed, whose matrices are kept."""
@@ -128,6 +132,121 @@ def _display(machine: "SliderCrank") -> Array:
     return np.array([float(other == name) for other in machine.degrees_of_freedom])
 
 
+class _Joint(NamedTuple):
+    """A joint of the stepper; see ``SteppedCrankModel``. ``scale`` multiplies stiffness and damping."""
+
+    row: Array
+    gap: float
+    scale: float
+    two_sided: bool
+    reading: Array
+    slides: bool
+
+
+def _joints(machine: "SliderCrank") -> list[_Joint]:
+    """Every channel is a joint with one row; a spherical ball joint is one with two."""
+    joints = []
+    if machine.slider_joint != "ideal" or machine.ball_joint == "instrumented":
+        channels, gaps = _channels(machine), _gaps(machine)
+        joints = [
+            _Joint(
+                row=channels.row[[j]],
+                gap=float(gaps[j]),
+                scale=float(channels.stiffness[j]) / machine.contact_stiffness,
+                two_sided=bool(channels.two_sided[j]),
+                reading=channels.reading[[j]],
+                slides=bool(channels.slides[j]),
+            )
+            for j in range(len(gaps))
+        ]
+    if machine.ball_joint == "spherical":
+        names = machine.degrees_of_freedom
+        row = np.array([[-float(name == other) for name in names] for other in (BALL_ALONG, BALL_ACROSS)])
+        monitored = 1.0 if machine.monitored_joint == "ball" else 0.0
+        joints.append(_Joint(row, machine.ball_clearance, 1.0, True, monitored * np.eye(2), False))
+    return joints
+
+
+def _hertz(machine: "SliderCrank") -> tuple[float, float]:
+    """K [N/m^1.5] and chi [s/m] with the linear law's secant stiffness and restitution at the reference force.
+
+    Half a swing of the linear law leaves e = exp(-pi zeta / sqrt(1 - zeta^2)) of the speed v at which slider and yoke
+    strike; Hunt and Crossley's law leaves about 1 - (2/3) chi v.
+    """
+    force, linear, zeta = machine.hertz_reference_force, machine.contact_stiffness, machine.contact_damping_ratio
+    depth = force / linear
+    stiffness = force / depth**1.5
+    speed = math.sqrt(0.8 * stiffness * depth**2.5 / (machine.slider_mass + machine.yoke_mass))
+    restitution = math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta**2)) if zeta < 1.0 else 0.0
+    return stiffness, 1.5 * (1.0 - restitution) / speed
+
+
+@lru_cache(maxsize=KEPT)
+def _held(kind: type, *structure: Any) -> tuple[Array, Array, Array, Array]:
+    """Inverse mass, free accelerations and forcing of all bins as in ``_Structure``, and friction per newton."""
+    machine = kind(**dict(zip(_structure_fields(kind), structure, strict=True)))
+    rod = rod_of(machine)
+    bins = round(360.0 / machine.matrix_update_interval)
+    width = 2.0 * math.pi / bins
+    middles = np.array([(b + 0.5) * width for b in range(bins)])
+    held = equations(machine, middles, rod)
+    n = held.mass.shape[-1]
+    inverse_mass = np.asarray(np.linalg.inv(held.mass), dtype=np.float64)
+    free = np.zeros((3, bins, 2 * n, n))
+    free[:, :, :n] = -np.swapaxes(inverse_mass @ held.stiffness, -1, -2)
+    free[:2, :, n:] = -np.swapaxes(inverse_mass @ held.damping, -1, -2)
+    nodes = FORCING_TERMS - 1
+    loads = equations(machine, np.array([k * width / nodes for k in range(bins * nodes)]), rod).load
+    friction = _friction(machine, middles)[:, None] * held.slider_along
+    return inverse_mass, free, _forcing(inverse_mass, loads), friction
+
+
+def _free_motion(free: Array, forcing: Array, rate: float) -> Array:
+    """Accelerations without contact at a crank rate, (bins, 2n + 4, n)."""
+    return np.concatenate(
+        [free[0] + rate * free[1] + rate**2 * free[2], forcing[0] + rate**2 * forcing[1]], axis=1
+    )
+
+
+def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankModel:
+    """Model of any machine for the Runge-Kutta stepper, a closed contact turning by ``step_phase`` / 4 in a step."""
+    inverse_mass, free, forcing, friction = _held(*_key(machine))
+    joints = _joints(machine)
+    row = np.concatenate([joint.row for joint in joints])
+    acceleration = _free_motion(free, forcing, machine.crank_rate)
+    scale = np.array([joint.scale for joint in joints])
+    first = np.cumsum([0] + [len(joint.row) for joint in joints])
+    linear = machine.contact_law == "linear"
+    stiffness, damping = (machine.contact_stiffness, machine.contact_damping) if linear else _hertz(machine)
+    answer = np.ascontiguousarray(np.swapaxes(inverse_mass @ row.T, -1, -2))
+    slide = -np.einsum("bij,bj->bi", inverse_mass, friction)
+    contact = math.sqrt(machine.contact_stiffness * np.max(np.einsum("brn,rn->br", answer, row)))
+    bins = len(inverse_mass)
+    duration = 2.0 * math.pi / (bins * machine.crank_rate)
+    n = len(row[0])
+    system = np.zeros((bins, 2 * n, 2 * n))
+    system[:, n:, :n] = np.eye(n)
+    system[:, :, n:] = acceleration[:, : 2 * n]
+    spectrum = float(np.max(np.abs(np.linalg.eigvals(system[[0, bins // 4]]))))
+    return SteppedCrankModel(
+        bin_duration=duration,
+        steps=max(1, math.ceil(duration * max(4.0 * contact / step_phase, spectrum / STABLE_PHASE))),
+        contact_rate=contact,
+        acceleration=acceleration,
+        first=first,
+        row=row,
+        answer=answer,
+        friction=np.stack([slide * joint.slides for joint in joints], axis=1),
+        gap=np.array([joint.gap for joint in joints]),
+        stiffness=stiffness * scale,
+        damping=damping * scale if linear else np.full(len(joints), damping),
+        law=LINEAR if linear else HERTZ,
+        two_sided=np.array([joint.two_sided for joint in joints]),
+        reading=np.concatenate([joint.reading for joint in joints]),
+        display=_display(machine),
+    )
+
+
 class _Structure(NamedTuple):
     """Accelerations of all bins by powers of the crank rate, whatever the speed and the clearance.
 
@@ -188,25 +307,13 @@ def _rates(free: Array, pushed: Array, row: Array) -> tuple[float, float]:
 @lru_cache(maxsize=KEPT)
 def _structure(kind: type, *structure: Any) -> _Structure:
     machine = kind(**dict(zip(_structure_fields(kind), structure, strict=True)))
-    rod = rod_of(machine)
-    bins = round(360.0 / machine.matrix_update_interval)
-    width = 2.0 * math.pi / bins
-    middles = np.array([(b + 0.5) * width for b in range(bins)])
-    held = equations(machine, middles, rod)
-    n = held.mass.shape[-1]
-    inverse_mass = np.asarray(np.linalg.inv(held.mass), dtype=np.float64)
-    free = np.zeros((3, bins, 2 * n, n))
-    free[:, :, :n] = -np.swapaxes(inverse_mass @ held.stiffness, -1, -2)
-    free[:2, :, n:] = -np.swapaxes(inverse_mass @ held.damping, -1, -2)
-    nodes = FORCING_TERMS - 1
-    loads = equations(machine, np.array([k * width / nodes for k in range(bins * nodes)]), rod).load
-
+    inverse_mass, free, forcing, friction = _held(kind, *structure)
+    n = inverse_mass.shape[-1]
     channels = _channels(machine)
     radix = 3 if machine.friction_coefficient > 0.0 else 2
-    push = _push(inverse_mass, channels, radix, _friction(machine, middles)[:, None] * held.slider_along)
-    some = [0, bins // 4]
+    push = _push(inverse_mass, channels, radix, friction)
+    some = [0, len(inverse_mass) // 4]
     contact, spectrum = _rates(free[0, some], push[-1, some, : 2 * n], channels.row)
-    forcing = _forcing(inverse_mass, loads)
     return _Structure(channels, radix, _display(machine), free, forcing, push, contact, spectrum)
 
 
@@ -225,8 +332,7 @@ def _at_speed(crank_speed: float, step_phase: float, *structure: Any) -> SliderC
     rate = crank_speed * math.pi / 30.0
     duration = 2.0 * math.pi / (bins * rate)
     acceleration = np.zeros((sets, bins, 2 * n + FORCING_TERMS + m, n))
-    acceleration[:, :, : 2 * n] = parts.free[0] + rate * parts.free[1] + rate**2 * parts.free[2]
-    acceleration[:, :, 2 * n : 2 * n + FORCING_TERMS] = parts.forcing[0] + rate**2 * parts.forcing[1]
+    acceleration[:, :, : 2 * n + FORCING_TERMS] = _free_motion(parts.free, parts.forcing, rate)
     acceleration[:, :, : 2 * n] += parts.push[:, :, : 2 * n]
     acceleration[:, :, 2 * n + FORCING_TERMS :] = parts.push[:, :, 2 * n :]
     steps = max(1, math.ceil(duration * max(parts.contact / step_phase, parts.spectrum / MAX_PHASE)))
