@@ -5,6 +5,7 @@ changes and the motion goes on from the state in which the last step ended.
 """
 
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
@@ -40,7 +41,30 @@ WIDEST_TOLERANCE = 4.0
 RENDER_SAMPLES = 1000
 """Samples of the motion kept in each cycle for rendering."""
 
+KEPT_MACHINES = 256
+"""Machines at one speed that are kept: checking all fields of a new one takes longer than a look-up."""
+
 METADATA: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}
+
+
+def nominal_machine(reference: Machine, parameters: Mapping[str, Any]) -> Machine:
+    """Return the reference machine with some fields replaced, but not its speed.
+
+    Raises
+    ------
+    ParameterError
+        If a field is the speed, unknown, or out of range.
+    """
+    if reference.speed_field in parameters:
+        raise ParameterError(
+            f"{reference.speed_field} is what the agent commands; set lowest_speed and highest_speed instead"
+        )
+    return with_settings(reference, parameters)
+
+
+@lru_cache(maxsize=KEPT_MACHINES)
+def _at_speed(machine: Machine, speed: float) -> Machine:
+    return with_settings(machine, {machine.speed_field: speed})
 
 
 class MachineEnv(gym.Env[Observation, Action]):
@@ -99,15 +123,11 @@ class MachineEnv(gym.Env[Observation, Action]):
         )
         self.observation_space = cast(Space[Observation], self._space)
         self.action_space = cast(Space[Action], Box(-1.0, 1.0, (1,), np.float32))
-        self.machine = self._at_speed(machine, drive.lowest_speed)
-        self._job_time = task.job_cycles * self._at_speed(machine, drive.highest_speed).cycle_period
+        self.machine = _at_speed(machine, drive.lowest_speed)
+        self._job_time = task.job_cycles * _at_speed(machine, drive.highest_speed).cycle_period
         self._damage = np.zeros(len(machine.sides))
         self._motion: MotionState | None = None
         self._dashboard: Dashboard | None = None
-
-    @staticmethod
-    def _at_speed(machine: Machine, speed: float) -> Machine:
-        return with_settings(machine, {machine.speed_field: speed})
 
     @property
     def speed(self) -> float:
@@ -163,7 +183,8 @@ class MachineEnv(gym.Env[Observation, Action]):
         """
         super().reset(seed=seed)
         speed = self._starting_speed(options or {})
-        self.machine = self._at_speed(self._draw_machine(), speed)
+        self._drawn = self._draw_machine()
+        self.machine = _at_speed(self._drawn, speed)
         self._motion = None
         self._action = self.drive.action_for(speed)
         self._cycles_done = 0
@@ -182,7 +203,7 @@ class MachineEnv(gym.Env[Observation, Action]):
             if name != "speed":
                 raise ParameterError(f"options has no entry {name!r}; allowed: speed")
         low, high = self.drive.lowest_speed, self.drive.highest_speed
-        return checked_number("options['speed']", options.get("speed", low), low, high)
+        return self.drive.rounded(checked_number("options['speed']", options.get("speed", low), low, high))
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Run one step; a simulation that fails ends the job instead of raising.
@@ -199,7 +220,7 @@ class MachineEnv(gym.Env[Observation, Action]):
         self._action, target = self.drive.target_of(action)
         speed = self.drive.approach(self.speed, target)
         if speed != self.speed:
-            self.machine = self._at_speed(self.machine, speed)
+            self.machine = _at_speed(self._drawn, speed)
         cycles = self.task.cycles_per_step
         damage_before = self.damage
         try:
