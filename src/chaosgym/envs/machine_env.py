@@ -5,6 +5,7 @@ changes and the motion goes on from the state in which the last step ended.
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, cast
 
@@ -114,7 +115,7 @@ class MachineEnv(gym.Env[Observation, Action]):
             raise ParameterError(f"render_mode = {render_mode!r} is not one of None, human, rgb_array")
         self.render_mode = render_mode
         self.nominal, self.drive, self.task = machine, drive, task
-        self._tolerances, self._is_type_iii = tolerances, is_type_iii
+        self.tolerances, self._is_type_iii = dict(tolerances), is_type_iii
         self._tolerance = checked_number("tolerance", tolerance, 0.0, WIDEST_TOLERANCE)
         self._sensor_error = checked_number("sensor_error", sensor_error, 0.0, FORCE_RANGE * task.force_limit)
         self.observation_names = observation_names(task.cycles_per_step)
@@ -142,20 +143,25 @@ class MachineEnv(gym.Env[Observation, Action]):
     def _draw_machine(self) -> Machine:
         if self._tolerance == 0.0:
             return self.nominal
-        factors = 1.0 + self._tolerance * self.np_random.uniform(-1.0, 1.0, len(self._tolerances)) * np.array(
-            list(self._tolerances.values())
+        factors = 1.0 + self._tolerance * self.np_random.uniform(-1.0, 1.0, len(self.tolerances)) * np.array(
+            list(self.tolerances.values())
         )
         drawn = {
             name: getattr(self.nominal, name) * float(factor)
-            for name, factor in zip(self._tolerances, factors, strict=True)
+            for name, factor in zip(self.tolerances, factors, strict=True)
         }
         return with_settings(self.nominal, drawn)
 
     def _run(self, cycles: int) -> CycleRecord:
-        samples = 0 if self.render_mode is None else RENDER_SAMPLES
-        record = simulate(self.machine, cycles, self._motion, samples_per_cycle=samples)
+        record = simulate(self.machine, cycles, self._motion)
         self._motion = record.final_state
         return record
+
+    def _shown(self) -> CycleRecord:
+        """Last step with a time history, each cycle run once more from its start: showing it changes no bit of it."""
+        machine = self._record.machine
+        runs = [simulate(machine, 1, state, samples_per_cycle=RENDER_SAMPLES) for state in self._record.section]
+        return replace(self._record, history=np.concatenate([run.history for run in runs if run.history is not None]))
 
     def _observe(self) -> Observation:
         measured = measured_peaks(self._record, self._sensor_error, self.np_random)
@@ -193,7 +199,7 @@ class MachineEnv(gym.Env[Observation, Action]):
         self._recent_peaks = run_in.peak_force[:, 0]
         self._record = run_in.after(len(run_in) - self.task.cycles_per_step)
         if self.render_mode is not None:
-            self._show().start(self._record)
+            self._show().start(self._shown())
             if self.render_mode == "human":
                 self.render()
         return self._observe(), {"speed": speed, "damage": 0.0, "status": int(Status.RUNNING)}
@@ -250,7 +256,7 @@ class MachineEnv(gym.Env[Observation, Action]):
         if status != Status.RUNNING:
             self._motion = None
         if self.render_mode is not None:
-            self._show().add(self._record, type_iii)
+            self._show().add(self._shown(), type_iii)
             if self.render_mode == "human":
                 self.render()
         return observation, reward, status != Status.RUNNING, False, info
