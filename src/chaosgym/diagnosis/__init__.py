@@ -1,6 +1,7 @@
 """What kind of response is this? Tests take a ``CycleRecord`` or a plain array of one sample a cycle."""
 
 from chaosgym.diagnosis.agreement import AgreementTable, agreement, random_machines
+from chaosgym.diagnosis.criteria import CriterionRate, PredictiveCriterion, criterion_rate, predictive_criteria
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.lyapunov import (
     LyapunovExponent,
@@ -9,6 +10,8 @@ from chaosgym.diagnosis.lyapunov import (
     lyapunov_spectrum,
     two_trajectory_exponent,
 )
+from chaosgym.diagnosis.matrix_update import compare_attractors, compare_outcomes, matrix_update_test
+from chaosgym.diagnosis.measured import CycleSamples, cycles_of, read_peaks, read_series
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
 from chaosgym.diagnosis.response import NATURES, STATUSES, TYPES, Diagnosis, Nature, Status, Type
 from chaosgym.diagnosis.response_type import (
@@ -23,6 +26,16 @@ from chaosgym.diagnosis.response_type import (
     response_type,
     types_on_grid,
 )
+from chaosgym.diagnosis.routes import (
+    Intermittency,
+    Precursors,
+    WarningRate,
+    bounce_fraction,
+    find_crises,
+    find_intermittency,
+    precursors,
+    warning_rates,
+)
 from chaosgym.diagnosis.spectrum import Spectrum, power_spectrum
 from chaosgym.diagnosis.stroboscopic import Recurrence, find_recurrence
 from chaosgym.diagnosis.two_step import two_step_test
@@ -33,11 +46,16 @@ __all__ = [
     "STATUSES",
     "TYPES",
     "AgreementTable",
+    "CriterionRate",
+    "CycleSamples",
     "Diagnosis",
+    "Intermittency",
     "LyapunovExponent",
     "Nature",
     "Neighbour",
     "PeriodicOrbit",
+    "Precursors",
+    "PredictiveCriterion",
     "Recurrence",
     "ResponseMap",
     "ResponseType",
@@ -45,22 +63,36 @@ __all__ = [
     "Status",
     "Tolerance",
     "Type",
+    "WarningRate",
     "agreement",
+    "bounce_fraction",
+    "compare_attractors",
+    "compare_outcomes",
+    "criterion_rate",
+    "cycles_of",
     "default_tolerances",
     "diagnose",
     "exponent_from_series",
+    "find_crises",
+    "find_intermittency",
     "find_periodic_orbit",
     "find_recurrence",
     "geometric_grid",
     "judge_type",
     "largest_lyapunov_exponent",
     "lyapunov_spectrum",
+    "matrix_update_test",
     "power_spectrum",
+    "precursors",
+    "predictive_criteria",
     "random_machines",
+    "read_peaks",
+    "read_series",
     "response_map",
     "response_type",
     "two_step_test",
     "two_trajectory_exponent",
     "types_on_grid",
+    "warning_rates",
     "zero_one_statistic",
 ]
