@@ -24,6 +24,7 @@ from chaosgym.diagnosis.response_type import (
     judge_type,
     response_map,
     response_type,
+    type_stability,
     types_on_grid,
 )
 from chaosgym.diagnosis.routes import (
@@ -92,6 +93,7 @@ __all__ = [
     "response_type",
     "two_step_test",
     "two_trajectory_exponent",
+    "type_stability",
     "types_on_grid",
     "warning_rates",
     "zero_one_statistic",

@@ -60,6 +60,7 @@ def poincare_section(record: CycleRecord, ax: Axes | None = None) -> Axes:
     ax = _axes(ax)
     ax.plot(1e3 * record.displacement, record.velocity, ".", ms=3)
     ax.set(xlabel="displacement [mm]", ylabel="velocity [m/s]", title="Poincaré section")
+    ax.locator_params(nbins=5)
     return ax
 
 
