@@ -11,7 +11,6 @@ from chaosgym.diagnosis.lyapunov import (
     two_trajectory_exponent,
 )
 from chaosgym.diagnosis.matrix_update import compare_attractors, compare_outcomes, matrix_update_test
-from chaosgym.diagnosis.measured import CycleSamples, cycles_of, read_peaks, read_series
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
 from chaosgym.diagnosis.response import NATURES, STATUSES, TYPES, Diagnosis, Nature, Status, Type
 from chaosgym.diagnosis.response_type import (
@@ -48,7 +47,6 @@ __all__ = [
     "TYPES",
     "AgreementTable",
     "CriterionRate",
-    "CycleSamples",
     "Diagnosis",
     "Intermittency",
     "LyapunovExponent",
@@ -70,7 +68,6 @@ __all__ = [
     "compare_attractors",
     "compare_outcomes",
     "criterion_rate",
-    "cycles_of",
     "default_tolerances",
     "diagnose",
     "exponent_from_series",
@@ -87,8 +84,6 @@ __all__ = [
     "precursors",
     "predictive_criteria",
     "random_machines",
-    "read_peaks",
-    "read_series",
     "response_map",
     "response_type",
     "two_step_test",

@@ -1,143 +1,84 @@
-"""How is a measured response brought to one sample a cycle? Reading and checking of CSV files."""
+"""How does a measured signal become one sample a cycle? Peak forces as they are, time series cut into periods."""
 
-import csv
-import math
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.diagnosis.stroboscopic import MIN_CYCLES
 from chaosgym.errors import DiagnosisError
 
 Array = NDArray[np.float64]
 
-JITTER = 0.01
-"""Largest deviation of a sampling interval from the median that still counts as even."""
+UNEVEN = 1e-3
+"""Largest deviation of a sampling interval from their mean, as a share, that counts as even sampling."""
 
-MIN_SAMPLES_PER_CYCLE = 4
-"""Fewest samples a cycle of a time history whose peaks mean anything."""
-
-
-@dataclass(frozen=True)
-class CycleSamples:
-    """A time history reduced to its cycles: ``peak`` (cycles,) largest value, ``section`` (cycles,) first value."""
-
-    peak: Array
-    section: Array
+FEWEST_SAMPLES = 8
+"""Samples that a period must have."""
 
 
-def read_peaks(path: str | Path) -> Array:
-    """Peak force of each cycle from a CSV file of one column, (cycles,).
+def read_columns(path: str | Path, columns: int) -> Array:
+    """Read numbers from a comma-separated file, (rows, columns); a first line that is not numeric is a header.
 
     Raises
     ------
     DiagnosisError
-        If the file can't be read, has several columns, fewer than 16 rows, values that are no numbers or not finite,
-        or one value throughout; names the file and the row.
+        If the file can't be read, or has another number of columns, or an entry that is not a finite number.
     """
-    peaks = _read(path, 1)[:, 0]
-    _check_varies(peaks, path)
-    return peaks
-
-
-def read_series(path: str | Path, period_s: float) -> CycleSamples:
-    """Cycles of a time history in a CSV file with the columns time [s] and value.
-
-    Parameters
-    ----------
-    path
-        File; a header line is allowed.
-    period_s
-        Duration of one operating cycle [s].
-
-    Raises
-    ------
-    DiagnosisError
-        As ``read_peaks``, and if the sampling is uneven or too coarse.
-    """
-    table = _read(path, 2)
-    _check_varies(table[:, 1], path)
-    return cycles_of(table[:, 0], table[:, 1], period_s)
-
-
-def cycles_of(time: ArrayLike, values: ArrayLike, period_s: float) -> CycleSamples:
-    """Reduce an evenly sampled time history to its whole cycles.
-
-    Parameters
-    ----------
-    time, values : (samples,)
-        Instants [s] and what was measured then.
-    period_s
-        Duration of one operating cycle [s].
-
-    Raises
-    ------
-    DiagnosisError
-        If the lengths differ, values are not finite, the sampling is uneven or coarser than four samples a cycle, or
-        there are fewer than 16 cycles.
-    """
-    t, x = np.asarray(time, dtype=float), np.asarray(values, dtype=float)
-    if not math.isfinite(period_s) or period_s <= 0.0:
-        raise DiagnosisError(f"period_s = {period_s!r} s is out of range; allowed: above 0")
-    if t.ndim != 1 or t.shape != x.shape or len(t) < 2:
-        raise DiagnosisError(f"time has shape {t.shape} and values {x.shape}; allowed: two equal lengths of 2 or more")
-    if not (np.isfinite(t).all() and np.isfinite(x).all()):
-        row = int(np.flatnonzero(~(np.isfinite(t) & np.isfinite(x)))[0])
-        raise DiagnosisError(f"sample {row} is not finite; allowed: finite times and values")
-    intervals = np.diff(t)
-    step = float(np.median(intervals))
-    if step <= 0.0 or np.max(np.abs(intervals - step)) > JITTER * step:
-        row = int(np.argmax(np.abs(intervals - step)))
-        raise DiagnosisError(
-            f"the series is sampled unevenly: {intervals[row]:.3g} s after sample {row}, but {step:.3g} s as a rule; "
-            "allowed: equal intervals within 1 %"
-        )
-    per_cycle = period_s / step
-    if per_cycle < MIN_SAMPLES_PER_CYCLE:
-        raise DiagnosisError(f"{per_cycle:.2g} samples a cycle are too few; allowed: {MIN_SAMPLES_PER_CYCLE} or more")
-    cycles = int((t[-1] - t[0] + (1.0 + 1e-6) * step) / period_s)
-    if cycles < MIN_CYCLES:
-        raise DiagnosisError(f"the series has {cycles} whole cycles; allowed: {MIN_CYCLES} or more")
-    starts = t[0] + period_s * np.arange(cycles + 1)
-    index = np.searchsorted(t, starts - 1e-6 * step)
-    peak = np.array([x[a:b].max() for a, b in pairwise(index)])
-    return CycleSamples(peak, np.interp(starts[:-1], t, x))
-
-
-def _read(path: str | Path, columns: int) -> Array:
     try:
-        with open(path, newline="") as file:
-            rows = [row for row in csv.reader(file) if any(cell.strip() for cell in row)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        lines = [line.strip() for line in Path(path).read_text().splitlines() if line.strip()]
+    except (OSError, UnicodeDecodeError) as error:
         raise DiagnosisError(f"{path} can't be read: {error}") from error
-    if rows and not _is_number(rows[0][0]):
-        rows = rows[1:]
-    values = np.empty((len(rows), columns))
-    for number, row in enumerate(rows, start=1):
+    rows = []
+    for number, line in enumerate(lines, start=1):
+        parts = line.split(",")
+        try:
+            row = [float(part) for part in parts]
+        except ValueError:
+            if number == 1:
+                continue
+            raise DiagnosisError(f"{path}, line {number}: {line[:40]!r} is not a number") from None
         if len(row) != columns:
-            raise DiagnosisError(f"{path} has {len(row)} columns in data row {number}; allowed: {columns}")
-        for k, cell in enumerate(row):
-            if not _is_number(cell) or not math.isfinite(float(cell)):
-                raise DiagnosisError(f"{path} has {cell.strip()!r} in data row {number}; allowed: finite numbers")
-            values[number - 1, k] = float(cell)
-    if len(values) < MIN_CYCLES:
-        raise DiagnosisError(f"{path} has {len(values)} data rows; allowed: {MIN_CYCLES} or more")
-    return values
+            raise DiagnosisError(f"{path}, line {number} has {len(row)} columns; allowed: {columns}")
+        if not np.all(np.isfinite(row)):
+            raise DiagnosisError(f"{path}, line {number}: {line[:40]!r} is not finite")
+        rows.append(row)
+    if not rows:
+        raise DiagnosisError(f"{path} holds no numbers")
+    return np.array(rows)
 
 
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
+def samples_per_period(time: ArrayLike, value: ArrayLike, period: float) -> Array:
+    """Two samples a period from a time series: the value at its start, and its largest modulus, (periods, 2).
 
+    Parameters
+    ----------
+    time : (n,)
+        Evenly spaced instants [s].
+    value : (n,)
+        The signal.
+    period
+        Operating cycle [s]; periods start at the first instant, and an incomplete last one is left out.
 
-def _check_varies(values: Array, path: str | Path) -> None:
-    if np.ptp(values) == 0.0:
+    Raises
+    ------
+    DiagnosisError
+        If the sampling is uneven, coarser than 8 samples a period, or the series shorter than one period.
+    """
+    instants, signal = np.asarray(time, dtype=float), np.asarray(value, dtype=float)
+    steps = np.diff(instants)
+    if not np.isfinite(period) or period <= 0.0:
+        raise DiagnosisError(f"period = {period:g} s is out of range; allowed: above 0")
+    if len(steps) == 0 or np.any(np.abs(steps - steps.mean()) > UNEVEN * abs(steps.mean())) or steps.mean() <= 0.0:
+        raise DiagnosisError("the series is sampled unevenly; resample it at equal, increasing instants")
+    if period < FEWEST_SAMPLES * steps.mean():
         raise DiagnosisError(
-            f"{path} holds {values[0]:g} throughout: a dead sensor or contact; allowed: a response that varies"
+            f"period = {period:g} s holds {period / steps.mean():.1f} samples; allowed: at least {FEWEST_SAMPLES}"
         )
+    periods = int((instants[-1] - instants[0]) / period * (1.0 + 1e-12))
+    if periods < 1:
+        raise DiagnosisError(f"the series lasts {instants[-1] - instants[0]:g} s, less than one period of {period:g} s")
+    starts = instants[0] + period * np.arange(periods + 1)
+    edges = np.searchsorted(instants, starts - 0.5 * steps.mean())
+    largest = [np.max(np.abs(signal[first:last])) for first, last in pairwise(edges)]
+    return np.column_stack([np.interp(starts[:-1], instants, signal), largest])

@@ -161,8 +161,10 @@ def judge_type(
     return "I", "periodic throughout the neighbourhood, peak force less than 10 % higher"
 
 
-def types_on_grid(natures: ArrayLike, largest_peaks: ArrayLike, axes: Sequence[int] | None = None) -> NDArray[np.str_]:
-    """Types of all points of a grid whose neighbours are the points of the grid one and two steps away.
+def types_on_grid(
+    natures: ArrayLike, largest_peaks: ArrayLike, axes: Sequence[int] | None = None, reach: Sequence[int] | int = 2
+) -> NDArray[np.str_]:
+    """Types of all points of a grid whose neighbours are the points of the grid up to ``reach`` steps away.
 
     Parameters
     ----------
@@ -172,6 +174,8 @@ def types_on_grid(natures: ArrayLike, largest_peaks: ArrayLike, axes: Sequence[i
         Largest peak force at each point.
     axes
         Axes along which tolerances lie; all by default. At the border neighbours of one side are missing.
+    reach
+        Steps of the grid in one tolerance, for all of ``axes`` or for each.
 
     Returns
     -------
@@ -181,11 +185,12 @@ def types_on_grid(natures: ArrayLike, largest_peaks: ArrayLike, axes: Sequence[i
     if nature.shape != peak.shape:
         raise DiagnosisError(f"natures have shape {nature.shape} and peaks {peak.shape}; allowed: the same shape")
     chosen = range(nature.ndim) if axes is None else axes
+    reaches = [reach] * len(chosen) if isinstance(reach, int) else reach
     types = np.empty(nature.shape, dtype="<U12")
     for index in np.ndindex(nature.shape):
         neighbours = []
-        for axis in chosen:
-            for step in (-2, -1, 1, 2):
+        for axis, far in zip(chosen, reaches, strict=True):
+            for step in (*range(-far, 0), *range(1, far + 1)):
                 place = index[axis] + step
                 if 0 <= place < nature.shape[axis]:
                     at = (*index[:axis], place, *index[axis + 1 :])
