@@ -6,7 +6,7 @@ while there are only spectral lines (quasiperiodic). Transient chaos is judged b
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from time import thread_time
 from typing import Any, NamedTuple
 
@@ -271,7 +271,7 @@ def _judge(machine: Machine, tests: Sequence[RecordTest], reference_cycles: int,
     cycles, seconds = [], []
     for test in tests:
         window = slice(test.transient, test.transient + test.cycles)
-        part = _rows(record, window)
+        part = record.until(window.stop).after(window.start)
         began = thread_time()
         votes.append(test.judge(part, growth[window]))
         seconds.append(thread_time() - began + per_cycle * window.stop)
@@ -282,11 +282,6 @@ def _judge(machine: Machine, tests: Sequence[RecordTest], reference_cycles: int,
     cycles.append(float(verdict.evidence["cycles_used"]))
     votes.append(_eventual(verdict))
     return _Point(reference_nature(record, growth), tuple(votes), tuple(cycles), tuple(seconds))
-
-
-def _rows(record: CycleRecord, window: slice) -> CycleRecord:
-    names = ("section", "displacement", "velocity", "peak_force", "impacts", "contact_fraction", "bounce_duration")
-    return replace(record, **{name: getattr(record, name)[window] for name in names})
 
 
 def _eventual(verdict: Diagnosis) -> Nature:

@@ -7,10 +7,10 @@ After 100, 200, 400 ... cycles from the initial condition:
     it does not              go on. At the end of the budget an exponent above three standard errors makes it chaotic,
                              one within them, with the figures of step II, quasiperiodic
 
+On machines whose matrices depend on their configuration the Matrix Update Test votes too (flow chart of figure 5.5).
 Chaos that dies out within the horizon counts as chaotic (thesis 5.2.3), with the status "transient".
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -37,6 +37,9 @@ FIRST_STAGE = 100
 
 DEFAULT_BUDGET = 3200
 """Cycles of the last stage."""
+
+UPDATE_CYCLES = 100
+"""Cycles of each run of the Matrix Update Test, on machines whose matrices depend on configuration (figure 5.5)."""
 
 NEAR = 0.05
 """How far Newton's method may move, relative to the size of the motion, to find the orbit that the motion nears."""
@@ -203,7 +206,7 @@ def _not_periodic(stage: _Stage) -> Diagnosis:
     )  # fmt: skip
 
 
-def _votes(stage: _Stage) -> Mapping[str, Nature]:
+def _votes(stage: _Stage) -> dict[str, Nature]:
     """What each test says of the last half of the record by itself."""
     verdict = two_step_test(stage.record.after(len(stage.record) // 2))
     figures = verdict.evidence
