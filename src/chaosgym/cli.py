@@ -99,6 +99,10 @@ def show(machine: Any, as_json: bool) -> None:
 
 @app.command()
 @functools.partial(machine_command, required=False)
+@click.option(
+    "--test", type=click.Choice(["adaptive", "mut"]), default="adaptive", show_default=True,
+    help="All tests in stages, or the Matrix Update Test alone.",
+)  # fmt: skip
 @click.option("--budget", type=click.IntRange(100, 10**7), default=3200, show_default=True, help="Cycles at the most.")
 @click.option("--types", is_flag=True, help="Also tell the response type (I, II, III) over the tolerances.")
 @click.option("--step-check", is_flag=True, help="Repeat with a finer step and say whether the verdict stays.")
@@ -108,6 +112,7 @@ def show(machine: Any, as_json: bool) -> None:
 @click.option("--sensor-error", type=float, default=0.0, show_default=True, help="Largest error of a measured value.")
 def diagnose(
     machine: Any,
+    test: str,
     budget: int,
     types: bool,
     step_check: bool,
@@ -124,6 +129,8 @@ def diagnose(
         result, lines = _diagnose_measured(peaks, series, period_s, sensor_error)
     elif machine is None:
         raise click.UsageError(f"give a machine ({', '.join(MACHINE_OPTIONS)}), --peaks FILE or --series FILE")
+    elif test == "mut":
+        result, lines = _matrix_update(machine)
     else:
         result, lines = _diagnose_machine(machine, budget, types, step_check)
     _emit(result, as_json, lambda: lines)
@@ -164,6 +171,16 @@ def _diagnose_measured(
     summary = _summary(samples if peaks else samples[:, 1])
     result = {"file": peaks or series, **verdict.as_dict(), "peak_force_summary_N": summary, "warnings": []}
     return result, _verdict_lines(str(peaks or series), verdict, summary, "")
+
+
+def _matrix_update(machine: Any) -> tuple[dict[str, Any], list[str]]:
+    from chaosgym.diagnosis import matrix_update_test
+    from chaosgym.simulation import simulate
+
+    verdict = matrix_update_test(machine)
+    summary = _summary(simulate(machine, SUMMARY_CYCLES, transient=SUMMARY_CYCLES).peak_force[:, 0])
+    result = {"machine": machine.name, **verdict.as_dict(), "peak_force_summary_N": summary, "warnings": []}
+    return result, _verdict_lines(f"{machine.name}, Matrix Update Test", verdict, summary, " N")
 
 
 def _diagnose_machine(machine: Any, budget: int, types: bool, check: bool) -> tuple[dict[str, Any], list[str]]:

@@ -3,7 +3,7 @@ import pytest
 
 from chaosgym.diagnosis import compare_attractors, compare_outcomes, matrix_update_test
 from chaosgym.errors import DiagnosisError
-from chaosgym.machines import ImpactBeam
+from chaosgym.machines import ImpactBeam, SliderCrank
 
 from .maps import logistic
 
@@ -50,3 +50,17 @@ def test_constant_matrices_are_refused():
         matrix_update_test(ImpactBeam())
     with pytest.raises(DiagnosisError, match="shapes"):
         compare_outcomes(np.ones(20), np.ones(21))
+
+
+def test_case_one_of_the_thesis_is_periodic():
+    """270 rpm, +-0.032 mm, matrices updated every 5 and every 10 deg: the two runs converge (figure 5.1)."""
+    crank = SliderCrank(crank_speed=270.0, slider_clearance=0.032e-3)
+    verdict = matrix_update_test(crank, intervals=(5.0, 10.0), transient=50, cycles=50)
+    assert verdict.nature == "periodic"
+
+
+def test_case_two_of_the_thesis_is_chaotic():
+    """190 rpm, +-0.254 mm, matrices updated every 5 and every 6 deg: the two runs part (figure 5.2)."""
+    crank = SliderCrank(crank_speed=190.0, slider_clearance=0.254e-3)
+    for form in ("attractors", "literal"):
+        assert matrix_update_test(crank, intervals=(5.0, 6.0), form=form, transient=50, cycles=62).nature == "chaotic"

@@ -47,7 +47,7 @@ def depends_on_configuration(machine: Machine) -> bool:
 def matrix_update_test(
     machine: Machine,
     *,
-    other_interval: float | None = None,
+    intervals: tuple[float, float] = (5.0, 10.0),
     form: Form = "attractors",
     transient: int = 200,
     cycles: int = 100,
@@ -59,9 +59,9 @@ def matrix_update_test(
     Parameters
     ----------
     machine
-        With a field ``matrix_update_interval`` [deg]; its own value is the first interval.
-    other_interval
-        The second interval; 6/5 of the first, or the nearest that divides a revolution (thesis: 5 and 6 degrees).
+        With a field ``matrix_update_interval`` [deg]; its own value does not matter.
+    intervals
+        Matrix-update intervals of the two runs [deg]; the thesis uses 5 and 10, and 5 and 6.
     form
         "literal" or "attractors"; see the module.
     transient, cycles
@@ -84,10 +84,8 @@ def matrix_update_test(
         )
     if form not in ("literal", "attractors"):
         raise DiagnosisError(f"form = {form!r} is not one of 'literal', 'attractors'")
-    interval = getattr(machine, FIELD)
-    second = other_interval if other_interval is not None else _neighbouring(interval)
-    other = replace(machine, **{FIELD: second})  # type: ignore[type-var]
-    evidence: dict[str, Any] = {"form": form, "intervals_deg": [interval, second], "transient": transient}
+    machine, other = (replace(machine, **{FIELD: interval}) for interval in intervals)  # type: ignore[type-var]
+    evidence: dict[str, Any] = {"form": form, "intervals_deg": list(intervals), "transient": transient}
     if form == "literal":
         runs = [simulate(one, cycles, initial_state, transient).peak_force for one in (machine, other)]
         verdict = compare_outcomes(*runs, tolerance=tolerance)
@@ -96,11 +94,6 @@ def matrix_update_test(
         runs = [simulate(one, cycles, start).peak_force for one in (machine, other)]
         verdict = compare_attractors(*runs, tolerance=tolerance)
     return replace(verdict, evidence={**evidence, **verdict.evidence}, horizon=transient + cycles)
-
-
-def _neighbouring(interval: float) -> float:
-    """The interval nearest to 6/5 of a given one that divides a revolution."""
-    return 360.0 / max(1, round(360.0 / interval * 5.0 / 6.0))
 
 
 def compare_outcomes(first: ArrayLike, second: ArrayLike, *, tolerance: float = TOLERANCE) -> Diagnosis:
