@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
 from chaosgym.core import status
-from chaosgym.core.fixed_step import advance_fixed_step
-from chaosgym.core.impact_beam import CycleArrays, Episode, advance
 from chaosgym.core.crank_stepper import SteppedCrankModel
 from chaosgym.core.crank_stepper import advance as advance_stepped_crank
+from chaosgym.core.fixed_step import advance_fixed_step
+from chaosgym.core.impact_beam import CycleArrays, Episode, advance
 from chaosgym.core.slider_crank import advance as advance_slider_crank
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines.impact_beam import ImpactBeam

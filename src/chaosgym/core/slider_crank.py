@@ -86,7 +86,7 @@ def closes(model, j, side, y, v):
     return depth > 0.0 and model.stiffness[j] * depth + model.damping[j] * side * v > 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def contact_set(model, side):
     """Index of the matrices of a contact set: closed sides as digits."""
     index, place = 0, 1
@@ -99,7 +99,7 @@ def contact_set(model, side):
     return index
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def put_sides(model, side, z):
     """Write the clearance columns of z."""
     m = side.shape[0]
@@ -108,7 +108,7 @@ def put_sides(model, side, z):
         z[first + j] = side[j] * model.gap[j]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def put_time(z, n, x):
     """Write the forcing columns of z for time x as a share of the bin."""
     z[2 * n] = 1.0
@@ -116,7 +116,7 @@ def put_time(z, n, x):
         z[2 * n + k] = z[2 * n + k - 1] * x
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def read_channels(model, z, y, v):
     """Displacement y and velocity v of every channel."""
     m, n = model.row.shape
@@ -140,27 +140,26 @@ def polynomial(coefficients, t):
 
 
 @njit(cache=True, inline="always")
-def margin(model, j, side, closed, coefficients, t):
-    """(value, slope) of what is positive as long as channel j keeps its contact state on ``side``.
+def margin(stiffness, damping, gap, side, closed, coefficients, t):
+    """(value, slope) of what is positive as long as a channel keeps its contact state on ``side``.
 
     Closed: the contact force. Open: how much is missing until the surface pushes, a penetration without force
     included.
     """
     y, v, a = polynomial(coefficients, t)
-    k, d = model.stiffness[j], model.damping[j]
-    spring, damper = k * (side * y - model.gap[j]), d * side * v
+    spring, damper = stiffness * (side * y - gap), damping * side * v
     if closed:
-        return spring + damper, side * (k * v + d * a)
+        return spring + damper, side * (stiffness * v + damping * a)
     if damper < 0.0:
-        return -spring - damper, -side * (k * v + d * a)
-    return -spring, -side * k * v
+        return -spring - damper, -side * (stiffness * v + damping * a)
+    return -spring, -side * stiffness * v
 
 
 @njit(cache=True)
-def locate(model, j, side, closed, coefficients, until, tolerance):
-    """Instant in [0, until] at which the margin of channel j has fallen to zero, or inf if it has not."""
+def locate(stiffness, damping, gap, side, closed, coefficients, until, tolerance):
+    """Instant in [0, until] at which the margin of a channel has fallen to zero, or inf if it has not."""
     low, high = 0.0, until
-    value, slope = margin(model, j, side, closed, coefficients, until)
+    value, slope = margin(stiffness, damping, gap, side, closed, coefficients, until)
     if value > 0.0:
         return math.inf
     t = until
@@ -173,7 +172,7 @@ def locate(model, j, side, closed, coefficients, until, tolerance):
         t = guess
         if abs(change) <= tolerance:
             break
-        value, slope = margin(model, j, side, closed, coefficients, t)
+        value, slope = margin(stiffness, damping, gap, side, closed, coefficients, t)
         if value > 0.0:
             low = t
         else:
@@ -181,7 +180,7 @@ def locate(model, j, side, closed, coefficients, until, tolerance):
     return t
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def suspect_closed(model, j, side, h, y0, v0, a0, y1, v1, a1):
     """Instant in (0, h] until which a closed channel may have lost its force, or -1."""
     k, d, c = model.stiffness[j], model.damping[j], model.gap[j]
@@ -196,7 +195,7 @@ def suspect_closed(model, j, side, h, y0, v0, a0, y1, v1, a1):
     return dip if dip > 0.0 and cubic(f0, r0, f1, r1, h, dip)[0] <= 0.0 else -1.0
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def suspect_open(model, j, side, h, y0, v0, y1, v1):
     """Instant in (0, h] until which an open channel may have begun to push on ``side``, or -1."""
     if closes(model, j, side, y1, v1):
@@ -220,23 +219,14 @@ def column_of(model, j, side):
     return UPPER if model.reading[j, 1] * side > 0.0 else LOWER
 
 
-@njit(cache=True)
-def note_contact(model, side, time, contact_time):
-    """Add ``time`` to the sides of the record (2,) on which a channel is closed."""
-    upper, lower = False, False
-    for j in range(side.shape[0]):
-        if side[j] != 0.0 and monitored(model, j):
-            if column_of(model, j, side[j]) == UPPER:
-                upper = True
-            else:
-                lower = True
-    if upper:
-        contact_time[UPPER] += time
-    if lower:
-        contact_time[LOWER] += time
+@njit(cache=True, inline="always")
+def note_share(force, time, contact_time):
+    """Add ``time`` to the side of the record (2,) towards which the resultant points."""
+    if force[0] != 0.0 or force[1] != 0.0:
+        contact_time[UPPER if force[1] > 0.0 else LOWER] += time
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def note_peak(peak, fx, fy):
     """Raise ``peak`` (2,) to the resultant."""
     column = UPPER if fy > 0.0 else LOWER
@@ -391,11 +381,11 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                         model, chosen, b, side, z, moved, y0, v0, a0, time, whole, arrays.peak_force[cycle]
                     )
                     if quiet > 0:
-                        note_contact(model, side, quiet * step, arrays.contact_time[cycle])
                         count += quiet
                         time = origin + count * step
                         left = duration - time
                         start = joint_force(model, side, y0, v0, a0)
+                        note_share(start, quiet * step, arrays.contact_time[cycle])
                 if left <= 1e-12 * duration:
                     break
                 expanded = False
@@ -436,7 +426,10 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                         channel[k] = 0.0
                         for i in range(n):
                             channel[k] += model.row[j, i] * series[k, i]
-                    found = locate(model, j, looked, side[j] != 0.0, channel, until, event_tolerance)
+                    found = locate(
+                        model.stiffness[j], model.damping[j], model.gap[j], looked, side[j] != 0.0, channel, until,
+                        event_tolerance,
+                    )  # fmt: skip
                     if found < instant:
                         first, instant, towards = j, found, looked
                 if first >= 0:
@@ -477,7 +470,7 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                         top = joint_force(model, side, y0, v0, a0)
                         note_peak(arrays.peak_force[cycle], top[0], top[1])
                     start = end
-                    note_contact(model, side, h, arrays.contact_time[cycle])
+                    note_share(end, h, arrays.contact_time[cycle])
                 z, moved = moved, z
                 y0, y1 = y1, y0
                 v0, v1 = v1, v0
@@ -523,7 +516,7 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
     return status.OK, arrays.section.shape[0]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def joint_force(model, side, y, v, a):
     """(F_x, F_y, rates of both) of the monitored joint from the channels' displacement, velocity and acceleration."""
     fx, fy, rx, ry = 0.0, 0.0, 0.0, 0.0

@@ -203,9 +203,7 @@ def _held(kind: type, *structure: Any) -> tuple[Array, Array, Array, Array]:
 
 def _free_motion(free: Array, forcing: Array, rate: float) -> Array:
     """Accelerations without contact at a crank rate, (bins, 2n + 4, n)."""
-    return np.concatenate(
-        [free[0] + rate * free[1] + rate**2 * free[2], forcing[0] + rate**2 * forcing[1]], axis=1
-    )
+    return np.concatenate([free[0] + rate * free[1] + rate**2 * free[2], forcing[0] + rate**2 * forcing[1]], axis=1)
 
 
 def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankModel:
@@ -232,7 +230,7 @@ def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankMode
         bin_duration=duration,
         steps=max(1, math.ceil(duration * max(4.0 * contact / step_phase, spectrum / STABLE_PHASE))),
         contact_rate=contact,
-        acceleration=acceleration,
+        acceleration=np.ascontiguousarray(np.swapaxes(acceleration, -1, -2)),
         first=first,
         row=row,
         answer=answer,
