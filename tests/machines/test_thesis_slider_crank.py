@@ -23,8 +23,9 @@ def spread(machine, **changes):
 
 @pytest.mark.parametrize("speed", [150.0, 180.0, 200.0, 230.0, 250.0, 270.0, 280.0, 290.0, 300.0])
 def test_small_clearance_is_periodic_at_5_percent(speed):
-    """At +-0.032 mm and 5 % contact damping every response is periodic (figure 4.14a, 5.2.2 case one)."""
-    assert spread(CRANK, crank_speed=speed, slider_clearance=0.032e-3) < 0.01
+    """At +-0.032 mm, 5 % contact damping, 50 peaks recur within 0.5 % (periodic in figure 4.14a and 5.2.2)."""
+    force = peaks(CRANK, crank_speed=speed, slider_clearance=0.032e-3)
+    assert np.ptp(force) < 0.005 * force.mean()
 
 
 def test_large_clearance_is_irregular():
@@ -96,11 +97,14 @@ BALL = replace(
 
 
 @pytest.mark.parametrize(
-    ("speed", "lost"), [(80.0, False), (130.0, True), (160.0, True), (220.0, False), (350.0, False)]
+    ("speed", "lost"), [(80.0, False), (120.0, True), (140.0, True), (220.0, False), (350.0, False)]
 )
 def test_the_spherical_ball_joint_loses_contact_between_110_and_190_rpm(speed, lost):
-    """At +-0.127 mm the ball leaves its shell only where weight and inertia balance (figures 4.8 and 4.9)."""
-    record = simulate(replace(BALL, crank_speed=speed), 8, transient=12)
+    """At +-0.127 mm the ball leaves its shell only where weight and inertia balance (figures 4.8 and 4.9).
+
+    Between 110 and 190 rpm it does so in some revolutions and not in others, least often at both ends.
+    """
+    record = simulate(replace(BALL, crank_speed=speed), 12, transient=12)
     assert (record.impacts.sum() > 0) == lost
     assert (record.contact_fraction.sum(axis=1).min() < 0.999) == lost
 

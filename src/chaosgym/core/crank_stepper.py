@@ -20,7 +20,7 @@ from numba import njit
 
 from chaosgym.core import status
 from chaosgym.core.impact_beam import LOWER, UPPER, cubic, cubic_extremum, note_touch
-from chaosgym.core.slider_crank import RUNAWAY, note_peak, note_share
+from chaosgym.core.slider_crank import RUNAWAY, crest_instant, note_peak, note_share, resultant
 
 LINEAR, HERTZ = 0, 1
 
@@ -55,8 +55,10 @@ class SteppedCrankModel(NamedTuple):
         LINEAR or HERTZ.
     two_sided : (J,) bool
         False if a joint with one row has a surface only where row . p is positive.
-    reading : (R, 2)
-        Contact force of the monitored joint [along, upward or across] per newton along each row.
+    reading : (R, 3)
+        Contact force of the monitored joint (along, upward or across, sideways) per newton along each row.
+    monitored : (J,) bool
+        True for the joints that are recorded.
     display : (n,)
         Displacement of the monitored joint per unit coordinate.
     """
@@ -75,6 +77,7 @@ class SteppedCrankModel(NamedTuple):
     law: int
     two_sided: np.ndarray
     reading: np.ndarray
+    monitored: np.ndarray
     display: np.ndarray
 
 
@@ -83,7 +86,7 @@ def measure(model, j, z, direction):
     """Penetration and its rate of joint j; writes the unit vector of its force on the surface into ``direction``."""
     n = model.row.shape[1]
     low, high = model.first[j], model.first[j + 1]
-    size, along = 0.0, 0.0
+    size, along, rate = 0.0, 0.0, 0.0
     for r in range(low, high):
         e, rate = 0.0, 0.0
         for i in range(n):
@@ -95,7 +98,6 @@ def measure(model, j, z, direction):
     if not model.two_sided[j]:
         # one row: e counts with its sign
         e = direction[low]
-        rate = along / e if e != 0.0 else 0.0
         direction[low] = 1.0
         return e - model.gap[j], rate
     size = math.sqrt(size)
@@ -165,9 +167,9 @@ def leap(model, b, time, h, z, closed, direction, k, inner, moved):
 
 @njit(cache=True, inline="always")
 def joint_force(model, z, dz, closed, direction):
-    """(F_x, F_y, rates of both) of the monitored joint; the rates neglect the turning of a spherical contact."""
+    """``resultant`` of the monitored joint."""
     n = model.row.shape[1]
-    fx, fy, rx, ry = 0.0, 0.0, 0.0, 0.0
+    fx, fy, fz, rx, ry, rz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(closed.shape[0]):
         if not closed[j]:
             continue
@@ -189,24 +191,11 @@ def joint_force(model, z, dz, closed, direction):
         for r in range(model.first[j], model.first[j + 1]):
             fx += model.reading[r, 0] * direction[r] * force
             fy += model.reading[r, 1] * direction[r] * force
+            fz += model.reading[r, 2] * direction[r] * force
             rx += model.reading[r, 0] * direction[r] * change
             ry += model.reading[r, 1] * direction[r] * change
-    return fx, fy, rx, ry
-
-
-@njit(cache=True, inline="always")
-def note_crest(peak, h, start, end):
-    """Raise ``peak`` (2,) to the crest of the resultant within a step, by the cubic through both ends."""
-    size0, size1 = math.hypot(start[0], start[1]), math.hypot(end[0], end[1])
-    if size0 == 0.0 or size1 == 0.0:
-        return
-    rate0 = (start[0] * start[2] + start[1] * start[3]) / size0
-    rate1 = (end[0] * end[2] + end[1] * end[3]) / size1
-    if rate0 > 0.0 and rate1 < 0.0:
-        crest = cubic_extremum(size0, rate0, size1, rate1, h, -1.0)
-        if crest > 0.0:
-            column = UPPER if end[1] > 0.0 else LOWER
-            peak[column] = max(peak[column], cubic(size0, rate0, size1, rate1, h, crest)[0])
+            rz += model.reading[r, 2] * direction[r] * change
+    return resultant(fx, fy, fz, rx, ry, rz)
 
 
 @njit(cache=True, inline="always")
@@ -266,11 +255,9 @@ def change_contacts(model, z, closed, direction, episode, time, impacts, bounce_
         closed[j] = not closed[j]
         if closed[j]:
             up = 0.0
-            monitored = False
             for r in range(model.first[j], model.first[j + 1]):
                 up += model.reading[r, 1] * direction[r]
-                monitored = monitored or model.reading[r, 0] != 0.0 or model.reading[r, 1] != 0.0
-            if monitored:
+            if model.monitored[j]:
                 impacts[UPPER if up > 0.0 else LOWER] += 1
                 note_touch(episode, 1.0 if up > 0.0 else -1.0, time, bounce_time)
     return changes
@@ -287,7 +274,7 @@ def take_sample(model, h, t, z, dz, moved, dz_moved, inner, closed, direction, s
         sample[0] += model.display[i] * inner[i]
         sample[1] += model.display[i] * inner[n + i]
     force = joint_force(model, inner, dz, closed, direction)
-    sample[2] = math.copysign(math.hypot(force[0], force[1]), force[1])
+    sample[2] = math.copysign(force[1], force[0])
 
 
 @njit(cache=True, inline="always")
@@ -355,8 +342,10 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                     sample += 1
                 end = joint_force(model, moved, k[3], closed, direction)
                 note_share(end, h, contact_time)
-                note_peak(peak, end[0], end[1])
-                note_crest(peak, h, start, end)
+                note_peak(peak, end)
+                _, crest = crest_instant(h, start, end)
+                column = UPPER if end[0] > 0.0 else LOWER
+                peak[column] = max(peak[column], crest)
                 z, moved = moved, z
                 changes = change_contacts(
                     model, z, closed, direction, episode, b * duration + time + h, impacts, bounce_time
@@ -367,7 +356,7 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                         return status.EVENT_BUDGET, cycle
                     slope(model, b, time + h, z, closed, direction, k[0])
                     end = joint_force(model, z, k[0], closed, direction)
-                    note_peak(peak, end[0], end[1])
+                    note_peak(peak, end)
                 else:
                     k[0] = k[3]
                 start = end

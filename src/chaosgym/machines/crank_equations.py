@@ -53,6 +53,7 @@ SLIDER_ACROSS = "slider across the guide"
 SLIDER_PITCH = "slider pitch"
 BALL_LATERAL = "ball sideways"
 SLIDER_LATERAL = "slider sideways"
+BALL_DIRECTIONS = (BALL_ALONG, BALL_ACROSS, BALL_LATERAL)
 
 
 def degrees_of_freedom(machine: "SliderCrank", spatial: bool = False) -> tuple[str, ...]:
@@ -60,7 +61,7 @@ def degrees_of_freedom(machine: "SliderCrank", spatial: bool = False) -> tuple[s
 
     ``spatial`` adds the sideways motion that a motor at an angle excites, also where it stands straight.
     """
-    spatial = spatial or machine.motor_angle > 0.0
+    spatial = spatial or machine.is_spatial
     names: list[str] = []
     if machine.ball_joint != "ideal":
         names += [BALL_ALONG, BALL_ACROSS]
