@@ -90,7 +90,9 @@ def main() -> None:
     model.save(out / "policy.zip")
     versions = {"chaosgym": chaosgym.__version__, "stable_baselines3": stable_baselines3.__version__,
                 "torch": torch.__version__, "numpy": np.__version__, "python": platform.python_version()}  # fmt: skip
-    (out / "config.json").write_text(json.dumps({"arguments": asdict(arguments), "versions": versions}, indent=2) + "\n")
+    (out / "config.json").write_text(
+        json.dumps({"arguments": asdict(arguments), "versions": versions}, indent=2) + "\n"
+    )
     print(f"policy, config and progress in {out}")
 
 

@@ -10,9 +10,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
+from gymnasium.wrappers import RescaleObservation
+from tqdm import tqdm
 
-from chaosgym.classifier.train import train_classifier
+from chaosgym.classifier.train import report_table, train_classifier
 from chaosgym.diagnosis import two_step_test
 from chaosgym.envs.evaluation import Evaluation, constant_speed, evaluate
 from chaosgym.errors import ChaosgymError, DatasetError
@@ -20,17 +23,21 @@ from chaosgym.machines import THESIS_IMPACT_BEAM
 from chaosgym.simulation import CycleRecord, simulate
 from chaosgym.sweeps import Axis, LabelledSweep, SweepPlan, run_sweep
 
-POINTS = {"I": (6.0, 0.032e-3), "II": (14.0, 0.032e-3), "III": (30.0, 0.127e-3)}
+POINTS = {"I": (6.0, 0.127e-3), "II": (19.0, 0.127e-3), "III": (30.0, 0.127e-3)}
 """Excitation frequency [Hz] and clearance [m] of one point of each type."""
 
 AXES = (
-    Axis("excitation_frequency", 4.0, 30.0, 66, "log"),
-    Axis("clearance", 0.02e-3, 0.2e-3, 16, "log"),
+    Axis("excitation_frequency", 4.0, 30.0, 103, "log"),
+    Axis("clearance", 0.06e-3, 0.145e-3, 19, "log"),
 )
-"""Grid of the small sweep: 1,056 points."""
+"""Grid of the small sweep: steps of 2 % of speed and 5 % of clearance, the tolerances that a type stands for."""
 
 ENVIRONMENT = "chaosgym/ImpactBeam-v0"
 TRAINING_STEPS = 40_000
+DISCOUNT = 0.98
+INITIAL_LOG_STD = -2.0
+"""Exploration of about +-1.8 Hz: calm windows are narrow, and a coarser search never stays in one."""
+
 JOBS = 5
 TEST_SEED = 10_000
 CONSTANT_SPEEDS = 14
@@ -68,8 +75,9 @@ def run_demo(folder: str | Path, seed: int = 0, say: Callable[[str], None] = pri
 
     say("1/5 simulate three points")
     records = {kind: _run_point(*point) for kind, point in POINTS.items()}
-    say(f"2/5 label a sweep of {np.prod([axis.count for axis in AXES])} points")
-    sweep = run_sweep(SweepPlan(THESIS_IMPACT_BEAM, AXES), folder / "sweep", progress=True)
+    plan = SweepPlan(THESIS_IMPACT_BEAM, AXES)
+    say(f"2/5 label a sweep of {len(plan)} points")
+    sweep = run_sweep(plan, folder / "sweep", progress=True)
     say("3/5 train and test the classifier")
     trained = train_classifier(sweep, seed, progress=True)
     trained.classifier.save(folder / "classifier.npz")
@@ -120,6 +128,11 @@ def _shares(sweep: LabelledSweep) -> dict[str, float]:
     return {str(kind): float(count) / len(sweep.table) for kind, count in zip(kinds, counts, strict=True)}
 
 
+def _environment() -> gym.Env[Any, Any]:
+    """The environment with every entry of the observation on one scale."""
+    return RescaleObservation(gym.make(ENVIRONMENT), np.float32(-1.0), np.float32(1.0))
+
+
 def _train_agent(seed: int) -> Any:
     import torch
     from stable_baselines3 import PPO
@@ -127,16 +140,23 @@ def _train_agent(seed: int) -> Any:
     from stable_baselines3.common.vec_env import VecNormalize
 
     torch.set_num_threads(1)
-    envs = make_vec_env(ENVIRONMENT, n_envs=8, seed=seed)
-    model = PPO("MlpPolicy", envs, n_steps=200, batch_size=400, gamma=0.98, seed=seed, device="cpu")
-    return model.learn(TRAINING_STEPS, callback=_ProgressBar(TRAINING_STEPS))
+    envs = VecNormalize(make_vec_env(_environment, n_envs=8, seed=seed), norm_obs=False, gamma=DISCOUNT)
+    model = PPO(
+        "MlpPolicy", envs, learning_rate=1e-3, n_steps=200, batch_size=200, gamma=DISCOUNT, seed=seed, device="cpu",
+        policy_kwargs={"log_std_init": INITIAL_LOG_STD},
+    )  # fmt: skip
+    with tqdm(total=TRAINING_STEPS, desc="train agent", unit="step") as bar:
+
+        def advance(values: dict[str, Any], _: Any) -> bool:
+            bar.update(values["self"].num_timesteps - bar.n)
+            return True
+
+        return model.learn(TRAINING_STEPS, callback=advance)
 
 
 def _compare(model: Any) -> dict[str, Evaluation]:
     """The agent and the lowest, the highest and the best constant speed on the same jobs."""
-    import gymnasium as gym
-
-    env = gym.make(ENVIRONMENT)
+    env = _environment()
     drive: Any = env.get_wrapper_attr("drive")
     speeds = np.linspace(drive.lowest_speed, drive.highest_speed, CONSTANT_SPEEDS)
     constants = {speed: evaluate(env, constant_speed(env, speed), JOBS, TEST_SEED) for speed in speeds}
@@ -148,3 +168,22 @@ def _compare(model: Any) -> dict[str, Evaluation]:
         f"constant {best:g} Hz (best of {CONSTANT_SPEEDS})": constants[best],
         f"constant {speeds[-1]:g} Hz": constants[speeds[-1]],
     }
+
+
+def demo_table(result: dict[str, Any]) -> list[str]:
+    """Lines of the result of ``run_demo``, for people."""
+    lines = ["", "three points            nature                peak force [N]      type among its neighbours"]
+    for point in result["points"].values():
+        period = f", period {point['period']}" if point["period"] else ""
+        low, high = point["peak_force_N"]
+        where = f"{point['frequency_hz']:g} Hz, +-{point['clearance_mm']:.3f} mm"
+        lines.append(
+            f"  {where:21s} {point['nature'] + period:21s} {low:6.1f} to {high:6.1f}    {point['type_in_sweep']}"
+        )
+    shares = ", ".join(f"{kind} {share:.0%}" for kind, share in result["sweep"]["types"].items())
+    lines += ["", f"sweep of {result['sweep']['points']} points: {shares}", "", *report_table(result["classifier"])]
+    lines += ["", f"{f'agent after {TRAINING_STEPS} steps, {JOBS} jobs':32s} return   Type III   damage     time"]
+    for name, row in result["agent"].items():
+        figures = f"{row['return']:8.2f} {row['type_iii_share']:10.1%} {row['damage']:8.2f} {row['time_cost']:8.2f}"
+        lines.append(f"  {name:29s} {figures}")
+    return [*lines, "", f"figure: {result['figure']}   ({result['seconds']:.0f} s)"]

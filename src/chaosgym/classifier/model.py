@@ -39,6 +39,12 @@ class Classification:
     probabilities: dict[str, float]
 
 
+def fourier_features(scaled: Array, waves: Array) -> Array:
+    """Scaled inputs (n, n_fields) followed by the sines and cosines of their waves, (n, n_fields + 2 n_waves)."""
+    phase = 2.0 * np.pi * scaled @ waves
+    return np.concatenate([scaled, np.sin(phase), np.cos(phase)], axis=1)
+
+
 @dataclass(frozen=True)
 class ResponseClassifier:
     """A trained network from machine parameters to the probabilities of Types I, II and III.
@@ -47,8 +53,11 @@ class ResponseClassifier:
     ----------
     weights, biases : tuples of (n_in, n_out) and (n_out,)
         Layers; tanh between them, softmax at the end.
-    centre, spread : (n_features,)
-        Mean and standard deviation of the features in training.
+    centre, spread : (n_fields,)
+        Mean and standard deviation of the logarithms of the fields in training.
+    waves : (n_fields, n_waves)
+        Frequencies of the sines and cosines that the first layer sees beside the scaled logarithms, so that it can
+        follow the stripes of the map (random Fourier features: Rahimi and Recht 2007; Tancik et al. 2020).
     card
         What the model was trained on and how good it is: machine, base parameters, features, ranges, metrics ...
     """
@@ -57,6 +66,7 @@ class ResponseClassifier:
     biases: tuple[Array, ...]
     centre: Array
     spread: Array
+    waves: Array
     card: Mapping[str, Any]
 
     @property
@@ -66,7 +76,7 @@ class ResponseClassifier:
 
     def predict_proba(self, values: Array) -> Array:
         """Probabilities (n, 3) of the types for parameter values (n, n_fields) in SI units."""
-        layer = (np.log(np.asarray(values, dtype=float)) - self.centre) / self.spread
+        layer = fourier_features((np.log(np.asarray(values, dtype=float)) - self.centre) / self.spread, self.waves)
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             layer = np.tanh(layer @ weight + bias)
         scores = layer @ self.weights[-1] + self.biases[-1]
@@ -75,7 +85,8 @@ class ResponseClassifier:
 
     def predict(self, values: Array) -> NDArray[np.str_]:
         """Most probable type (n,) for parameter values (n, n_fields) in SI units."""
-        return np.array(RESPONSE_TYPES)[self.predict_proba(values).argmax(axis=1)]
+        predicted: NDArray[np.str_] = np.array(RESPONSE_TYPES)[self.predict_proba(values).argmax(axis=1)]
+        return predicted
 
     def classify(self, machine: Machine) -> Classification:
         """Classify one machine.
@@ -120,7 +131,7 @@ class ResponseClassifier:
         write_atomically(Path(path), lambda temporary: temporary.write_bytes(buffer.getvalue()))
 
     def _arrays(self) -> dict[str, Any]:
-        arrays: dict[str, Any] = {"centre": self.centre, "spread": self.spread}
+        arrays: dict[str, Any] = {"centre": self.centre, "spread": self.spread, "waves": self.waves}
         for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             arrays[f"weight{layer}"] = weight
             arrays[f"bias{layer}"] = bias
@@ -136,7 +147,7 @@ class ResponseClassifier:
             If it is missing, damaged, of another version, or its arrays do not match their hash.
         """
         try:
-            with np.load(path, allow_pickle=False) as held:
+            with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as held:
                 arrays = {name: held[name] for name in held.files if name != "card"}
                 card = json.loads(held["card"].tobytes())
             if card["format"] != FORMAT:
@@ -149,6 +160,7 @@ class ResponseClassifier:
                 biases=tuple(arrays[f"bias{layer}"] for layer in layers),
                 centre=arrays["centre"],
                 spread=arrays["spread"],
+                waves=arrays["waves"],
                 card=card,
             )
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:

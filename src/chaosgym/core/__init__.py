@@ -10,12 +10,17 @@ from pathlib import Path
 
 from numba import config
 
-_sources = sorted(Path(__file__).parent.glob("*.py"))
-_digest = hashlib.sha256(b"".join(path.read_bytes() for path in _sources)).hexdigest()[:16]
+
+def source_digest(folder: Path) -> str:
+    """Hash of all Python sources in a folder."""
+    sources = sorted(folder.glob("*.py"))
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
+
+
 _cache_root = os.environ.get("NUMBA_CACHE_DIR") or os.path.join(
     os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "chaosgym", "kernels"
 )
-KERNEL_CACHE = os.path.join(_cache_root, _digest)
+KERNEL_CACHE = os.path.join(_cache_root, source_digest(Path(__file__).parent))
 """Folder of the compiled kernels."""
 
 _previous_cache_folder = config.CACHE_DIR
@@ -30,6 +35,7 @@ try:
         propagator,
         slider_crank,
         status,
+        tangent,
     )
 finally:
     config.CACHE_DIR = _previous_cache_folder

@@ -52,7 +52,7 @@ def power_spectrum(series: Array, noise_variance: float = 0.0) -> Spectrum:
     window = _window(n)
     transform = np.fft.rfft(window * (series - series.mean()))
     power = np.asarray(np.abs(transform) ** 2 * (2.0 / (n * np.sum(window**2))), dtype=np.float64)
-    frequency = np.fft.rfftfreq(n)
+    frequency = np.arange(len(power)) / n
     total = float(power.sum())
     floor = float(np.median(power) / np.mean(power)) if total > 0.0 else 0.0
     return Spectrum(frequency, power, floor, _count_lines(power, total - max(1e-3 * total, 1.2 * noise_variance)))

@@ -7,22 +7,35 @@ from typing import Any
 import numpy as np
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.parameters import parameter, validate
+
+
+def checked_number(name: str, value: Any, low: float, high: float) -> float:
+    """Return the value as a float.
+
+    Raises
+    ------
+    ParameterError
+        If it is no number from ``low`` to ``high``; names it, its value and the range.
+    """
+    if isinstance(value, str) or not hasattr(value, "__float__") or not low <= float(value) <= high:
+        raise ParameterError(f"{name} = {value!r} is out of range; allowed: {low:g} to {high:g}")
+    return float(value)
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedDrive:
     """Speed range and slew limit of a drive, in the unit of the machine's speed field."""
 
-    lowest_speed: float = parameter(4.0, low=0.0, high=1e6, provenance="printed", source="thesis 3.5.1: 4 to 30 Hz")
+    lowest_speed: float
     """Target speed of action -1."""
-    highest_speed: float = parameter(30.0, low=0.0, high=1e6, provenance="printed", source="thesis 3.5.1: 4 to 30 Hz")
+    highest_speed: float
     """Target speed of action +1."""
-    slew_limit: float = parameter(1.0, low=0.0, high=1e6, provenance="assumed", source="26 steps for the whole range")
+    slew_limit: float
     """Largest change of speed in one step."""
 
     def __post_init__(self) -> None:
-        validate(self)
+        for name in ("lowest_speed", "highest_speed", "slew_limit"):
+            object.__setattr__(self, name, checked_number(name, getattr(self, name), 0.0, 1e6))
         if self.highest_speed <= self.lowest_speed:
             raise ParameterError(
                 f"highest_speed = {self.highest_speed:g} is out of range; allowed: above lowest_speed = "

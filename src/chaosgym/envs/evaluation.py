@@ -96,4 +96,5 @@ def evaluate(
             -sum(info["reward_time"] for info in infos),
         ))  # fmt: skip
         speeds = np.array([info["speed"] for info in infos])
-    return Evaluation(*np.array(rows, dtype=float).T, speeds)
+    returns, type_iii, cost, damage, time_cost = np.array(rows, dtype=float).T
+    return Evaluation(returns, type_iii, cost, damage, time_cost, speeds)

@@ -3,7 +3,7 @@
 from typing import Any
 
 from chaosgym.envs.drive import SpeedDrive
-from chaosgym.envs.machine_env import MachineEnv
+from chaosgym.envs.machine_env import SENSOR_ERROR, MachineEnv
 from chaosgym.envs.tasks import Task
 from chaosgym.errors import ParameterError
 from chaosgym.machines.impact_beam import THESIS_IMPACT_BEAM, ImpactBeam
@@ -79,15 +79,20 @@ class ImpactBeamEnv(MachineEnv):
     | `reward_failure`  | -w on fracture or a failed simulation                         | 10       |
 
     *Damage* follows the basic rating life of bearings: a cycle with peak force F uses up (F / C)^(10/3) / 10^6 of the
-    life of a sensor surface, times an acceleration of 1000. C = 68.4 N is the equivalent force of the worst constant
-    speed, which therefore uses up about one life in one job. True peak forces count, of the worse surface.
+    life of a sensor surface, times an acceleration of 1000. With C = 70 N the worst constant speeds use up 0.8 to 1
+    life in one job: 26.6 to 26.8 Hz, and 28.8 to 29.1 Hz, where several periodic responses coexist and rounding
+    decides which one is reached. True peak forces count, of the worse surface.
 
     A step counts as *Type III* if its peak forces don't repeat: the last four true peaks of the upper sensor are
     compared with the four that lie 1, 2, ... 8 cycles before them, and the step repeats if one of these comparisons
     agrees within 5 % of the largest peak (the thesis measured less than 5 % in periodic responses, 3.5.2). Earlier
     cycles count whatever the speed was then; the first cycle of the step, disturbed by the change of speed, is not
-    judged. At constant speed this marks nine of ten steps of strongly chaotic responses and none of a periodic response
-    with a period up to 8; chaos whose peaks stay within 5 % passes, and periods above 8 don't.
+    judged.
+
+    How far this agrees with the Two-Step Test on 400 cycles from rest, at constant speeds from 4 to 30 Hz by 0.25 Hz:
+    of the steps after the first 100 cycles it marks 1.4 % where the test says periodic (70 speeds; all of the marks
+    at 20.25 Hz, period 9) and 67 % where it says chaotic (34 speeds). It marks nine of ten steps of strongly chaotic
+    responses; narrow bands, chaos whose peaks stay within 5 %, and what settles after transient chaos pass.
 
     `info["cost"]` is 1 in a step that counts as Type III (`cost_type_iii`), has a peak force above the force limit on
     either sensor (`cost_force`) or fails, and 0 otherwise. `info` also holds `speed` [Hz], `damage`, `status`
@@ -95,12 +100,13 @@ class ImpactBeamEnv(MachineEnv):
 
     Loopholes considered:
 
-    - *Farming*: no term is ever positive, and each is proportional to cycles done, so nothing can be collected twice.
+    - *Farming*: no term is ever positive, and a job has a fixed number of cycles, so there is nothing to collect.
     - *Standing still*: the lowest speed costs 7.5 in time alone, the highest at most 3 without fracture.
     - *Giving up*: an early end costs 10, more than the rest of any job at 4 Hz. A lowest speed below a tenth of the
       highest would change this.
     - *Dithering*: comparing only cycles of equal speed would let small changes of speed wipe out the record, so earlier
-      cycles count at any speed. Changing speed while the response is regular costs nothing but the disturbance itself.
+      cycles count at any speed. Alternating by 0.05 to 1 Hz about 24, 26.5, 28 and 29.5 Hz leaves 81 to 99 % of the
+      steps marked, as do the constant speeds with 84 to 98 %; speeds drawn at random from 22 to 30 Hz, 96 %.
     - *Crossing chaos quickly* and *holding the response periodic by small corrections* (control of chaos) do reduce the
       cost. Both are what one wants.
 
@@ -147,6 +153,9 @@ class ImpactBeamEnv(MachineEnv):
 
     ```
 
+    Where another library makes the environment in a fresh process, the id names the package to import:
+    `chaosgym:chaosgym/ImpactBeam-v0`.
+
     ## Version History
 
     * v0: Initial version.
@@ -155,14 +164,14 @@ class ImpactBeamEnv(MachineEnv):
     def __init__(
         self,
         *,
-        lowest_speed: float = 4.0,
-        highest_speed: float = 30.0,
+        lowest_speed: float = ImpactBeam.usual_ranges[ImpactBeam.speed_field][0],
+        highest_speed: float = ImpactBeam.usual_ranges[ImpactBeam.speed_field][1],
         slew_limit: float = 1.0,
-        cycles_per_step: int = 5,
-        job_cycles: int = 1000,
-        force_limit: float = 80.0,
+        cycles_per_step: int = Task.cycles_per_step,
+        job_cycles: int = Task.job_cycles,
+        force_limit: float = Task.force_limit,
         tolerance: bool | float = False,
-        sensor_error: float = 3.0,
+        sensor_error: float = SENSOR_ERROR,
         render_mode: str | None = None,
         **parameters: Any,
     ) -> None:

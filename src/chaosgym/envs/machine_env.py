@@ -5,14 +5,14 @@ changes and the motion goes on from the state in which the last step ended.
 """
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
-from chaosgym.envs.drive import SpeedDrive
+from chaosgym.envs.drive import SpeedDrive, checked_number
 from chaosgym.envs.observation import Observation, measured_peaks, observation_names, observation_space, observe
 from chaosgym.envs.tasks import LONGEST_PERIOD, Status, Step, Task, does_not_repeat, judged_cycles
 from chaosgym.errors import ParameterError, SimulationError
@@ -27,6 +27,9 @@ Action = NDArray[np.float32]
 
 RUN_IN_CYCLES = 20
 """Cycles at the starting speed before the job begins; at least a step."""
+
+SENSOR_ERROR = 3.0
+"""Half width [N] of the error of a force sensor (thesis 3.5.2)."""
 
 FORCE_RANGE = 5.0
 """Range of the force sensors in units of the force limit."""
@@ -79,7 +82,7 @@ class MachineEnv(gym.Env[Observation, Action]):
         *,
         tolerances: Mapping[str, float],
         tolerance: bool | float = False,
-        sensor_error: float = 3.0,
+        sensor_error: float = SENSOR_ERROR,
         is_type_iii: Callable[[Step], bool] = does_not_repeat,
         render_mode: str | None = None,
     ) -> None:
@@ -88,14 +91,14 @@ class MachineEnv(gym.Env[Observation, Action]):
         self.render_mode = render_mode
         self.nominal, self.drive, self.task = machine, drive, task
         self._tolerances, self._is_type_iii = tolerances, is_type_iii
-        self._tolerance = _number("tolerance", tolerance, WIDEST_TOLERANCE)
-        self._sensor_error = _number("sensor_error", sensor_error, FORCE_RANGE * task.force_limit)
+        self._tolerance = checked_number("tolerance", tolerance, 0.0, WIDEST_TOLERANCE)
+        self._sensor_error = checked_number("sensor_error", sensor_error, 0.0, FORCE_RANGE * task.force_limit)
         self.observation_names = observation_names(task.cycles_per_step)
         self._space = observation_space(
             drive.lowest_speed, drive.highest_speed, FORCE_RANGE * task.force_limit, task.cycles_per_step
         )
-        self.observation_space = self._space
-        self.action_space = Box(-1.0, 1.0, (1,), np.float32)
+        self.observation_space = cast(Space[Observation], self._space)
+        self.action_space = cast(Space[Action], Box(-1.0, 1.0, (1,), np.float32))
         self.machine = self._at_speed(machine, drive.lowest_speed)
         self._job_time = task.job_cycles * self._at_speed(machine, drive.highest_speed).cycle_period
         self._damage = np.zeros(len(machine.sides))
@@ -179,7 +182,7 @@ class MachineEnv(gym.Env[Observation, Action]):
             if name != "speed":
                 raise ParameterError(f"options has no entry {name!r}; allowed: speed")
         low, high = self.drive.lowest_speed, self.drive.highest_speed
-        return _number("options['speed']", options.get("speed", low), high, low)
+        return checked_number("options['speed']", options.get("speed", low), low, high)
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Run one step; a simulation that fails ends the job instead of raising.
@@ -259,9 +262,3 @@ class MachineEnv(gym.Env[Observation, Action]):
         if self._dashboard is not None:
             self._dashboard.close()
             self._dashboard = None
-
-
-def _number(name: str, value: Any, high: float, low: float = 0.0) -> float:
-    if isinstance(value, str) or not hasattr(value, "__float__") or not low <= float(value) <= high:
-        raise ParameterError(f"{name} = {value!r} is out of range; allowed: {low:g} to {high:g}")
-    return float(value)

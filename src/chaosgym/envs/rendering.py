@@ -59,6 +59,7 @@ class Dashboard:
         self._speeds: list[float] = []
         self._peaks: list[NDArray[np.float64]] = []
         self._wild: list[bool] = []
+        self._top_velocity = 0.0
         self._record = record
 
     def add(self, record: CycleRecord, type_iii: bool) -> None:
@@ -113,7 +114,8 @@ class Dashboard:
         panel.axvspan(-10.0 * gap, -gap, color=PALE, alpha=0.5, linewidth=0)
         panel.plot(samples[:, 0] * 1e3, samples[:, 1], color=colour, linewidth=0.8)
         panel.plot(record.displacement * 1e3, record.velocity, "o", color=INK, markersize=4)
-        panel.set_xlim(-1.15 * gap, 1.15 * gap)
+        self._top_velocity = max(self._top_velocity, float(np.abs(samples[:, 1]).max()))
+        panel.set(xlim=(-1.15 * gap, 1.15 * gap), ylim=(-1.1 * self._top_velocity, 1.1 * self._top_velocity))
         panel.set_title("Phase portrait; dots: start of each cycle", fontsize=9, loc="left", color=INK)
         panel.set_xlabel("displacement [mm]", fontsize=8, color=INK)
         panel.set_ylabel("velocity [m/s]", fontsize=8, color=INK)
@@ -144,7 +146,7 @@ class Dashboard:
         axis = self._speed_axis
         axis.step(np.arange(len(self._speeds)) * step, self._speeds, where="post", color=INK, linewidth=1.2)
         margin = 0.05 * (self._drive.highest_speed - self._drive.lowest_speed)
-        axis.set_ylim(self._drive.lowest_speed - margin, self._drive.highest_speed + 3.0 * margin)
+        axis.set_ylim(self._drive.lowest_speed - margin, self._drive.highest_speed + margin)
         axis.yaxis.set_label_position("right")
         axis.set_ylabel(f"speed [{self._unit}]", fontsize=8, color=INK)
 

@@ -117,8 +117,8 @@ class Task:
     )
     """Peak force above which a step costs."""
     load_rating: float = parameter(
-        68.4, unit="N", low=1e-6, high=1e9, provenance="derived",
-        source="equivalent force of the beam at 26.8 Hz, its worst constant speed, so that a job takes one life there",
+        70.0, unit="N", low=1e-6, high=1e9, provenance="derived",
+        source="largest equivalent force at constant speed, 66 to 69 N at 26.6 to 29.1 Hz, rounded up",
     )  # fmt: skip
     """Force under which a surface lasts a million cycles."""
     damage_acceleration: float = parameter(

@@ -7,6 +7,7 @@ live there and nowhere else; validation, the command line and the documentation 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import cache
 from types import MappingProxyType
 from typing import Any, Literal, TypeVar
 
@@ -47,6 +48,15 @@ def parameter(
 
 def parameters_of(machine: Any) -> Mapping[str, Parameter]:
     """Describe every parameter of a machine or machine class, by field name."""
+    return _parameters_of(_class_of(machine))
+
+
+def _class_of(machine: Any) -> type:
+    return machine if isinstance(machine, type) else type(machine)
+
+
+@cache
+def _parameters_of(machine: type) -> Mapping[str, Parameter]:
     return MappingProxyType({f.name: f.metadata["parameter"] for f in fields(machine)})
 
 
@@ -67,7 +77,7 @@ def check_parameter(owner: Any, name: str, value: Any) -> Any:
         if value not in described.choices:
             raise ParameterError(f"{name} = {value!r} is not one of {', '.join(described.choices)}")
         return value
-    whole = isinstance(next(f.default for f in fields(owner) if f.name == name), int)
+    whole = isinstance(getattr(_class_of(owner), name), int)
     unit = "" if described.unit == "-" else f" {described.unit}"
     allowed = f"allowed: {described.low:g} to {described.high:g}{unit}"
     if not _is_real(value) or not math.isfinite(value) or not described.low <= value <= described.high:

@@ -71,7 +71,9 @@ def read_sweep(folder: str | Path) -> LabelledSweep:
     """
     path = Path(folder) / DATA_FILE
     if not path.is_file():
-        raise DatasetError(f"{folder} holds no finished sweep (no {DATA_FILE}); run `chaosgym sweep` again to finish it")
+        raise DatasetError(
+            f"{folder} holds no finished sweep (no {DATA_FILE}); run `chaosgym sweep` again to finish it"
+        )
     try:
         table = pq.read_table(path)
         settings = json.loads(table.schema.metadata[b"chaosgym"])

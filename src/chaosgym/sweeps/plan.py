@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from chaosgym.diagnosis import default_tolerances
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import check_parameter, parameters_of, with_settings
@@ -139,12 +140,30 @@ class SweepPlan:
         """Build the machines of some rows of ``points``."""
         return [with_settings(self.machine, {name: points[name][row] for name in points}) for row in rows]
 
+    def type_reach(self) -> dict[str, int]:
+        """Over which neighbours of a grid point its response type is judged: {field: steps of the grid}.
+
+        Along speed and clearance, as many steps as the default tolerance of the field holds, and at least one: where
+        the grid is coarser than the tolerance, the type stands for a wider neighbourhood. Empty unless on a grid.
+        """
+        tolerances = default_tolerances(self.machine)
+        reach = {}
+        for axis in self.axes:
+            if axis.count is None or axis.field not in (self.machine.speed_field, self.machine.clearance_field):
+                continue
+            middle = float(axis.at(np.array([0.5]))[0])
+            step = float(axis.at(np.array([0.5 + 1.0 / (axis.count - 1)]))[0]) - middle
+            width = tolerances[axis.field].at(middle, 1.0) - middle
+            reach[axis.field] = max(1, round(width / step))
+        return reach
+
     def settings(self) -> dict[str, Any]:
         """Everything that decides the rows of the sweep, as JSON values."""
         described = asdict(self)
         described["machine"] = self.machine.name
         described["base"] = {name: getattr(self.machine, name) for name in parameters_of(self.machine)}
         described["axes"] = [asdict(axis) for axis in self.axes]
+        described["type_reach"] = self.type_reach()
         return described
 
 

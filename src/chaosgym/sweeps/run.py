@@ -12,8 +12,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from tqdm import tqdm
 
-from chaosgym import __version__
-from chaosgym.diagnosis import types_on_grid, two_step_test
+from chaosgym.diagnosis import two_step_test
+from chaosgym.diagnosis.response_type import types_on_grid
 from chaosgym.errors import DatasetError, SimulationError
 from chaosgym.files import write_atomically
 from chaosgym.machines import Machine
@@ -21,6 +21,7 @@ from chaosgym.machines.parameters import parameters_of
 from chaosgym.simulation import simulate
 from chaosgym.sweeps.dataset import DATA_FILE, LabelledSweep, read_sweep, schema
 from chaosgym.sweeps.plan import SweepPlan
+from chaosgym.version import __version__
 
 PLAN_FILE = "plan.json"
 CHUNK_FOLDER = "chunks"
@@ -98,7 +99,7 @@ def run_sweep(
 
     with (
         ThreadPoolExecutor(max_workers=workers or cpu_count() or 1) as pool,
-        tqdm(total=len(plan), desc="sweep", unit="point", disable=not progress) as bar,
+        tqdm(total=len(plan), desc="sweep", unit="point", disable=not progress, mininterval=1.0) as bar,
     ):
         for done in pool.map(compute, starts, chunks):
             bar.update(done)
@@ -133,14 +134,14 @@ def _claim(folder: Path, settings: dict[str, Any]) -> None:
 
 def _with_response_types(table: pa.Table, plan: SweepPlan) -> pa.Table:
     """Fill the response types of a grid over speed and clearance from each point's neighbours."""
-    fields = [axis.field for axis in plan.axes]
-    neighbours = [fields.index(name) for name in (plan.machine.speed_field, plan.machine.clearance_field)
-                  if name in fields]  # fmt: skip
-    if plan.sampling != "grid" or not neighbours:
+    reach = plan.type_reach()
+    if not reach:
         return table
+    fields = [axis.field for axis in plan.axes]
     natures = np.array(table.column("nature").fill_null("undetermined").to_pylist()).reshape(plan.shape)
     largest = table.column("peak_force_max").to_numpy(zero_copy_only=False).reshape(plan.shape)
-    types = types_on_grid(natures, largest, axes=tuple(neighbours))
+    axes = [fields.index(name) for name in reach]
+    types = types_on_grid(natures, largest, axes=axes, reach=list(reach.values()))
     position = table.schema.get_field_index("response_type")
     column = pa.array(types.ravel().tolist(), pa.string())
     return table.set_column(position, table.schema.field(position), column)

@@ -1,0 +1,25 @@
+"""What does each environment's page say? What the docstring of its class says.
+
+python -m chaosgym.envs.documentation > docs/environments.md
+"""
+
+import inspect
+
+import gymnasium as gym
+from gymnasium.envs.registration import load_env_creator
+
+from chaosgym.envs import ENVIRONMENTS
+
+
+def environments_page() -> str:
+    """Return the page of all environments, in the format of Gymnasium's own pages (Markdown)."""
+    sections = ["# Environments\n\nThis page is written by `python -m chaosgym.envs.documentation`.\n"]
+    for name in ENVIRONMENTS:
+        entry_point = gym.spec(name).entry_point
+        assert isinstance(entry_point, str)
+        sections.append(f"# {name}\n\n{inspect.getdoc(load_env_creator(entry_point))}\n")
+    return "\n".join(sections)
+
+
+if __name__ == "__main__":
+    print(environments_page(), end="")

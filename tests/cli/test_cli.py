@@ -1,0 +1,137 @@
+"""The command line keeps its contract: JSON keys, exit codes, one clear line for bad input."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from chaosgym.machines import ImpactBeam
+from chaosgym.machines.parameters import parameters_of
+from chaosgym.simulation import simulate
+
+
+def run(*arguments):
+    """Run the command in a process of its own: (exit code, standard output, standard error)."""
+    done = subprocess.run([sys.executable, "-m", "chaosgym", *arguments], capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+def run_json(*arguments):
+    """Run with --json and return the object, which must be all of standard output."""
+    code, out, err = run(*arguments, "--json")
+    assert code == 0, err
+    return json.loads(out)
+
+
+def test_simulate_prints_the_peaks_of_simulate():
+    """The numbers are those of the library, upper side, one a cycle from rest."""
+    result = run_json("simulate", "impact-beam", "--frequency-hz", "19", "--clearance-mm", "0.1", "--cycles", "30")
+    record = simulate(ImpactBeam(excitation_frequency=19.0, clearance=0.1e-3), 30)
+    assert result["peak_force_N"] == record.peak_force[:, 0].tolist()
+    assert result["impacts"] == record.impacts.sum(axis=1).tolist()
+    assert 0.0 < result["seconds_per_cycle"] < 1.0
+
+
+@pytest.mark.parametrize(("frequency", "nature"), [("19", "periodic"), ("30", "chaotic")])
+def test_diagnose_tells_the_printed_natures(frequency, nature):
+    """At +-0.127 mm the thesis prints periodic at 19 Hz and chaotic at 30 Hz (figures 3.6 and 3.7)."""
+    result = run_json("diagnose", "impact-beam", "--frequency-hz", frequency, "--clearance-mm", "0.127")
+    assert result["nature"] == nature
+    assert (result["period"] == 1) == (nature == "periodic")
+    assert set(result["peak_force_summary_N"]) == {"min", "max", "mean", "std"}
+    assert result["evidence"]
+
+
+def test_diagnose_can_check_the_step():
+    """A finer step keeps the verdict of the exact integrator."""
+    result = run_json("diagnose", "impact-beam", "--frequency-hz", "19", "--step-check")
+    assert result["step_check"]["nature_stays"] is True
+    assert result["step_check"]["period_stays"] is True
+
+
+def test_classify_answers_with_probabilities():
+    """A type, and three probabilities that sum to one; 30 Hz at +-0.127 mm is Type III in the thesis."""
+    result = run_json("classify", "impact-beam", "--frequency-hz", "30", "--clearance-mm", "0.127")
+    assert set(result["probabilities"]) == {"I", "II", "III"}
+    assert sum(result["probabilities"].values()) == pytest.approx(1.0)
+    assert result["response_type"] == "III"
+
+
+def test_show_prints_every_field_and_its_provenance():
+    """All fields in SI, natural frequencies, and where each number comes from; a changed one is "given"."""
+    result = run_json("show", "impact-beam", "--clearance-mm", "0.1", "--set", "n_modes=3")
+    assert set(result["parameters"]) == set(parameters_of(ImpactBeam)) == set(result["provenance"])
+    assert result["parameters"]["clearance"] == pytest.approx(1e-4)
+    assert len(result["natural_frequencies_hz"]) == 3
+    assert result["provenance"]["clearance"]["grade"] == "given"
+    assert result["provenance"]["contact_stiffness"]["grade"] == "printed"
+
+
+def test_sweep_writes_parquet_and_resumes(tmp_path):
+    """A sweep fills its folder; the same command again is done at once; another one leaves it alone."""
+    command = (
+        "sweep", "impact-beam", "--axis", "excitation_frequency=18:30:3", "--axis", "clearance=1e-4:1.3e-4:2",
+        "--transient", "20", "--cycles", "30", "--out", str(tmp_path / "s"),
+    )  # fmt: skip
+    first = run_json(*command)
+    assert first["points"] == 6
+    assert sum(first["nature"].values()) == 6
+    held = (tmp_path / "s" / "sweep.parquet").read_bytes()
+    assert run_json(*command) == first
+    code, _, err = run(*command, "--seed", "5")
+    assert code == 2
+    assert "another sweep" in err
+    assert (tmp_path / "s" / "sweep.parquet").read_bytes() == held
+
+
+def test_info_and_version():
+    """Version and packages for a bug report."""
+    assert run("--version")[1].startswith("chaosgym, version ")
+    assert run_json("info")["packages"]["numba"]
+
+
+SIMULATE = ("simulate", "impact-beam")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((*SIMULATE, "--clearance-mm", "-1"), "--clearance-mm = -1 is out of range; allowed: 0 to 1000 mm"),
+        ((*SIMULATE, "--frequency-hz", "0"), "--frequency-hz = 0 is out of range; allowed: 0.001 to 10000 Hz"),
+        ((*SIMULATE, "--frequency-hz", "nan"), "--frequency-hz = nan is out of range"),
+        ((*SIMULATE, "--frequency-hz", "fast"), "'fast' is not a valid float"),
+        ((*SIMULATE, "--set", "lenth=1"), "did you mean length?"),
+        ((*SIMULATE, "--set", "length=-1"), "length = -1 m is out of range; allowed: 0.01 to 10 m"),
+        ((*SIMULATE, "--set", "length"), "not of the form FIELD=VALUE"),
+        ((*SIMULATE, "--clearance-mm", "1", "--set", "clearance=1"), "given twice"),
+        ((*SIMULATE, "--cycles", "0"), "0 is not in the range"),
+        (("simulate", "steam-engine"), "'steam-engine' is not"),
+        (("classify", "impact-beam", "--frequency-hz", "300"), "outside what the classifier was trained on"),
+        (("classify", "impact-beam", "--set", "length=0.28"), "differs from the classifier's training machine"),
+        (("classify", "impact-beam", "--model", "nowhere.npz"), "'nowhere.npz' does not exist"),
+        (("classify", "impact-beam", "--model", __file__), "can't be read as a classifier"),
+        (("sweep", "impact-beam", "--axis", "clearance=2:1:3", "--out", "o"), "empty or reversed"),
+        (("sweep", "impact-beam", "--random", "5", "--sobol", "5", "--out", "o"), "exclude each other"),
+        (("train-classifier", "--data", "nowhere", "--out", "x.npz"), "'nowhere' does not exist"),
+    ],
+)
+def test_bad_input_ends_in_one_line_and_exit_code_2(arguments, message, tmp_path, monkeypatch):
+    """No traceback, nothing on standard output, nothing written."""
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(*arguments)
+    assert code == 2
+    assert out == ""
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_with_other_things_in_it_is_left_alone(tmp_path):
+    """Sweep and demo refuse a folder that is not theirs."""
+    (tmp_path / "thesis.txt").write_text("mine")
+    for command in (("sweep", "impact-beam"), ("demo",)):
+        code, _, err = run(*command, "--out", str(tmp_path))
+        assert code == 2
+        assert "choose another folder" in err
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]

@@ -1,0 +1,57 @@
+"""Environments are found by id, wherever they are made."""
+
+import subprocess
+import sys
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import chaosgym.envs
+from chaosgym.envs import ENVIRONMENTS, register_environments
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_registering_again_changes_nothing_and_warns_of_nothing(name: str) -> None:
+    """The ids are registered by importing the package, once."""
+    before = gym.spec(name)
+    register_environments()
+    assert gym.spec(name) is before
+
+
+def test_importing_the_package_loads_neither_kernels_nor_plots() -> None:
+    """Registration costs no more than importing gymnasium."""
+    code = "import sys, chaosgym, gymnasium; print([m for m in ('numba', 'scipy', 'matplotlib') if m in sys.modules])"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"
+
+
+def test_an_id_can_name_the_package_to_import() -> None:
+    """Nothing but the id is needed in a fresh process."""
+    code = "import gymnasium; print(gymnasium.make('chaosgym:chaosgym/ImpactBeam-v0').spec.id)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "chaosgym/ImpactBeam-v0"
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_the_spec_survives_json(name: str) -> None:
+    """An environment made from the JSON of its spec is the same, keywords included."""
+    env = gym.make(name, clearance=0.0635e-3, tolerance=0.5, job_cycles=50)
+    assert env.spec is not None
+    again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    first, second = (e.reset(seed=3)[0] for e in (env, again))
+    assert np.array_equal(first, second)
+    assert again.unwrapped.nominal == env.unwrapped.nominal
+
+
+def test_the_time_limit_wrapper_truncates() -> None:
+    """Only max_episode_steps truncates."""
+    env = gym.make("chaosgym/ImpactBeam-v0", max_episode_steps=3)
+    env.reset(seed=0)
+    flags = [env.step(np.zeros(1, np.float32))[2:4] for _ in range(3)]
+    assert flags == [(False, False), (False, False), (False, True)]
+
+
+def test_entry_points_are_strings() -> None:
+    """Strings are what a spawned worker can load."""
+    assert all(isinstance(gym.spec(name).entry_point, str) for name in chaosgym.envs.ENVIRONMENTS)

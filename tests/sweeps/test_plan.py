@@ -1,0 +1,90 @@
+"""Plans of sweeps: axes, sampling, validation."""
+
+import numpy as np
+import pytest
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines import THESIS_IMPACT_BEAM
+from chaosgym.sweeps import Axis, SweepPlan
+from chaosgym.sweeps.plan import default_axes
+
+SPEED = Axis("excitation_frequency", 4.0, 16.0, 3, "log")
+CLEARANCE = Axis("clearance", 1e-5, 3e-5, 2)
+
+
+def test_axis_is_read_from_text():
+    """FIELD=LOW:HIGH[:COUNT][:lin|log] in every form."""
+    assert Axis.parse("excitation_frequency=4:16:3:log") == SPEED
+    assert Axis.parse("clearance=1e-5:3e-5:2") == CLEARANCE
+    assert Axis.parse("clearance=1e-5:3e-5") == Axis("clearance", 1e-5, 3e-5)
+    assert Axis.parse("clearance=1e-5:3e-5:log") == Axis("clearance", 1e-5, 3e-5, scale="log")
+
+
+def test_grid_has_every_combination_with_the_first_axis_slowest():
+    """Three speeds in geometric and two clearances in arithmetic progression."""
+    points = SweepPlan(THESIS_IMPACT_BEAM, (SPEED, CLEARANCE)).points()
+    np.testing.assert_allclose(points["excitation_frequency"], [4, 4, 8, 8, 16, 16])
+    np.testing.assert_allclose(points["clearance"], [1e-5, 3e-5] * 3)
+
+
+@pytest.mark.parametrize("sampling", ["random", "sobol"])
+def test_drawn_points_fill_the_range_and_depend_on_the_seed_alone(sampling):
+    """Same seed, same points; another seed, others; all inside the ranges."""
+    axes = (Axis("excitation_frequency", 4.0, 16.0, scale="log"), Axis("clearance", 1e-5, 3e-5))
+    first, again, other = (
+        SweepPlan(THESIS_IMPACT_BEAM, axes, sampling, 100, seed).points() for seed in (1, 1, 2)
+    )  # fmt: skip
+    for name, low, high in (("excitation_frequency", 4.0, 16.0), ("clearance", 1e-5, 3e-5)):
+        np.testing.assert_array_equal(first[name], again[name])
+        assert not np.array_equal(first[name], other[name])
+        assert low <= first[name].min() < low + 0.1 * (high - low)
+        assert high - 0.2 * (high - low) < first[name].max() <= high
+
+
+def test_default_axes_are_speed_and_clearance():
+    """With no axis a sweep covers the machine's usual ranges."""
+    fields = [axis.field for axis in default_axes(THESIS_IMPACT_BEAM, "grid")]
+    assert fields == ["excitation_frequency", "clearance"]
+
+
+def test_types_reach_one_tolerance_far():
+    """2 % steps of speed are one step per tolerance (+-2 %), 2.5 % steps of clearance two (+-5 %), coarse ones one."""
+    fine = Axis("excitation_frequency", 10.0, 10.0 * 1.02**20, 21, "log")
+    half = Axis("clearance", 1e-4, 1e-4 * 1.025**10, 11, "log")
+    coarse = Axis("clearance", 1e-5, 1e-3, 4, "log")
+    assert SweepPlan(THESIS_IMPACT_BEAM, (fine, half)).type_reach() == {"excitation_frequency": 1, "clearance": 2}
+    assert SweepPlan(THESIS_IMPACT_BEAM, (fine, coarse)).type_reach()["clearance"] == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("clearance", "not of the form"),
+        ("clearance=1e-5", "not of the form"),
+        ("clearance=a:b:3", "not of the form"),
+        ("clearance=3e-5:1e-5:4", "empty or reversed"),
+        ("clearance=0:1e-5:4:log", "can't be logarithmic"),
+        ("clearance=0:1e-5:1", "1 points; allowed: 2 to 1000000"),
+    ],
+)
+def test_bad_axes_are_refused(text, message):
+    """A bad axis names itself and what is allowed."""
+    with pytest.raises(ParameterError, match=message):
+        Axis.parse(text)
+
+
+@pytest.mark.parametrize(
+    ("axes", "options", "message"),
+    [
+        ((Axis("clearence", 1e-5, 3e-5, 2),), {}, "no field"),
+        ((Axis("clearance", -1e-5, 3e-5, 2),), {}, r"clearance = -1e-05 m is out of range"),
+        ((CLEARANCE, CLEARANCE), {}, "each field once"),
+        ((Axis("clearance", 1e-5, 3e-5),), {}, "needs a COUNT"),
+        ((CLEARANCE,), {"sampling": "random", "size": 5}, "takes no COUNT"),
+        ((Axis("damping_family", 0.0, 1.0, 2),), {}, "is a choice"),
+    ],
+)
+def test_bad_plans_are_refused(axes, options, message):
+    """A plan that can't be run is not constructed."""
+    with pytest.raises(ParameterError, match=message):
+        SweepPlan(THESIS_IMPACT_BEAM, axes, **options)
