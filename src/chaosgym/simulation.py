@@ -17,6 +17,7 @@ from tqdm import tqdm
 from chaosgym.core import status
 from chaosgym.core.fixed_step import advance_fixed_step
 from chaosgym.core.impact_beam import CycleArrays, Episode, advance
+from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.machines.machine import Machine
@@ -156,7 +157,12 @@ _PER_CYCLE = (
 
 
 def _run_impact_beam(
-    beam: ImpactBeam, state: MotionState, cycles: int, samples: int, integrator: Integrator
+    beam: ImpactBeam,
+    state: MotionState,
+    cycles: int,
+    samples: int,
+    integrator: Integrator,
+    tangents: Tangents | None = None,
 ) -> tuple[int, int, CycleRecord]:
     model = beam.reduce()
     states = 2 * beam.n_modes
@@ -173,10 +179,11 @@ def _run_impact_beam(
     coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
     if isinstance(integrator, ExactEvents):
-        outcome, done = advance(
-            model, coordinates, episode, arrays, integrator.step_phase, integrator.event_tolerance,
-            integrator.event_budget,
-        )  # fmt: skip
+        settings = (integrator.step_phase, integrator.event_tolerance, integrator.event_budget)
+        if tangents is None:
+            outcome, done = advance(model, coordinates, episode, arrays, *settings)
+        else:
+            outcome, done = advance(model, coordinates, episode, arrays, *settings, tangents)
     else:
         outcome, done = advance_fixed_step(model, coordinates, episode, arrays, integrator.steps_per_cycle)
     record = CycleRecord(
@@ -276,6 +283,54 @@ def simulate(
             state = record.final_state
             first += count
     return record
+
+
+def simulate_with_deviations(
+    machine: ImpactBeam,
+    cycles: int,
+    initial_state: MotionState | ArrayLike | None = None,
+    *,
+    deviations: ArrayLike,
+    orthonormal: bool = True,
+    integrator: ExactEvents | None = None,
+) -> tuple[CycleRecord, Array, Array]:
+    """Run an impact beam and carry small deviations of its state through every contact, exactly.
+
+    Parameters
+    ----------
+    machine, cycles, initial_state, integrator
+        As for ``simulate``.
+    deviations : (m, n_states)
+        Initial deviations of the state.
+    orthonormal
+        Make them orthonormal in energy after each cycle; otherwise they grow as they are.
+
+    Returns
+    -------
+    (record, deviations, log_growth)
+        The run; the deviations at its end, (m, n_states); the logarithm of the growth of each in each cycle,
+        (cycles, m), or (cycles, 0) if they are not made orthonormal.
+
+    Raises
+    ------
+    ParameterError, SimulationError
+        As ``simulate``.
+    """
+    cycles = _count("cycles", cycles, 1)
+    state = _initial(machine, initial_state)
+    vectors = np.array(deviations, dtype=float, ndmin=2)
+    if vectors.shape[1] != len(state.coordinates) or not np.all(np.isfinite(vectors)):
+        raise ParameterError(
+            f"deviations have shape {vectors.shape}; allowed: (m, {len(state.coordinates)}), all values finite"
+        )
+    log_growth = np.empty((cycles, len(vectors) if orthonormal else 0))
+    integrator = integrator or ExactEvents()
+    outcome, done, record = _run_impact_beam(
+        machine, state, cycles, 0, integrator, Tangents(vectors, log_growth)
+    )  # fmt: skip
+    if outcome != status.OK:
+        raise _failure(machine, outcome, done, integrator)
+    return record, vectors, log_growth
 
 
 def _failure(machine: Machine, outcome: int, cycle: int, integrator: Integrator) -> SimulationError:

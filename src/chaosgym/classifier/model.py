@@ -147,7 +147,7 @@ class ResponseClassifier:
             If it is missing, damaged, of another version, or its arrays do not match their hash.
         """
         try:
-            with np.load(path, allow_pickle=False) as held:
+            with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as held:
                 arrays = {name: held[name] for name in held.files if name != "card"}
                 card = json.loads(held["card"].tobytes())
             if card["format"] != FORMAT:

@@ -26,6 +26,6 @@ KERNEL_CACHE = os.path.join(_cache_root, source_digest(Path(__file__).parent))
 _previous_cache_folder = config.CACHE_DIR
 config.CACHE_DIR = KERNEL_CACHE
 try:
-    from chaosgym.core import contact, fixed_step, impact_beam, propagator, status  # noqa: F401
+    from chaosgym.core import contact, fixed_step, impact_beam, propagator, status, tangent  # noqa: F401
 finally:
     config.CACHE_DIR = _previous_cache_folder

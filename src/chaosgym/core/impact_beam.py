@@ -24,6 +24,7 @@ from numba import njit
 
 from chaosgym.core import status
 from chaosgym.core.propagator import Regimes, move, nudge, safe_time, step_table, with_force
+from chaosgym.core.tangent import carry, orthonormalise, touch
 
 FREE, PRESSED = 0, 1
 GAP, CONTACT, DETACHED = 0, 1, 2
@@ -337,11 +338,12 @@ def leave_regime(model, regimes, tip_state, side, u, state):
 
 
 @njit(cache=True, nogil=True)
-def advance(model, state, episode, arrays, step_phase, event_tolerance, event_budget):
+def advance(model, state, episode, arrays, step_phase, event_tolerance, event_budget, tangents=None):
     """Advance ``state`` (2n,) and ``episode`` in place by whole cycles, one for each row of ``arrays``.
 
     Every cycle starts at phase zero of the force. ``step_phase`` is the angle [rad] by which the fastest mode turns in
-    the shortest step, ``event_tolerance`` the error of an event's instant as an angle of the fastest mode.
+    the shortest step, ``event_tolerance`` the error of an event's instant as an angle of the fastest mode. ``tangents``
+    travel with the motion; None compiles to a kernel without them.
 
     Returns
     -------
@@ -374,6 +376,10 @@ def advance(model, state, episode, arrays, step_phase, event_tolerance, event_bu
         events = 0
         sample = 0
         time = 0.0
+        carried = 0.0
+        if tangents is not None:
+            vectors, growth = tangents.vectors, tangents.log_growth[cycle]
+            growth[:] = 0.0
         tip_state, side = tip_state_of(model, x, v)
         r = PRESSED if tip_state == CONTACT else FREE
         enter_regime(model, regimes, tip_state, side, state, 1.0, 0.0, u)
@@ -460,6 +466,12 @@ def advance(model, state, episode, arrays, step_phase, event_tolerance, event_bu
                 return status.EVENT_BUDGET, cycle
             cosine, sine = math.cos(omega * time), math.sin(omega * time)
             leave_regime(model, regimes, tip_state, side, u, state)
+            if tangents is not None:
+                if not (tip_state == DETACHED and event == 1):
+                    carry(model.stiffness, regimes, r, time - carried, vectors, growth, spare)
+                    carried = time
+                if tip_state == GAP:
+                    touch(model.tip_shape, model.contact_damping, vectors)
             if tip_state == GAP:
                 side = 1.0 if event == 1 else -1.0
                 tip_state = CONTACT
@@ -477,6 +489,9 @@ def advance(model, state, episode, arrays, step_phase, event_tolerance, event_bu
 
         arrays.events[cycle] = events
         leave_regime(model, regimes, tip_state, side, u, state)
+        if tangents is not None:
+            carry(model.stiffness, regimes, r, time - carried, vectors, growth, spare)
+            orthonormalise(model.stiffness, vectors, growth)
         for i in range(n2):
             if not math.isfinite(state[i]):
                 return status.DIVERGED, cycle

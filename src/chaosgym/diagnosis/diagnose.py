@@ -1,36 +1,243 @@
-"""What kind of response has this machine? Runs it in stages, each twice as long, until the verdict is sure."""
+"""What kind of response has this machine? Runs it in stages, each twice as long, until the verdict is sure.
 
-from dataclasses import replace
+After 100, 200, 400 ... cycles from the initial condition:
+
+    it repeats, or nearly    Newton's method proves the orbit: periodic, certified. Where it can't (near grazing), a
+                             largest exponent below zero confirms the recurrence: periodic, agreed
+    it does not              go on. At the end of the budget an exponent above three standard errors makes it chaotic,
+                             one within them, with the figures of step II, quasiperiodic
+
+Chaos that dies out within the horizon counts as chaotic (thesis 5.2.3), with the status "transient".
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.diagnosis.response import Diagnosis
-from chaosgym.diagnosis.two_step import two_step_test
+from chaosgym.diagnosis.lyapunov import Deviation, LyapunovExponent, average_growth
+from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
+from chaosgym.diagnosis.response import Diagnosis, Nature, Status
+from chaosgym.diagnosis.two_step import (
+    CHAOTIC_STATISTIC,
+    QUASIPERIODIC_CYCLES,
+    REGULAR_STATISTIC,
+    two_step_test,
+)
+from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
-from chaosgym.simulation import Integrator, MotionState, simulate
+from chaosgym.simulation import CycleRecord, Integrator, MotionState, simulate
+
+Array = NDArray[np.float64]
 
 FIRST_STAGE = 100
 """Cycles of the first stage."""
+
+DEFAULT_BUDGET = 3200
+"""Cycles of the last stage."""
+
+NEAR = 0.05
+"""How far Newton's method may move, relative to the size of the motion, to find the orbit that the motion nears."""
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """What is known after a stage."""
+
+    record: CycleRecord
+    growth: Array
+    verdict: Diagnosis
+    exponent: LyapunovExponent
+    orbit: PeriodicOrbit | None
+    cycles_used: int
 
 
 def diagnose(
     machine: Machine,
     *,
     initial_state: MotionState | ArrayLike | None = None,
-    budget: int = 3200,
+    budget: int = DEFAULT_BUDGET,
     integrator: Integrator | None = None,
 ) -> Diagnosis:
-    """Tell the nature of a machine's response."""
-    record = simulate(machine, FIRST_STAGE, initial_state, integrator=integrator)
+    """Tell the nature of a machine's response, and how sure that is.
+
+    Parameters
+    ----------
+    machine
+        What to judge.
+    initial_state
+        Rest by default; part of the label.
+    budget
+        Cycles that the last stage may reach, at least 100. Chaos takes them all, a periodic response mostly 100.
+    integrator
+        ``ExactEvents()`` by default.
+
+    Returns
+    -------
+    Diagnosis
+        With status, horizon, settle cycle and the votes of all tests. ``evidence`` holds the figures of the Two-Step
+        Test, ``largest_lyapunov_exponent_per_cycle``, the ``orbit`` if one was found, ``largest_peak`` [N] of the
+        settled cycles, ``cycles_used`` (Newton's method included) and ``final_state``.
+
+    Raises
+    ------
+    DiagnosisError
+        If the budget is below the first stage.
+    SimulationError
+        If the motion can't be followed.
+    """
+    if budget < FIRST_STAGE:
+        raise DiagnosisError(f"budget = {budget} cycles is out of range; allowed: {FIRST_STAGE} or more")
+    deviation = Deviation(machine, initial_state, integrator)
+    record, growth = deviation.run(FIRST_STAGE)
+    searched = 0
     while True:
-        verdict = two_step_test(record)
-        if (verdict.nature == "periodic" and verdict.settle_cycle is not None) or 2 * len(record) > budget:
+        stage = _stage(machine, record, growth, searched)
+        verdict = _periodic(stage)
+        if verdict is not None or 2 * len(record) > budget:
             break
-        more = simulate(machine, len(record), record.final_state, integrator=integrator)
-        record = record.followed_by(more)
-    evidence = dict(verdict.evidence)
-    settled = max(len(record) // 2, verdict.settle_cycle or 0)
-    evidence["largest_peak"] = float(np.max(record.peak_force[settled:]))
-    evidence["final_state"] = [float(value) for value in record.final_state.coordinates]
-    return replace(verdict, evidence=evidence, horizon=len(record))
+        searched = stage.cycles_used - len(record)
+        more, more_growth = deviation.run(len(record))
+        record, growth = record.followed_by(more), np.concatenate([growth, more_growth])
+    verdict = verdict or _not_periodic(stage)
+    return replace(verdict, votes=_votes(stage), horizon=len(record), evidence=_evidence(stage, verdict, initial_state))
+
+
+def _stage(machine: Machine, record: CycleRecord, growth: Array, searched: int) -> _Stage:
+    verdict = two_step_test(record)
+    exponent = average_growth(growth[len(growth) // 2 :], machine.cycle_period)
+    orbit, spent = None, 0
+    if verdict.period is not None or exponent.sign < 0:
+        for period in _candidates(record, verdict):
+            found = find_periodic_orbit(machine, record.final_state, period)
+            spent += 8 * period
+            if found is not None and found.certified and _approaches(machine, record, found):
+                orbit = found
+                spent += 4 * period
+                break
+    return _Stage(record, growth, verdict, exponent, orbit, len(record) + searched + spent)
+
+
+def _candidates(record: CycleRecord, verdict: Diagnosis) -> tuple[int, ...]:
+    """Periods worth a search: that of the verdict, or else the one after which the state comes back best."""
+    if verdict.period is not None:
+        return (verdict.period,)
+    states = record.section
+    gaps = [
+        float(np.linalg.norm((states[-1] - states[-1 - k]) / np.ptp(states, axis=0).clip(1e-300))) for k in range(1, 17)
+    ]
+    return (int(np.argmin(gaps)) + 1,)
+
+
+def _approaches(machine: Machine, record: CycleRecord, orbit: PeriodicOrbit) -> bool:
+    """True if the motion is near the orbit, and nearer four periods later unless it is there already."""
+    if orbit.distance > NEAR:
+        return False
+    if orbit.distance < 1e-6:
+        return True
+    later = simulate(machine, 4 * orbit.period, record.final_state).final_state.coordinates
+    now = record.final_state.coordinates - orbit.state
+    size = np.maximum(np.abs(orbit.state), 1e-9 * np.max(np.abs(orbit.state)))
+    return bool(np.linalg.norm((later - orbit.state) / size) < np.linalg.norm(now / size))
+
+
+def _periodic(stage: _Stage) -> Diagnosis | None:
+    """The verdict if the motion is known to be periodic in the end, else None."""
+    verdict, orbit = stage.verdict, stage.orbit
+    transient = _was_chaotic(stage)
+    if orbit is not None:
+        reason = f"period {orbit.period} proven: miss {orbit.residual:.0e}, multiplier {orbit.largest_multiplier:.3g}"
+        margin = 1.0 - orbit.largest_multiplier
+        status: Status = "certified"
+    elif verdict.settle_cycle is not None and stage.exponent.sign < 0:
+        reason = f"{verdict.reason}; exponent {stage.exponent.per_cycle:.3g} a cycle"
+        margin, status = verdict.margin, "agreed"
+    else:
+        return None
+    settle = verdict.settle_cycle if verdict.settle_cycle is not None else len(stage.record)
+    if transient:
+        return Diagnosis(
+            nature="chaotic", period=orbit.period if orbit else verdict.period, margin=margin, transient=True,
+            status="transient", settle_cycle=settle,
+            reason=f"transient chaos for {verdict.evidence['irregular_cycles']} cycles; then {reason}",
+        )  # fmt: skip
+    return Diagnosis(
+        nature="periodic", period=orbit.period if orbit else verdict.period, margin=margin, status=status,
+        settle_cycle=settle, reason=reason,
+    )  # fmt: skip
+
+
+def _was_chaotic(stage: _Stage) -> bool:
+    """True if the irregular cycles before a recurrence were chaotic by the exponent too."""
+    irregular = stage.verdict.evidence.get("irregular_cycles", 0)
+    return stage.verdict.transient and float(np.mean(stage.growth[:irregular])) > 0.0
+
+
+def _not_periodic(stage: _Stage) -> Diagnosis:
+    verdict, exponent = stage.verdict, stage.exponent
+    shown = f"exponent {exponent.per_cycle:.3g} +- {exponent.standard_error:.2g} a cycle"
+    if exponent.sign > 0 and verdict.settle_cycle is None:
+        margin = float(np.clip(exponent.per_cycle / (3.0 * exponent.standard_error) - 1.0, 0.0, 1.0))
+        status: Status = "agreed" if verdict.nature in ("chaotic", "undetermined") else "disputed"
+        return Diagnosis(
+            nature="chaotic", period=None, margin=margin, status=status, reason=f"{shown}; {verdict.reason}"
+        )
+    settled = len(stage.record) - len(stage.record) // 2
+    if exponent.sign == 0 and verdict.nature == "quasiperiodic" and settled >= QUASIPERIODIC_CYCLES:
+        return Diagnosis(
+            nature="quasiperiodic",
+            period=None,
+            margin=verdict.margin,
+            status="agreed",
+            reason=f"{shown}; {verdict.reason}",
+        )
+    if exponent.sign < 0 and verdict.nature == "periodic":
+        return Diagnosis(
+            nature="periodic", period=verdict.period, margin=0.0, status="agreed", reason=f"{shown}; {verdict.reason}"
+        )
+    return Diagnosis(
+        nature="undetermined", period=None, margin=0.0, status="unresolved",
+        reason=f"not settled after {len(stage.record)} cycles: {shown}; {verdict.reason}",
+    )  # fmt: skip
+
+
+def _votes(stage: _Stage) -> Mapping[str, Nature]:
+    """What each test says of the last half of the record by itself."""
+    verdict = two_step_test(stage.record.after(len(stage.record) // 2))
+    figures = verdict.evidence
+    by_sign: dict[int, Nature] = {1: "chaotic", -1: "periodic", 0: "undetermined"}
+    votes: dict[str, Nature] = {"two_step": verdict.nature, "lyapunov": by_sign[stage.exponent.sign]}
+    statistic = figures.get("zero_one")
+    if statistic is not None:
+        votes["zero_one"] = (
+            "chaotic" if statistic > CHAOTIC_STATISTIC
+            else "quasiperiodic" if statistic < REGULAR_STATISTIC else "undetermined"
+        )  # fmt: skip
+    votes["newton"] = "periodic" if stage.orbit is not None else "undetermined"
+    return votes
+
+
+def _evidence(stage: _Stage, verdict: Diagnosis, initial_state: MotionState | ArrayLike | None) -> dict[str, Any]:
+    record = stage.record
+    settled = max(len(record) // 2, verdict.settle_cycle if verdict.settle_cycle is not None else 0)
+    settled = min(settled, len(record) - 1)
+    exponent = stage.exponent.as_dict()
+    if stage.orbit is not None:
+        # exact for the orbit itself
+        exponent |= {
+            "value": float(np.log(max(stage.orbit.largest_multiplier, 1e-300))) / stage.orbit.period,
+            "standard_error": 0.0,
+        }
+        exponent["per_second"] = exponent["value"] / stage.exponent.cycle_period
+    given = initial_state.coordinates if isinstance(initial_state, MotionState) else initial_state
+    return {
+        **stage.verdict.evidence,
+        "largest_lyapunov_exponent_per_cycle": exponent,
+        "orbit": stage.orbit.as_dict() if stage.orbit is not None else None,
+        "largest_peak": float(np.max(record.peak_force[settled:])),
+        "cycles_used": stage.cycles_used,
+        "initial_state": "rest" if given is None else [float(value) for value in np.asarray(given)],
+        "final_state": [float(value) for value in record.final_state.coordinates],
+    }

@@ -1,0 +1,295 @@
+r"""Do neighbouring motions part or meet? Lyapunov exponents, per cycle and per second.
+
+    value = lim  1/N  log |w(N)| / |w(0)|         w: a small deviation of the state, N cycles
+
+Beam: w is carried exactly, through contacts by saltation matrices (``core.tangent``). Any other machine or map: a
+second trajectory at a small distance, brought back to that distance each cycle (Benettin). A measured series: mean
+divergence of nearest neighbours (Rosenstein), which needs a few thousand cycles and sees neither weak chaos nor decay.
+
+A forced machine has no exponent of zero from the direction of the flow: a periodic response has a negative largest
+exponent, and zero means a torus or a bifurcation.
+
+References
+----------
+G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9-30.
+M. T. Rosenstein, J. J. Collins, C. J. De Luca, Physica D 65 (1993) 117-134.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+
+from chaosgym.diagnosis.stroboscopic import as_samples
+from chaosgym.errors import DiagnosisError
+from chaosgym.machines import ImpactBeam, Machine
+from chaosgym.simulation import (
+    CycleRecord,
+    ExactEvents,
+    Integrator,
+    MotionState,
+    rest_state,
+    simulate,
+    simulate_with_deviations,
+)
+
+Array = NDArray[np.float64]
+
+DISTANCE = 1e-7
+"""Distance of the second trajectory, relative to the size of the motion."""
+
+BLOCKS = 20
+"""Blocks whose scatter gives the standard error."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LyapunovExponent:
+    """A largest Lyapunov exponent with its uncertainty.
+
+    Attributes
+    ----------
+    per_cycle
+        Mean logarithm of the growth of a deviation in one cycle.
+    standard_error
+        Of ``per_cycle``, from the scatter of block means; the larger of the values for 20 and for 10 blocks.
+    cycle_period
+        Duration of a cycle [s]; 1 where time counts in cycles.
+    history : (blocks,)
+        Means of successive blocks: they show a drift that the standard error hides.
+    cycles
+        Number of cycles averaged.
+    """
+
+    per_cycle: float
+    standard_error: float
+    cycle_period: float
+    history: tuple[float, ...]
+    cycles: int
+
+    @property
+    def per_second(self) -> float:
+        """Exponent per second [1/s]."""
+        return self.per_cycle / self.cycle_period
+
+    @property
+    def sign(self) -> int:
+        """+1 or -1 where the exponent differs from zero by more than three standard errors, else 0."""
+        return int(np.sign(self.per_cycle)) if abs(self.per_cycle) > 3.0 * self.standard_error else 0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {"value": self.per_cycle, "standard_error": self.standard_error, "per_second": self.per_second,
+                "cycles": self.cycles, "history": list(self.history)}  # fmt: skip
+
+
+def average_growth(log_growth: ArrayLike, cycle_period: float = 1.0) -> LyapunovExponent:
+    """Exponent from the logarithms of the growth in successive cycles, (cycles,)."""
+    growth = as_samples(log_growth, minimum=2 * BLOCKS)[:, 0]
+
+    def means(blocks: int) -> Array:
+        length = len(growth) // blocks
+        return np.asarray(growth[len(growth) - blocks * length :].reshape(blocks, length).mean(axis=1))
+
+    error = max(float(np.std(means(count), ddof=1) / np.sqrt(count)) for count in (BLOCKS, BLOCKS // 2))
+    return LyapunovExponent(
+        per_cycle=float(growth.mean()), standard_error=error, cycle_period=cycle_period,
+        history=tuple(float(value) for value in means(BLOCKS)), cycles=len(growth),
+    )  # fmt: skip
+
+
+class Deviation:
+    """A motion and one small deviation that travels with it; call ``run`` again and again to go on.
+
+    Attributes
+    ----------
+    state : MotionState
+        Where the motion is.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        initial_state: MotionState | ArrayLike | None = None,
+        integrator: Integrator | None = None,
+    ) -> None:
+        rest = rest_state(machine)
+        given = rest if initial_state is None else initial_state
+        self.state = given if isinstance(given, MotionState) else MotionState(np.array(given, float), rest.bouncing)
+        self._machine = machine
+        self._integrator = integrator
+        self._direction: Array = np.cos(1.0 + np.arange(len(rest.coordinates)))
+        self._scale: Array | None = None
+
+    def run(self, cycles: int) -> tuple[CycleRecord, Array]:
+        """Run on; return the record and the logarithm of the deviation's growth in each cycle, (cycles,)."""
+        exact = self._integrator is None or isinstance(self._integrator, ExactEvents)
+        if isinstance(self._machine, ImpactBeam) and exact:
+            integrator = self._integrator if isinstance(self._integrator, ExactEvents) else None
+            record, vectors, growth = simulate_with_deviations(
+                self._machine, cycles, self.state, deviations=self._direction, integrator=integrator
+            )
+            self._direction, log_growth = vectors[0], growth[:, 0]
+        else:
+            record = simulate(self._machine, cycles, self.state, integrator=self._integrator)
+            log_growth = self._second_trajectory(record)
+        self.state = record.final_state
+        return record, log_growth
+
+    def _second_trajectory(self, record: CycleRecord) -> Array:
+        states = np.vstack([record.section, record.final_state.coordinates])
+        if self._scale is None:
+            largest = np.max(np.abs(states), axis=0)
+            self._scale = np.where(largest > 0.0, largest, 1.0)
+            self._direction = self._scale * self._direction
+        log_growth = np.empty(len(record))
+        for cycle in range(len(record)):
+            length = float(np.linalg.norm(self._direction / self._scale))
+            start = states[cycle] + DISTANCE / length * self._direction
+            end = simulate(self._machine, 1, start, integrator=self._integrator).final_state.coordinates
+            self._direction = end - states[cycle + 1]
+            distance = float(np.linalg.norm(self._direction / self._scale))
+            log_growth[cycle] = np.log(max(distance, 1e-300) / DISTANCE)
+        return log_growth
+
+
+def largest_lyapunov_exponent(
+    machine: Machine,
+    cycles: int = 1000,
+    *,
+    transient: int = 200,
+    initial_state: MotionState | ArrayLike | None = None,
+    integrator: Integrator | None = None,
+) -> LyapunovExponent:
+    """Largest Lyapunov exponent of a machine's motion.
+
+    Parameters
+    ----------
+    machine
+        What to run.
+    cycles, transient
+        Cycles to average, at least 40, and to run before; the deviation settles during the transient too.
+    initial_state
+        Rest by default.
+    integrator
+        With ``RungeKutta4`` the beam too takes two trajectories.
+    """
+    deviation = Deviation(machine, initial_state, integrator)
+    if transient:
+        deviation.run(transient)
+    return average_growth(deviation.run(cycles)[1], machine.cycle_period)
+
+
+def lyapunov_spectrum(
+    machine: ImpactBeam,
+    cycles: int = 200,
+    *,
+    transient: int = 200,
+    initial_state: MotionState | ArrayLike | None = None,
+) -> tuple[Array, float]:
+    """All exponents of an impact beam per cycle, descending, (n_states,), and the sum that the trace demands.
+
+    The sum is -tr(D) T - d |phi_t|^2 t_contact: damping of structure and shaker, and of the contact while it lasts.
+    """
+    states = len(rest_state(machine).coordinates)
+    first, vectors, _ = simulate_with_deviations(
+        machine, max(1, transient), initial_state, deviations=np.eye(states)
+    )  # fmt: skip
+    record, _, growth = simulate_with_deviations(machine, cycles, first.final_state, deviations=vectors)
+    model = machine.reduce()
+    contact_time = float(record.contact_fraction.sum(axis=1).mean()) * machine.cycle_period
+    trace = -float(np.trace(model.damping)) * machine.cycle_period
+    trace -= model.contact_damping * float(np.sum(model.tip_shape**2)) * contact_time
+    return np.asarray(growth.mean(axis=0)), trace
+
+
+def two_trajectory_exponent(
+    step: Callable[[Array], Array],
+    state: ArrayLike,
+    cycles: int = 1000,
+    *,
+    transient: int = 200,
+    distance: float = DISTANCE,
+    cycle_period: float = 1.0,
+) -> LyapunovExponent:
+    """Largest exponent of any map by two trajectories that are brought back to ``distance`` each cycle.
+
+    Parameters
+    ----------
+    step
+        Advances a state (d,) by one cycle.
+    state : (d,)
+        Initial state.
+    """
+    reference = np.array(state, dtype=float, ndmin=1)
+    for _ in range(transient):
+        reference = np.asarray(step(reference), dtype=float)
+    direction = np.cos(1.0 + np.arange(len(reference)))
+    settle = 20
+    log_growth = np.empty(settle + cycles)
+    for cycle in range(settle + cycles):
+        other = np.asarray(step(reference + distance / np.linalg.norm(direction) * direction), dtype=float)
+        reference = np.asarray(step(reference), dtype=float)
+        direction = other - reference
+        length = float(np.linalg.norm(direction))
+        log_growth[cycle] = np.log(max(length, 1e-300) / distance)
+        if length == 0.0:
+            direction = np.cos(1.0 + np.arange(len(reference)))
+    return average_growth(log_growth[settle:], cycle_period)
+
+
+def exponent_from_series(
+    series: ArrayLike, *, dimension: int = 3, steps: int = 8, cycle_period: float = 1.0
+) -> LyapunovExponent:
+    """Largest exponent of a measured series of one sample a cycle, by the divergence of nearest neighbours.
+
+    Parameters
+    ----------
+    series : (cycles,)
+        Settled and nearly free of noise; 1000 cycles or more.
+    dimension
+        Number of successive samples that make a point.
+    steps
+        Cycles over which neighbours are followed.
+
+    Raises
+    ------
+    DiagnosisError
+        If there are fewer than 500 cycles, the series is constant, or neighbours are as far apart at the start as they
+        ever get, as in noise.
+
+    Notes
+    -----
+    Good to about a fifth for strong chaos. It can't see a negative exponent: for a periodic series there is no
+    divergence to follow. It underestimates where a step of one cycle already fills the attractor (exponents near or
+    above 1), and takes sensor noise for divergence.
+    """
+    x = as_samples(series, minimum=500)[:, 0]
+    spread = float(np.std(x))
+    if spread <= 1e-9 * float(np.max(np.abs(x))):
+        raise DiagnosisError("the series is constant; allowed: a series that varies")
+    points = np.lib.stride_tricks.sliding_window_view(x / spread, dimension)
+    usable = len(points) - steps
+    distances, partners = cKDTree(points[:usable]).query(points[:usable], k=12)
+    apart = np.abs(partners - np.arange(usable)[:, None]) > dimension
+    apart &= distances > 1e-12
+    first = np.argmax(apart, axis=1)
+    kept = np.flatnonzero(apart.any(axis=1))
+    if len(kept) < usable // 2:
+        raise DiagnosisError("the series repeats: neighbours do not part, and there is no exponent to measure")
+    partner = partners[kept, first[kept]]
+    # distances of the newest sample of each point: no delay between divergence and cycle
+    gaps = np.abs(
+        x[kept[:, None] + dimension - 1 + np.arange(steps)] - x[partner[:, None] + dimension - 1 + np.arange(steps)]
+    )
+    logs = np.log(np.maximum(gaps / spread, 1e-12))
+    curve = logs.mean(axis=0)
+    ceiling = float(np.mean(np.log(np.abs(np.subtract.outer(x[::7], x[3::7])) / spread + 1e-12)))
+    rising = np.flatnonzero(curve > ceiling - 1.0)
+    last = max(2, int(rising[0]) if len(rising) else steps - 1)
+    if curve[0] > ceiling - 1.0:
+        raise DiagnosisError("nearest neighbours are as far apart as any two points: noise, or far too few cycles")
+    growth = (logs[:, last] - logs[:, 0]) / last
+    return average_growth(growth, cycle_period)

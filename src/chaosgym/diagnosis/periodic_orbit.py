@@ -1,0 +1,145 @@
+r"""Is a periodic response proven? Newton's method on the map of k cycles, and its Floquet multipliers.
+
+    y <- y - (M - I)^-1 (P(y) - y)         P: the motion over k cycles, M = dP/dy
+
+An orbit is certified if |P(y) - y| falls below 1e-10 of the orbit's size and every eigenvalue of M lies inside the
+unit circle. Newton's method, like M itself, fails near grazing, where P is not smooth.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chaosgym.errors import SimulationError
+from chaosgym.machines import ImpactBeam, Machine
+from chaosgym.simulation import ExactEvents, MotionState, simulate, simulate_with_deviations
+
+Array = NDArray[np.float64]
+
+RESIDUAL = 1e-10
+"""Largest miss of a certified orbit, relative to its size."""
+
+PRECISE = ExactEvents(event_tolerance=1e-13)
+"""Events to rounding error, so that the miss can fall below the limit."""
+
+FINITE_DIFFERENCE = 1e-6
+"""Step of the derivative where no exact deviations exist, relative to the size of the coordinate."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeriodicOrbit:
+    """A fixed point of the map of ``period`` cycles.
+
+    Attributes
+    ----------
+    period
+        Cycles.
+    state : (n_states,)
+        State at the start of a cycle.
+    residual
+        Miss after one period, relative to the size of the state in energy.
+    multipliers : (n_states,) complex
+        Floquet multipliers, largest modulus first.
+    distance
+        How far the search moved, relative to the size.
+    """
+
+    period: int
+    state: Array
+    residual: float
+    multipliers: NDArray[np.complex128]
+    distance: float
+
+    @property
+    def largest_multiplier(self) -> float:
+        """Largest modulus of the multipliers: the factor by which deviations change in one period."""
+        return float(np.abs(self.multipliers[0]))
+
+    @property
+    def certified(self) -> bool:
+        """True if the orbit closes and attracts."""
+        return self.residual < RESIDUAL and self.largest_multiplier < 1.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {"period": self.period, "residual": self.residual, "largest_multiplier": self.largest_multiplier,
+                "distance": self.distance, "certified": self.certified}  # fmt: skip
+
+
+def find_periodic_orbit(
+    machine: Machine, start: MotionState | ArrayLike, period: int, *, iterations: int = 8
+) -> PeriodicOrbit | None:
+    """Search for a periodic orbit near a state.
+
+    Parameters
+    ----------
+    machine
+        What runs.
+    start
+        A state near the orbit at the start of a cycle.
+    period
+        Cycles after which the orbit closes.
+    iterations
+        Newton steps at most.
+
+    Returns
+    -------
+    PeriodicOrbit or None
+        The best fixed point found, which need not be certified; None if the motion could not be followed.
+    """
+    origin = np.array(start.coordinates if isinstance(start, MotionState) else start, dtype=float)
+    state = origin.copy()
+    weight = _weights(machine, origin)
+    best: tuple[float, Array, Array] | None = None
+    try:
+        for _ in range(iterations):
+            end, monodromy = _period_map(machine, state, period, weight)
+            residual = float(np.linalg.norm(weight * (end - state)) / np.linalg.norm(weight * state))
+            if best is not None and residual >= best[0]:
+                break
+            best = (residual, state, monodromy)
+            if residual < 1e-3 * RESIDUAL:
+                break
+            state = state - np.linalg.solve(monodromy - np.eye(len(state)), end - state)
+    except (SimulationError, np.linalg.LinAlgError):
+        pass
+    if best is None:
+        return None
+    residual, state, monodromy = best
+    multipliers = np.linalg.eigvals(monodromy)
+    return PeriodicOrbit(
+        period=period, state=state, residual=residual,
+        multipliers=np.asarray(multipliers[np.argsort(-np.abs(multipliers))], dtype=complex),
+        distance=float(np.linalg.norm(weight * (state - origin)) / np.linalg.norm(weight * origin)),
+    )  # fmt: skip
+
+
+def _weights(machine: Machine, state: Array) -> Array:
+    """Weights that make the squared norm of a state its energy (beam), or each coordinate count alike."""
+    if isinstance(machine, ImpactBeam):
+        stiffness = machine.reduce().stiffness
+        return np.concatenate([np.sqrt(stiffness), np.ones(len(stiffness))])
+    size = np.abs(state)
+    return np.asarray(1.0 / np.where(size > 1e-6 * size.max(), size, max(size.max(), 1e-300)))
+
+
+def _period_map(machine: Machine, state: Array, period: int, weight: Array) -> tuple[Array, Array]:
+    """State after one period, and its derivative."""
+    if isinstance(machine, ImpactBeam):
+        record, vectors, _ = simulate_with_deviations(
+            machine, period, state, deviations=np.eye(len(state)), orthonormal=False, integrator=PRECISE
+        )
+        return record.final_state.coordinates, np.ascontiguousarray(vectors.T)
+    end = simulate(machine, period, state, integrator=PRECISE).final_state.coordinates
+    derivative = np.empty((len(state), len(state)))
+    for i in range(len(state)):
+        step = FINITE_DIFFERENCE / weight[i]
+        pair = []
+        for sign in (1.0, -1.0):
+            moved = state.copy()
+            moved[i] += sign * step
+            pair.append(simulate(machine, period, moved, integrator=PRECISE).final_state.coordinates)
+        derivative[:, i] = (pair[0] - pair[1]) / (2.0 * step)
+    return end, derivative

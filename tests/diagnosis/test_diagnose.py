@@ -1,0 +1,68 @@
+import json
+
+import numpy as np
+import pytest
+
+from chaosgym.diagnosis import agreement, diagnose, random_machines
+from chaosgym.errors import DiagnosisError
+from chaosgym.machines import ImpactBeam
+
+
+@pytest.mark.parametrize(("frequency", "period"), [(10.0, 1), (19.0, 1), (22.0, 4)])
+def test_periodic_responses_are_certified(frequency, period):
+    """Newton's method proves the orbits at 10, 19 and 22 Hz within 200 cycles; their exponents are negative."""
+    verdict = diagnose(ImpactBeam(excitation_frequency=frequency))
+    assert (verdict.nature, verdict.period, verdict.status) == ("periodic", period, "certified")
+    assert verdict.horizon <= 200
+    assert verdict.evidence["orbit"]["residual"] < 1e-10
+    assert verdict.evidence["largest_lyapunov_exponent_per_cycle"]["value"] < 0.0
+    assert verdict.settle_cycle is not None
+    assert json.dumps(verdict.as_dict())
+
+
+def test_chaos_of_the_beam_is_agreed():
+    """At 30 Hz and +-0.127 mm every test says chaos, and the exponent exceeds three standard errors."""
+    verdict = diagnose(ImpactBeam(), budget=400)
+    assert (verdict.nature, verdict.status, verdict.horizon) == ("chaotic", "agreed", 400)
+    exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
+    assert exponent["value"] > 3.0 * exponent["standard_error"] > 0.0
+    assert set(verdict.votes.values()) <= {"chaotic", "undetermined"}
+
+
+def test_transient_chaos_is_chaos_with_a_flag():
+    """A beam that is chaotic for 79 cycles before it settles on period 6."""
+    beam = ImpactBeam(
+        excitation_frequency=23.75485448704849, clearance=0.0001330375507648476, damping_ratio=0.01707462128796029
+    )
+    verdict = diagnose(beam)
+    assert (verdict.nature, verdict.status, verdict.transient, verdict.period) == ("chaotic", "transient", True, 6)
+
+
+def test_the_initial_state_is_part_of_the_label():
+    """A start on the settled orbit settles at once and says where it started."""
+    beam = ImpactBeam(excitation_frequency=10.0)
+    first = diagnose(beam)
+    second = diagnose(beam, initial_state=first.evidence["final_state"])
+    assert first.evidence["initial_state"] == "rest"
+    assert second.evidence["initial_state"] == first.evidence["final_state"]
+    assert second.settle_cycle == 0
+
+
+def test_a_budget_below_the_first_stage_is_refused():
+    """The error names the range."""
+    with pytest.raises(DiagnosisError, match="100 or more"):
+        diagnose(ImpactBeam(), budget=50)
+
+
+def test_agreement_of_all_tests_on_a_few_beams():
+    """On six random beams long tests agree with the reference; the table adds up and draws the same machines again."""
+    machines = random_machines(ImpactBeam(), 6, seed=3)
+    assert machines == random_machines(ImpactBeam(), 6, seed=3)
+    table = agreement(machines, reference_cycles=2000, budget=800)
+    assert sum(table.reference.values()) == table.points == 6
+    assert np.allclose(np.diag(table.pairwise), 1.0)
+    rows = {row.test: row for row in table.rows}
+    assert rows["Two-Step Test, 1000 + 1000"].agreement == 1.0
+    assert rows["diagnose, up to 800"].agreement == 1.0
+    assert table.markdown().count("\n") == len(table.rows) + 3
+    assert json.dumps(table.as_dict())
