@@ -34,7 +34,14 @@ from chaosgym.design.reliability import (
     safety_factor,
     time_blocks,
 )
-from chaosgym.design.runs import Series, SettledRun, build_series, settled_run
+from chaosgym.design.runs import (
+    DIAGNOSIS_BUDGET,
+    NOMINAL_BUDGET,
+    Series,
+    SettledRun,
+    build_series,
+    settled_run,
+)
 from chaosgym.design.statistics import Convergence, convergence
 from chaosgym.diagnosis import ResponseType, Tolerance, Type, default_tolerances, response_type
 from chaosgym.machines import Machine
@@ -323,8 +330,8 @@ def assess(
     region = default_tolerances(machine) if tolerances is None else dict(tolerances)
     criteria = criteria or Criteria()
     exponent = criteria.life_exponent
-    response = response_type(machine, region, workers=workers)
-    nominal = settled_run(machine, until_converged=True)
+    response = response_type(machine, region, budget=DIAGNOSIS_BUDGET, workers=workers)
+    nominal = settled_run(machine, until_converged=True, budget=NOMINAL_BUDGET)
     series = build_series(machine, region, series_size, seed=seed, workers=workers, progress=progress)
     force = equivalent_force(nominal.worse_side(exponent), exponent)
     forces = np.array([equivalent_force(run.worse_side(exponent), exponent) for run in series.runs])

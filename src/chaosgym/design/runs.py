@@ -19,8 +19,11 @@ Array = NDArray[np.float64]
 SERIES_CYCLES = 200
 """Cycles recorded of a machine of a series whose response does not repeat."""
 
-DIAGNOSIS_BUDGET = 800
-"""Cycles that the diagnosis of one machine may take."""
+DIAGNOSIS_BUDGET = 400
+"""Cycles that the diagnosis of one machine of a series may take."""
+
+NOMINAL_BUDGET = 1600
+"""Cycles that the diagnosis of the nominal machine may take."""
 
 LONGEST_RUN = 12_800
 """Cycles after which statistics that have not converged are given up."""
