@@ -77,9 +77,7 @@ def brief_from(values: Mapping[str, Any]) -> DesignBrief:
     """Build a design brief from the values of its file."""
     _known("the brief", values, SECTIONS)
     name = values.get("machine")
-    if name not in MACHINES:
-        raise DesignError(f"machine = {name!r} is not one of {', '.join(sorted(MACHINES))}")
-    machine: Any = MACHINES[name]()
+    machine = _machine(name)
     fields = parameters_of(machine)
     settings = {
         key: given if fields[key].choices else parse_quantity(f"parameters.{key}", given, fields[key].unit)
@@ -100,6 +98,14 @@ def brief_from(values: Mapping[str, Any]) -> DesignBrief:
         series_size=_series_size(values),
         stated=tuple(values.get("criteria", {})),
     )
+
+
+def _machine(name: Any) -> Any:
+    if name not in MACHINES:
+        near = get_close_matches(str(name), MACHINES, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(sorted(MACHINES))}"
+        raise DesignError(f"machine = {name!r} does not exist; {hint}")
+    return MACHINES[name]()
 
 
 def _known(where: str, given: Iterable[str], known: Iterable[str]) -> None:
@@ -181,9 +187,7 @@ def template(name: str) -> str:
     DesignError
         If there is no such machine.
     """
-    if name not in MACHINES:
-        raise DesignError(f"machine = {name!r} is not one of {', '.join(sorted(MACHINES))}")
-    machine: Any = MACHINES[name]()
+    machine = _machine(name)
     speed, clearance = machine.speed_field, machine.clearance_field
     criteria = Criteria()
     lines = [
@@ -207,8 +211,8 @@ def template(name: str) -> str:
         'load_rating = "500 N"          # force under which the surface lasts a million cycles',
         'life = "2000 Mcycles"          # million cycles',
         "reliability = 0.999            # probability that the strength exceeds the contact stress",
-        f"safety_factor = {criteria.safety_factor:g}              # strength against largest stress, Types I and II",
-        f'life_exponent = "{criteria.life_exponent:.6g}"      # 10/3 for line contact, 3 for point contact',
+        f"safety_factor = {criteria.safety_factor:g}              # strength against largest stress, for Types I and II",
+        "# life_exponent = 3             # point contact; line contact, 10/3, if left out",
         f'contact_radius = "{1e3 * criteria.contact_radius:g} mm"        # ball on a flat surface',
         f'contact_modulus = "{1e-9 * criteria.contact_modulus:g} GPa"     # steel on steel',
         f'strength = "{1e-9 * criteria.strength:g} GPa"            # Hertzian endurance strength, mean',

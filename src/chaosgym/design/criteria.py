@@ -87,6 +87,8 @@ def variation_region(
 
 
 def _widened(tolerance: Tolerance, factor: int) -> Tolerance:
+    if factor == 1:
+        return tolerance
     if tolerance.relative:
         return Tolerance((1.0 + tolerance.value) ** factor - 1.0)
     return Tolerance(factor * tolerance.value, relative=False)
