@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from chaosgym.diagnosis import Diagnosis, two_step_test
     from chaosgym.diagnosis.step_check import step_check
     from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
-    from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam
+    from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, ImpactBeam, SliderCrank
     from chaosgym.simulation import CycleRecord, ExactEvents, RungeKutta4, simulate, simulate_many
     from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
 
@@ -27,7 +27,7 @@ _HOME = {
     "chaosgym.diagnosis": ("Diagnosis", "two_step_test"),
     "chaosgym.diagnosis.step_check": ("step_check",),
     "chaosgym.errors": ("ChaosgymError", "ParameterError", "SimulationError"),
-    "chaosgym.machines": ("THESIS_IMPACT_BEAM", "ImpactBeam"),
+    "chaosgym.machines": ("THESIS_IMPACT_BEAM", "THESIS_SLIDER_CRANK", "ImpactBeam", "SliderCrank"),
     "chaosgym.simulation": ("CycleRecord", "ExactEvents", "RungeKutta4", "simulate", "simulate_many"),
     "chaosgym.sweeps": ("Axis", "SweepPlan", "read_sweep", "run_sweep"),
 }
@@ -35,6 +35,7 @@ _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
     "THESIS_IMPACT_BEAM",
+    "THESIS_SLIDER_CRANK",
     "Axis",
     "ChaosgymError",
     "CycleRecord",
@@ -45,6 +46,7 @@ __all__ = [
     "ResponseClassifier",
     "RungeKutta4",
     "SimulationError",
+    "SliderCrank",
     "SweepPlan",
     "__version__",
     "default_classifier",

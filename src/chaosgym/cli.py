@@ -33,6 +33,10 @@ MACHINE_OPTIONS: Mapping[str, Mapping[str, OptionOf]] = {
 """By machine: the options that set its fields. Every other field is reached by ``--set``."""
 
 
+SUMMARY_CYCLES = 200
+"""Settled cycles that the summary of the peak force covers."""
+
+
 def _machine_class(name: str) -> Any:
     from chaosgym.machines import MACHINES
 
@@ -80,17 +84,19 @@ def _build(machine: str, options: Mapping[str, float | None], settings: tuple[st
     return with_settings(_machine_class(machine)(), fields)
 
 
-def machine_command(function: Callable[..., None]) -> Callable[..., None]:
+def machine_command(function: Callable[..., None], *, required: bool = True) -> Callable[..., None]:
     """Give a command the MACHINE argument, the options of all machines, ``--set`` and ``--json``.
 
-    The function receives ``machine`` (constructed) and ``as_json``.
+    The function receives ``machine`` (constructed, or None if it is not required and not given) and ``as_json``.
     """
     names = sorted({option for options in MACHINE_OPTIONS.values() for option in options})
 
     @functools.wraps(function)
-    def wrapped(machine: str, settings: tuple[str, ...], **others: Any) -> None:
+    def wrapped(machine: str | None, settings: tuple[str, ...], **others: Any) -> None:
         given = {name: others.pop(_identifier(name)) for name in names}
-        function(machine=_build(machine, given, settings), **others)
+        if machine is None and (settings or any(value is not None for value in given.values())):
+            raise click.UsageError(f"these options need a machine: {', '.join(MACHINE_OPTIONS)}")
+        function(machine=machine and _build(machine, given, settings), **others)
 
     for name in reversed(names):
         owners = ", ".join(machine for machine, options in MACHINE_OPTIONS.items() if name in options)
@@ -99,7 +105,7 @@ def machine_command(function: Callable[..., None]) -> Callable[..., None]:
         "--set", "settings", multiple=True, metavar="FIELD=VALUE", help="Any field of the machine, in SI; repeatable."
     )(wrapped)
     wrapped = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")(wrapped)
-    return click.argument("machine", type=click.Choice(sorted(MACHINE_OPTIONS)))(wrapped)
+    return click.argument("machine", type=click.Choice(sorted(MACHINE_OPTIONS)), required=required)(wrapped)
 
 
 def _identifier(option: str) -> str:
@@ -184,35 +190,103 @@ def show(machine: Any, as_json: bool) -> None:
 
 
 @app.command()
-@machine_command
-@click.option("--transient", type=click.IntRange(0, 10**7), default=200, show_default=True, help="Cycles to skip.")
-@click.option("--cycles", type=click.IntRange(16, 10**7), default=200, show_default=True, help="Cycles to judge.")
+@functools.partial(machine_command, required=False)
+@click.option("--budget", type=click.IntRange(100, 10**7), default=3200, show_default=True, help="Cycles at the most.")
+@click.option("--types", is_flag=True, help="Also tell the response type (I, II, III) over the tolerances.")
 @click.option("--step-check", is_flag=True, help="Repeat with a finer step and say whether the verdict stays.")
-def diagnose(machine: Any, transient: int, cycles: int, step_check: bool, as_json: bool) -> None:
-    """Tell periodic from chaotic by the Two-Step Test."""
+@click.option("--peaks", type=click.Path(), help="Judge measured peak forces instead: one column, one line a cycle.")
+@click.option("--series", type=click.Path(), help="Judge a measured time series instead: columns time [s] and value.")
+@click.option("--period-s", type=float, help="Operating cycle of the series [s].")
+@click.option("--sensor-error", type=float, default=0.0, show_default=True, help="Largest error of a measured value.")
+def diagnose(
+    machine: Any,
+    budget: int,
+    types: bool,
+    step_check: bool,
+    peaks: str | None,
+    series: str | None,
+    period_s: float | None,
+    sensor_error: float,
+    as_json: bool,
+) -> None:
+    """Tell periodic from chaotic: a machine by simulation, or a measured signal."""
+    if peaks or series:
+        if machine or types or step_check or (peaks and series) or (series and period_s is None):
+            raise click.UsageError("give --peaks FILE, or --series FILE with --period-s T, or a machine")
+        result, lines = _diagnose_measured(peaks, series, period_s, sensor_error)
+    elif machine is None:
+        raise click.UsageError(f"give a machine ({', '.join(MACHINE_OPTIONS)}), --peaks FILE or --series FILE")
+    else:
+        result, lines = _diagnose_machine(machine, budget, types, step_check)
+    _emit(result, as_json, lambda: lines)
+
+
+def _verdict_lines(subject: str, verdict: Any, summary: Mapping[str, float], unit: str) -> list[str]:
+    period = f", period {verdict.period}" if verdict.period else ""
+    status = f"{verdict.status}, " if verdict.status else ""
+    return [
+        f"{subject}: {verdict.nature}{period} ({status}margin {verdict.margin:.2f})",
+        f"  {verdict.reason}",
+        f"  {summary['min']:.2f} to {summary['max']:.2f}{unit}, mean {summary['mean']:.2f}{unit}, "
+        f"standard deviation {summary['std']:.2f}{unit}",
+    ]
+
+
+def _summary(values: Any) -> dict[str, float]:
+    return {
+        "min": float(values.min()),
+        "max": float(values.max()),
+        "mean": float(values.mean()),
+        "std": float(values.std()),
+    }
+
+
+def _diagnose_measured(
+    peaks: str | None, series: str | None, period: float | None, sensor_error: float
+) -> tuple[dict[str, Any], list[str]]:
     from chaosgym.diagnosis import two_step_test
-    from chaosgym.diagnosis.step_check import step_check as check
+    from chaosgym.diagnosis.measured import read_columns, samples_per_period
+
+    if peaks:
+        samples = read_columns(peaks, 1)[:, 0]
+    else:
+        time, value = read_columns(str(series), 2).T
+        samples = samples_per_period(time, value, float(period or 0.0))
+    verdict = two_step_test(samples, sensor_error=sensor_error)
+    summary = _summary(samples if peaks else samples[:, 1])
+    result = {"file": peaks or series, **verdict.as_dict(), "peak_force_summary_N": summary, "warnings": []}
+    return result, _verdict_lines(str(peaks or series), verdict, summary, "")
+
+
+def _diagnose_machine(machine: Any, budget: int, types: bool, check: bool) -> tuple[dict[str, Any], list[str]]:
+    from chaosgym.diagnosis import diagnose, response_type
+    from chaosgym.diagnosis.step_check import step_check
     from chaosgym.simulation import simulate
 
-    record = simulate(machine, cycles, transient=transient)
-    verdict = two_step_test(record)
-    peaks = record.peak_force[:, 0]
-    summary = {"min": peaks.min(), "max": peaks.max(), "mean": peaks.mean(), "std": peaks.std()}
-    result = {"machine": machine.name, **verdict.as_dict(), "peak_force_summary_N": summary}
-    if step_check:
-        result["step_check"] = check(machine, cycles=cycles, transient=transient).as_dict()
-
-    def lines() -> list[str]:
-        period = f", period {verdict.period}" if verdict.period else ""
-        shown = [
-            f"{machine.name}: {verdict.nature}{period} (margin {verdict.margin:.2f})",
-            f"  {verdict.reason}",
-            f"  peak force {summary['min']:.2f} to {summary['max']:.2f} N, mean {summary['mean']:.2f} N, "
-            f"standard deviation {summary['std']:.2f} N",
-        ]
-        return [*shown, f"  {result['step_check']['summary']}"] if step_check else shown
-
-    _emit(result, as_json, lines)
+    verdict = diagnose(machine, budget=budget)
+    settled = simulate(machine, SUMMARY_CYCLES, verdict.evidence["final_state"])
+    summary = _summary(settled.peak_force[:, 0])
+    exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
+    result = {
+        "machine": machine.name,
+        **verdict.as_dict(),
+        "peak_force_summary_N": summary,
+        "largest_lyapunov_exponent_per_cycle": {key: exponent[key] for key in ("value", "standard_error")},
+        "cycles_used": verdict.evidence["cycles_used"],
+        "warnings": [verdict.reason] if verdict.status in ("disputed", "transient", "unresolved") else [],
+    }
+    votes = ", ".join(f"{test} {vote}" for test, vote in verdict.votes.items())
+    lines = _verdict_lines(machine.name, verdict, summary, " N")
+    lines.append(f"  {result['cycles_used']} cycles used; votes: {votes}")
+    if types:
+        judged = response_type(machine)
+        result |= {"response_type": judged.type, "response_type_reason": judged.reason}
+        lines.append(f"  Type {judged.type}: {judged.reason}")
+    if check:
+        compared = step_check(machine)
+        result["step_check"] = compared.as_dict()
+        lines.append(f"  {compared.summary}")
+    return result, lines
 
 
 @app.command()

@@ -15,13 +15,17 @@ from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
 from chaosgym.core import status
+from chaosgym.core.crank_stepper import SteppedCrankModel
+from chaosgym.core.crank_stepper import advance as advance_stepped_crank
 from chaosgym.core.fixed_step import advance_fixed_step
 from chaosgym.core.impact_beam import CycleArrays, Episode, advance
+from chaosgym.core.slider_crank import advance as advance_slider_crank
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
+from chaosgym.machines.slider_crank import SliderCrank
 
 Array = NDArray[np.float64]
 
@@ -156,17 +160,8 @@ _PER_CYCLE = (
 )  # fmt: skip
 
 
-def _run_impact_beam(
-    beam: ImpactBeam,
-    state: MotionState,
-    cycles: int,
-    samples: int,
-    integrator: Integrator,
-    tangents: Tangents | None = None,
-) -> tuple[int, int, CycleRecord]:
-    model = beam.reduce()
-    states = 2 * beam.n_modes
-    arrays = CycleArrays(
+def _cycle_arrays(cycles: int, states: int, samples: int) -> CycleArrays:
+    return CycleArrays(
         section=np.empty((cycles, states)),
         tip=np.empty((cycles, 2)),
         peak_force=np.empty((cycles, 2)),
@@ -176,6 +171,33 @@ def _run_impact_beam(
         events=np.empty(cycles, dtype=np.int64),
         history=np.empty((cycles, samples, 3)),
     )
+
+
+def _record(machine: Machine, arrays: CycleArrays, final_state: MotionState) -> CycleRecord:
+    return CycleRecord(
+        machine=machine,
+        section=arrays.section,
+        displacement=arrays.tip[:, 0],
+        velocity=arrays.tip[:, 1],
+        peak_force=arrays.peak_force,
+        impacts=arrays.impacts,
+        contact_fraction=arrays.contact_time / machine.cycle_period,
+        bounce_duration=arrays.bounce_time,
+        final_state=final_state,
+        history=arrays.history if arrays.history.shape[1] else None,
+    )
+
+
+def _run_impact_beam(
+    beam: ImpactBeam,
+    state: MotionState,
+    cycles: int,
+    samples: int,
+    integrator: Integrator,
+    tangents: Tangents | None = None,
+) -> tuple[int, int, CycleRecord]:
+    model = beam.reduce()
+    arrays = _cycle_arrays(cycles, 2 * beam.n_modes, samples)
     coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
     if isinstance(integrator, ExactEvents):
@@ -186,24 +208,29 @@ def _run_impact_beam(
             outcome, done = advance(model, coordinates, episode, arrays, *settings, tangents)
     else:
         outcome, done = advance_fixed_step(model, coordinates, episode, arrays, integrator.steps_per_cycle)
-    record = CycleRecord(
-        machine=beam,
-        section=arrays.section,
-        displacement=arrays.tip[:, 0],
-        velocity=arrays.tip[:, 1],
-        peak_force=arrays.peak_force,
-        impacts=arrays.impacts,
-        contact_fraction=arrays.contact_time / beam.cycle_period,
-        bounce_duration=arrays.bounce_time,
-        final_state=MotionState(coordinates, bouncing),
-        history=arrays.history if samples else None,
-    )
-    return outcome, done, record
+    return outcome, done, _record(beam, arrays, MotionState(coordinates, bouncing))
+
+
+def _run_slider_crank(
+    crank: SliderCrank, state: MotionState, cycles: int, samples: int, integrator: Integrator
+) -> tuple[int, int, CycleRecord]:
+    if not isinstance(integrator, ExactEvents):
+        raise ParameterError(f"integrator = {integrator} does not run a slider crank; allowed: ExactEvents(...)")
+    # its peaks and events are refined on the exact motion, so its steps may be twice as long as the beam's
+    model = crank.reduce(2.0 * integrator.step_phase)
+    arrays = _cycle_arrays(cycles, 2 * len(crank.degrees_of_freedom), samples)
+    coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
+    episode = Episode(side=bouncing[:1], touch=bouncing[1:])
+    tolerance, budget = integrator.event_tolerance / model.contact_rate, integrator.event_budget
+    kernel = advance_stepped_crank if isinstance(model, SteppedCrankModel) else advance_slider_crank
+    outcome, done = kernel(model, coordinates, episode, arrays, tolerance, budget)
+    return outcome, done, _record(crank, arrays, MotionState(coordinates, bouncing))
 
 
 _Run = Callable[[Any, MotionState, int, int, Integrator], tuple[int, int, CycleRecord]]
 _RUNS: dict[str, tuple[_Run, Callable[[Any], int]]] = {
     ImpactBeam.name: (_run_impact_beam, lambda beam: 2 * beam.n_modes),
+    SliderCrank.name: (_run_slider_crank, lambda crank: 2 * len(crank.degrees_of_freedom)),
 }
 """By machine: what runs it, and its number of states. A new machine adds one line."""
 

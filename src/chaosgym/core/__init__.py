@@ -26,6 +26,16 @@ KERNEL_CACHE = os.path.join(_cache_root, source_digest(Path(__file__).parent))
 _previous_cache_folder = config.CACHE_DIR
 config.CACHE_DIR = KERNEL_CACHE
 try:
-    from chaosgym.core import contact, fixed_step, impact_beam, propagator, status, tangent  # noqa: F401
+    from chaosgym.core import (  # noqa: F401
+        contact,
+        crank_propagator,
+        crank_stepper,
+        fixed_step,
+        impact_beam,
+        propagator,
+        slider_crank,
+        status,
+        tangent,
+    )
 finally:
     config.CACHE_DIR = _previous_cache_folder

@@ -1,11 +1,14 @@
 """How does a slender beam bend? Cubic finite elements of Euler-Bernoulli theory.
 
-Degrees of freedom run node by node: deflection [m], slope [rad].
+Degrees of freedom run node by node: deflection [m], slope [rad]. What the closed-form matrices leave out (geometric
+stiffness, gyroscopic coupling, distributed loads) is integrated with the shape functions of ``interpolation``.
 
 References
 ----------
 Przemieniecki, Theory of Matrix Structural Analysis (1968), sections 5.6 and 11.3.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +54,46 @@ def bending_matrices(lengths: Matrix, bending_stiffness: float, mass_per_length:
             ]
         )
     return mass, stiffness
+
+
+class Interpolation(NamedTuple):
+    """Shape functions of a mesh at its integration points.
+
+    ``position`` (p,) [m] from the first node on and ``weight`` (p,) [m] of the points, ``deflection`` (p, dofs) and
+    ``slope`` (p, dofs) of the beam there for unit degrees of freedom.
+    """
+
+    position: Matrix
+    weight: Matrix
+    deflection: Matrix
+    slope: Matrix
+
+
+def interpolation(lengths: Matrix) -> Interpolation:
+    """Shape functions of all elements at four Gauss points each: exact for products of two deflections.
+
+    Parameters
+    ----------
+    lengths : (n_elements,)
+        Element lengths from the first node on [m].
+    """
+    abscissa, gauss_weight = np.polynomial.legendre.leggauss(4)
+    x = 0.5 * (1.0 + abscissa)
+    count, points = len(lengths), len(x)
+    shape = np.zeros((count * points, 2 * count + 2))
+    slope = np.zeros_like(shape)
+    for element, h in enumerate(lengths):
+        at = slice(element * points, (element + 1) * points)
+        dofs = slice(2 * element, 2 * element + 4)
+        shape[at, dofs] = np.column_stack(
+            [1 - 3 * x**2 + 2 * x**3, h * (x - 2 * x**2 + x**3), 3 * x**2 - 2 * x**3, h * (x**3 - x**2)]
+        )
+        slope[at, dofs] = np.column_stack(
+            [6 * (x**2 - x) / h, 1 - 4 * x + 3 * x**2, 6 * (x - x**2) / h, 3 * x**2 - 2 * x]
+        )
+    start = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
+    position = (start[:, None] + np.outer(lengths, x)).ravel()
+    return Interpolation(position, np.outer(lengths, 0.5 * gauss_weight).ravel(), shape, slope)
 
 
 def graded_mesh(stations: tuple[float, ...], elements: int) -> Matrix:

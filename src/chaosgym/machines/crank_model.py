@@ -1,0 +1,355 @@
+r"""How do the equations of a slider crank become the model that the kernels integrate?
+
+Matrices are held at the middle of each bin of crank angle, loads follow as cubics in the time of a bin, and every set
+of closed contacts adds its stiffness and damping. Mass matrices, loads and contacts of all bins depend neither on the
+speed nor on the clearance; at a given speed they are summed and turned into propagators. Both results are kept for
+machines that differ only in speed or clearance.
+"""
+
+import math
+from dataclasses import fields
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.core.crank_propagator import FORCING_TERMS, propagator_table, series_order
+from chaosgym.core.crank_stepper import HERTZ, LINEAR, SteppedCrankModel
+from chaosgym.core.slider_crank import SliderCrankModel
+from chaosgym.machines.crank_equations import BALL_ACROSS, BALL_ALONG, SLIDER_ACROSS, SLIDER_PITCH, equations, rod_of
+from chaosgym.machines.kinematics import planar_motion
+
+if TYPE_CHECKING:
+    from chaosgym.machines.slider_crank import SliderCrank
+
+Array = NDArray[np.float64]
+
+MAX_PHASE = 8.0
+"""Longest step times largest eigenvalue that a Taylor series sums without loss of digits."""
+
+STABLE_PHASE = 2.0
+"""Longest Runge-Kutta step times largest eigenvalue; the method is stable up to 2.7."""
+
+KEPT = 64
+"""Machines, and machines at one speed, whose matrices are kept."""
+
+_NOT_IN_THE_MATRICES = ("crank_speed", "slider_clearance", "ball_clearance")
+
+
+def exact_model(machine: "SliderCrank", step_phase: float) -> SliderCrankModel:
+    """Model of a machine whose contacts are piecewise linear, with propagators for steps of ``step_phase`` [rad]."""
+    return _at_speed(machine.crank_speed, step_phase, *_key(machine))._replace(gap=_gaps(machine))
+
+
+def _key(machine: "SliderCrank") -> tuple[Any, ...]:
+    """Class and all fields that shape the matrices."""
+    kind = type(machine)
+    return (kind, *(getattr(machine, name) for name in _structure_fields(kind)))
+
+
+def _structure_fields(kind: Any) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind) if field.name not in _NOT_IN_THE_MATRICES)
+
+
+class _Channels(NamedTuple):
+    """Contact channels; see ``SliderCrankModel``. ``slides`` (m,): friction acts along the guide."""
+
+    row: Array
+    stiffness: Array
+    damping: Array
+    two_sided: NDArray[np.bool_]
+    reading: Array
+    slides: NDArray[np.bool_]
+
+
+def _slider_channels(machine: "SliderCrank") -> _Channels:
+    """One gap at the pivot, or two stations of sensors that share stiffness and damping."""
+    names = machine.degrees_of_freedom
+    instrumented = machine.slider_joint == "instrumented"
+    stations = (machine.sensor_distance, -machine.sensor_distance) if instrumented else (0.0,)
+    count = len(stations)
+    row = np.zeros((count, len(names)))
+    row[:, names.index(SLIDER_ACROSS)] = 1.0
+    if instrumented:
+        row[:, names.index(SLIDER_PITCH)] = stations
+    monitored = 1.0 if machine.monitored_joint == "slider" else 0.0
+    return _Channels(
+        row=row,
+        stiffness=np.full(count, machine.contact_stiffness / count),
+        damping=np.full(count, machine.contact_damping / count),
+        two_sided=np.ones(count, dtype=bool),
+        reading=np.tile([0.0, -monitored], (count, 1)),
+        slides=np.ones(count, dtype=bool),
+    )
+
+
+def _ball_channels(machine: "SliderCrank") -> _Channels:
+    """Four tetrahedral sensors, symmetric to the plane: two lie in it, the other two act as one with half the lift.
+
+    Two sensors enclose the angle of arccos(-1/3) in the plane; the other two lean to either side of it, so their
+    normals have the length 1 / sqrt(3) in the plane and their pushes across it cancel.
+    """
+    names = machine.degrees_of_freedom
+    angle = math.radians(machine.ball_sensor_angle)
+    axis = np.array([math.cos(angle), math.sin(angle)])
+    across = np.array([-axis[1], axis[0]])
+    normal = np.array([[1.0, math.sqrt(2.0)], [1.0, -math.sqrt(2.0)], [-1.0, 0.0]]) @ np.array([axis, across])
+    normal /= math.sqrt(3.0)
+    # the ball's eccentricity in its housing is minus the motion of the rod's end
+    row = np.zeros((3, len(names)))
+    row[:, [names.index(BALL_ALONG), names.index(BALL_ACROSS)]] = -normal
+    sensors = np.array([1.0, 1.0, 2.0])
+    monitored = 1.0 if machine.monitored_joint == "ball" else 0.0
+    return _Channels(
+        row=row,
+        stiffness=machine.contact_stiffness * sensors,
+        damping=machine.contact_damping * sensors,
+        two_sided=np.zeros(3, dtype=bool),
+        reading=monitored * normal,
+        slides=np.zeros(3, dtype=bool),
+    )
+
+
+def _channels(machine: "SliderCrank") -> _Channels:
+    parts = []
+    if machine.slider_joint != "ideal":
+        parts.append(_slider_channels(machine))
+    if machine.ball_joint == "instrumented":
+        parts.append(_ball_channels(machine))
+    return _Channels(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+
+
+def _gaps(machine: "SliderCrank") -> Array:
+    slider = {"ideal": 0, "clearance": 1, "instrumented": 2}[machine.slider_joint]
+    ball = 3 if machine.ball_joint == "instrumented" else 0
+    return np.array([machine.slider_clearance] * slider + [machine.ball_clearance] * ball)
+
+
+def _display(machine: "SliderCrank") -> Array:
+    """Displacement of the monitored joint: of the slider across the guide, or of the rod's end across the rod."""
+    name = SLIDER_ACROSS if machine.monitored_joint == "slider" else BALL_ACROSS
+    return np.array([float(other == name) for other in machine.degrees_of_freedom])
+
+
+class _Joint(NamedTuple):
+    """A joint of the stepper; see ``SteppedCrankModel``. ``scale`` multiplies stiffness and damping."""
+
+    row: Array
+    gap: float
+    scale: float
+    two_sided: bool
+    reading: Array
+    slides: bool
+
+
+def _joints(machine: "SliderCrank") -> list[_Joint]:
+    """Every channel is a joint with one row; a spherical ball joint is one with two."""
+    joints = []
+    if machine.slider_joint != "ideal" or machine.ball_joint == "instrumented":
+        channels, gaps = _channels(machine), _gaps(machine)
+        joints = [
+            _Joint(
+                row=channels.row[[j]],
+                gap=float(gaps[j]),
+                scale=float(channels.stiffness[j]) / machine.contact_stiffness,
+                two_sided=bool(channels.two_sided[j]),
+                reading=channels.reading[[j]],
+                slides=bool(channels.slides[j]),
+            )
+            for j in range(len(gaps))
+        ]
+    if machine.ball_joint == "spherical":
+        names = machine.degrees_of_freedom
+        row = np.array([[-float(name == other) for name in names] for other in (BALL_ALONG, BALL_ACROSS)])
+        monitored = 1.0 if machine.monitored_joint == "ball" else 0.0
+        joints.append(_Joint(row, machine.ball_clearance, 1.0, True, monitored * np.eye(2), False))
+    return joints
+
+
+def _hertz(machine: "SliderCrank") -> tuple[float, float]:
+    """K [N/m^1.5] and chi [s/m] with the linear law's secant stiffness and restitution at the reference force.
+
+    Half a swing of the linear law leaves e = exp(-pi zeta / sqrt(1 - zeta^2)) of the speed v at which slider and yoke
+    strike; Hunt and Crossley's law leaves about 1 - (2/3) chi v.
+    """
+    force, linear, zeta = machine.hertz_reference_force, machine.contact_stiffness, machine.contact_damping_ratio
+    depth = force / linear
+    stiffness = force / depth**1.5
+    speed = math.sqrt(0.8 * stiffness * depth**2.5 / (machine.slider_mass + machine.yoke_mass))
+    restitution = math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta**2)) if zeta < 1.0 else 0.0
+    return stiffness, 1.5 * (1.0 - restitution) / speed
+
+
+@lru_cache(maxsize=KEPT)
+def _held(kind: type, *structure: Any) -> tuple[Array, Array, Array, Array]:
+    """Inverse mass, free accelerations and forcing of all bins as in ``_Structure``, and friction per newton."""
+    machine = kind(**dict(zip(_structure_fields(kind), structure, strict=True)))
+    rod = rod_of(machine)
+    bins = round(360.0 / machine.matrix_update_interval)
+    width = 2.0 * math.pi / bins
+    middles = np.array([(b + 0.5) * width for b in range(bins)])
+    held = equations(machine, middles, rod)
+    n = held.mass.shape[-1]
+    inverse_mass = np.asarray(np.linalg.inv(held.mass), dtype=np.float64)
+    free = np.zeros((3, bins, 2 * n, n))
+    free[:, :, :n] = -np.swapaxes(inverse_mass @ held.stiffness, -1, -2)
+    free[:2, :, n:] = -np.swapaxes(inverse_mass @ held.damping, -1, -2)
+    nodes = FORCING_TERMS - 1
+    loads = equations(machine, np.array([k * width / nodes for k in range(bins * nodes)]), rod).load
+    friction = _friction(machine, middles)[:, None] * held.slider_along
+    return inverse_mass, free, _forcing(inverse_mass, loads), friction
+
+
+def _free_motion(free: Array, forcing: Array, rate: float) -> Array:
+    """Accelerations without contact at a crank rate, (bins, 2n + 4, n)."""
+    return np.concatenate([free[0] + rate * free[1] + rate**2 * free[2], forcing[0] + rate**2 * forcing[1]], axis=1)
+
+
+def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankModel:
+    """Model of any machine for the Runge-Kutta stepper, a closed contact turning by ``step_phase`` / 4 in a step."""
+    inverse_mass, free, forcing, friction = _held(*_key(machine))
+    joints = _joints(machine)
+    row = np.concatenate([joint.row for joint in joints])
+    acceleration = _free_motion(free, forcing, machine.crank_rate)
+    scale = np.array([joint.scale for joint in joints])
+    first = np.cumsum([0] + [len(joint.row) for joint in joints])
+    linear = machine.contact_law == "linear"
+    stiffness, damping = (machine.contact_stiffness, machine.contact_damping) if linear else _hertz(machine)
+    answer = np.ascontiguousarray(np.swapaxes(inverse_mass @ row.T, -1, -2))
+    slide = -np.einsum("bij,bj->bi", inverse_mass, friction)
+    contact = math.sqrt(machine.contact_stiffness * np.max(np.einsum("brn,rn->br", answer, row)))
+    bins = len(inverse_mass)
+    duration = 2.0 * math.pi / (bins * machine.crank_rate)
+    n = len(row[0])
+    system = np.zeros((bins, 2 * n, 2 * n))
+    system[:, n:, :n] = np.eye(n)
+    system[:, :, n:] = acceleration[:, : 2 * n]
+    spectrum = float(np.max(np.abs(np.linalg.eigvals(system[[0, bins // 4]]))))
+    return SteppedCrankModel(
+        bin_duration=duration,
+        steps=max(1, math.ceil(duration * max(4.0 * contact / step_phase, spectrum / STABLE_PHASE))),
+        contact_rate=contact,
+        acceleration=acceleration,
+        first=first,
+        row=row,
+        answer=answer,
+        friction=np.stack([slide * joint.slides for joint in joints], axis=1),
+        gap=np.array([joint.gap for joint in joints]),
+        stiffness=stiffness * scale,
+        damping=damping * scale if linear else np.full(len(joints), damping),
+        law=LINEAR if linear else HERTZ,
+        two_sided=np.array([joint.two_sided for joint in joints]),
+        reading=np.concatenate([joint.reading for joint in joints]),
+        display=_display(machine),
+    )
+
+
+class _Structure(NamedTuple):
+    """Accelerations of all bins by powers of the crank rate, whatever the speed and the clearance.
+
+    ``free`` (3, bins, 2n, n) per unit p and p'; ``forcing`` (2, bins, 4, n) of gravity and of squared crank rate;
+    ``push`` (sets, bins, 2n + m, n) what closed contacts add per unit p, p' and clearance; ``contact`` [rad/s] angular
+    frequency of the masses next to the closed contacts; ``spectrum`` [1/s] largest modulus of an eigenvalue.
+    """
+
+    channels: _Channels
+    radix: int
+    display: Array
+    free: Array
+    forcing: Array
+    push: Array
+    contact: float
+    spectrum: float
+
+
+def _forcing(inverse_mass: Array, loads: Array) -> Array:
+    """Cubics in the time of each bin through the loads at its nodes, as accelerations: (2, bins, 4, n)."""
+    bins, nodes = len(inverse_mass), FORCING_TERMS - 1
+    at = (np.arange(bins)[:, None] * nodes + np.arange(FORCING_TERMS)) % (bins * nodes)
+    coefficients = np.linalg.inv(np.vander(np.arange(FORCING_TERMS) / nodes, increasing=True))
+    return np.asarray(-np.einsum("bij,kbcj->kbci", inverse_mass, coefficients @ loads[:, at]))
+
+
+def _push(inverse_mass: Array, channels: _Channels, radix: int, friction: Array) -> Array:
+    """Accelerations that the closed contacts of every set add: (sets, bins, 2n + m, n).
+
+    ``friction`` (bins, n) is what one newton of contact force drives along the guide.
+    """
+    bins, n, m = len(inverse_mass), inverse_mass.shape[-1], len(channels.row)
+    push = np.zeros((radix**m, bins, 2 * n + m, n))
+    for chosen in range(radix**m):
+        for j in range(m):
+            digit = chosen // radix**j % radix
+            if digit:
+                row, sign = channels.row[j], 1.0 if digit == 1 else -1.0
+                force = row + sign * channels.slides[j] * friction
+                answer = np.einsum("bij,bj->bi", inverse_mass, force)[:, None, :]
+                push[chosen, :, :n] -= channels.stiffness[j] * row[:, None] * answer
+                push[chosen, :, n : 2 * n] -= channels.damping[j] * row[:, None] * answer
+                push[chosen, :, 2 * n + j] += channels.stiffness[j] * answer[:, 0]
+    return push
+
+
+def _rates(free: Array, pushed: Array, row: Array) -> tuple[float, float]:
+    """(contact, spectrum) of ``_Structure`` from the accelerations (b, 2n, n) of some bins with all contacts closed."""
+    n = free.shape[-1]
+    local = -row @ pushed[:, :n] @ np.linalg.pinv(row)
+    contact = math.sqrt(float(np.max(np.abs(np.linalg.eigvals(local)))))
+    system = np.zeros((len(free), 2 * n, 2 * n))
+    system[:, n:, :n] = np.eye(n)
+    system[:, :, n:] = free + pushed
+    return contact, float(np.max(np.abs(np.linalg.eigvals(system))))
+
+
+@lru_cache(maxsize=KEPT)
+def _structure(kind: type, *structure: Any) -> _Structure:
+    machine = kind(**dict(zip(_structure_fields(kind), structure, strict=True)))
+    inverse_mass, free, forcing, friction = _held(kind, *structure)
+    n = inverse_mass.shape[-1]
+    channels = _channels(machine)
+    radix = 3 if machine.friction_coefficient > 0.0 else 2
+    push = _push(inverse_mass, channels, radix, friction)
+    some = [0, len(inverse_mass) // 4]
+    contact, spectrum = _rates(free[0, some], push[-1, some, : 2 * n], channels.row)
+    return _Structure(channels, radix, _display(machine), free, forcing, push, contact, spectrum)
+
+
+def _friction(machine: "SliderCrank", crank_angle: Array) -> Array:
+    """Friction coefficient with the sign of the nominal slider velocity, ramped through zero."""
+    motion = planar_motion(crank_angle, machine.crank_radius, machine.rod_length)
+    speed = motion.slider_rate / (machine.friction_ramp * machine.crank_radius)
+    return np.asarray(machine.friction_coefficient * np.clip(speed, -1.0, 1.0))
+
+
+@lru_cache(maxsize=KEPT)
+def _at_speed(crank_speed: float, step_phase: float, *structure: Any) -> SliderCrankModel:
+    parts = _structure(*structure)
+    m = len(parts.channels.row)
+    sets, bins, _, n = parts.push.shape
+    rate = crank_speed * math.pi / 30.0
+    duration = 2.0 * math.pi / (bins * rate)
+    acceleration = np.zeros((sets, bins, 2 * n + FORCING_TERMS + m, n))
+    acceleration[:, :, : 2 * n + FORCING_TERMS] = _free_motion(parts.free, parts.forcing, rate)
+    acceleration[:, :, : 2 * n] += parts.push[:, :, : 2 * n]
+    acceleration[:, :, 2 * n + FORCING_TERMS :] = parts.push[:, :, 2 * n :]
+    steps = max(1, math.ceil(duration * max(parts.contact / step_phase, parts.spectrum / MAX_PHASE)))
+    step = duration / steps
+    order = series_order(parts.spectrum * step)
+    return SliderCrankModel(
+        bin_duration=duration,
+        steps=steps,
+        contact_rate=parts.contact,
+        order=order,
+        row=parts.channels.row,
+        gap=np.zeros(m),
+        stiffness=parts.channels.stiffness,
+        damping=parts.channels.damping,
+        two_sided=parts.channels.two_sided,
+        radix=parts.radix,
+        reading=parts.channels.reading,
+        display=parts.display,
+        acceleration=acceleration,
+        curvature=np.ascontiguousarray(np.einsum("jn,sbcn->sbjc", parts.channels.row, acceleration)),
+        propagator=propagator_table(acceleration, duration, step, order),
+    )

@@ -1,0 +1,88 @@
+r"""Where do the links of a slider crank stand when every joint is tight?
+
+Vector loop of the mechanism. X runs along the guide from the crank to the slider, Y upward, Z = X x Y is the motor axis
+at zero motor angle; the crank angle is zero at the outer dead point. With crank pin P and slider pivot S = (s, 0, 0)
+
+    P = r (cos th cos b, sin th, -cos th sin b),   s = P_x + sqrt(l^2 - P_y^2 - P_z^2)
+
+where b is the motor angle: the crank plane turns about Y through its own centre. In the plane (b = 0) the rod makes
+the angle phi with the guide, sin phi = (r / l) sin th.
+
+The crank turns at a constant rate w, so d/dt = w d/dth: everything here is given per unit crank rate.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class PlanarMotion(NamedTuple):
+    """Nominal motion of the planar mechanism at given crank angles, all arrays of their shape (B,).
+
+    ``phi`` [rad] with its first and second derivative by the crank angle; slider position ``slider`` [m] and its
+    derivatives; ``pin_along`` and ``pin_across`` [m]: acceleration of the crank pin per squared crank rate along the
+    rod and across it.
+    """
+
+    phi: Array
+    phi_rate: Array
+    phi_acceleration: Array
+    slider: Array
+    slider_rate: Array
+    slider_acceleration: Array
+    pin_along: Array
+    pin_across: Array
+
+
+def planar_motion(crank_angle: Array, radius: float, length: float) -> PlanarMotion:
+    """Nominal motion of the planar mechanism.
+
+    Parameters
+    ----------
+    crank_angle : (B,)
+        Crank angles [rad].
+    radius, length
+        Of the crank and the rod [m].
+    """
+    sine, cosine = np.sin(crank_angle), np.cos(crank_angle)
+    ratio = radius / length
+    phi = np.arcsin(ratio * sine)
+    rate = ratio * cosine / np.cos(phi)
+    acceleration = (-ratio * sine + rate**2 * np.sin(phi)) / np.cos(phi)
+    return PlanarMotion(
+        phi=phi,
+        phi_rate=rate,
+        phi_acceleration=acceleration,
+        slider=radius * cosine + length * np.cos(phi),
+        slider_rate=-radius * sine - length * np.sin(phi) * rate,
+        slider_acceleration=-radius * cosine - length * (np.cos(phi) * rate**2 + np.sin(phi) * acceleration),
+        pin_along=-radius * np.cos(crank_angle + phi),
+        pin_across=-radius * np.sin(crank_angle + phi),
+    )
+
+
+def crank_pin(crank_angle: Array, radius: float, motor_angle: float) -> Array:
+    """Position (B, 3) [m] of the crank pin; ``motor_angle`` in radians."""
+    return radius * np.stack(
+        [
+            np.cos(crank_angle) * np.cos(motor_angle),
+            np.sin(crank_angle),
+            -np.cos(crank_angle) * np.sin(motor_angle),
+        ],
+        axis=-1,
+    )
+
+
+def slider_position(crank_angle: Array, radius: float, length: float, motor_angle: float) -> Array:
+    """Position (B,) [m] of the slider pivot along the guide; ``motor_angle`` in radians."""
+    pin = crank_pin(crank_angle, radius, motor_angle)
+    return np.asarray(pin[..., 0] + np.sqrt(length**2 - pin[..., 1] ** 2 - pin[..., 2] ** 2))
+
+
+def stroke(radius: float, length: float, motor_angle: float) -> float:
+    """Length [m] of the slider's way from one dead point to the other: 2 r cos(motor angle)."""
+    outer, inner = slider_position(np.array([0.0, np.pi]), radius, length, motor_angle)
+    return float(outer - inner)

@@ -1,0 +1,100 @@
+"""The slider crank once more, by other means: Runge-Kutta with continuous matrices, and the exact rigid pendulum."""
+
+import math
+
+import numpy as np
+from numba import njit
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+
+from chaosgym.machines.crank_equations import equations
+
+
+@njit
+def _march(a, f, push, row, k, d, gap, h, samples, out):
+    """Classical Runge-Kutta on p'' = a (p, p') + f + push N from rest; stages at every half step of a and f."""
+    n = f.shape[1]
+    p, v = np.zeros(n), np.zeros(n)
+    kp, kv = np.zeros((4, n)), np.zeros((4, n))
+    steps = (a.shape[0] - 1) // 2
+    peak = 0.0
+    for step in range(steps):
+        if step % samples == 0:
+            y, w = row @ p, row @ v
+            out[step // samples, 0], out[step // samples, 1] = y, w
+        for stage in range(4):
+            at = 2 * step + (0 if stage == 0 else (2 if stage == 3 else 1))
+            share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+            before = stage - 1 if stage > 0 else 0
+            ps = p + h * share * kp[before]
+            vs = v + h * share * kv[before]
+            y, w = row @ ps, row @ vs
+            force = 0.0
+            if y > gap:
+                force = max(0.0, k * (y - gap) + d * w)
+            elif y < -gap:
+                force = min(0.0, k * (y + gap) + d * w)
+            if stage == 0:
+                peak = max(peak, abs(force))
+            kp[stage] = vs
+            for i in range(n):
+                total = f[at, i] - push[at, i] * force
+                for j in range(n):
+                    total += a[at, i, j] * ps[j] + a[at, i, n + j] * vs[j]
+                kv[stage, i] = total
+        p += h / 6 * (kp[0] + 2 * kp[1] + 2 * kp[2] + kp[3])
+        v += h / 6 * (kv[0] + 2 * kv[1] + 2 * kv[2] + kv[3])
+    return peak
+
+
+def continuous_twin(machine, degrees, steps, samples):
+    """(Displacement, velocity) and peak force of a run from rest with matrices that follow the crank."""
+    grid = np.linspace(0.0, 2.0 * math.pi, 721)
+    system = equations(machine, grid)
+    rate = machine.crank_rate
+    inverse = np.linalg.inv(system.mass)
+    stiffness = system.stiffness[0] + rate * system.stiffness[1] + rate**2 * system.stiffness[2]
+    damping = system.damping[0] + rate * system.damping[1]
+    a = -np.concatenate([inverse @ stiffness, inverse @ damping], axis=-1)
+    f = -np.einsum("bij,bj->bi", inverse, system.load[0] + rate**2 * system.load[1])
+    row = np.array([float(name == "slider across the guide") for name in machine.degrees_of_freedom])
+    push = inverse @ row
+    at = np.linspace(0.0, math.radians(degrees), 2 * steps + 1)
+    spline = [np.ascontiguousarray(CubicSpline(grid, part, axis=0)(at)) for part in (a, f, push)]
+    out = np.empty((steps // samples, 2))
+    h = math.radians(degrees) / rate / steps
+    peak = _march(
+        *spline, row, machine.contact_stiffness, machine.contact_damping, machine.slider_clearance, h, samples, out
+    )
+    return out, peak
+
+
+def rigid_twin(machine, instants):
+    """Displacement (len(instants),) of a rigid rod's slider by the exact, nonlinear pendulum, DOP853."""
+    m_rod = machine.density * math.pi * machine.rod_diameter**2 / 4 * machine.rod_length
+    r, length, rate = machine.crank_radius, machine.rod_length, machine.crank_rate
+    inertia = machine.slider_mass * length**2 + m_rod * length**2 / 3 + machine.housing_inertia + machine.yoke_inertia
+    inertia += machine.yoke_mass * (length**2 + 2 * length * machine.yoke_offset_along)
+    first = machine.slider_mass * length + m_rod * length / 2 + machine.housing_mass * machine.housing_offset_along
+    first += machine.yoke_mass * (length + machine.yoke_offset_along)
+    k, d, gap = machine.contact_stiffness, machine.contact_damping, machine.slider_clearance
+
+    def slope(t, state):
+        phi, phi_rate = state
+        theta = rate * t
+        y = r * math.sin(theta) - length * math.sin(phi)
+        w = r * rate * math.cos(theta) - length * math.cos(phi) * phi_rate
+        force = 0.0
+        if y > gap:
+            force = max(0.0, k * (y - gap) + d * w)
+        elif y < -gap:
+            force = min(0.0, k * (y + gap) + d * w)
+        moment = first * machine.gravity * math.cos(phi) + force * length * math.cos(phi)
+        moment -= first * r * rate**2 * math.sin(theta + phi)
+        return [phi_rate, moment / inertia]
+
+    run = solve_ivp(
+        slope, (0.0, instants[-1]), [0.0, r * rate / length], method="DOP853", t_eval=instants, rtol=1e-10,
+        atol=1e-13, max_step=2e-5,
+    )  # fmt: skip
+    return r * np.sin(rate * instants) - length * np.sin(run.y[0])
