@@ -1,8 +1,8 @@
 """What may a designer rely on? From the type of a response to life, reliability and the next change (thesis 5.4, 5.6).
 
-    from chaosgym.design import Criteria, assess, improve
-    assessment = assess(ImpactBeam(), criteria=Criteria(load_rating=500.0, life=500.0))
-    assessment.verdict, improve(assessment).best
+from chaosgym.design import Criteria, assess, improve
+assessment = assess(ImpactBeam(), criteria=Criteria(load_rating=500.0, life=500.0))
+assessment.verdict, improve(assessment).best
 """
 
 from chaosgym.design.criteria import Criteria, variation_region

@@ -15,9 +15,8 @@ from typing import Any
 
 from tqdm import tqdm
 
-from chaosgym.design.criteria import Criteria
 from chaosgym.design.methodology import SERIES_SIZE, Assessment, assess
-from chaosgym.diagnosis import Tolerance, default_tolerances
+from chaosgym.diagnosis import default_tolerances
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
@@ -195,7 +194,7 @@ def _taken_back(machine: Machine, best: Trial, attempt: Any) -> Trial:
     full = {name: math.log(value / getattr(machine, name)) for name, value in best.changes.items()}
     for _ in range(REFINEMENTS):
         share = 0.5 * (low + high)
-        trial = attempt({name: getattr(machine, name) * math.exp(share * ratio) for name, ratio in full.items()})
+        trial = attempt({name: _rounded(getattr(machine, name) * math.exp(share * full[name])) for name in full})
         if trial is not None and trial.meets:
             best, high = trial, share
         else:
@@ -203,12 +202,19 @@ def _taken_back(machine: Machine, best: Trial, attempt: Any) -> Trial:
     return best
 
 
+def _rounded(value: float) -> float:
+    """Three significant digits: a change is an engineering figure."""
+    return float(f"{value:.3g}")
+
+
 def _rank(trial: Trial) -> tuple[bool, float]:
     """Those that meet the criteria by cost, the others by the factor by which life or strength misses."""
     if trial.meets:
         return False, trial.cost
     shortfall = [
-        (1.0 - check.reached) / (1.0 - check.required) if check.name == "reliability" else check.required / check.reached
+        (1.0 - check.reached) / (1.0 - check.required)
+        if check.name == "reliability"
+        else check.required / check.reached
         for check in trial.assessment.checks
     ]
     return True, max(shortfall)

@@ -8,8 +8,8 @@ r"""Does a machine meet its criteria, whatever its tolerances do? The design met
     VI   evaluation          I: the trend; II: the worst case; III: statistics                ``evaluate``
     VII  verdict             against the criteria; if it fails, change and go back to I       ``improve``
 
-Type I: peak forces follow a trend, log F = log F_0 + sum b_i d_i with deviations d_i in tolerances; the evaluation takes
-the trend to the unfavourable corner of the region. With no tolerances it is the classical answer for the nominal
+Type I: peak forces follow a trend, log F = log F_0 + sum b_i d_i with deviations d_i in tolerances; the evaluation
+takes the trend to the unfavourable corner of the region. With no tolerances it is the classical answer for the nominal
 machine. Type II: the largest peak found anywhere in the region. Type III: the peaks of all machines of the region
 together, each machine equally likely; the verdict takes the unfavourable end of the confidence interval.
 """
@@ -96,7 +96,7 @@ def fit_trend(parameters: tuple[str, ...], shares: Array, forces: Array, nominal
     if nominal == 0.0 or touching.sum() <= len(parameters):
         return Trend(parameters, np.zeros(len(parameters)), 0.0)
     logs = np.log(forces[touching] / nominal)
-    slopes, *_ = np.linalg.lstsq(shares[touching], logs)
+    slopes = np.asarray(np.linalg.lstsq(shares[touching], logs)[0], dtype=float)
     return Trend(parameters, slopes, float(np.std(logs - shares[touching] @ slopes)))
 
 
@@ -353,7 +353,9 @@ def _by_type(
     exponent = criteria.life_exponent
     if response.type == "I":
         peaks = trend.worst_factor * nominal.worse_side(exponent)
-        return evaluate([peaks], criteria, "Type I: the trend, taken to the unfavourable corner of the tolerances", seed)
+        return evaluate(
+            [peaks], criteria, "Type I: the trend, taken to the unfavourable corner of the tolerances", seed
+        )
     if response.type == "II":
         found = [run.largest_peak for run in (nominal, *series.runs)]
         found += [point.largest_peak for point in response.neighbours] + list(response.coexisting_peaks)

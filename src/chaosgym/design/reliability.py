@@ -6,7 +6,7 @@ r"""How likely does the surface endure the stress of an impact? (thesis 5.4.2)
     R = Phi((mu_S - mu_s) / sqrt(sigma_S^2 + sigma_s^2))   (5.9)  both normal
 
 S strength, s stress. Over the stresses of n recorded cycles the outer integral of (5.8) is the mean of P(S > s_i):
-nothing is fitted, and every peak of a multi-peak distribution counts. (5.9) beside it shows what a normal fit would say.
+nothing is fitted, and every peak of a multi-peak distribution counts. (5.9) beside it shows what a normal fit says.
 
 The stress is the largest Hertzian pressure of a ball of radius R on a flat surface,
 
@@ -133,7 +133,7 @@ def mean_interval(blocks: Sequence[ArrayLike], confidence: float = 0.95, seed: i
     """
     if not 0.0 < confidence < 1.0:
         raise DesignError(f"confidence = {confidence:g} is out of range; allowed: above 0, below 1")
-    means = np.array([np.mean(block) for block in blocks])
+    means = np.array([np.mean(np.asarray(block, dtype=float)) for block in blocks])
     if np.ptp(means) == 0.0:
         return Interval(float(means[0]), float(means[0]))
     result = stats.bootstrap(

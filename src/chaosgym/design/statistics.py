@@ -48,7 +48,9 @@ def as_forces(forces: ArrayLike, minimum: int = 1) -> Array:
         raise DesignError(f"forces have shape {values.shape}; allowed: (cycles,)")
     bad = np.flatnonzero(~(np.isfinite(values) & (values >= 0.0)))
     if len(bad):
-        raise DesignError(f"force {values[bad[0]]:g} N in cycle {bad[0] + 1} is out of range; allowed: finite, 0 or more")
+        raise DesignError(
+            f"force {values[bad[0]]:g} N in cycle {bad[0] + 1} is out of range; allowed: finite, 0 or more"
+        )
     if len(values) < minimum:
         raise DesignError(f"{len(values)} cycles are too few; needed: {minimum} or more")
     return values
@@ -136,7 +138,8 @@ def correlation_time(values: ArrayLike) -> float:
     ----------
     C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992), 473-483.
     """
-    centred = np.asarray(values, dtype=float) - np.mean(values)
+    series = np.asarray(values, dtype=float)
+    centred = series - np.mean(series)
     size = len(centred)
     spectrum = np.fft.rfft(centred, 2 * size)
     covariance = np.fft.irfft(np.abs(spectrum) ** 2)[:size] / size

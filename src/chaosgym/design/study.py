@@ -57,6 +57,29 @@ class DesignStudy:
     diagram: PeakImpactDiagram
     seed: int
 
+    def lines(self) -> list[str]:
+        """Return lines for people."""
+        found, best = self.assessment, self.improvement.best if self.improvement is not None else None
+        lines = [
+            f"{found.machine.name}: {found.verdict}",
+            f"  Type {found.type}: {found.response.reason}; {found.evaluation.method.partition(': ')[2]}",
+            *(
+                f"  {check.name:14s} {check.reached:.6g} of {check.required:g} {check.unit}".rstrip()
+                + (" met" if check.met else " NOT met")
+                for check in found.checks
+            ),
+            f"  largest peak   {found.evaluation.largest_force:.1f} N, equivalent {found.evaluation.force:.1f} N",
+            f"  load rating    {found.evaluation.required_load_rating:.0f} N needed for the life",
+            f"  in tolerance   {100 * found.machines_that_meet:.0f} % of {len(found.series.runs)} machines meet life "
+            "and reliability by themselves",
+        ]
+        if best is not None:
+            changes = ", ".join(f"{name} = {value:g}" for name, value in best.changes.items())
+            lines.append(f"  cheapest change that meets all criteria: {changes} (SI), cost {best.cost:.2f}")
+        elif self.improvement is not None:
+            lines.append("  no change that was tried meets all criteria")
+        return lines
+
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         found = self.improvement
@@ -86,9 +109,7 @@ def _finite(values: Any) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values]
 
 
-def study(
-    brief: DesignBrief, *, seed: int = 0, workers: int | None = None, progress: bool = False
-) -> DesignStudy:
+def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, progress: bool = False) -> DesignStudy:
     """Answer a design brief.
 
     Parameters

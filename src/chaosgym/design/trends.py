@@ -167,4 +167,3 @@ def clearance_trade_off(
 
     points: list[ClearancePoint] = parallel_map(one, clearances, workers=workers)
     return points
-

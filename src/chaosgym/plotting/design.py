@@ -25,7 +25,7 @@ from chaosgym.plotting.overview import TYPE_COLOURS
 INK, ACCENT, BAD, MUTED = "#22303c", "#1f6f8b", "#b3392f", "#8a97a3"
 NATURE_COLOURS = {"periodic": ACCENT, "quasiperiodic": "#8e5ea2", "chaotic": "#d1495b", "undetermined": MUTED}
 
-STYLE: dict[str, Any] = {
+STYLE: Any = {
     "font.size": 9.5, "axes.edgecolor": MUTED, "axes.labelcolor": INK, "axes.titlesize": 10.5,
     "axes.titlelocation": "left", "axes.titleweight": "bold", "axes.spines.top": False, "axes.spines.right": False,
     "axes.grid": True, "grid.color": "#e6eaee", "grid.linewidth": 0.7, "axes.axisbelow": True, "text.color": INK,
@@ -136,7 +136,7 @@ def stress_against_strength(assessment: Assessment, ax: Axes) -> Axes:
     runs = [np.resize(run.worse_side(criteria.life_exponent), 200) for run in assessment.series.runs]
     pooled = stress(np.concatenate(runs)) if runs else nominal
     low, high = float(min(pooled.min(), nominal.min())), float(max(pooled.max(), nominal.max()))
-    edges = np.linspace(low - 1e-3, high + 1e-3, 45)
+    edges = np.linspace(low - 1e-3, high + 1e-3, 45).tolist()
     ax.hist(pooled, edges, density=True, color=ACCENT, alpha=0.55, lw=0, label="stress, machines in tolerance")
     if len(nominal) > 32:
         ax.hist(nominal, edges, density=True, histtype="step", color=INK, lw=1.1, label="stress, nominal machine")

@@ -9,9 +9,11 @@ import io
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 
 import matplotlib
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chaosgym.design.improve import Trial
@@ -77,7 +79,7 @@ figure img { width:100%; height:auto; display:block; }
 figcaption { color:var(--soft); font-size:13px; margin-top:8px; }
 .columns { display:grid; grid-template-columns:repeat(auto-fit,minmax(460px,1fr)); gap:16px; align-items:start; }
 .note { color:var(--soft); font-size:13.5px; max-width:90ch; }
-footer { margin-top:36px; color:var(--soft); font-size:12.5px; }
+footer { margin-top:36px; padding-bottom:8px; color:var(--soft); font-size:12.5px; }
 @media (max-width:560px) { .figures,.columns { grid-template-columns:1fr; } main { padding:16px 12px 40px; } }
 @media print { body { background:#fff; } main { max-width:none; padding:0; }
   figure,table,.card { break-inside:avoid; box-shadow:none; border:1px solid var(--line); } }
@@ -90,7 +92,7 @@ def design_report(study: DesignStudy, command: str = "") -> str:
     tone, headline = HEADLINES[found.verdict]
     parts = [
         f'<header class="{tone}"><p class="kicker">Design report &middot; {_text(machine.name)}</p>'
-        f"<h1>{headline}</h1><p class=\"lead\">{_lead(study)}</p></header>",
+        f'<h1>{headline}</h1><p class="lead">{_lead(study)}</p></header>',
         _cards(found),
         "<h2>Criteria</h2>" + _checks(found.checks),
         _changes(study),
@@ -101,15 +103,15 @@ def design_report(study: DesignStudy, command: str = "") -> str:
     return _page(f"{headline}: {machine.name}", parts, command)
 
 
-def measured_report(measured: MeasuredPeaks, load_rating: float, command: str = "") -> str:
+def measured_report(measured: MeasuredPeaks, command: str = "") -> str:
     """HTML report on measured peak forces."""
     found = measured.evaluation
     lead = (
         f"{len(measured.peaks)} measured cycles, equivalent force {found.force:.3g} N: a surface with a load rating of "
-        f"{load_rating:g} N lasts {_life(found.life)} million cycles ({_life(found.life_interval.low)} to "
-        f"{_life(found.life_interval.high)})."
+        f"{measured.criteria.load_rating:g} N lasts {_life(found.life)} million cycles "
+        f"({' to '.join(_life(end) for end in found.life_interval)})."
     )
-    record = _figure_of_peaks(measured.peaks, 10.0 / 3.0)
+    record = _figure_of_peaks(measured.peaks, measured.criteria.life_exponent)
     pictures = [_picture(record, "Peak force of every cycle, and how often each force occurs.", wide=True)]
     pictures.append(_picture(_figure_of_convergence(measured.peaks, measured.convergence.cycles), _CONVERGENCE))
     parts = [
@@ -117,11 +119,19 @@ def measured_report(measured: MeasuredPeaks, load_rating: float, command: str = 
         f'<h1>{_life(found.life)} million cycles</h1><p class="lead">{lead}</p></header>',
         "<h2>What the joint does</h2>" + f'<div class="figures">{"".join(pictures)}</div>',
         "<h2>How the numbers came about</h2>" + _evaluation_table({"measured": found}),
+        "<h2>What was assumed</h2>"
+        + _table(
+            ("criterion", "value"),
+            [(name.replace("_", " "), _value(measured.criteria, name)) for name in parameters_of(measured.criteria)],
+            (1,),
+        ),
     ]
     return _page("Measured peak forces", parts, command)
 
 
-def write_report(page: str, numbers: Mapping[str, object], out: str | Path, overwrite: bool = False) -> tuple[Path, Path]:
+def write_report(
+    page: str, numbers: Mapping[str, object], out: str | Path, overwrite: bool = False
+) -> tuple[Path, Path]:
     """Write the HTML file, and the numbers as JSON beside it.
 
     Returns
@@ -137,10 +147,14 @@ def write_report(page: str, numbers: Mapping[str, object], out: str | Path, over
     text = json.dumps(numbers, allow_nan=False, indent=1)
     for path, content in zip(paths, (page, text + "\n"), strict=True):
         try:
-            write_atomically(path, lambda temporary, content=content: temporary.write_text(content, encoding="utf-8"))
+            write_atomically(path, partial(_write, content=content))
         except OSError as error:
             raise DesignError(f"{path} can't be written: {error.strerror}") from None
     return paths
+
+
+def _write(path: Path, content: str) -> None:
+    path.write_text(content, encoding="utf-8")
 
 
 def report_paths(out: str | Path, overwrite: bool = False) -> tuple[Path, Path]:
@@ -161,7 +175,7 @@ def _page(title: str, parts: Iterable[str], command: str) -> str:
     again = f"<br>Made by <code>{_text(command)}</code>" if command else ""
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
+        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
         "style-src 'unsafe-inline'\">"
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{_text(title)}</title><style>{_STYLE}</style></head><body><main>\n"
@@ -214,7 +228,13 @@ def _cards(found: Assessment) -> str:
 
 def _checks(checks: Iterable[Check]) -> str:
     rows = [
-        (check.name, _reached(check.name, check.reached), _reached(check.name, check.required), check.unit, _mark(check.met))
+        (
+            check.name,
+            _reached(check.name, check.reached),
+            _reached(check.name, check.required),
+            check.unit,
+            _mark(check.met),
+        )
         for check in checks
     ]
     return _table(("criterion", "reached", "required", "", "met"), rows, numeric=(1, 2)) + (
@@ -226,7 +246,7 @@ def _checks(checks: Iterable[Check]) -> str:
 def _changes(study: DesignStudy) -> str:
     improvement, machine = study.improvement, study.assessment.machine
     if improvement is None:
-        return "<h2>What to change next</h2><p class=\"note\">Nothing: the machine meets its criteria as it is.</p>"
+        return '<h2>What to change next</h2><p class="note">Nothing: the machine meets its criteria as it is.</p>'
     trials = list(improvement.suggestions)
     best = improvement.best
     if best is not None:
@@ -241,7 +261,7 @@ def _changes(study: DesignStudy) -> str:
     head = ("change", "type", "cost", "life [10<sup>6</sup> cycles]", "reliability", "largest peak", "meets all")
     note = (
         '<p class="note">Every change was built and simulated over the same tolerances. Cost: weight &times; '
-        "|ln(new / old)|. Changes that meet all criteria come first, by cost; the others follow by how far they miss.</p>"
+        "|ln(new / old)|. Those that meet all criteria come first, by cost; the others follow by how far they miss.</p>"
     )
     return "<h2>What to change next</h2>" + _table(head, rows, (2, 3, 4, 5), best=best is not None) + note
 
@@ -259,20 +279,20 @@ def _figures(study: DesignStudy) -> str:
     pictures = [
         _picture(
             _figure_of_peaks(peaks, exponent),
-            "The nominal machine, the surface that fatigues faster: peak force of every cycle, and how often each force "
-            "occurs.",
+            "The nominal machine, the surface that fatigues faster: peak force of every cycle, and how often each "
+            "force occurs.",
             wide=True,
         )
     ]
     if study.map is not None:
-        caption = "Each square is a machine with its own tolerance neighbourhood. Box: the tolerances; circle: the design."
+        caption = "Each square is a machine with its own tolerances around it. Box: the tolerances; circle: the design."
         region, result = study.assessment.region, study.map
         pictures.append(_picture(_drawn(lambda ax: figures.type_map_around(result, region, ax)), caption))
     if study.life_over_speed is not None:
         trend = study.life_over_speed
         caption = (
-            "Life relative to the lowest speed. Dots: statistical mean life; bars: what the largest and the smallest peak "
-            "alone would suggest. Dotted: the design."
+            "Life relative to the lowest speed. Dots: statistical mean life; bars: what the largest and the smallest "
+            "peak alone would suggest. Dotted: the design."
         )
         pictures.append(_picture(_drawn(lambda ax: figures.life_over_speed(trend, machine, ax)), caption))
     caption = "Machines with deviations spread over all tolerances at once, each from rest, by its own statistics."
@@ -299,14 +319,15 @@ def _evaluations(found: Assessment) -> str:
         f"Statistics of the nominal machine rest on {cycles.recorded} cycles; {cycles.needed} are needed, and mean and "
         f"deviation stay in their bands from cycle {cycles.cycles} on."
         if found.nominal.period is None
-        else f"The nominal response repeats every {'cycle' if found.nominal.period == 1 else f'{found.nominal.period} cycles'}."
+        else "The nominal response repeats every "
+        f"{'cycle' if found.nominal.period == 1 else f'{found.nominal.period} cycles'}."
     )
     if found.nominal.period is None and not cycles.converged:
         statistics += " <b>They have not converged.</b>"
     return (
         _evaluation_table({"verdict rests on": found.evaluation, "nominal machine": found.nominal_evaluation})
-        + f'<p class="note">{_text(found.evaluation.method)}. Type {found.type} because {_text(found.response.reason)}. '
-        f"Nominal machine: {_text(found.nominal.reason)}. {statistics}</p>"
+        + f'<p class="note">{_text(found.evaluation.method)}. Type {found.type} because '
+        f"{_text(found.response.reason)}. Nominal machine: {_text(found.nominal.reason)}. {statistics}</p>"
     )
 
 
@@ -367,7 +388,7 @@ def _table(
     numbers = set(numeric)
 
     def cells(tag: str, row: Iterable[str]) -> str:
-        return "".join(f'<{tag}{" class=n" if k in numbers else ""}>{cell}</{tag}>' for k, cell in enumerate(row))
+        return "".join(f"<{tag}{' class=n' if k in numbers else ''}>{cell}</{tag}>" for k, cell in enumerate(row))
 
     body = "".join(
         f"<tr{' class=best' if best and k == 0 else ''}>{cells('td', row)}</tr>" for k, row in enumerate(rows)
@@ -375,7 +396,7 @@ def _table(
     return f"<table><thead><tr>{cells('th', head)}</tr></thead><tbody>{body}</tbody></table>"
 
 
-def _drawn(draw: Callable[[figures.Axes], object]) -> Figure:
+def _drawn(draw: Callable[[Axes], object]) -> Figure:
     with matplotlib.rc_context(figures.STYLE):
         figure = figures.figure_of()
         draw(figure.add_subplot())
