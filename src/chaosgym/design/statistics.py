@@ -28,8 +28,14 @@ MIN_CYCLES = 16
 MEAN_BAND, DEVIATION_BAND = 0.02, 0.15
 """Bands of the running mean and deviation, as shares of their final values; 0.15 is 1.96 / sqrt(2 * 80), rounded."""
 
+COARSE_MEAN_BAND, COARSE_DEVIATION_BAND = 0.05, 0.30
+"""Bands that a measurement must reach at least: half of the 10 % change of force that matters (thesis 5.5.2)."""
+
 CONFIDENCE_FACTOR = 1.96
 """Standard errors in a two-sided 95 % interval."""
+
+MOST_LEVELS = 16
+"""Values that repeat exactly up to which each is a mode of its own."""
 
 MODE_SIGNIFICANCE = 3.0
 """Standard errors of the estimated density by which a mode must stand out."""
@@ -114,7 +120,7 @@ def convergence(forces: ArrayLike) -> Convergence:
     return Convergence(int(last[-1]) + 2 if len(last) else 1, len(values), cycles_needed(values))
 
 
-def cycles_needed(forces: ArrayLike) -> int:
+def cycles_needed(forces: ArrayLike, mean_band: float = MEAN_BAND, deviation_band: float = DEVIATION_BAND) -> int:
     r"""Cycles that mean and deviation within their bands take, at 95 % confidence, by their standard errors.
 
     n >= tau (1.96 s / (b m))^2 for the mean and n >= tau (1.96 / b)^2 (k - 1) / 4 for the deviation, where tau is the
@@ -122,12 +128,12 @@ def cycles_needed(forces: ArrayLike) -> int:
     """
     values = as_forces(forces, 1)
     mean, deviation = float(np.mean(values)), float(np.std(values))
-    if deviation <= 0.1 * MEAN_BAND * mean:
+    if deviation <= 0.1 * mean_band * mean:
         return MIN_CYCLES
     centred = (values - mean) / deviation
-    of_mean = correlation_time(centred) * (CONFIDENCE_FACTOR * deviation / (MEAN_BAND * mean)) ** 2
+    of_mean = correlation_time(centred) * (CONFIDENCE_FACTOR * deviation / (mean_band * mean)) ** 2
     kurtosis = float(np.mean(centred**4))
-    of_deviation = correlation_time(centred**2) * (CONFIDENCE_FACTOR / DEVIATION_BAND) ** 2 * (kurtosis - 1.0) / 4.0
+    of_deviation = correlation_time(centred**2) * (CONFIDENCE_FACTOR / deviation_band) ** 2 * (kurtosis - 1.0) / 4.0
     return max(MIN_CYCLES, math.ceil(of_mean), math.ceil(of_deviation))
 
 
@@ -153,7 +159,7 @@ def correlation_time(values: ArrayLike) -> float:
 
 
 def require_enough(forces: ArrayLike) -> Array:
-    """Return the forces if they suffice for a statistic.
+    """Return the forces if they suffice for a statistic within the coarse bands.
 
     Raises
     ------
@@ -161,7 +167,7 @@ def require_enough(forces: ArrayLike) -> Array:
         If they don't; says how many cycles are needed.
     """
     values = as_forces(forces)
-    needed = cycles_needed(values)
+    needed = cycles_needed(values, COARSE_MEAN_BAND, COARSE_DEVIATION_BAND)
     if len(values) < needed:
         raise DesignError(
             f"{len(values)} cycles are too few for a statistic of these forces (mean {np.mean(values):.3g} N, standard "
@@ -221,7 +227,7 @@ def histogram(forces: ArrayLike, bins: int | None = None) -> Histogram:
 
 def _modes(values: Array) -> Array:
     levels = np.unique(np.round(values / np.max(values), 6))
-    if len(levels) <= len(values) // 4:
+    if len(levels) <= min(MOST_LEVELS, len(values) // 4):
         return np.asarray(levels * np.max(values))
     bandwidth = 0.5 * 1.06 * float(np.std(values)) * len(values) ** -0.2
     grid = np.linspace(np.min(values) - 3.0 * bandwidth, np.max(values) + 3.0 * bandwidth, 512)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from chaosgym.design.brief import DesignBrief
+from chaosgym.design.fatigue import equivalent_force_of_history
 from chaosgym.design.improve import Improvement, improve
 from chaosgym.design.methodology import Assessment, assess
 from chaosgym.design.peak_impacts import PeakImpactDiagram, peak_impacts
@@ -14,7 +15,7 @@ from chaosgym.design.trends import HISTORY_SAMPLES, LifeTrend, life_against
 from chaosgym.diagnosis import ResponseMap, response_map
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import Machine
-from chaosgym.simulation import simulate
+from chaosgym.simulation import CycleRecord, simulate
 from chaosgym.version import __version__
 
 MAP_SHARES = np.arange(-4, 5) / 2.0
@@ -45,6 +46,8 @@ class DesignStudy:
         Over the machine's usual range; None without contact at its low end.
     diagram
         Where the peak impacts act.
+    force_of_every_impact
+        Equivalent force a cycle [N] if every impact counts, by rainflow counting, and not the peak of a cycle alone.
     seed
         Of the series and the bootstrap.
     """
@@ -55,6 +58,7 @@ class DesignStudy:
     map: ResponseMap | None
     life_over_speed: LifeTrend | None
     diagram: PeakImpactDiagram
+    force_of_every_impact: float
     seed: int
 
     def lines(self) -> list[str]:
@@ -101,6 +105,7 @@ class DesignStudy:
                 "lowest": _finite(self.life_over_speed.lowest),
                 "highest": _finite(self.life_over_speed.highest),
             },
+            "force_of_every_impact_N": self.force_of_every_impact,
             "peak_impacts": {"spread": self.diagram.spread, "unit": self.diagram.unit},
         }  # fmt: skip
 
@@ -145,8 +150,14 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
     side = int(np.argmax(np.sum(record.peak_force**3, axis=0)))
     return DesignStudy(
         brief, assessment, improvement, _map(brief, workers, progress), _life_over_speed(machine, workers, progress),
-        peak_impacts(record, side), seed,
+        peak_impacts(record, side), _every_impact(record, side, brief), seed,
     )  # fmt: skip
+
+
+def _every_impact(record: CycleRecord, side: int, brief: DesignBrief) -> float:
+    assert record.history is not None
+    force = np.maximum(record.history[:, :, 2].ravel() * (1.0 if side == 0 else -1.0), 0.0)
+    return equivalent_force_of_history(force, len(record), brief.criteria.life_exponent)
 
 
 def _map(brief: DesignBrief, workers: int | None, progress: bool) -> ResponseMap | None:

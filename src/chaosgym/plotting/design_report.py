@@ -16,6 +16,7 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chaosgym.design.fatigue import rating_life
 from chaosgym.design.improve import Trial
 from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.design.methodology import Assessment, Check, Evaluation
@@ -97,7 +98,7 @@ def design_report(study: DesignStudy, command: str = "") -> str:
         "<h2>Criteria</h2>" + _checks(found.checks),
         _changes(study),
         "<h2>What the joint does</h2>" + _figures(study),
-        "<h2>How the numbers came about</h2>" + _evaluations(found),
+        "<h2>How the numbers came about</h2>" + _evaluations(study),
         "<h2>What was assumed</h2>" + _inputs(study),
     ]
     return _page(f"{headline}: {machine.name}", parts, command)
@@ -313,7 +314,8 @@ def _figures(study: DesignStudy) -> str:
     return f'<div class="figures">{"".join(pictures)}</div>'
 
 
-def _evaluations(found: Assessment) -> str:
+def _evaluations(study: DesignStudy) -> str:
+    found, every = study.assessment, study.force_of_every_impact
     cycles = found.convergence
     statistics = (
         f"Statistics of the nominal machine rest on {cycles.recorded} cycles; {cycles.needed} are needed, and mean and "
@@ -328,6 +330,9 @@ def _evaluations(found: Assessment) -> str:
         _evaluation_table({"verdict rests on": found.evaluation, "nominal machine": found.nominal_evaluation})
         + f'<p class="note">{_text(found.evaluation.method)}. Type {found.type} because '
         f"{_text(found.response.reason)}. Nominal machine: {_text(found.nominal.reason)}. {statistics}</p>"
+        '<p class="note">A cycle counts once, by its peak. Counting every impact of the nominal machine instead '
+        f"(rainflow) gives an equivalent force of {every:.1f} N and a life of "
+        f"{_life(rating_life(every, found.criteria.load_rating, found.criteria.life_exponent))} million cycles.</p>"
     )
 
 
