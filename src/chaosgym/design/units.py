@@ -5,7 +5,6 @@ rotation differ by 60, never by 2 pi. Units that are not listed are written as t
 """
 
 from collections.abc import Mapping
-from difflib import get_close_matches
 from typing import Any
 
 from chaosgym.errors import DesignError
@@ -62,9 +61,7 @@ def parse_quantity(name: str, given: Any, unit: str) -> float:
         raise DesignError(f"{name} = {given!r} does not begin with a number") from None
     if written not in allowed:
         what = f"has the unknown unit {written!r}" if written else "has no unit"
-        near = get_close_matches(written, allowed, n=1) if written else []
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise DesignError(f"{name} = {given!r} {what}{hint} (allowed: {listed})")
+        raise DesignError(f"{name} = {given!r} {what} (allowed: {listed})")
     return value * allowed[written]
 
 

@@ -62,8 +62,8 @@ h2 { font-size:19px; margin:34px 0 12px; }
 .card b { display:block; font-size:24px; line-height:1.25; }
 .card span { color:var(--soft); font-size:13px; }
 .card .label { text-transform:uppercase; letter-spacing:.04em; font-size:11.5px; }
-table { width:100%; border-collapse:collapse; background:var(--paper); font-variant-numeric:tabular-nums;
-  box-shadow:0 1px 3px rgba(30,45,60,.10); border-radius:4px; overflow:hidden; }
+.scroll { overflow-x:auto; background:var(--paper); box-shadow:0 1px 3px rgba(30,45,60,.10); border-radius:4px; }
+table { width:100%; border-collapse:collapse; font-variant-numeric:tabular-nums; }
 th,td { text-align:left; padding:8px 12px; border-bottom:1px solid var(--line); vertical-align:top; }
 th { font-size:12.5px; color:var(--soft); font-weight:600; background:#fafbfc; }
 td.n,th.n { text-align:right; white-space:nowrap; }
@@ -79,11 +79,12 @@ figure.wide { grid-column:1/-1; }
 figure img { width:100%; height:auto; display:block; }
 figcaption { color:var(--soft); font-size:13px; margin-top:8px; }
 .columns { display:grid; grid-template-columns:repeat(auto-fit,minmax(460px,1fr)); gap:16px; align-items:start; }
+.columns > *,.figures > * { min-width:0; }
 .note { color:var(--soft); font-size:13.5px; max-width:90ch; }
 footer { margin-top:36px; padding-bottom:8px; color:var(--soft); font-size:12.5px; }
 @media (max-width:560px) { .figures,.columns { grid-template-columns:1fr; } main { padding:16px 12px 40px; } }
 @media print { body { background:#fff; } main { max-width:none; padding:0; }
-  figure,table,.card { break-inside:avoid; box-shadow:none; border:1px solid var(--line); } }
+  figure,.scroll,.card { break-inside:avoid; box-shadow:none; border:1px solid var(--line); } }
 """
 
 
@@ -398,7 +399,7 @@ def _table(
     body = "".join(
         f"<tr{' class=best' if best and k == 0 else ''}>{cells('td', row)}</tr>" for k, row in enumerate(rows)
     )
-    return f"<table><thead><tr>{cells('th', head)}</tr></thead><tbody>{body}</tbody></table>"
+    return f'<div class="scroll"><table><thead><tr>{cells("th", head)}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
 def _drawn(draw: Callable[[Axes], object]) -> Figure:
