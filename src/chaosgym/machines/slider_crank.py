@@ -18,7 +18,7 @@ P. Gu, Chaotic Vibration in Machine Systems and Its Implications for Design, PhD
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -31,6 +31,7 @@ from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.errors import ParameterError
 from chaosgym.machines.crank_equations import SLIDER_ACROSS, degrees_of_freedom, equations
 from chaosgym.machines.crank_model import exact_model, stepped_model
+from chaosgym.machines.kinematics import planar_motion
 from chaosgym.machines.parameters import parameter, validate
 
 Array = NDArray[np.float64]
@@ -219,8 +220,12 @@ class SliderCrank:
                     f"{field} = {getattr(self, field):g} kg m^2 is out of range; "
                     f"allowed: from mass times squared offset, {least:g} kg m^2, on"
                 )
-        if self.motor_angle != 0.0:
-            raise ParameterError(f"motor_angle = {self.motor_angle:g} deg is not implemented yet; allowed: 0 deg")
+        if self.is_spatial and self.slider_joint == "instrumented":
+            raise ParameterError(
+                "slider_joint = 'instrumented' needs a motor at 0 deg; allowed at an angle: 'ideal', 'clearance'"
+            )
+        if self.is_spatial and self.geometric_stiffness == "on":
+            raise ParameterError("geometric_stiffness = 'on' needs a motor at 0 deg; allowed at an angle: 'off'")
 
     @property
     def cycle_period(self) -> float:
@@ -244,6 +249,13 @@ class SliderCrank:
         return "slider" if self.slider_joint != "ideal" else "ball"
 
     @property
+    def bearing_position(self) -> Callable[[Array], Array] | None:
+        """Place of the slider on its guide [m] by phase [rad] of the cycle; None if the ball joint is monitored."""
+        if self.monitored_joint != "slider":
+            return None
+        return lambda phase: planar_motion(phase, self.crank_radius, self.rod_length).slider
+
+    @property
     def natural_frequencies(self) -> Array:
         """Natural frequencies [Hz] at rest at crank angle zero, every joint tight, (n_modes + 1,)."""
         return frequencies_at(self, 0.0)
@@ -252,6 +264,11 @@ class SliderCrank:
     def degrees_of_freedom(self) -> tuple[str, ...]:
         """Names of the coordinates that are integrated: only those that the scene requires."""
         return degrees_of_freedom(self)
+
+    @property
+    def is_spatial(self) -> bool:
+        """True if the motor stands at an angle, so that the rod swings in two planes."""
+        return self.motor_angle > 0.0
 
     @property
     def is_piecewise_linear(self) -> bool:
