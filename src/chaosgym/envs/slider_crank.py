@@ -102,9 +102,9 @@ class SliderCrankEnv(MachineEnv):
     Earlier revolutions count whatever the speed was then; the first one of the step is not judged.
 
     At constant speeds from 50 to 300 rpm by 2.5 rpm, 45 % of the settled steps of the nominal machine count, and more
-    than half of them at 50 of the 101 speeds. Less than 5 % do at 55, 82.5, 190, 232.5 to 237.5, 277.5 to 280 and
-    292.5 rpm. The best constant speeds started from are 237.5 rpm with a return of -1.67 and 277.5 rpm with -1.71, but
-    the latter exceeds the force limit; 300 rpm returns -2.3, 50 rpm -6.7.
+    than half of them at 50 of the 101 speeds. None do at 82.5, 232.5 to 237.5 and 277.5 to 280 rpm; at 55, 190 and
+    292.5 rpm it hangs on rounding. Jobs that start at the best constant speed, 237.5 rpm, return -1.68; 277.5 rpm
+    returns -1.71, but exceeds the force limit; 300 rpm returns -2.4, 50 rpm -6.7.
 
     The diagnosis from rest, with a horizon of 400 revolutions, at every other speed: periodic at 4 of 51 speeds,
     where no settled step counts, chaotic at 47, where 51 % do. Most responses never repeat exactly; what counts here is
