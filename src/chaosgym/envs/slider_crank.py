@@ -106,8 +106,8 @@ class SliderCrankEnv(MachineEnv):
     292.5 rpm it hangs on rounding. Jobs that start at the best constant speed, 237.5 rpm, return -1.68; 277.5 rpm
     returns -1.71, but exceeds the force limit; 300 rpm returns -2.4, 50 rpm -6.7.
 
-    The diagnosis from rest, with a horizon of 400 revolutions, at every other speed: periodic at 4 of 51 speeds,
-    where no settled step counts, chaotic at 47, where 51 % do. Most responses never repeat exactly; what counts here is
+    The diagnosis from rest, with a horizon of 400 revolutions, at every other speed: periodic at 2 of 51 speeds,
+    where no settled step counts, chaotic at 49, where 49 % do. Most responses never repeat exactly; what counts here is
     whether a force sensor can tell.
 
     `info["cost"]` is 1 in a step that counts as Type III (`cost_type_iii`), has a peak force above the force limit on
