@@ -354,10 +354,11 @@ def _at_speed(crank_speed: float, step_phase: float, *structure: Any) -> SliderC
     sets, bins, _, n = parts.push.shape
     rate = crank_speed * math.pi / 30.0
     duration = 2.0 * math.pi / (bins * rate)
-    acceleration = np.zeros((sets, bins, 2 * n + FORCING_TERMS + m, n))
-    acceleration[:, :, : 2 * n + FORCING_TERMS] = _free_motion(parts.free, parts.forcing, rate)
-    acceleration[:, :, : 2 * n] += parts.push[:, :, : 2 * n]
-    acceleration[:, :, 2 * n + FORCING_TERMS :] = parts.push[:, :, 2 * n :]
+    columns = np.zeros((sets, bins, 2 * n + FORCING_TERMS + m, n))
+    columns[:, :, : 2 * n + FORCING_TERMS] = _free_motion(parts.free, parts.forcing, rate)
+    columns[:, :, : 2 * n] += parts.push[:, :, : 2 * n]
+    columns[:, :, 2 * n + FORCING_TERMS :] = parts.push[:, :, 2 * n :]
+    acceleration = np.ascontiguousarray(np.swapaxes(columns, -1, -2))
     steps = max(1, math.ceil(duration * max(parts.contact / step_phase, parts.spectrum / MAX_PHASE)))
     step = duration / steps
     order = series_order(parts.spectrum * step)
@@ -376,6 +377,6 @@ def _at_speed(crank_speed: float, step_phase: float, *structure: Any) -> SliderC
         reach=np.linalg.norm(parts.channels.reading, axis=1),
         display=parts.display,
         acceleration=acceleration,
-        curvature=np.ascontiguousarray(np.einsum("jn,sbcn->sbjc", parts.channels.row, acceleration)),
+        curvature=np.ascontiguousarray(parts.channels.row @ acceleration),
         propagator=propagator_table(acceleration, duration, step, order),
     )
