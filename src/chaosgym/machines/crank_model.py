@@ -8,7 +8,7 @@ machines that differ only in speed or clearance.
 
 import math
 from dataclasses import fields
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -54,10 +54,11 @@ def exact_model(machine: "SliderCrank", step_phase: float) -> SliderCrankModel:
 
 def _key(machine: "SliderCrank") -> tuple[Any, ...]:
     """Class and all fields that shape the matrices."""
-    kind = type(machine)
+    kind: Any = type(machine)
     return (kind, *(getattr(machine, name) for name in _structure_fields(kind)))
 
 
+@cache
 def _structure_fields(kind: Any) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind) if field.name not in _NOT_IN_THE_MATRICES)
 
