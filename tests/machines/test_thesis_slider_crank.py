@@ -72,7 +72,7 @@ def test_gravity_keeps_the_slider_on_the_guide():
     assert simulate(replace(CRANK, crank_speed=450.0, gravity=9.81), 5, transient=30).impacts.sum() > 0
 
 
-@pytest.mark.parametrize(("clearance", "over_background"), [(0.0, 8.0), (0.127e-3, 2.5)])
+@pytest.mark.parametrize(("clearance", "over_background"), [(0.0, 8.0), (0.127e-3, 3.0)])
 def test_the_third_superharmonic_resonance(clearance, over_background):
     """With end bodies off the rod's ends, forces crest at a third of 75.6 Hz, 1508 rpm, whatever the clearance."""
     speeds = np.arange(1484.0, 1533.0, 4.0)
@@ -117,7 +117,7 @@ def test_matrix_updates_at_5_and_6_degrees_part_on_a_chaotic_response():
     """190 rpm, +-0.254 mm: close at first, then as far apart as the peaks scatter, the mean the same (case two)."""
     runs = [peaks(CRANK, cycles=100, transient=0, matrix_update_interval=interval) for interval in (5.0, 6.0)]
     apart = np.abs(runs[0] - runs[1])
-    assert apart[:2].max() < 2.0
+    assert apart[:2].max() < 3.0
     assert apart[20:].max() > 12.0
     assert runs[0][20:].mean() == pytest.approx(runs[1][20:].mean(), rel=0.03)
 
