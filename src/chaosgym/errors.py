@@ -23,3 +23,7 @@ class DatasetError(ChaosgymError, ValueError):
 
 class ModelFileError(ChaosgymError, ValueError):
     """A classifier or policy file is missing, damaged, or of another version."""
+
+
+class DesignError(ChaosgymError, ValueError):
+    """A design question can't be answered as asked: too few cycles, a wrong unit, or a criterion out of range."""

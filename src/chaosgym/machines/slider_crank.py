@@ -18,7 +18,7 @@ P. Gu, Chaotic Vibration in Machine Systems and Its Implications for Design, PhD
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -31,6 +31,7 @@ from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.errors import ParameterError
 from chaosgym.machines.crank_equations import SLIDER_ACROSS, degrees_of_freedom, equations
 from chaosgym.machines.crank_model import exact_model, stepped_model
+from chaosgym.machines.kinematics import planar_motion
 from chaosgym.machines.parameters import parameter, validate
 
 Array = NDArray[np.float64]
@@ -246,6 +247,13 @@ class SliderCrank:
     def monitored_joint(self) -> str:
         """Joint whose force is recorded: the slider joint if it has clearance, otherwise the ball joint."""
         return "slider" if self.slider_joint != "ideal" else "ball"
+
+    @property
+    def bearing_position(self) -> Callable[[Array], Array] | None:
+        """Place of the slider on its guide [m] by phase [rad] of the cycle; None if the ball joint is monitored."""
+        if self.monitored_joint != "slider":
+            return None
+        return lambda phase: planar_motion(phase, self.crank_radius, self.rod_length).slider
 
     @property
     def natural_frequencies(self) -> Array:

@@ -1,0 +1,12 @@
+"""What may a designer rely on? From the type of a response to life, reliability and the next change (thesis 5.4, 5.6).
+
+from chaosgym.design import Criteria, assess, improve
+assessment = assess(ImpactBeam(), criteria=Criteria(load_rating=500.0, life=500.0))
+assessment.verdict, improve(assessment).best
+"""
+
+from chaosgym.design.criteria import Criteria, variation_region
+from chaosgym.design.improve import Improvement, Trial, improve
+from chaosgym.design.methodology import Assessment, assess
+
+__all__ = ["Assessment", "Criteria", "Improvement", "Trial", "assess", "improve", "variation_region"]

@@ -1,0 +1,254 @@
+"""What has an engineer asked for? The design brief: machine, tolerances, criteria and changes in one TOML file."""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from chaosgym.design.criteria import Criteria, variation_region
+from chaosgym.design.improve import default_changes
+from chaosgym.design.methodology import SERIES_SIZE
+from chaosgym.design.units import parse_quantity
+from chaosgym.diagnosis import Tolerance, default_tolerances
+from chaosgym.errors import DesignError
+from chaosgym.machines import MACHINES, Machine
+from chaosgym.machines.parameters import parameters_of, with_settings
+
+REQUIRED_CRITERIA = ("load_rating", "life", "reliability")
+"""Criteria that a brief must state; the others have defaults, which the report lists."""
+
+SECTIONS = ("machine", "series", "parameters", "tolerances", "region", "criteria", "changes", "costs")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignBrief:
+    """A design question.
+
+    Attributes
+    ----------
+    machine
+        The nominal machine.
+    region
+        Tolerance of each field, widened to the region asked for.
+    criteria
+        Bearing data and requirements.
+    changes
+        Values that may be tried, by field.
+    costs
+        Cost weights by field.
+    series_size
+        Machines that represent the region.
+    stated
+        Names of the criteria that the brief states itself.
+    """
+
+    machine: Machine
+    region: Mapping[str, Tolerance]
+    criteria: Criteria
+    changes: Mapping[str, tuple[float, ...]]
+    costs: Mapping[str, float]
+    series_size: int = SERIES_SIZE
+    stated: tuple[str, ...] = field(default=())
+
+
+def read_brief(path: str | Path) -> DesignBrief:
+    """Read a design brief.
+
+    Raises
+    ------
+    DesignError
+        If the file can't be read as TOML, a key is unknown, a unit missing or a value not allowed.
+    ParameterError
+        If a parameter, tolerance or criterion is out of its range.
+    """
+    try:
+        with open(path, "rb") as file:
+            values = tomllib.load(file)
+    except OSError as error:
+        raise DesignError(f"{path} can't be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DesignError(f"{path} is not valid TOML: {error}") from None
+    return brief_from(values)
+
+
+def brief_from(values: Mapping[str, Any]) -> DesignBrief:
+    """Build a design brief from the values of its file."""
+    _known("the brief", values, SECTIONS)
+    name = values.get("machine")
+    machine = _machine(name)
+    fields = parameters_of(machine)
+    settings = {
+        key: given if fields[key].choices else parse_quantity(f"parameters.{key}", given, fields[key].unit)
+        for key, given in _section(values, "parameters", fields).items()
+    }
+    machine = with_settings(machine, settings)
+    region = _section(values, "region", ("tolerances", "wear"))
+    wear = region.get("wear", False)
+    if not isinstance(wear, bool):
+        raise DesignError(f"region.wear = {wear!r} is out of range; allowed: true or false")
+    criteria = _criteria(values)
+    return DesignBrief(
+        machine=machine,
+        region=variation_region(machine, _tolerances(values, machine), region.get("tolerances", 1), wear),
+        criteria=criteria,
+        changes=_changes(values, machine),
+        costs=_costs(values, machine),
+        series_size=_series_size(values),
+        stated=tuple(values.get("criteria", {})),
+    )
+
+
+def _machine(name: Any) -> Any:
+    if name not in MACHINES:
+        near = get_close_matches(str(name), MACHINES, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(sorted(MACHINES))}"
+        raise DesignError(f"machine = {name!r} does not exist; {hint}")
+    return MACHINES[name]()
+
+
+def _known(where: str, given: Iterable[str], known: Iterable[str]) -> None:
+    known = list(known)
+    for key in given:
+        if key not in known:
+            near = get_close_matches(key, known, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
+            raise DesignError(f"{where} has no key {key!r}; {hint}")
+
+
+def _section(values: Mapping[str, Any], name: str, known: Iterable[str]) -> Mapping[str, Any]:
+    section = values.get(name, {})
+    if not isinstance(section, Mapping):
+        raise DesignError(f"{name} = {section!r} is not a table; write [{name}] and one line a value below it")
+    _known(f"[{name}]", section, known)
+    return section
+
+
+def _criteria(values: Mapping[str, Any]) -> Criteria:
+    known = parameters_of(Criteria)
+    section = _section(values, "criteria", known)
+    for name in REQUIRED_CRITERIA:
+        if name not in section:
+            raise DesignError(f"[criteria] lacks {name}")
+    return Criteria(
+        **{key: parse_quantity(f"criteria.{key}", given, known[key].unit) for key, given in section.items()}
+    )
+
+
+def _tolerances(values: Mapping[str, Any], machine: Machine) -> dict[str, Tolerance]:
+    if "tolerances" not in values:
+        return default_tolerances(machine)
+    fields = {name: about for name, about in parameters_of(machine).items() if not about.choices}
+    tolerances = {}
+    for key, given in _section(values, "tolerances", fields).items():
+        relative = isinstance(given, str) and given.strip().endswith("%")
+        value = parse_quantity(f"tolerances.{key}", given, "-" if relative else fields[key].unit)
+        if not value > 0.0:
+            raise DesignError(f"tolerances.{key} = {given!r} is out of range; allowed: above 0")
+        tolerances[key] = Tolerance(value, relative=relative)
+    return tolerances
+
+
+def _changes(values: Mapping[str, Any], machine: Machine) -> dict[str, tuple[float, ...]]:
+    if "changes" not in values:
+        return default_changes(machine)
+    fields = {name: about for name, about in parameters_of(machine).items() if not about.choices}
+    changes = {}
+    for key, given in _section(values, "changes", fields).items():
+        row = given if isinstance(given, list) else [given]
+        changes[key] = tuple(parse_quantity(f"changes.{key}", one, fields[key].unit) for one in row)
+        for value in changes[key]:
+            with_settings(machine, {key: value})
+    return changes
+
+
+def _costs(values: Mapping[str, Any], machine: Machine) -> dict[str, float]:
+    section = _section(values, "costs", _changes(values, machine))
+    costs = {key: parse_quantity(f"costs.{key}", given, "-") for key, given in section.items()}
+    for key, cost in costs.items():
+        if not cost >= 0.0:
+            raise DesignError(f"costs.{key} = {cost:g} is out of range; allowed: 0 or more")
+    return costs
+
+
+def _series_size(values: Mapping[str, Any]) -> int:
+    size = values.get("series", SERIES_SIZE)
+    if isinstance(size, bool) or not isinstance(size, int) or not 8 <= size <= 4096:
+        raise DesignError(f"series = {size!r} is out of range; allowed: whole numbers from 8 to 4096")
+    return size
+
+
+def template(name: str) -> str:
+    """Commented design brief of a machine, ready to edit.
+
+    Raises
+    ------
+    DesignError
+        If there is no such machine.
+    """
+    machine = _machine(name)
+    speed, clearance = machine.speed_field, machine.clearance_field
+    criteria = Criteria()
+    lines = [
+        "# Design brief for `chaosgym design`. Quantities are texts with a unit; % is a share of the nominal value.",
+        "",
+        f'machine = "{name}"',
+        f"series = {SERIES_SIZE}  # machines built at random within the tolerances",
+        "",
+        "[parameters]  # any field of the machine; those left out keep the value of the thesis",
+        f"{speed} = {_quantity(machine, speed)}",
+        f"{clearance} = {_quantity(machine, clearance)}  # half the gap",
+        "",
+        "[tolerances]  # on either side of nominal",
+        *(_tolerance_line(machine, key, tolerance) for key, tolerance in default_tolerances(machine).items()),
+        "",
+        "[region]",
+        "tolerances = 1  # 1, or 2 to look at twice the tolerance",
+        "wear = false    # true: two tolerances for the clearance, which grows in service",
+        "",
+        "[criteria]",
+        'load_rating = "500 N"          # force under which the surface lasts a million cycles',
+        'life = "2000 Mcycles"          # million cycles',
+        "reliability = 0.999            # probability that the strength exceeds the contact stress",
+        f"safety_factor = {criteria.safety_factor:g}              # strength against stress, for Types I and II",
+        "# life_exponent = 3             # point contact; line contact, 10/3, if left out",
+        f'contact_radius = "{1e3 * criteria.contact_radius:g} mm"        # ball on a flat surface',
+        f'contact_modulus = "{1e-9 * criteria.contact_modulus:g} GPa"     # steel on steel',
+        f'strength = "{1e-9 * criteria.strength:g} GPa"            # Hertzian endurance strength, mean',
+        f'strength_deviation = "{1e-9 * criteria.strength_deviation:g} GPa"  # and standard deviation',
+        f"fatigue_factor = {criteria.fatigue_factor:g}             # multiplies the stress",
+        f"confidence = {criteria.confidence:g}              # of the intervals",
+        "",
+        "[changes]  # values that may be tried to meet the criteria",
+        *(_change_line(machine, key, row) for key, row in default_changes(machine).items()),
+        "",
+        "[costs]  # weight of a change: weight * |ln(new / old)|; 1 if left out",
+        f"{speed} = 2",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+_SHOWN_UNITS = {"m": ("mm", 1e-3)}
+
+
+def _written(value: float, unit: str) -> str:
+    if unit == "-":
+        return f"{value:.6g}"
+    shown, size = _SHOWN_UNITS.get(unit, (unit, 1.0))
+    return f'"{value / size:.6g} {shown}"'
+
+
+def _quantity(machine: Machine, name: str) -> str:
+    return _written(getattr(machine, name), parameters_of(machine)[name].unit)
+
+
+def _tolerance_line(machine: Machine, name: str, tolerance: Tolerance) -> str:
+    if tolerance.relative:
+        return f'{name} = "{100 * tolerance.value:g} %"'
+    return f"{name} = {_written(tolerance.value, parameters_of(machine)[name].unit)}"
+
+
+def _change_line(machine: Machine, name: str, row: Iterable[float]) -> str:
+    unit = parameters_of(machine)[name].unit
+    return f"{name} = [{', '.join(_written(value, unit) for value in row)}]"

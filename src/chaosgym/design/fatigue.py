@@ -1,0 +1,151 @@
+r"""How long does a bearing surface last under forces that vary from cycle to cycle? (thesis 5.4.2)
+
+    L = (C / F)^p                          (5.2)  life in millions of cycles, constant force
+    C = F L^(1/p)                          (5.3)  load rating for a life
+    1 / L = sum p_i / L_i                  (5.4)  Palmgren-Miner over the distribution of forces
+    C = [L sum p_i F_i^p]^(1/p)            (5.5)
+
+(5.4) and (5.5) are (5.2) and (5.3) with the equivalent force F_eq = (sum p_i F_i^p)^(1/p). The conservative life takes
+the largest force instead. p = 10/3 for line contact, 3 in figure 5.12 and for point contact.
+
+A cycle counts once, by its peak. ``equivalent_force_of_history`` counts every impact of a time history instead, by
+rainflow counting.
+
+References
+----------
+ISO 281:2007, Rolling bearings - Dynamic load ratings and rating life.
+ASTM E1049-85(2017), Standard practices for cycle counting in fatigue analysis, 5.4.4 and 5.4.5.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import rainflow
+from numpy.typing import ArrayLike, NDArray
+
+from chaosgym.design.statistics import as_forces
+from chaosgym.errors import DesignError
+
+Array = NDArray[np.float64]
+
+LIFE_EXPONENT = 10.0 / 3.0
+"""Exponent p of eq. 5.2, line contact."""
+
+CUBIC_EXPONENT = 3.0
+"""Exponent of figure 5.12 and of the 25 % criterion (5.5.2), point contact."""
+
+
+def _positive(name: str, value: float, unit: str) -> float:
+    if not (math.isfinite(value) and value > 0.0):
+        raise DesignError(f"{name} = {value:g}{unit} is out of range; allowed: above 0{unit}, finite")
+    return value
+
+
+def rating_life(force: float, load_rating: float, exponent: float = LIFE_EXPONENT) -> float:
+    """Life [10^6 cycles] under a constant force [N], eq. 5.2; infinite without force."""
+    _positive("load_rating", load_rating, " N")
+    _positive("exponent", exponent, "")
+    return math.inf if force == 0.0 else float((load_rating / force) ** exponent)
+
+
+def required_load_rating(force: float, life: float, exponent: float = LIFE_EXPONENT) -> float:
+    """Load rating [N] for a life [10^6 cycles] under a force [N]: eq. 5.3, and eq. 5.5 with an equivalent force."""
+    return float(force * _positive("life", life, " million cycles") ** (1.0 / _positive("exponent", exponent, "")))
+
+
+def equivalent_force(
+    forces: ArrayLike, exponent: float = LIFE_EXPONENT, probabilities: ArrayLike | None = None
+) -> float:
+    """Constant force [N] that does the damage of a distribution of forces, (sum p_i F_i^p)^(1/p).
+
+    Parameters
+    ----------
+    forces : (levels,)
+        Peak forces of the cycles, or force levels [N].
+    exponent
+        p.
+    probabilities : (levels,)
+        Share of cycles at each level; equal if None.
+
+    Raises
+    ------
+    DesignError
+        If a force is negative or the probabilities do not add up to 1.
+    """
+    values = as_forces(forces)
+    _positive("exponent", exponent, "")
+    if probabilities is None:
+        share = np.full(len(values), 1.0 / len(values))
+    else:
+        share = np.asarray(probabilities, dtype=float)
+        if share.shape != values.shape or np.any(share < 0.0) or abs(share.sum() - 1.0) > 1e-9:
+            raise DesignError(f"probabilities add up to {share.sum():g}; allowed: 0 or more, one a force, 1 in all")
+    largest = float(np.max(values))
+    if largest == 0.0:
+        return 0.0
+    return float(largest * np.sum(share * (values / largest) ** exponent) ** (1.0 / exponent))
+
+
+def statistical_life(
+    forces: ArrayLike, load_rating: float, exponent: float = LIFE_EXPONENT, probabilities: ArrayLike | None = None
+) -> float:
+    """Life [10^6 cycles] by Palmgren-Miner over a distribution of forces, eq. 5.4."""
+    return rating_life(equivalent_force(forces, exponent, probabilities), load_rating, exponent)
+
+
+def conservative_life(forces: ArrayLike, load_rating: float, exponent: float = LIFE_EXPONENT) -> float:
+    """Life [10^6 cycles] under the largest of the forces, the first approach of 5.4.2."""
+    return rating_life(float(np.max(as_forces(forces))), load_rating, exponent)
+
+
+class RelativeLife(NamedTuple):
+    """Life relative to a reference: what the largest and the smallest peak suggest, and the statistical mean life."""
+
+    lowest: float
+    highest: float
+    statistical: float
+
+
+def relative_life(forces: ArrayLike, reference: float, exponent: float = CUBIC_EXPONENT) -> RelativeLife:
+    """Life relative to that under a reference force [N], as figure 5.12 shows it."""
+    values = as_forces(forces)
+    return RelativeLife(
+        conservative_life(values, reference, exponent),
+        rating_life(float(np.min(values)), reference, exponent),
+        statistical_life(values, reference, exponent),
+    )
+
+
+def rainflow_cycles(history: ArrayLike) -> tuple[Array, Array]:
+    """Ranges and counts (cycles,) of a force history that repeats.
+
+    The history is turned round so that it begins and ends at its largest value; then every cycle closes and none is
+    counted half (ASTM E1049, 5.4.5).
+    """
+    values = np.asarray(history, dtype=float)
+    if values.ndim != 1 or len(values) < 3 or not np.all(np.isfinite(values)):
+        raise DesignError(f"the history has shape {values.shape}; allowed: (samples,) with 3 finite values or more")
+    start = int(np.argmax(values))
+    closed = np.concatenate([values[start:], values[: start + 1]])
+    found = rainflow.count_cycles(closed.tolist())
+    ranges, counts = np.array(found, dtype=float).reshape(-1, 2).T
+    return ranges, counts
+
+
+def equivalent_force_of_history(history: ArrayLike, cycles: int, exponent: float = LIFE_EXPONENT) -> float:
+    """Constant peak force [N] a cycle that does the damage of every impact of a history.
+
+    Parameters
+    ----------
+    history : (samples,)
+        Force on one surface [N], 0 without contact, fine enough to show each impact.
+    cycles
+        Operating cycles that it covers.
+    exponent
+        p.
+    """
+    if cycles < 1:
+        raise DesignError(f"cycles = {cycles} is out of range; allowed: 1 or more")
+    ranges, counts = rainflow_cycles(history)
+    return float((np.sum(counts * ranges**exponent) / cycles) ** (1.0 / exponent))

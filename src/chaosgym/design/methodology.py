@@ -1,0 +1,391 @@
+r"""Does a machine meet its criteria, whatever its tolerances do? The design methodology of thesis 5.6.
+
+    I    modelling           the machine: its parameters, with their provenance
+    II   variation region    one or two tolerances of each parameter, wear included           ``variation_region``
+    III  simulation          the nominal machine and a series of machines over the region     ``build_series``
+    IV   nature              the Two-Step Test on each; statistics until they converge        ``settled_run``
+    V    classification      Type I, II or III over the region                                ``response_type``
+    VI   evaluation          I: the trend; II: the worst case; III: statistics                ``evaluate``
+    VII  verdict             against the criteria; if it fails, change and go back to I       ``improve``
+
+Type I: peak forces follow a trend, log F = log F_0 + sum b_i d_i with deviations d_i in tolerances; the evaluation
+takes the trend to the unfavourable corner of the region. With no tolerances it is the classical answer for the nominal
+machine. Type II: the largest peak found anywhere in the region. Type III: the peaks of all machines of the region
+together, each machine equally likely; the verdict takes the unfavourable end of the confidence interval.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.design.criteria import Criteria
+from chaosgym.design.fatigue import conservative_life, equivalent_force, rating_life, required_load_rating
+from chaosgym.design.reliability import (
+    Interval,
+    Strength,
+    hertz_pressure,
+    mean_interval,
+    normal_reliability,
+    reliability,
+    safety_factor,
+    time_blocks,
+)
+from chaosgym.design.runs import (
+    DIAGNOSIS_BUDGET,
+    NOMINAL_BUDGET,
+    Series,
+    SettledRun,
+    build_series,
+    settled_run,
+)
+from chaosgym.design.statistics import Convergence, convergence
+from chaosgym.diagnosis import ResponseType, Tolerance, Type, default_tolerances, response_type
+from chaosgym.machines import Machine
+from chaosgym.machines.parameters import parameters_of
+
+Array = NDArray[np.float64]
+Verdict = Literal["meets", "fails", "undetermined"]
+
+SERIES_SIZE = 32
+"""Machines of the series that represents the region."""
+
+
+@dataclass(frozen=True)
+class Trend:
+    """How the equivalent peak force follows the tolerances.
+
+    Attributes
+    ----------
+    parameters
+        Names of the toleranced fields.
+    slopes : (parameters,)
+        Change of log force for one tolerance.
+    unexplained
+        Standard deviation of log force over the series that the trend leaves.
+    """
+
+    parameters: tuple[str, ...]
+    slopes: Array
+    unexplained: float
+
+    @property
+    def worst_factor(self) -> float:
+        """Force in the unfavourable corner of the region, relative to nominal."""
+        return math.exp(float(np.sum(np.abs(self.slopes))))
+
+
+def fit_trend(parameters: tuple[str, ...], shares: Array, forces: Array, nominal: float) -> Trend:
+    """Fit the trend through the nominal force by least squares.
+
+    Parameters
+    ----------
+    parameters
+        Names of the columns of ``shares``.
+    shares : (machines, parameters)
+        Deviations from nominal in tolerances.
+    forces : (machines,)
+        Equivalent peak forces [N]; machines without contact are left out.
+    nominal
+        Force of the nominal machine [N].
+    """
+    touching = forces > 0.0
+    if nominal == 0.0 or touching.sum() <= len(parameters):
+        return Trend(parameters, np.zeros(len(parameters)), 0.0)
+    logs = np.log(forces[touching] / nominal)
+    slopes = np.asarray(np.linalg.lstsq(shares[touching], logs)[0], dtype=float)
+    return Trend(parameters, slopes, float(np.std(logs - shares[touching] @ slopes)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluation:
+    """What forces mean for the bearing.
+
+    Attributes
+    ----------
+    method
+        How the force was chosen, in words.
+    force
+        Equivalent peak force [N].
+    largest_force
+        Largest peak force [N].
+    life, life_interval
+        By Palmgren-Miner [10^6 cycles], and its interval (degenerate for single values).
+    conservative_life
+        Under the largest force throughout [10^6 cycles].
+    required_load_rating
+        For the required life, eq. 5.5 [N].
+    reliability, reliability_interval
+        Eq. 5.8.
+    normal_reliability
+        Eq. 5.9 with the same mean and deviation of stress.
+    safety_factor
+        Eq. 5.6 at the largest stress.
+    """
+
+    method: str
+    force: float
+    largest_force: float
+    life: float
+    life_interval: Interval
+    conservative_life: float
+    required_load_rating: float
+    reliability: float
+    reliability_interval: Interval
+    normal_reliability: float
+    safety_factor: float
+
+
+def evaluate(blocks: list[Array], criteria: Criteria, method: str, seed: int = 0) -> Evaluation:
+    """Evaluate life and reliability over peak forces (thesis 5.4.2).
+
+    Parameters
+    ----------
+    blocks
+        Peak forces [N] in blocks that are independent of each other and weigh the same: stretches of one record, or
+        machines of a series. A single force is the classical case.
+    criteria
+        Bearing data.
+    method
+        How the forces were chosen, in words.
+    seed
+        Of the bootstrap.
+    """
+    exponent, confidence = criteria.life_exponent, criteria.confidence
+    force = equivalent_force([equivalent_force(block, exponent) for block in blocks], exponent)
+    largest = max(float(np.max(block)) for block in blocks)
+    scale = largest or 1.0
+    damage = mean_interval([(block / scale) ** exponent for block in blocks], confidence, seed)
+    low, high = (scale * value ** (1.0 / exponent) for value in damage)
+    strength = Strength(criteria.strength, criteria.strength_deviation)
+    stresses = [
+        criteria.fatigue_factor * hertz_pressure(block, criteria.contact_radius, criteria.contact_modulus)
+        for block in blocks
+    ]
+    survival = [strength.exceeds(stress) for stress in stresses]
+    mean = float(np.mean([np.mean(stress) for stress in stresses]))
+    square = float(np.mean([np.mean((stress - mean) ** 2) for stress in stresses]))
+    largest_stress = max(float(np.max(stress)) for stress in stresses)
+    return Evaluation(
+        method=method,
+        force=force,
+        largest_force=largest,
+        life=rating_life(force, criteria.load_rating, exponent),
+        life_interval=Interval(*(rating_life(end, criteria.load_rating, exponent) for end in (high, low))),
+        conservative_life=conservative_life([largest], criteria.load_rating, exponent),
+        required_load_rating=required_load_rating(force, criteria.life, exponent),
+        reliability=float(np.mean([reliability(stress, strength) for stress in stresses])),
+        reliability_interval=mean_interval(survival, confidence, seed),
+        normal_reliability=normal_reliability(mean, math.sqrt(square), *strength),
+        safety_factor=safety_factor(largest_stress, criteria.strength),
+    )
+
+
+@dataclass(frozen=True)
+class Check:
+    """One criterion: what is required, what is reached, and whether that is enough."""
+
+    name: str
+    reached: float
+    required: float
+    unit: str
+
+    @property
+    def met(self) -> bool:
+        """Whether the criterion is met."""
+        return self.reached >= self.required
+
+
+@dataclass(frozen=True, kw_only=True)
+class Assessment:
+    """The result of the methodology for one machine.
+
+    Attributes
+    ----------
+    machine, criteria
+        What was asked.
+    region
+        Tolerance of each field over which it was asked.
+    response
+        Type of the response over the region, and its evidence.
+    nominal
+        Response of the nominal machine.
+    convergence
+        Cycles that its statistics take.
+    series
+        Machines of the region.
+    trend
+        How the force follows the tolerances; its slopes are the sensitivities.
+    nominal_evaluation
+        Of the nominal machine alone, by its own statistics.
+    evaluation
+        The one that the type asks for.
+    checks
+        Each criterion.
+    verdict
+        "meets", "fails", or "undetermined" where the nominal response is.
+    machines_that_meet
+        Share of the series, each judged by its own statistics.
+    """
+
+    machine: Machine
+    criteria: Criteria
+    region: Mapping[str, Tolerance]
+    response: ResponseType
+    nominal: SettledRun
+    convergence: Convergence
+    series: Series
+    trend: Trend
+    nominal_evaluation: Evaluation
+    evaluation: Evaluation
+    checks: tuple[Check, ...]
+    verdict: Verdict
+    machines_that_meet: float
+
+    @property
+    def type(self) -> Type:
+        """Type of the response."""
+        return self.response.type
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON; None stands for an infinite life."""
+        return {
+            "machine": self.machine.name,
+            "parameters": {name: getattr(self.machine, name) for name in parameters_of(self.machine)},
+            "criteria": {name: getattr(self.criteria, name) for name in parameters_of(self.criteria)},
+            "region": {name: tolerance._asdict() for name, tolerance in self.region.items()},
+            "verdict": self.verdict,
+            "response": self.response.as_dict(),
+            "nominal": {
+                "nature": self.nominal.nature,
+                "period": self.nominal.period,
+                "reason": self.nominal.reason,
+                "cycles": len(self.nominal.peaks),
+                "largest_peak_N": self.nominal.largest_peak,
+            },
+            "cycles": {**vars(self.convergence), "converged": self.convergence.converged},
+            "evaluation": plain(vars(self.evaluation)),
+            "nominal_evaluation": plain(vars(self.nominal_evaluation)),
+            "checks": [plain({**vars(check), "met": check.met}) for check in self.checks],
+            "sensitivities": dict(zip(self.trend.parameters, self.trend.slopes.tolist(), strict=True)),
+            "series": {
+                "machines": len(self.series.runs),
+                "share_that_meets": self.machines_that_meet,
+                "largest_peak_N": [run.largest_peak for run in self.series.runs],
+                "nature": [run.nature for run in self.series.runs],
+            },
+        }
+
+
+def plain(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Replace infinite numbers by None, and tuples by lists."""
+
+    def one(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return [one(each) for each in value]
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return {name: one(value) for name, value in values.items()}
+
+
+def assess(
+    machine: Machine,
+    tolerances: Mapping[str, Tolerance] | None = None,
+    criteria: Criteria | None = None,
+    *,
+    series_size: int = SERIES_SIZE,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: bool = False,
+) -> Assessment:
+    """Take a machine through phases I to VII.
+
+    Parameters
+    ----------
+    machine
+        The nominal machine.
+    tolerances
+        Region by field, see ``variation_region``; the usual tolerances of the machine if None.
+    criteria
+        Bearing data and requirements; the defaults of ``Criteria`` if None.
+    series_size
+        Machines that represent the region.
+    seed
+        Of the series and the bootstrap.
+    workers
+        Number of threads; all processors by default.
+    progress
+        Show a progress bar on standard error.
+
+    Raises
+    ------
+    ParameterError
+        If a tolerance names no field, or leads out of the field's range.
+    SimulationError
+        If a run can't be finished.
+    """
+    region = default_tolerances(machine) if tolerances is None else dict(tolerances)
+    criteria = criteria or Criteria()
+    exponent = criteria.life_exponent
+    response = response_type(machine, region, budget=DIAGNOSIS_BUDGET, workers=workers)
+    nominal = settled_run(machine, until_converged=True, budget=NOMINAL_BUDGET)
+    series = build_series(machine, region, series_size, seed=seed, workers=workers, progress=progress)
+    force = equivalent_force(nominal.worse_side(exponent), exponent)
+    forces = np.array([equivalent_force(run.worse_side(exponent), exponent) for run in series.runs])
+    trend = fit_trend(series.parameters, series.shares, forces, force)
+    own = evaluate(time_blocks(nominal.worse_side(exponent)), criteria, "statistics of the nominal machine", seed)
+    evaluation = _by_type(response, nominal, series, trend, criteria, seed)
+    checks = _checks(response.type, evaluation, criteria)
+    return Assessment(
+        machine=machine, criteria=criteria, region=region, response=response, nominal=nominal,
+        convergence=convergence(nominal.worse_side(exponent)), series=series, trend=trend, nominal_evaluation=own,
+        evaluation=evaluation, checks=checks, verdict=_verdict(response.type, checks),
+        machines_that_meet=_share_that_meets(series.runs or (nominal,), criteria, seed),
+    )  # fmt: skip
+
+
+def _by_type(
+    response: ResponseType, nominal: SettledRun, series: Series, trend: Trend, criteria: Criteria, seed: int
+) -> Evaluation:
+    exponent = criteria.life_exponent
+    if response.type == "I":
+        peaks = trend.worst_factor * nominal.worse_side(exponent)
+        return evaluate(
+            [peaks], criteria, "Type I: the trend, taken to the unfavourable corner of the tolerances", seed
+        )
+    if response.type == "II":
+        found = [run.largest_peak for run in (nominal, *series.runs)]
+        found += [point.largest_peak for point in response.neighbours] + list(response.coexisting_peaks)
+        method = "Type II: the largest peak force found in the tolerances, in every cycle"
+        return evaluate([np.array([np.nanmax(found)])], criteria, method, seed)
+    blocks = [run.worse_side(exponent) for run in (nominal, *series.runs)]
+    if len(blocks) == 1:
+        return evaluate(time_blocks(blocks[0]), criteria, "Type III: statistics of the nominal machine", seed)
+    return evaluate(blocks, criteria, "Type III: statistics over all machines in the tolerances", seed)
+
+
+def _checks(kind: Type, evaluation: Evaluation, criteria: Criteria) -> tuple[Check, ...]:
+    life = Check("fatigue life", evaluation.life_interval.low, criteria.life, "million cycles")
+    endures = Check("reliability", evaluation.reliability_interval.low, criteria.reliability, "")
+    if kind in ("I", "II"):
+        return life, endures, Check("safety factor", evaluation.safety_factor, criteria.safety_factor, "")
+    return life, endures
+
+
+def _verdict(kind: Type, checks: tuple[Check, ...]) -> Verdict:
+    if not all(check.met for check in checks):
+        return "fails"
+    return "undetermined" if kind == "undetermined" else "meets"
+
+
+def _share_that_meets(runs: tuple[SettledRun, ...], criteria: Criteria, seed: int) -> float:
+    """Share of machines whose own life and reliability, without confidence interval, suffice."""
+    exponent = criteria.life_exponent
+    verdicts = []
+    for run in runs:
+        own = evaluate([run.worse_side(exponent)], criteria, "", seed)
+        verdicts.append(own.life >= criteria.life and own.reliability >= criteria.reliability)
+    return float(np.mean(verdicts))

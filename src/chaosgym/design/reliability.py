@@ -1,0 +1,143 @@
+r"""How likely does the surface endure the stress of an impact? (thesis 5.4.2)
+
+    S_e >= SF K_f s                                        (5.6)  single values
+    R = P(S_e > s)                                         (5.7)
+    R = int f(s) int_s^inf f(S) dS ds                      (5.8)
+    R = Phi((mu_S - mu_s) / sqrt(sigma_S^2 + sigma_s^2))   (5.9)  both normal
+
+S strength, s stress. Over the stresses of n recorded cycles the outer integral of (5.8) is the mean of P(S > s_i):
+nothing is fitted, and every peak of a multi-peak distribution counts. (5.9) beside it shows what a normal fit says.
+
+The stress is the largest Hertzian pressure of a ball of radius R on a flat surface,
+
+    s = (6 F E*^2 / (pi^3 R^2))^(1/3),   1 / E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2
+
+Intervals come from bootstrap over blocks of successive cycles, because these are not independent.
+
+References
+----------
+K. L. Johnson, Contact Mechanics, Cambridge, 1985, section 4.2.
+H. R. Kuensch, The jackknife and the bootstrap for general stationary observations, Annals of Statistics 17 (1989).
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import integrate, stats
+
+from chaosgym.errors import DesignError
+
+Array = NDArray[np.float64]
+
+RESAMPLES = 2000
+"""Bootstrap samples of an interval."""
+
+BLOCKS = 20
+"""Blocks into which a record is cut for the bootstrap."""
+
+
+class Strength(NamedTuple):
+    """Hertzian endurance strength of a surface, normally distributed: mean and standard deviation [Pa]."""
+
+    mean: float
+    deviation: float
+
+    def exceeds(self, stress: ArrayLike) -> Array:
+        """Probability that the strength exceeds each stress [Pa]; the inner integral of eq. 5.8."""
+        if self.deviation == 0.0:
+            return np.asarray(np.asarray(stress, dtype=float) < self.mean, dtype=float)
+        return np.asarray(stats.norm.sf(stress, self.mean, self.deviation))
+
+
+def effective_modulus(
+    youngs_modulus: float, poisson_ratio: float, other_modulus: float = math.inf, other_poisson_ratio: float = 0.0
+) -> float:
+    """Contact modulus E* [Pa] of two surfaces; the other one is rigid by default."""
+    return 1.0 / ((1.0 - poisson_ratio**2) / youngs_modulus + (1.0 - other_poisson_ratio**2) / other_modulus)
+
+
+def hertz_pressure(forces: ArrayLike, radius: float, modulus: float) -> Array:
+    """Largest contact pressure [Pa] of a ball on a flat surface.
+
+    Parameters
+    ----------
+    forces
+        Any shape [N].
+    radius
+        Of the ball [m].
+    modulus
+        Contact modulus E* [Pa].
+    """
+    if not (radius > 0.0 and modulus > 0.0):
+        raise DesignError(f"radius = {radius:g} m and modulus = {modulus:g} Pa are out of range; allowed: above 0")
+    return np.asarray(np.cbrt(6.0 * np.asarray(forces, dtype=float) * modulus**2 / (math.pi**3 * radius**2)))
+
+
+def safety_factor(stress: float, strength: float, fatigue_factor: float = 1.0) -> float:
+    """Safety factor SF of eq. 5.6; infinite without stress."""
+    return math.inf if stress == 0.0 else strength / (fatigue_factor * stress)
+
+
+def reliability(stresses: ArrayLike, strength: Strength) -> float:
+    """Reliability over recorded stresses [Pa], eq. 5.8."""
+    return float(np.mean(strength.exceeds(stresses)))
+
+
+def reliability_of_distributions(stress: Any, strength: Any) -> float:
+    """Reliability of two distributions (frozen, of ``scipy.stats``) by numerical integration of eq. 5.8."""
+    low, high = stress.ppf(1e-12), stress.isf(1e-12)
+    middle = stress.ppf(np.linspace(0.05, 0.95, 19))
+    value, _ = integrate.quad(
+        lambda s: stress.pdf(s) * strength.sf(s), low, high, points=middle, limit=400, epsabs=1e-13, epsrel=1e-10
+    )
+    return float(value)
+
+
+def normal_reliability(
+    stress_mean: float, stress_deviation: float, strength_mean: float, strength_deviation: float
+) -> float:
+    """Reliability of normal stress and normal strength, eq. 5.9."""
+    spread = math.hypot(stress_deviation, strength_deviation)
+    if spread == 0.0:
+        return float(strength_mean > stress_mean)
+    return float(stats.norm.cdf((strength_mean - stress_mean) / spread))
+
+
+class Interval(NamedTuple):
+    """Ends of a confidence interval."""
+
+    low: float
+    high: float
+
+
+def time_blocks(values: ArrayLike, blocks: int = BLOCKS) -> list[Array]:
+    """Cut a record into blocks of successive cycles, at least one cycle each."""
+    record = np.asarray(values, dtype=float)
+    return np.array_split(record, min(blocks, len(record)))
+
+
+def mean_interval(blocks: Sequence[ArrayLike], confidence: float = 0.95, seed: int = 0) -> Interval:
+    """Confidence interval of a mean over blocks of values that are independent of one another.
+
+    Parameters
+    ----------
+    blocks
+        Values of each block: successive cycles, or the cycles of one machine of a series.
+    confidence
+        Probability that the interval holds the mean.
+    seed
+        Of the bootstrap; same seed, same interval.
+    """
+    if not 0.0 < confidence < 1.0:
+        raise DesignError(f"confidence = {confidence:g} is out of range; allowed: above 0, below 1")
+    means = np.array([np.mean(np.asarray(block, dtype=float)) for block in blocks])
+    if np.ptp(means) == 0.0:
+        return Interval(float(means[0]), float(means[0]))
+    result = stats.bootstrap(
+        (means,), np.mean, n_resamples=RESAMPLES, confidence_level=confidence, method="percentile",
+        rng=np.random.default_rng(seed),
+    )  # fmt: skip
+    return Interval(float(result.confidence_interval.low), float(result.confidence_interval.high))

@@ -1,0 +1,168 @@
+"""Which peak forces does a machine give once it has settled? One machine, or a series built to its tolerances."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from chaosgym.design.fatigue import LIFE_EXPONENT, equivalent_force
+from chaosgym.design.statistics import convergence
+from chaosgym.diagnosis import Nature, Tolerance, diagnose
+from chaosgym.machines import Machine
+from chaosgym.machines.parameters import with_settings
+from chaosgym.simulation import MotionState, parallel_map, rest_state, simulate
+
+Array = NDArray[np.float64]
+
+SERIES_CYCLES = 200
+"""Cycles recorded of a machine of a series whose response does not repeat."""
+
+DIAGNOSIS_BUDGET = 400
+"""Cycles that the diagnosis of one machine of a series may take."""
+
+NOMINAL_BUDGET = 1600
+"""Cycles that the diagnosis of the nominal machine may take."""
+
+LONGEST_RUN = 12_800
+"""Cycles after which statistics that have not converged are given up."""
+
+
+@dataclass(frozen=True)
+class SettledRun:
+    """Settled response of one machine.
+
+    Attributes
+    ----------
+    machine
+        What was run, from rest.
+    nature
+        By the Two-Step Test.
+    period
+        Cycles after which it repeats; None if it does not.
+    reason
+        One sentence for people.
+    peaks : (cycles, sides)
+        Peak force of each cycle [N]: one period, or a record long enough for statistics.
+    """
+
+    machine: Machine
+    nature: Nature
+    period: int | None
+    reason: str
+    peaks: Array
+
+    def worse_side(self, exponent: float = LIFE_EXPONENT) -> Array:
+        """Peaks (cycles,) of the surface that fatigues faster."""
+        damage = [equivalent_force(column, exponent) for column in self.peaks.T]
+        return np.ascontiguousarray(self.peaks[:, int(np.argmax(damage))])
+
+    @property
+    def largest_peak(self) -> float:
+        """Largest peak force of any surface [N]."""
+        return float(np.max(self.peaks))
+
+
+def settled_run(
+    machine: Machine, *, cycles: int = SERIES_CYCLES, until_converged: bool = False, budget: int = DIAGNOSIS_BUDGET
+) -> SettledRun:
+    """Run a machine from rest until it has settled, and record its peak forces.
+
+    Parameters
+    ----------
+    machine
+        What to run.
+    cycles
+        Cycles to record of a response that does not repeat; of one that does, its period.
+    until_converged
+        Go on, doubling the record, until mean and deviation have converged on the worse surface.
+    budget
+        Cycles that the diagnosis may take.
+
+    Raises
+    ------
+    SimulationError
+        If the run can't be finished.
+    """
+    verdict = diagnose(machine, budget=budget)
+    state = MotionState(np.asarray(verdict.evidence["final_state"]), rest_state(machine).bouncing)
+    repeats = verdict.nature == "periodic" and verdict.period is not None
+    record = simulate(machine, verdict.period if repeats and verdict.period else cycles, state)
+    run = SettledRun(
+        machine, verdict.nature, verdict.period if repeats else None, verdict.reason, record.peak_force.copy()
+    )
+    while until_converged and not repeats and len(record) < LONGEST_RUN:
+        if convergence(run.worse_side()).converged:
+            break
+        record = record.followed_by(simulate(machine, len(record), record.final_state))
+        run = SettledRun(machine, run.nature, run.period, run.reason, record.peak_force.copy())
+    return run
+
+
+@dataclass(frozen=True)
+class Series:
+    """Machines built to the tolerances.
+
+    Attributes
+    ----------
+    parameters
+        Names of the toleranced fields.
+    shares : (machines, parameters)
+        Deviation of each machine from nominal, in tolerances, -1 to 1.
+    runs
+        What each machine does.
+    """
+
+    parameters: tuple[str, ...]
+    shares: Array
+    runs: tuple[SettledRun, ...]
+
+
+def build_series(
+    machine: Machine,
+    tolerances: Mapping[str, Tolerance],
+    size: int,
+    *,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: bool = False,
+) -> Series:
+    """Run machines whose parameters deviate together, spread evenly over the tolerances by a Sobol sequence.
+
+    Parameters
+    ----------
+    machine
+        The nominal machine, which is not part of the series.
+    tolerances
+        By field; none gives an empty series.
+    size
+        Number of machines.
+    seed
+        Of the sequence.
+    workers
+        Number of threads; all processors by default.
+    progress
+        Show a progress bar on standard error.
+
+    Raises
+    ------
+    ParameterError
+        If a tolerance names no field, or leads out of its range.
+    """
+    names = tuple(tolerances)
+    if not names or size == 0:
+        return Series(names, np.empty((0, len(names))), ())
+    sequence = qmc.Sobol(len(names), rng=np.random.default_rng(seed))
+    shares = 2.0 * sequence.random_base2(int(np.ceil(np.log2(size))))[:size] - 1.0
+    machines = [_deviating(machine, tolerances, row) for row in shares]
+    runs = parallel_map(settled_run, machines, workers=workers, progress="machines in tolerance" if progress else None)
+    return Series(names, shares, tuple(runs))
+
+
+def _deviating(machine: Machine, tolerances: Mapping[str, Tolerance], shares: Sequence[float] | Array) -> Machine:
+    settings = {
+        name: tolerance.at(getattr(machine, name), float(share))
+        for (name, tolerance), share in zip(tolerances.items(), shares, strict=True)
+    }
+    return with_settings(machine, settings)

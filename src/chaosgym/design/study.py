@@ -1,0 +1,186 @@
+"""Everything that a design report shows: the assessment, the map around it, life over speed, and what to change."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from chaosgym.design.brief import DesignBrief
+from chaosgym.design.fatigue import equivalent_force_of_history
+from chaosgym.design.improve import Improvement, improve
+from chaosgym.design.methodology import Assessment, assess
+from chaosgym.design.peak_impacts import PeakImpactDiagram, peak_impacts
+from chaosgym.design.runs import DIAGNOSIS_BUDGET
+from chaosgym.design.trends import HISTORY_SAMPLES, LifeTrend, life_against
+from chaosgym.diagnosis import ResponseMap, response_map
+from chaosgym.errors import DesignError, ParameterError
+from chaosgym.machines import Machine
+from chaosgym.simulation import CycleRecord, simulate
+from chaosgym.version import __version__
+
+MAP_SHARES = np.arange(-4, 5) / 2.0
+"""Points of the map along speed and clearance, in tolerances."""
+
+TREND_POINTS = 53
+"""Speeds of the life trend."""
+
+DIAGRAM_CYCLES = 200
+"""Cycles of the Peak Impact Diagram."""
+
+
+@dataclass(frozen=True)
+class DesignStudy:
+    """Answer to a design brief.
+
+    Attributes
+    ----------
+    brief
+        What was asked.
+    assessment
+        Of the machine as it is.
+    improvement
+        Ranked changes; None if the machine meets its criteria as it is.
+    map
+        Types around the nominal speed and clearance; None where these have no tolerance or it leaves their range.
+    life_over_speed
+        Over the machine's usual range; None without contact at its low end.
+    diagram
+        Where the peak impacts act.
+    force_of_every_impact
+        Equivalent force a cycle [N] if every impact counts, by rainflow counting, and not the peak of a cycle alone.
+    seed
+        Of the series and the bootstrap.
+    """
+
+    brief: DesignBrief
+    assessment: Assessment
+    improvement: Improvement | None
+    map: ResponseMap | None
+    life_over_speed: LifeTrend | None
+    diagram: PeakImpactDiagram
+    force_of_every_impact: float
+    seed: int
+
+    def lines(self) -> list[str]:
+        """Return lines for people."""
+        found, best = self.assessment, self.improvement.best if self.improvement is not None else None
+        lines = [
+            f"{found.machine.name}: {found.verdict}",
+            f"  Type {found.type}: {found.response.reason}; {found.evaluation.method.partition(': ')[2]}",
+            *(
+                f"  {check.name:14s} {check.reached:.6g} of {check.required:g} {check.unit}".rstrip()
+                + (" met" if check.met else " NOT met")
+                for check in found.checks
+            ),
+            f"  largest peak   {found.evaluation.largest_force:.1f} N, equivalent {found.evaluation.force:.1f} N",
+            f"  load rating    {found.evaluation.required_load_rating:.0f} N needed for the life",
+            f"  in tolerance   {100 * found.machines_that_meet:.0f} % of {len(found.series.runs)} machines meet life "
+            "and reliability by themselves",
+        ]
+        if best is not None:
+            changes = ", ".join(f"{name} = {value:g}" for name, value in best.changes.items())
+            lines.append(f"  cheapest change that meets all criteria: {changes} (SI), cost {best.cost:.2f}")
+        elif self.improvement is not None:
+            lines.append("  no change that was tried meets all criteria")
+        return lines
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        found = self.improvement
+        return {
+            "chaosgym": __version__,
+            "seed": self.seed,
+            **self.assessment.as_dict(),
+            "improvement": None if found is None else {
+                "best": None if found.best is None else found.best.as_dict(),
+                "suggestions": [trial.as_dict() for trial in found.suggestions],
+            },
+            "map": None if self.map is None else {
+                name: getattr(self.map, name).tolist() for name in ("speed", "clearance", "type", "largest_peak")
+            },
+            "life_over_speed": None if self.life_over_speed is None else {
+                "speed": self.life_over_speed.values.tolist(),
+                "nature": list(self.life_over_speed.nature),
+                "relative_life": _finite(self.life_over_speed.statistical),
+                "lowest": _finite(self.life_over_speed.lowest),
+                "highest": _finite(self.life_over_speed.highest),
+            },
+            "force_of_every_impact_N": self.force_of_every_impact,
+            "peak_impacts": {"spread": self.diagram.spread, "unit": self.diagram.unit},
+        }  # fmt: skip
+
+
+def _finite(values: Any) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]
+
+
+def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, progress: bool = False) -> DesignStudy:
+    """Answer a design brief.
+
+    Parameters
+    ----------
+    brief
+        What is asked.
+    seed
+        Of the series and the bootstrap.
+    workers
+        Number of threads; all processors by default.
+    progress
+        Show progress bars on standard error.
+
+    Raises
+    ------
+    ParameterError
+        If a tolerance leads out of its field's range.
+    SimulationError
+        If a run of the nominal machine or its series can't be finished.
+    """
+    machine = brief.machine
+    assessment = assess(
+        machine, brief.region, brief.criteria, series_size=brief.series_size, seed=seed, workers=workers,
+        progress=progress,
+    )  # fmt: skip
+    improvement = None
+    if assessment.verdict != "meets":
+        improvement = improve(
+            assessment, brief.changes, brief.costs, series_size=brief.series_size, seed=seed, workers=workers,
+            progress=progress,
+        )  # fmt: skip
+    record = simulate(machine, DIAGRAM_CYCLES, transient=DIAGRAM_CYCLES, samples_per_cycle=HISTORY_SAMPLES)
+    side = int(np.argmax(np.sum(record.peak_force**3, axis=0)))
+    return DesignStudy(
+        brief, assessment, improvement, _map(brief, workers, progress), _life_over_speed(machine, workers, progress),
+        peak_impacts(record, side), _every_impact(record, side, brief), seed,
+    )  # fmt: skip
+
+
+def _every_impact(record: CycleRecord, side: int, brief: DesignBrief) -> float:
+    assert record.history is not None
+    force = np.maximum(record.history[:, :, 2].ravel() * (1.0 if side == 0 else -1.0), 0.0)
+    return equivalent_force_of_history(force, len(record), brief.criteria.life_exponent)
+
+
+def _map(brief: DesignBrief, workers: int | None, progress: bool) -> ResponseMap | None:
+    machine, region = brief.machine, brief.region
+    if machine.speed_field not in region or machine.clearance_field not in region:
+        return None
+    speeds, clearances = (
+        [region[name].at(getattr(machine, name), share) for share in MAP_SHARES]
+        for name in (machine.speed_field, machine.clearance_field)
+    )
+    try:
+        return response_map(
+            machine, speeds, clearances, region, budget=DIAGNOSIS_BUDGET, workers=workers, progress=progress
+        )
+    except ParameterError:
+        return None
+
+
+def _life_over_speed(machine: Machine, workers: int | None, progress: bool) -> LifeTrend | None:
+    low, high = machine.usual_ranges[machine.speed_field]
+    nominal = getattr(machine, machine.speed_field)
+    speeds = np.union1d(np.linspace(min(low, nominal), max(high, nominal), TREND_POINTS), [nominal])
+    try:
+        return life_against(machine, machine.speed_field, speeds, workers=workers, progress=progress)
+    except DesignError:
+        return None

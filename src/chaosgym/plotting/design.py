@@ -1,0 +1,209 @@
+"""Figures of a design study: what the force does, what it means for the bearing, and what drives it."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+from numpy.typing import NDArray
+from scipy import stats
+
+from chaosgym.design.fatigue import equivalent_force, statistical_life
+from chaosgym.design.methodology import Assessment
+from chaosgym.design.peak_impacts import PeakImpactDiagram
+from chaosgym.design.reliability import hertz_pressure
+from chaosgym.design.statistics import histogram, running_statistics
+from chaosgym.design.trends import LifeTrend
+from chaosgym.diagnosis import ResponseMap
+from chaosgym.machines import Machine
+from chaosgym.machines.parameters import parameters_of
+from chaosgym.plotting.overview import TYPE_COLOURS
+
+INK, ACCENT, BAD, MUTED = "#22303c", "#1f6f8b", "#b3392f", "#8a97a3"
+NATURE_COLOURS = {"periodic": ACCENT, "quasiperiodic": "#8e5ea2", "chaotic": "#d1495b", "undetermined": MUTED}
+
+STYLE: Any = {
+    "font.size": 9.5, "axes.edgecolor": MUTED, "axes.labelcolor": INK, "axes.titlesize": 10.5,
+    "axes.titlelocation": "left", "axes.titleweight": "bold", "axes.spines.top": False, "axes.spines.right": False,
+    "axes.grid": True, "grid.color": "#e6eaee", "grid.linewidth": 0.7, "axes.axisbelow": True, "text.color": INK,
+    "xtick.color": INK, "ytick.color": INK, "legend.frameon": False, "legend.fontsize": 8.5,
+    "svg.hashsalt": "chaosgym", "svg.fonttype": "path",
+}  # fmt: skip
+"""Settings for ``matplotlib.rc_context`` around these figures."""
+
+Array = NDArray[np.float64]
+
+
+def axis_label(machine: Machine, name: str) -> tuple[str, float]:
+    """Label of a field with its unit, millimetres for metres, and the factor that goes with it."""
+    unit = parameters_of(machine)[name].unit
+    shown, factor = ("mm", 1e3) if unit == "m" else (unit, 1.0)
+    return name.replace("_", " ") + ("" if shown == "-" else f" [{shown}]"), factor
+
+
+def peak_record(peaks: Array, exponent: float, left: Axes, right: Axes) -> None:
+    """Peak force of every cycle [N], and beside it how often each force occurs, on one scale."""
+    shown = np.resize(peaks, max(len(peaks), 60)) if len(peaks) <= 32 else peaks[:400]
+    left.plot(np.arange(1, len(shown) + 1), shown, ".", ms=4, color=ACCENT)
+    force = equivalent_force(peaks, exponent)
+    for axes in (left, right):
+        axes.axhline(force, color=INK, lw=1.2)
+        axes.axhline(np.max(peaks), color=BAD, lw=1.2, ls="--")
+    found = histogram(peaks)
+    share = found.count / np.sum(found.count)
+    heights = np.diff(found.edges)
+    right.barh(found.edges[:-1], share, heights, align="edge", color=ACCENT, alpha=0.75, lw=0)
+    top = 1.15 * float(np.max(peaks)) or 1.0
+    left.set(xlabel="cycle", ylabel="peak force [N]", ylim=(0.0, top), title="Peak force of every cycle")
+    right.set(xlabel="share of cycles", ylim=(0.0, top), title=f"{len(found.modes)} mode{'s' * (len(found.modes) > 1)}")
+    right.tick_params(labelleft=False)
+    handles = [
+        Line2D([], [], color=INK, lw=1.2, label=f"equivalent {force:.1f} N"),
+        Line2D([], [], color=BAD, lw=1.2, ls="--", label=f"largest {np.max(peaks):.1f} N"),
+    ]
+    left.legend(handles=handles, loc="lower left", ncols=2)
+
+
+def running_convergence(peaks: Array, cycles: int, mean: Axes, deviation: Axes) -> None:
+    """Mean and standard deviation [N] of the first n cycles (thesis figure 5.14)."""
+    running = running_statistics(peaks)
+    for axes, values, name in ((mean, running.mean, "mean"), (deviation, running.deviation, "standard deviation")):
+        axes.plot(running.cycles, values, color=ACCENT, lw=1.3)
+        axes.axvline(cycles, color=BAD, lw=1.0, ls="--")
+        axes.set(ylabel=f"{name} [N]", xlim=(0, len(peaks)))
+    low, high = np.min(running.mean[3:], initial=running.mean[-1]), np.max(running.mean[3:], initial=running.mean[-1])
+    mean.set_ylim(low - 0.5 * (high - low) - 0.01, high + 0.5 * (high - low) + 0.01)
+    mean.set_title("Running statistics")
+    deviation.set_xlabel("cycles")
+
+
+def type_map_around(result: ResponseMap, region: Any, ax: Axes) -> Axes:
+    """Response types around the nominal point; the box is the tolerance region."""
+    machine = result.machine
+    kinds = list(TYPE_COLOURS)
+    index = np.array([[kinds.index(str(kind)) for kind in row] for row in result.type])
+    names = (machine.speed_field, machine.clearance_field)
+    (across, wide), (up, high) = (axis_label(machine, name) for name in names)
+    ax.pcolormesh(
+        wide * result.speed, high * result.clearance, index.T, cmap=ListedColormap(list(TYPE_COLOURS.values())),
+        vmin=-0.5, vmax=len(kinds) - 0.5, shading="nearest", alpha=0.85, rasterized=False, edgecolors="white", lw=0.5,
+    )  # fmt: skip
+    corners = [
+        [factor * region[name].at(getattr(machine, name), share) for share in (-1.0, 1.0)]
+        for name, factor in zip(names, (wide, high), strict=True)
+    ]
+    (left, right), (bottom, top) = corners
+    ax.add_patch(Rectangle((left, bottom), right - left, top - bottom, fill=False, ec=INK, lw=1.6))
+    ax.plot(wide * getattr(machine, names[0]), high * getattr(machine, names[1]), "o", mfc="white", mec=INK, ms=6)
+    present = [kind for kind in kinds if kind in set(result.type.ravel())]
+    handles = [Patch(color=TYPE_COLOURS[kind], label=f"Type {kind}" if len(kind) < 4 else kind) for kind in present]
+    ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=len(present))
+    ax.set(xlabel=across, ylabel=up, title="Response types around the design")
+    ax.grid(False)
+    return ax
+
+
+def life_over_speed(trend: LifeTrend, machine: Machine, ax: Axes) -> Axes:
+    """Life relative to the lowest speed (thesis figure 5.12): statistical mean, and what single peaks would suggest."""
+    label, factor = axis_label(machine, trend.field)
+    nature = np.array(trend.nature)
+    for kind, colour in NATURE_COLOURS.items():
+        rows = nature == kind
+        if rows.any():
+            at = factor * trend.values[rows]
+            ax.vlines(at, trend.lowest[rows], trend.highest[rows], color=colour, lw=2.2, alpha=0.75)
+            ax.plot(at, trend.statistical[rows], "o", ms=3.5, color=colour, label=kind)
+    ax.plot(factor * trend.values, trend.statistical, color=INK, lw=0.9)
+    ax.axvline(factor * getattr(machine, trend.field), color=MUTED, lw=1.0, ls=":")
+    ax.set(yscale="log", xlabel=label, ylabel="relative life (cubic law)", title="What speed costs")
+    ax.legend(loc="lower left", ncols=2)
+    return ax
+
+
+def stress_against_strength(assessment: Assessment, ax: Axes) -> Axes:
+    """Contact stress [GPa] of the nominal machine and of those in tolerance, beside the strength."""
+    criteria = assessment.criteria
+    grid = np.linspace(-4.0, 4.0, 161) * criteria.strength_deviation + criteria.strength
+
+    def stress(peaks: Array) -> Array:
+        pressure = hertz_pressure(peaks, criteria.contact_radius, criteria.contact_modulus)
+        return np.asarray(1e-9 * criteria.fatigue_factor * pressure)
+
+    nominal = stress(assessment.nominal.worse_side(criteria.life_exponent))
+    runs = [np.resize(run.worse_side(criteria.life_exponent), 200) for run in assessment.series.runs]
+    pooled = stress(np.concatenate(runs)) if runs else nominal
+    low, high = float(min(pooled.min(), nominal.min())), float(max(pooled.max(), nominal.max()))
+    edges = np.linspace(low - 1e-3, high + 1e-3, 45).tolist()
+    ax.hist(pooled, edges, density=True, color=ACCENT, alpha=0.55, lw=0, label="stress, machines in tolerance")
+    if len(nominal) > 32:
+        ax.hist(nominal, edges, density=True, histtype="step", color=INK, lw=1.1, label="stress, nominal machine")
+    else:
+        for k, value in enumerate(np.unique(nominal)):
+            ax.axvline(value, color=INK, lw=1.1, label=None if k else "stress, nominal machine")
+    if criteria.strength_deviation > 0.0:
+        density = 1e9 * stats.norm.pdf(grid, criteria.strength, criteria.strength_deviation)
+        ax.fill_between(1e-9 * grid, density, color=BAD, alpha=0.35, lw=0, label="strength")
+    else:
+        ax.axvline(1e-9 * criteria.strength, color=BAD, lw=1.6, label="strength")
+    ax.set(xlabel="contact stress [GPa]", ylabel="density [1/GPa]", title="Stress against strength")
+    ax.set_ylim(0.0, 1.3 * ax.get_ylim()[1])
+    ax.legend(loc="upper left")
+    return ax
+
+
+def sensitivities(assessment: Assessment, ax: Axes) -> Axes:
+    """Change of the equivalent force [%] for one tolerance of each parameter."""
+    trend = assessment.trend
+    order = np.argsort(np.abs(trend.slopes))
+    values = 100.0 * np.expm1(trend.slopes[order])
+    ax.barh(np.arange(len(order)), values, color=np.where(values > 0.0, BAD, ACCENT), alpha=0.8, height=0.62)
+    ax.set_yticks(np.arange(len(order)), [trend.parameters[k].replace("_", " ") for k in order])
+    ax.axvline(0.0, color=INK, lw=0.8)
+    ax.set(xlabel="force for one tolerance upward [%]", title="What drives the force")
+    ax.grid(axis="y", visible=False)
+    return ax
+
+
+def series_life(assessment: Assessment, ax: Axes) -> Axes:
+    """Life of every machine in tolerance by its own statistics [10^6 cycles], ascending, with the requirement."""
+    criteria = assessment.criteria
+    exponent = criteria.life_exponent
+    runs = assessment.series.runs or (assessment.nominal,)
+    lives = np.array([statistical_life(run.worse_side(exponent), criteria.load_rating, exponent) for run in runs])
+    order = np.argsort(lives)
+    colours = [NATURE_COLOURS[runs[k].nature] for k in order]
+    ax.scatter(np.arange(1, len(runs) + 1), lives[order], c=colours, s=22, lw=0)
+    ax.axhline(criteria.life, color=BAD, lw=1.3, ls="--")
+    own = assessment.nominal_evaluation.life
+    ax.axhline(own, color=MUTED, lw=1.0, ls=":")
+    handles = [
+        Line2D([], [], color=BAD, lw=1.3, ls="--", label=f"required {criteria.life:,.0f}"),
+        Line2D([], [], color=MUTED, lw=1.0, ls=":", label="nominal machine"),
+        *(Line2D([], [], ls="", marker="o", ms=5, color=NATURE_COLOURS[kind], label=kind)
+          for kind in NATURE_COLOURS if any(run.nature == kind for run in runs)),
+    ]  # fmt: skip
+    ax.legend(handles=handles, loc="upper left", ncols=2)
+    finite = lives[np.isfinite(lives)]
+    if len(finite):
+        ax.set_ylim(0.6 * min(finite.min(), criteria.life), 2.5 * max(finite.max(), criteria.life))
+    ax.set(yscale="log", xlabel="machine, by life", ylabel="life [10$^6$ cycles]", title="Life of each machine built")
+    return ax
+
+
+def impact_diagram(diagram: PeakImpactDiagram, ax: Axes) -> Axes:
+    """Peak Impact Diagram: force [N] against place on the bearing (thesis figures 5.10 and 5.11)."""
+    along = diagram.unit == "m"
+    ax.scatter((1e3 if along else 1.0) * diagram.location, diagram.force, s=14, color=ACCENT, alpha=0.7, lw=0)
+    label = "place on the bearing [mm]" if along else "instant in the cycle, relative to the mean [deg]"
+    ax.set(xlabel=label, ylabel="peak force [N]", title="Peak Impact Diagram", ylim=(0.0, None))
+    if not along and diagram.spread < 10.0:
+        ax.set_xlim(-10.0, 10.0)
+    return ax
+
+
+def figure_of(width: float = 6.2, height: float = 3.7) -> Figure:
+    """Empty figure of a report."""
+    return Figure(figsize=(width, height), layout="constrained")

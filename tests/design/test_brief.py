@@ -1,0 +1,137 @@
+"""Design briefs: what is written is what is assessed, and every mistake is named with its cure."""
+
+import tomllib
+
+import pytest
+
+from chaosgym.design import Criteria
+from chaosgym.design.brief import brief_from, read_brief, template
+from chaosgym.design.measured import evaluate_peaks, read_peaks
+from chaosgym.design.units import parse_quantity
+from chaosgym.diagnosis import Tolerance, default_tolerances
+from chaosgym.errors import DesignError, ParameterError
+from chaosgym.machines import MACHINES, ImpactBeam
+
+CRITERIA = '[criteria]\nload_rating = "500 N"\nlife = "10 Mcycles"\nreliability = 0.99\n'
+
+
+def brief(text):
+    """Brief of an impact beam with the usual criteria and some more lines."""
+    return brief_from(tomllib.loads('machine = "impact-beam"\n' + text + "\n" + CRITERIA))
+
+
+@pytest.mark.parametrize("name", sorted(MACHINES))
+def test_template_of_every_machine_describes_the_machine_of_the_thesis(name, tmp_path):
+    """As printed, it asks for the default machine, its usual tolerances and the default criteria."""
+    path = tmp_path / "brief.toml"
+    path.write_text(template(name))
+    found = read_brief(path)
+    assert found.machine == MACHINES[name]()
+    assert found.region.keys() == default_tolerances(found.machine).keys()
+    for field, tolerance in default_tolerances(found.machine).items():
+        assert found.region[field].value == pytest.approx(tolerance.value)
+    assert found.criteria.contact_modulus == Criteria().contact_modulus
+    assert found.costs == {found.machine.speed_field: 2.0}
+
+
+def test_units_do_not_matter():
+    """0.127 mm and 30 Hz are 0.005 in and 1800 rpm; half a kilonewton is 500 N."""
+    metric = brief('[parameters]\nclearance = "0.127 mm"\nexcitation_frequency = "30 Hz"')
+    other = brief_from(tomllib.loads(
+        'machine = "impact-beam"\n[parameters]\nclearance = "0.005 in"\nexcitation_frequency = "1800 rpm"\n'
+        '[criteria]\nload_rating = "0.5 kN"\nlife = "10000000 cycles"\nreliability = "99 %"'
+    ))  # fmt: skip
+    assert other.machine.clearance == pytest.approx(metric.machine.clearance, rel=1e-12)
+    assert other.machine.excitation_frequency == pytest.approx(metric.machine.excitation_frequency, rel=1e-12)
+    for field in ("load_rating", "life", "reliability"):
+        assert getattr(other.criteria, field) == pytest.approx(getattr(metric.criteria, field), rel=1e-12)
+
+
+def test_tolerances_are_shares_or_amounts():
+    """A percentage is relative to nominal, anything else is an amount; two tolerances double it."""
+    found = brief('[tolerances]\nclearance = "5 %"\nexcitation_frequency = "0.5 Hz"\n[region]\ntolerances = 2')
+    assert found.region["clearance"].value == pytest.approx(1.05**2 - 1.0)
+    assert found.region["excitation_frequency"] == Tolerance(1.0, relative=False)
+
+
+def test_quantities_are_read_with_and_without_a_space():
+    """2 %, 2% and 0.02 are one value; a compound unit is written as the field states it."""
+    assert {parse_quantity("x", given, "-") for given in ("2 %", "2%", 0.02)} == {0.02}
+    assert parse_quantity("x", "22.5 N s/m", "N s/m") == 22.5
+    assert parse_quantity("x", "1e-3 m", "m") == 1e-3
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[parameters]\nclearence = '1 mm'", "'clearence'; did you mean clearance?"),
+        ("[parametres]", "'parametres'; did you mean parameters?"),
+        ("[parameters]\nclearance = 0.1", "has no unit; write parameters.clearance"),
+        ("[parameters]\nclearance = '0.1'", "has no unit"),
+        ("[parameters]\nclearance = '0.1 mn'", "unknown unit 'mn' (allowed: m, mm, um, in)"),
+        ("[parameters]\nclearance = 'wide'", "does not begin with a number"),
+        ("[parameters]\nclearance = '-1 mm'", "clearance = -0.001 m is out of range"),
+        ("[parameters]\nclearance = [1, 2]", "is not a quantity"),
+        ("[tolerances]\nclearance = '-5 %'", "allowed: above 0"),
+        ("[region]\ntolerances = 3", "region = 3"),
+        ("[region]\nwear = 'yes'", "allowed: true or false"),
+        ("[changes]\nclearance = ['2 m']", "clearance = 2 m is out of range"),
+        ("[costs]\nlength = 1", "'length'"),
+        ("[costs]\nclearance = -1", "costs.clearance = -1"),
+        ("series = 2", "series = 2"),
+        ("tolerances = 2", "is not a table"),
+    ],
+)
+def test_mistakes_are_named_with_their_cure(text, message):
+    """Unknown keys with a suggestion, missing units with the line to write, values with their range."""
+    with pytest.raises((DesignError, ParameterError)) as error:
+        brief(text)
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("machine = 'impact-bean'", "did you mean impact-beam?"),
+        ("machine = 'impact-beam'", "[criteria] lacks load_rating"),
+        ("machine = 'impact-beam'\n" + CRITERIA.replace("500 N", "-500 N"), "load_rating = -500 N is out of range"),
+        ("machine = 'impact-beam'\n" + CRITERIA.replace("0.99", "1.5"), "reliability = 1.5 is out of range"),
+        ("machine = ", "is not valid TOML"),
+    ],
+)
+def test_unusable_files_are_refused(text, message, tmp_path):
+    """One line that says what is wrong."""
+    path = tmp_path / "brief.toml"
+    path.write_text(text)
+    with pytest.raises((DesignError, ParameterError)) as error:
+        read_brief(path)
+    assert message in str(error.value)
+
+
+def test_measured_peaks_give_what_simulated_ones_would(tmp_path):
+    """A file with header and further columns is read by its first column, and evaluated like any record."""
+    path = tmp_path / "peaks.csv"
+    path.write_text("peak force,cycle\n" + "".join(f"{40 + k % 3},{k}\n" for k in range(90)))
+    peaks = read_peaks(path)
+    assert len(peaks) == 90
+    found = evaluate_peaks(peaks, Criteria(load_rating=500.0))
+    assert found.histogram.modes == pytest.approx([40.0, 41.0, 42.0], rel=1e-5)
+    assert 40.0 < found.evaluation.force < 42.0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("40\nforty\n", "line 2: 'forty'"), ("force\n", "holds no peak forces"), ("40\n-3\n" * 20, "-3 N in cycle 2")],
+)
+def test_damaged_measurements_are_refused(text, message, tmp_path):
+    """The line or the cycle is named."""
+    path = tmp_path / "peaks.csv"
+    path.write_text(text)
+    with pytest.raises(DesignError, match=message):
+        evaluate_peaks(read_peaks(path), Criteria())
+
+
+def test_default_machine_of_a_brief_is_the_one_of_the_thesis():
+    """Fields left out keep the value of the thesis."""
+    assert brief("").machine == ImpactBeam()

@@ -1,0 +1,107 @@
+"""Peak Impact Diagrams: where impacts act, when the diagram has taken shape, and what spreading them is worth."""
+
+import numpy as np
+import pytest
+
+from chaosgym.design.peak_impacts import PeakImpactDiagram, coverage, filling_cycles, peak_impacts, spot_life
+from chaosgym.design.statistics import convergence
+from chaosgym.design.trends import clearance_trade_off, life_against
+from chaosgym.errors import DesignError, SimulationError
+from chaosgym.machines import MACHINES, ImpactBeam
+from chaosgym.machines.parameters import with_settings
+from chaosgym.simulation import simulate
+
+
+def test_a_periodic_response_gives_one_point():
+    """All impacts in one place, with the record's own peak forces."""
+    record = simulate(ImpactBeam(excitation_frequency=10.0), 30, transient=100, samples_per_cycle=1000)
+    diagram = peak_impacts(record)
+    assert diagram.spread < 1.0
+    assert diagram.unit == "deg"
+    assert np.array_equal(diagram.force, record.peak_force[:, 0])
+    assert filling_cycles(diagram) == 2
+
+
+def test_a_chaotic_response_spreads():
+    """At 30 Hz the instants of the peaks spread over tens of degrees."""
+    record = simulate(ImpactBeam(), 100, transient=100, samples_per_cycle=1000)
+    assert peak_impacts(record).spread > 20.0
+
+
+def test_place_follows_from_the_phase():
+    """A bearing on which the contact travels as cos(phase) has its impacts within that stroke."""
+    record = simulate(ImpactBeam(), 60, transient=100, samples_per_cycle=1000)
+    diagram = peak_impacts(record, position=lambda phase: 0.05 * np.cos(phase))
+    assert diagram.unit == "m"
+    assert np.all(np.abs(diagram.location) <= 0.05)
+    with pytest.raises(SimulationError, match="samples_per_cycle"):
+        peak_impacts(simulate(ImpactBeam(), 5))
+
+
+def test_coverage_of_equal_sections_is_that_of_good_and_turing():
+    """Two sections hit in turn: no impact is new from the fourth on, and the estimate says so."""
+    diagram = PeakImpactDiagram(np.tile([0.0, 1.0], 5), np.full(10, 50.0), "m")
+    assert coverage(diagram)[:4] == pytest.approx([0.0, 0.0, 1.0 - 1.0 / 3.0, 1.0])
+    assert filling_cycles(diagram) == 4
+    scattered = PeakImpactDiagram(np.arange(5.0), np.arange(5.0), "m")
+    assert filling_cycles(scattered) is None
+
+
+def test_coverage_foresees_the_share_of_impacts_in_known_sections():
+    """Over 20 random diagrams the mean estimate after 60 impacts is the share of later ones in visited sections."""
+    estimates, shares = [], []
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        location, force = random.normal(size=4000), random.normal(50.0, 5.0, 4000)
+        estimates.append(coverage(PeakImpactDiagram(location, force, "m"))[59])
+        section = [np.minimum((v - v.min()) / np.ptp(v) * 5, 4).astype(int) for v in (location, force)]
+        cell = section[0] * 5 + section[1]
+        shares.append(np.isin(cell[60:], cell[:60]).mean())
+    assert np.mean(estimates) == pytest.approx(np.mean(shares), abs=0.03)
+
+
+def test_slider_crank_fills_its_diagram_in_about_eighty_cycles():
+    """Figures 5.13 and 5.14, 190 rpm and +-0.254 mm: both tests of the thesis ask for about 80 cycles."""
+    crank = with_settings(MACHINES["slider-crank"](), {"crank_speed": 190.0, "slider_clearance": 0.254e-3})
+    record = simulate(crank, 300, transient=60, samples_per_cycle=360)
+    diagram = peak_impacts(record)
+    assert diagram.unit == "m"
+    assert 0.0 < diagram.spread < 0.101
+    filled = filling_cycles(diagram)
+    assert filled is not None
+    assert 40 <= filled <= 160
+    assert 20 <= convergence(diagram.force).cycles <= 160
+
+
+def test_impacts_in_one_place_have_the_life_of_the_joint():
+    """Without spread, and with a stretch as wide as the spread, the worst spot takes all the damage (eq. 5.4)."""
+    assert spot_life(np.zeros(4), [50.0] * 4, 100.0, 1e-3, 3.0) == pytest.approx(8.0)
+    assert spot_life([0.0, 1.0, 2.0, 3.0], [50.0] * 4, 100.0, 3.0, 3.0) == pytest.approx(8.0)
+
+
+def test_spreading_impacts_over_two_places_doubles_the_life():
+    """Half the impacts in each of two distant places: each place sees half the damage."""
+    place = np.tile([0.0, 1.0], 10)
+    assert spot_life(place, [50.0] * 20, 100.0, 0.1, 3.0) == pytest.approx(16.0)
+    with pytest.raises(DesignError, match="width"):
+        spot_life(place, [50.0] * 20, 100.0, 0.0)
+
+
+def test_less_clearance_trades_force_against_spread():
+    """5.4.1 on the beam: at 30 Hz a larger clearance gives larger peaks, a wider spread and a shorter life."""
+    small, large = clearance_trade_off(ImpactBeam(), [0.03e-3, 0.127e-3], 500.0, 5.0, cycles=100)
+    assert small.largest_peak < large.largest_peak
+    assert small.spread < large.spread
+    assert large.life < small.life
+    assert large.spot_life >= large.life
+    assert large.spot_life / large.life > small.spot_life / small.life
+
+
+def test_life_against_speed_is_one_at_its_reference_and_scattered_in_chaos():
+    """Figure 5.12: periodic speeds have one life, chaotic ones a range around the statistical mean."""
+    trend = life_against(ImpactBeam(), "excitation_frequency", [6.0, 12.0, 30.0])
+    assert trend.statistical[0] == pytest.approx(1.0)
+    assert trend.nature == ("periodic", "periodic", "chaotic")
+    assert trend.highest[1] == pytest.approx(trend.lowest[1], rel=1e-3)
+    assert trend.highest[2] > 2.0 * trend.lowest[2]
+    assert trend.lowest[2] < trend.statistical[2] < trend.highest[2]

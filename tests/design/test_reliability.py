@@ -1,0 +1,87 @@
+"""Reliability: the integral against the closed form, Hertz against his own mean pressure, intervals in practice."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from chaosgym.design.reliability import (
+    Strength,
+    effective_modulus,
+    hertz_pressure,
+    mean_interval,
+    normal_reliability,
+    reliability,
+    reliability_of_distributions,
+    safety_factor,
+    time_blocks,
+)
+
+
+@pytest.mark.parametrize("distance", [-1.0, 0.0, 1.5, 4.0])
+def test_integral_of_normal_distributions_is_the_closed_form(distance):
+    """Eq. 5.8 integrated for two normal distributions gives eq. 5.9."""
+    stress, strength = stats.norm(10.0, 0.7), stats.norm(10.0 + distance, 1.3)
+    closed = normal_reliability(10.0, 0.7, 10.0 + distance, 1.3)
+    assert reliability_of_distributions(stress, strength) == pytest.approx(closed, abs=1e-10)
+    assert closed == pytest.approx(stats.norm.cdf(distance / math.hypot(0.7, 1.3)), abs=1e-15)
+
+
+def test_recorded_stresses_converge_to_the_integral():
+    """Quantiles of a normal stress, 20,000 of them, give the reliability of eq. 5.9 in four digits."""
+    stresses = stats.norm(1.3e9, 0.05e9).ppf((np.arange(20_000) + 0.5) / 20_000)
+    found = reliability(stresses, Strength(1.6e9, 0.1e9))
+    assert found == pytest.approx(normal_reliability(1.3e9, 0.05e9, 1.6e9, 0.1e9), abs=1e-4)
+
+
+def test_two_peaks_are_seen_by_the_integral_and_lost_by_the_normal_fit():
+    """A tenth of the impacts at a stress that kills half the surfaces: R = 0.95; a normal fit says 0.97."""
+    stresses = np.array([1.0] * 9 + [2.0])
+    strength = Strength(2.0, 0.05)
+    assert reliability(stresses, strength) == pytest.approx(0.95)
+    assert normal_reliability(stresses.mean(), stresses.std(), *strength) > 0.99
+
+
+def test_strength_without_scatter_is_the_classical_criterion():
+    """With a single strength the reliability is the share of stresses below it."""
+    assert reliability([1.0, 2.0, 3.0, 4.0], Strength(2.5, 0.0)) == 0.5
+    assert safety_factor(2.0, 5.0, 1.25) == 2.0
+    assert normal_reliability(1.0, 0.0, 2.0, 0.0) == 1.0
+
+
+def test_hertz_pressure_of_a_sphere_on_a_flat():
+    """Mean pressure F / (pi a^2) with a^3 = 3 F R / (4 E*) is two thirds of the largest one (Johnson 4.2)."""
+    force, radius, modulus = 60.0, 8e-3, effective_modulus(210e9, 0.3, 210e9, 0.3)
+    contact = (3.0 * force * radius / (4.0 * modulus)) ** (1.0 / 3.0)
+    assert hertz_pressure(force, radius, modulus) == pytest.approx(1.5 * force / (math.pi * contact**2), rel=1e-12)
+    assert modulus == pytest.approx(115.4e9, rel=1e-3)
+
+
+def test_pressure_does_not_depend_on_units():
+    """Newton and millimetre give megapascal: the same pressure."""
+    assert hertz_pressure(60.0, 8.0, 115e3) == pytest.approx(1e-6 * hertz_pressure(60.0, 8e-3, 115e9), rel=1e-12)
+
+
+def test_interval_holds_the_mean_as_often_as_it_says():
+    """Of 200 records of 400 independent values, 95 % intervals hold the true mean in about 190."""
+    random = np.random.default_rng(5)
+    intervals = [mean_interval(time_blocks(random.normal(3.0, 1.0, 400))) for _ in range(200)]
+    hits = sum(low <= 3.0 <= high for low, high in intervals)
+    assert 178 <= hits <= 199
+
+
+def test_interval_widens_for_correlated_cycles():
+    """Values that come in runs of ten say less than independent ones: the interval is about three times as wide."""
+    random = np.random.default_rng(6)
+    independent = random.normal(size=2000)
+    in_runs = np.repeat(random.normal(size=200), 10)
+    widths = [high - low for low, high in (mean_interval(time_blocks(x)) for x in (independent, in_runs))]
+    assert 2.0 < widths[1] / widths[0] < 5.0
+
+
+def test_interval_is_reproducible_and_degenerate_for_a_constant():
+    """Same seed, same interval; a constant has no uncertainty."""
+    values = np.random.default_rng(7).normal(size=100)
+    assert mean_interval(time_blocks(values)) == mean_interval(time_blocks(values))
+    assert mean_interval([np.array([2.0])]) == (2.0, 2.0)

@@ -1,0 +1,193 @@
+"""The report: complete in one file, at home in a real browser, and never written over anything unasked."""
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+
+from chaosgym.design import Criteria
+from chaosgym.design.brief import brief_from, template
+from chaosgym.design.measured import evaluate_peaks
+from chaosgym.design.study import study
+from chaosgym.errors import DesignError
+from chaosgym.plotting.design_report import design_report, measured_report, write_report
+from tests.design.browser import CHROMIUM, Browser
+
+needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
+
+CALM = """
+machine = "impact-beam"
+series = 8
+[parameters]
+excitation_frequency = "8 Hz"
+[tolerances]
+excitation_frequency = "2 %"
+clearance = "5 %"
+[criteria]
+load_rating = "300 N"
+life = "2000 Mcycles"
+reliability = 0.999
+[changes]
+clearance = ["0.0635 mm"]
+"""
+
+
+@pytest.fixture(scope="module")
+def answered():
+    """A study of the calm beam, which misses its life until its clearance is reduced."""
+    return study(brief_from(tomllib.loads(CALM)))
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    """One browser for all pages."""
+    with Browser(tmp_path_factory.mktemp("profile")) as opened:
+        yield opened
+
+
+def run(*arguments):
+    """Run the command in a process of its own: (exit code, standard output, standard error)."""
+    command = [sys.executable, "-m", "chaosgym", "design", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+def check_page(browser, path, pictures):
+    """Nothing is requested but the file itself, nothing complains, and every figure is there and fits."""
+    for width in (1200, 420):
+        seen = browser.visit(path, width=width)
+        assert [url for url in seen.requests if not url.startswith("data:image/svg+xml;base64,")] == [path.as_uri()]
+        assert seen.complaints == []
+        assert len(seen.pictures) == pictures
+        assert all(across > 100 and down > 100 for across, down in seen.pictures)
+        assert seen.width[0] <= seen.width[1], "the page is wider than the window"
+
+
+@needs_browser
+def test_report_opens_in_a_browser(answered, browser, tmp_path):
+    """A page of a study: no external request, no error, all seven figures."""
+    path = tmp_path / "report.html"
+    write_report(design_report(answered), answered.as_dict(), path)
+    check_page(browser, path, 7)
+
+
+@needs_browser
+def test_browser_test_can_fail(browser, tmp_path):
+    """A page with a foreign picture, a script error and a missing figure is caught by the same questions."""
+    path = tmp_path / "bad.html"
+    path.write_text('<img src="http://example.org/x.png"><script>absent()</script>')
+    seen = browser.visit(path)
+    assert "http://example.org/x.png" in seen.requests
+    assert any("Uncaught" in complaint for complaint in seen.complaints)
+    assert seen.pictures == [[0, 0]]
+
+
+@needs_browser
+def test_report_on_measured_peaks_opens_in_a_browser(browser, tmp_path):
+    """Two figures: the record with its histogram, and the running statistics."""
+    found = evaluate_peaks(np.random.default_rng(0).normal(50.0, 5.0, 300), Criteria())
+    path = tmp_path / "measured.html"
+    write_report(measured_report(found), found.as_dict(), path)
+    check_page(browser, path, 2)
+
+
+@pytest.mark.slow
+@needs_browser
+def test_report_on_the_chaotic_beam_opens_in_a_browser(browser, tmp_path):
+    """The template as it is printed: Type III, with the running statistics as an eighth figure."""
+    found = study(brief_from(tomllib.loads(template("impact-beam"))))
+    assert found.assessment.type == "III"
+    path = tmp_path / "report.html"
+    write_report(design_report(found), found.as_dict(), path)
+    check_page(browser, path, 8)
+
+
+def test_report_says_what_the_numbers_say(answered):
+    """Headline, best change and life on the page are those of the study; the same study gives the same bytes."""
+    page = design_report(answered)
+    assert answered.assessment.verdict == "fails"
+    assert "Does not meet its criteria" in page
+    assert answered.improvement.best is not None
+    best = 1e3 * answered.improvement.best.changes["clearance"]
+    assert f"clearance 0.127 mm &rarr; {best:.6g} mm" in page
+    assert f"{answered.assessment.evaluation.life:,.0f}" in page
+    assert page == design_report(answered)
+    assert not re.search(r"<script|https?://", page)
+
+
+def test_numbers_lie_beside_the_report(answered, tmp_path):
+    """The JSON file holds what the page shows."""
+    page, numbers = write_report(design_report(answered), answered.as_dict(), tmp_path / "report.html")
+    values = json.loads(numbers.read_text())
+    assert page.read_text().startswith("<!DOCTYPE html>")
+    assert values["verdict"] == "fails"
+    assert values["response"]["type"] == "I"
+    assert values["improvement"]["best"]["verdict"] == "meets"
+    assert len(values["series"]["largest_peak_N"]) == 8
+    assert values["force_of_every_impact_N"] > 0.0
+    assert len(values["map"]["type"]) == len(values["map"]["speed"])
+
+
+def test_nothing_is_overwritten_unasked(answered, tmp_path):
+    """An existing page, or numbers beside it, stay as they are."""
+    (tmp_path / "report.json").write_text("mine")
+    with pytest.raises(DesignError, match=r"report\.json exists"):
+        write_report("<p>", {}, tmp_path / "report.html")
+    assert [path.name for path in tmp_path.iterdir()] == ["report.json"]
+    assert (tmp_path / "report.json").read_text() == "mine"
+    write_report("<p>", {"a": 1}, tmp_path / "report.html", overwrite=True)
+    assert json.loads((tmp_path / "report.json").read_text()) == {"a": 1}
+    with pytest.raises(DesignError, match="is no folder"):
+        write_report("<p>", {}, tmp_path / "absent" / "report.html")
+
+
+def test_command_answers_a_brief(tmp_path):
+    """From template to report on the command line; what is printed is what is written."""
+    brief, page = tmp_path / "brief.toml", tmp_path / "report.html"
+    code, out, _ = run("--template", "impact-beam")
+    assert code == 0
+    assert tomllib.loads(out)["machine"] == "impact-beam"
+    brief.write_text(CALM)
+    code, out, err = run(brief, "--out", page, "--json")
+    assert code == 0, err
+    assert json.loads(out) == json.loads(page.with_suffix(".json").read_text())
+    assert "machines in tolerance: 100%" in err
+    code, _, err = run(brief, "--out", page)
+    assert code == 2
+    assert "report.html exists" in err
+
+
+def test_command_evaluates_measured_peaks(tmp_path):
+    """Peak forces of 50 N under a rating of 100 N last 2^(10/3) million cycles."""
+    path = tmp_path / "peaks.csv"
+    path.write_text("50\n" * 40)
+    code, out, err = run("--peaks", path, "--load-rating", "100", "--json")
+    assert code == 0, err
+    assert json.loads(out)["evaluation"]["life"] == pytest.approx(2.0 ** (10.0 / 3.0))
+    path.write_text("".join(f"{force}\n" for force in (30, 70, 45, 90, 38, 61)))
+    code, _, err = run("--peaks", path, "--load-rating", "100")
+    assert code == 2
+    assert re.search(r"6 cycles are too few .* needed: \d+ or more", err)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "give a brief"),
+        (("--template", "impact-bean"), "did you mean impact-beam?"),
+        (("absent.toml",), "can't be read"),
+        (("--peaks", "absent.csv", "--load-rating", "100"), "can't be read"),
+        (("--peaks", "absent.csv", "--load-rating", "-100"), "load_rating = -100 N"),
+        (("absent.toml", "--out", "report.pdf"), "ends in .html"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_code_2(arguments, message):
+    """No traceback, exit code 2, and what to do."""
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
