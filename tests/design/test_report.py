@@ -2,13 +2,13 @@
 
 import json
 import re
-import subprocess
 import sys
 import tomllib
 
 import numpy as np
 import pytest
 
+from chaosgym.cli import main
 from chaosgym.design import Criteria
 from chaosgym.design.brief import brief_from, template
 from chaosgym.design.measured import evaluate_peaks
@@ -49,11 +49,20 @@ def browser(tmp_path_factory):
         yield opened
 
 
-def run(*arguments):
-    """Run the command in a process of its own: (exit code, standard output, standard error)."""
-    command = [sys.executable, "-m", "chaosgym", "design", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    return done.returncode, done.stdout, done.stderr
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run ``chaosgym design`` as its entry point does: (exit code, standard output, standard error)."""
+
+    def command(*arguments):
+        monkeypatch.setattr(sys, "argv", ["chaosgym", "design", *map(str, arguments)])
+        try:
+            main()
+            code = 0
+        except SystemExit as stop:
+            code = stop.code
+        return code, *capsys.readouterr()
+
+    return command
 
 
 def check_page(browser, path, pictures):
@@ -145,7 +154,7 @@ def test_nothing_is_overwritten_unasked(answered, tmp_path):
         write_report("<p>", {}, tmp_path / "absent" / "report.html")
 
 
-def test_command_answers_a_brief(tmp_path):
+def test_command_answers_a_brief(run, tmp_path):
     """From template to report on the command line; what is printed is what is written."""
     brief, page = tmp_path / "brief.toml", tmp_path / "report.html"
     code, out, _ = run("--template", "impact-beam")
@@ -161,7 +170,7 @@ def test_command_answers_a_brief(tmp_path):
     assert "report.html exists" in err
 
 
-def test_command_evaluates_measured_peaks(tmp_path):
+def test_command_evaluates_measured_peaks(run, tmp_path):
     """Peak forces of 50 N under a rating of 100 N last 2^(10/3) million cycles."""
     path = tmp_path / "peaks.csv"
     path.write_text("50\n" * 40)
@@ -185,7 +194,7 @@ def test_command_evaluates_measured_peaks(tmp_path):
         (("absent.toml", "--out", "report.pdf"), "ends in .html"),
     ],
 )
-def test_wrong_usage_is_one_line_and_code_2(arguments, message):
+def test_wrong_usage_is_one_line_and_code_2(run, arguments, message):
     """No traceback, exit code 2, and what to do."""
     code, out, err = run(*arguments)
     assert (code, out) == (2, "")
