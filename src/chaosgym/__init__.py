@@ -15,7 +15,7 @@ from chaosgym.version import __version__
 
 if TYPE_CHECKING:
     from chaosgym.classifier import ResponseClassifier, default_classifier
-    from chaosgym.diagnosis import Diagnosis, two_step_test
+    from chaosgym.diagnosis import Diagnosis, diagnose, response_map, response_type, two_step_test
     from chaosgym.diagnosis.step_check import step_check
     from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
     from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, ImpactBeam, SliderCrank
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "chaosgym.classifier": ("ResponseClassifier", "default_classifier"),
-    "chaosgym.diagnosis": ("Diagnosis", "two_step_test"),
+    "chaosgym.diagnosis": ("Diagnosis", "diagnose", "response_map", "response_type", "two_step_test"),
     "chaosgym.diagnosis.step_check": ("step_check",),
     "chaosgym.errors": ("ChaosgymError", "ParameterError", "SimulationError"),
     "chaosgym.machines": ("THESIS_IMPACT_BEAM", "THESIS_SLIDER_CRANK", "ImpactBeam", "SliderCrank"),
@@ -50,7 +50,10 @@ __all__ = [
     "SweepPlan",
     "__version__",
     "default_classifier",
+    "diagnose",
     "read_sweep",
+    "response_map",
+    "response_type",
     "run_sweep",
     "simulate",
     "simulate_many",

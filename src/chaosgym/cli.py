@@ -8,108 +8,16 @@ import functools
 import json
 import sys
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import click
 
 from chaosgym.errors import ChaosgymError, SimulationError
+from chaosgym.machine_options import MACHINE_OPTIONS, machine_command
 from chaosgym.version import __version__
-
-
-class OptionOf(NamedTuple):
-    """A command-line option that sets one field of a machine: the field, and how many SI units one unit is."""
-
-    field: str
-    unit: str
-    factor: float
-
-
-MACHINE_OPTIONS: Mapping[str, Mapping[str, OptionOf]] = {
-    "impact-beam": {
-        "--frequency-hz": OptionOf("excitation_frequency", "Hz", 1.0),
-        "--clearance-mm": OptionOf("clearance", "mm", 1e-3),
-    },
-}
-"""By machine: the options that set its fields. Every other field is reached by ``--set``."""
-
 
 SUMMARY_CYCLES = 200
 """Settled cycles that the summary of the peak force covers."""
-
-
-def _machine_class(name: str) -> Any:
-    from chaosgym.machines import MACHINES
-
-    return MACHINES[name]
-
-
-def _option_value(machine: str, option: str, value: float) -> tuple[str, float]:
-    """Field and SI value of a machine option, checked; the message speaks of the option in its own unit."""
-    from chaosgym.machines.parameters import check_parameter, parameters_of
-
-    known = MACHINE_OPTIONS[machine]
-    if option not in known:
-        raise click.UsageError(f"{option} is no option of {machine}; it takes {', '.join(known)} and --set FIELD=VALUE")
-    field, unit, factor = known[option]
-    owner = _machine_class(machine)
-    try:
-        return field, check_parameter(owner, field, value * factor)
-    except ChaosgymError as error:
-        described = parameters_of(owner)[field]
-        low, high = described.low / factor, described.high / factor
-        raise click.UsageError(f"{option} = {value:g} is out of range; allowed: {low:g} to {high:g} {unit}") from error
-
-
-def _setting(text: str) -> tuple[str, Any]:
-    """Parse FIELD=VALUE."""
-    field, separator, value = text.partition("=")
-    if not separator or not field or not value:
-        raise click.UsageError(f"--set {text!r} is not of the form FIELD=VALUE")
-    try:
-        return field, int(value) if value.lstrip("+-").isdigit() else float(value)
-    except ValueError:
-        return field, value
-
-
-def _build(machine: str, options: Mapping[str, float | None], settings: tuple[str, ...]) -> Any:
-    """Build the machine that a command line describes."""
-    from chaosgym.machines.parameters import with_settings
-
-    fields = dict(_option_value(machine, name, value) for name, value in options.items() if value is not None)
-    for text in settings:
-        field, value = _setting(text)
-        if field in fields:
-            raise click.UsageError(f"{field} is given twice: by an option and by --set")
-        fields[field] = value
-    return with_settings(_machine_class(machine)(), fields)
-
-
-def machine_command(function: Callable[..., None], *, required: bool = True) -> Callable[..., None]:
-    """Give a command the MACHINE argument, the options of all machines, ``--set`` and ``--json``.
-
-    The function receives ``machine`` (constructed, or None if it is not required and not given) and ``as_json``.
-    """
-    names = sorted({option for options in MACHINE_OPTIONS.values() for option in options})
-
-    @functools.wraps(function)
-    def wrapped(machine: str | None, settings: tuple[str, ...], **others: Any) -> None:
-        given = {name: others.pop(_identifier(name)) for name in names}
-        if machine is None and (settings or any(value is not None for value in given.values())):
-            raise click.UsageError(f"these options need a machine: {', '.join(MACHINE_OPTIONS)}")
-        function(machine=machine and _build(machine, given, settings), **others)
-
-    for name in reversed(names):
-        owners = ", ".join(machine for machine, options in MACHINE_OPTIONS.items() if name in options)
-        wrapped = click.option(name, type=float, default=None, help=f"{owners}; default: the thesis' machine.")(wrapped)
-    wrapped = click.option(
-        "--set", "settings", multiple=True, metavar="FIELD=VALUE", help="Any field of the machine, in SI; repeatable."
-    )(wrapped)
-    wrapped = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")(wrapped)
-    return click.argument("machine", type=click.Choice(sorted(MACHINE_OPTIONS)), required=required)(wrapped)
-
-
-def _identifier(option: str) -> str:
-    return option.lstrip("-").replace("-", "_")
 
 
 def _emit(result: Mapping[str, Any], as_json: bool, lines: Callable[[], list[str]]) -> None:
@@ -191,6 +99,10 @@ def show(machine: Any, as_json: bool) -> None:
 
 @app.command()
 @functools.partial(machine_command, required=False)
+@click.option(
+    "--test", type=click.Choice(["adaptive", "mut"]), default="adaptive", show_default=True,
+    help="All tests in stages, or the Matrix Update Test alone.",
+)  # fmt: skip
 @click.option("--budget", type=click.IntRange(100, 10**7), default=3200, show_default=True, help="Cycles at the most.")
 @click.option("--types", is_flag=True, help="Also tell the response type (I, II, III) over the tolerances.")
 @click.option("--step-check", is_flag=True, help="Repeat with a finer step and say whether the verdict stays.")
@@ -200,6 +112,7 @@ def show(machine: Any, as_json: bool) -> None:
 @click.option("--sensor-error", type=float, default=0.0, show_default=True, help="Largest error of a measured value.")
 def diagnose(
     machine: Any,
+    test: str,
     budget: int,
     types: bool,
     step_check: bool,
@@ -216,6 +129,8 @@ def diagnose(
         result, lines = _diagnose_measured(peaks, series, period_s, sensor_error)
     elif machine is None:
         raise click.UsageError(f"give a machine ({', '.join(MACHINE_OPTIONS)}), --peaks FILE or --series FILE")
+    elif test == "mut":
+        result, lines = _matrix_update(machine)
     else:
         result, lines = _diagnose_machine(machine, budget, types, step_check)
     _emit(result, as_json, lambda: lines)
@@ -256,6 +171,16 @@ def _diagnose_measured(
     summary = _summary(samples if peaks else samples[:, 1])
     result = {"file": peaks or series, **verdict.as_dict(), "peak_force_summary_N": summary, "warnings": []}
     return result, _verdict_lines(str(peaks or series), verdict, summary, "")
+
+
+def _matrix_update(machine: Any) -> tuple[dict[str, Any], list[str]]:
+    from chaosgym.diagnosis import matrix_update_test
+    from chaosgym.simulation import simulate
+
+    verdict = matrix_update_test(machine)
+    summary = _summary(simulate(machine, SUMMARY_CYCLES, transient=SUMMARY_CYCLES).peak_force[:, 0])
+    result = {"machine": machine.name, **verdict.as_dict(), "peak_force_summary_N": summary, "warnings": []}
+    return result, _verdict_lines(f"{machine.name}, Matrix Update Test", verdict, summary, " N")
 
 
 def _diagnose_machine(machine: Any, budget: int, types: bool, check: bool) -> tuple[dict[str, Any], list[str]]:

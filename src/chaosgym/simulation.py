@@ -145,6 +145,10 @@ class CycleRecord:
         """Return the record without its first cycles."""
         return self._with_rows(lambda name: getattr(self, name)[cycles:])
 
+    def until(self, cycles: int) -> "CycleRecord":
+        """Return the record's first cycles; ``final_state`` stays that of the whole."""
+        return self._with_rows(lambda name: getattr(self, name)[:cycles])
+
     def followed_by(self, later: "CycleRecord") -> "CycleRecord":
         """Return this record and the one that goes on from its final state, as one."""
         return later._with_rows(lambda name: np.concatenate([getattr(self, name), getattr(later, name)]))

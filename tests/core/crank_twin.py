@@ -98,3 +98,51 @@ def rigid_twin(machine, instants):
         atol=1e-13, max_step=2e-5,
     )  # fmt: skip
     return r * np.sin(rate * instants) - length * np.sin(run.y[0])
+
+
+def rigid_ball_twin(machine, instants):
+    """Eccentricity (len(instants), 2) along and across the nominal rod of a ball in a shell, the slider tight, DOP853.
+
+    The exact, nonlinear motion of the slider (x) and of the rod (phi) that swings about it, no offsets.
+    """
+    m_rod = machine.density * math.pi * machine.rod_diameter**2 / 4 * machine.rod_length
+    r, length, rate = machine.crank_radius, machine.rod_length, machine.crank_rate
+    total = machine.slider_mass + machine.yoke_mass + machine.housing_mass + m_rod
+    first = machine.housing_mass * length + m_rod * length / 2
+    inertia = machine.housing_mass * length**2 + m_rod * length**2 / 3 + machine.housing_inertia + machine.yoke_inertia
+    k, d, gap = machine.contact_stiffness, machine.contact_damping, machine.ball_clearance
+
+    def eccentricity(t, state):
+        x, phi, x_rate, phi_rate = state
+        theta = rate * t
+        e = np.array([r * np.cos(theta) - x + length * np.cos(phi), r * np.sin(theta) - length * np.sin(phi)])
+        e_rate = np.array(
+            [
+                -r * rate * np.sin(theta) - x_rate - length * np.sin(phi) * phi_rate,
+                r * rate * np.cos(theta) - length * np.cos(phi) * phi_rate,
+            ]
+        )
+        return e, e_rate
+
+    def slope(t, state):
+        _, phi, x_rate, phi_rate = state
+        e, e_rate = eccentricity(t, state)
+        size = np.hypot(*e)
+        force = np.zeros(2)
+        if size > gap:
+            force = max(0.0, k * (size - gap) + d * (e @ e_rate) / size) * e / size
+        sine, cosine = math.sin(phi), math.cos(phi)
+        mass = np.array([[total, first * sine], [first * sine, inertia]])
+        load = [
+            force[0] - first * cosine * phi_rate**2,
+            force[0] * length * sine + force[1] * length * cosine - first * machine.gravity * cosine,
+        ]
+        return np.concatenate([[x_rate, phi_rate], np.linalg.solve(mass, load)])
+
+    start = [r + length, 0.0, 0.0, r * rate / length]
+    run = solve_ivp(
+        slope, (0.0, instants[-1]), start, method="DOP853", t_eval=instants, rtol=1e-9, atol=1e-12, max_step=1e-4
+    )
+    e, _ = eccentricity(instants, run.y)
+    phi = np.arcsin(r / length * np.sin(rate * instants))
+    return np.column_stack([e[0] * np.cos(phi) - e[1] * np.sin(phi), e[0] * np.sin(phi) + e[1] * np.cos(phi)])

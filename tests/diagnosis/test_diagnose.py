@@ -38,6 +38,13 @@ def test_transient_chaos_is_chaos_with_a_flag():
     assert (verdict.nature, verdict.status, verdict.transient, verdict.period) == ("chaotic", "transient", True, 6)
 
 
+def test_a_long_period_is_proven_where_recurrence_does_not_look():
+    """At 26.6 Hz the motion locks on 34 cycles; at 28.8 Hz it settles on one cycle, not on twelve."""
+    assert diagnose(ImpactBeam(excitation_frequency=26.6), budget=800).period == 34
+    slow = diagnose(ImpactBeam(excitation_frequency=28.8), budget=800)
+    assert (slow.period, slow.transient) == (1, True)
+
+
 def test_the_initial_state_is_part_of_the_label():
     """A start on the settled orbit settles at once and says where it started."""
     beam = ImpactBeam(excitation_frequency=10.0)

@@ -11,6 +11,7 @@ from chaosgym.diagnosis import (
     judge_type,
     response_map,
     response_type,
+    type_stability,
     types_on_grid,
 )
 from chaosgym.errors import DiagnosisError, ParameterError
@@ -112,3 +113,18 @@ def test_wrong_requests_are_refused():
         response_type(ImpactBeam(excitation_frequency=8.0), {"clearence": Tolerance(0.1)}, budget=100)
     with pytest.raises(DiagnosisError, match="initial_states"):
         response_type(ImpactBeam(), initial_states=7)
+
+
+def test_the_definition_of_the_window_is_part_of_the_label():
+    """A wide window at 16.5 Hz reaches what a narrow one does not; far from any change no definition matters."""
+    flips = type_stability([ImpactBeam(excitation_frequency=7.0), ImpactBeam()], budget=400, workers=1)
+    assert set(flips.values()) == {0.0}
+    narrow = {"excitation_frequency": Tolerance(0.001)}
+    wide = {"excitation_frequency": Tolerance(0.2)}
+    beam = ImpactBeam(excitation_frequency=16.5)
+    kinds = [response_type(beam, tolerances, initial_states=1, budget=400).type for tolerances in (narrow, wide)]
+    assert kinds[0] != kinds[1]
+    assert (
+        response_type(beam, narrow, start="continuation", initial_states=1, budget=400).definition["start"]
+        == "continuation"
+    )

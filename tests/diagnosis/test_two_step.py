@@ -60,6 +60,12 @@ def test_slow_decay_is_periodic(r, period):
     assert (verdict.nature, verdict.period) == ("periodic", period)
 
 
+def test_chaos_that_happens_to_fall_is_not_a_slow_decay():
+    """Distances that fall from block to block by chance and then drop are no approach to a period."""
+    chaos = logistic(3.9, 1600) * np.repeat([1.0, 0.98, 0.96, 0.94, 0.92, 0.9, 0.88, 0.2], 200)
+    assert two_step_test(chaos).nature != "periodic"
+
+
 def test_at_the_bifurcation_itself_nothing_is_claimed():
     """At r = 3 deviations fall like n^-1/2: neither a torus nor a period."""
     verdict = two_step_test(logistic(3.0, 1000))

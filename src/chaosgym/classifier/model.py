@@ -179,7 +179,15 @@ def _digest(arrays: Mapping[str, Any]) -> str:
 
 @lru_cache
 def default_classifier(machine_name: str) -> ResponseClassifier:
-    """Return the classifier that is shipped for a machine."""
+    """Return the classifier that is shipped for a machine.
+
+    Raises
+    ------
+    ModelFileError
+        If none is shipped for it.
+    """
     path = resources.files("chaosgym") / "weights" / f"{machine_name}.npz"
+    if not path.is_file():
+        raise ModelFileError(f"no classifier is shipped for {machine_name}; train one with `chaosgym train-classifier`")
     with resources.as_file(path) as file:
         return ResponseClassifier.load(file)

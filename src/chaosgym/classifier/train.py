@@ -22,11 +22,11 @@ Array = NDArray[np.float64]
 BLOCKS = 12
 """The held-out rectangles come from a BLOCKS x BLOCKS board laid over the first two swept parameters."""
 
-WAVES, WAVE_SCALE = 64, 0.5
+WAVES, WAVE_SCALE = 64, 0.1
 HIDDEN = 64
 UPDATES, BATCH = 2500, 256
 LEARNING_RATE = 5e-3
-WEIGHT_DECAY = 1e-2
+WEIGHT_DECAY = 0.1
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from numba import njit
 
 from chaosgym.core import status
 from chaosgym.core.impact_beam import LOWER, UPPER, cubic, cubic_extremum, note_touch
-from chaosgym.core.slider_crank import RUNAWAY, note_peak
+from chaosgym.core.slider_crank import RUNAWAY, crest_instant, note_peak, note_share, resultant
 
 LINEAR, HERTZ = 0, 1
 
@@ -39,8 +39,8 @@ class SteppedCrankModel(NamedTuple):
         Steps in a bin without events.
     contact_rate : float
         Angular frequency of the masses next to the closed contacts [rad/s].
-    acceleration : (bins, 2n + 4, n)
-        p'' per unit (p, p', 1, x, x^2, x^3) without contact, by columns; x is the time in the bin over its duration.
+    acceleration : (bins, n, 2n + 4)
+        p'' per unit (p, p', 1, x, x^2, x^3) without contact; x is the time in the bin over its duration.
     first : (J + 1,) int
         Joint j owns the rows first[j] to first[j + 1] - 1.
     row : (R, n)
@@ -55,8 +55,10 @@ class SteppedCrankModel(NamedTuple):
         LINEAR or HERTZ.
     two_sided : (J,) bool
         False if a joint with one row has a surface only where row . p is positive.
-    reading : (R, 2)
-        Contact force of the monitored joint [along, upward or across] per newton along each row.
+    reading : (R, 3)
+        Contact force of the monitored joint (along, upward or across, sideways) per newton along each row.
+    monitored : (J,) bool
+        True for the joints that are recorded.
     display : (n,)
         Displacement of the monitored joint per unit coordinate.
     """
@@ -75,15 +77,16 @@ class SteppedCrankModel(NamedTuple):
     law: int
     two_sided: np.ndarray
     reading: np.ndarray
+    monitored: np.ndarray
     display: np.ndarray
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def measure(model, j, z, direction):
     """Penetration and its rate of joint j; writes the unit vector of its force on the surface into ``direction``."""
     n = model.row.shape[1]
     low, high = model.first[j], model.first[j + 1]
-    size, along = 0.0, 0.0
+    size, along, rate = 0.0, 0.0, 0.0
     for r in range(low, high):
         e, rate = 0.0, 0.0
         for i in range(n):
@@ -95,7 +98,6 @@ def measure(model, j, z, direction):
     if not model.two_sided[j]:
         # one row: e counts with its sign
         e = direction[low]
-        rate = along / e if e != 0.0 else 0.0
         direction[low] = 1.0
         return e - model.gap[j], rate
     size = math.sqrt(size)
@@ -126,7 +128,7 @@ def margin(model, j, closed, depth, rate):
     return force if closed else -min(depth, force)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def slope(model, b, time, z, closed, direction, dz):
     """dz = (p', p'') at ``time`` in bin b."""
     n = model.row.shape[1]
@@ -134,11 +136,10 @@ def slope(model, b, time, z, closed, direction, dz):
     x = time / model.bin_duration
     for i in range(n):
         dz[i] = z[n + i]
-        dz[n + i] = a[2 * n, i] + x * (a[2 * n + 1, i] + x * (a[2 * n + 2, i] + x * a[2 * n + 3, i]))
-    for c in range(2 * n):
-        factor = z[c]
-        for i in range(n):
-            dz[n + i] += a[c, i] * factor
+        total = a[i, 2 * n] + x * (a[i, 2 * n + 1] + x * (a[i, 2 * n + 2] + x * a[i, 2 * n + 3]))
+        for c in range(2 * n):
+            total += a[i, c] * z[c]
+        dz[n + i] = total
     for j in range(closed.shape[0]):
         if closed[j]:
             depth, rate = measure(model, j, z, direction)
@@ -151,7 +152,7 @@ def slope(model, b, time, z, closed, direction, dz):
                     dz[n + i] -= model.answer[b, r, i] * push
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def leap(model, b, time, h, z, closed, direction, k, inner, moved):
     """One Runge-Kutta step from z to ``moved``; k (4, 2n) receives the slopes, k[0] must hold the first one."""
     n2 = z.shape[0]
@@ -164,11 +165,11 @@ def leap(model, b, time, h, z, closed, direction, k, inner, moved):
         moved[i] = z[i] + h / 6.0 * (k[0, i] + 2.0 * (k[1, i] + k[2, i]) + k[3, i])
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def joint_force(model, z, dz, closed, direction):
-    """(F_x, F_y, rates of both) of the monitored joint; the rates neglect the turning of a spherical contact."""
+    """``resultant`` of the monitored joint."""
     n = model.row.shape[1]
-    fx, fy, rx, ry = 0.0, 0.0, 0.0, 0.0
+    fx, fy, fz, rx, ry, rz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(closed.shape[0]):
         if not closed[j]:
             continue
@@ -190,34 +191,14 @@ def joint_force(model, z, dz, closed, direction):
         for r in range(model.first[j], model.first[j + 1]):
             fx += model.reading[r, 0] * direction[r] * force
             fy += model.reading[r, 1] * direction[r] * force
+            fz += model.reading[r, 2] * direction[r] * force
             rx += model.reading[r, 0] * direction[r] * change
             ry += model.reading[r, 1] * direction[r] * change
-    return fx, fy, rx, ry
-
-
-@njit(cache=True)
-def note_crest(peak, h, start, end):
-    """Raise ``peak`` (2,) to the crest of the resultant within a step, by the cubic through both ends."""
-    size0, size1 = math.hypot(start[0], start[1]), math.hypot(end[0], end[1])
-    if size0 == 0.0 or size1 == 0.0:
-        return
-    rate0 = (start[0] * start[2] + start[1] * start[3]) / size0
-    rate1 = (end[0] * end[2] + end[1] * end[3]) / size1
-    if rate0 > 0.0 and rate1 < 0.0:
-        crest = cubic_extremum(size0, rate0, size1, rate1, h, -1.0)
-        if crest > 0.0:
-            column = UPPER if end[1] > 0.0 else LOWER
-            peak[column] = max(peak[column], cubic(size0, rate0, size1, rate1, h, crest)[0])
+            rz += model.reading[r, 2] * direction[r] * change
+    return resultant(fx, fy, fz, rx, ry, rz)
 
 
 @njit(cache=True, inline="always")
-def note_share(force, time, contact_time):
-    """Add ``time`` to the side of the record (2,) towards which the resultant points."""
-    if force[0] != 0.0 or force[1] != 0.0:
-        contact_time[UPPER if force[1] > 0.0 else LOWER] += time
-
-
-@njit(cache=True)
 def lowest_margin(model, z, closed, direction):
     """Smallest margin of all joints: positive as long as none changes its contact state."""
     lowest = math.inf
@@ -229,35 +210,40 @@ def lowest_margin(model, z, closed, direction):
 
 @njit(cache=True)
 def first_change(model, b, time, until, z, closed, direction, k, inner, moved, tolerance):
-    """Instant in (0, until] just after which a joint changes its contact state, or ``until`` if none does."""
-    leap(model, b, time, until, z, closed, direction, k, inner, moved)
-    high, f_high = until, lowest_margin(model, moved, closed, direction)
-    if f_high > 0.0:
-        return until
+    """Instant in (0, until] just after which a joint changes its contact state, or ``until`` if none does.
+
+    Regula falsi on repeated steps, an end halved when it was kept twice (Illinois). Leaves the state of that instant
+    in ``moved``.
+    """
     low, f_low = 0.0, max(lowest_margin(model, z, closed, direction), 0.0)
-    kept = 0
+    high, f_high = until, 0.0
+    t, kept = until, 0
     for _ in range(POLISH):
-        if high - low <= tolerance:
-            break
-        # regula falsi, each end halved when it was kept twice (Illinois)
-        t = (low * f_high - high * f_low) / (f_high - f_low) if f_low > 0.0 else 0.5 * (low + high)
-        t = min(max(t, low + 0.01 * (high - low)), high - 0.01 * (high - low))
         leap(model, b, time, t, z, closed, direction, k, inner, moved)
         f = lowest_margin(model, moved, closed, direction)
         if f > 0.0:
+            if t == until:
+                return until
             low, f_low = t, f
             if kept > 0:
                 f_high *= 0.5
             kept = 1
         else:
             high, f_high = t, f
+            if high - low <= tolerance:
+                break
             if kept < 0:
                 f_low *= 0.5
             kept = -1
-    return high
+        if high - low <= tolerance:
+            t = high
+        else:
+            t = (low * f_high - high * f_low) / (f_high - f_low) if f_low > 0.0 else 0.5 * (low + high)
+            t = min(max(t, low + 0.01 * (high - low)), high - 0.01 * (high - low))
+    return t
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def change_contacts(model, z, closed, direction, episode, time, impacts, bounce_time):
     """Open and close the joints whose margin is used up at ``time`` in the revolution; how many."""
     changes = 0
@@ -269,29 +255,29 @@ def change_contacts(model, z, closed, direction, episode, time, impacts, bounce_
         closed[j] = not closed[j]
         if closed[j]:
             up = 0.0
-            monitored = False
             for r in range(model.first[j], model.first[j + 1]):
                 up += model.reading[r, 1] * direction[r]
-                monitored = monitored or model.reading[r, 0] != 0.0 or model.reading[r, 1] != 0.0
-            if monitored:
+            if model.monitored[j]:
                 impacts[UPPER if up > 0.0 else LOWER] += 1
                 note_touch(episode, 1.0 if up > 0.0 else -1.0, time, bounce_time)
     return changes
 
 
-@njit(cache=True)
-def take_sample(model, z, dz, closed, direction, sample):
-    """Write displacement, velocity and signed resultant (positive where it points up) of the monitored joint."""
+@njit(cache=True, inline="always")
+def take_sample(model, h, t, z, dz, moved, dz_moved, inner, closed, direction, sample):
+    """Write displacement, velocity and signed resultant (positive where it points up) at t in a step of length h."""
     n = model.display.shape[0]
+    for i in range(2 * n):
+        inner[i] = cubic(z[i], dz[i], moved[i], dz_moved[i], h, t)[0]
     sample[0], sample[1] = 0.0, 0.0
     for i in range(n):
-        sample[0] += model.display[i] * z[i]
-        sample[1] += model.display[i] * z[n + i]
-    force = joint_force(model, z, dz, closed, direction)
-    sample[2] = math.copysign(math.hypot(force[0], force[1]), force[1])
+        sample[0] += model.display[i] * inner[i]
+        sample[1] += model.display[i] * inner[n + i]
+    force = joint_force(model, inner, dz, closed, direction)
+    sample[2] = math.copysign(force[1], force[0])
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def grazes(model, h, closed, direction, z, moved):
     """Instant in (0, h) at which an open joint may touch and leave again, or h."""
     instant = h
@@ -309,7 +295,7 @@ def grazes(model, h, closed, direction, z, moved):
 @njit(cache=True, nogil=True)
 def advance(model, state, episode, arrays, event_tolerance, event_budget):
     """Advance ``state`` (2n,) and ``episode`` in place by whole revolutions; see ``slider_crank.advance``."""
-    bins, _, n = model.acceleration.shape
+    bins, n, _ = model.acceleration.shape
     joints, n2 = model.gap.shape[0], 2 * n
     duration = model.bin_duration
     step = duration / model.steps
@@ -345,23 +331,21 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                     break
                 leap(model, b, time, h, z, closed, direction, k, inner, moved)
                 until = grazes(model, h, closed, direction, z, moved)
-                changing = until < h or lowest_margin(model, moved, closed, direction) <= 0.0
-                if changing:
+                if until < h or lowest_margin(model, moved, closed, direction) <= 0.0:
                     h = first_change(model, b, time, until, z, closed, direction, k, inner, moved, event_tolerance)
-                while sample < samples and sample * period < (b * duration + time + h) * samples:
-                    share = max(sample * period / samples - b * duration - time, 0.0)
-                    leap(model, b, time, share, z, closed, direction, k, inner, moved)
-                    slope(model, b, time + share, moved, closed, direction, k[3])
-                    take_sample(model, moved, k[3], closed, direction, arrays.history[cycle, sample])
-                    sample += 1
-                    changing = True
-                if changing:
-                    leap(model, b, time, h, z, closed, direction, k, inner, moved)
                 slope(model, b, time + h, moved, closed, direction, k[3])
+                while sample < samples and sample * period < (b * duration + time + h) * samples:
+                    t = max(sample * period / samples - b * duration - time, 0.0)
+                    take_sample(
+                        model, h, t, z, k[0], moved, k[3], inner, closed, direction, arrays.history[cycle, sample]
+                    )
+                    sample += 1
                 end = joint_force(model, moved, k[3], closed, direction)
                 note_share(end, h, contact_time)
-                note_peak(peak, end[0], end[1])
-                note_crest(peak, h, start, end)
+                note_peak(peak, end)
+                _, crest = crest_instant(h, start, end)
+                column = UPPER if end[0] > 0.0 else LOWER
+                peak[column] = max(peak[column], crest)
                 z, moved = moved, z
                 changes = change_contacts(
                     model, z, closed, direction, episode, b * duration + time + h, impacts, bounce_time
@@ -372,7 +356,7 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                         return status.EVENT_BUDGET, cycle
                     slope(model, b, time + h, z, closed, direction, k[0])
                     end = joint_force(model, z, k[0], closed, direction)
-                    note_peak(peak, end[0], end[1])
+                    note_peak(peak, end)
                 else:
                     k[0] = k[3]
                 start = end

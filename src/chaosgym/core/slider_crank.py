@@ -50,8 +50,11 @@ class SliderCrankModel(NamedTuple):
         True if the channel has a surface on either side, False if only where row . p is positive.
     radix : int
         2 where both sides of a channel share their matrices, 3 where friction sets them apart.
-    reading : (m, 2)
-        Contact force of the monitored joint [along the guide, upward] per newton on a channel's positive side.
+    reading : (m, 3)
+        Contact force of the monitored joint (along, upward or across, sideways) per newton on a channel's positive
+        side; zero for the channels of another joint.
+    reach : (m,)
+        Length of each channel's reading.
     display : (n,)
         Displacement of the monitored joint per unit coordinate.
     acceleration : (radix^m, bins, 2n + 4 + m, n)
@@ -73,6 +76,7 @@ class SliderCrankModel(NamedTuple):
     two_sided: np.ndarray
     radix: int
     reading: np.ndarray
+    reach: np.ndarray
     display: np.ndarray
     acceleration: np.ndarray
     curvature: np.ndarray
@@ -86,7 +90,7 @@ def closes(model, j, side, y, v):
     return depth > 0.0 and model.stiffness[j] * depth + model.damping[j] * side * v > 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def contact_set(model, side):
     """Index of the matrices of a contact set: closed sides as digits."""
     index, place = 0, 1
@@ -99,7 +103,7 @@ def contact_set(model, side):
     return index
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def put_sides(model, side, z):
     """Write the clearance columns of z."""
     m = side.shape[0]
@@ -108,7 +112,7 @@ def put_sides(model, side, z):
         z[first + j] = side[j] * model.gap[j]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def put_time(z, n, x):
     """Write the forcing columns of z for time x as a share of the bin."""
     z[2 * n] = 1.0
@@ -116,7 +120,7 @@ def put_time(z, n, x):
         z[2 * n + k] = z[2 * n + k - 1] * x
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def read_channels(model, z, y, v):
     """Displacement y and velocity v of every channel."""
     m, n = model.row.shape
@@ -140,27 +144,26 @@ def polynomial(coefficients, t):
 
 
 @njit(cache=True, inline="always")
-def margin(model, j, side, closed, coefficients, t):
-    """(value, slope) of what is positive as long as channel j keeps its contact state on ``side``.
+def margin(stiffness, damping, gap, side, closed, coefficients, t):
+    """(value, slope) of what is positive as long as a channel keeps its contact state on ``side``.
 
     Closed: the contact force. Open: how much is missing until the surface pushes, a penetration without force
     included.
     """
     y, v, a = polynomial(coefficients, t)
-    k, d = model.stiffness[j], model.damping[j]
-    spring, damper = k * (side * y - model.gap[j]), d * side * v
+    spring, damper = stiffness * (side * y - gap), damping * side * v
     if closed:
-        return spring + damper, side * (k * v + d * a)
+        return spring + damper, side * (stiffness * v + damping * a)
     if damper < 0.0:
-        return -spring - damper, -side * (k * v + d * a)
-    return -spring, -side * k * v
+        return -spring - damper, -side * (stiffness * v + damping * a)
+    return -spring, -side * stiffness * v
 
 
 @njit(cache=True)
-def locate(model, j, side, closed, coefficients, until, tolerance):
-    """Instant in [0, until] at which the margin of channel j has fallen to zero, or inf if it has not."""
+def locate(stiffness, damping, gap, side, closed, coefficients, until, tolerance):
+    """Instant in [0, until] at which the margin of a channel has fallen to zero, or inf if it has not."""
     low, high = 0.0, until
-    value, slope = margin(model, j, side, closed, coefficients, until)
+    value, slope = margin(stiffness, damping, gap, side, closed, coefficients, until)
     if value > 0.0:
         return math.inf
     t = until
@@ -173,7 +176,7 @@ def locate(model, j, side, closed, coefficients, until, tolerance):
         t = guess
         if abs(change) <= tolerance:
             break
-        value, slope = margin(model, j, side, closed, coefficients, t)
+        value, slope = margin(stiffness, damping, gap, side, closed, coefficients, t)
         if value > 0.0:
             low = t
         else:
@@ -181,7 +184,7 @@ def locate(model, j, side, closed, coefficients, until, tolerance):
     return t
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def suspect_closed(model, j, side, h, y0, v0, a0, y1, v1, a1):
     """Instant in (0, h] until which a closed channel may have lost its force, or -1."""
     k, d, c = model.stiffness[j], model.damping[j], model.gap[j]
@@ -196,7 +199,7 @@ def suspect_closed(model, j, side, h, y0, v0, a0, y1, v1, a1):
     return dip if dip > 0.0 and cubic(f0, r0, f1, r1, h, dip)[0] <= 0.0 else -1.0
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def suspect_open(model, j, side, h, y0, v0, y1, v1):
     """Instant in (0, h] until which an open channel may have begun to push on ``side``, or -1."""
     if closes(model, j, side, y1, v1):
@@ -211,7 +214,7 @@ def suspect_open(model, j, side, h, y0, v0, y1, v1):
 @njit(cache=True, inline="always")
 def monitored(model, j):
     """True if channel j belongs to the joint that is recorded."""
-    return model.reading[j, 0] != 0.0 or model.reading[j, 1] != 0.0
+    return model.reach[j] > 0.0
 
 
 @njit(cache=True, inline="always")
@@ -220,45 +223,37 @@ def column_of(model, j, side):
     return UPPER if model.reading[j, 1] * side > 0.0 else LOWER
 
 
-@njit(cache=True)
-def note_contact(model, side, time, contact_time):
-    """Add ``time`` to the sides of the record (2,) on which a channel is closed."""
-    upper, lower = False, False
-    for j in range(side.shape[0]):
-        if side[j] != 0.0 and monitored(model, j):
-            if column_of(model, j, side[j]) == UPPER:
-                upper = True
-            else:
-                lower = True
-    if upper:
-        contact_time[UPPER] += time
-    if lower:
-        contact_time[LOWER] += time
+@njit(cache=True, inline="always")
+def resultant(fx, fy, fz, rx, ry, rz):
+    """(Upward part, size, rate of the size) of a force with components f and rates r."""
+    size = math.sqrt(fx * fx + fy * fy + fz * fz)
+    growth = (fx * rx + fy * ry + fz * rz) / size if size > 0.0 else 0.0
+    return fy, size, growth
 
 
-@njit(cache=True)
-def note_peak(peak, fx, fy):
-    """Raise ``peak`` (2,) to the resultant."""
-    column = UPPER if fy > 0.0 else LOWER
-    peak[column] = max(peak[column], math.hypot(fx, fy))
+@njit(cache=True, inline="always")
+def note_share(force, time, contact_time):
+    """Add ``time`` to the side of the record (2,) towards which the resultant points."""
+    if force[1] > 0.0:
+        contact_time[UPPER if force[0] > 0.0 else LOWER] += time
 
 
-@njit(cache=True)
-def crest_instant(peak, h, start, end):
-    """Instant in a step at which the resultant may crest above ``peak`` (2,), or -1.
+@njit(cache=True, inline="always")
+def note_peak(peak, force):
+    """Raise ``peak`` (2,) to the size of the resultant."""
+    column = UPPER if force[0] > 0.0 else LOWER
+    peak[column] = max(peak[column], force[1])
 
-    ``start`` and ``end`` are (F_x, F_y, their rates) at both ends of the step.
-    """
-    size0, size1 = math.hypot(start[0], start[1]), math.hypot(end[0], end[1])
-    if size0 == 0.0 or size1 == 0.0:
-        return -1.0
-    rate0 = (start[0] * start[2] + start[1] * start[3]) / size0
-    rate1 = (end[0] * end[2] + end[1] * end[3]) / size1
-    if rate0 <= 0.0 or rate1 >= 0.0:
-        return -1.0
-    crest = cubic_extremum(size0, rate0, size1, rate1, h, -1.0)
-    column = UPPER if end[1] > 0.0 else LOWER
-    return crest if crest > 0.0 and cubic(size0, rate0, size1, rate1, h, crest)[0] > 0.99 * peak[column] else -1.0
+
+@njit(cache=True, inline="always")
+def crest_instant(h, start, end):
+    """(Instant, size) of the crest of the resultant in a step, by the cubic through both ends; (-1, 0) if none."""
+    if start[1] == 0.0 or end[1] == 0.0 or start[2] <= 0.0 or end[2] >= 0.0:
+        return -1.0, 0.0
+    crest = cubic_extremum(start[1], start[2], end[1], end[2], h, -1.0)
+    if crest <= 0.0:
+        return -1.0, 0.0
+    return crest, cubic(start[1], start[2], end[1], end[2], h, crest)[0]
 
 
 @njit(cache=True, inline="always")
@@ -310,7 +305,7 @@ def quiet_steps(model, chosen, b, side, z, moved, y, v, a, time, limit, peak):
             if min(f0, f1) - turn <= 0.0:
                 return count
             fy += model.reading[j, 1] * s * f1
-            total += math.hypot(model.reading[j, 0], model.reading[j, 1]) * (max(f0, f1) + turn)
+            total += model.reach[j] * (max(f0, f1) + turn)
         if total > peak[UPPER if fy > 0.0 else LOWER]:
             return count
         for j in range(m):
@@ -391,11 +386,11 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                         model, chosen, b, side, z, moved, y0, v0, a0, time, whole, arrays.peak_force[cycle]
                     )
                     if quiet > 0:
-                        note_contact(model, side, quiet * step, arrays.contact_time[cycle])
                         count += quiet
                         time = origin + count * step
                         left = duration - time
                         start = joint_force(model, side, y0, v0, a0)
+                        note_share(start, quiet * step, arrays.contact_time[cycle])
                 if left <= 1e-12 * duration:
                     break
                 expanded = False
@@ -436,7 +431,10 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                         channel[k] = 0.0
                         for i in range(n):
                             channel[k] += model.row[j, i] * series[k, i]
-                    found = locate(model, j, looked, side[j] != 0.0, channel, until, event_tolerance)
+                    found = locate(
+                        model.stiffness[j], model.damping[j], model.gap[j], looked, side[j] != 0.0, channel, until,
+                        event_tolerance,
+                    )  # fmt: skip
                     if found < instant:
                         first, instant, towards = j, found, looked
                 if first >= 0:
@@ -456,14 +454,14 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                             expand(a, z, duration, series)
                             expanded = True
                         evaluate(series, max(sample * period / samples - now, 0.0), at_sample)
-                        take_sample(model, side, at_sample, y1, v1, arrays.history[cycle, sample])
+                        take_sample(model, side, at_sample, y1, v1, a1, arrays.history[cycle, sample])
                         sample += 1
                     read_channels(model, moved, y1, v1)
                 if closed:
                     end = joint_force(model, side, y1, v1, a1)
-                    note_peak(arrays.peak_force[cycle], end[0], end[1])
-                    crest = crest_instant(arrays.peak_force[cycle], h, start, end)
-                    if crest > 0.0:
+                    note_peak(arrays.peak_force[cycle], end)
+                    crest, size_there = crest_instant(h, start, end)
+                    if size_there > 0.99 * arrays.peak_force[cycle, UPPER if end[0] > 0.0 else LOWER]:
                         if not expanded:
                             expand(a, z, duration, series)
                         evaluate(series, crest, at_crest)
@@ -475,9 +473,9 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                             if side[j] != 0.0:
                                 a0[j] = curve(model.curvature[chosen, b], at_crest, j)
                         top = joint_force(model, side, y0, v0, a0)
-                        note_peak(arrays.peak_force[cycle], top[0], top[1])
+                        note_peak(arrays.peak_force[cycle], top)
                     start = end
-                    note_contact(model, side, h, arrays.contact_time[cycle])
+                    note_share(end, h, arrays.contact_time[cycle])
                 z, moved = moved, z
                 y0, y1 = y1, y0
                 v0, v1 = v1, v0
@@ -510,7 +508,7 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                         closed = True
                         a0[j] = curve(model.curvature[chosen, b], z, j)
                 start = joint_force(model, side, y0, v0, a0)
-                note_peak(arrays.peak_force[cycle], start[0], start[1])
+                note_peak(arrays.peak_force[cycle], start)
                 origin, count = time + h, 0
 
         arrays.events[cycle] = events
@@ -523,34 +521,31 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
     return status.OK, arrays.section.shape[0]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def joint_force(model, side, y, v, a):
-    """(F_x, F_y, rates of both) of the monitored joint from the channels' displacement, velocity and acceleration."""
-    fx, fy, rx, ry = 0.0, 0.0, 0.0, 0.0
+    """``resultant`` of the monitored joint from the channels' displacement, velocity and acceleration."""
+    fx, fy, fz, rx, ry, rz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(side.shape[0]):
         if side[j] != 0.0:
             force = model.stiffness[j] * (y[j] - side[j] * model.gap[j]) + model.damping[j] * v[j]
             rate = model.stiffness[j] * v[j] + model.damping[j] * a[j]
             fx += model.reading[j, 0] * force
             fy += model.reading[j, 1] * force
+            fz += model.reading[j, 2] * force
             rx += model.reading[j, 0] * rate
             ry += model.reading[j, 1] * rate
-    return fx, fy, rx, ry
+            rz += model.reading[j, 2] * rate
+    return resultant(fx, fy, fz, rx, ry, rz)
 
 
 @njit(cache=True)
-def take_sample(model, side, z, y, v, sample):
+def take_sample(model, side, z, y, v, a, sample):
     """Write displacement, velocity and signed resultant (positive where it points up) of the monitored joint."""
     n = model.display.shape[0]
     read_channels(model, z, y, v)
-    fx, fy = 0.0, 0.0
-    for j in range(side.shape[0]):
-        if side[j] != 0.0:
-            force = model.stiffness[j] * (y[j] - side[j] * model.gap[j]) + model.damping[j] * v[j]
-            fx += model.reading[j, 0] * force
-            fy += model.reading[j, 1] * force
+    force = joint_force(model, side, y, v, a)
     sample[0], sample[1] = 0.0, 0.0
     for i in range(n):
         sample[0] += model.display[i] * z[i]
         sample[1] += model.display[i] * z[n + i]
-    sample[2] = math.copysign(math.hypot(fx, fy), fy)
+    sample[2] = math.copysign(force[1], force[0])

@@ -1,6 +1,7 @@
 """What kind of response is this? Tests take a ``CycleRecord`` or a plain array of one sample a cycle."""
 
 from chaosgym.diagnosis.agreement import AgreementTable, agreement, random_machines
+from chaosgym.diagnosis.criteria import CriterionRate, PredictiveCriterion, criterion_rate, predictive_criteria
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.lyapunov import (
     LyapunovExponent,
@@ -9,6 +10,7 @@ from chaosgym.diagnosis.lyapunov import (
     lyapunov_spectrum,
     two_trajectory_exponent,
 )
+from chaosgym.diagnosis.matrix_update import compare_attractors, compare_outcomes, matrix_update_test
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
 from chaosgym.diagnosis.response import NATURES, STATUSES, TYPES, Diagnosis, Nature, Status, Type
 from chaosgym.diagnosis.response_type import (
@@ -21,7 +23,18 @@ from chaosgym.diagnosis.response_type import (
     judge_type,
     response_map,
     response_type,
+    type_stability,
     types_on_grid,
+)
+from chaosgym.diagnosis.routes import (
+    Intermittency,
+    Precursors,
+    WarningRate,
+    bounce_fraction,
+    find_crises,
+    find_intermittency,
+    precursors,
+    warning_rates,
 )
 from chaosgym.diagnosis.spectrum import Spectrum, power_spectrum
 from chaosgym.diagnosis.stroboscopic import Recurrence, find_recurrence
@@ -33,11 +46,15 @@ __all__ = [
     "STATUSES",
     "TYPES",
     "AgreementTable",
+    "CriterionRate",
     "Diagnosis",
+    "Intermittency",
     "LyapunovExponent",
     "Nature",
     "Neighbour",
     "PeriodicOrbit",
+    "Precursors",
+    "PredictiveCriterion",
     "Recurrence",
     "ResponseMap",
     "ResponseType",
@@ -45,22 +62,34 @@ __all__ = [
     "Status",
     "Tolerance",
     "Type",
+    "WarningRate",
     "agreement",
+    "bounce_fraction",
+    "compare_attractors",
+    "compare_outcomes",
+    "criterion_rate",
     "default_tolerances",
     "diagnose",
     "exponent_from_series",
+    "find_crises",
+    "find_intermittency",
     "find_periodic_orbit",
     "find_recurrence",
     "geometric_grid",
     "judge_type",
     "largest_lyapunov_exponent",
     "lyapunov_spectrum",
+    "matrix_update_test",
     "power_spectrum",
+    "precursors",
+    "predictive_criteria",
     "random_machines",
     "response_map",
     "response_type",
     "two_step_test",
     "two_trajectory_exponent",
+    "type_stability",
     "types_on_grid",
+    "warning_rates",
     "zero_one_statistic",
 ]

@@ -6,7 +6,7 @@ while there are only spectral lines (quasiperiodic). Transient chaos is judged b
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from time import thread_time
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from chaosgym.diagnosis.diagnose import DEFAULT_BUDGET, diagnose
 from chaosgym.diagnosis.lyapunov import Deviation, average_growth, exponent_from_series
+from chaosgym.diagnosis.matrix_update import Form, depends_on_configuration, matrix_update_test
 from chaosgym.diagnosis.response import Diagnosis, Nature
 from chaosgym.diagnosis.response_type import default_tolerances
 from chaosgym.diagnosis.spectrum import power_spectrum
@@ -30,6 +31,9 @@ Array = NDArray[np.float64]
 
 REFERENCE_CYCLES = 10_000
 """Cycles of the reference run."""
+
+UPDATE_FORMS: tuple[Form, ...] = ("literal", "attractors")
+"""Forms of the Matrix Update Test, for machines whose matrices depend on their configuration."""
 
 
 class RecordTest(NamedTuple):
@@ -252,6 +256,8 @@ def agreement(
     if not points:
         raise DiagnosisError("none of the machines could be simulated")
     names = [f"{test.name}, {test.transient} + {test.cycles}" for test in tests]
+    if depends_on_configuration(machines[0]):
+        names += [f"Matrix Update Test, {form}, 200 + 100" for form in UPDATE_FORMS]
     names.append(f"diagnose, up to {budget}")
     rows = tuple(_row(name, index, points) for index, name in enumerate(names))
     votes = np.array([point.votes for point in points])
@@ -271,22 +277,22 @@ def _judge(machine: Machine, tests: Sequence[RecordTest], reference_cycles: int,
     cycles, seconds = [], []
     for test in tests:
         window = slice(test.transient, test.transient + test.cycles)
-        part = _rows(record, window)
+        part = record.until(window.stop).after(window.start)
         began = thread_time()
         votes.append(test.judge(part, growth[window]))
         seconds.append(thread_time() - began + per_cycle * window.stop)
         cycles.append(float(window.stop))
+    for form in UPDATE_FORMS if depends_on_configuration(machine) else ():
+        began = thread_time()
+        votes.append(matrix_update_test(machine, form=form).nature)
+        seconds.append(thread_time() - began)
+        cycles.append(600.0 if form == "literal" else 400.0)
     began = thread_time()
     verdict = diagnose(machine, budget=budget)
     seconds.append(thread_time() - began)
     cycles.append(float(verdict.evidence["cycles_used"]))
     votes.append(_eventual(verdict))
     return _Point(reference_nature(record, growth), tuple(votes), tuple(cycles), tuple(seconds))
-
-
-def _rows(record: CycleRecord, window: slice) -> CycleRecord:
-    names = ("section", "displacement", "velocity", "peak_force", "impacts", "contact_fraction", "bounce_duration")
-    return replace(record, **{name: getattr(record, name)[window] for name in names})
 
 
 def _eventual(verdict: Diagnosis) -> Nature:

@@ -7,10 +7,10 @@ After 100, 200, 400 ... cycles from the initial condition:
     it does not              go on. At the end of the budget an exponent above three standard errors makes it chaotic,
                              one within them, with the figures of step II, quasiperiodic
 
+On machines whose matrices depend on their configuration the Matrix Update Test votes too (flow chart of figure 5.5).
 Chaos that dies out within the horizon counts as chaotic (thesis 5.2.3), with the status "transient".
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -37,6 +37,12 @@ FIRST_STAGE = 100
 
 DEFAULT_BUDGET = 3200
 """Cycles of the last stage."""
+
+UPDATE_CYCLES = 100
+"""Cycles of each run of the Matrix Update Test, on machines whose matrices depend on configuration (figure 5.5)."""
+
+MAX_SEARCHED_PERIOD = 128
+"""Longest period that Newton's method is tried on where the motion contracts but does not repeat."""
 
 NEAR = 0.05
 """How far Newton's method may move, relative to the size of the motion, to find the orbit that the motion nears."""
@@ -114,8 +120,8 @@ def _stage(machine: Machine, record: CycleRecord, growth: Array, searched: int) 
             found = find_periodic_orbit(machine, record.final_state, period)
             spent += 8 * period
             if found is not None and found.certified and _approaches(machine, record, found):
-                orbit = found
-                spent += 4 * period
+                orbit = _primitive(machine, found)
+                spent += 6 * period
                 break
     return _Stage(record, growth, verdict, exponent, orbit, len(record) + searched + spent)
 
@@ -124,11 +130,23 @@ def _candidates(record: CycleRecord, verdict: Diagnosis) -> tuple[int, ...]:
     """Periods worth a search: that of the verdict, or else the one after which the state comes back best."""
     if verdict.period is not None:
         return (verdict.period,)
-    states = record.section
-    gaps = [
-        float(np.linalg.norm((states[-1] - states[-1 - k]) / np.ptp(states, axis=0).clip(1e-300))) for k in range(1, 17)
-    ]
-    return (int(np.argmin(gaps)) + 1,)
+    states = record.section / np.ptp(record.section, axis=0).clip(1e-300)
+    longest = min(MAX_SEARCHED_PERIOD, len(states) // 2)
+    last = states[-4:]
+    gaps = np.array([np.linalg.norm(last - states[-4 - k : -k]) for k in range(1, longest + 1)])
+    return (int(np.argmax(gaps <= 1.5 * gaps.min())) + 1,)
+
+
+def _primitive(machine: Machine, orbit: PeriodicOrbit) -> PeriodicOrbit:
+    """The orbit with its smallest period: a multiple of it closes too."""
+    states = simulate(machine, orbit.period, orbit.state).section
+    size = np.maximum(np.abs(orbit.state), 1e-9 * np.max(np.abs(orbit.state)))
+    for divisor in (d for d in range(1, orbit.period) if orbit.period % d == 0):
+        if np.max(np.abs(states[divisor] - orbit.state) / size) < 1e-4:
+            shorter = find_periodic_orbit(machine, orbit.state, divisor)
+            if shorter is not None and shorter.certified:
+                return replace(shorter, distance=orbit.distance)
+    return orbit
 
 
 def _approaches(machine: Machine, record: CycleRecord, orbit: PeriodicOrbit) -> bool:
@@ -203,7 +221,7 @@ def _not_periodic(stage: _Stage) -> Diagnosis:
     )  # fmt: skip
 
 
-def _votes(stage: _Stage) -> Mapping[str, Nature]:
+def _votes(stage: _Stage) -> dict[str, Nature]:
     """What each test says of the last half of the record by itself."""
     verdict = two_step_test(stage.record.after(len(stage.record) // 2))
     figures = verdict.evidence

@@ -10,8 +10,7 @@ the tolerance and all of it, each from rest. The statistic is the largest peak f
     undetermined  if the centre is
 
 A point that is undetermined is not known to be periodic, and counts as not periodic. Window, statistic and rule of
-initial states are part of the label: on test oscillators 9 % of labels change in a window of half the width, and 13 %
-if runs continue from a neighbour instead of starting from rest.
+initial states are part of the label: ``type_stability`` counts how many labels change with them.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -30,6 +29,7 @@ from chaosgym.simulation import MotionState, parallel_map, rest_state
 
 Array = NDArray[np.float64]
 Window = Literal["parameters", "speed-clearance"]
+Start = Literal["rest", "continuation"]
 
 FORCE_CHANGE = 0.10
 """Change of the largest peak force that matters: a quarter of the fatigue life (thesis 5.5.2)."""
@@ -204,6 +204,7 @@ def response_type(
     tolerances: Mapping[str, Tolerance] | None = None,
     *,
     window: Window = "parameters",
+    start: Start = "rest",
     initial_states: int = 3,
     budget: int = 1600,
     workers: int | None = None,
@@ -219,6 +220,8 @@ def response_type(
     window
         "parameters" varies every field that has a tolerance; "speed-clearance" varies these two only, which is what
         maps and datasets use.
+    start
+        Where the runs of the neighbourhood start: at rest, or in the state that the centre ended in.
     initial_states
         How many initial states look for coexisting attractors at the centre, 1 to 3: rest; the mirror image of the
         state that rest leads to; half that state.
@@ -232,24 +235,29 @@ def response_type(
     ParameterError
         If a tolerance names no field, or leads out of the field's range.
     DiagnosisError
-        If ``window`` or ``initial_states`` is not allowed.
+        If ``window``, ``start`` or ``initial_states`` is not allowed.
     SimulationError
         If a run can't be finished.
     """
     allowed = _tolerances_of(machine, tolerances, window)
     _check_initial_states(initial_states)
+    if start not in ("rest", "continuation"):
+        raise DiagnosisError(f"start = {start!r} is not one of 'rest', 'continuation'")
     centre = diagnose(machine, budget=budget)
+    origin = centre.evidence["final_state"] if start == "continuation" else None
     neighbours: tuple[Neighbour, ...] = ()
     coexisting: tuple[float, ...] = ()
     if centre.nature == "periodic":
         points = _points(machine, allowed)
-        runs = parallel_map(lambda point: diagnose(point[2], budget=budget), points, workers=workers)
+        runs = parallel_map(
+            lambda point: diagnose(point[2], initial_state=origin, budget=budget), points, workers=workers
+        )
         neighbours = tuple(_neighbour(name, side, run) for (name, side, _), run in zip(points, runs, strict=True))
         coexisting = _coexisting_peaks(machine, centre, initial_states, budget)
     kind, reason = judge_type(centre.nature, centre.evidence["largest_peak"], neighbours, coexisting)
     return ResponseType(
         type=kind, reason=reason, centre=centre, largest_peak=centre.evidence["largest_peak"], neighbours=neighbours,
-        coexisting_peaks=coexisting, definition=_definition(allowed, window, initial_states, budget),
+        coexisting_peaks=coexisting, definition=_definition(allowed, window, start, initial_states, budget),
     )  # fmt: skip
 
 
@@ -292,7 +300,7 @@ def _coexisting_peaks(machine: Machine, centre: Diagnosis, initial_states: int, 
 
 
 def _definition(
-    tolerances: Mapping[str, Tolerance], window: Window, initial_states: int, budget: int
+    tolerances: Mapping[str, Tolerance], window: Window, start: Start, initial_states: int, budget: int
 ) -> dict[str, Any]:
     return {
         "window": window,
@@ -301,8 +309,46 @@ def _definition(
         "statistic": "largest peak force of the settled cycles, both sides",
         "force_change": FORCE_CHANGE,
         "initial_states": initial_states,
-        "runs_start": "from rest",
+        "start": start,
         "budget": budget,
+    }
+
+
+def type_stability(
+    machines: Sequence[Machine], *, budget: int = 800, workers: int | None = None, progress: bool = False
+) -> dict[str, float]:
+    """Share of type labels that change with the definition, over machines.
+
+    Parameters
+    ----------
+    machines
+        What to label, in the two-parameter window.
+    budget, workers, progress
+        As for ``response_map``.
+
+    Returns
+    -------
+    dict
+        "window x 0.5" and "window x 2.5" (frequency +-1 % and +-5 % instead of +-2 %), "continuation" (runs of the
+        neighbourhood start where the centre ended) and "one initial state" (no search for coexisting attractors).
+    """
+
+    def labels(machine: Machine) -> list[Type]:
+        given = default_tolerances(machine)
+        half, wide = ({name: t._replace(value=f * t.value) for name, t in given.items()} for f in (0.5, 2.5))
+        variants: list[dict[str, Any]] = [
+            {}, {"tolerances": half}, {"tolerances": wide}, {"start": "continuation"}, {"initial_states": 1},
+        ]  # fmt: skip
+        return [
+            response_type(machine, window="speed-clearance", budget=budget, workers=1, **variant).type
+            for variant in variants
+        ]
+
+    rows = parallel_map(labels, machines, workers=workers, progress="types" if progress else None)
+    names = ("window x 0.5", "window x 2.5", "continuation", "one initial state")
+    return {
+        name: sum(row[0] != row[column] for row in rows) / max(1, len(rows))
+        for column, name in enumerate(names, start=1)
     }
 
 
@@ -423,7 +469,7 @@ def response_map(
         types[i, k] = judge_type(centre.nature, float(peaks[i, k]), neighbours, coexisting)[0]
     return ResponseMap(
         machine=machine, speed=speed, clearance=clearance, type=types, nature=natures, largest_peak=peaks,
-        runs=len(keys), definition=_definition(allowed, "speed-clearance", initial_states, budget),
+        runs=len(keys), definition=_definition(allowed, "speed-clearance", "rest", initial_states, budget),
     )  # fmt: skip
 
 

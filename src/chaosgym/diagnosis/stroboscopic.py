@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 MIN_CYCLES = 16
 """Fewest cycles that are judged at all."""
 
-MAX_PERIOD = 32
+MAX_PERIOD = 64
 """Longest period that is looked for."""
 
 MIN_REPEATS, NOISY_REPEATS = 3, 8
@@ -27,6 +27,12 @@ MIN_REPEATS, NOISY_REPEATS = 3, 8
 
 DECAY_BLOCKS = 8
 """Blocks of the window over which distances must shrink from each to the next."""
+
+MAX_DECAY_PERIOD = 16
+"""Longest period whose steady approach is looked for."""
+
+STRAIGHTNESS = 0.8
+"""Least squared correlation of the logarithms of the blocks with time: a sudden drop is no steady approach."""
 
 DECAY_FACTOR = 4.0
 """How much they must shrink in all for the approach to count as periodic."""
@@ -138,18 +144,18 @@ def find_recurrence(
     recurrent = np.flatnonzero(residuals <= 1.0)
     if len(recurrent) == 0:
         return Recurrence(None, float(np.min(residuals)) * worst, None, None)
-    period = _true_period(scaled, int(recurrent[0]) + 1)
+    period = _true_period(tail, int(recurrent[0]) + 1)
     deviation = deviations(units, period)
     beyond = np.flatnonzero(deviation > 2.0)
     settle = int(beyond[-1]) + 1 if len(beyond) else 0
     return Recurrence(period, float(residuals[period - 1]) * worst, settle, _contraction(deviation, settle, period))
 
 
-def _true_period(scaled: Array, period: int) -> int:
+def _true_period(tail: Array, period: int) -> int:
     """The divisor of a period that the series still approaches steadily: an alternating decay repeats twice as well."""
     if period == 1:
         return 1
-    decay = find_decay(scaled, period // 2)
+    decay = find_decay(tail, period // 2)
     return decay.period if decay is not None and decay.factor >= DECAY_FACTOR and period % decay.period == 0 else period
 
 
@@ -184,26 +190,32 @@ class Decay:
     contraction: float
 
 
-def find_decay(scaled: Array, max_period: int = MAX_PERIOD) -> Decay | None:
+def find_decay(scaled: Array, max_period: int = MAX_DECAY_PERIOD) -> Decay | None:
     """Return the steady approach to a periodic motion that a series shows, or None.
 
-    The largest distance |x(n + k) - x(n)| of each of eight blocks must be smaller than that of the block before. Holds
+    The largest distance |x(n + k) - x(n)| of each of eight blocks must be smaller than that of the block before, and
+    their logarithms must fall nearly in a line. Holds
     for slow real and complex multipliers alike, and for the slower than geometric approach at a bifurcation. The
     smallest k counts for which they shrink to a quarter; if there is none, the smallest for which they shrink at all.
     """
     n = len(scaled)
     slow = None
-    for k in range(1, min(max_period, n // (2 * DECAY_BLOCKS)) + 1):
+    for k in range(1, min(max_period, MAX_DECAY_PERIOD, n // (2 * DECAY_BLOCKS)) + 1):
         distance = np.max(np.abs(scaled[k:] - scaled[:-k]), axis=1)
         length = len(distance) // DECAY_BLOCKS
         blocks = distance[len(distance) - DECAY_BLOCKS * length :].reshape(DECAY_BLOCKS, length).max(axis=1)
-        if np.all(blocks[1:] < blocks[:-1]):
+        if np.all(blocks[1:] < blocks[:-1]) and _straightness(np.log(np.maximum(blocks, 1e-300))) > STRAIGHTNESS:
             factor = float(blocks[0]) / max(float(blocks[-1]), 1e-300)
             decay = Decay(k, factor, factor ** (-1.0 / ((DECAY_BLOCKS - 1) * length)))
             if factor >= DECAY_FACTOR:
                 return decay
             slow = slow or decay
     return slow
+
+
+def _straightness(values: Array) -> float:
+    """Squared correlation of values with their index."""
+    return float(np.corrcoef(np.arange(len(values)), values)[0, 1] ** 2)
 
 
 def subtract_bands(series: Array, max_bands: int = 24, min_repeats: int = 30) -> tuple[Array, int]:

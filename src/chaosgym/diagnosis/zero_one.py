@@ -19,7 +19,7 @@ from chaosgym.diagnosis.stroboscopic import as_samples, subtract_bands
 
 Array = NDArray[np.float64]
 
-MAX_SAMPLES = 2000
+MAX_SAMPLES = 1000
 """Samples used at most, the last ones of the series."""
 
 FREQUENCIES = 100
@@ -53,10 +53,7 @@ def zero_one_statistic(series: ArrayLike, *, remove_bands: bool = True) -> float
     golden = (np.sqrt(5.0) - 1.0) / 2.0
     c = np.pi * (0.2 + 0.6 * ((np.arange(FREQUENCIES) * golden) % 1.0))
     walk = np.cumsum(x * np.exp(1j * np.outer(c, np.arange(1, n + 1))), axis=1)
-    displacement = np.empty((FREQUENCIES, lags))
-    kept = n - lags
-    for lag in range(1, lags + 1):
-        displacement[:, lag - 1] = np.mean(np.abs(walk[:, lag : lag + kept] - walk[:, :kept]) ** 2, axis=1)
+    displacement = _mean_square_displacement(walk, lags)
     steps = np.arange(1, lags + 1)
     oscillation = (x.mean() ** 2) * (1.0 - np.cos(np.outer(c, steps))) / (1.0 - np.cos(c))[:, None]
     growth = displacement - oscillation
@@ -64,3 +61,15 @@ def zero_one_statistic(series: ArrayLike, *, remove_bands: bool = True) -> float
     time = steps - steps.mean()
     norms = np.sqrt(np.sum(growth**2, axis=1) * np.sum(time**2))
     return float(np.median(growth @ time / np.where(norms > 0.0, norms, 1.0)))
+
+
+def _mean_square_displacement(walk: NDArray[np.complex128], lags: int) -> Array:
+    """Mean of |z(j + n) - z(j)|^2 over j for the lags n = 1 ... lags, (walks, lags), by the convolution theorem."""
+    walk = walk - walk.mean(axis=1, keepdims=True)
+    total = walk.shape[1]
+    kept = total - lags
+    length = 1 << int(np.ceil(np.log2(total + kept)))
+    cross = np.fft.ifft(np.fft.fft(walk, length) * np.conj(np.fft.fft(walk[:, :kept], length)))[:, 1 : lags + 1].real
+    squares = np.concatenate([np.zeros((len(walk), 1)), np.cumsum(np.abs(walk) ** 2, axis=1)], axis=1)
+    later = squares[:, kept + 1 : kept + lags + 1] - squares[:, 1 : lags + 1]
+    return np.asarray((later + squares[:, kept : kept + 1] - 2.0 * cross) / kept)

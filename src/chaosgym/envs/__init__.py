@@ -4,6 +4,7 @@ from gymnasium.envs.registration import register, registry
 
 ENVIRONMENTS = {
     "chaosgym/ImpactBeam-v0": "chaosgym.envs.impact_beam:ImpactBeamEnv",
+    "chaosgym/SliderCrank-v0": "chaosgym.envs.slider_crank:SliderCrankEnv",
 }
 """Entry point of each environment by id. A new machine adds one line."""
 

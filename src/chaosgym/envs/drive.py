@@ -32,14 +32,27 @@ class SpeedDrive:
     """Target speed of action +1."""
     slew_limit: float
     """Largest change of speed in one step."""
+    speed_grid: float = 0.0
+    """Spacing of the speeds that can be commanded, from the lowest one on; 0 if all can."""
 
     def __post_init__(self) -> None:
-        for name in ("lowest_speed", "highest_speed", "slew_limit"):
+        for name in ("lowest_speed", "highest_speed", "slew_limit", "speed_grid"):
             object.__setattr__(self, name, checked_number(name, getattr(self, name), 0.0, 1e6))
         if self.highest_speed <= self.lowest_speed:
             raise ParameterError(
                 f"highest_speed = {self.highest_speed:g} is out of range; allowed: above lowest_speed = "
                 f"{self.lowest_speed:g}"
+            )
+        if self.speed_grid > 0.0:
+            self._check_grid()
+
+    def _check_grid(self) -> None:
+        spaces = (self.highest_speed - self.lowest_speed) / self.speed_grid
+        if abs(spaces - round(spaces)) > 1e-9 * max(1.0, spaces) or self.speed_grid > self.slew_limit:
+            raise ParameterError(
+                f"speed_grid = {self.speed_grid:g} is out of range; allowed: 0, or up to slew_limit = "
+                f"{self.slew_limit:g} and a whole number of times in the range of {self.lowest_speed:g} to "
+                f"{self.highest_speed:g}"
             )
 
     def target_of(self, action: Any) -> tuple[float, float]:
@@ -54,12 +67,22 @@ class SpeedDrive:
         if not math.isfinite(value):
             raise ParameterError(f"action = {action!r} is not usable; allowed: one number from -1 to 1, shape (1,)")
         value = min(max(value, -1.0), 1.0)
-        return value, self.lowest_speed + 0.5 * (value + 1.0) * (self.highest_speed - self.lowest_speed)
+        target = self.lowest_speed + 0.5 * (value + 1.0) * (self.highest_speed - self.lowest_speed)
+        return value, self.rounded(target)
 
     def action_for(self, speed: float) -> float:
         """Return the action whose target is ``speed``."""
         return 2.0 * (speed - self.lowest_speed) / (self.highest_speed - self.lowest_speed) - 1.0
 
+    def rounded(self, speed: float) -> float:
+        """Return the speed nearest to ``speed`` that can be commanded."""
+        if self.speed_grid == 0.0:
+            return speed
+        return self.lowest_speed + self.speed_grid * round((speed - self.lowest_speed) / self.speed_grid)
+
     def approach(self, speed: float, target: float) -> float:
-        """Return the speed of the next step."""
-        return speed + min(max(target - speed, -self.slew_limit), self.slew_limit)
+        """Return the speed of the next step, between two speeds that can be commanded."""
+        limit = self.slew_limit
+        if self.speed_grid > 0.0:
+            limit = self.speed_grid * math.floor(limit / self.speed_grid * (1.0 + 1e-12))
+        return self.rounded(speed + min(max(target - speed, -limit), limit))

@@ -3,11 +3,9 @@
 from typing import Any
 
 from chaosgym.envs.drive import SpeedDrive
-from chaosgym.envs.machine_env import SENSOR_ERROR, MachineEnv
+from chaosgym.envs.machine_env import SENSOR_ERROR, MachineEnv, nominal_machine
 from chaosgym.envs.tasks import Task
-from chaosgym.errors import ParameterError
 from chaosgym.machines.impact_beam import THESIS_IMPACT_BEAM, ImpactBeam
-from chaosgym.machines.parameters import with_settings
 
 TOLERANCES = {"clearance": 0.2, "damping_ratio": 0.2, "length": 0.002}
 """Half widths as shares of the nominal value. Clearance: +-0.0254 mm at +-0.127 mm, the repeatability of the thesis'
@@ -175,12 +173,8 @@ class ImpactBeamEnv(MachineEnv):
         render_mode: str | None = None,
         **parameters: Any,
     ) -> None:
-        if ImpactBeam.speed_field in parameters:
-            raise ParameterError(
-                f"{ImpactBeam.speed_field} is what the agent commands; set lowest_speed and highest_speed instead"
-            )
         super().__init__(
-            with_settings(THESIS_IMPACT_BEAM, parameters),
+            nominal_machine(THESIS_IMPACT_BEAM, parameters),
             SpeedDrive(lowest_speed=lowest_speed, highest_speed=highest_speed, slew_limit=slew_limit),
             Task(job_cycles=job_cycles, cycles_per_step=cycles_per_step, force_limit=force_limit),
             tolerances=TOLERANCES,

@@ -5,6 +5,8 @@ changes and the motion goes on from the state in which the last step ended.
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
@@ -40,7 +42,30 @@ WIDEST_TOLERANCE = 4.0
 RENDER_SAMPLES = 1000
 """Samples of the motion kept in each cycle for rendering."""
 
+KEPT_MACHINES = 256
+"""Machines at one speed that are kept: checking all fields of a new one takes longer than a look-up."""
+
 METADATA: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}
+
+
+def nominal_machine(reference: Machine, parameters: Mapping[str, Any]) -> Machine:
+    """Return the reference machine with some fields replaced, but not its speed.
+
+    Raises
+    ------
+    ParameterError
+        If a field is the speed, unknown, or out of range.
+    """
+    if reference.speed_field in parameters:
+        raise ParameterError(
+            f"{reference.speed_field} is what the agent commands; set lowest_speed and highest_speed instead"
+        )
+    return with_settings(reference, parameters)
+
+
+@lru_cache(maxsize=KEPT_MACHINES)
+def _at_speed(machine: Machine, speed: float) -> Machine:
+    return with_settings(machine, {machine.speed_field: speed})
 
 
 class MachineEnv(gym.Env[Observation, Action]):
@@ -90,7 +115,7 @@ class MachineEnv(gym.Env[Observation, Action]):
             raise ParameterError(f"render_mode = {render_mode!r} is not one of None, human, rgb_array")
         self.render_mode = render_mode
         self.nominal, self.drive, self.task = machine, drive, task
-        self._tolerances, self._is_type_iii = tolerances, is_type_iii
+        self.tolerances, self._is_type_iii = dict(tolerances), is_type_iii
         self._tolerance = checked_number("tolerance", tolerance, 0.0, WIDEST_TOLERANCE)
         self._sensor_error = checked_number("sensor_error", sensor_error, 0.0, FORCE_RANGE * task.force_limit)
         self.observation_names = observation_names(task.cycles_per_step)
@@ -99,15 +124,11 @@ class MachineEnv(gym.Env[Observation, Action]):
         )
         self.observation_space = cast(Space[Observation], self._space)
         self.action_space = cast(Space[Action], Box(-1.0, 1.0, (1,), np.float32))
-        self.machine = self._at_speed(machine, drive.lowest_speed)
-        self._job_time = task.job_cycles * self._at_speed(machine, drive.highest_speed).cycle_period
+        self.machine = _at_speed(machine, drive.lowest_speed)
+        self._job_time = task.job_cycles * _at_speed(machine, drive.highest_speed).cycle_period
         self._damage = np.zeros(len(machine.sides))
         self._motion: MotionState | None = None
         self._dashboard: Dashboard | None = None
-
-    @staticmethod
-    def _at_speed(machine: Machine, speed: float) -> Machine:
-        return with_settings(machine, {machine.speed_field: speed})
 
     @property
     def speed(self) -> float:
@@ -122,20 +143,25 @@ class MachineEnv(gym.Env[Observation, Action]):
     def _draw_machine(self) -> Machine:
         if self._tolerance == 0.0:
             return self.nominal
-        factors = 1.0 + self._tolerance * self.np_random.uniform(-1.0, 1.0, len(self._tolerances)) * np.array(
-            list(self._tolerances.values())
+        factors = 1.0 + self._tolerance * self.np_random.uniform(-1.0, 1.0, len(self.tolerances)) * np.array(
+            list(self.tolerances.values())
         )
         drawn = {
             name: getattr(self.nominal, name) * float(factor)
-            for name, factor in zip(self._tolerances, factors, strict=True)
+            for name, factor in zip(self.tolerances, factors, strict=True)
         }
         return with_settings(self.nominal, drawn)
 
     def _run(self, cycles: int) -> CycleRecord:
-        samples = 0 if self.render_mode is None else RENDER_SAMPLES
-        record = simulate(self.machine, cycles, self._motion, samples_per_cycle=samples)
+        record = simulate(self.machine, cycles, self._motion)
         self._motion = record.final_state
         return record
+
+    def _shown(self) -> CycleRecord:
+        """Last step with a time history, each cycle run once more from its start: showing it changes no bit of it."""
+        machine = self._record.machine
+        runs = [simulate(machine, 1, state, samples_per_cycle=RENDER_SAMPLES) for state in self._record.section]
+        return replace(self._record, history=np.concatenate([run.history for run in runs if run.history is not None]))
 
     def _observe(self) -> Observation:
         measured = measured_peaks(self._record, self._sensor_error, self.np_random)
@@ -163,7 +189,8 @@ class MachineEnv(gym.Env[Observation, Action]):
         """
         super().reset(seed=seed)
         speed = self._starting_speed(options or {})
-        self.machine = self._at_speed(self._draw_machine(), speed)
+        self._drawn = self._draw_machine()
+        self.machine = _at_speed(self._drawn, speed)
         self._motion = None
         self._action = self.drive.action_for(speed)
         self._cycles_done = 0
@@ -172,7 +199,7 @@ class MachineEnv(gym.Env[Observation, Action]):
         self._recent_peaks = run_in.peak_force[:, 0]
         self._record = run_in.after(len(run_in) - self.task.cycles_per_step)
         if self.render_mode is not None:
-            self._show().start(self._record)
+            self._show().start(self._shown())
             if self.render_mode == "human":
                 self.render()
         return self._observe(), {"speed": speed, "damage": 0.0, "status": int(Status.RUNNING)}
@@ -182,7 +209,7 @@ class MachineEnv(gym.Env[Observation, Action]):
             if name != "speed":
                 raise ParameterError(f"options has no entry {name!r}; allowed: speed")
         low, high = self.drive.lowest_speed, self.drive.highest_speed
-        return checked_number("options['speed']", options.get("speed", low), low, high)
+        return self.drive.rounded(checked_number("options['speed']", options.get("speed", low), low, high))
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Run one step; a simulation that fails ends the job instead of raising.
@@ -199,7 +226,7 @@ class MachineEnv(gym.Env[Observation, Action]):
         self._action, target = self.drive.target_of(action)
         speed = self.drive.approach(self.speed, target)
         if speed != self.speed:
-            self.machine = self._at_speed(self.machine, speed)
+            self.machine = _at_speed(self._drawn, speed)
         cycles = self.task.cycles_per_step
         damage_before = self.damage
         try:
@@ -229,7 +256,7 @@ class MachineEnv(gym.Env[Observation, Action]):
         if status != Status.RUNNING:
             self._motion = None
         if self.render_mode is not None:
-            self._show().add(self._record, type_iii)
+            self._show().add(self._shown(), type_iii)
             if self.render_mode == "human":
                 self.render()
         return observation, reward, status != Status.RUNNING, False, info

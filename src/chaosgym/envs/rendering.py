@@ -1,4 +1,4 @@
-"""What does a step look like? The tip in its gap, its phase portrait, the contact force, and the job so far."""
+"""What does a step look like? The machine in motion, its phase portrait, the contact force, and the job so far."""
 
 from typing import Any
 
@@ -8,19 +8,18 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chaosgym.envs.drive import SpeedDrive
+from chaosgym.envs.pictures import CALM, INK, LIMIT, PALE, PICTURES, WILD, samples_of
 from chaosgym.envs.tasks import Task
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.simulation import CycleRecord
 
-INK, PALE, CALM, WILD, LIMIT = "#1f2933", "#cbd2d9", "#1f77b4", "#d1495b", "#e09f3e"
-"""Colours: text and beam, background lines, repeating steps, steps that count as Type III, force limit."""
-
 SIZE = (9.6, 6.4)
 DOTS_PER_INCH = 100
 
-GHOSTS = 60
-"""Earlier positions shown behind the beam."""
+STROBE = 12
+"""Each step is shown at a moment of its last cycle, this fraction of a cycle later than the step before: every step
+ends at the same phase, so that the machine would stand still otherwise."""
 
 
 class Dashboard:
@@ -38,7 +37,7 @@ class Dashboard:
 
     def __init__(self, machine: Machine, drive: SpeedDrive, task: Task, *, window: bool) -> None:
         self._drive, self._task = drive, task
-        self._draw_machine = PICTURES[machine.name]
+        self._picture = PICTURES[machine.name]
         self._unit = parameters_of(machine)[machine.speed_field].unit
         if window:
             from matplotlib import pyplot
@@ -59,13 +58,14 @@ class Dashboard:
         self._speeds: list[float] = []
         self._peaks: list[NDArray[np.float64]] = []
         self._wild: list[bool] = []
-        self._top_velocity = 0.0
+        self._top_velocity = self._top_force = 0.0
         self._record = record
 
     def add(self, record: CycleRecord, type_iii: bool) -> None:
         """Take in a step."""
         self._speeds.append(_speed(record))
         self._peaks.append(record.peak_force[:, 0])
+        self._top_force = max(self._top_force, float(record.peak_force.max()))
         self._wild.append(type_iii)
         self._record = record
 
@@ -78,7 +78,7 @@ class Dashboard:
             panel.tick_params(colors=INK, labelsize=8)
             panel.spines[["top", "right"]].set_visible(False)
         picture, portrait, force, job = self._panels
-        self._draw_machine(picture, record, colour)
+        self._picture.draw(picture, record, colour, (len(self._speeds) % STROBE) / STROBE, self._task.force_limit)
         self._draw_portrait(portrait, record, colour)
         self._draw_force(force, record, colour)
         self._draw_job(job)
@@ -108,25 +108,29 @@ class Dashboard:
         )  # fmt: skip
 
     def _draw_portrait(self, panel: Any, record: CycleRecord, colour: str) -> None:
-        samples = _samples(record)
-        gap = _clearance(record) * 1e3
+        samples = samples_of(record)
+        gap = self._picture.room(record.machine) * 1e3
         panel.axvspan(gap, 10.0 * gap, color=PALE, alpha=0.5, linewidth=0)
         panel.axvspan(-10.0 * gap, -gap, color=PALE, alpha=0.5, linewidth=0)
         panel.plot(samples[:, 0] * 1e3, samples[:, 1], color=colour, linewidth=0.8)
         panel.plot(record.displacement * 1e3, record.velocity, "o", color=INK, markersize=4)
         self._top_velocity = max(self._top_velocity, float(np.abs(samples[:, 1]).max()))
-        panel.set(xlim=(-1.15 * gap, 1.15 * gap), ylim=(-1.1 * self._top_velocity, 1.1 * self._top_velocity))
+        reach = max(1.15 * gap, 1.05e3 * float(np.abs(samples[:, 0]).max()))
+        panel.set(xlim=(-reach, reach), ylim=(-1.1 * self._top_velocity, 1.1 * self._top_velocity))
         panel.set_title("Phase portrait; dots: start of each cycle", fontsize=9, loc="left", color=INK)
         panel.set_xlabel("displacement [mm]", fontsize=8, color=INK)
         panel.set_ylabel("velocity [m/s]", fontsize=8, color=INK)
 
+    def _force_range(self) -> float:
+        return 1.15 * max(self._task.force_limit, self._top_force)
+
     def _draw_force(self, panel: Any, record: CycleRecord, colour: str) -> None:
-        force = _samples(record)[:, 2]
+        force = samples_of(record)[:, 2]
         cycles = len(record)
         panel.axhline(self._task.force_limit, color=LIMIT, linewidth=1.0, linestyle="--")
         panel.axhline(-self._task.force_limit, color=LIMIT, linewidth=1.0, linestyle="--")
         panel.fill_between(np.arange(len(force)) * cycles / len(force), force, color=colour, linewidth=0.6)
-        panel.set(xlim=(0, cycles), ylim=(-1.15 * self._task.force_limit, 1.15 * self._task.force_limit))
+        panel.set(xlim=(0, cycles), ylim=(-self._force_range(), self._force_range()))
         panel.set_title("Contact force in this step", fontsize=9, loc="left", color=INK)
         panel.set_xlabel("cycle", fontsize=8, color=INK)
         panel.set_ylabel("force [N]", fontsize=8, color=INK)
@@ -139,7 +143,7 @@ class Dashboard:
         for chosen, colour in ((~wild, CALM), (wild, WILD)):
             panel.plot(cycle[chosen], peaks[chosen], ".", color=colour, markersize=3)
         panel.axhline(self._task.force_limit, color=LIMIT, linewidth=1.0, linestyle="--")
-        panel.set(xlim=(0, self._task.job_cycles), ylim=(0, 1.15 * self._task.force_limit))
+        panel.set(xlim=(0, self._task.job_cycles), ylim=(0, self._force_range()))
         panel.set_title("Job: peak force (dots) and speed (line)", fontsize=9, loc="left", color=INK)
         panel.set_xlabel("cycle", fontsize=8, color=INK)
         panel.set_ylabel("peak force [N]", fontsize=8, color=INK)
@@ -151,49 +155,5 @@ class Dashboard:
         axis.set_ylabel(f"speed [{self._unit}]", fontsize=8, color=INK)
 
 
-def _samples(record: CycleRecord) -> NDArray[np.float64]:
-    assert record.history is not None
-    return record.history.reshape(-1, 3)
-
-
-def _clearance(record: CycleRecord) -> float:
-    return float(getattr(record.machine, record.machine.clearance_field))
-
-
 def _speed(record: CycleRecord) -> float:
     return float(getattr(record.machine, record.machine.speed_field))
-
-
-def draw_beam(panel: Any, record: CycleRecord, colour: str) -> None:
-    """Draw the beam between its sensors at the end of the step, its earlier positions pale, deflection exaggerated."""
-    gap = 0.13
-    tip = _samples(record)[:, 0] / _clearance(record) * gap
-    along = np.linspace(0.0, 1.0, 2)
-    for deflection in tip[:: max(1, len(tip) // GHOSTS)]:
-        panel.plot(along, deflection * along, color=PALE, linewidth=1.2, alpha=0.45, solid_capstyle="round")
-    push = 0.65
-    panel.annotate(
-        "", (push, push * tip[-1] - 0.02), (push, -0.24), arrowprops={"arrowstyle": "<|-|>", "color": INK, "lw": 1.2}
-    )
-    panel.text(push, -0.26, "shaker", ha="center", va="top", fontsize=8, color=INK)
-    panel.plot(along, tip[-1] * along, color=INK, linewidth=6.0, solid_capstyle="round")
-    panel.fill_between([-0.09, -0.05], -0.1, 0.1, color=PALE, linewidth=0)
-    panel.plot([-0.05, 0.0], [0.0, 0.0], color=INK, linewidth=2.0)
-    panel.plot(0.0, 0.0, marker="o", color="white", markeredgecolor=INK, markeredgewidth=2.5, markersize=9)
-    panel.text(-0.09, -0.12, "flexure pivot", ha="left", va="top", fontsize=8, color=INK)
-    for side, (name, sign) in enumerate(zip(record.machine.sides, (1.0, -1.0), strict=True)):
-        peak = float(record.peak_force[:, side].max())
-        edge = sign * (gap + 0.014)
-        panel.fill_between([0.93, 1.07], edge, edge + sign * 0.05, color=colour, linewidth=0)
-        panel.text(1.0, edge + sign * 0.07, f"{name} sensor: {peak:.0f} N", ha="center", fontsize=8, color=INK,
-                   va="bottom" if sign > 0 else "top")  # fmt: skip
-    panel.set(xlim=(-0.1, 1.24), ylim=(-0.32, 0.32))
-    panel.set_title(
-        f"Beam in its gap of ±{_clearance(record) * 1e3:.3g} mm, exaggerated; peak forces of the step",
-        fontsize=9, loc="left", color=INK,
-    )  # fmt: skip
-    panel.axis("off")
-
-
-PICTURES = {"impact-beam": draw_beam}
-"""What draws a machine, by its name."""

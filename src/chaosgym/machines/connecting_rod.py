@@ -84,6 +84,12 @@ class ConnectingRod(NamedTuple):
         Angular frequencies [rad/s] of the modes.
     line_mass : float
         Mass per length of the bar [kg/m].
+    position, weight : (p,)
+        Integration points along the bar, and the lengths [m] they stand for.
+    mode_shape : (p, n_modes)
+        Deflection of the modes at the integration points.
+    mode_slope : (2, n_modes)
+        Slope of the modes at A and B [1/m].
     """
 
     mass: Array
@@ -95,6 +101,10 @@ class ConnectingRod(NamedTuple):
     load: Load
     mode_frequency: Array
     line_mass: float
+    position: Array
+    weight: Array
+    mode_shape: Array
+    mode_slope: Array
 
 
 def _symmetric(matrix: Array) -> Array:
@@ -192,4 +202,8 @@ def connecting_rod(bar: Bar, housing: EndBody, yoke: EndBody, n_modes: int, elem
         load=Load(*(load @ basis)),
         mode_frequency=frequency,
         line_mass=line_mass,
+        position=points.position,
+        weight=points.weight,
+        mode_shape=across @ basis[:, MODES:],
+        mode_slope=basis[[3, size - 1], MODES:],
     )

@@ -51,21 +51,31 @@ BALL_ACROSS = "ball across the rod"
 SLIDER_ALONG = "slider along the guide"
 SLIDER_ACROSS = "slider across the guide"
 SLIDER_PITCH = "slider pitch"
+BALL_LATERAL = "ball sideways"
+SLIDER_LATERAL = "slider sideways"
+BALL_DIRECTIONS = (BALL_ALONG, BALL_ACROSS, BALL_LATERAL)
 
 
-def degrees_of_freedom(machine: "SliderCrank") -> tuple[str, ...]:
-    """Names of the coordinates that the scene of a machine requires, in their order."""
+def degrees_of_freedom(machine: "SliderCrank", spatial: bool = False) -> tuple[str, ...]:
+    """Names of the coordinates that the scene of a machine requires, in their order.
+
+    ``spatial`` adds the sideways motion that a motor at an angle excites, also where it stands straight.
+    """
+    spatial = spatial or machine.is_spatial
     names: list[str] = []
     if machine.ball_joint != "ideal":
         names += [BALL_ALONG, BALL_ACROSS]
+        names += [BALL_LATERAL] if spatial else []
     if machine.rod == "flexible":
         names.append(SLIDER_ALONG)
     if machine.slider_joint != "ideal":
         names.append(SLIDER_ACROSS)
+        names += [SLIDER_LATERAL] if spatial else []
     if machine.slider_joint == "instrumented":
         names.append(SLIDER_PITCH)
     if machine.rod == "flexible":
         names += [f"rod mode {i + 1}" for i in range(machine.n_modes)]
+        names += [f"sideways rod mode {i + 1}" for i in range(machine.n_modes)] if spatial else []
     return tuple(names)
 
 
@@ -103,32 +113,40 @@ class _Inertia(NamedTuple):
     slider_across: Array
 
 
+def bar_of(machine: "SliderCrank") -> Bar:
+    """The rod without its end bodies."""
+    return Bar(machine.rod_length, machine.rod_diameter, machine.youngs_modulus, machine.density)
+
+
 def rod_of(machine: "SliderCrank") -> ConnectingRod:
     """Rod with its end bodies, in the coordinates that the scene requires."""
-    return connecting_rod(
-        Bar(machine.rod_length, machine.rod_diameter, machine.youngs_modulus, machine.density),
-        EndBody(
-            machine.housing_mass, machine.housing_inertia, machine.housing_offset_along, machine.housing_offset_across
-        ),
-        EndBody(machine.yoke_mass, machine.yoke_inertia, machine.yoke_offset_along, machine.yoke_offset_across),
-        machine.n_modes if machine.rod == "flexible" else 0,
-        ELEMENTS,
+    housing = EndBody(
+        machine.housing_mass, machine.housing_inertia, machine.housing_offset_along, machine.housing_offset_across
     )
+    yoke = EndBody(machine.yoke_mass, machine.yoke_inertia, machine.yoke_offset_along, machine.yoke_offset_across)
+    modes = machine.n_modes if machine.rod == "flexible" else 0
+    return connecting_rod(bar_of(machine), housing, yoke, modes, ELEMENTS)
+
+
+def mode_damping(machine: "SliderCrank", rod: ConnectingRod) -> tuple[Array, Array]:
+    """Stiffness and structural damping of stretch and modes, (1 + n_modes,) each, by the machine's damping family."""
+    stretch = rod.stiffness[ALONG_B, ALONG_B]
+    stiffness = np.concatenate([[stretch], rod.mode_frequency**2])
+    if machine.damping_family == "stiffness":
+        return stiffness, np.asarray(stiffness * 2.0 * machine.damping_ratio / rod.mode_frequency[0])
+    moving = machine.slider_mass + machine.yoke_mass + rod.line_mass * machine.rod_length / 3.0
+    inertia = np.concatenate([[moving], np.ones(len(rod.mode_frequency))])
+    return stiffness, np.asarray(2.0 * machine.damping_ratio * np.sqrt(stiffness * inertia))
 
 
 def _structural_damping(machine: "SliderCrank", rod: ConnectingRod) -> Array:
-    """C of the rod coordinates: zero for a rigid rod, otherwise by the machine's damping family."""
+    """C of the rod coordinates; zero for a rigid rod."""
     damping = np.zeros_like(rod.stiffness)
-    if machine.rod == "rigid":
-        return damping
-    if machine.damping_family == "stiffness":
-        return np.asarray(rod.stiffness * 2.0 * machine.damping_ratio / rod.mode_frequency[0])
-    modes = slice(MODES, MODES + len(rod.mode_frequency))
-    damping[modes, modes] = np.diag(2.0 * machine.damping_ratio * rod.mode_frequency)
-    moving = machine.slider_mass + machine.yoke_mass + rod.line_mass * machine.rod_length / 3.0
-    axial = 2.0 * machine.damping_ratio * math.sqrt(rod.stiffness[ALONG_B, ALONG_B] * moving)
-    for i, j, sign in ((ALONG_A, ALONG_A, 1), (ALONG_A, ALONG_B, -1), (ALONG_B, ALONG_A, -1), (ALONG_B, ALONG_B, 1)):
-        damping[i, j] += sign * axial
+    if machine.rod == "flexible":
+        _, (stretch, *modes) = mode_damping(machine, rod)
+        damping[MODES:, MODES:] = np.diag(modes)
+        ends = [ALONG_A, ALONG_B]
+        damping[np.ix_(ends, ends)] = stretch * np.array([[1.0, -1.0], [-1.0, 1.0]])
     return damping
 
 

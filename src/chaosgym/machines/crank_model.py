@@ -17,8 +17,18 @@ from numpy.typing import NDArray
 from chaosgym.core.crank_propagator import FORCING_TERMS, propagator_table, series_order
 from chaosgym.core.crank_stepper import HERTZ, LINEAR, SteppedCrankModel
 from chaosgym.core.slider_crank import SliderCrankModel
-from chaosgym.machines.crank_equations import BALL_ACROSS, BALL_ALONG, SLIDER_ACROSS, SLIDER_PITCH, equations, rod_of
-from chaosgym.machines.kinematics import planar_motion
+from chaosgym.machines.crank_equations import (
+    BALL_ACROSS,
+    BALL_DIRECTIONS,
+    SLIDER_ACROSS,
+    SLIDER_LATERAL,
+    SLIDER_PITCH,
+    Equations,
+    equations,
+    rod_of,
+)
+from chaosgym.machines.kinematics import slider_rate
+from chaosgym.machines.spatial_equations import spatial_equations, spatial_loads
 
 if TYPE_CHECKING:
     from chaosgym.machines.slider_crank import SliderCrank
@@ -63,51 +73,61 @@ class _Channels(NamedTuple):
     slides: NDArray[np.bool_]
 
 
+def _unit_row(machine: "SliderCrank", *names: str) -> Array:
+    """One row for each name that picks this coordinate, (len(names), n)."""
+    return np.array([[float(name == other) for other in machine.degrees_of_freedom] for name in names])
+
+
 def _slider_channels(machine: "SliderCrank") -> _Channels:
-    """One gap at the pivot, or two stations of sensors that share stiffness and damping."""
-    names = machine.degrees_of_freedom
-    instrumented = machine.slider_joint == "instrumented"
-    stations = (machine.sensor_distance, -machine.sensor_distance) if instrumented else (0.0,)
-    count = len(stations)
-    row = np.zeros((count, len(names)))
-    row[:, names.index(SLIDER_ACROSS)] = 1.0
-    if instrumented:
-        row[:, names.index(SLIDER_PITCH)] = stations
-    monitored = 1.0 if machine.monitored_joint == "slider" else 0.0
+    """One gap above and below the pivot, or two stations of sensors that share stiffness and damping.
+
+    A motor at an angle adds the gap to either side.
+    """
+    row = _unit_row(machine, SLIDER_ACROSS)
+    reading = np.array([[0.0, -1.0, 0.0]])
+    share = 1.0
+    if machine.slider_joint == "instrumented":
+        pitch = machine.sensor_distance * _unit_row(machine, SLIDER_PITCH)
+        row, reading, share = np.concatenate([row + pitch, row - pitch]), np.repeat(reading, 2, axis=0), 0.5
+    elif machine.is_spatial:
+        row = _unit_row(machine, SLIDER_ACROSS, SLIDER_LATERAL)
+        reading = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
+    count = len(row)
     return _Channels(
         row=row,
-        stiffness=np.full(count, machine.contact_stiffness / count),
-        damping=np.full(count, machine.contact_damping / count),
+        stiffness=np.full(count, share * machine.contact_stiffness),
+        damping=np.full(count, share * machine.contact_damping),
         two_sided=np.ones(count, dtype=bool),
-        reading=np.tile([0.0, -monitored], (count, 1)),
+        reading=reading * (machine.monitored_joint == "slider"),
         slides=np.ones(count, dtype=bool),
     )
 
 
-def _ball_channels(machine: "SliderCrank") -> _Channels:
-    """Four tetrahedral sensors, symmetric to the plane: two lie in it, the other two act as one with half the lift.
-
-    Two sensors enclose the angle of arccos(-1/3) in the plane; the other two lean to either side of it, so their
-    normals have the length 1 / sqrt(3) in the plane and their pushes across it cancel.
-    """
-    names = machine.degrees_of_freedom
+def _sensor_normals(machine: "SliderCrank") -> Array:
+    """Normals (4, 3) of the tetrahedral sensors (along, across, sideways): two in the plane, two mirrored by it."""
     angle = math.radians(machine.ball_sensor_angle)
-    axis = np.array([math.cos(angle), math.sin(angle)])
-    across = np.array([-axis[1], axis[0]])
-    normal = np.array([[1.0, math.sqrt(2.0)], [1.0, -math.sqrt(2.0)], [-1.0, 0.0]]) @ np.array([axis, across])
-    normal /= math.sqrt(3.0)
+    axis, across = np.array([math.cos(angle), math.sin(angle), 0.0]), np.array([-math.sin(angle), math.cos(angle), 0.0])
+    sideways = np.array([0.0, 0.0, 1.0])
+    lean = math.sqrt(2.0)
+    normals = [axis + lean * across, axis - lean * across, -axis + lean * sideways, -axis - lean * sideways]
+    return np.array(normals) / math.sqrt(3.0)
+
+
+def _ball_channels(machine: "SliderCrank") -> _Channels:
+    """Four tetrahedral sensors; in the plane the two that lean to either side of it act as one with half the lift."""
+    normal = _sensor_normals(machine)
+    sensors = np.ones(4)
+    if not machine.is_spatial:
+        normal, sensors = np.array([*normal[:2], normal[2:].mean(axis=0)]), np.array([1.0, 1.0, 2.0])
     # the ball's eccentricity in its housing is minus the motion of the rod's end
-    row = np.zeros((3, len(names)))
-    row[:, [names.index(BALL_ALONG), names.index(BALL_ACROSS)]] = -normal
-    sensors = np.array([1.0, 1.0, 2.0])
-    monitored = 1.0 if machine.monitored_joint == "ball" else 0.0
+    names = BALL_DIRECTIONS if machine.is_spatial else BALL_DIRECTIONS[:2]
     return _Channels(
-        row=row,
+        row=-normal[:, : len(names)] @ _unit_row(machine, *names),
         stiffness=machine.contact_stiffness * sensors,
         damping=machine.contact_damping * sensors,
-        two_sided=np.zeros(3, dtype=bool),
-        reading=monitored * normal,
-        slides=np.zeros(3, dtype=bool),
+        two_sided=np.zeros(len(sensors), dtype=bool),
+        reading=normal * (machine.monitored_joint == "ball"),
+        slides=np.zeros(len(sensors), dtype=bool),
     )
 
 
@@ -121,15 +141,14 @@ def _channels(machine: "SliderCrank") -> _Channels:
 
 
 def _gaps(machine: "SliderCrank") -> Array:
-    slider = {"ideal": 0, "clearance": 1, "instrumented": 2}[machine.slider_joint]
-    ball = 3 if machine.ball_joint == "instrumented" else 0
+    slider = {"ideal": 0, "clearance": 2 if machine.is_spatial else 1, "instrumented": 2}[machine.slider_joint]
+    ball = (4 if machine.is_spatial else 3) if machine.ball_joint == "instrumented" else 0
     return np.array([machine.slider_clearance] * slider + [machine.ball_clearance] * ball)
 
 
 def _display(machine: "SliderCrank") -> Array:
     """Displacement of the monitored joint: of the slider across the guide, or of the rod's end across the rod."""
-    name = SLIDER_ACROSS if machine.monitored_joint == "slider" else BALL_ACROSS
-    return np.array([float(other == name) for other in machine.degrees_of_freedom])
+    return np.asarray(_unit_row(machine, SLIDER_ACROSS if machine.monitored_joint == "slider" else BALL_ACROSS)[0])
 
 
 class _Joint(NamedTuple):
@@ -160,10 +179,9 @@ def _joints(machine: "SliderCrank") -> list[_Joint]:
             for j in range(len(gaps))
         ]
     if machine.ball_joint == "spherical":
-        names = machine.degrees_of_freedom
-        row = np.array([[-float(name == other) for name in names] for other in (BALL_ALONG, BALL_ACROSS)])
-        monitored = 1.0 if machine.monitored_joint == "ball" else 0.0
-        joints.append(_Joint(row, machine.ball_clearance, 1.0, True, monitored * np.eye(2), False))
+        names = BALL_DIRECTIONS if machine.is_spatial else BALL_DIRECTIONS[:2]
+        reading = np.eye(3)[: len(names)] * (machine.monitored_joint == "ball")
+        joints.append(_Joint(-_unit_row(machine, *names), machine.ball_clearance, 1.0, True, reading, False))
     return joints
 
 
@@ -181,22 +199,28 @@ def _hertz(machine: "SliderCrank") -> tuple[float, float]:
     return stiffness, 1.5 * (1.0 - restitution) / speed
 
 
+def _assembled(machine: "SliderCrank", middles: Array, nodes: Array) -> tuple[Equations, Array]:
+    """Equations at the middles of the bins and loads at the nodes of the forcing, in the plane or in space."""
+    if machine.is_spatial:
+        return spatial_equations(machine, middles), spatial_loads(machine, nodes)
+    rod = rod_of(machine)
+    return equations(machine, middles, rod), equations(machine, nodes, rod).load
+
+
 @lru_cache(maxsize=KEPT)
 def _held(kind: type, *structure: Any) -> tuple[Array, Array, Array, Array]:
     """Inverse mass, free accelerations and forcing of all bins as in ``_Structure``, and friction per newton."""
     machine = kind(**dict(zip(_structure_fields(kind), structure, strict=True)))
-    rod = rod_of(machine)
     bins = round(360.0 / machine.matrix_update_interval)
     width = 2.0 * math.pi / bins
     middles = np.array([(b + 0.5) * width for b in range(bins)])
-    held = equations(machine, middles, rod)
+    nodes = FORCING_TERMS - 1
+    held, loads = _assembled(machine, middles, np.array([k * width / nodes for k in range(bins * nodes)]))
     n = held.mass.shape[-1]
     inverse_mass = np.asarray(np.linalg.inv(held.mass), dtype=np.float64)
     free = np.zeros((3, bins, 2 * n, n))
     free[:, :, :n] = -np.swapaxes(inverse_mass @ held.stiffness, -1, -2)
     free[:2, :, n:] = -np.swapaxes(inverse_mass @ held.damping, -1, -2)
-    nodes = FORCING_TERMS - 1
-    loads = equations(machine, np.array([k * width / nodes for k in range(bins * nodes)]), rod).load
     friction = _friction(machine, middles)[:, None] * held.slider_along
     return inverse_mass, free, _forcing(inverse_mass, loads), friction
 
@@ -230,7 +254,7 @@ def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankMode
         bin_duration=duration,
         steps=max(1, math.ceil(duration * max(4.0 * contact / step_phase, spectrum / STABLE_PHASE))),
         contact_rate=contact,
-        acceleration=acceleration,
+        acceleration=np.ascontiguousarray(np.swapaxes(acceleration, -1, -2)),
         first=first,
         row=row,
         answer=answer,
@@ -241,6 +265,7 @@ def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankMode
         law=LINEAR if linear else HERTZ,
         two_sided=np.array([joint.two_sided for joint in joints]),
         reading=np.concatenate([joint.reading for joint in joints]),
+        monitored=np.array([bool(np.any(joint.reading)) for joint in joints]),
         display=_display(machine),
     )
 
@@ -317,8 +342,8 @@ def _structure(kind: type, *structure: Any) -> _Structure:
 
 def _friction(machine: "SliderCrank", crank_angle: Array) -> Array:
     """Friction coefficient with the sign of the nominal slider velocity, ramped through zero."""
-    motion = planar_motion(crank_angle, machine.crank_radius, machine.rod_length)
-    speed = motion.slider_rate / (machine.friction_ramp * machine.crank_radius)
+    rate = slider_rate(crank_angle, machine.crank_radius, machine.rod_length, math.radians(machine.motor_angle))
+    speed = rate / (machine.friction_ramp * machine.crank_radius)
     return np.asarray(machine.friction_coefficient * np.clip(speed, -1.0, 1.0))
 
 
@@ -348,6 +373,7 @@ def _at_speed(crank_speed: float, step_phase: float, *structure: Any) -> SliderC
         two_sided=parts.channels.two_sided,
         radix=parts.radix,
         reading=parts.channels.reading,
+        reach=np.linalg.norm(parts.channels.reading, axis=1),
         display=parts.display,
         acceleration=acceleration,
         curvature=np.ascontiguousarray(np.einsum("jn,sbcn->sbjc", parts.channels.row, acceleration)),

@@ -35,6 +35,10 @@ class Machine(Protocol):
         """Natural frequencies [Hz] of the machine free of contact, those of the kept modes."""
         ...
 
+    def __hash__(self) -> int:
+        """Equal fields, equal hash: results of a machine can be kept."""
+        ...
+
     def reduce(self) -> Any:
         """Return the model, a NamedTuple of numbers and arrays, that the kernels integrate."""
         ...

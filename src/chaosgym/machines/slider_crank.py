@@ -220,8 +220,12 @@ class SliderCrank:
                     f"{field} = {getattr(self, field):g} kg m^2 is out of range; "
                     f"allowed: from mass times squared offset, {least:g} kg m^2, on"
                 )
-        if self.motor_angle != 0.0:
-            raise ParameterError(f"motor_angle = {self.motor_angle:g} deg is not implemented yet; allowed: 0 deg")
+        if self.is_spatial and self.slider_joint == "instrumented":
+            raise ParameterError(
+                "slider_joint = 'instrumented' needs a motor at 0 deg; allowed at an angle: 'ideal', 'clearance'"
+            )
+        if self.is_spatial and self.geometric_stiffness == "on":
+            raise ParameterError("geometric_stiffness = 'on' needs a motor at 0 deg; allowed at an angle: 'off'")
 
     @property
     def cycle_period(self) -> float:
@@ -260,6 +264,11 @@ class SliderCrank:
     def degrees_of_freedom(self) -> tuple[str, ...]:
         """Names of the coordinates that are integrated: only those that the scene requires."""
         return degrees_of_freedom(self)
+
+    @property
+    def is_spatial(self) -> bool:
+        """True if the motor stands at an angle, so that the rod swings in two planes."""
+        return self.motor_angle > 0.0
 
     @property
     def is_piecewise_linear(self) -> bool:

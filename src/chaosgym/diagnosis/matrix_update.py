@@ -1,0 +1,198 @@
+r"""Is the response sensitive to small disturbances? The Matrix Update Test (thesis 5.2.2).
+
+A machine whose matrices depend on its configuration is run twice, with two slightly different intervals between
+updates of these matrices. Each update disturbs the motion a little, so the two runs amount to two initial conditions.
+
+    literal      both from rest; "if the outcomes agree at each observation, the response is periodic; if they are
+                 different at each observation, chaotic". Calls periodic responses chaotic whose two runs end on
+                 different coexisting motions, in a different phase of one motion, or settle slowly.
+    attractors   both from one settled state; what they end in is compared, after the best shift by whole cycles. Two
+                 runs that repeat are periodic even if they differ; two that do not repeat and part are chaotic.
+"""
+
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chaosgym.diagnosis.response import Diagnosis
+from chaosgym.diagnosis.stroboscopic import as_samples, find_decay, find_recurrence, scales
+from chaosgym.errors import DiagnosisError
+from chaosgym.machines import Machine
+from chaosgym.machines.parameters import parameters_of
+from chaosgym.simulation import MotionState, simulate
+
+Array = NDArray[np.float64]
+Form = Literal["literal", "attractors"]
+
+FIELD = "matrix_update_interval"
+"""Field of a machine whose matrices depend on its configuration."""
+
+TOLERANCE = 0.01
+"""Difference of two outcomes, as a share of the largest, that a reader of a plot takes for agreement."""
+
+REPEATS = 1e-4
+"""Half range within which a run counts as repeating."""
+
+MAX_SHIFT = 32
+"""Cycles by which one run may lag behind the other."""
+
+
+def depends_on_configuration(machine: Machine) -> bool:
+    """True if the machine's matrices are updated during a cycle, so that the test applies."""
+    return FIELD in parameters_of(machine)
+
+
+def matrix_update_test(
+    machine: Machine,
+    *,
+    intervals: tuple[float, float] = (5.0, 10.0),
+    form: Form = "attractors",
+    transient: int = 200,
+    cycles: int = 100,
+    tolerance: float = TOLERANCE,
+    initial_state: MotionState | None = None,
+) -> Diagnosis:
+    """Judge a machine by two runs with different matrix-update intervals.
+
+    Parameters
+    ----------
+    machine
+        With a field ``matrix_update_interval`` [deg]; its own value does not matter.
+    intervals
+        Matrix-update intervals of the two runs [deg]; the thesis uses 5 and 10, and 5 and 6.
+    form
+        "literal" or "attractors"; see the module.
+    transient, cycles
+        Cycles before the comparison (literal: of both runs, from rest; attractors: of the first run), and compared.
+    tolerance
+        Difference, as a share of the largest peak force, that counts as agreement.
+    initial_state
+        Where both runs, or the transient, start; rest by default.
+
+    Raises
+    ------
+    DiagnosisError
+        If the machine's matrices are constant, or ``form`` is unknown.
+    SimulationError
+        If a run can't be finished.
+    """
+    if not depends_on_configuration(machine):
+        raise DiagnosisError(
+            f"{machine.name} has constant matrices, so there is nothing to update; use two_step_test (thesis 5.2.3)"
+        )
+    if form not in ("literal", "attractors"):
+        raise DiagnosisError(f"form = {form!r} is not one of 'literal', 'attractors'")
+    machine, other = (replace(machine, **{FIELD: interval}) for interval in intervals)  # type: ignore[type-var]
+    evidence: dict[str, Any] = {"form": form, "intervals_deg": list(intervals), "transient": transient}
+    if form == "literal":
+        runs = [simulate(one, cycles, initial_state, transient).peak_force for one in (machine, other)]
+        verdict = compare_outcomes(*runs, tolerance=tolerance)
+    else:
+        start = simulate(machine, transient, initial_state).final_state if transient else initial_state
+        runs = [simulate(one, cycles, start).peak_force for one in (machine, other)]
+        verdict = compare_attractors(*runs, tolerance=tolerance)
+    return replace(verdict, evidence={**evidence, **verdict.evidence}, horizon=transient + cycles)
+
+
+def compare_outcomes(first: ArrayLike, second: ArrayLike, *, tolerance: float = TOLERANCE) -> Diagnosis:
+    """Literal form: do two series agree in every cycle, or in none?
+
+    Parameters
+    ----------
+    first, second : (cycles,) or (cycles, sides)
+        Outcome of each cycle of two runs.
+
+    Returns
+    -------
+    Diagnosis
+        Periodic if at least 95 % of the cycles agree within the tolerance, chaotic if at most half do, otherwise
+        undetermined.
+    """
+    one, two, scale = _pair(first, second)
+    agreeing = float(np.mean(np.max(np.abs(one - two), axis=1) <= tolerance * scale))
+    evidence = {"agreeing_cycles": agreeing}
+    if agreeing >= 0.95:
+        return Diagnosis(
+            nature="periodic",
+            period=None,
+            margin=agreeing,
+            evidence=evidence,
+            reason=f"runs agree in {agreeing:.0%} of the cycles",
+        )
+    nature: Literal["chaotic", "undetermined"] = "chaotic" if agreeing <= 0.5 else "undetermined"
+    return Diagnosis(
+        nature=nature, period=None, margin=max(0.0, 1.0 - 2.0 * agreeing), evidence=evidence,
+        reason=f"runs agree in only {agreeing:.0%} of the cycles",
+    )  # fmt: skip
+
+
+def compare_attractors(first: ArrayLike, second: ArrayLike, *, tolerance: float = TOLERANCE) -> Diagnosis:
+    """Attractor form: do two settled runs end in the same motion, or at least each in one that repeats?
+
+    Parameters
+    ----------
+    first, second : (cycles,) or (cycles, sides)
+        Outcome of each cycle of two runs that start from one settled state.
+    """
+    one, two, scale = _pair(first, second)
+    shift, distance = _best_shift(one, two)
+    periods = [_period(one), _period(two)]
+    evidence: dict[str, Any] = {"shift": shift, "distance": distance / scale, "periods": periods}
+    if all(period is not None for period in periods):
+        same = distance <= tolerance * scale
+        reason = f"both runs repeat, {'the same motion' if same else 'but not the same motion'}"
+        period = periods[0] if same else None
+        return Diagnosis(
+            nature="periodic", period=period, margin=1.0 if same else 0.5, evidence=evidence, reason=reason
+        )
+    if distance <= tolerance * scale:
+        return Diagnosis(
+            nature="periodic", period=None, margin=1.0 - distance / (tolerance * scale), evidence=evidence,
+            reason=f"runs agree within {distance / scale:.1e} of the largest peak",
+        )  # fmt: skip
+    if any(period is not None for period in periods):
+        return Diagnosis(
+            nature="undetermined",
+            period=None,
+            margin=0.0,
+            evidence=evidence,
+            reason="one run repeats, the other does not",
+        )
+    margin = float(np.clip(np.log10(distance / (tolerance * scale)), 0.0, 1.0))
+    return Diagnosis(
+        nature="chaotic", period=None, margin=margin, evidence=evidence,
+        reason=f"neither run repeats, and they part by {distance / scale:.0%} of the largest peak",
+    )  # fmt: skip
+
+
+def _pair(first: ArrayLike, second: ArrayLike) -> tuple[Array, Array, float]:
+    one, two = as_samples(first), as_samples(second)
+    if one.shape != two.shape:
+        raise DiagnosisError(f"the two runs have shapes {one.shape} and {two.shape}; allowed: the same shape")
+    scale = float(max(np.max(np.abs(one)), np.max(np.abs(two))))
+    return one, two, scale if scale > 0.0 else 1.0
+
+
+def _best_shift(one: Array, two: Array) -> tuple[int, float]:
+    """Whole cycles by which the runs are best shifted, and their largest distance then, over the last half."""
+    half, longest = len(one) // 2, min(MAX_SHIFT, len(one) // 6)
+    tail = one[half : len(one) - longest]
+    best = (0, np.inf)
+    for shift in range(-longest, longest + 1):
+        moved = two[half + shift : len(two) - longest + shift]
+        distance = float(np.max(np.abs(tail - moved)))
+        if distance < best[1] or (distance == best[1] and abs(shift) < abs(best[0])):
+            best = (shift, distance)
+    return best
+
+
+def _period(samples: Array) -> int | None:
+    """Period of a run that repeats or steadily approaches a repetition."""
+    scaled = samples / scales(samples)
+    recurrence = find_recurrence(scaled, REPEATS)
+    if recurrence.period is not None:
+        return recurrence.period
+    decay = find_decay(scaled)
+    return decay.period if decay is not None and decay.factor >= 4.0 else None

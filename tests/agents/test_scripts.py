@@ -1,0 +1,47 @@
+"""The training and evaluation scripts run end to end and leave what they promise."""
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+AGENTS = Path(__file__).parent.parent.parent / "agents"
+
+
+def _run(script, *arguments):
+    command = [sys.executable, str(AGENTS / script), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.slow
+def test_a_policy_is_trained_saved_and_compared_with_constant_speeds(tmp_path):
+    """train_ppo.py writes policy, config and progress; evaluate.py a table in which top speed costs the least time."""
+    out = tmp_path / "ppo"
+    trained = _run("train_ppo.py", "--steps", "3200", "--rollout", "200", "--out", str(out), "--seed", "3")
+    assert trained.returncode == 0, trained.stderr
+    config = json.loads((out / "config.json").read_text())
+    assert config["arguments"]["seed"] == 3
+    assert config["versions"]["stable_baselines3"]
+    episodes = list(csv.DictReader((out / "progress.csv").open()))
+    assert len(episodes) == 16
+    assert all(float(row["return"]) < 0.0 for row in episodes)
+    evaluated = _run("evaluate.py", "--policy", str(out), "--jobs", "1", "--speeds", "2")
+    assert evaluated.returncode == 0, evaluated.stderr
+    results = json.loads((out / "evaluation.json").read_text())["results"]
+    assert set(results) == {"constant   4.0", "constant  30.0", "policy"}
+    assert (
+        results["constant  30.0"]["time_cost"] < results["policy"]["time_cost"] < results["constant   4.0"]["time_cost"]
+    )
+
+
+def test_an_existing_folder_is_left_alone(tmp_path):
+    """Training never writes into a folder that exists, and evaluation says what is missing."""
+    refused = _run("train_ppo.py", "--out", str(tmp_path))
+    assert refused.returncode != 0
+    assert "choose another folder" in refused.stderr
+    missing = _run("evaluate.py", "--policy", str(tmp_path))
+    assert "holds no policy.zip" in missing.stderr
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,30 @@
+"""The demo passes through every floor; here with a smaller sweep and a shorter training."""
+
+import pytest
+
+from chaosgym import demo
+from chaosgym.errors import DatasetError
+from chaosgym.sweeps import Axis
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:CUDA initialization")
+def test_demo_computes_every_number_and_draws_the_figure(tmp_path, monkeypatch):
+    """Three points of the printed natures, a typed sweep, a judged classifier, an agent beside constant speeds."""
+    axes = (Axis("excitation_frequency", 6.0, 30.0, 24, "log"), Axis("clearance", 1.0e-4, 1.45e-4, 5, "log"))
+    monkeypatch.setattr(demo, "AXES", axes)
+    monkeypatch.setattr(demo, "TRAINING_STEPS", 1600)
+    monkeypatch.setattr(demo, "JOBS", 1)
+    monkeypatch.setattr(demo, "CONSTANT_SPEEDS", 3)
+    said = []
+    result = demo.run_demo(tmp_path / "demo", say=said.append)
+    assert [row["nature"] for row in result["points"].values()] == ["periodic", "periodic", "chaotic"]
+    assert result["points"]["III"]["type_in_sweep"] == "III"
+    assert result["sweep"]["points"] == 120
+    assert 0.0 <= result["classifier"]["held_out"]["network"]["accuracy"] <= 1.0
+    assert result["agent"]["agent"]["return"] < 0.0
+    assert (tmp_path / "demo" / "overview.png").stat().st_size > 20_000
+    assert len(said) == 5
+    assert any("chaotic" in line for line in demo.demo_table(result))
+    with pytest.raises(DatasetError, match="choose another folder"):
+        demo.run_demo(tmp_path / "demo", say=said.append)
