@@ -1,9 +1,11 @@
 """The report: complete in one file, at home in a real browser, and never written over anything unasked."""
 
+import doctest
 import json
 import re
 import sys
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +18,8 @@ from chaosgym.design.study import study
 from chaosgym.errors import DesignError
 from chaosgym.plotting.design_report import design_report, measured_report, write_report
 from tests.design.browser import CHROMIUM, Browser
+
+DOCUMENTATION = Path(__file__).parents[2] / "docs"
 
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 
@@ -104,12 +108,35 @@ def test_report_on_measured_peaks_opens_in_a_browser(browser, tmp_path):
     check_page(browser, path, 2)
 
 
+@pytest.fixture(scope="module")
+def chaotic():
+    """The study of the template as it is printed: the beam of the thesis at 30 Hz."""
+    return study(brief_from(tomllib.loads(template("impact-beam"))))
+
+
+@pytest.mark.slow
+def test_worked_example_of_the_documentation(chaotic):
+    """What the page prints is what the command gives, within what chaos leaves open between computers."""
+    page = (DOCUMENTATION / "design.md").read_text()
+    shown, given = ({
+        name: float(value) for name, value in re.findall(r"  (fatigue life|reliability|load rating) +([\d.]+)", text)
+    } for text in (page, "\n".join(chaotic.lines())))  # fmt: skip
+    assert shown.keys() == given.keys() == {"fatigue life", "reliability", "load rating"}
+    assert given == pytest.approx(shown, rel=0.1)
+    assert chaotic.assessment.type == "III"
+    assert chaotic.improvement.best.changes["clearance"] == pytest.approx(8.23e-5, rel=0.15)
+
+
+def test_examples_of_the_documentation():
+    """The Python lines of the page give what it prints."""
+    assert doctest.testfile(str(DOCUMENTATION / "design.md"), module_relative=False) == (0, 7)
+
+
 @pytest.mark.slow
 @needs_browser
-def test_report_on_the_chaotic_beam_opens_in_a_browser(browser, tmp_path):
-    """The template as it is printed: Type III, with the running statistics as an eighth figure."""
-    found = study(brief_from(tomllib.loads(template("impact-beam"))))
-    assert found.assessment.type == "III"
+def test_report_on_the_chaotic_beam_opens_in_a_browser(chaotic, browser, tmp_path):
+    """Type III has the running statistics as an eighth figure."""
+    found = chaotic
     path = tmp_path / "report.html"
     write_report(design_report(found), found.as_dict(), path)
     check_page(browser, path, 8)
