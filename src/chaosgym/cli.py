@@ -216,6 +216,20 @@ def _diagnose_machine(machine: Any, budget: int, types: bool, check: bool) -> tu
 
 @app.command()
 @machine_command
+@click.option("--points", type=click.IntRange(1, 10**6), default=500, show_default=True, help="Random machines.")
+@click.option("--cycles", type=click.IntRange(1000, 10**7), default=10_000, show_default=True, help="Of the reference.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+def agreement(machine: Any, points: int, cycles: int, seed: int, as_json: bool) -> None:
+    """Compare all tests of chaos with a long reference on random machines (takes long)."""
+    from chaosgym.diagnosis.agreement import agreement as compare
+    from chaosgym.diagnosis.agreement import random_machines
+
+    table = compare(random_machines(machine, points, seed), reference_cycles=cycles, progress=True)
+    _emit(table.as_dict(), as_json, lambda: table.markdown().splitlines())
+
+
+@app.command()
+@machine_command
 @click.option(
     "--model", type=click.Path(exists=True, dir_okay=False), help="Classifier file; default: the shipped one."
 )
