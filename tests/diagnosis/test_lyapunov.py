@@ -9,7 +9,7 @@ from chaosgym.diagnosis import (
 )
 from chaosgym.diagnosis.lyapunov import average_growth
 from chaosgym.errors import DiagnosisError
-from chaosgym.machines import ImpactBeam
+from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.simulation import RungeKutta4, simulate
 
 from .maps import GOLDEN, circle, henon, logistic
@@ -115,3 +115,11 @@ def test_a_coarse_integrator_takes_two_trajectories():
     beam = ImpactBeam(excitation_frequency=10.0)
     exponent = largest_lyapunov_exponent(beam, 40, transient=20, integrator=RungeKutta4(2000))
     assert exponent.per_cycle < 0.0
+
+
+def test_trajectories_that_meet_start_anew():
+    """A map that forgets its state in one cycle has an exponent far below zero, not an error."""
+    exponent = two_trajectory_exponent(lambda x: 0.0 * x + 0.5, [0.3], 100, transient=0)
+    assert exponent.per_cycle < -10.0
+    crank = SliderCrank(crank_speed=120.0, slider_clearance=0.02e-3, contact_damping_ratio=0.1)
+    assert largest_lyapunov_exponent(crank, 40, transient=20).sign == -1

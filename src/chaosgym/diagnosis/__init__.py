@@ -13,19 +13,8 @@ from chaosgym.diagnosis.lyapunov import (
 from chaosgym.diagnosis.matrix_update import compare_attractors, compare_outcomes, matrix_update_test
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
 from chaosgym.diagnosis.response import NATURES, STATUSES, TYPES, Diagnosis, Nature, Status, Type
-from chaosgym.diagnosis.response_type import (
-    Neighbour,
-    ResponseMap,
-    ResponseType,
-    Tolerance,
-    default_tolerances,
-    geometric_grid,
-    judge_type,
-    response_map,
-    response_type,
-    type_stability,
-    types_on_grid,
-)
+from chaosgym.diagnosis.response_map import ResponseMap, geometric_grid, response_map, type_stability
+from chaosgym.diagnosis.response_type import ResponseType, Tolerance, default_tolerances, response_type
 from chaosgym.diagnosis.routes import (
     Intermittency,
     Precursors,
@@ -39,6 +28,7 @@ from chaosgym.diagnosis.routes import (
 from chaosgym.diagnosis.spectrum import Spectrum, power_spectrum
 from chaosgym.diagnosis.stroboscopic import Recurrence, find_recurrence
 from chaosgym.diagnosis.two_step import two_step_test
+from chaosgym.diagnosis.type_rule import Neighbour, judge_type, types_on_grid
 from chaosgym.diagnosis.zero_one import zero_one_statistic
 
 __all__ = [

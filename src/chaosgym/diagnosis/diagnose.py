@@ -115,6 +115,8 @@ def diagnose(
         record, growth = record.followed_by(more), np.concatenate([growth, more_growth])
     verdict = verdict or _not_periodic(stage)
     votes, evidence = _votes(stage), _evidence(stage, verdict, initial_state)
+    if stage.orbit is not None:
+        evidence["largest_peak"] = float(np.max(simulate(machine, stage.orbit.period, stage.orbit.state).peak_force))
     status = verdict.status
     if depends_on_configuration(machine):
         interval = getattr(machine, FIELD)

@@ -41,6 +41,9 @@ Array = NDArray[np.float64]
 DISTANCE = 1e-7
 """Distance of the second trajectory, relative to the size of the motion."""
 
+ROUNDING = 1e-15
+"""Distance below which two trajectories have met; the second one then starts anew."""
+
 BLOCKS = 20
 """Blocks whose scatter gives the standard error."""
 
@@ -100,6 +103,10 @@ def average_growth(log_growth: ArrayLike, cycle_period: float = 1.0) -> Lyapunov
     )  # fmt: skip
 
 
+def _any_direction(dimension: int) -> Array:
+    return np.asarray(np.cos(1.0 + np.arange(dimension)))
+
+
 class Deviation:
     """A motion and one small deviation that travels with it; call ``run`` again and again to go on.
 
@@ -120,7 +127,7 @@ class Deviation:
         self.state = given if isinstance(given, MotionState) else MotionState(np.array(given, float), rest.bouncing)
         self._machine = machine
         self._integrator = integrator
-        self._direction: Array = np.cos(1.0 + np.arange(len(rest.coordinates)))
+        self._direction: Array = _any_direction(len(rest.coordinates))
         self._scale: Array | None = None
 
     def run(self, cycles: int) -> tuple[CycleRecord, Array]:
@@ -151,7 +158,9 @@ class Deviation:
             end = simulate(self._machine, 1, start, integrator=self._integrator).final_state.coordinates
             self._direction = end - states[cycle + 1]
             distance = float(np.linalg.norm(self._direction / self._scale))
-            log_growth[cycle] = np.log(max(distance, 1e-300) / DISTANCE)
+            log_growth[cycle] = np.log(max(distance, ROUNDING) / DISTANCE)
+            if distance < ROUNDING:
+                self._direction = self._scale * _any_direction(len(self._scale))
         return log_growth
 
 
@@ -226,7 +235,7 @@ def two_trajectory_exponent(
     reference = np.array(state, dtype=float, ndmin=1)
     for _ in range(transient):
         reference = np.asarray(step(reference), dtype=float)
-    direction = np.cos(1.0 + np.arange(len(reference)))
+    direction = _any_direction(len(reference))
     settle = 20
     log_growth = np.empty(settle + cycles)
     for cycle in range(settle + cycles):
@@ -236,7 +245,7 @@ def two_trajectory_exponent(
         length = float(np.linalg.norm(direction))
         log_growth[cycle] = np.log(max(length, 1e-300) / distance)
         if length == 0.0:
-            direction = np.cos(1.0 + np.arange(len(reference)))
+            direction = _any_direction(len(reference))
     return average_growth(log_growth[settle:], cycle_period)
 
 

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from tqdm import tqdm
 
 from chaosgym.diagnosis import two_step_test
-from chaosgym.diagnosis.response_type import types_on_grid
+from chaosgym.diagnosis.type_rule import types_on_grid
 from chaosgym.errors import DatasetError, SimulationError
 from chaosgym.files import write_atomically
 from chaosgym.machines import Machine

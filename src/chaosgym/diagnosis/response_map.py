@@ -1,0 +1,199 @@
+"""How do response types lie over speed and clearance, and how much do they depend on their definition?"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chaosgym.diagnosis.diagnose import diagnose
+from chaosgym.diagnosis.response import Diagnosis, Type
+from chaosgym.diagnosis.response_type import (
+    SHARES,
+    Tolerance,
+    check_initial_states,
+    chosen_tolerances,
+    coexisting_peaks,
+    default_tolerances,
+    define,
+    response_type,
+)
+from chaosgym.diagnosis.type_rule import Neighbour, judge_type
+from chaosgym.errors import SimulationError
+from chaosgym.machines import Machine
+from chaosgym.machines.parameters import with_settings
+from chaosgym.simulation import parallel_map
+
+Array = NDArray[np.float64]
+Place = tuple[float, float]
+"""Speed and clearance."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResponseMap:
+    """Types over speed and clearance.
+
+    Attributes
+    ----------
+    machine
+        Base machine.
+    speed : (n_speeds,)
+        In the unit of the machine's speed field.
+    clearance : (n_clearances,)
+        [m].
+    type, nature : (n_speeds, n_clearances) of str
+        Type over the neighbourhood, and nature at the point.
+    largest_peak : (n_speeds, n_clearances)
+        [N].
+    runs
+        Number of machines that were run; without sharing it would be nine times the number of points and more.
+    definition
+        Window, statistic and initial states.
+    """
+
+    machine: Machine
+    speed: Array
+    clearance: Array
+    type: NDArray[np.str_]
+    nature: NDArray[np.str_]
+    largest_peak: Array
+    runs: int
+    definition: Mapping[str, Any]
+
+
+def geometric_grid(low: float, high: float, tolerance: Tolerance, points_per_tolerance: int = 2) -> Array:
+    """Grid from ``low`` to at most ``high`` on which neighbourhoods share their points.
+
+    Successive values are half a tolerance apart; fewer ``points_per_tolerance`` than 2 do not share all.
+    """
+    share = 1.0 / points_per_tolerance
+    values = [low]
+    while values[-1] < high:
+        values.append(tolerance.at(low, share * len(values)))
+    return np.array(values[:-1] if values[-1] > high * (1.0 + 1e-9) else values)
+
+
+def response_map(
+    machine: Machine,
+    speeds: ArrayLike,
+    clearances: ArrayLike,
+    tolerances: Mapping[str, Tolerance] | None = None,
+    *,
+    initial_states: int = 1,
+    budget: int = 1600,
+    workers: int | None = None,
+    progress: bool = False,
+) -> ResponseMap:
+    """Types over a grid of speeds and clearances, in the two-parameter window.
+
+    Machines that several neighbourhoods need are run once; on a ``geometric_grid`` that is nearly all of them.
+
+    Parameters
+    ----------
+    machine
+        Base machine.
+    speeds, clearances : (n_speeds,), (n_clearances,)
+        In the fields' units.
+    tolerances, initial_states, budget, workers
+        As for ``response_type``. One initial state by default: more can't be shared.
+    progress
+        Show a progress bar on standard error.
+    """
+    allowed = chosen_tolerances(machine, tolerances, "speed-clearance")
+    check_initial_states(initial_states)
+    speed, clearance = np.asarray(speeds, dtype=float), np.asarray(clearances, dtype=float)
+    fields = (machine.speed_field, machine.clearance_field)
+    shape = (len(speed), len(clearance))
+    centres = {at: _place(float(speed[at[0]]), float(clearance[at[1]])) for at in np.ndindex(shape)}
+    around = {at: _around(place, fields, allowed) for at, place in centres.items()}
+    places = list(dict.fromkeys([*centres.values(), *(place for near in around.values() for _, _, place in near)]))
+
+    def at_place(place: Place) -> Machine:
+        return with_settings(machine, dict(zip(fields, place, strict=True)))
+
+    def judge(place: Place) -> Diagnosis | None:
+        try:
+            return diagnose(at_place(place), budget=budget)
+        except SimulationError:
+            return None
+
+    found = parallel_map(judge, places, workers=workers, progress="map" if progress else None)
+    runs = dict(zip(places, found, strict=True))
+    types, natures = np.full(shape, "undetermined"), np.full(shape, "undetermined")
+    peaks = np.full(shape, np.nan)
+    for at, place in centres.items():
+        centre = runs[place]
+        if centre is None:
+            continue
+        natures[at], peaks[at] = centre.nature, centre.evidence["largest_peak"]
+        others: tuple[float, ...] = ()
+        if initial_states > 1 and centre.nature == "periodic":
+            others = coexisting_peaks(at_place(place), centre, initial_states, budget)
+        neighbours = [_neighbour(name, side, runs[near]) for name, side, near in around[at]]
+        types[at] = judge_type(centre.nature, float(peaks[at]), neighbours, others)[0]
+    return ResponseMap(
+        machine=machine, speed=speed, clearance=clearance, type=types, nature=natures, largest_peak=peaks,
+        runs=len(places), definition=define(allowed, "speed-clearance", "rest", initial_states, budget),
+    )  # fmt: skip
+
+
+def _place(speed: float, clearance: float) -> Place:
+    """Speed and clearance to eleven digits: machines that differ beyond are the same."""
+    return float(f"{speed:.10e}"), float(f"{clearance:.10e}")
+
+
+def _around(place: Place, fields: tuple[str, str], tolerances: Mapping[str, Tolerance]) -> list[tuple[str, int, Place]]:
+    """(parameter, side, place) of every point of a neighbourhood."""
+    points = []
+    for name, tolerance in tolerances.items():
+        at = fields.index(name)
+        for share in SHARES:
+            moved = list(place)
+            moved[at] = tolerance.at(place[at], share)
+            points.append((name, int(np.sign(share)), _place(*moved)))
+    return points
+
+
+def _neighbour(name: str, side: int, run: Diagnosis | None) -> Neighbour:
+    if run is None:
+        return Neighbour(name, side, "undetermined", np.nan)
+    return Neighbour(name, side, run.nature, run.evidence["largest_peak"])
+
+
+def type_stability(
+    machines: Sequence[Machine], *, budget: int = 800, workers: int | None = None, progress: bool = False
+) -> dict[str, float]:
+    """Share of type labels that change with the definition, over machines.
+
+    Parameters
+    ----------
+    machines
+        What to label, in the two-parameter window.
+    budget, workers, progress
+        As for ``response_map``.
+
+    Returns
+    -------
+    dict
+        "window x 0.5" and "window x 2.5" (frequency +-1 % and +-5 % instead of +-2 %), "continuation" (runs of the
+        neighbourhood start where the centre ended) and "one initial state" (no search for coexisting attractors).
+    """
+
+    def labels(machine: Machine) -> list[Type]:
+        given = default_tolerances(machine)
+        half, wide = ({name: t._replace(value=f * t.value) for name, t in given.items()} for f in (0.5, 2.5))
+        variants: list[dict[str, Any]] = [
+            {}, {"tolerances": half}, {"tolerances": wide}, {"start": "continuation"}, {"initial_states": 1},
+        ]  # fmt: skip
+        return [
+            response_type(machine, window="speed-clearance", budget=budget, workers=1, **variant).type
+            for variant in variants
+        ]
+
+    rows = parallel_map(labels, machines, workers=workers, progress="types" if progress else None)
+    names = ("window x 0.5", "window x 2.5", "continuation", "one initial state")
+    return {
+        name: sum(row[0] != row[column] for row in rows) / max(1, len(rows))
+        for column, name in enumerate(names, start=1)
+    }

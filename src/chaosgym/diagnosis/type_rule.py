@@ -1,0 +1,106 @@
+r"""Which type follows from what a response and its neighbourhood do? The rule of thesis 5.5.
+
+    III           the centre is not periodic; or points that are not periodic lie on both sides along one parameter;
+                  or attractors that coexist at the centre have largest peaks more than 10 % apart
+    II            otherwise, if some point exceeds the centre's largest peak by 10 % or is not periodic
+    I             the rest
+    undetermined  if the centre is
+
+A point that is undetermined is not known to be periodic, and counts as not periodic.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chaosgym.diagnosis.response import Nature, Type
+from chaosgym.errors import DiagnosisError
+
+FORCE_CHANGE = 0.10
+"""Change of the largest peak force that matters: a quarter of the fatigue life (thesis 5.5.2)."""
+
+
+class Neighbour(NamedTuple):
+    """One point of the neighbourhood: along which parameter, on which side (-1 or +1), and what it does."""
+
+    parameter: str
+    side: int
+    nature: Nature
+    largest_peak: float
+
+
+def judge_type(
+    nature: Nature, largest_peak: float, neighbours: Iterable[Neighbour], coexisting_peaks: Sequence[float] = ()
+) -> tuple[Type, str]:
+    """Type of a response and its reason, from what the centre and its neighbourhood do.
+
+    Parameters
+    ----------
+    nature, largest_peak
+        Of the centre; the peak force in any unit.
+    neighbours
+        Points of the neighbourhood.
+    coexisting_peaks
+        Largest peaks at the centre from other initial states.
+    """
+    neighbours = list(neighbours)
+    if nature == "undetermined":
+        return "undetermined", "the nominal response is undetermined"
+    if nature != "periodic":
+        return "III", f"the nominal response is {nature}"
+    for peak in coexisting_peaks:
+        if abs(peak - largest_peak) > FORCE_CHANGE * min(peak, largest_peak):
+            return "III", f"another initial state leads to {peak:.3g} N instead of {largest_peak:.3g} N"
+    restless = [point for point in neighbours if point.nature != "periodic"]
+    for name in dict.fromkeys(point.parameter for point in restless):
+        if len({point.side for point in restless if point.parameter == name}) == 2:
+            return "III", f"not periodic on both sides along {name}"
+    if restless:
+        first = restless[0]
+        return "II", f"{first.nature} {'above' if first.side > 0 else 'below'} the nominal {first.parameter}"
+    for point in neighbours:
+        if point.largest_peak > (1.0 + FORCE_CHANGE) * largest_peak:
+            more = point.largest_peak / largest_peak - 1.0 if largest_peak > 0.0 else np.inf
+            side = "above" if point.side > 0 else "below"
+            return "II", f"peak force {more:.0%} higher {side} the nominal {point.parameter}"
+    return "I", "periodic throughout the neighbourhood, peak force less than 10 % higher"
+
+
+def types_on_grid(
+    natures: ArrayLike, largest_peaks: ArrayLike, axes: Sequence[int] | None = None, reach: Sequence[int] | int = 2
+) -> NDArray[np.str_]:
+    """Types of all points of a grid whose neighbours are the points of the grid up to ``reach`` steps away.
+
+    Parameters
+    ----------
+    natures : (...) of str
+        Nature at each point.
+    largest_peaks : (...)
+        Largest peak force at each point.
+    axes
+        Axes along which tolerances lie; all by default. At the border neighbours of one side are missing.
+    reach
+        Steps of the grid in one tolerance, for all of ``axes`` or for each.
+
+    Returns
+    -------
+    array of "I", "II", "III" or "undetermined", of the same shape.
+    """
+    nature, peak = np.asarray(natures, dtype=object), np.asarray(largest_peaks, dtype=float)
+    if nature.shape != peak.shape:
+        raise DiagnosisError(f"natures have shape {nature.shape} and peaks {peak.shape}; allowed: the same shape")
+    chosen = range(nature.ndim) if axes is None else axes
+    reaches = [reach] * len(chosen) if isinstance(reach, int) else reach
+    types = np.empty(nature.shape, dtype="<U12")
+    for index in np.ndindex(nature.shape):
+        neighbours = []
+        for axis, far in zip(chosen, reaches, strict=True):
+            for step in (*range(-far, 0), *range(1, far + 1)):
+                place = index[axis] + step
+                if 0 <= place < nature.shape[axis]:
+                    at = (*index[:axis], place, *index[axis + 1 :])
+                    neighbours.append(Neighbour(f"axis {axis}", int(np.sign(step)), nature[at], float(peak[at])))
+        types[index] = judge_type(cast(Nature, nature[index]), float(peak[index]), neighbours)[0]
+    return types
