@@ -5,7 +5,7 @@ import pytest
 
 from chaosgym.diagnosis import agreement, diagnose, random_machines
 from chaosgym.errors import DiagnosisError
-from chaosgym.machines import ImpactBeam
+from chaosgym.machines import ImpactBeam, SliderCrank
 
 
 @pytest.mark.parametrize(("frequency", "period"), [(10.0, 1), (19.0, 1), (22.0, 4)])
@@ -43,6 +43,16 @@ def test_a_long_period_is_proven_where_recurrence_does_not_look():
     assert diagnose(ImpactBeam(excitation_frequency=26.6), budget=800).period == 34
     slow = diagnose(ImpactBeam(excitation_frequency=28.8), budget=800)
     assert (slow.period, slow.transient) == (1, True)
+
+
+def test_chaos_within_the_sensor_error_counts_as_periodic_on_request():
+    """At 180 rpm and +-0.032 mm the crank is chaotic by 0.7 N of 26 N: periodic to a sensor with an error of 3 N."""
+    crank = SliderCrank(crank_speed=180.0, slider_clearance=0.032e-3)
+    assert diagnose(crank, budget=200).nature == "chaotic"
+    seen = diagnose(crank, budget=200, sensor_error=3.0)
+    assert seen.nature == "periodic"
+    assert "exactly" in seen.reason
+    assert diagnose(ImpactBeam(), budget=200, sensor_error=3.0).nature == "chaotic"
 
 
 def test_the_initial_state_is_part_of_the_label():

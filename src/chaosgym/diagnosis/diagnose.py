@@ -71,6 +71,7 @@ def diagnose(
     *,
     initial_state: MotionState | ArrayLike | None = None,
     budget: int = DEFAULT_BUDGET,
+    sensor_error: float = 0.0,
     integrator: Integrator | None = None,
 ) -> Diagnosis:
     """Tell the nature of a machine's response, and how sure that is.
@@ -83,6 +84,9 @@ def diagnose(
         Rest by default; part of the label.
     budget
         Cycles that the last stage may reach, at least 100. Chaos takes them all, a periodic response mostly 100.
+    sensor_error
+        Peak forces [N] that differ by less count as equal (thesis 3.6: 3 N); 0 judges exactly. Small clearances give
+        chaos whose peak forces differ by a fraction of a newton, which no sensor would tell from a period.
     integrator
         ``ExactEvents()`` by default.
 
@@ -107,7 +111,7 @@ def diagnose(
     searched = 0
     while True:
         stage = _stage(machine, record, growth, searched)
-        verdict = _periodic(stage)
+        verdict = _periodic(stage) or _periodic_within(stage, sensor_error)
         if verdict is not None or 2 * len(record) > budget:
             break
         searched = stage.cycles_used - len(record)
@@ -127,7 +131,7 @@ def diagnose(
         votes["matrix_update"] = update.nature
         evidence["matrix_update"] = update.reason
         evidence["cycles_used"] += 4 * UPDATE_CYCLES
-        if status == "agreed" and update.nature not in (verdict.nature, "undetermined"):
+        if status == "agreed" and sensor_error == 0.0 and update.nature not in (verdict.nature, "undetermined"):
             status = "disputed"
     return replace(verdict, votes=votes, status=status, horizon=len(record), evidence=evidence)
 
@@ -206,6 +210,19 @@ def _periodic(stage: _Stage) -> Diagnosis | None:
         nature="periodic", period=orbit.period if orbit else verdict.period, margin=margin, status=status,
         settle_cycle=settle, reason=reason,
     )  # fmt: skip
+
+
+def _periodic_within(stage: _Stage, sensor_error: float) -> Diagnosis | None:
+    """The verdict if the peak forces of the last half repeat within a sensor error, else None."""
+    settled = stage.record.after(len(stage.record) // 2)
+    if sensor_error == 0.0 or not np.any(settled.peak_force):
+        return None
+    coarse = two_step_test(settled, sensor_error=sensor_error)
+    if coarse.nature != "periodic":
+        return None
+    return replace(
+        coarse, status="agreed", reason=f"{coarse.reason} and {sensor_error:g} N; exactly, {stage.verdict.reason}"
+    )
 
 
 def _was_chaotic(stage: _Stage) -> bool:

@@ -82,6 +82,7 @@ def response_map(
     *,
     initial_states: int = 1,
     budget: int = 1600,
+    sensor_error: float = 0.0,
     workers: int | None = None,
     progress: bool = False,
 ) -> ResponseMap:
@@ -95,7 +96,7 @@ def response_map(
         Base machine.
     speeds, clearances : (n_speeds,), (n_clearances,)
         In the fields' units.
-    tolerances, initial_states, budget, workers
+    tolerances, initial_states, budget, sensor_error, workers
         As for ``response_type``. One initial state by default: more can't be shared.
     progress
         Show a progress bar on standard error.
@@ -114,7 +115,7 @@ def response_map(
 
     def judge(place: Place) -> Diagnosis | None:
         try:
-            return diagnose(at_place(place), budget=budget)
+            return diagnose(at_place(place), budget=budget, sensor_error=sensor_error)
         except SimulationError:
             return None
 
@@ -134,7 +135,7 @@ def response_map(
         types[at] = judge_type(centre.nature, float(peaks[at]), neighbours, others)[0]
     return ResponseMap(
         machine=machine, speed=speed, clearance=clearance, type=types, nature=natures, largest_peak=peaks,
-        runs=len(places), definition=define(allowed, "speed-clearance", "rest", initial_states, budget),
+        runs=len(places), definition=define(allowed, "speed-clearance", "rest", initial_states, budget, sensor_error),
     )  # fmt: skip
 
 

@@ -113,6 +113,7 @@ def response_type(
     start: Start = "rest",
     initial_states: int = 3,
     budget: int = 1600,
+    sensor_error: float = 0.0,
     workers: int | None = None,
 ) -> ResponseType:
     """Type of a machine's response over its tolerance neighbourhood.
@@ -133,6 +134,8 @@ def response_type(
         state that rest leads to; half that state.
     budget
         Cycles that each run may take.
+    sensor_error
+        Peak forces [N] that differ by less count as equal; see ``diagnose``.
     workers
         Number of threads; all processors by default.
 
@@ -149,14 +152,16 @@ def response_type(
     check_initial_states(initial_states)
     if start not in ("rest", "continuation"):
         raise DiagnosisError(f"start = {start!r} is not one of 'rest', 'continuation'")
-    centre = diagnose(machine, budget=budget)
+    centre = diagnose(machine, budget=budget, sensor_error=sensor_error)
     origin = centre.evidence["final_state"] if start == "continuation" else None
     neighbours: tuple[Neighbour, ...] = ()
     coexisting: tuple[float, ...] = ()
     if centre.nature == "periodic":
         points = _points(machine, allowed)
         runs = parallel_map(
-            lambda point: diagnose(point[2], initial_state=origin, budget=budget), points, workers=workers
+            lambda point: diagnose(point[2], initial_state=origin, budget=budget, sensor_error=sensor_error),
+            points,
+            workers=workers,
         )
         neighbours = tuple(
             Neighbour(name, side, run.nature, run.evidence["largest_peak"])
@@ -166,7 +171,7 @@ def response_type(
     kind, reason = judge_type(centre.nature, centre.evidence["largest_peak"], neighbours, coexisting)
     return ResponseType(
         type=kind, reason=reason, centre=centre, largest_peak=centre.evidence["largest_peak"], neighbours=neighbours,
-        coexisting_peaks=coexisting, definition=define(allowed, window, start, initial_states, budget),
+        coexisting_peaks=coexisting, definition=define(allowed, window, start, initial_states, budget, sensor_error),
     )  # fmt: skip
 
 
@@ -212,7 +217,12 @@ def coexisting_peaks(machine: Machine, centre: Diagnosis, initial_states: int, b
 
 
 def define(
-    tolerances: Mapping[str, Tolerance], window: Window, start: Start, initial_states: int, budget: int
+    tolerances: Mapping[str, Tolerance],
+    window: Window,
+    start: Start,
+    initial_states: int,
+    budget: int,
+    sensor_error: float,
 ) -> dict[str, Any]:
     """The definition of a type label, as plain values."""
     return {
@@ -224,4 +234,5 @@ def define(
         "initial_states": initial_states,
         "start": start,
         "budget": budget,
+        "sensor_error": sensor_error,
     }
