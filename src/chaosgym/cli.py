@@ -365,7 +365,11 @@ def design(
         page, result, lines = report.measured_report(found), found.as_dict(), found.lines()
     elif asked is not None:
         answer = study(asked, seed=seed, workers=workers, progress=True)
-        page, result, lines = report.design_report(answer, f"chaosgym design {brief}"), answer.as_dict(), answer.lines()
+        page, result, lines = (
+            report.design_report(answer, f"chaosgym design {brief} --seed {seed}"),
+            answer.as_dict(),
+            answer.lines(),
+        )
     if out is not None:
         report.write_report(page, result, out, overwrite)
         lines.append(f"report: {out}")

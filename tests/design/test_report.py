@@ -1,14 +1,16 @@
 """The report: complete in one file, at home in a real browser, and never written over anything unasked."""
 
+import doctest
 import json
 import re
-import subprocess
 import sys
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from chaosgym.cli import main
 from chaosgym.design import Criteria
 from chaosgym.design.brief import brief_from, template
 from chaosgym.design.measured import evaluate_peaks
@@ -16,6 +18,8 @@ from chaosgym.design.study import study
 from chaosgym.errors import DesignError
 from chaosgym.plotting.design_report import design_report, measured_report, write_report
 from tests.design.browser import CHROMIUM, Browser
+
+DOCUMENTATION = Path(__file__).parents[2] / "docs"
 
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 
@@ -49,11 +53,20 @@ def browser(tmp_path_factory):
         yield opened
 
 
-def run(*arguments):
-    """Run the command in a process of its own: (exit code, standard output, standard error)."""
-    command = [sys.executable, "-m", "chaosgym", "design", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    return done.returncode, done.stdout, done.stderr
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run ``chaosgym design`` as its entry point does: (exit code, standard output, standard error)."""
+
+    def command(*arguments):
+        monkeypatch.setattr(sys, "argv", ["chaosgym", "design", *map(str, arguments)])
+        try:
+            main()
+            code = 0
+        except SystemExit as stop:
+            code = stop.code
+        return code, *capsys.readouterr()
+
+    return command
 
 
 def check_page(browser, path, pictures):
@@ -95,12 +108,35 @@ def test_report_on_measured_peaks_opens_in_a_browser(browser, tmp_path):
     check_page(browser, path, 2)
 
 
+@pytest.fixture(scope="module")
+def chaotic():
+    """The study of the template as it is printed: the beam of the thesis at 30 Hz."""
+    return study(brief_from(tomllib.loads(template("impact-beam"))))
+
+
+@pytest.mark.slow
+def test_worked_example_of_the_documentation(chaotic):
+    """What the page prints is what the command gives, within what chaos leaves open between computers."""
+    page = (DOCUMENTATION / "design.md").read_text()
+    shown, given = ({
+        name: float(value) for name, value in re.findall(r"  (fatigue life|reliability|load rating) +([\d.]+)", text)
+    } for text in (page, "\n".join(chaotic.lines())))  # fmt: skip
+    assert shown.keys() == given.keys() == {"fatigue life", "reliability", "load rating"}
+    assert given == pytest.approx(shown, rel=0.1)
+    assert chaotic.assessment.type == "III"
+    assert chaotic.improvement.best.changes["clearance"] == pytest.approx(8.23e-5, rel=0.15)
+
+
+def test_examples_of_the_documentation():
+    """The Python lines of the page give what it prints."""
+    assert doctest.testfile(str(DOCUMENTATION / "design.md"), module_relative=False) == (0, 7)
+
+
 @pytest.mark.slow
 @needs_browser
-def test_report_on_the_chaotic_beam_opens_in_a_browser(browser, tmp_path):
-    """The template as it is printed: Type III, with the running statistics as an eighth figure."""
-    found = study(brief_from(tomllib.loads(template("impact-beam"))))
-    assert found.assessment.type == "III"
+def test_report_on_the_chaotic_beam_opens_in_a_browser(chaotic, browser, tmp_path):
+    """Type III has the running statistics as an eighth figure."""
+    found = chaotic
     path = tmp_path / "report.html"
     write_report(design_report(found), found.as_dict(), path)
     check_page(browser, path, 8)
@@ -145,7 +181,7 @@ def test_nothing_is_overwritten_unasked(answered, tmp_path):
         write_report("<p>", {}, tmp_path / "absent" / "report.html")
 
 
-def test_command_answers_a_brief(tmp_path):
+def test_command_answers_a_brief(run, tmp_path):
     """From template to report on the command line; what is printed is what is written."""
     brief, page = tmp_path / "brief.toml", tmp_path / "report.html"
     code, out, _ = run("--template", "impact-beam")
@@ -161,7 +197,7 @@ def test_command_answers_a_brief(tmp_path):
     assert "report.html exists" in err
 
 
-def test_command_evaluates_measured_peaks(tmp_path):
+def test_command_evaluates_measured_peaks(run, tmp_path):
     """Peak forces of 50 N under a rating of 100 N last 2^(10/3) million cycles."""
     path = tmp_path / "peaks.csv"
     path.write_text("50\n" * 40)
@@ -185,7 +221,7 @@ def test_command_evaluates_measured_peaks(tmp_path):
         (("absent.toml", "--out", "report.pdf"), "ends in .html"),
     ],
 )
-def test_wrong_usage_is_one_line_and_code_2(arguments, message):
+def test_wrong_usage_is_one_line_and_code_2(run, arguments, message):
     """No traceback, exit code 2, and what to do."""
     code, out, err = run(*arguments)
     assert (code, out) == (2, "")

@@ -211,6 +211,7 @@ def template(name: str) -> str:
         'load_rating = "500 N"          # force under which the surface lasts a million cycles',
         'life = "2000 Mcycles"          # million cycles',
         "reliability = 0.999            # probability that the strength exceeds the contact stress",
+        'machines_that_meet = "90 %"    # of those in tolerance, each by its own statistics',
         f"safety_factor = {criteria.safety_factor:g}              # strength against stress, for Types I and II",
         "# life_exponent = 3             # point contact; line contact, 10/3, if left out",
         f'contact_radius = "{1e3 * criteria.contact_radius:g} mm"        # ball on a flat surface',

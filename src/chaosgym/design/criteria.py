@@ -30,6 +30,10 @@ class Criteria:
     """Life that is required [10^6 cycles]."""
     reliability: float = parameter(0.99, low=0.0, high=1.0, provenance="assumed", source="thesis 5.4.2: high")
     """Probability that the strength exceeds the stress that is required."""
+    machines_that_meet: float = parameter(
+        0.9, low=0.0, high=1.0, provenance="assumed", source="as the survivors of the rating life, ISO 281"
+    )
+    """Share of the machines in tolerance that must reach life and reliability by their own statistics."""
     safety_factor: float = parameter(1.0, low=0.0, high=100.0, provenance="assumed", source="scatter is in reliability")
     """Safety factor SF of eq. 5.6 that responses of Type I and II must have."""
     life_exponent: float = parameter(10.0 / 3.0, low=1.0, high=20.0, provenance="printed", source="thesis eq. 5.2")

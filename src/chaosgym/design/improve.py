@@ -15,7 +15,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from chaosgym.design.methodology import SERIES_SIZE, Assessment, assess
+from chaosgym.design.methodology import SERIES_SIZE, Assessment, Check, assess
 from chaosgym.diagnosis import default_tolerances
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
@@ -81,7 +81,9 @@ def default_changes(machine: Machine) -> dict[str, tuple[float, ...]]:
     factors |= {name: DAMPING_FACTORS for name in default_tolerances(machine) if "damping" in name}
     factors[machine.speed_field] = SPEED_FACTORS
     factors |= {name: SECTION_FACTORS for name in SECTION_FIELDS if name in parameters_of(machine)}
-    return {name: tuple(getattr(machine, name) * factor for factor in row) for name, row in factors.items()}
+    return {
+        name: tuple(_rounded(getattr(machine, name) * factor, 4) for factor in row) for name, row in factors.items()
+    }
 
 
 def change_cost(machine: Machine, changes: Mapping[str, float], weights: Mapping[str, float] | None = None) -> float:
@@ -169,7 +171,9 @@ def improve(
                     best = trial
                     break
         if best is not None:
+            bar.total += REFINEMENTS
             best = _taken_back(machine, best, attempt)
+            bar.update(REFINEMENTS)
     return Improvement(tuple(sorted(done, key=_rank)), best)
 
 
@@ -202,19 +206,19 @@ def _taken_back(machine: Machine, best: Trial, attempt: Any) -> Trial:
     return best
 
 
-def _rounded(value: float) -> float:
-    """Three significant digits: a change is an engineering figure."""
-    return float(f"{value:.3g}")
+def _rounded(value: float, digits: int = 3) -> float:
+    """A change is an engineering figure."""
+    return float(f"{value:.{digits}g}")
 
 
 def _rank(trial: Trial) -> tuple[bool, float]:
-    """Those that meet the criteria by cost, the others by the factor by which life or strength misses."""
+    """Those that meet the criteria by cost, the others by the largest factor by which they miss."""
     if trial.meets:
         return False, trial.cost
-    shortfall = [
-        (1.0 - check.reached) / (1.0 - check.required)
-        if check.name == "reliability"
-        else check.required / check.reached
-        for check in trial.assessment.checks
-    ]
-    return True, max(shortfall)
+    return True, max(_shortfall(check) for check in trial.assessment.checks)
+
+
+def _shortfall(check: Check) -> float:
+    if check.name == "reliability":
+        return (1.0 - check.reached) / (1.0 - check.required)
+    return check.required / max(check.reached, 1e-9)

@@ -38,7 +38,7 @@ HEADLINES = {
 WHAT_TYPES_MEAN = {
     "I": "repeats, and follows a trend when parameters vary",
     "II": "repeats, but small variations change the force by more than 10 %",
-    "III": "unpredictable in detail: only statistics hold",
+    "III": "unpredictable in detail, so that only statistics hold",
     "undetermined": "the nature of the nominal response could not be told",
 }
 
@@ -219,7 +219,7 @@ def _cards(found: Assessment) -> str:
          f"required {_share(found.criteria.reliability)}"),
         ("", "largest peak force", f"{value.largest_force:.1f} N", f"equivalent {value.force:.1f} N"),
         ("", "load rating needed", f"{value.required_load_rating:.0f} N", f"chosen {found.criteria.load_rating:g} N"),
-        ("", "machines that meet", f"{100 * found.machines_that_meet:.0f} %",
+        (_tone(by_name["machines that meet"].met), "machines that meet", _percent(found.machines_that_meet),
          f"of {max(len(found.series.runs), 1)} in tolerance, each by its own force"),
     ]  # fmt: skip
     return '<div class="cards">' + "".join(
@@ -509,4 +509,9 @@ def _share(value: float) -> str:
 
 
 def _reached(name: str, value: float) -> str:
-    return {"fatigue life": _life, "reliability": _share, "safety factor": _number}[name](value)
+    shown = {"fatigue life": _life, "reliability": _share, "safety factor": _number, "machines that meet": _percent}
+    return shown[name](value)
+
+
+def _percent(value: float) -> str:
+    return f"{100.0 * value:.0f} %"
