@@ -1,8 +1,8 @@
 """Which surfaces can touch in the joints of a slider crank, and how hard do they push?
 
 A channel is a gap with a surface on one side or on both: the slider's pivot in its guide, a station of sensors, one
-flat of an instrumented ball joint. Its force is piecewise linear, so propagators exist for every set of closed channels.
-A joint of the stepper is a channel or a ball in a spherical shell, with linear or Hertzian contact.
+flat of an instrumented ball joint. Its force is piecewise linear, so there are propagators for every set of closed
+channels. A joint of the stepper is a channel or a ball in a spherical shell, with linear or Hertzian contact.
 """
 
 import math

@@ -102,7 +102,12 @@ def _radix(machine: "SliderCrank") -> int:
 def _key(machine: "SliderCrank") -> tuple[Any, ...]:
     """Class and all fields that shape the matrices."""
     kind: Any = type(machine)
-    return (kind, *attrgetter(*_structure_fields(kind))(machine))
+    return (kind, *_structure_values(kind)(machine))
+
+
+@cache
+def _structure_values(kind: Any) -> Callable[[Any], tuple[Any, ...]]:
+    return attrgetter(*_structure_fields(kind))
 
 
 @cache
