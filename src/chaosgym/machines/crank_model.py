@@ -21,16 +21,8 @@ from numpy.typing import NDArray
 from chaosgym.core.crank_propagator import FORCING_TERMS, propagator_table, series_order
 from chaosgym.core.crank_stepper import HERTZ, LINEAR, SteppedCrankModel
 from chaosgym.core.slider_crank import SliderCrankModel
-from chaosgym.machines.crank_equations import (
-    BALL_ACROSS,
-    BALL_DIRECTIONS,
-    SLIDER_ACROSS,
-    SLIDER_LATERAL,
-    SLIDER_PITCH,
-    Equations,
-    equations,
-    rod_of,
-)
+from chaosgym.machines.crank_equations import Equations, equations, rod_of
+from chaosgym.machines.crank_joints import Channels, channels_of, display_of, gaps_of, hertz_constants, joints_of
 from chaosgym.machines.kinematics import slider_rate
 from chaosgym.machines.spatial_equations import spatial_equations, spatial_loads
 
@@ -91,7 +83,7 @@ def has_propagators(machine: "SliderCrank") -> bool:
     """True if contact is linear, no contact force turns with the ball, and the contact sets are few."""
     if machine.contact_law != "linear" or machine.ball_joint == "spherical":
         return False
-    return int(_radix(machine) ** len(_gaps(machine))) <= MAX_SETS
+    return int(_radix(machine) ** len(gaps_of(machine))) <= MAX_SETS
 
 
 def exact_model(machine: "SliderCrank", step_phase: float) -> SliderCrankModel:
@@ -99,7 +91,7 @@ def exact_model(machine: "SliderCrank", step_phase: float) -> SliderCrankModel:
     structure = _key(machine)
     key = (machine.crank_speed, step_phase, structure)
     model = _recent.get(key, lambda: _at_speed(machine.crank_speed, step_phase, _structure(*structure)))
-    return model._replace(gap=_gaps(machine))
+    return model._replace(gap=gaps_of(machine))
 
 
 def _radix(machine: "SliderCrank") -> int:
@@ -110,149 +102,17 @@ def _radix(machine: "SliderCrank") -> int:
 def _key(machine: "SliderCrank") -> tuple[Any, ...]:
     """Class and all fields that shape the matrices."""
     kind: Any = type(machine)
-    return (kind, *attrgetter(*_structure_fields(kind))(machine))
+    return (kind, *_structure_values(kind)(machine))
+
+
+@cache
+def _structure_values(kind: Any) -> Callable[[Any], tuple[Any, ...]]:
+    return attrgetter(*_structure_fields(kind))
 
 
 @cache
 def _structure_fields(kind: Any) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind) if field.name not in _NOT_IN_THE_MATRICES)
-
-
-class _Channels(NamedTuple):
-    """Contact channels; see ``SliderCrankModel``. ``slides`` (m,): friction acts along the guide."""
-
-    row: Array
-    stiffness: Array
-    damping: Array
-    two_sided: NDArray[np.bool_]
-    reading: Array
-    slides: NDArray[np.bool_]
-
-
-def _unit_row(machine: "SliderCrank", *names: str) -> Array:
-    """One row for each name that picks this coordinate, (len(names), n)."""
-    return np.array([[float(name == other) for other in machine.degrees_of_freedom] for name in names])
-
-
-def _slider_channels(machine: "SliderCrank") -> _Channels:
-    """One gap above and below the pivot, or two stations of sensors that share stiffness and damping.
-
-    A motor at an angle adds the gap to either side.
-    """
-    row = _unit_row(machine, SLIDER_ACROSS)
-    reading = np.array([[0.0, -1.0, 0.0]])
-    share = 1.0
-    if machine.slider_joint == "instrumented":
-        pitch = machine.sensor_distance * _unit_row(machine, SLIDER_PITCH)
-        row, reading, share = np.concatenate([row + pitch, row - pitch]), np.repeat(reading, 2, axis=0), 0.5
-    elif machine.is_spatial:
-        row = _unit_row(machine, SLIDER_ACROSS, SLIDER_LATERAL)
-        reading = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0]])
-    count = len(row)
-    return _Channels(
-        row=row,
-        stiffness=np.full(count, share * machine.contact_stiffness),
-        damping=np.full(count, share * machine.contact_damping),
-        two_sided=np.ones(count, dtype=bool),
-        reading=reading * (machine.monitored_joint == "slider"),
-        slides=np.ones(count, dtype=bool),
-    )
-
-
-def _sensor_normals(machine: "SliderCrank") -> Array:
-    """Normals (4, 3) of the tetrahedral sensors (along, across, sideways): two in the plane, two mirrored by it."""
-    angle = math.radians(machine.ball_sensor_angle)
-    axis, across = np.array([math.cos(angle), math.sin(angle), 0.0]), np.array([-math.sin(angle), math.cos(angle), 0.0])
-    sideways = np.array([0.0, 0.0, 1.0])
-    lean = math.sqrt(2.0)
-    normals = [axis + lean * across, axis - lean * across, -axis + lean * sideways, -axis - lean * sideways]
-    return np.array(normals) / math.sqrt(3.0)
-
-
-def _ball_channels(machine: "SliderCrank") -> _Channels:
-    """Four tetrahedral sensors; in the plane the two that lean to either side of it act as one with half the lift."""
-    normal = _sensor_normals(machine)
-    sensors = np.ones(4)
-    if not machine.is_spatial:
-        normal, sensors = np.array([*normal[:2], normal[2:].mean(axis=0)]), np.array([1.0, 1.0, 2.0])
-    # the ball's eccentricity in its housing is minus the motion of the rod's end
-    names = BALL_DIRECTIONS if machine.is_spatial else BALL_DIRECTIONS[:2]
-    return _Channels(
-        row=-normal[:, : len(names)] @ _unit_row(machine, *names),
-        stiffness=machine.contact_stiffness * sensors,
-        damping=machine.contact_damping * sensors,
-        two_sided=np.zeros(len(sensors), dtype=bool),
-        reading=normal * (machine.monitored_joint == "ball"),
-        slides=np.zeros(len(sensors), dtype=bool),
-    )
-
-
-def _channels(machine: "SliderCrank") -> _Channels:
-    parts = []
-    if machine.slider_joint != "ideal":
-        parts.append(_slider_channels(machine))
-    if machine.ball_joint == "instrumented":
-        parts.append(_ball_channels(machine))
-    return _Channels(*(np.concatenate(part) for part in zip(*parts, strict=True)))
-
-
-def _gaps(machine: "SliderCrank") -> Array:
-    slider = {"ideal": 0, "clearance": 2 if machine.is_spatial else 1, "instrumented": 2}[machine.slider_joint]
-    ball = (4 if machine.is_spatial else 3) if machine.ball_joint == "instrumented" else 0
-    return np.array([machine.slider_clearance] * slider + [machine.ball_clearance] * ball)
-
-
-def _display(machine: "SliderCrank") -> Array:
-    """Displacement of the monitored joint: of the slider across the guide, or of the rod's end across the rod."""
-    return np.asarray(_unit_row(machine, SLIDER_ACROSS if machine.monitored_joint == "slider" else BALL_ACROSS)[0])
-
-
-class _Joint(NamedTuple):
-    """A joint of the stepper; see ``SteppedCrankModel``. ``scale`` multiplies stiffness and damping."""
-
-    row: Array
-    gap: float
-    scale: float
-    two_sided: bool
-    reading: Array
-    slides: bool
-
-
-def _joints(machine: "SliderCrank") -> list[_Joint]:
-    """Every channel is a joint with one row; a spherical ball joint is one with two."""
-    joints = []
-    if machine.slider_joint != "ideal" or machine.ball_joint == "instrumented":
-        channels, gaps = _channels(machine), _gaps(machine)
-        joints = [
-            _Joint(
-                row=channels.row[[j]],
-                gap=float(gaps[j]),
-                scale=float(channels.stiffness[j]) / machine.contact_stiffness,
-                two_sided=bool(channels.two_sided[j]),
-                reading=channels.reading[[j]],
-                slides=bool(channels.slides[j]),
-            )
-            for j in range(len(gaps))
-        ]
-    if machine.ball_joint == "spherical":
-        names = BALL_DIRECTIONS if machine.is_spatial else BALL_DIRECTIONS[:2]
-        reading = np.eye(3)[: len(names)] * (machine.monitored_joint == "ball")
-        joints.append(_Joint(-_unit_row(machine, *names), machine.ball_clearance, 1.0, True, reading, False))
-    return joints
-
-
-def _hertz(machine: "SliderCrank") -> tuple[float, float]:
-    """K [N/m^1.5] and chi [s/m] with the linear law's secant stiffness and restitution at the reference force.
-
-    Half a swing of the linear law leaves e = exp(-pi zeta / sqrt(1 - zeta^2)) of the speed v at which slider and yoke
-    strike; Hunt and Crossley's law leaves about 1 - (2/3) chi v.
-    """
-    force, linear, zeta = machine.hertz_reference_force, machine.contact_stiffness, machine.contact_damping_ratio
-    depth = force / linear
-    stiffness = force / depth**1.5
-    speed = math.sqrt(0.8 * stiffness * depth**2.5 / (machine.slider_mass + machine.yoke_mass))
-    restitution = math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta**2)) if zeta < 1.0 else 0.0
-    return stiffness, 1.5 * (1.0 - restitution) / speed
 
 
 def _assembled(machine: "SliderCrank", middles: Array, nodes: Array) -> tuple[Equations, Array]:
@@ -289,13 +149,13 @@ def _free_motion(free: Array, forcing: Array, rate: float) -> Array:
 def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankModel:
     """Model of any machine for the Runge-Kutta stepper, a closed contact turning by ``step_phase`` / 4 in a step."""
     inverse_mass, free, forcing, friction = _held(*_key(machine))
-    joints = _joints(machine)
+    joints = joints_of(machine)
     row = np.concatenate([joint.row for joint in joints])
     acceleration = _free_motion(free, forcing, machine.crank_rate)
     scale = np.array([joint.scale for joint in joints])
     first = np.cumsum([0] + [len(joint.row) for joint in joints])
     linear = machine.contact_law == "linear"
-    stiffness, damping = (machine.contact_stiffness, machine.contact_damping) if linear else _hertz(machine)
+    stiffness, damping = (machine.contact_stiffness, machine.contact_damping) if linear else hertz_constants(machine)
     answer = np.ascontiguousarray(np.swapaxes(inverse_mass @ row.T, -1, -2))
     slide = -np.einsum("bij,bj->bi", inverse_mass, friction)
     contact = math.sqrt(machine.contact_stiffness * np.max(np.einsum("brn,rn->br", answer, row)))
@@ -322,7 +182,7 @@ def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankMode
         two_sided=np.array([joint.two_sided for joint in joints]),
         reading=np.concatenate([joint.reading for joint in joints]),
         monitored=np.array([bool(np.any(joint.reading)) for joint in joints]),
-        display=_display(machine),
+        display=display_of(machine),
     )
 
 
@@ -334,7 +194,7 @@ class _Structure(NamedTuple):
     frequency of the masses next to the closed contacts; ``spectrum`` [1/s] largest modulus of an eigenvalue.
     """
 
-    channels: _Channels
+    channels: Channels
     radix: int
     display: Array
     free: Array
@@ -352,7 +212,7 @@ def _forcing(inverse_mass: Array, loads: Array) -> Array:
     return np.asarray(-np.einsum("bij,kbcj->kbci", inverse_mass, coefficients @ loads[:, at]))
 
 
-def _push(inverse_mass: Array, channels: _Channels, radix: int, friction: Array) -> Array:
+def _push(inverse_mass: Array, channels: Channels, radix: int, friction: Array) -> Array:
     """Accelerations that the closed contacts of every set add: (sets, bins, 2n + m, n).
 
     ``friction`` (bins, n) is what one newton of contact force drives along the guide.
@@ -388,12 +248,12 @@ def _structure(kind: type, *structure: Any) -> _Structure:
     machine = kind(**dict(zip(_structure_fields(kind), structure, strict=True)))
     inverse_mass, free, forcing, friction = _held(kind, *structure)
     n = inverse_mass.shape[-1]
-    channels = _channels(machine)
+    channels = channels_of(machine)
     radix = _radix(machine)
     push = _push(inverse_mass, channels, radix, friction)
     some = [0, len(inverse_mass) // 4]
     contact, spectrum = _rates(free[0, some], push[-1, some, : 2 * n], channels.row)
-    return _Structure(channels, radix, _display(machine), free, forcing, push, contact, spectrum)
+    return _Structure(channels, radix, display_of(machine), free, forcing, push, contact, spectrum)
 
 
 def _friction(machine: "SliderCrank", crank_angle: Array) -> Array:

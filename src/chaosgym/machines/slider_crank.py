@@ -10,7 +10,8 @@ held over bins of crank angle -> exact propagators (``core.crank_propagator``) -
 Gravity is off by default. With the mechanism's plane upright, the slider's weight keeps it on the guide below about
 360 rpm, so no impact could happen in the slider joint; yet the thesis shows impacts of 35 to 130 N at 190 to 290 rpm
 (4.4.2), which follow the law of a slider without weight. Its ball joint results need gravity (4.4.1). Each scene
-therefore says which gravity it has.
+therefore says which gravity it has. What makes impacts of the printed size under gravity is pitch: an instrumented
+slider joint whose slider has its centre of gravity about 30 mm off the guide.
 
 References
 ----------
