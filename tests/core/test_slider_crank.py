@@ -61,8 +61,8 @@ def frozen_model(machine, duration):
     model = machine.reduce(0.25)
     place = round(40.0 / machine.matrix_update_interval)
     acceleration = np.ascontiguousarray(model.acceleration[:, [place, place]])
-    n = acceleration.shape[-1]
-    acceleration[:, :, 2 * n : 2 * n + 4] = 0.0
+    n = acceleration.shape[-2]
+    acceleration[..., 2 * n : 2 * n + 4] = 0.0
     step = duration / 2 / model.steps
     steps = math.ceil(step * model.contact_rate / 0.25) * model.steps
     step = duration / 2 / steps
@@ -70,7 +70,7 @@ def frozen_model(machine, duration):
     table = propagator_table(acceleration, duration / 2, step, order)
     return model._replace(
         bin_duration=duration / 2, steps=steps, order=order, acceleration=acceleration, propagator=table,
-        curvature=np.einsum("jn,sbcn->sbjc", model.row, acceleration).copy(),
+        curvature=model.row @ acceleration,
     )  # fmt: skip
 
 

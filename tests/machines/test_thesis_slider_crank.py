@@ -72,7 +72,7 @@ def test_gravity_keeps_the_slider_on_the_guide():
     assert simulate(replace(CRANK, crank_speed=450.0, gravity=9.81), 5, transient=30).impacts.sum() > 0
 
 
-@pytest.mark.parametrize(("clearance", "over_background"), [(0.0, 8.0), (0.127e-3, 2.5)])
+@pytest.mark.parametrize(("clearance", "over_background"), [(0.0, 8.0), (0.127e-3, 3.0)])
 def test_the_third_superharmonic_resonance(clearance, over_background):
     """With end bodies off the rod's ends, forces crest at a third of 75.6 Hz, 1508 rpm, whatever the clearance."""
     speeds = np.arange(1484.0, 1533.0, 4.0)
@@ -85,10 +85,41 @@ def test_the_third_superharmonic_resonance(clearance, over_background):
     assert force[crest] > over_background * background
 
 
-def test_friction_changes_the_peaks():
-    """A coefficient of 0.1 changes the irregular sequence of peaks at 260 rpm, 2.5 % (4.5.3)."""
-    setting = {"crank_speed": 260.0, "slider_clearance": 0.032e-3, "contact_damping_ratio": 0.025}
-    assert not np.allclose(peaks(CRANK, **setting), peaks(CRANK, friction_coefficient=0.1, **setting), rtol=1e-3)
+def test_friction_changes_the_nature_at_single_speeds():
+    """At +-0.032 mm, 2.5 %, a coefficient of 0.1 turns 230 rpm from periodic to irregular (figure 4.17).
+
+    At 260 rpm, printed as chaotic without friction and periodic with it, the scatter halves but does not vanish.
+    """
+    setting = {"slider_clearance": 0.032e-3, "contact_damping_ratio": 0.025}
+    assert spread(CRANK, crank_speed=230.0, **setting) < 0.5
+    assert spread(CRANK, crank_speed=230.0, friction_coefficient=0.1, **setting) > 3.0
+    without = spread(CRANK, crank_speed=260.0, **setting)
+    assert spread(CRANK, crank_speed=260.0, friction_coefficient=0.1, **setting) < without
+
+
+def test_matrix_updates_at_5_and_10_degrees_agree_on_a_periodic_response():
+    """270 rpm, +-0.032 mm: two runs stay within 5 % of each other and do not part (5.2.2 case one).
+
+    They do not become equal as printed: matrices held over 5 and 10 deg shift the level by 1 to 4 %.
+    """
+    runs = [
+        peaks(
+            CRANK, cycles=35, transient=0, crank_speed=270.0, slider_clearance=0.032e-3, matrix_update_interval=interval
+        )
+        for interval in (5.0, 10.0)
+    ]
+    apart = np.abs(runs[0] - runs[1])
+    assert apart.max() < 0.05 * runs[0].mean()
+    assert apart[20:].max() < 2.0 * apart[:20].max()
+
+
+def test_matrix_updates_at_5_and_6_degrees_part_on_a_chaotic_response():
+    """190 rpm, +-0.254 mm: close at first, then as far apart as the peaks scatter, the mean the same (case two)."""
+    runs = [peaks(CRANK, cycles=100, transient=0, matrix_update_interval=interval) for interval in (5.0, 6.0)]
+    apart = np.abs(runs[0] - runs[1])
+    assert apart[:2].max() < 3.0
+    assert apart[20:].max() > 12.0
+    assert runs[0][20:].mean() == pytest.approx(runs[1][20:].mean(), rel=0.03)
 
 
 BALL = replace(

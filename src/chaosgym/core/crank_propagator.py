@@ -31,38 +31,30 @@ def series_order(phase):
 def expand(a, z, duration, series):
     """Taylor coefficients of p about the instant of z, in seconds: series[k] = p^(k) / k!, (order + 1, n).
 
-    ``a`` is the acceleration matrix (2n + 4 + channels, n) of one bin and contact set, column by column.
+    ``a`` is the acceleration matrix (n, 2n + 4 + channels) of one bin and contact set.
     """
-    size, n = a.shape
+    n, size = a.shape
     for i in range(n):
         series[0, i] = z[i]
         series[1, i] = z[n + i]
-    scale, binomial_row = 1.0, np.empty(FORCING_TERMS)
-    binomial_row[:] = 1.0
+    scale = 1.0
     for k in range(series.shape[0] - 2):
-        target = series[k + 2]
-        for i in range(n):
-            target[i] = 0.0
-        for j in range(n):
-            x, v = series[k, j], (k + 1) * series[k + 1, j]
-            for i in range(n):
-                target[i] += a[j, i] * x + a[n + j, i] * v
-        if k < FORCING_TERMS:
-            # coefficient of t^k of sum_j F_j (x + t / duration)^j
-            for j in range(k, FORCING_TERMS):
-                factor = binomial_row[j] * scale * z[2 * n + j - k]
-                for i in range(n):
-                    target[i] += a[2 * n + j, i] * factor
-            scale /= duration
-            for j in range(FORCING_TERMS - 1, k, -1):
-                binomial_row[j] = binomial_row[j] * (j - k) / (k + 1)
-        if k == 0:
-            for j in range(2 * n + FORCING_TERMS, size):
-                for i in range(n):
-                    target[i] += a[j, i] * z[j]
         share = 1.0 / ((k + 1) * (k + 2))
         for i in range(n):
-            target[i] *= share
+            total = 0.0
+            for j in range(n):
+                total += a[i, j] * series[k, j] + a[i, n + j] * ((k + 1) * series[k + 1, j])
+            if k < FORCING_TERMS:
+                # coefficient of t^k of sum_j F_j (x + t / duration)^j
+                binomial = scale
+                for j in range(k, FORCING_TERMS):
+                    total += a[i, 2 * n + j] * binomial * z[2 * n + j - k]
+                    binomial *= (j + 1.0) / (j + 1 - k)
+            if k == 0:
+                for j in range(2 * n + FORCING_TERMS, size):
+                    total += a[i, j] * z[j]
+            series[k + 2, i] = share * total
+        scale /= duration
 
 
 @njit(cache=True)
@@ -82,7 +74,7 @@ def evaluate(series, time, z):
 @njit(cache=True, nogil=True)
 def propagator_table(acceleration, duration, step, order):
     """Propagators of one step for every contact set and bin: (sets, bins, 2n + 4 + channels, 2n), by columns."""
-    sets, bins, size, n = acceleration.shape
+    sets, bins, n, size = acceleration.shape
     table = np.empty((sets, bins, size, 2 * n))
     series = np.empty((order + 1, n))
     z, moved = np.empty(size), np.empty(size)

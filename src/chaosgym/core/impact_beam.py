@@ -23,6 +23,7 @@ import numpy as np
 from numba import njit
 
 from chaosgym.core import status
+from chaosgym.core.contact import pressing_force
 from chaosgym.core.propagator import Regimes, move, nudge, safe_time, step_table, with_force
 from chaosgym.core.tangent import carry, orthonormalise, touch
 
@@ -124,7 +125,7 @@ def tip_state_of(model, x, v):
     if abs(x) <= model.clearance:
         return GAP, 1.0
     side = 1.0 if x > 0.0 else -1.0
-    force = model.contact_stiffness * (side * x - model.clearance) + model.contact_damping * side * v
+    force = pressing_force(side * x - model.clearance, side * v, model.contact_stiffness, model.contact_damping)
     return (CONTACT, side) if force > 0.0 else (DETACHED, side)
 
 
@@ -152,8 +153,9 @@ def tip_motion(output, r, u, shift):
 @njit(cache=True, inline="always")
 def pressing(model, side, x, v, a):
     """Force of surface ``side`` and its rate, from tip motion measured from that surface; negative where it pulls."""
-    k, d = side * model.contact_stiffness, side * model.contact_damping
-    return k * x + d * v, k * v + d * a
+    force = pressing_force(side * x, side * v, model.contact_stiffness, model.contact_damping)
+    force_rate = pressing_force(side * v, side * a, model.contact_stiffness, model.contact_damping)
+    return force, force_rate
 
 
 @njit(cache=True, inline="always")

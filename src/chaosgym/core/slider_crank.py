@@ -57,12 +57,12 @@ class SliderCrankModel(NamedTuple):
         Length of each channel's reading.
     display : (n,)
         Displacement of the monitored joint per unit coordinate.
-    acceleration : (radix^m, bins, 2n + 4 + m, n)
-        p'' per unit z, by columns, for every contact set and bin.
+    acceleration : (radix^m, bins, n, 2n + 4 + m)
+        p'' per unit z for every contact set and bin.
     curvature : (radix^m, bins, m, 2n + 4 + m)
         Second derivative of each channel's displacement per unit z.
     propagator : (radix^m, bins, 2n + 4 + m, 2n)
-        p and p' one step later.
+        p and p' one step later, by columns.
     """
 
     bin_duration: float
@@ -121,14 +121,39 @@ def put_time(z, n, x):
 
 
 @njit(cache=True, inline="always")
-def read_channels(model, z, y, v):
-    """Displacement y and velocity v of every channel."""
+def read_channels(row, curvature, side, z, reading):
+    """Fill ``reading`` (3, m): displacement, velocity and, where closed, acceleration of the channels in the state z.
+
+    ``row`` and ``curvature`` are those of the model, the latter of one contact set and bin.
+    """
+    m, n = row.shape
+    for j in range(m):
+        y, v = 0.0, 0.0
+        for i in range(n):
+            y += row[j, i] * z[i]
+            v += row[j, i] * z[n + i]
+        reading[0, j], reading[1, j] = y, v
+        if side[j] != 0.0:
+            a = 0.0
+            for c in range(z.shape[0]):
+                a += curvature[j, c] * z[c]
+            reading[2, j] = a
+
+
+@njit(cache=True, inline="always")
+def find_sides(model, z, side):
+    """Write which side of every channel is closed in the state z."""
     m, n = model.row.shape
     for j in range(m):
-        y[j], v[j] = 0.0, 0.0
+        y, v = 0.0, 0.0
         for i in range(n):
-            y[j] += model.row[j, i] * z[i]
-            v[j] += model.row[j, i] * z[n + i]
+            y += model.row[j, i] * z[i]
+            v += model.row[j, i] * z[n + i]
+        side[j] = 0.0
+        if closes(model, j, 1.0, y, v):
+            side[j] = 1.0
+        elif model.two_sided[j] and closes(model, j, -1.0, y, v):
+            side[j] = -1.0
 
 
 @njit(cache=True)
@@ -185,30 +210,69 @@ def locate(stiffness, damping, gap, side, closed, coefficients, until, tolerance
 
 
 @njit(cache=True, inline="always")
-def suspect_closed(model, j, side, h, y0, v0, a0, y1, v1, a1):
+def suspect_closed(model, j, side, h, start, end):
     """Instant in (0, h] until which a closed channel may have lost its force, or -1."""
     k, d, c = model.stiffness[j], model.damping[j], model.gap[j]
-    f1 = k * (side * y1 - c) + d * side * v1
+    f1 = k * (side * end[0, j] - c) + d * side * end[1, j]
     if f1 <= 0.0:
         return h
-    r0, r1 = side * (k * v0 + d * a0), side * (k * v1 + d * a1)
+    r0, r1 = side * (k * start[1, j] + d * start[2, j]), side * (k * end[1, j] + d * end[2, j])
     if r0 >= 0.0 or r1 <= 0.0:
         return -1.0
-    f0 = k * (side * y0 - c) + d * side * v0
+    f0 = k * (side * start[0, j] - c) + d * side * start[1, j]
     dip = cubic_extremum(f0, r0, f1, r1, h, 1.0)
     return dip if dip > 0.0 and cubic(f0, r0, f1, r1, h, dip)[0] <= 0.0 else -1.0
 
 
 @njit(cache=True, inline="always")
-def suspect_open(model, j, side, h, y0, v0, y1, v1):
+def suspect_open(model, j, side, h, start, end):
     """Instant in (0, h] until which an open channel may have begun to push on ``side``, or -1."""
-    if closes(model, j, side, y1, v1):
+    if closes(model, j, side, end[0, j], end[1, j]):
         return h
-    c = model.gap[j]
-    if side * v0 <= 0.0 or side * v1 >= 0.0:
+    v0, v1 = side * start[1, j], side * end[1, j]
+    if v0 <= 0.0 or v1 >= 0.0:
         return -1.0
-    dip = cubic_extremum(side * y0 - c, side * v0, side * y1 - c, side * v1, h, -1.0)
-    return dip if dip > 0.0 and cubic(side * y0 - c, side * v0, side * y1 - c, side * v1, h, dip)[0] > 0.0 else -1.0
+    depth0, depth1 = side * start[0, j] - model.gap[j], side * end[0, j] - model.gap[j]
+    top = cubic_extremum(depth0, v0, depth1, v1, h, -1.0)
+    return top if top > 0.0 and cubic(depth0, v0, depth1, v1, h, top)[0] > 0.0 else -1.0
+
+
+@njit(cache=True, inline="always")
+def find_suspects(model, side, h, start, end, until, towards):
+    """How many channels may have changed their contact in a step; writes until when (or -1) and on which side."""
+    count = 0
+    for j in range(side.shape[0]):
+        if side[j] != 0.0:
+            towards[j] = side[j]
+            until[j] = suspect_closed(model, j, side[j], h, start, end)
+        else:
+            towards[j] = 1.0
+            until[j] = suspect_open(model, j, 1.0, h, start, end)
+            if until[j] < 0.0 and model.two_sided[j]:
+                towards[j] = -1.0
+                until[j] = suspect_open(model, j, -1.0, h, start, end)
+        if until[j] >= 0.0:
+            count += 1
+    return count
+
+
+@njit(cache=True, inline="always")
+def first_change(model, side, series, until, towards, channel, tolerance):
+    """(Channel or -1, instant) of the first change among the suspects, on the Taylor series of the step."""
+    first, instant = -1, math.inf
+    for j in range(side.shape[0]):
+        if until[j] < 0.0:
+            continue
+        for k in range(channel.shape[0]):
+            channel[k] = 0.0
+            for i in range(series.shape[1]):
+                channel[k] += model.row[j, i] * series[k, i]
+        found = locate(
+            model.stiffness[j], model.damping[j], model.gap[j], towards[j], side[j] != 0.0, channel, until[j], tolerance
+        )
+        if found < instant:
+            first, instant = j, found
+    return first, instant
 
 
 @njit(cache=True, inline="always")
@@ -257,67 +321,112 @@ def crest_instant(h, start, end):
 
 
 @njit(cache=True, inline="always")
-def curve(curvature, z, j):
-    """Second derivative of the displacement of channel j."""
-    total = 0.0
-    for c in range(z.shape[0]):
-        total += curvature[j, c] * z[c]
-    return total
+def joint_force(model, side, reading):
+    """``resultant`` of the monitored joint."""
+    fx, fy, fz, rx, ry, rz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(side.shape[0]):
+        if side[j] != 0.0:
+            k, d = model.stiffness[j], model.damping[j]
+            force = k * (reading[0, j] - side[j] * model.gap[j]) + d * reading[1, j]
+            rate = k * reading[1, j] + d * reading[2, j]
+            fx += model.reading[j, 0] * force
+            fy += model.reading[j, 1] * force
+            fz += model.reading[j, 2] * force
+            rx += model.reading[j, 0] * rate
+            ry += model.reading[j, 1] * rate
+            rz += model.reading[j, 2] * rate
+    return resultant(fx, fy, fz, rx, ry, rz)
 
 
 @njit(cache=True)
-def quiet_steps(model, chosen, b, side, z, moved, y, v, a, time, limit, peak):
+def quiet_steps(model, chosen, b, side, z, moved, start, end, time, limit, peak, contact_time):
     """Take up to ``limit`` whole steps in which no contact changes and no force passes ``peak`` (2,); how many.
 
     Stops before a step that could do either, judged by its ends: between them, a cubic exceeds the larger end by no
-    more than 4/27 of the step times the sum of both slopes. z and the channels' motion y, v, a go along.
+    more than 4/27 of the step times the sum of both slopes. z and its reading ``start`` go along.
     """
-    n2 = 2 * model.row.shape[1]
+    n = model.row.shape[1]
     m = side.shape[0]
     step = model.bin_duration / model.steps
-    table = model.propagator[chosen, b]
-    curvature = model.curvature[chosen, b]
+    row, table, curvature = model.row, model.propagator[chosen, b], model.curvature[chosen, b]
     swing = 4.0 / 27.0 * step
-    for c in range(n2 + FORCING_TERMS, z.shape[0]):
+    for c in range(2 * n + FORCING_TERMS, z.shape[0]):
         moved[c] = z[c]
     for count in range(limit):
         propagate(table, z, moved)
-        put_time(moved, n2 // 2, (time + (count + 1) * step) / model.bin_duration)
-        fy, total = 0.0, 0.0
+        put_time(moved, n, (time + (count + 1) * step) / model.bin_duration)
+        read_channels(row, curvature, side, moved, end)
+        upward, total = 0.0, 0.0
         for j in range(m):
-            y1, v1 = 0.0, 0.0
-            for i in range(n2 // 2):
-                y1 += model.row[j, i] * moved[i]
-                v1 += model.row[j, i] * moved[n2 // 2 + i]
             gap = model.gap[j]
             if side[j] == 0.0:
-                reach = max(abs(y[j]), abs(y1))
-                if v[j] * v1 < 0.0:
-                    reach += swing * (abs(v[j]) + abs(v1))
+                reach = max(start[0, j], end[0, j])
+                if model.two_sided[j]:
+                    reach = max(abs(start[0, j]), abs(end[0, j]))
+                if start[1, j] * end[1, j] < 0.0:
+                    reach += swing * (abs(start[1, j]) + abs(end[1, j]))
                 if reach >= gap:
                     return count
                 continue
             k, d, s = model.stiffness[j], model.damping[j], side[j]
-            r0 = s * (k * v[j] + d * a[j])
-            r1 = s * (k * v1 + d * curve(curvature, moved, j))
-            f0, f1 = k * (s * y[j] - gap) + d * s * v[j], k * (s * y1 - gap) + d * s * v1
+            r0, r1 = s * (k * start[1, j] + d * start[2, j]), s * (k * end[1, j] + d * end[2, j])
+            f0 = k * (s * start[0, j] - gap) + d * s * start[1, j]
+            f1 = k * (s * end[0, j] - gap) + d * s * end[1, j]
             turn = swing * (abs(r0) + abs(r1)) if r0 * r1 < 0.0 else 0.0
             if min(f0, f1) - turn <= 0.0:
                 return count
-            fy += model.reading[j, 1] * s * f1
+            upward += model.reading[j, 1] * s * f1
             total += model.reach[j] * (max(f0, f1) + turn)
-        if total > peak[UPPER if fy > 0.0 else LOWER]:
+        column = UPPER if upward > 0.0 else LOWER
+        if total > peak[column]:
             return count
+        if total > 0.0:
+            contact_time[column] += step
         for j in range(m):
-            y[j], v[j] = 0.0, 0.0
-            for i in range(n2 // 2):
-                y[j] += model.row[j, i] * moved[i]
-                v[j] += model.row[j, i] * moved[n2 // 2 + i]
-            if side[j] != 0.0:
-                a[j] = curve(curvature, moved, j)
-        for c in range(n2 + FORCING_TERMS):
+            start[0, j], start[1, j], start[2, j] = end[0, j], end[1, j], end[2, j]
+        for c in range(2 * n + FORCING_TERMS):
             z[c] = moved[c]
     return limit
+
+
+@njit(cache=True, inline="always")
+def refined_force(model, chosen, b, side, series, time, at, there, reading):
+    """Resultant at time ``at`` in a step that began at ``time``; leaves the state in ``there``.
+
+    The clearance columns of ``there`` must be those of the step.
+    """
+    evaluate(series, at, there)
+    put_time(there, series.shape[1], (time + at) / model.bin_duration)
+    read_channels(model.row, model.curvature[chosen, b], side, there, reading)
+    return joint_force(model, side, reading)
+
+
+@njit(cache=True, inline="always")
+def write_sample(model, z, force, sample):
+    """Write displacement, velocity and signed resultant (positive where it points up) of the monitored joint."""
+    n = model.display.shape[0]
+    sample[0], sample[1] = 0.0, 0.0
+    for i in range(n):
+        sample[0] += model.display[i] * z[i]
+        sample[1] += model.display[i] * z[n + i]
+    sample[2] = math.copysign(force[1], force[0])
+
+
+@njit(cache=True, inline="always")
+def begin_cycle(model, state, arrays, cycle):
+    """Write the section of a revolution and clear its row."""
+    n = model.display.shape[0]
+    for i in range(2 * n):
+        arrays.section[cycle, i] = state[i]
+    arrays.tip[cycle, 0], arrays.tip[cycle, 1] = 0.0, 0.0
+    for i in range(n):
+        arrays.tip[cycle, 0] += model.display[i] * state[i]
+        arrays.tip[cycle, 1] += model.display[i] * state[n + i]
+    for column in range(2):
+        arrays.peak_force[cycle, column] = 0.0
+        arrays.impacts[cycle, column] = 0
+        arrays.contact_time[cycle, column] = 0.0
+        arrays.bounce_time[cycle, column] = 0.0
 
 
 @njit(cache=True, nogil=True)
@@ -330,185 +439,115 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
     -------
     (status, cycle) : the cycle is the first one not finished.
     """
-    _, bins, size, n = model.acceleration.shape
-    m = model.row.shape[0]
+    _, bins, n, size = model.acceleration.shape
+    row = model.row
+    m = row.shape[0]
     duration = model.bin_duration
     step = duration / model.steps
     samples = arrays.history.shape[1]
     period = bins * duration
-    z, moved, at_sample, at_crest = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
-    series = np.empty((model.order + 1, n))
-    channel = np.empty(model.order + 1)
-    side = np.empty(m)
-    y0, v0, a0, y1, v1, a1 = np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m)
+    z, moved, there, side = np.empty(size), np.empty(size), np.empty(size), np.empty(m)
+    until, towards = np.empty(m), np.empty(m)
+    series, channel = np.empty((model.order + 1, n)), np.empty(model.order + 1)
+    start = np.zeros((3, m))
+    end = np.zeros((3, m))
+    spare = np.zeros((3, m))
 
     for cycle in range(arrays.section.shape[0]):
+        begin_cycle(model, state, arrays, cycle)
+        peak, contact_time = arrays.peak_force[cycle], arrays.contact_time[cycle]
         for i in range(2 * n):
             z[i] = state[i]
-        read_channels(model, z, y0, v0)
-        for j in range(m):
-            side[j] = 0.0
-            if closes(model, j, 1.0, y0[j], v0[j]):
-                side[j] = 1.0
-            elif model.two_sided[j] and closes(model, j, -1.0, y0[j], v0[j]):
-                side[j] = -1.0
+        find_sides(model, z, side)
         put_sides(model, side, z)
-        arrays.section[cycle] = state
-        arrays.tip[cycle, 0], arrays.tip[cycle, 1] = 0.0, 0.0
-        for i in range(n):
-            arrays.tip[cycle, 0] += model.display[i] * state[i]
-            arrays.tip[cycle, 1] += model.display[i] * state[n + i]
-        for column in range(2):
-            arrays.peak_force[cycle, column] = 0.0
-            arrays.impacts[cycle, column] = 0
-            arrays.contact_time[cycle, column] = 0.0
-            arrays.bounce_time[cycle, column] = 0.0
-        events = 0
-        sample = 0
         chosen = contact_set(model, side)
+        events, sample = 0, 0
 
         for b in range(bins):
-            a = model.acceleration[chosen, b]
+            curvature = model.curvature[chosen, b]
             put_time(z, n, 0.0)
-            closed = False
-            for j in range(m):
-                if side[j] != 0.0:
-                    closed = True
-                    a0[j] = curve(model.curvature[chosen, b], z, j)
-            start = joint_force(model, side, y0, v0, a0)
+            read_channels(row, curvature, side, z, start)
+            force = joint_force(model, side, start)
+            # steps are counted from the last event
             origin, count = 0.0, 0
             while True:
                 time = origin + count * step
-                left = duration - time
-                whole = int(left / step + 1e-9)
+                whole = int((duration - time) / step + 1e-9)
                 if whole > 0 and sample == samples:
-                    quiet = quiet_steps(
-                        model, chosen, b, side, z, moved, y0, v0, a0, time, whole, arrays.peak_force[cycle]
-                    )
-                    if quiet > 0:
-                        count += quiet
-                        time = origin + count * step
-                        left = duration - time
-                        start = joint_force(model, side, y0, v0, a0)
-                        note_share(start, quiet * step, arrays.contact_time[cycle])
-                if left <= 1e-12 * duration:
+                    count += quiet_steps(model, chosen, b, side, z, moved, start, end, time, whole, peak, contact_time)
+                    time = origin + count * step
+                    force = joint_force(model, side, start)
+                h = min(step, duration - time)
+                if h <= 1e-12 * duration:
                     break
-                expanded = False
-                if left >= (1.0 - 1e-9) * step:
-                    h = step
+                fits = h >= (1.0 - 1e-9) * step
+                expanded = not fits
+                for c in range(2 * n, size):
+                    moved[c] = z[c]
+                if fits:
                     propagate(model.propagator[chosen, b], z, moved)
                 else:
-                    h = left
-                    expand(a, z, duration, series)
-                    expanded = True
+                    expand(model.acceleration[chosen, b], z, duration, series)
                     evaluate(series, h, moved)
-                for c in range(2 * n + FORCING_TERMS, size):
-                    moved[c] = z[c]
                 put_time(moved, n, (time + h) / duration)
-                read_channels(model, moved, y1, v1)
+                read_channels(row, curvature, side, moved, end)
 
                 # did a contact begin or end on the way?
-                first, instant, towards = -1, math.inf, 0.0
-                for j in range(m):
-                    if side[j] != 0.0:
-                        a1[j] = curve(model.curvature[chosen, b], moved, j)
-                        until = suspect_closed(model, j, side[j], h, y0[j], v0[j], a0[j], y1[j], v1[j], a1[j])
-                        if until < 0.0:
-                            continue
-                        looked = side[j]
-                    else:
-                        looked = 1.0
-                        until = suspect_open(model, j, 1.0, h, y0[j], v0[j], y1[j], v1[j])
-                        if until < 0.0 and model.two_sided[j]:
-                            looked = -1.0
-                            until = suspect_open(model, j, -1.0, h, y0[j], v0[j], y1[j], v1[j])
-                        if until < 0.0:
-                            continue
+                changed = -1
+                if find_suspects(model, side, h, start, end, until, towards) > 0:
                     if not expanded:
-                        expand(a, z, duration, series)
+                        expand(model.acceleration[chosen, b], z, duration, series)
                         expanded = True
-                    for k in range(channel.shape[0]):
-                        channel[k] = 0.0
-                        for i in range(n):
-                            channel[k] += model.row[j, i] * series[k, i]
-                    found = locate(
-                        model.stiffness[j], model.damping[j], model.gap[j], looked, side[j] != 0.0, channel, until,
-                        event_tolerance,
-                    )  # fmt: skip
-                    if found < instant:
-                        first, instant, towards = j, found, looked
-                if first >= 0:
-                    h = instant
-                    evaluate(series, h, moved)
-                    put_time(moved, n, (time + h) / duration)
-                    read_channels(model, moved, y1, v1)
-                    for j in range(m):
-                        if side[j] != 0.0:
-                            a1[j] = curve(model.curvature[chosen, b], moved, j)
+                    changed, instant = first_change(model, side, series, until, towards, channel, event_tolerance)
+                    if changed >= 0:
+                        h = instant
+                        evaluate(series, h, moved)
+                        put_time(moved, n, (time + h) / duration)
+                        read_channels(row, curvature, side, moved, end)
 
                 # record the step
-                if sample < samples:
-                    now = b * duration + time
-                    while sample < samples and sample * period < (now + h) * samples:
-                        if not expanded:
-                            expand(a, z, duration, series)
-                            expanded = True
-                        evaluate(series, max(sample * period / samples - now, 0.0), at_sample)
-                        take_sample(model, side, at_sample, y1, v1, a1, arrays.history[cycle, sample])
-                        sample += 1
-                    read_channels(model, moved, y1, v1)
-                if closed:
-                    end = joint_force(model, side, y1, v1, a1)
-                    note_peak(arrays.peak_force[cycle], end)
-                    crest, size_there = crest_instant(h, start, end)
-                    if size_there > 0.99 * arrays.peak_force[cycle, UPPER if end[0] > 0.0 else LOWER]:
-                        if not expanded:
-                            expand(a, z, duration, series)
-                        evaluate(series, crest, at_crest)
-                        put_time(at_crest, n, (time + crest) / duration)
-                        for c in range(2 * n + FORCING_TERMS, size):
-                            at_crest[c] = z[c]
-                        read_channels(model, at_crest, y0, v0)
-                        for j in range(m):
-                            if side[j] != 0.0:
-                                a0[j] = curve(model.curvature[chosen, b], at_crest, j)
-                        top = joint_force(model, side, y0, v0, a0)
-                        note_peak(arrays.peak_force[cycle], top)
-                    start = end
-                    note_share(end, h, arrays.contact_time[cycle])
+                before, force = force, joint_force(model, side, end)
+                note_share(force, h, contact_time)
+                note_peak(peak, force)
+                crest, size_there = crest_instant(h, before, force)
+                sampled = sample < samples and sample * period < (b * duration + time + h) * samples
+                crested = size_there > 0.99 * peak[UPPER if force[0] > 0.0 else LOWER]
+                if sampled or crested:
+                    if not expanded:
+                        expand(model.acceleration[chosen, b], z, duration, series)
+                    for c in range(2 * n, size):
+                        there[c] = z[c]
+                if crested:
+                    note_peak(peak, refined_force(model, chosen, b, side, series, time, crest, there, spare))
+                while sample < samples and sample * period < (b * duration + time + h) * samples:
+                    at = max(sample * period / samples - b * duration - time, 0.0)
+                    at_sample = refined_force(model, chosen, b, side, series, time, at, there, spare)
+                    write_sample(model, there, at_sample, arrays.history[cycle, sample])
+                    sample += 1
                 z, moved = moved, z
-                y0, y1 = y1, y0
-                v0, v1 = v1, v0
-                a0, a1 = a1, a0
-                if first < 0:
-                    if h < step:
+                start, end = end, start
+                if changed < 0:
+                    if not fits:
                         break
                     count += 1
                     continue
 
-                # a contact changes
+                # the contact set changes
                 events += 1
                 if events > event_budget:
                     return status.EVENT_BUDGET, cycle
-                if side[first] != 0.0:
-                    side[first] = 0.0
-                else:
-                    side[first] = towards
-                    if monitored(model, first):
-                        column = column_of(model, first, towards)
-                        arrays.impacts[cycle, column] += 1
-                        upward = 1.0 if column == UPPER else -1.0
-                        note_touch(episode, upward, b * duration + time + h, arrays.bounce_time[cycle])
+                side[changed] = towards[changed] if side[changed] == 0.0 else 0.0
+                if side[changed] != 0.0 and monitored(model, changed):
+                    column = column_of(model, changed, side[changed])
+                    arrays.impacts[cycle, column] += 1
+                    upward = 1.0 if column == UPPER else -1.0
+                    note_touch(episode, upward, b * duration + time + h, arrays.bounce_time[cycle])
                 put_sides(model, side, z)
                 chosen = contact_set(model, side)
-                a = model.acceleration[chosen, b]
-                closed = False
-                for j in range(m):
-                    if side[j] != 0.0:
-                        closed = True
-                        a0[j] = curve(model.curvature[chosen, b], z, j)
-                start = joint_force(model, side, y0, v0, a0)
-                note_peak(arrays.peak_force[cycle], start)
+                curvature = model.curvature[chosen, b]
+                read_channels(row, curvature, side, z, start)
+                force = joint_force(model, side, start)
+                note_peak(peak, force)
                 origin, count = time + h, 0
 
         arrays.events[cycle] = events
@@ -519,33 +558,3 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
         episode.touch[0] -= period
         episode.touch[1] -= period
     return status.OK, arrays.section.shape[0]
-
-
-@njit(cache=True, inline="always")
-def joint_force(model, side, y, v, a):
-    """``resultant`` of the monitored joint from the channels' displacement, velocity and acceleration."""
-    fx, fy, fz, rx, ry, rz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(side.shape[0]):
-        if side[j] != 0.0:
-            force = model.stiffness[j] * (y[j] - side[j] * model.gap[j]) + model.damping[j] * v[j]
-            rate = model.stiffness[j] * v[j] + model.damping[j] * a[j]
-            fx += model.reading[j, 0] * force
-            fy += model.reading[j, 1] * force
-            fz += model.reading[j, 2] * force
-            rx += model.reading[j, 0] * rate
-            ry += model.reading[j, 1] * rate
-            rz += model.reading[j, 2] * rate
-    return resultant(fx, fy, fz, rx, ry, rz)
-
-
-@njit(cache=True)
-def take_sample(model, side, z, y, v, a, sample):
-    """Write displacement, velocity and signed resultant (positive where it points up) of the monitored joint."""
-    n = model.display.shape[0]
-    read_channels(model, z, y, v)
-    force = joint_force(model, side, y, v, a)
-    sample[0], sample[1] = 0.0, 0.0
-    for i in range(n):
-        sample[0] += model.display[i] * z[i]
-        sample[1] += model.display[i] * z[n + i]
-    sample[2] = math.copysign(force[1], force[0])

@@ -32,8 +32,10 @@ Array = NDArray[np.float64]
 REFERENCE_CYCLES = 10_000
 """Cycles of the reference run."""
 
-UPDATE_FORMS: tuple[Form, ...] = ("literal", "attractors")
-"""Forms of the Matrix Update Test, for machines whose matrices depend on their configuration."""
+UPDATES: tuple[tuple[Form, tuple[float, float]], ...] = (
+    ("literal", (5.0, 6.0)), ("literal", (1.0, 1.2)), ("attractors", (5.0, 6.0)), ("attractors", (1.0, 1.2)),
+)  # fmt: skip
+"""Forms and intervals [deg] of the Matrix Update Test, for machines whose matrices depend on their configuration."""
 
 
 class RecordTest(NamedTuple):
@@ -257,7 +259,7 @@ def agreement(
         raise DiagnosisError("none of the machines could be simulated")
     names = [f"{test.name}, {test.transient} + {test.cycles}" for test in tests]
     if depends_on_configuration(machines[0]):
-        names += [f"Matrix Update Test, {form}, 200 + 100" for form in UPDATE_FORMS]
+        names += [f"Matrix Update Test, {form}, {a:g} and {b:g} deg, 200 + 100" for form, (a, b) in UPDATES]
     names.append(f"diagnose, up to {budget}")
     rows = tuple(_row(name, index, points) for index, name in enumerate(names))
     votes = np.array([point.votes for point in points])
@@ -282,11 +284,11 @@ def _judge(machine: Machine, tests: Sequence[RecordTest], reference_cycles: int,
         votes.append(test.judge(part, growth[window]))
         seconds.append(thread_time() - began + per_cycle * window.stop)
         cycles.append(float(window.stop))
-    for form in UPDATE_FORMS if depends_on_configuration(machine) else ():
+    for form, intervals in UPDATES if depends_on_configuration(machine) else ():
         began = thread_time()
-        votes.append(matrix_update_test(machine, form=form).nature)
+        votes.append(matrix_update_test(machine, form=form, intervals=intervals).nature)
         seconds.append(thread_time() - began)
-        cycles.append(600.0 if form == "literal" else 400.0)
+        cycles.append(600.0)
     began = thread_time()
     verdict = diagnose(machine, budget=budget)
     seconds.append(thread_time() - began)

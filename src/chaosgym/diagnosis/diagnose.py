@@ -18,6 +18,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.diagnosis.lyapunov import Deviation, LyapunovExponent, average_growth
+from chaosgym.diagnosis.matrix_update import (
+    FIELD,
+    depends_on_configuration,
+    matrix_update_test,
+    neighbouring_interval,
+)
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
 from chaosgym.diagnosis.response import Diagnosis, Nature, Status
 from chaosgym.diagnosis.two_step import (
@@ -38,7 +44,7 @@ FIRST_STAGE = 100
 DEFAULT_BUDGET = 3200
 """Cycles of the last stage."""
 
-UPDATE_CYCLES = 100
+UPDATE_CYCLES = 50
 """Cycles of each run of the Matrix Update Test, on machines whose matrices depend on configuration (figure 5.5)."""
 
 MAX_SEARCHED_PERIOD = 128
@@ -108,7 +114,20 @@ def diagnose(
         more, more_growth = deviation.run(len(record))
         record, growth = record.followed_by(more), np.concatenate([growth, more_growth])
     verdict = verdict or _not_periodic(stage)
-    return replace(verdict, votes=_votes(stage), horizon=len(record), evidence=_evidence(stage, verdict, initial_state))
+    votes, evidence = _votes(stage), _evidence(stage, verdict, initial_state)
+    status = verdict.status
+    if depends_on_configuration(machine):
+        interval = getattr(machine, FIELD)
+        update = matrix_update_test(
+            machine, intervals=(interval, neighbouring_interval(interval)), transient=0, cycles=UPDATE_CYCLES,
+            initial_state=record.final_state,
+        )  # fmt: skip
+        votes["matrix_update"] = update.nature
+        evidence["matrix_update"] = update.reason
+        evidence["cycles_used"] += 4 * UPDATE_CYCLES
+        if status == "agreed" and update.nature not in (verdict.nature, "undetermined"):
+            status = "disputed"
+    return replace(verdict, votes=votes, status=status, horizon=len(record), evidence=evidence)
 
 
 def _stage(machine: Machine, record: CycleRecord, growth: Array, searched: int) -> _Stage:

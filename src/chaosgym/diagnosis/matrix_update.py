@@ -65,7 +65,8 @@ def matrix_update_test(
     form
         "literal" or "attractors"; see the module.
     transient, cycles
-        Cycles before the comparison (literal: of both runs, from rest; attractors: of the first run), and compared.
+        Cycles before the comparison (literal: of both runs, from rest; attractors: of the first run, after which each
+        takes ``cycles`` more to settle), and compared.
     tolerance
         Difference, as a share of the largest peak force, that counts as agreement.
     initial_state
@@ -91,9 +92,14 @@ def matrix_update_test(
         verdict = compare_outcomes(*runs, tolerance=tolerance)
     else:
         start = simulate(machine, transient, initial_state).final_state if transient else initial_state
-        runs = [simulate(one, cycles, start).peak_force for one in (machine, other)]
+        runs = [simulate(one, cycles, start, transient=cycles).peak_force for one in (machine, other)]
         verdict = compare_attractors(*runs, tolerance=tolerance)
     return replace(verdict, evidence={**evidence, **verdict.evidence}, horizon=transient + cycles)
+
+
+def neighbouring_interval(interval: float) -> float:
+    """The interval nearest to 6/5 of a given one that divides a revolution."""
+    return 360.0 / max(1, round(360.0 / interval * 5.0 / 6.0))
 
 
 def compare_outcomes(first: ArrayLike, second: ArrayLike, *, tolerance: float = TOLERANCE) -> Diagnosis:

@@ -7,8 +7,12 @@ machines that differ only in speed or clearance.
 """
 
 import math
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
 from dataclasses import fields
-from functools import lru_cache
+from functools import cache, lru_cache
+from operator import attrgetter
+from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -41,23 +45,75 @@ MAX_PHASE = 8.0
 STABLE_PHASE = 2.0
 """Longest Runge-Kutta step times largest eigenvalue; the method is stable up to 2.7."""
 
-KEPT = 64
-"""Machines, and machines at one speed, whose matrices are kept."""
+MAX_SETS = 32
+"""Contact sets for which propagators are made; a machine with more is left to the stepper."""
+
+KEPT = 32
+"""Machines whose assembled equations are kept, whatever their speed and clearance."""
+
+KEPT_BYTES = 256_000_000
+"""Memory for the propagators of machines at one speed; those used longest ago go first."""
 
 _NOT_IN_THE_MATRICES = ("crank_speed", "slider_clearance", "ball_clearance")
 
 
+class _RecentModels:
+    """Models by key within ``KEPT_BYTES``; several threads may ask at once."""
+
+    def __init__(self) -> None:
+        self._models: OrderedDict[Hashable, SliderCrankModel] = OrderedDict()
+        self._bytes = 0
+        self._lock = Lock()
+
+    def get(self, key: Hashable, make: Callable[[], SliderCrankModel]) -> SliderCrankModel:
+        with self._lock:
+            if key in self._models:
+                self._models.move_to_end(key)
+                return self._models[key]
+        model = make()
+        with self._lock:
+            if key not in self._models:
+                self._models[key] = model
+                self._bytes += _size(model)
+            while self._bytes > KEPT_BYTES and len(self._models) > 1:
+                self._bytes -= _size(self._models.popitem(last=False)[1])
+        return model
+
+
+def _size(model: SliderCrankModel) -> int:
+    return model.acceleration.nbytes + model.curvature.nbytes + model.propagator.nbytes
+
+
+_recent = _RecentModels()
+
+
+def has_propagators(machine: "SliderCrank") -> bool:
+    """True if contact is linear, no contact force turns with the ball, and the contact sets are few."""
+    if machine.contact_law != "linear" or machine.ball_joint == "spherical":
+        return False
+    return int(_radix(machine) ** len(_gaps(machine))) <= MAX_SETS
+
+
 def exact_model(machine: "SliderCrank", step_phase: float) -> SliderCrankModel:
-    """Model of a machine whose contacts are piecewise linear, with propagators for steps of ``step_phase`` [rad]."""
-    return _at_speed(machine.crank_speed, step_phase, *_key(machine))._replace(gap=_gaps(machine))
+    """Model of a machine that ``has_propagators``; a closed contact turns by ``step_phase`` [rad] in a step."""
+    structure = _key(machine)
+    key = (machine.crank_speed, step_phase, structure)
+    model = _recent.get(key, lambda: _at_speed(machine.crank_speed, step_phase, _structure(*structure)))
+    return model._replace(gap=_gaps(machine))
+
+
+def _radix(machine: "SliderCrank") -> int:
+    """Contact states of a channel that differ in their matrices: friction tells one side from the other."""
+    return 3 if machine.friction_coefficient > 0.0 else 2
 
 
 def _key(machine: "SliderCrank") -> tuple[Any, ...]:
     """Class and all fields that shape the matrices."""
-    kind = type(machine)
-    return (kind, *(getattr(machine, name) for name in _structure_fields(kind)))
+    kind: Any = type(machine)
+    return (kind, *attrgetter(*_structure_fields(kind))(machine))
 
 
+@cache
 def _structure_fields(kind: Any) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind) if field.name not in _NOT_IN_THE_MATRICES)
 
@@ -333,7 +389,7 @@ def _structure(kind: type, *structure: Any) -> _Structure:
     inverse_mass, free, forcing, friction = _held(kind, *structure)
     n = inverse_mass.shape[-1]
     channels = _channels(machine)
-    radix = 3 if machine.friction_coefficient > 0.0 else 2
+    radix = _radix(machine)
     push = _push(inverse_mass, channels, radix, friction)
     some = [0, len(inverse_mass) // 4]
     contact, spectrum = _rates(free[0, some], push[-1, some, : 2 * n], channels.row)
@@ -347,17 +403,16 @@ def _friction(machine: "SliderCrank", crank_angle: Array) -> Array:
     return np.asarray(machine.friction_coefficient * np.clip(speed, -1.0, 1.0))
 
 
-@lru_cache(maxsize=KEPT)
-def _at_speed(crank_speed: float, step_phase: float, *structure: Any) -> SliderCrankModel:
-    parts = _structure(*structure)
+def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> SliderCrankModel:
     m = len(parts.channels.row)
     sets, bins, _, n = parts.push.shape
     rate = crank_speed * math.pi / 30.0
     duration = 2.0 * math.pi / (bins * rate)
-    acceleration = np.zeros((sets, bins, 2 * n + FORCING_TERMS + m, n))
-    acceleration[:, :, : 2 * n + FORCING_TERMS] = _free_motion(parts.free, parts.forcing, rate)
-    acceleration[:, :, : 2 * n] += parts.push[:, :, : 2 * n]
-    acceleration[:, :, 2 * n + FORCING_TERMS :] = parts.push[:, :, 2 * n :]
+    columns = np.zeros((sets, bins, 2 * n + FORCING_TERMS + m, n))
+    columns[:, :, : 2 * n + FORCING_TERMS] = _free_motion(parts.free, parts.forcing, rate)
+    columns[:, :, : 2 * n] += parts.push[:, :, : 2 * n]
+    columns[:, :, 2 * n + FORCING_TERMS :] = parts.push[:, :, 2 * n :]
+    acceleration = np.ascontiguousarray(np.swapaxes(columns, -1, -2))
     steps = max(1, math.ceil(duration * max(parts.contact / step_phase, parts.spectrum / MAX_PHASE)))
     step = duration / steps
     order = series_order(parts.spectrum * step)
@@ -376,6 +431,6 @@ def _at_speed(crank_speed: float, step_phase: float, *structure: Any) -> SliderC
         reach=np.linalg.norm(parts.channels.reading, axis=1),
         display=parts.display,
         acceleration=acceleration,
-        curvature=np.ascontiguousarray(np.einsum("jn,sbcn->sbjc", parts.channels.row, acceleration)),
+        curvature=np.ascontiguousarray(parts.channels.row @ acceleration),
         propagator=propagator_table(acceleration, duration, step, order),
     )

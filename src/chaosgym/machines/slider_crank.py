@@ -30,7 +30,7 @@ from chaosgym.core.crank_stepper import SteppedCrankModel
 from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.errors import ParameterError
 from chaosgym.machines.crank_equations import SLIDER_ACROSS, degrees_of_freedom, equations
-from chaosgym.machines.crank_model import exact_model, stepped_model
+from chaosgym.machines.crank_model import exact_model, has_propagators, stepped_model
 from chaosgym.machines.kinematics import planar_motion
 from chaosgym.machines.parameters import parameter, validate
 
@@ -270,19 +270,14 @@ class SliderCrank:
         """True if the motor stands at an angle, so that the rod swings in two planes."""
         return self.motor_angle > 0.0
 
-    @property
-    def is_piecewise_linear(self) -> bool:
-        """True if exact propagators exist: linear contact, and no contact force that turns with the ball."""
-        return self.contact_law == "linear" and self.ball_joint != "spherical"
-
     def reduce(self, step_phase: float = 1.0) -> SliderCrankModel | SteppedCrankModel:
         """Return the model for steps in which a closed contact turns by at most ``step_phase`` [rad].
 
-        With exact propagators where they exist, for the Runge-Kutta stepper otherwise.
-
-        Machines that differ in clearance alone share all of it; those that differ in speed share the assembly.
+        With exact propagators if contact is linear and does not turn with the ball, for the Runge-Kutta stepper
+        otherwise. Machines that differ in clearance alone share all of it; those that differ in speed
+        share the assembly.
         """
-        return exact_model(self, step_phase) if self.is_piecewise_linear else stepped_model(self, step_phase)
+        return exact_model(self, step_phase) if has_propagators(self) else stepped_model(self, step_phase)
 
 
 THESIS_SLIDER_CRANK = SliderCrank()

@@ -24,9 +24,7 @@ from numpy.typing import NDArray
 
 from chaosgym.machines.connecting_rod import ConnectingRod, EndBody, connecting_rod
 from chaosgym.machines.crank_equations import (
-    BALL_ACROSS,
-    BALL_ALONG,
-    BALL_LATERAL,
+    BALL_DIRECTIONS,
     ELEMENTS,
     SLIDER_ACROSS,
     SLIDER_ALONG,
@@ -57,18 +55,25 @@ class _Rods(NamedTuple):
     lateral: ConnectingRod
 
 
-class _Motion(NamedTuple):
-    """Particles at B crank angles.
+class _Frame(NamedTuple):
+    """Nominal crank pin and slider pivot, and the axes d, n, b of the rod and the yoke's own, all (B, 3)."""
 
-    ``mass`` (k,); ``position`` (B, k, 3) nominal; ``shape`` (B, k, 3, n) Phi; ``director`` (B, k) 1 for a unit vector
-    that carries rotary inertia, 0 for a point; ``strain`` (B, 1 + modes, n) stretch of the rod and its modes per unit
-    coordinate; ``slider_along`` (B, n).
+    pin: Array
+    slider: Array
+    along: Array
+    across: Array
+    sideways: Array
+    yoke: Array
+
+
+class _Shapes(NamedTuple):
+    """Motion per unit coordinate.
+
+    ``particle`` (B, k, 3, n) Phi; ``strain`` (B, 1 + modes, n) stretch of the rod, and its modes; ``slider_along``
+    (B, n).
     """
 
-    mass: Array
-    position: Array
-    shape: Array
-    director: Array
+    particle: Array
     strain: Array
     slider_along: Array
 
@@ -81,103 +86,120 @@ def _rods(machine: "SliderCrank") -> _Rods:
     return _Rods(swing, connecting_rod(bar_of(machine), housing, still, modes, ELEMENTS))
 
 
-def _motion(machine: "SliderCrank", angle: Array, rods: _Rods) -> _Motion:
-    names = degrees_of_freedom(machine, spatial=True)
-    n, count, length = len(names), len(angle), machine.rod_length
+def _frame(machine: "SliderCrank", angle: Array) -> _Frame:
     tilt = math.radians(machine.motor_angle)
     pin = crank_pin(angle, machine.crank_radius, tilt)
     slider = np.zeros_like(pin)
-    slider[:, 0] = slider_position(angle, machine.crank_radius, length, tilt)
-    d = (slider - pin) / length
-    flat = np.hypot(d[:, 0], d[:, 1])
-    across = np.stack([-d[:, 1], d[:, 0], np.zeros(count)], axis=-1) / flat[:, None]
-    in_plane = np.stack([across[:, 1], -across[:, 0], np.zeros(count)], axis=-1)
-    lateral = np.cross(d, across)
+    slider[:, 0] = slider_position(angle, machine.crank_radius, machine.rod_length, tilt)
+    along = (slider - pin) / machine.rod_length
+    yoke = along * [1.0, 1.0, 0.0]
+    yoke /= np.linalg.norm(yoke, axis=1)[:, None]
+    across = np.cross([0.0, 0.0, 1.0], yoke)
+    return _Frame(pin, slider, along, across, np.cross(along, across), yoke)
 
-    def column(name: str) -> int | None:
-        return names.index(name) if name in names else None
 
-    # ends of the rod in space per unit coordinate
-    at_a, at_b = np.zeros((count, 3, n)), np.zeros((count, 3, n))
-    for name, axis in ((BALL_ALONG, d), (BALL_ACROSS, across), (BALL_LATERAL, lateral)):
-        if (c := column(name)) is not None:
-            at_a[:, :, c] = axis
-    for name, k in ((SLIDER_ALONG, 0), (SLIDER_ACROSS, 1), (SLIDER_LATERAL, 2)):
-        if (c := column(name)) is not None:
-            at_b[:, k, c] = 1.0
+def _masses(machine: "SliderCrank", rods: _Rods) -> tuple[Array, Array]:
+    """Masses (k,) of the particles: the bar's points, housing, yoke, slider, and the unit vectors of housing and yoke.
+
+    The second array (k,) is 1 for the two unit vectors, whose mass is a central rotary inertia, and 0 for points.
+    """
+    housing = machine.housing_offset_along**2 + machine.housing_offset_across**2
+    yoke = machine.yoke_offset_along**2 + machine.yoke_offset_across**2
+    bodies = [
+        machine.housing_mass,
+        machine.yoke_mass,
+        machine.slider_mass,
+        machine.housing_inertia - machine.housing_mass * housing,
+        machine.yoke_inertia - machine.yoke_mass * yoke,
+    ]
+    bar = rods.swing.line_mass * rods.swing.weight
+    return np.concatenate([bar, bodies]), np.concatenate([np.zeros(len(bar) + 3), np.ones(2)])
+
+
+def _positions(machine: "SliderCrank", angle: Array, rods: _Rods) -> Array:
+    """Nominal positions (B, k, 3) of the particles, unit vectors included."""
+    frame = _frame(machine, angle)
+    bar = frame.pin[:, None] + rods.swing.position[:, None] * frame.along[:, None]
+    housing = frame.pin + machine.housing_offset_along * frame.along + machine.housing_offset_across * frame.across
+    yoke = frame.slider + machine.yoke_offset_along * frame.yoke + machine.yoke_offset_across * frame.across
+    return np.concatenate([bar, np.stack([housing, yoke, frame.slider, frame.along, frame.yoke], axis=1)], axis=1)
+
+
+def _ends(machine: "SliderCrank", frame: _Frame) -> tuple[Array, Array]:
+    """Motion (B, 3, n) of the rod's ends A and B per unit coordinate."""
+    names = degrees_of_freedom(machine, spatial=True)
+    at_a, at_b = np.zeros((2, len(frame.pin), 3, len(names)))
+    for name, axis in zip(BALL_DIRECTIONS, (frame.along, frame.across, frame.sideways), strict=True):
+        if name in names:
+            at_a[:, :, names.index(name)] = axis
+    for k, name in enumerate((SLIDER_ALONG, SLIDER_ACROSS, SLIDER_LATERAL)):
+        if name in names:
+            at_b[:, k, names.index(name)] = 1.0
     if machine.rod == "rigid":
-        stretch = np.einsum("bi,bin->bn", d, at_b - at_a)
-        at_b[:, 0] -= stretch / d[:, :1]
+        stretch = np.einsum("bi,bin->bn", frame.along, at_b - at_a)
+        at_b[:, 0] -= stretch / frame.along[:, :1]
+    return at_a, at_b
 
-    modes = len(rods.swing.mode_frequency)
-    first = n - 2 * modes
-    bend = np.zeros((2, count, 3, n))
+
+def _shapes(machine: "SliderCrank", angle: Array, rods: _Rods) -> _Shapes:
+    frame = _frame(machine, angle)
+    at_a, at_b = _ends(machine, frame)
+    count, _, n = at_a.shape
+    length, modes = machine.rod_length, len(rods.swing.mode_frequency)
     chord = at_b - at_a
-    turn = (chord - d[:, :, None] * np.einsum("bi,bin->bn", d, chord)[:, None]) / length
-    share = rods.swing.position / length
-    bar = at_a[:, None] * (1.0 - share)[:, None, None] + at_b[:, None] * share[:, None, None]
-    for rod, axis, start in ((rods.swing, across, first), (rods.lateral, lateral, first + modes)):
-        own = slice(start, start + modes)
+    stretch = np.einsum("bi,bin->bn", frame.along, chord)
+    turn = (chord - frame.along[:, :, None] * stretch[:, None]) / length
+    share = (rods.swing.position / length)[:, None, None]
+    bar = at_a[:, None] * (1.0 - share) + at_b[:, None] * share
+    housing_turn, yoke_end_turn = turn, turn.copy()
+    strain = np.zeros((count, 1 + 2 * modes, n))
+    strain[:, 0] = stretch
+    for rod, axis, first in ((rods.swing, frame.across, n - 2 * modes), (rods.lateral, frame.sideways, n - modes)):
+        own = slice(first, first + modes)
         bar[..., own] += np.einsum("bi,pm->bpim", axis, rod.mode_shape)
-        bend[..., own] += np.einsum("bi,em->ebim", axis, rod.mode_slope)
-    at_housing, at_yoke = turn + bend[0], turn + bend[1]
+        housing_turn[..., own] += np.einsum("bi,m->bim", axis, rod.mode_slope[0])
+        yoke_end_turn[..., own] += np.einsum("bi,m->bim", axis, rod.mode_slope[1])
+    strain[:, 1:, n - 2 * modes :] = np.eye(2 * modes)
 
     def swing(direction: Array) -> Array:
-        return np.asarray(np.einsum("bi,bin->bn", across, direction))
+        return np.asarray(np.einsum("bi,bin->bn", frame.across, direction)[:, None])
 
-    x, y = machine.housing_offset_along, machine.housing_offset_across
-    housing = at_a + x * at_housing - y * d[:, :, None] * swing(at_housing)[:, None]
-    angle_of_yoke = swing(at_yoke) / flat[:, None]
-    yx, yy = machine.yoke_offset_along, machine.yoke_offset_across
-    yoke_turn = across[:, :, None] * angle_of_yoke[:, None]
-    yoke = at_b + yx * yoke_turn - yy * in_plane[:, :, None] * angle_of_yoke[:, None]
+    # the yoke turns about the slider's pivot axis only, so that the rod's end keeps in its plane
+    swing_of_yoke = swing(yoke_end_turn) / np.einsum("bi,bi->b", frame.along, frame.yoke)[:, None, None]
+    yoke_turn = frame.across[:, :, None] * swing_of_yoke
+    housing = at_a + machine.housing_offset_along * housing_turn
+    housing -= machine.housing_offset_across * frame.along[:, :, None] * swing(housing_turn)
+    yoke = at_b + machine.yoke_offset_along * yoke_turn
+    yoke -= machine.yoke_offset_across * frame.yoke[:, :, None] * swing_of_yoke
+    bodies = np.stack([housing, yoke, at_b, housing_turn, yoke_turn], axis=1)
+    return _Shapes(np.concatenate([bar, bodies], axis=1), strain, at_b[:, 0].copy())
 
-    central = [
-        machine.housing_inertia - machine.housing_mass * (x**2 + y**2),
-        machine.yoke_inertia - machine.yoke_mass * (yx**2 + yy**2),
-    ]
-    bodies = [
-        (machine.housing_mass, pin + x * d + y * across, housing),
-        (machine.yoke_mass, slider + yx * in_plane + yy * across, yoke),
-        (machine.slider_mass, slider, at_b),
-        (central[0], d, at_housing),
-        (central[1], in_plane, yoke_turn),
-    ]
-    points = pin[:, None] + rods.swing.position[:, None] * d[:, None]
-    strain = np.zeros((count, 1 + 2 * modes, n))
-    strain[:, 0] = np.einsum("bi,bin->bn", d, chord)
-    for i in range(2 * modes):
-        strain[:, 1 + i, first + i] = 1.0
-    return _Motion(
-        mass=np.concatenate([rods.swing.line_mass * rods.swing.weight, [mass for mass, _, _ in bodies]]),
-        position=np.concatenate([points, np.stack([place for _, place, _ in bodies], axis=1)], axis=1),
-        shape=np.concatenate([bar, np.stack([shape for _, _, shape in bodies], axis=1)], axis=1),
-        director=np.concatenate([np.zeros(len(share) + 3), np.ones(2)]),
-        strain=strain,
-        slider_along=at_b[:, 0].copy(),
-    )
+
+def _difference(weights: Array, around: list[Array]) -> Array:
+    return np.asarray(sum(w * part for w, part in zip(weights, around, strict=True)))
+
+
+def _shifted(crank_angle: Array) -> list[Array]:
+    return [crank_angle + _SHIFT * k for k in range(-4, 5)]
 
 
 def spatial_loads(machine: "SliderCrank", crank_angle: Array) -> Array:
     """Load of gravity and, per squared crank rate, of the nominal motion: (2, B, n)."""
     rods = _rods(machine)
-    motion = _motion(machine, crank_angle, rods)
-    return _load(machine, motion, _derivative(machine, crank_angle, rods, _SECOND))
+    around = [_positions(machine, angle, rods) for angle in _shifted(crank_angle)]
+    particle = _shapes(machine, crank_angle, rods).particle
+    return _loads(machine, rods, particle, _difference(_SECOND, around))
 
 
-def _derivative(machine: "SliderCrank", angle: Array, rods: _Rods, weights: Array) -> Array:
-    """Derivative of the particles' nominal position, (B, k, 3)."""
-    shifts = _SHIFT * np.arange(-4, 5)
-    return np.asarray(sum(w * _motion(machine, angle + s, rods).position for w, s in zip(weights, shifts, strict=True)))
-
-
-def _load(machine: "SliderCrank", motion: _Motion, acceleration: Array) -> Array:
+def _loads(machine: "SliderCrank", rods: _Rods, particle: Array, acceleration: Array) -> Array:
+    mass, director = _masses(machine, rods)
     tilt = math.radians(machine.gravity_angle)
     up = machine.gravity * np.array([-math.sin(tilt), math.cos(tilt), 0.0])
-    weight = motion.mass * (1.0 - motion.director)
-    gravity = np.einsum("k,bkin,i->bn", weight, motion.shape, up, optimize=True)
-    inertia = np.einsum("k,bkin,bki->bn", motion.mass, motion.shape, acceleration, optimize=True)
-    return np.stack([gravity, inertia])
+    count, _, _, n = particle.shape
+    flat = particle.reshape(count, -1, n)
+    gravity = ((mass * (1.0 - director))[:, None] * up).reshape(1, 1, -1) @ flat
+    inertia = (mass[:, None] * acceleration).reshape(count, 1, -1) @ flat
+    return np.stack([gravity[:, 0], inertia[:, 0]])
 
 
 def spatial_equations(machine: "SliderCrank", crank_angle: Array) -> Equations:
@@ -191,29 +213,28 @@ def spatial_equations(machine: "SliderCrank", crank_angle: Array) -> Equations:
         Crank angles [rad].
     """
     rods = _rods(machine)
-    around = [_motion(machine, crank_angle + _SHIFT * k, rods) for k in range(-4, 5)]
-    here = around[4]
-    shape1 = sum(w * part.shape for w, part in zip(_FIRST, around, strict=True))
-    shape2 = sum(w * part.shape for w, part in zip(_SECOND, around, strict=True))
-    strain1 = sum(w * part.strain for w, part in zip(_FIRST, around, strict=True))
-    place1 = sum(w * part.position for w, part in zip(_FIRST, around, strict=True))
-    place2 = sum(w * part.position for w, part in zip(_SECOND, around, strict=True))
-    count, _, _, n = here.shape.shape
-    weighted = (here.mass[:, None, None] * here.shape).reshape(count, -1, n).swapaxes(-1, -2)
+    mass, director = _masses(machine, rods)
+    around = [_shapes(machine, angle, rods) for angle in _shifted(crank_angle)]
+    places = [_positions(machine, angle, rods) for angle in _shifted(crank_angle)]
+    particles, here = [part.particle for part in around], around[4]
+    strain1 = _difference(_FIRST, [part.strain for part in around])
+    count, _, _, n = here.particle.shape
+    weighted = (mass[:, None, None] * here.particle).reshape(count, -1, n).swapaxes(-1, -2)
 
     def against(shape: Array) -> Array:
         return np.asarray(weighted @ shape.reshape(count, -1, n))
 
     # a unit vector stays one: the second-order turn of a body that carries rotary inertia
-    turning = here.mass * here.director * np.einsum("bki,bki->bk", place1, place1)
-    kept = np.einsum("bk,bkin,bkim->bnm", turning, here.shape, here.shape, optimize=True)
+    speed = _difference(_FIRST, places)
+    kept = (director * np.einsum("bki,bki->bk", speed, speed))[:, :, None, None] * here.particle
     elastic, damping = _elastic(machine, rods)
     back = here.strain.swapaxes(-1, -2)
+    inertial = against(_difference(_SECOND, particles) + kept)
     return Equations(
-        mass=against(here.shape),
-        damping=np.stack([back @ damping @ here.strain, 2.0 * against(shape1)]),
-        stiffness=np.stack([back @ elastic @ here.strain, back @ damping @ strain1, against(shape2) + kept]),
-        load=_load(machine, here, place2),
+        mass=against(here.particle),
+        damping=np.stack([back @ damping @ here.strain, 2.0 * against(_difference(_FIRST, particles))]),
+        stiffness=np.stack([back @ elastic @ here.strain, back @ damping @ strain1, inertial]),
+        load=_loads(machine, rods, here.particle, _difference(_SECOND, places)),
         slider_along=here.slider_along,
     )
 
