@@ -136,9 +136,8 @@ def test_examples_of_the_documentation():
 @needs_browser
 def test_report_on_the_chaotic_beam_opens_in_a_browser(chaotic, browser, tmp_path):
     """Type III has the running statistics as an eighth figure."""
-    found = chaotic
     path = tmp_path / "report.html"
-    write_report(design_report(found), found.as_dict(), path)
+    write_report(design_report(chaotic), chaotic.as_dict(), path)
     check_page(browser, path, 8)
 
 
