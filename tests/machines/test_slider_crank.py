@@ -188,3 +188,10 @@ def test_clearance_shares_the_cached_propagators():
     assert one.propagator is other.propagator
     assert one.gap[0] == 0.254e-3
     assert other.gap[0] == 0.1e-3
+
+
+def test_the_clearance_that_varies_is_that_of_the_monitored_joint():
+    """Sweeps and types vary the ball's clearance where only the ball rattles, and the slider's otherwise."""
+    assert SliderCrank().clearance_field == "slider_clearance"
+    assert SliderCrank(slider_joint="ideal", ball_joint="spherical").clearance_field == "ball_clearance"
+    assert SliderCrank(ball_joint="spherical").clearance_field == "slider_clearance"

@@ -18,12 +18,15 @@ class Machine(Protocol):
     """Name on the command line, such as ``impact-beam``."""
     speed_field: ClassVar[str]
     """Field that an operator changes while the machine runs."""
-    clearance_field: ClassVar[str]
-    """Field that holds the clearance of the monitored joint."""
     usual_ranges: ClassVar[Mapping[str, tuple[float, float]]]
     """Ranges of speed and clearance, in the fields' units, that sweeps and environments cover by default."""
     sides: ClassVar[tuple[str, ...]]
     """Names of the bearing surfaces whose contact force is recorded."""
+
+    @property
+    def clearance_field(self) -> str:
+        """Field that holds the clearance of the monitored joint."""
+        ...
 
     @property
     def cycle_period(self) -> float:

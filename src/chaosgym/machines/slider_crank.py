@@ -53,10 +53,10 @@ class SliderCrank:
 
     name: ClassVar[str] = "slider-crank"
     speed_field: ClassVar[str] = "crank_speed"
-    clearance_field: ClassVar[str] = "slider_clearance"
     usual_ranges: ClassVar[Mapping[str, tuple[float, float]]] = {
         "crank_speed": (50.0, 300.0),
         "slider_clearance": (0.02e-3, 0.3e-3),
+        "ball_clearance": (0.02e-3, 0.3e-3),
     }
     sides: ClassVar[tuple[str, ...]] = ("upper", "lower")
     """Surfaces whose force points up and down: on the slider, or on the housing if the ball joint is monitored."""
@@ -255,6 +255,11 @@ class SliderCrank:
         if self.monitored_joint != "slider":
             return None
         return lambda phase: planar_motion(phase, self.crank_radius, self.rod_length).slider
+
+    @property
+    def clearance_field(self) -> str:
+        """Field that holds the clearance of the monitored joint."""
+        return f"{self.monitored_joint}_clearance"
 
     @property
     def natural_frequencies(self) -> Array:
