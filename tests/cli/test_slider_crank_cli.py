@@ -1,0 +1,49 @@
+"""The slider crank on the command line: the same keys as the beam, its own options, clear errors."""
+
+import pytest
+
+from chaosgym.machines import SliderCrank
+from chaosgym.simulation import simulate
+
+from .test_cli import run, run_json
+
+CRANK = ("slider-crank", "--speed-rpm", "190", "--clearance-mm", "0.254")
+
+
+def test_simulate_and_show_speak_of_the_same_machine():
+    """Peaks are those of the library; the options set the fields."""
+    result = run_json("simulate", *CRANK, "--contact-damping-ratio", "0.025", "--cycles", "20")
+    crank = SliderCrank(crank_speed=190.0, slider_clearance=0.254e-3, contact_damping_ratio=0.025)
+    assert result["peak_force_N"] == simulate(crank, 20).peak_force[:, 0].tolist()
+    shown = run_json("show", "slider-crank", "--clearance-joint", "ball-instrumented", "--clearance-mm", "0.1")
+    assert shown["parameters"]["ball_clearance"] == pytest.approx(1e-4)
+    assert shown["parameters"]["ball_joint"] == "instrumented"
+    assert shown["parameters"]["slider_joint"] == "ideal"
+    assert shown["parameters"]["gravity"] == 9.81
+
+
+def test_diagnose_tells_the_printed_nature_and_runs_the_matrix_update_test():
+    """190 rpm and +-0.254 mm are chaotic in the thesis (figure 4.14 b), by both tests."""
+    result = run_json("diagnose", *CRANK, "--budget", "200")
+    assert result["nature"] == "chaotic"
+    assert result["largest_lyapunov_exponent_per_cycle"]["value"] > 0.0
+    assert run_json("diagnose", *CRANK, "--test", "mut")["nature"] == "chaotic"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--clearance-mm", "5"), "--clearance-mm = 5 is out of range; allowed: 0 to 1 mm"),
+        (("--motor-angle-deg", "30"), "--motor-angle-deg = 30 is out of range; allowed: 0 to 25 deg"),
+        (("--set", "rod_length=0.04"), "rod_length = 0.04 m is out of range; allowed: above the crank radius"),
+        (("--frequency-hz", "3"), "--frequency-hz is no option of slider-crank"),
+        (("--clearance-joint", "hinge"), "'hinge' is not one of"),
+        (("--clearance-joint", "ball-spherical", "--clearance-mm", "0.1", "--ball-clearance-mm", "0.1"), "both set"),
+    ],
+)
+def test_bad_input_names_the_option(arguments, message):
+    """One line, exit code 2."""
+    code, out, err = run("simulate", "slider-crank", *arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
