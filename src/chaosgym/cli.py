@@ -109,7 +109,7 @@ def show(machine: Any, as_json: bool) -> None:
 @click.option("--peaks", type=click.Path(), help="Judge measured peak forces instead: one column, one line a cycle.")
 @click.option("--series", type=click.Path(), help="Judge a measured time series instead: columns time [s] and value.")
 @click.option("--period-s", type=float, help="Operating cycle of the series [s].")
-@click.option("--sensor-error", type=float, default=0.0, show_default=True, help="Largest error of a measured value.")
+@click.option("--sensor-error", type=float, default=0.0, show_default=True, help="Differences within it do not count.")
 def diagnose(
     machine: Any,
     test: str,
@@ -132,7 +132,7 @@ def diagnose(
     elif test == "mut":
         result, lines = _matrix_update(machine)
     else:
-        result, lines = _diagnose_machine(machine, budget, types, step_check)
+        result, lines = _diagnose_machine(machine, budget, types, step_check, sensor_error)
     _emit(result, as_json, lambda: lines)
 
 
@@ -183,12 +183,14 @@ def _matrix_update(machine: Any) -> tuple[dict[str, Any], list[str]]:
     return result, _verdict_lines(f"{machine.name}, Matrix Update Test", verdict, summary, " N")
 
 
-def _diagnose_machine(machine: Any, budget: int, types: bool, check: bool) -> tuple[dict[str, Any], list[str]]:
+def _diagnose_machine(
+    machine: Any, budget: int, types: bool, check: bool, sensor_error: float
+) -> tuple[dict[str, Any], list[str]]:
     from chaosgym.diagnosis import diagnose, response_type
     from chaosgym.diagnosis.step_check import step_check
     from chaosgym.simulation import simulate
 
-    verdict = diagnose(machine, budget=budget)
+    verdict = diagnose(machine, budget=budget, sensor_error=sensor_error)
     settled = simulate(machine, SUMMARY_CYCLES, verdict.evidence["final_state"])
     summary = _summary(settled.peak_force[:, 0])
     exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
@@ -204,7 +206,7 @@ def _diagnose_machine(machine: Any, budget: int, types: bool, check: bool) -> tu
     lines = _verdict_lines(machine.name, verdict, summary, " N")
     lines.append(f"  {result['cycles_used']} cycles used; votes: {votes}")
     if types:
-        judged = response_type(machine)
+        judged = response_type(machine, sensor_error=sensor_error)
         result |= {"response_type": judged.type, "response_type_reason": judged.reason}
         lines.append(f"  Type {judged.type}: {judged.reason}")
     if check:

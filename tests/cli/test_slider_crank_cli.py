@@ -30,6 +30,13 @@ def test_diagnose_tells_the_printed_nature_and_runs_the_matrix_update_test():
     assert run_json("diagnose", *CRANK, "--test", "mut")["nature"] == "chaotic"
 
 
+def test_classify_knows_the_crank():
+    """190 rpm and +-0.254 mm are Type III in the thesis (figure 4.14 b)."""
+    result = run_json("classify", *CRANK)
+    assert result["response_type"] == "III"
+    assert sum(result["probabilities"].values()) == pytest.approx(1.0)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
