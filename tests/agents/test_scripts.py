@@ -25,7 +25,7 @@ def test_a_policy_is_trained_saved_and_compared_with_constant_speeds(tmp_path):
     config = json.loads((out / "config.json").read_text())
     assert config["arguments"]["seed"] == 3
     assert config["versions"]["stable_baselines3"]
-    episodes = list(csv.DictReader((out / "progress.csv").open()))
+    episodes = list(csv.DictReader((out / "progress.csv").read_text().splitlines()))
     assert len(episodes) == 16
     assert all(float(row["return"]) < 0.0 for row in episodes)
     evaluated = _run("evaluate.py", "--policy", str(out), "--jobs", "1", "--speeds", "2")
