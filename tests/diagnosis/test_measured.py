@@ -63,3 +63,11 @@ def test_a_header_is_skipped(tmp_path):
     path = tmp_path / "peaks.csv"
     path.write_text("peak force [N]\n1.5\n2.5\n")
     assert read_columns(path, 1).tolist() == [[1.5], [2.5]]
+
+
+def test_a_short_noisy_record_says_which_periods_it_can_show():
+    """With a sensor error 19 cycles of period 2 are too few, and the verdict says so; 40 are enough."""
+    short = two_step_test(np.tile([4.0, 3.0], 10)[:19], sensor_error=1e-3)
+    assert short.nature == "undetermined"
+    assert "19 cycles show periods up to 1 only" in short.reason
+    assert two_step_test(np.tile([4.0, 3.0], 20), sensor_error=1e-3).period == 2

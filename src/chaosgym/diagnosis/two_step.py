@@ -9,6 +9,7 @@ Chaos that dies out counts as chaotic, as in the thesis (5.2.3), and is flagged 
 step II disagree, or the record is too short for the verdict, the answer is "undetermined".
 """
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from chaosgym.diagnosis.spectrum import power_spectrum
 from chaosgym.diagnosis.stroboscopic import (
     DECAY_FACTOR,
     MAX_PERIOD,
+    NOISY_REPEATS,
     Decay,
     Recurrence,
     as_samples,
@@ -116,7 +118,12 @@ def two_step_test(
     decay = find_decay(scaled, max_period) if sensor_error == 0.0 else None
     if decay is not None:
         return _approaching(decay, evidence)
-    return _step_two(series, evidence, sensor_error)
+    verdict = _step_two(series, evidence, sensor_error)
+    longest = (len(samples) - len(samples) // 2) // NOISY_REPEATS
+    if verdict.nature == "undetermined" and sensor_error > 0.0 and longest < max_period:
+        hint = f"; with a sensor error {len(samples)} cycles show periods up to {max(1, longest)} only"
+        return replace(verdict, reason=verdict.reason + hint)
+    return verdict
 
 
 def _observables(x: CycleRecord | ArrayLike, sensor_error: float) -> tuple[Array, list[Array]]:
