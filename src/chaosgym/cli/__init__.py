@@ -1,0 +1,47 @@
+"""The command line: each command parses, calls one library function, and prints or saves.
+
+Tables for people go to standard output, ``--json`` prints one JSON object there instead; progress and logs go to
+standard error. Exit codes: 0 done, 1 a computation failed, 2 wrong usage.
+"""
+
+import sys
+
+import click
+
+from chaosgym.cli.bench import bench
+from chaosgym.cli.classify import classify, train_classifier
+from chaosgym.cli.demo import demo
+from chaosgym.cli.design import design
+from chaosgym.cli.diagnose import agreement, diagnose
+from chaosgym.cli.info import info
+from chaosgym.cli.simulate import show, simulate
+from chaosgym.cli.sweep import sweep
+from chaosgym.errors import ChaosgymError, SimulationError
+from chaosgym.version import __version__
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(__version__, prog_name="chaosgym")
+def app() -> None:
+    """Machines with clearance that rattle: simulate, diagnose, sweep and classify them."""
+
+
+for command in (
+    simulate, show, diagnose, agreement, classify, sweep, train_classifier, demo, design, info, bench,
+):  # fmt: skip
+    app.add_command(command)
+
+
+def main() -> None:
+    """Entry point: one clear line instead of a traceback for every error that chaosgym raises on purpose."""
+    try:
+        app(standalone_mode=False)
+    except click.exceptions.Abort:
+        click.echo("Aborted.", err=True)
+        sys.exit(130)
+    except click.ClickException as error:
+        click.echo(f"Error: {error.format_message()}", err=True)
+        sys.exit(error.exit_code)
+    except (ChaosgymError, OSError) as error:
+        click.echo(f"Error: {error}", err=True)
+        sys.exit(1 if isinstance(error, SimulationError) else 2)

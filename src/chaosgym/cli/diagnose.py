@@ -1,0 +1,148 @@
+"""Is a response periodic or chaotic? ``diagnose`` and ``agreement``."""
+
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import click
+
+from chaosgym.cli.machine_options import MACHINE_OPTIONS, machine_command
+from chaosgym.cli.output import emit
+
+SUMMARY_CYCLES = 200
+"""Settled cycles that the summary of the peak force covers."""
+
+
+@click.command()
+@functools.partial(machine_command, required=False)
+@click.option(
+    "--test", type=click.Choice(["adaptive", "mut"]), default="adaptive", show_default=True,
+    help="All tests in stages, or the Matrix Update Test alone.",
+)  # fmt: skip
+@click.option("--budget", type=click.IntRange(100, 10**7), default=3200, show_default=True, help="Cycles at the most.")
+@click.option("--types", is_flag=True, help="Also tell the response type (I, II, III) over the tolerances.")
+@click.option("--step-check", is_flag=True, help="Repeat with a finer step and say whether the verdict stays.")
+@click.option("--peaks", type=click.Path(), help="Judge measured peak forces instead: one column, one line a cycle.")
+@click.option("--series", type=click.Path(), help="Judge a measured time series instead: columns time [s] and value.")
+@click.option("--period-s", type=float, help="Operating cycle of the series [s].")
+@click.option("--sensor-error", type=float, default=0.0, show_default=True, help="Differences within it do not count.")
+def diagnose(
+    machine: Any,
+    test: str,
+    budget: int,
+    types: bool,
+    step_check: bool,
+    peaks: str | None,
+    series: str | None,
+    period_s: float | None,
+    sensor_error: float,
+    as_json: bool,
+) -> None:
+    """Tell periodic from chaotic: a machine by simulation, or a measured signal."""
+    if peaks or series:
+        if machine or types or step_check or (peaks and series) or (series and period_s is None):
+            raise click.UsageError("give --peaks FILE, or --series FILE with --period-s T, or a machine")
+        result, lines = _diagnose_measured(peaks, series, period_s, sensor_error)
+    elif machine is None:
+        raise click.UsageError(f"give a machine ({', '.join(MACHINE_OPTIONS)}), --peaks FILE or --series FILE")
+    elif test == "mut":
+        result, lines = _matrix_update(machine)
+    else:
+        result, lines = _diagnose_machine(machine, budget, types, step_check, sensor_error)
+    emit(result, as_json, lambda: lines)
+
+
+def _verdict_lines(subject: str, verdict: Any, summary: Mapping[str, float], unit: str) -> list[str]:
+    period = f", period {verdict.period}" if verdict.period else ""
+    status = f"{verdict.status}, " if verdict.status else ""
+    return [
+        f"{subject}: {verdict.nature}{period} ({status}margin {verdict.margin:.2f})",
+        f"  {verdict.reason}",
+        f"  {summary['min']:.2f} to {summary['max']:.2f}{unit}, mean {summary['mean']:.2f}{unit}, "
+        f"standard deviation {summary['std']:.2f}{unit}",
+    ]
+
+
+def _summary(values: Any) -> dict[str, float]:
+    return {
+        "min": float(values.min()),
+        "max": float(values.max()),
+        "mean": float(values.mean()),
+        "std": float(values.std()),
+    }
+
+
+def _diagnose_measured(
+    peaks: str | None, series: str | None, period: float | None, sensor_error: float
+) -> tuple[dict[str, Any], list[str]]:
+    from chaosgym.diagnosis import two_step_test
+    from chaosgym.diagnosis.measured import read_columns, samples_per_period
+
+    if peaks:
+        samples = read_columns(peaks, 1)[:, 0]
+    else:
+        time, value = read_columns(str(series), 2).T
+        samples = samples_per_period(time, value, float(period or 0.0))
+    verdict = two_step_test(samples, sensor_error=sensor_error)
+    summary = _summary(samples if peaks else samples[:, 1])
+    result = {"file": peaks or series, **verdict.as_dict(), "peak_force_summary_N": summary, "warnings": []}
+    return result, _verdict_lines(str(peaks or series), verdict, summary, "")
+
+
+def _matrix_update(machine: Any) -> tuple[dict[str, Any], list[str]]:
+    from chaosgym.diagnosis import matrix_update_test
+    from chaosgym.simulation import simulate
+
+    verdict = matrix_update_test(machine)
+    summary = _summary(simulate(machine, SUMMARY_CYCLES, transient=SUMMARY_CYCLES).peak_force[:, 0])
+    result = {"machine": machine.name, **verdict.as_dict(), "peak_force_summary_N": summary, "warnings": []}
+    return result, _verdict_lines(f"{machine.name}, Matrix Update Test", verdict, summary, " N")
+
+
+def _diagnose_machine(
+    machine: Any, budget: int, types: bool, check: bool, sensor_error: float
+) -> tuple[dict[str, Any], list[str]]:
+    from chaosgym.diagnosis import diagnose, response_type
+    from chaosgym.diagnosis.step_check import step_check
+    from chaosgym.simulation import simulate
+
+    verdict = diagnose(machine, budget=budget, sensor_error=sensor_error)
+    settled = simulate(machine, SUMMARY_CYCLES, verdict.evidence["final_state"])
+    summary = _summary(settled.peak_force[:, 0])
+    exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
+    result = {
+        "machine": machine.name,
+        **verdict.as_dict(),
+        "peak_force_summary_N": summary,
+        "largest_lyapunov_exponent_per_cycle": {key: exponent[key] for key in ("value", "standard_error")},
+        "cycles_used": verdict.evidence["cycles_used"],
+        "warnings": [verdict.reason] if verdict.status in ("disputed", "transient", "unresolved") else [],
+    }
+    votes = ", ".join(f"{test} {vote}" for test, vote in verdict.votes.items())
+    lines = _verdict_lines(machine.name, verdict, summary, " N")
+    lines.append(f"  {result['cycles_used']} cycles used; votes: {votes}")
+    if types:
+        judged = response_type(machine, sensor_error=sensor_error)
+        result |= {"response_type": judged.type, "response_type_reason": judged.reason}
+        lines.append(f"  Type {judged.type}: {judged.reason}")
+    if check:
+        compared = step_check(machine)
+        result["step_check"] = compared.as_dict()
+        lines.append(f"  {compared.summary}")
+    return result, lines
+
+
+@click.command()
+@machine_command
+@click.option("--points", type=click.IntRange(1, 10**6), default=500, show_default=True, help="Random machines.")
+@click.option("--cycles", type=click.IntRange(1000, 10**7), default=10_000, show_default=True, help="Of the reference.")
+@click.option("--budget", type=click.IntRange(100, 10**7), default=3200, show_default=True, help="Of the diagnosis.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+def agreement(machine: Any, points: int, cycles: int, budget: int, seed: int, as_json: bool) -> None:
+    """Compare all tests of chaos with a long reference on random machines (takes long)."""
+    from chaosgym.diagnosis.agreement import agreement as compare
+    from chaosgym.diagnosis.agreement import random_machines
+
+    machines = random_machines(machine, points, seed)
+    table = compare(machines, reference_cycles=cycles, budget=budget, progress=True)
+    emit(table.as_dict(), as_json, lambda: table.markdown().splitlines())

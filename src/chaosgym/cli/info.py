@@ -1,0 +1,38 @@
+"""Which versions and folders are in use? ``info``."""
+
+import click
+
+from chaosgym.cli.machine_options import MACHINE_OPTIONS
+from chaosgym.cli.output import emit
+from chaosgym.version import __version__
+
+
+@click.command()
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def info(as_json: bool) -> None:
+    """Print versions and folders, for a bug report."""
+    import platform
+    from importlib import metadata
+
+    from chaosgym.core import KERNEL_CACHE
+
+    packages: dict[str, str | None] = {}
+    for package in ("numpy", "scipy", "numba", "gymnasium", "pyarrow", "matplotlib", "torch", "stable-baselines3"):
+        try:
+            packages[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            packages[package] = None
+    result = {
+        "version": __version__,
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "machines": sorted(MACHINE_OPTIONS),
+        "packages": packages,
+        "kernel_cache": KERNEL_CACHE,
+    }
+    emit(result, as_json, lambda: [
+        f"chaosgym {__version__} on Python {result['python']}, {result['platform']}",
+        "machines: " + ", ".join(MACHINE_OPTIONS),
+        *(f"{package:18s} {version or 'not installed'}" for package, version in packages.items()),
+        f"kernel cache: {KERNEL_CACHE}",
+    ])  # fmt: skip

@@ -1,0 +1,70 @@
+"""What does a machine do? ``simulate`` and ``show``."""
+
+from typing import Any
+
+import click
+
+from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.output import emit
+
+
+@click.command()
+@machine_command
+@click.option("--cycles", type=click.IntRange(1, 10**7), default=100, show_default=True, help="Cycles to record.")
+@click.option("--transient", type=click.IntRange(0, 10**7), default=0, show_default=True, help="Cycles to skip first.")
+def simulate(machine: Any, cycles: int, transient: int, as_json: bool) -> None:
+    """Run a machine from rest and print the peak force of every cycle."""
+    from chaosgym.bench import timed_run
+
+    record, seconds_per_cycle = timed_run(machine, cycles, transient=transient)
+    peaks = record.peak_force[:, 0]
+    result = {
+        "machine": machine.name,
+        "peak_force_N": peaks.tolist(),
+        "impacts": record.impacts.sum(axis=1).tolist(),
+        "contact_fraction": record.contact_fraction.sum(axis=1).tolist(),
+        "seconds_per_cycle": seconds_per_cycle,
+    }
+    emit(result, as_json, lambda: [
+        f"{machine.name}: {cycles} cycles after {transient}",
+        f"peak force, {machine.sides[0]} side   {peaks.min():.2f} to {peaks.max():.2f} N, mean {peaks.mean():.2f} N",
+        f"last peaks                {' '.join(f'{peak:.2f}' for peak in peaks[-8:])}",
+        f"impacts per cycle         {record.impacts.sum(axis=1).mean():.1f}",
+        f"share in contact          {record.contact_fraction.sum(axis=1).mean():.2f}",
+        f"computing time            {1e6 * seconds_per_cycle:.0f} us per cycle",
+    ])  # fmt: skip
+
+
+@click.command()
+@machine_command
+def show(machine: Any, as_json: bool) -> None:
+    """Print every parameter of a machine with its unit and where the number comes from."""
+    from chaosgym.machines.parameters import parameters_of
+
+    described = parameters_of(machine)
+    frequencies = machine.natural_frequencies.tolist()
+    default = type(machine)()
+    provenance = {
+        name: {"unit": about.unit, "grade": about.provenance, "source": about.source}
+        if getattr(machine, name) == getattr(default, name)
+        else {"unit": about.unit, "grade": "given", "source": "this command"}
+        for name, about in described.items()
+    }
+    result = {
+        "machine": machine.name,
+        "parameters": {name: getattr(machine, name) for name in described},
+        "natural_frequencies_hz": frequencies,
+        "provenance": provenance,
+    }
+
+    def lines() -> list[str]:
+        rows = []
+        for name, about in described.items():
+            value = getattr(machine, name)
+            shown = value if isinstance(value, str) else f"{value:.6g}"
+            unit = "" if about.unit == "-" else about.unit
+            origin = provenance[name]
+            rows.append(f"{name:30s} {shown:>11s} {unit:8s} {origin['grade']:10s} {origin['source']}")
+        return [*rows, "natural frequencies [Hz]: " + ", ".join(f"{value:.1f}" for value in frequencies)]
+
+    emit(result, as_json, lines)
