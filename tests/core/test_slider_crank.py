@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from chaosgym.core.crank_propagator import propagator_table, series_order
-from chaosgym.core.impact_beam import CycleArrays, Episode
+from chaosgym.core.impact_beam import Episode, cycle_arrays
 from chaosgym.core.slider_crank import advance
 from chaosgym.errors import SimulationError
 from chaosgym.machines.crank_equations import equations
@@ -88,11 +88,7 @@ def test_energy_is_conserved_without_damping():
     n = len(mass)
     state = np.zeros(2 * n)
     state[n : 2 * n] = [0.02, 0.1, 0.01, 0.0, 0.0]
-    arrays = CycleArrays(
-        section=np.empty((cycles, 2 * n)), tip=np.empty((cycles, 2)), peak_force=np.empty((cycles, 2)),
-        impacts=np.empty((cycles, 2), dtype=np.int64), contact_time=np.empty((cycles, 2)),
-        bounce_time=np.empty((cycles, 2)), events=np.empty(cycles, dtype=np.int64), history=np.empty((cycles, 0, 3)),
-    )  # fmt: skip
+    arrays = cycle_arrays(cycles, 2 * n, travels=True)
     outcome, _ = advance(model, state, Episode(np.zeros(1), np.zeros(2)), arrays, 1e-13, 10_000)
     assert outcome == 0
     assert arrays.impacts.sum() > 500
