@@ -1,5 +1,7 @@
-"""The learned classifier: the response type of a machine in microseconds, from its parameters alone."""
+"""The learned classifier: the response type of a machine in microseconds, from its parameters or a short record."""
 
-from chaosgym.classifier.model import RESPONSE_TYPES, Classification, ResponseClassifier, default_classifier
+from chaosgym.classifier.answer import Classification
+from chaosgym.classifier.estimator import ResponseClassifier
+from chaosgym.classifier.shipped import MachineClassifier, default_classifier
 
-__all__ = ["RESPONSE_TYPES", "Classification", "ResponseClassifier", "default_classifier"]
+__all__ = ["Classification", "MachineClassifier", "ResponseClassifier", "default_classifier"]

@@ -1,0 +1,356 @@
+"""A classifier of response type in scikit-learn's manner, for machine parameters and for records of peak forces.
+
+Type and nature are learned together, as pairs such as (III, chaotic), so that their probabilities never contradict each
+other. Calibration is cross-fitted: every training row is judged by a model that has not seen its machine; temperature,
+conformal threshold and the least confidence of an answer come from these judgements. The model that is kept sees all
+rows.
+
+Training needs scikit-learn (and torch for networks); everything else needs numpy and numba.
+"""
+
+import inspect
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chaosgym.classifier.calibration import best_temperature, conformal_threshold, softmax
+from chaosgym.classifier.features import record_features
+from chaosgym.classifier.network import Network, network_scores
+from chaosgym.classifier.novelty import neighbourhood, novelty
+from chaosgym.classifier.parameter_features import parameter_features, parameter_scaling
+from chaosgym.classifier.trees import Forest, forest_scores
+from chaosgym.machines import Machine
+
+Array = NDArray[np.float64]
+Labels = NDArray[np.int64]
+Scorer = Forest | Network
+
+ABSTAIN = 0.05
+"""Share of the training machines' responses, the least confident ones, that are not answered."""
+
+COVERAGE = 0.90
+"""Of the sets of plausible types."""
+
+QUANTILES = (0.05, 0.5, 0.95)
+"""Of the peak force of a settled cycle."""
+
+QUANTILE_ROUNDS = PERIOD_ROUNDS = 60
+
+PERIODS = (1, 2, 3, 4)
+"""Periods that parameters are asked for; longer ones are answered by None."""
+
+
+class ResponseClassifier:
+    """Types of response from parameters or records.
+
+    Parameters
+    ----------
+    inputs
+        "parameters": rows are values of machine fields in SI units. "records": rows are peak forces [N], one a cycle,
+        8 to 64 of them; shorter ones end in NaN.
+    model
+        "boosting": gradient boosted trees; "network": an ensemble of small networks; "both": mean of their scores.
+    machine, fields
+        The machine whose fields the columns are, for logarithms and dimensionless groups. None takes plain columns.
+    rounds, leaves, learning_rate
+        Of the boosting.
+    members
+        Networks of the ensemble.
+    folds
+        Of the cross-fitting.
+    seed
+        Same seed, same model.
+
+    Attributes
+    ----------
+    classes_, natures_
+        Labels in the order of the probabilities.
+    n_features_in_
+        Number of columns.
+    """
+
+    def __init__(
+        self,
+        inputs: Literal["parameters", "records"] = "parameters",
+        model: Literal["boosting", "network", "both"] = "boosting",
+        machine: Machine | None = None,
+        fields: tuple[str, ...] | None = None,
+        rounds: int = 150,
+        leaves: int = 31,
+        learning_rate: float = 0.08,
+        members: int = 1,
+        folds: int = 3,
+        seed: int = 0,
+    ) -> None:
+        self.inputs = inputs
+        self.model = model
+        self.machine = machine
+        self.fields = fields
+        self.rounds = rounds
+        self.leaves = leaves
+        self.learning_rate = learning_rate
+        self.members = members
+        self.folds = folds
+        self.seed = seed
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Return the constructor's parameters."""
+        return {name: getattr(self, name) for name in inspect.signature(type(self)).parameters}
+
+    def set_params(self, **params: Any) -> "ResponseClassifier":
+        """Change the constructor's parameters."""
+        known = self.get_params()
+        for name, value in params.items():
+            if name not in known:
+                raise ValueError(f"{name!r} is no parameter of ResponseClassifier; allowed: {', '.join(known)}")
+            setattr(self, name, value)
+        return self
+
+    def __repr__(self) -> str:
+        return f"ResponseClassifier(inputs={self.inputs!r}, model={self.model!r}, seed={self.seed})"
+
+    def __sklearn_is_fitted__(self) -> bool:
+        return hasattr(self, "scorers_")
+
+    def __sklearn_tags__(self) -> Any:
+        from sklearn.utils import ClassifierTags, InputTags, Tags, TargetTags
+
+        records = self.inputs == "records"
+        return Tags(
+            estimator_type="classifier",
+            target_tags=TargetTags(required=True),
+            classifier_tags=ClassifierTags(),
+            input_tags=InputTags(allow_nan=records, positive_only=records),
+        )
+
+    def fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        *,
+        nature: ArrayLike | None = None,
+        period: ArrayLike | None = None,
+        peak_force: ArrayLike | None = None,
+        groups: ArrayLike | None = None,
+        section: ArrayLike | None = None,
+        sensor_error: ArrayLike | None = None,
+        tick: Callable[[], object] = lambda: None,
+    ) -> "ResponseClassifier":
+        """Train.
+
+        Parameters
+        ----------
+        X : (n, n_columns)
+            Parameters or records, by ``inputs``.
+        y : (n,)
+            Response types.
+        nature : (n,), optional
+            Natures; learned along with the types.
+        period : (n,), optional
+            Periods, 0 where there is none; of parameters only, since a record shows its period.
+        peak_force : (n,), optional
+            Peak force of some settled cycle of each row [N], for the predicted quantiles.
+        groups : (n,), optional
+            Machine that a row belongs to; rows of one machine stay together in the cross-fitting.
+        section, sensor_error
+            Of records; see ``record_features``.
+        tick
+            Called after each of ``folds + 1`` trainings.
+        """
+        from sklearn.utils.multiclass import check_classification_targets
+        from sklearn.utils.validation import check_X_y
+
+        finite: Any = "allow-nan" if self.inputs == "records" else True
+        values, types = check_X_y(X, y, dtype=np.float64, ensure_all_finite=finite, estimator=self)
+        check_classification_targets(types)
+        self.n_features_in_ = values.shape[1]
+        labels = self._encode(types, types if nature is None else np.asarray(nature))
+        parts = np.arange(len(labels)) if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1]
+        if self.inputs == "parameters":
+            self.scaling_ = parameter_scaling(self.machine, self.fields or (), values)
+            self.low_, self.high_ = values.min(axis=0), values.max(axis=0)
+        features = self._features(values, section, sensor_error)
+        if self.inputs == "records":
+            self.neighbourhood_ = neighbourhood(features, parts, self.seed)
+        self._calibrate(features, labels, parts, tick)
+        self.scorers_ = self._train(features, labels)
+        self._fit_period(features, period)
+        self._fit_peak_force(features, values, peak_force)
+        tick()
+        return self
+
+    def _encode(self, types: NDArray[Any], natures: NDArray[Any]) -> Labels:
+        """Number the pairs of type and nature that occur, (n,)."""
+        self.classes_, type_of = np.unique(types, return_inverse=True)
+        self.natures_, nature_of = np.unique(natures, return_inverse=True)
+        pairs, labels = np.unique(type_of * len(self.natures_) + nature_of, return_inverse=True)
+        if len(pairs) < 2:
+            raise ValueError("y holds one class; ResponseClassifier needs at least 2 classes")
+        self.type_of_, self.nature_of_ = np.divmod(pairs, len(self.natures_))
+        return np.asarray(labels)
+
+    def _calibrate(self, features: Array, labels: Labels, parts: Labels, tick: Callable[[], object]) -> None:
+        scores = np.zeros((len(labels), len(self.type_of_)))
+        fold = (np.random.default_rng(self.seed).permutation(parts.max() + 1) % self.folds)[parts]
+        judged = np.zeros(len(labels), dtype=bool)
+        for held in range(self.folds):
+            known, rows = fold != held, fold == held
+            if rows.any() and len(np.unique(labels[known])) == len(self.type_of_):
+                scores[rows] = _raw_scores(self._train(features[known], labels[known]), features[rows])
+                judged |= rows
+            tick()
+        if not judged.any():
+            judged[:] = True
+        scores, labels = scores[judged], labels[judged]
+        self.temperature_ = best_temperature(scores, labels)
+        chances = _pooled(softmax(scores / self.temperature_), self.type_of_)
+        self.plausible_ = conformal_threshold(chances, self.type_of_[labels], COVERAGE)
+        self.least_confidence_ = float(np.quantile(chances.max(axis=1), ABSTAIN))
+
+    def _train(self, features: Array, labels: Labels) -> tuple[Scorer, ...]:
+        scorers: list[Scorer] = []
+        if self.model in ("boosting", "both"):
+            from chaosgym.classifier.boosting import train_forest
+
+            scorers.append(train_forest(features, labels, self.rounds, self.leaves, self.learning_rate, self.seed))
+        if self.model in ("network", "both"):
+            from chaosgym.classifier.network import train_networks
+
+            scorers.append(train_networks(features, labels, len(self.type_of_), self.members, self.seed))
+        if not scorers:
+            raise ValueError(f"model = {self.model!r} is not one of 'boosting', 'network', 'both'")
+        return tuple(scorers)
+
+    def _fit_period(self, features: Array, period: ArrayLike | None) -> None:
+        self.period_forest_: Forest | None = None
+        if period is None or self.inputs == "records":
+            return
+        from chaosgym.classifier.boosting import train_forest
+
+        periods = np.asarray(period)
+        rows = periods > 0
+        kinds = np.searchsorted(PERIODS, periods[rows])
+        self.period_kinds_, numbers = np.unique(kinds, return_inverse=True)
+        if len(self.period_kinds_) > 1:
+            self.period_forest_ = train_forest(features[rows], numbers, PERIOD_ROUNDS, 15, 0.1, self.seed)
+
+    def _fit_peak_force(self, features: Array, values: Array, peak_force: ArrayLike | None) -> None:
+        self.quantile_forests_: tuple[Forest, ...] = ()
+        if peak_force is None:
+            return
+        from chaosgym.classifier.boosting import train_quantile_forest
+
+        forces = np.asarray(peak_force, dtype=float) / self._level(values)
+        rows = np.isfinite(forces) & (forces > 0.0)
+        self.quantile_forests_ = tuple(
+            train_quantile_forest(features[rows], np.log(forces[rows]), quantile, QUANTILE_ROUNDS, self.seed)
+            for quantile in QUANTILES
+        )
+
+    def predict(self, X: ArrayLike, **record: Any) -> NDArray[Any]:
+        """Most probable type (n,); ``section`` and ``sensor_error`` of records as in ``fit``."""
+        chances = self.predict_proba(X, **record)
+        predicted: NDArray[Any] = self.classes_[chances.argmax(axis=1)]
+        return predicted
+
+    def predict_proba(self, X: ArrayLike, **record: Any) -> Array:
+        """Probabilities (n, n_types), in the order of ``classes_``."""
+        return _pooled(self.predict_pairs(X, **record), self.type_of_)
+
+    def predict_nature_proba(self, X: ArrayLike, **record: Any) -> Array:
+        """Probabilities (n, n_natures), in the order of ``natures_``."""
+        return _pooled(self.predict_pairs(X, **record), self.nature_of_)
+
+    def predict_pairs(self, X: ArrayLike, **record: Any) -> Array:
+        """Probabilities (n, n_pairs) of type ``classes_[type_of_]`` with nature ``natures_[nature_of_]``."""
+        return self.chances(self._features(self._checked(X), **record))
+
+    def chances(self, features: Array) -> Array:
+        """Probabilities of the pairs from features that are computed already."""
+        return softmax(_raw_scores(self.scorers_, features) / self.temperature_)
+
+    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, **record: Any) -> float:
+        """Share of types that are right."""
+        return float(np.average(self.predict(X, **record) == np.asarray(y), weights=sample_weight))
+
+    def out_of_range(self, X: ArrayLike, **record: Any) -> NDArray[np.bool_]:
+        """Whether each row (n,) lies outside what was trained on."""
+        values = self._checked(X)
+        if self.inputs == "parameters":
+            return np.asarray(((values < self.low_) | (values > self.high_)).any(axis=1))
+        return self.unlike_training(self._features(values, **record))
+
+    def unlike_training(self, features: Array) -> NDArray[np.bool_]:
+        """Whether features of records that are computed already resemble none of the training."""
+        return novelty(self.neighbourhood_, features) > self.neighbourhood_.threshold
+
+    def predict_period(self, features: Array) -> Labels:
+        """Most probable period (n,) of a periodic response from its features; 0 for a longer one or if not trained."""
+        if self.period_forest_ is None:
+            return np.zeros(len(features), dtype=np.int64)
+        chances = softmax(forest_scores(self.period_forest_, features))
+        return np.array([*PERIODS, 0])[self.period_kinds_[chances.argmax(axis=1)]]
+
+    def predict_peak_force(self, features: Array, values: Array) -> Array:
+        """Quantiles (n, 3) of the peak force of a settled cycle [N]; (n, 0) if not trained."""
+        if not self.quantile_forests_:
+            return np.empty((len(features), 0))
+        logs = np.column_stack([forest_scores(forest, features)[:, 0] for forest in self.quantile_forests_])
+        return np.asarray(np.sort(np.exp(logs), axis=1) * self._level(values)[:, None])
+
+    def _level(self, values: Array) -> Array:
+        """Force [N] that predicted forces are relative to."""
+        if self.inputs == "parameters":
+            return np.ones(len(values))
+        level = np.nanmean(values, axis=1)
+        return np.where(level > 0.0, level, 1.0)
+
+    def _features(
+        self, values: Array, section: ArrayLike | None = None, sensor_error: ArrayLike | None = None
+    ) -> Array:
+        if self.inputs == "records":
+            return record_features(values, section, sensor_error)
+        return parameter_features(self.scaling_, values)
+
+    def _checked(self, X: ArrayLike) -> Array:
+        """Columns as numbers, or an error that says what is wrong."""
+        if not hasattr(self, "scorers_"):
+            from sklearn.exceptions import NotFittedError
+
+            raise NotFittedError("this ResponseClassifier is not fitted; call fit first, or load a trained one")
+        if hasattr(X, "toarray"):
+            raise TypeError("sparse input is not supported; give a dense array")
+        values = np.asarray(X)
+        if np.iscomplexobj(values):
+            raise ValueError("Complex data not supported; give real numbers")
+        values = np.ascontiguousarray(values, dtype=float)
+        if values.ndim != 2:
+            raise ValueError(f"X has shape {values.shape}; allowed: 2D, (rows, columns). Reshape your data")
+        if self.inputs == "parameters":
+            if values.shape[1] != self.n_features_in_:
+                raise ValueError(
+                    f"X has {values.shape[1]} features, but ResponseClassifier is expecting "
+                    f"{self.n_features_in_} features as input"
+                )
+            if not np.isfinite(values).all():
+                raise ValueError("X holds NaN or infinity; allowed: finite numbers")
+        return values
+
+
+def _raw_scores(scorers: tuple[Scorer, ...], features: Array) -> Array:
+    """Mean scores of the scorers, (n, n_pairs)."""
+    parts = []
+    for scorer in scorers:
+        score = network_scores(scorer, features) if isinstance(scorer, Network) else forest_scores(scorer, features)
+        parts.append(np.concatenate([np.zeros_like(score), score], axis=1) if score.shape[1] == 1 else score)
+    return parts[0] if len(parts) == 1 else np.asarray(sum(parts) / len(parts))
+
+
+def _pooled(chances: Array, group_of: Labels) -> Array:
+    """Sums of the probabilities of pairs (n, n_pairs) over the pairs of each group, (n, n_groups)."""
+    pooled = np.zeros((len(chances), int(group_of.max()) + 1))
+    for pair, group in enumerate(group_of):
+        pooled[:, group] += chances[:, pair]
+    return pooled

@@ -1,0 +1,96 @@
+"""Does an input resemble anything that was trained on? Ranges for parameters, nearest neighbours for records.
+
+A record is far away if its figures lie further from those of the nearest kept training records than all but a few
+training records do from the records of other machines, or if one figure lies beyond its range in training.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+PROTOTYPES = 2000
+"""Training rows that are kept to compare with."""
+
+LIMIT = 6.0
+"""Scaled figures are clipped here, so that a single one can't decide by its tail."""
+
+FALSE_REFUSALS = 0.03
+"""Share of the training rows that are told apart by mistake."""
+
+
+class Neighbourhood(NamedTuple):
+    """Kept training rows.
+
+    ``centre``, ``spread`` (n_features,); ``low``, ``high`` (n_features,) range in training with a tenth more on both
+    sides; ``prototypes`` (n_kept, n_features) scaled; ``threshold`` largest usual distance.
+    """
+
+    centre: Array
+    spread: Array
+    low: Array
+    high: Array
+    prototypes: Array
+    threshold: float
+
+
+def neighbourhood(features: Array, groups: NDArray[np.int64], seed: int) -> Neighbourhood:
+    """Keep rows of features (n, n_features) and find the usual distance to rows of other groups (n,)."""
+    generator = np.random.default_rng(seed)
+    centre = np.nan_to_num(np.nanmedian(features, axis=0))
+    spread = np.nanpercentile(features, 84.0, axis=0) - np.nanpercentile(features, 16.0, axis=0)
+    spread = np.where(np.nan_to_num(spread) > 1e-9, 0.5 * spread, 1.0)
+    low, high = np.nanmin(features, axis=0), np.nanmax(features, axis=0)
+    room = 0.1 * (high - low)
+    whole = Neighbourhood(centre, spread, low - room, high + room, np.empty((0, len(centre))), np.inf)
+    parts = np.unique(groups)
+    held = np.isin(groups, generator.permutation(parts)[: max(1, len(parts) // 5)])
+    if held.all():
+        held = generator.random(len(groups)) < 0.2
+    known = whole._replace(prototypes=_drawn(features[~held], whole, generator))
+    distances = novelty(known, _some(features[held], generator))
+    return whole._replace(
+        prototypes=_drawn(features, whole, generator), threshold=float(np.quantile(distances, 1.0 - FALSE_REFUSALS))
+    )
+
+
+def _some(features: Array, generator: np.random.Generator) -> Array:
+    return features[generator.permutation(len(features))[:PROTOTYPES]]
+
+
+def _drawn(features: Array, scale: Neighbourhood, generator: np.random.Generator) -> Array:
+    return _scaled(_some(features, generator), scale.centre, scale.spread).astype(np.float32).astype(float)
+
+
+def novelty(kept: Neighbourhood, features: Array) -> Array:
+    """Distance (n,) of rows to the nearest kept row, root mean square over the figures; infinite beyond a range."""
+    distances = _nearest(_scaled(features, kept.centre, kept.spread), kept.prototypes)
+    with np.errstate(invalid="ignore"):
+        beyond = ((features < kept.low) | (features > kept.high)).any(axis=1)
+    return np.where(beyond, np.inf, distances)
+
+
+def _scaled(features: Array, centre: Array, spread: Array) -> Array:
+    return np.asarray(np.clip((features - centre) / spread, -LIMIT, LIMIT))
+
+
+@njit(cache=True, nogil=True)
+def _nearest(rows: Array, prototypes: Array) -> Array:
+    """Smallest root mean square difference over the figures that both rows have."""
+    out = np.empty(len(rows))
+    for i in range(len(rows)):
+        best = np.inf
+        for j in range(len(prototypes)):
+            total, count = 0.0, 0
+            for k in range(rows.shape[1]):
+                gap = rows[i, k] - prototypes[j, k]
+                if gap == gap:
+                    total += gap * gap
+                    count += 1
+            if count > 0:
+                best = min(best, total / count)
+        out[i] = np.sqrt(best)
+    return out
