@@ -14,7 +14,7 @@ import chaosgym.envs  # noqa: F401  (registers the environments)
 from chaosgym.version import __version__
 
 if TYPE_CHECKING:
-    from chaosgym.classifier import ResponseClassifier, default_classifier
+    from chaosgym.classifier import MachineClassifier, ResponseClassifier, default_classifier
     from chaosgym.diagnosis import Diagnosis, diagnose, response_map, response_type, two_step_test
     from chaosgym.diagnosis.step_check import step_check
     from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
 
 _HOME = {
-    "chaosgym.classifier": ("ResponseClassifier", "default_classifier"),
+    "chaosgym.classifier": ("MachineClassifier", "ResponseClassifier", "default_classifier"),
     "chaosgym.diagnosis": ("Diagnosis", "diagnose", "response_map", "response_type", "two_step_test"),
     "chaosgym.diagnosis.step_check": ("step_check",),
     "chaosgym.errors": ("ChaosgymError", "ParameterError", "SimulationError"),
@@ -43,6 +43,7 @@ __all__ = [
     "ExactEvents",
     "ImpactBeam",
     "ParameterError",
+    "MachineClassifier",
     "ResponseClassifier",
     "RungeKutta4",
     "SimulationError",

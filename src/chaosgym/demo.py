@@ -15,7 +15,8 @@ import numpy as np
 from gymnasium.wrappers import RescaleObservation
 from tqdm import tqdm
 
-from chaosgym.classifier.train import report_table, train_classifier
+from chaosgym.classifier.report import report_table
+from chaosgym.classifier.train import train_classifier
 from chaosgym.diagnosis import two_step_test
 from chaosgym.envs.evaluation import Evaluation, constant_speed, evaluate
 from chaosgym.errors import ChaosgymError, DatasetError
@@ -79,7 +80,7 @@ def run_demo(folder: str | Path, seed: int = 0, say: Callable[[str], None] = pri
     say(f"2/5 label a sweep of {len(plan)} points")
     sweep = run_sweep(plan, folder / "sweep", progress=True)
     say("3/5 train and test the classifier")
-    trained = train_classifier(sweep, seed, progress=True)
+    trained = train_classifier(sweep, seed, curve=False, progress=True)
     trained.classifier.save(folder / "classifier.npz")
     say(f"4/5 train an agent for {TRAINING_STEPS} steps")
     model = _train_agent(seed)

@@ -7,7 +7,7 @@ from chaosgym.classifier.trees import Forest, forest_of
 
 Array = NDArray[np.float64]
 
-L2 = 1.0
+L2 = 10.0
 LEAST_ROWS = 20
 """Rows of a leaf at least."""
 
@@ -18,14 +18,15 @@ def without_empty_columns(features: Array) -> Array:
 
 
 def train_forest(
-    features: Array, labels: NDArray[np.int64], rounds: int, leaves: int, learning_rate: float, seed: int
-) -> Forest:
+    features: Array, labels: NDArray[np.int64], *, rounds: int, leaves: int = 15, learning_rate: float = 0.1,
+    least_rows: int = 20, seed: int = 0,
+) -> Forest:  # fmt: skip
     """Train a boosted classifier of class numbers (n,) on features (n, n_features)."""
     from sklearn.ensemble import HistGradientBoostingClassifier
 
     model = HistGradientBoostingClassifier(
         max_iter=rounds, max_leaf_nodes=leaves, learning_rate=learning_rate, l2_regularization=L2,
-        min_samples_leaf=min(LEAST_ROWS, max(1, len(labels) // 20)), early_stopping=False, random_state=seed,
+        min_samples_leaf=min(least_rows, max(1, len(labels) // 20)), early_stopping=False, random_state=seed,
     )  # fmt: skip
     return forest_of(model.fit(without_empty_columns(features), labels))
 

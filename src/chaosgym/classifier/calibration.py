@@ -15,9 +15,7 @@ BINS = 15
 
 
 def softmax(scores: Array) -> Array:
-    """Probabilities (n, classes) of scores (n, classes); of a single column the logistic function, (n, 2)."""
-    if scores.shape[1] == 1:
-        scores = np.concatenate([np.zeros_like(scores), scores], axis=1)
+    """Probabilities (n, classes) of scores (n, classes)."""
     powers = np.exp(scores - scores.max(axis=1, keepdims=True))
     powers /= powers.sum(axis=1, keepdims=True)
     return np.asarray(powers)

@@ -1,7 +1,7 @@
 """A classifier of response type in scikit-learn's manner, for machine parameters and for records of peak forces.
 
-Type and nature are learned together, as pairs such as (III, chaotic), so that their probabilities never contradict each
-other. Calibration is cross-fitted: every training row is judged by a model that has not seen its machine; temperature,
+First the nature is learned, then the type of a response of such a nature; the probabilities of pairs such as (III,
+chaotic) are products, so that those of types and natures never contradict each other. Calibration is cross-fitted: every training row is judged by a model that has not seen its machine; temperature,
 conformal threshold and the least confidence of an answer come from these judgements. The model that is kept sees all
 rows.
 
@@ -18,14 +18,15 @@ from numpy.typing import ArrayLike, NDArray
 from chaosgym.classifier.calibration import best_temperature, conformal_threshold, softmax
 from chaosgym.classifier.features import record_features
 from chaosgym.classifier.network import Network, network_scores
-from chaosgym.classifier.novelty import neighbourhood, novelty
+from chaosgym.classifier.novelty import is_novel, neighbourhood
 from chaosgym.classifier.parameter_features import parameter_features, parameter_scaling
-from chaosgym.classifier.trees import Forest, forest_scores
+from chaosgym.classifier.trees import Forest, class_scores, constant_forest, forest_scores
 from chaosgym.machines import Machine
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 Scorer = Forest | Network
+_Tick = Callable[[], object]
 
 ABSTAIN = 0.05
 """Share of the training machines' responses, the least confident ones, that are not answered."""
@@ -54,12 +55,12 @@ class ResponseClassifier:
         "boosting": gradient boosted trees; "network": an ensemble of small networks; "both": mean of their scores.
     machine, fields
         The machine whose fields the columns are, for logarithms and dimensionless groups. None takes plain columns.
-    rounds, leaves, learning_rate
-        Of the boosting.
+    rounds, leaves, learning_rate, least_rows
+        Of the boosting; ``least_rows`` in a leaf.
     members
         Networks of the ensemble.
     folds
-        Of the cross-fitting.
+        Of the cross-fitting; below 2 there is none, and the probabilities are those of the model.
     seed
         Same seed, same model.
 
@@ -78,8 +79,9 @@ class ResponseClassifier:
         machine: Machine | None = None,
         fields: tuple[str, ...] | None = None,
         rounds: int = 150,
-        leaves: int = 31,
-        learning_rate: float = 0.08,
+        leaves: int = 15,
+        learning_rate: float = 0.06,
+        least_rows: int = 20,
         members: int = 1,
         folds: int = 3,
         seed: int = 0,
@@ -91,6 +93,7 @@ class ResponseClassifier:
         self.rounds = rounds
         self.leaves = leaves
         self.learning_rate = learning_rate
+        self.least_rows = least_rows
         self.members = members
         self.folds = folds
         self.seed = seed
@@ -134,9 +137,10 @@ class ResponseClassifier:
         period: ArrayLike | None = None,
         peak_force: ArrayLike | None = None,
         groups: ArrayLike | None = None,
+        ranges: tuple[ArrayLike, ArrayLike] | None = None,
         section: ArrayLike | None = None,
         sensor_error: ArrayLike | None = None,
-        tick: Callable[[], object] = lambda: None,
+        tick: _Tick = lambda: None,
     ) -> "ResponseClassifier":
         """Train.
 
@@ -154,6 +158,8 @@ class ResponseClassifier:
             Peak force of some settled cycle of each row [N], for the predicted quantiles.
         groups : (n,), optional
             Machine that a row belongs to; rows of one machine stay together in the cross-fitting.
+        ranges : two of (n_columns,), optional
+            Lowest and highest parameters that count as known; those of the rows by default.
         section, sensor_error
             Of records; see ``record_features``.
         tick
@@ -166,59 +172,93 @@ class ResponseClassifier:
         values, types = check_X_y(X, y, dtype=np.float64, ensure_all_finite=finite, estimator=self)
         check_classification_targets(types)
         self.n_features_in_ = values.shape[1]
-        labels = self._encode(types, types if nature is None else np.asarray(nature))
-        parts = np.arange(len(labels)) if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1]
+        kinds, natures = self._encode(types, np.full(len(types), "any") if nature is None else np.asarray(nature))
+        parts = np.arange(len(kinds)) if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1]
         if self.inputs == "parameters":
             self.scaling_ = parameter_scaling(self.machine, self.fields or (), values)
-            self.low_, self.high_ = values.min(axis=0), values.max(axis=0)
+            low, high = (values.min(axis=0), values.max(axis=0)) if ranges is None else ranges
+            self.low_, self.high_ = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
         features = self._features(values, section, sensor_error)
         if self.inputs == "records":
             self.neighbourhood_ = neighbourhood(features, parts, self.seed)
-        self._calibrate(features, labels, parts, tick)
-        self.scorers_ = self._train(features, labels)
+        self._calibrate(features, kinds, natures, parts, tick)
+        everything = np.arange(len(kinds))
+        self.scorers_ = tuple(
+            self._train(question, features, labels, everything[counts])
+            for question, (counts, labels) in enumerate(self._questions(kinds, natures))
+        )
         self._fit_period(features, period)
         self._fit_peak_force(features, values, peak_force)
         tick()
         return self
 
-    def _encode(self, types: NDArray[Any], natures: NDArray[Any]) -> Labels:
-        """Number the pairs of type and nature that occur, (n,)."""
+    def _encode(self, types: NDArray[Any], natures: NDArray[Any]) -> tuple[Labels, Labels]:
+        """Number types and natures, (n,) each, and the pairs that occur."""
         self.classes_, type_of = np.unique(types, return_inverse=True)
         self.natures_, nature_of = np.unique(natures, return_inverse=True)
-        pairs, labels = np.unique(type_of * len(self.natures_) + nature_of, return_inverse=True)
-        if len(pairs) < 2:
+        if len(self.classes_) < 2:
             raise ValueError("y holds one class; ResponseClassifier needs at least 2 classes")
-        self.type_of_, self.nature_of_ = np.divmod(pairs, len(self.natures_))
-        return np.asarray(labels)
+        pairs = np.unique(nature_of * len(self.classes_) + type_of)
+        self.nature_of_, self.type_of_ = np.divmod(pairs, len(self.classes_))
+        return np.asarray(type_of), np.asarray(nature_of)
 
-    def _calibrate(self, features: Array, labels: Labels, parts: Labels, tick: Callable[[], object]) -> None:
-        scores = np.zeros((len(labels), len(self.type_of_)))
+    def _questions(self, types: Labels, natures: Labels) -> list[tuple[NDArray[np.bool_], Labels]]:
+        """What is learned: the nature, and for each nature its type; (rows that count (n,), class numbers (n,))."""
+        asked = [(np.ones(len(types), dtype=bool), natures)]
+        for nature in range(len(self.natures_)):
+            known = self.type_of_[self.nature_of_ == nature]
+            asked.append((natures == nature, np.searchsorted(known, types).clip(max=len(known) - 1)))
+        return asked
+
+    def _calibrate(self, features: Array, types: Labels, natures: Labels, parts: Labels, tick: _Tick) -> None:
+        questions = self._questions(types, natures)
+        self.temperatures_ = np.ones(len(questions))
+        self.plausible_, self.least_confidence_ = 0.0, 0.0
+        if self.folds < 2:
+            return
         fold = (np.random.default_rng(self.seed).permutation(parts.max() + 1) % self.folds)[parts]
-        judged = np.zeros(len(labels), dtype=bool)
+        scores: list[list[Array]] = [[] for _ in questions]
+        order = []
         for held in range(self.folds):
-            known, rows = fold != held, fold == held
-            if rows.any() and len(np.unique(labels[known])) == len(self.type_of_):
-                scores[rows] = _raw_scores(self._train(features[known], labels[known]), features[rows])
-                judged |= rows
+            rows = np.flatnonzero(fold == held)
+            kept = np.flatnonzero(fold != held)
+            if len(rows) and len(kept):
+                order.append(rows)
+                for question, (counts, labels) in enumerate(questions):
+                    scorers = self._train(question, features, labels, kept[counts[kept]])
+                    scores[question].append(_raw_scores(scorers, features[rows]))
             tick()
-        if not judged.any():
-            judged[:] = True
-        scores, labels = scores[judged], labels[judged]
-        self.temperature_ = best_temperature(scores, labels)
-        chances = _pooled(softmax(scores / self.temperature_), self.type_of_)
-        self.plausible_ = conformal_threshold(chances, self.type_of_[labels], COVERAGE)
+        rows = np.concatenate(order)
+        out_of_fold = [np.concatenate(part) for part in scores]
+        for question, (counts, labels) in enumerate(questions):
+            counted = counts[rows]
+            if out_of_fold[question].shape[1] > 1 and counted.any():
+                self.temperatures_[question] = best_temperature(out_of_fold[question][counted], labels[rows][counted])
+        chances = self.types_of(self._pairs(out_of_fold))
+        self.plausible_ = conformal_threshold(chances, types[rows], COVERAGE)
         self.least_confidence_ = float(np.quantile(chances.max(axis=1), ABSTAIN))
 
-    def _train(self, features: Array, labels: Labels) -> tuple[Scorer, ...]:
+    def _train(self, question: int, features: Array, labels: Labels, rows: Labels) -> tuple[Scorer, ...]:
+        """Scorers of one question from some rows; none where there is nothing to tell apart."""
+        count = int(labels.max()) + 1 if question == 0 else int(np.sum(self.nature_of_ == question - 1))
+        if count < 2:
+            return ()
+        known, asked = features[rows], labels[rows]
+        if len(np.unique(asked)) < count:
+            shares = np.bincount(asked, minlength=count) / max(1, len(asked))
+            return (constant_forest(np.log(shares.clip(1e-6))),)
         scorers: list[Scorer] = []
         if self.model in ("boosting", "both"):
             from chaosgym.classifier.boosting import train_forest
 
-            scorers.append(train_forest(features, labels, self.rounds, self.leaves, self.learning_rate, self.seed))
+            scorers.append(train_forest(
+                known, asked, rounds=self.rounds, leaves=self.leaves, learning_rate=self.learning_rate,
+                least_rows=self.least_rows, seed=self.seed,
+            ))  # fmt: skip
         if self.model in ("network", "both"):
             from chaosgym.classifier.network import train_networks
 
-            scorers.append(train_networks(features, labels, len(self.type_of_), self.members, self.seed))
+            scorers.append(train_networks(known, asked, count, self.members, self.seed))
         if not scorers:
             raise ValueError(f"model = {self.model!r} is not one of 'boosting', 'network', 'both'")
         return tuple(scorers)
@@ -234,7 +274,7 @@ class ResponseClassifier:
         kinds = np.searchsorted(PERIODS, periods[rows])
         self.period_kinds_, numbers = np.unique(kinds, return_inverse=True)
         if len(self.period_kinds_) > 1:
-            self.period_forest_ = train_forest(features[rows], numbers, PERIOD_ROUNDS, 15, 0.1, self.seed)
+            self.period_forest_ = train_forest(features[rows], numbers, rounds=PERIOD_ROUNDS, seed=self.seed)
 
     def _fit_peak_force(self, features: Array, values: Array, peak_force: ArrayLike | None) -> None:
         self.quantile_forests_: tuple[Forest, ...] = ()
@@ -257,19 +297,39 @@ class ResponseClassifier:
 
     def predict_proba(self, X: ArrayLike, **record: Any) -> Array:
         """Probabilities (n, n_types), in the order of ``classes_``."""
-        return _pooled(self.predict_pairs(X, **record), self.type_of_)
+        return self.types_of(self.predict_pairs(X, **record))
 
     def predict_nature_proba(self, X: ArrayLike, **record: Any) -> Array:
         """Probabilities (n, n_natures), in the order of ``natures_``."""
-        return _pooled(self.predict_pairs(X, **record), self.nature_of_)
+        return self.natures_of(self.predict_pairs(X, **record))
 
     def predict_pairs(self, X: ArrayLike, **record: Any) -> Array:
         """Probabilities (n, n_pairs) of type ``classes_[type_of_]`` with nature ``natures_[nature_of_]``."""
-        return self.chances(self._features(self._checked(X), **record))
+        return self.chances(self.features(X, **record))
 
     def chances(self, features: Array) -> Array:
         """Probabilities of the pairs from features that are computed already."""
-        return softmax(_raw_scores(self.scorers_, features) / self.temperature_)
+        return self._pairs([_raw_scores(scorers, features) for scorers in self.scorers_])
+
+    def _pairs(self, scores: list[Array]) -> Array:
+        """Probabilities of the pairs: that of the nature times that of the type of such a nature."""
+        parts = [softmax(score / temperature) for score, temperature in zip(scores, self.temperatures_, strict=True)]
+        chances = np.empty((len(scores[0]), len(self.type_of_)))
+        for nature in range(len(self.natures_)):
+            chances[:, self.nature_of_ == nature] = parts[0][:, nature : nature + 1] * parts[nature + 1]
+        return chances
+
+    def types_of(self, pairs: Array) -> Array:
+        """Probabilities of types (n, n_types) from those of pairs (n, n_pairs)."""
+        return _pooled(pairs, self.type_of_)
+
+    def natures_of(self, pairs: Array) -> Array:
+        """Probabilities of natures (n, n_natures) from those of pairs (n, n_pairs)."""
+        return _pooled(pairs, self.nature_of_)
+
+    def features(self, X: ArrayLike, **record: Any) -> Array:
+        """Features (n, n_features) that the model sees."""
+        return self._features(self._checked(X), **record)
 
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, **record: Any) -> float:
         """Share of types that are right."""
@@ -284,13 +344,13 @@ class ResponseClassifier:
 
     def unlike_training(self, features: Array) -> NDArray[np.bool_]:
         """Whether features of records that are computed already resemble none of the training."""
-        return novelty(self.neighbourhood_, features) > self.neighbourhood_.threshold
+        return is_novel(self.neighbourhood_, features)
 
     def predict_period(self, features: Array) -> Labels:
         """Most probable period (n,) of a periodic response from its features; 0 for a longer one or if not trained."""
         if self.period_forest_ is None:
             return np.zeros(len(features), dtype=np.int64)
-        chances = softmax(forest_scores(self.period_forest_, features))
+        chances = class_scores(self.period_forest_, features)
         return np.array([*PERIODS, 0])[self.period_kinds_[chances.argmax(axis=1)]]
 
     def predict_peak_force(self, features: Array, values: Array) -> Array:
@@ -340,11 +400,11 @@ class ResponseClassifier:
 
 
 def _raw_scores(scorers: tuple[Scorer, ...], features: Array) -> Array:
-    """Mean scores of the scorers, (n, n_pairs)."""
-    parts = []
-    for scorer in scorers:
-        score = network_scores(scorer, features) if isinstance(scorer, Network) else forest_scores(scorer, features)
-        parts.append(np.concatenate([np.zeros_like(score), score], axis=1) if score.shape[1] == 1 else score)
+    """Mean scores of the scorers, (n, n_classes); a single class where there are none."""
+    parts = [network_scores(scorer, features) if isinstance(scorer, Network) else class_scores(scorer, features)
+             for scorer in scorers]  # fmt: skip
+    if not parts:
+        return np.zeros((len(features), 1))
     return parts[0] if len(parts) == 1 else np.asarray(sum(parts) / len(parts))
 
 

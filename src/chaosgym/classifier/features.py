@@ -57,7 +57,7 @@ def as_records(
     section : (n_records, cycles, 2), optional
         Stroboscopic displacement and velocity, in any units.
     sensor_error : float or (n_records,), optional
-        Largest error of a peak [N]; NaN or None where unknown.
+        Largest error of a peak [N], 0 for exact peaks; NaN or None where unknown.
 
     Returns
     -------
@@ -338,7 +338,7 @@ def _features(x: Array, sensor_error: float, out: Array) -> None:
     head = (np.log(float(n)), _log(level), _log(error), _log(deviation), _log(late_deviation), _log(spread))
     for i in range(6):
         out[i] = head[i]
-    if not error > 0.0:
+    if np.isnan(error):
         out[2] = np.nan
     at = 6
     out[at] = _log(spread / (2.0 * error)) if error > 0.0 else np.nan

@@ -18,7 +18,10 @@ PROTOTYPES = 2000
 LIMIT = 6.0
 """Scaled figures are clipped here, so that a single one can't decide by its tail."""
 
-FALSE_REFUSALS = 0.03
+BANDS = 4
+"""Lengths of record with a threshold of their own."""
+
+FALSE_REFUSALS = 0.04
 """Share of the training rows that are told apart by mistake."""
 
 
@@ -26,7 +29,8 @@ class Neighbourhood(NamedTuple):
     """Kept training rows.
 
     ``centre``, ``spread`` (n_features,); ``low``, ``high`` (n_features,) range in training with a tenth more on both
-    sides; ``prototypes`` (n_kept, n_features) scaled; ``threshold`` largest usual distance.
+    sides; ``prototypes`` (n_kept, n_features) scaled; ``thresholds`` (n_bands,) largest usual distance for values of
+    the first feature, the length of the record, between ``edges`` (n_bands - 1,).
     """
 
     centre: Array
@@ -34,7 +38,8 @@ class Neighbourhood(NamedTuple):
     low: Array
     high: Array
     prototypes: Array
-    threshold: float
+    edges: Array
+    thresholds: Array
 
 
 def neighbourhood(features: Array, groups: NDArray[np.int64], seed: int) -> Neighbourhood:
@@ -45,16 +50,24 @@ def neighbourhood(features: Array, groups: NDArray[np.int64], seed: int) -> Neig
     spread = np.where(np.nan_to_num(spread) > 1e-9, 0.5 * spread, 1.0)
     low, high = np.nanmin(features, axis=0), np.nanmax(features, axis=0)
     room = 0.1 * (high - low)
-    whole = Neighbourhood(centre, spread, low - room, high + room, np.empty((0, len(centre))), np.inf)
+    none = np.empty((0, len(centre)))
+    edges = np.quantile(features[:, 0], np.arange(1, BANDS) / BANDS)
+    whole = Neighbourhood(centre, spread, low - room, high + room, none, edges, np.full(BANDS, np.inf))
     parts = np.unique(groups)
     held = np.isin(groups, generator.permutation(parts)[: max(1, len(parts) // 5)])
     if held.all():
         held = generator.random(len(groups)) < 0.2
     known = whole._replace(prototypes=_drawn(features[~held], whole, generator))
-    distances = novelty(known, _some(features[held], generator))
-    return whole._replace(
-        prototypes=_drawn(features, whole, generator), threshold=float(np.quantile(distances, 1.0 - FALSE_REFUSALS))
-    )
+    tried = _some(features[held], generator)
+    distances, band = novelty(known, tried), np.searchsorted(edges, tried[:, 0])
+    thresholds = [np.quantile(distances[band == i], 1.0 - FALSE_REFUSALS) if np.any(band == i) else np.inf
+                  for i in range(BANDS)]  # fmt: skip
+    return whole._replace(prototypes=_drawn(features, whole, generator), thresholds=np.array(thresholds))
+
+
+def is_novel(kept: Neighbourhood, features: Array) -> NDArray[np.bool_]:
+    """Whether rows (n, n_features) lie further away than is usual for their length, (n,)."""
+    return novelty(kept, features) > kept.thresholds[np.searchsorted(kept.edges, features[:, 0])]
 
 
 def _some(features: Array, generator: np.random.Generator) -> Array:

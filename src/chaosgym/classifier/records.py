@@ -12,7 +12,6 @@ clean records fail on noisy ones.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,24 +38,6 @@ class Records(NamedTuple):
     section: Array
     sensor_error: Array
     rows: NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Noise of a sensor: normal with a share of the mean peak, or even over an error [N]; and whether it is told."""
-
-    share: float = 0.0
-    error: float = 0.0
-    told: bool = True
-
-    def on(self, peaks: Array, generator: np.random.Generator) -> tuple[Array, Array]:
-        """Noisy peaks (n, cycles), never below zero, and the error told for each (n,)."""
-        level = peaks.mean(axis=1)
-        noisy = peaks + self.share * level[:, None] * generator.standard_normal(peaks.shape)
-        noisy += self.error * generator.uniform(-1.0, 1.0, peaks.shape)
-        size = NORMAL_DEVIATIONS * self.share * level + self.error
-        told = size if self.told else np.full(len(peaks), np.nan)
-        return np.maximum(noisy, 0.0), np.where(told > 0.0, told, np.nan)
 
 
 def signals_of(table: Any, window: str) -> tuple[Array, Array, NDArray[np.int64]]:
@@ -101,11 +82,11 @@ def _copy(peaks: Array, section: Array, rows: NDArray[np.int64], generator: np.r
     error = np.where(kind >= 3, np.exp(generator.uniform(np.log(0.3), np.log(5.0), count)), 0.0)
     forces = forces + (share * level)[:, None] * generator.standard_normal(forces.shape)
     forces = np.maximum(forces + error[:, None] * generator.uniform(-1.0, 1.0, forces.shape), 0.0)
-    told = np.where(generator.random(count) < 2.0 / 3.0, NORMAL_DEVIATIONS * share * level + error, 0.0)
+    told = np.where(generator.random(count) < 2.0 / 3.0, NORMAL_DEVIATIONS * share * level + error, np.nan)
     states = np.take_along_axis(section, columns[:, :, None], axis=1)
     size = np.sqrt(np.mean(states**2, axis=1, keepdims=True))
     noise = 10.0 ** generator.uniform(-4.0, -1.5, (count, 1, 1))
     states = states + noise * size * generator.standard_normal(states.shape)
     states[generator.random(count) >= 1.0 / 3.0] = np.nan
     forces[ended] = np.nan
-    return Records(forces, states, np.where(told > 0.0, told, np.nan), rows)
+    return Records(forces, states, told, rows)

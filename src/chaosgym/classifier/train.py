@@ -1,169 +1,212 @@
-"""How is the classifier trained, and is it any better than simple rules?
+"""How is the classifier of a machine trained, and is it any better than simple rules?
 
-The network and the scikit-learn baselines see the same rows and are judged on the same held-out blocks of the swept
-plane: whole rectangles, since a random split would put near-copies of every test point into the training set.
+Everything is judged on machines (or blocks of a plane) that no training has seen. The learning curve repeats the
+training on a half, a quarter and an eighth of the machines.
 """
 
-from dataclasses import dataclass, replace
-from itertools import pairwise
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from tqdm import trange
+from tqdm import tqdm
 
-from chaosgym.classifier.model import RESPONSE_TYPES, ResponseClassifier, fourier_features
-from chaosgym.errors import DatasetError
+from chaosgym.classifier.compare import SCENES, compare_parameters, compare_scene, outside_parameters, refusals
+from chaosgym.classifier.data import Examples, examples_of
+from chaosgym.classifier.estimator import ResponseClassifier
+from chaosgym.classifier.evaluation import probability_scores
+from chaosgym.classifier.records import training_records
+from chaosgym.classifier.report import card_lines
+from chaosgym.classifier.shipped import MachineClassifier
+from chaosgym.files import write_atomically
+from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import LabelledSweep
 from chaosgym.version import __version__
 
-Array = NDArray[np.float64]
+CURVE = (0.125, 0.25, 0.5, 1.0)
+"""Shares of the training machines of the learning curve."""
 
-BLOCKS = 12
-"""The held-out rectangles come from a BLOCKS x BLOCKS board laid over the first two swept parameters."""
-
-WAVES, WAVE_SCALE = 64, 0.1
-HIDDEN = 64
-UPDATES, BATCH = 2500, 256
-LEARNING_RATE = 5e-3
-WEIGHT_DECAY = 0.1
+RECORDS = 60_000
+"""Noisy training records made of the signals, at most and about."""
 
 
 @dataclass(frozen=True)
 class TrainingResult:
-    """Trained classifier and the report: rows, and per method accuracy and balanced accuracy on held-out rows."""
+    """Trained classifier, the report on held-out rows, and the examples that both come from."""
 
-    classifier: ResponseClassifier
+    classifier: MachineClassifier
     report: dict[str, Any]
+    examples: Examples
+
+    def save(self, folder: str | Path) -> None:
+        """Write ``classifier.npz``, ``report.json`` and ``CARD.md`` into a folder."""
+        target = Path(folder)
+        target.mkdir(parents=True, exist_ok=True)
+        self.classifier.save(target / "classifier.npz")
+        text = json.dumps(self.report, indent=1)
+        write_atomically(target / "report.json", lambda temporary: temporary.write_text(text + "\n"))
+        card = "\n".join(card_lines(self.classifier.card)) + "\n"
+        write_atomically(target / "CARD.md", lambda temporary: temporary.write_text(card))
 
 
-def held_out_blocks(features: Array, seed: int, share: float = 0.25) -> NDArray[np.bool_]:
-    """Choose the held-out rows: True for the rows (n,) in randomly drawn rectangles of the first two features."""
-    board = np.zeros(len(features), dtype=int)
-    for column in features[:, :2].T:
-        edges = np.linspace(column.min(), column.max(), BLOCKS + 1)[1:-1]
-        board = board * BLOCKS + np.digitize(column, edges)
-    occupied = np.unique(board)
-    drawn = np.random.default_rng(seed).permutation(occupied)
-    return np.isin(board, drawn[: max(1, round(share * len(occupied)))])
-
-
-def train_classifier(sweep: LabelledSweep, seed: int = 0, *, progress: bool = False) -> TrainingResult:
-    """Train the network on a labelled sweep and judge it beside its baselines.
+def train_classifier(
+    sweep: LabelledSweep,
+    seed: int = 0,
+    *,
+    model: str = "boosting",
+    curve: bool = True,
+    transfer: LabelledSweep | None = None,
+    progress: bool = False,
+) -> TrainingResult:
+    """Train on a labelled sweep and judge beside baselines.
 
     Parameters
     ----------
     sweep
-        Labelled points; rows without a response type are left out.
+        Labelled points; with signals, records are learned too.
     seed
-        Of the held-out blocks, the first weights and the baselines. Same seed, same weights.
+        Of split, noise, weights and baselines. Same seed, same weights.
+    model
+        What judges parameters: "boosting", "network" or "both". Records are judged by boosting.
+    curve
+        Measure the learning curve too.
+    transfer
+        Sweep of another machine, on whose held-out records the record classifier is tried.
     progress
         Show a progress bar on standard error.
 
     Raises
     ------
     DatasetError
-        If fewer than 50 rows have a response type, or only one type occurs in the training or held-out rows.
+        If there are too few rows or only one response type.
     """
-    fields = [axis["field"] for axis in sweep.settings["axes"]]
-    answers = np.array([str(value) for value in sweep.column("response_type")])
-    usable = np.isin(answers, RESPONSE_TYPES)
-    if usable.sum() < 50:
-        raise DatasetError(f"only {usable.sum()} rows have a response type; at least 50 are needed to train")
-    values = np.column_stack([sweep.column(name)[usable] for name in fields])
-    if np.any(values <= 0.0):
-        raise DatasetError("the classifier takes logarithms of the swept parameters; all must be above 0")
-    features = np.log(values)
-    labels = np.searchsorted(RESPONSE_TYPES, answers[usable])
-    test = held_out_blocks(features, seed)
-    for name, rows in (("training", ~test), ("held-out", test)):
-        if len(np.unique(labels[rows])) < 2:
-            raise DatasetError(f"the {name} rows hold one response type only; sweep a wider range or more points")
+    examples = examples_of(sweep, seed)
+    steps = 5 + (4 + len(SCENES) if examples.signals else 0) + (len(CURVE) if curve else 0)
+    with tqdm(total=steps, desc="train classifier", unit="step", disable=not progress, mininterval=0.5) as bar:
+        began = time.perf_counter()
+        parameters = fit_parameters(examples, ~examples.test, model, seed, tick=bar.update)
+        records = fit_records(examples, seed, tick=bar.update) if examples.signals else None
+        seconds = time.perf_counter() - began
+        report = _rows(examples) | {"training_seconds": round(seconds, 1)}
+        report["parameters"] = compare_parameters(examples, parameters, seed)
+        report["parameters"]["refused"] = outside_parameters(examples, parameters, seed)
+        bar.update()
+        if records is not None:
+            report["records"] = {}
+            for scene in SCENES:
+                report["records"][scene.name] = compare_scene(scene, examples, records, seed)
+                bar.update()
+            report["refused"] = refusals(examples, records, seed)
+            if transfer is not None:
+                report["transfer"] = _transfer(transfer, records, seed)
+        if curve:
+            report["learning_curve"] = [_curve_point(examples, share, model, seed, bar.update) for share in CURVE]
+    card = _card(sweep, examples, report, seed)
+    return TrainingResult(MachineClassifier(examples.machine, parameters, records, card), report, examples)
 
-    centre, spread = features[~test].mean(axis=0), features[~test].std(axis=0)
-    scaled = (features - centre) / spread
-    waves = WAVE_SCALE * np.random.default_rng(seed).standard_normal((len(fields), WAVES))
-    weights, biases = _fit_network(fourier_features(scaled[~test], waves), labels[~test], seed, progress)
-    classifier = ResponseClassifier(weights, biases, centre, spread, waves, card={"fields": fields})
-    predicted = {"network": classifier.predict_proba(values[test]).argmax(axis=1)}
-    predicted |= _baselines(scaled[~test], labels[~test], scaled[test], seed)
-    report = {
-        "rows": {"training": int((~test).sum()), "held_out": int(test.sum())},
-        "share_of_types": {
-            name: float((labels == index).mean()) for index, name in enumerate(RESPONSE_TYPES)
+
+def fit_parameters(
+    examples: Examples, rows: Any, model: str, seed: int, *, folds: int = 3, tick: Callable[[], object] = lambda: None
+) -> ResponseClassifier:
+    """Train from parameters on some rows (n,)."""
+    peaks = np.full(len(examples.values), np.nan)
+    if examples.signals:
+        settled, _, at = examples.signals["settled"]
+        peaks[at] = settled[np.arange(len(at)), np.random.default_rng(seed).integers(0, settled.shape[1], len(at))]
+    kind: Any = model
+    classifier = ResponseClassifier(
+        "parameters", kind, examples.machine, examples.fields, least_rows=60, folds=folds, seed=seed
+    )
+    return classifier.fit(
+        examples.values[rows], examples.response_type[rows], nature=examples.nature[rows],
+        period=examples.period[rows], peak_force=peaks[rows] if np.isfinite(peaks[rows]).any() else None,
+        groups=examples.groups[rows], ranges=(examples.values.min(axis=0), examples.values.max(axis=0)), tick=tick,
+    )  # fmt: skip
+
+
+def fit_records(
+    examples: Examples, seed: int, *, folds: int = 3, tick: Callable[[], object] = lambda: None
+) -> ResponseClassifier:
+    """Train on noisy records of the training rows."""
+    signals = examples.signals_where(~examples.test)
+    runs = max(1, sum(len(peaks) for peaks, _, _ in signals.values()))
+    noisy = training_records(signals, max(1, round(RECORDS / runs)), seed)
+    later = examples.signals["settled"]
+    where = np.full(len(examples.values), -1)
+    where[later[2]] = np.arange(len(later[2]))
+    columns = np.random.default_rng(seed + 1).integers(0, later[0].shape[1], len(noisy.rows))
+    classifier = ResponseClassifier("records", "boosting", folds=folds, seed=seed)
+    return classifier.fit(
+        noisy.peaks, examples.response_type[noisy.rows], nature=examples.nature[noisy.rows],
+        peak_force=later[0][where[noisy.rows], columns], groups=examples.groups[noisy.rows],
+        section=noisy.section, sensor_error=noisy.sensor_error, tick=tick,
+    )  # fmt: skip
+
+
+def _curve_point(
+    examples: Examples, share: float, model: str, seed: int, tick: Callable[[], object]
+) -> dict[str, Any]:
+    """Scores on the held-out rows after training on a share of the training machines."""
+    machines = np.unique(examples.groups[~examples.test])
+    drawn = np.random.default_rng(seed).permutation(machines)[: max(1, round(share * len(machines)))]
+    rows = np.isin(examples.groups, drawn) & ~examples.test
+    classifier = fit_parameters(examples, rows, model, seed, folds=0)
+    tick()
+    test, groups = examples.test, examples.groups[examples.test]
+    values = examples.values[test]
+    kinds, natures = classifier.predict_proba(values), classifier.predict_nature_proba(values)
+    return {
+        "machines": len(drawn),
+        "rows": int(rows.sum()),
+        "response_type": probability_scores(classifier.classes_, kinds, examples.response_type[test], groups),
+        "nature": probability_scores(classifier.natures_, natures, examples.nature[test], groups),
+    }
+
+
+def _transfer(sweep: LabelledSweep, records: ResponseClassifier, seed: int) -> dict[str, Any]:
+    """Scores of the record classifier on another machine's held-out records."""
+    other = examples_of(sweep, seed)
+    found = {scene.name: compare_scene(scene, other, records, seed, baselines=False) for scene in SCENES[:3]}
+    return {"machine": other.machine.name, "scenes": found}
+
+
+def _rows(examples: Examples) -> dict[str, Any]:
+    test = examples.test
+    return {
+        "rows": {"training": int((~test).sum()), "held_out": int(test.sum()), "left_out": examples.left_out},
+        "machines": {
+            "training": len(np.unique(examples.groups[~test])), "held_out": len(np.unique(examples.groups[test]))
         },
-        "held_out": {name: _scores(labels[test], guess) for name, guess in predicted.items()},
+        "share_of_types": {name: float((examples.response_type == name).mean()) for name in ("I", "II", "III")},
+        "share_of_natures": {str(name): float((examples.nature == name).mean()) for name in np.unique(examples.nature)},
     }  # fmt: skip
-    card = {
-        "machine": sweep.settings["machine"],
-        "base": sweep.settings["base"],
-        "fields": fields,
+
+
+def _card(sweep: LabelledSweep, examples: Examples, report: dict[str, Any], seed: int) -> dict[str, Any]:
+    training = ~examples.test
+    kept = ("sampling", "size", "seed", "budget", "signals", "transient", "cycles", "axes", "patches", "type_reach")
+    return {
+        "machine": examples.machine.name,
+        "base": {name: getattr(examples.machine, name) for name in parameters_of(examples.machine)},
+        "fields": list(examples.fields),
         "ranges": {name: [float(column.min()), float(column.max())]
-                   for name, column in zip(fields, values.T, strict=True)},
-        "label": {key: sweep.settings[key] for key in ("budget", "sampling", "axes", "type_reach")},
+                   for name, column in zip(examples.fields, examples.values[training].T, strict=True)},
+        "data": {key: sweep.settings[key] for key in kept if key in sweep.settings},
+        "rows": {
+            "parameters": int(training.sum()),
+            "records": sum(len(part[0]) for part in examples.signals_where(training).values()),
+        },
         "seed": seed,
         "version": __version__,
+        "command": f"chaosgym train-classifier --data FOLDER --out FOLDER --seed {seed}",
+        "limits": (
+            "knows machines that differ from the base in the named fields, within their ranges; the nature is that of "
+            "the diagnosis within its budget, the type that of the neighbours in speed and clearance from one initial "
+            "state; transient chaos counts as chaotic although a settled record of it is periodic; chaos weaker than "
+            "the sensor's noise looks periodic"
+        ),
         "report": report,
     }  # fmt: skip
-    return TrainingResult(replace(classifier, card=card), report)
-
-
-def _fit_network(
-    features: Array, labels: NDArray[np.int64], seed: int, progress: bool
-) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-    import torch
-
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    generator = torch.Generator().manual_seed(seed)
-    sizes = (features.shape[1], HIDDEN, HIDDEN, len(RESPONSE_TYPES))
-    layers = [torch.nn.Linear(inputs, outputs, dtype=torch.float64)
-              for inputs, outputs in pairwise(sizes)]  # fmt: skip
-    with torch.no_grad():
-        for layer in layers:
-            torch.nn.init.xavier_uniform_(layer.weight, gain=5 / 3, generator=generator)
-            torch.nn.init.zeros_(layer.bias)
-    network = torch.nn.Sequential(layers[0], torch.nn.Tanh(), layers[1], torch.nn.Tanh(), layers[2])
-    optimiser = torch.optim.AdamW(network.parameters(), lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, LEARNING_RATE, total_steps=UPDATES)
-    inputs, targets = torch.from_numpy(features), torch.from_numpy(labels)
-    for _ in trange(UPDATES, desc="train classifier", unit="update", disable=not progress, mininterval=1.0):
-        rows = torch.randint(len(inputs), (BATCH,), generator=generator)
-        optimiser.zero_grad()
-        torch.nn.functional.cross_entropy(network(inputs[rows]), targets[rows]).backward()  # type: ignore[no-untyped-call]
-        optimiser.step()
-        schedule.step()
-    torch.set_num_threads(threads)
-    weights = tuple(layer.weight.detach().numpy().T.copy() for layer in layers)
-    return weights, tuple(layer.bias.detach().numpy().copy() for layer in layers)
-
-
-def _baselines(features: Array, labels: NDArray[np.int64], test: Array, seed: int) -> dict[str, NDArray[np.int64]]:
-    from sklearn.dummy import DummyClassifier
-    from sklearn.ensemble import HistGradientBoostingClassifier
-    from sklearn.linear_model import LogisticRegression
-    from sklearn.neighbors import KNeighborsClassifier
-
-    models = {
-        "majority": DummyClassifier(),
-        "logistic regression": LogisticRegression(max_iter=1000),
-        "nearest neighbours": KNeighborsClassifier(n_neighbors=15),
-        "gradient boosting": HistGradientBoostingClassifier(random_state=seed),
-    }
-    return {name: model.fit(features, labels).predict(test) for name, model in models.items()}
-
-
-def _scores(truth: NDArray[np.int64], guess: NDArray[np.int64]) -> dict[str, float]:
-    recalls = [float((guess[truth == kind] == kind).mean()) for kind in np.unique(truth)]
-    return {"accuracy": float((guess == truth).mean()), "balanced_accuracy": float(np.mean(recalls))}
-
-
-def report_table(report: dict[str, Any]) -> list[str]:
-    """Lines of the comparison on held-out rows, for people."""
-    rows = report["rows"]
-    head = f"{rows['held_out']} held-out and {rows['training']} training points"
-    return [
-        f"{head:44s} accuracy  balanced",
-        *(f"  {name:42s} {score['accuracy']:8.3f}  {score['balanced_accuracy']:8.3f}"
-          for name, score in report["held_out"].items()),
-    ]  # fmt: skip

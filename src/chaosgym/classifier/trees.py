@@ -59,6 +59,12 @@ def forest_of(model: Any) -> Forest:
     )  # fmt: skip
 
 
+def constant_forest(baseline: Array) -> Forest:
+    """A forest without trees: the same scores (n_scores,) for every row."""
+    none = np.zeros(0, dtype=np.int32)
+    return Forest(none, np.zeros(0), none, none, np.zeros(0, dtype=np.bool_), none, none, baseline)
+
+
 def forest_scores(forest: Forest, features: Array) -> Array:
     """Scores (n_rows, n_scores) of features (n_rows, n_features)."""
     out = np.empty((len(features), len(forest.baseline)))
@@ -67,6 +73,12 @@ def forest_scores(forest: Forest, features: Array) -> Array:
     else:
         _walk_all(*forest, features, out)
     return out
+
+
+def class_scores(forest: Forest, features: Array) -> Array:
+    """Scores (n_rows, n_classes); of two classes, for which boosting has one score, the first has zero."""
+    found = forest_scores(forest, features)
+    return np.concatenate([np.zeros_like(found), found], axis=1) if found.shape[1] == 1 else found
 
 
 @njit(cache=True, nogil=True, inline="always")

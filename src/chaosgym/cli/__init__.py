@@ -9,13 +9,14 @@ import sys
 import click
 
 from chaosgym.cli.bench import bench
-from chaosgym.cli.classify import classify, train_classifier
+from chaosgym.cli.classify import classify
 from chaosgym.cli.demo import demo
 from chaosgym.cli.design import design
 from chaosgym.cli.diagnose import agreement, diagnose
 from chaosgym.cli.info import info
 from chaosgym.cli.simulate import show, simulate
 from chaosgym.cli.sweep import sweep
+from chaosgym.cli.train_classifier import train_classifier
 from chaosgym.errors import ChaosgymError, SimulationError, UnfinishedError
 from chaosgym.version import __version__
 

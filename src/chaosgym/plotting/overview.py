@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from chaosgym.classifier import RESPONSE_TYPES, ResponseClassifier
+from chaosgym.classifier import MachineClassifier
 from chaosgym.simulation import CycleRecord
 from chaosgym.sweeps import LabelledSweep
 
@@ -41,14 +41,14 @@ def type_map(sweep: LabelledSweep, ax: Axes) -> Axes:
     return ax
 
 
-def classifier_map(classifier: ResponseClassifier, ax: Axes) -> Axes:
+def classifier_map(classifier: MachineClassifier, ax: Axes) -> Axes:
     """Most probable types over the two trained parameters, paler where the classifier is less sure."""
     ranges: dict[str, tuple[float, float]] = classifier.card["ranges"]
     speed, clearance = np.meshgrid(*[np.geomspace(*ranges[field], 200) for field in classifier.fields], indexing="ij")
-    chances = classifier.predict_proba(np.column_stack([speed.ravel(), clearance.ravel()]))
+    chances = classifier.parameters.predict_proba(np.column_stack([speed.ravel(), clearance.ravel()]))
     index = chances.argmax(axis=1).reshape(speed.shape)
     sure = np.clip((chances.max(axis=1).reshape(speed.shape) - 1 / 3) * 1.5, 0.05, 1.0)
-    colours = ListedColormap([TYPE_COLOURS[kind] for kind in RESPONSE_TYPES])
+    colours = ListedColormap([TYPE_COLOURS[kind] for kind in classifier.parameters.classes_])
     ax.pcolormesh(speed, 1e3 * clearance, index, cmap=colours, vmin=-0.5, vmax=2.5, alpha=sure)
     return _plane(ax, "Classifier: paler where less sure")
 
@@ -75,7 +75,7 @@ def schedules(speeds: Mapping[str, NDArray[np.float64]], ax: Axes) -> Axes:
 def overview(
     records: Mapping[str, CycleRecord],
     sweep: LabelledSweep,
-    classifier: ResponseClassifier,
+    classifier: MachineClassifier,
     speeds: Mapping[str, NDArray[np.float64]],
 ) -> Figure:
     """Four panels of ``chaosgym demo``."""

@@ -1,0 +1,69 @@
+"""How does a training report read? A table of methods with their intervals, for people."""
+
+from collections.abc import Mapping
+from typing import Any
+
+NAME_WIDTH = 38
+
+
+def report_table(report: Mapping[str, Any]) -> list[str]:
+    """Lines of the comparison on held-out rows."""
+    rows = report["rows"]
+    lines = [f"{rows['held_out']} held-out and {rows['training']} training points, 95 % bootstrap intervals"]
+    for name in ("response_type", "nature"):
+        lines += ["", *_block(f"{name.replace('_', ' ')} from parameters", report["parameters"][name])]
+    refused = report["parameters"]["refused"]
+    lines.append(f"  refused: {refused['outside']:.1%} of machines outside the range, {refused['inside']:.1%} inside")
+    for name, scene in report.get("records", {}).items():
+        target = f", target {scene['target']:.0%}" if scene["target"] else ""
+        lines += ["", *_block(f"nature, {name}{target}", scene["nature"])]
+        lines.append(_line("response type by classifier", scene["response_type"]))
+    if "transfer" in report:
+        for name, scene in report["transfer"]["scenes"].items():
+            lines += ["", *_block(f"nature, {report['transfer']['machine']}, {name}", scene["nature"])]
+    if "refused" in report:
+        shares = ", ".join(f"{name} {share:.1%}" for name, share in report["refused"].items())
+        lines += ["", f"records refused by fault: {shares}"]
+    if "learning_curve" in report:
+        lines += ["", f"{'learning curve':{NAME_WIDTH}s}  type    nature"]
+        lines += [
+            f"  {point['rows']:6d} points of {point['machines']:4d} machines     "
+            f"{point['response_type']['accuracy'][0]:6.3f}  {point['nature']['accuracy'][0]:6.3f}"
+            for point in report["learning_curve"]
+        ]
+    return lines
+
+
+def _block(title: str, methods: Mapping[str, Any]) -> list[str]:
+    head = f"{title}\n  {'':{NAME_WIDTH}s} accuracy               balanced               ECE    sure 90 %"
+    best = sorted(methods.items(), key=lambda item: -item[1]["accuracy"][0])
+    return [*head.split("\n"), *(_line(name, scores) for name, scores in best)]
+
+
+def _line(name: str, scores: Mapping[str, Any]) -> str:
+    shown = [f"{value:.3f} [{low:.3f}, {high:.3f}]" for value, low, high in
+             (scores["accuracy"], scores["balanced_accuracy"])]  # fmt: skip
+    rest = ""
+    if "calibration_error" in scores:
+        rest = f"   {scores['calibration_error']:.3f}  {scores['accuracy_on_most_confident']:.3f}"
+    return f"  {name:{NAME_WIDTH}s} {shown[0]}   {shown[1]}{rest}"
+
+
+def card_lines(card: Mapping[str, Any]) -> list[str]:
+    """Model card as Markdown."""
+    ranges = ", ".join(f"{name} {low:.4g} to {high:.4g}" for name, (low, high) in card["ranges"].items())
+    return [
+        f"# Classifier of the {card['machine']}'s response type",
+        "",
+        "Use: type (I, II, III) and nature of a response from machine parameters, or from 8 to 64 measured peak forces.",
+        f"Data: {card['rows']['parameters']} labelled responses, {card['rows']['records']} recorded windows; "
+        f"{card['report']['machines']['training']} machines (or blocks) train, "
+        f"{card['report']['machines']['held_out']} judge.",
+        f"Range, SI: {ranges}.",
+        f"Limits: {card['limits']}.",
+        f"Made by chaosgym {card['version']}: `{card['command']}`.",
+        "",
+        "```",
+        *report_table(card["report"]),
+        "```",
+    ]
