@@ -22,6 +22,7 @@ from chaosgym.core.impact_beam import CycleArrays, Episode, advance, cycle_array
 from chaosgym.core.slider_crank import advance as advance_slider_crank
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError, SimulationError
+from chaosgym.machines.crank_joints import sensor_peaks
 from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
@@ -219,7 +220,8 @@ def _run_slider_crank(
         raise ParameterError(f"integrator = {integrator} does not run a slider crank; allowed: ExactEvents(...)")
     # its peaks and events are refined on the exact motion, so its steps may be twice as long as the beam's
     model = crank.reduce(2.0 * integrator.step_phase)
-    arrays = cycle_arrays(cycles, 2 * len(crank.degrees_of_freedom), samples, travels=True)
+    channels = len(model.gap) if crank.sensors else 0
+    arrays = cycle_arrays(cycles, 2 * len(crank.degrees_of_freedom), samples, travels=True, channels=channels)
     coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
     tolerance, budget = integrator.event_tolerance / model.contact_rate, integrator.event_budget
@@ -229,6 +231,7 @@ def _run_slider_crank(
         _record(crank, arrays, MotionState(coordinates, bouncing)),
         peak_phase=arrays.peak_instant * crank.crank_rate,
         peak_vector=arrays.peak_vector,
+        sensor_peak=sensor_peaks(crank, arrays.channel_peak) if crank.sensors else None,
     )
     return outcome, done, record
 
