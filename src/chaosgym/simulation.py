@@ -184,6 +184,12 @@ _PER_CYCLE = (
 )  # fmt: skip
 
 
+def batch_arrays(machine: Machine, count: int, cycles: int) -> CycleArrays:
+    """Return arrays for the kernels that run ``count`` variants of a machine: one more axis, the machines, in front."""
+    one = cycle_arrays(cycles, _states(machine))
+    return CycleArrays(*(np.empty((count, *array.shape), array.dtype) for array in one))
+
+
 def _record(machine: Machine, arrays: CycleArrays, final_state: MotionState) -> CycleRecord:
     return CycleRecord(
         machine=machine,
@@ -261,7 +267,11 @@ _RUNS: dict[str, tuple[_Run, Callable[[Any], int]]] = {
 
 def rest_state(machine: Machine) -> MotionState:
     """Return the state of rest in the middle of the gap."""
-    return MotionState(np.zeros(_RUNS[machine.name][1](machine)), np.zeros(3))
+    return MotionState(np.zeros(_states(machine)), np.zeros(3))
+
+
+def _states(machine: Machine) -> int:
+    return _RUNS[machine.name][1](machine)
 
 
 def _initial(machine: Machine, given: MotionState | ArrayLike | None) -> MotionState:

@@ -150,7 +150,12 @@ class ImpactBeam(FidelityLadder):
     @property
     def cycle_period(self) -> float:
         """Duration of one operating cycle [s]."""
-        return 1.0 / self.excitation_frequency
+        return float(self.period_at(self.excitation_frequency))
+
+    @staticmethod
+    def period_at(speed: Any) -> Any:
+        """Duration of one operating cycle [s] at a speed [Hz], or at many."""
+        return 1.0 / speed
 
     @property
     def natural_frequencies(self) -> Array:
