@@ -41,7 +41,8 @@ def rows_of(arrays, k):
     """Arrays of the machine in row k."""
     return CycleArrays(
         arrays.section[k], arrays.tip[k], arrays.peak_force[k], arrays.impacts[k], arrays.contact_time[k],
-        arrays.bounce_time[k], arrays.events[k], arrays.history[k],
+        arrays.bounce_time[k], arrays.events[k], arrays.history[k], arrays.peak_instant[k], arrays.peak_vector[k],
+        arrays.channel_peak[k],
     )  # fmt: skip
 
 

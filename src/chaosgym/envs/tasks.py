@@ -7,8 +7,8 @@ A step of n cycles of a job of N cycles earns
     - w_type_iii * n / N                     if the step counts as Type III
     - w_failure                              on fracture or a failed simulation
 
-Damage follows the basic rating life of a bearing: L = (C / F)^p million cycles with p = 10/3 for line contact, so that
-a cycle with peak force F uses up (F / C)^p / 10^6 of a life. The damage of a joint is that of its worse surface.
+Damage follows the basic rating life of a bearing (``life_law``), p = 10/3 for line contact. The damage of a joint is
+that of its worse surface.
 
 References
 ----------
@@ -24,12 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.errors import ParameterError
+from chaosgym.life_law import damage_in_a_million
 from chaosgym.machines.parameters import parameter, validate
 
 Array = NDArray[np.float64]
-
-LIFE_EXPONENT = 10.0 / 3.0
-"""Exponent p of the basic rating life, line contact."""
 
 LONGEST_PERIOD = 8
 """Longest period, in cycles, that counts as a repetition."""
@@ -101,7 +99,7 @@ def damage_of(peak_force: Array, load_rating: float, acceleration: float) -> Arr
     -------
     (..., sides)
     """
-    shares: Array = ((peak_force / load_rating) ** LIFE_EXPONENT).sum(axis=-2)
+    shares: Array = damage_in_a_million(peak_force, load_rating).sum(axis=-2)
     return shares * (acceleration * 1e-6)
 
 
@@ -149,9 +147,8 @@ class Task:
 
     def status(self, failed: Any, cycles_done: Any, damage: Any) -> Any:
         """Where jobs stand (...), by whether their simulation failed, cycles done, and damage of the joint."""
-        done = np.where(cycles_done >= self.job_cycles, Status.JOB_DONE, Status.RUNNING)
-        broken = np.where(damage >= 1.0, Status.FRACTURE, done)
-        return np.where(failed, Status.SIMULATION_FAILED, broken)
+        done = np.where(cycles_done >= self.job_cycles, int(Status.JOB_DONE), int(Status.RUNNING))
+        return np.where(failed, int(Status.SIMULATION_FAILED), np.where(damage >= 1.0, int(Status.FRACTURE), done))
 
     def judge(
         self, step: Step, status: Any, *, type_iii: Any, damage_increase: Any, job_time: float
@@ -171,14 +168,14 @@ class Task:
         job_time
             Duration of the whole job at top speed [s].
         """
-        failed = status == Status.SIMULATION_FAILED
+        failed = status == int(Status.SIMULATION_FAILED)
         type_iii = type_iii & ~failed
         overload = ~failed & (step.peak_force.max(axis=(-2, -1)) > self.force_limit)
         terms = {
             "reward_time": -self.time_weight * step.duration / job_time,
             "reward_damage": 0.0 - self.damage_weight * damage_increase,
             "reward_type_iii": 0.0 - self.type_iii_weight * type_iii * self.cycles_per_step / self.job_cycles,
-            "reward_failure": 0.0 - self.failure_weight * (failed | (status == Status.FRACTURE)),
+            "reward_failure": 0.0 - self.failure_weight * (failed | (status == int(Status.FRACTURE))),
         }
         costs = {"cost": type_iii | overload | failed, "cost_type_iii": type_iii, "cost_force": overload}
         named = terms | {name: np.asarray(cost, dtype=float) for name, cost in costs.items()}
