@@ -65,6 +65,17 @@ def test_card_holds_the_command_that_makes_the_dataset_again(folder, tmp_path):
     (folder / "noise.json").write_text(json.dumps(noise))
 
 
+def test_cost_is_measured_against_every_axis(folder):
+    """Mean cost, cost by axis, and what larger sweeps would take."""
+    cost = run_json("dataset", "cost", str(folder), "--points", "6")
+    assert 1e-4 < cost["seconds"] < 10.0
+    assert set(cost["by"]) == {"nature", "damping_ratio", "excitation_frequency", "clearance"}
+    assert cost["hours"]["1e+09"]["64"] == pytest.approx(1e9 * cost["seconds"] / 64 / 3600)
+    code, _, err = run("dataset", "cost", str(folder), "--points", "55")
+    assert code == 2
+    assert "3 to 54" in err
+
+
 def test_map_is_drawn(folder, tmp_path):
     """A lattice and a grid give a picture; an unknown kind of picture is refused."""
     assert run("dataset", "map", str(folder), "--out", str(tmp_path / "m.png"))[0] == 0
