@@ -14,6 +14,7 @@ from chaosgym.cli.dataset import dataset
 from chaosgym.cli.demo import demo
 from chaosgym.cli.design import design
 from chaosgym.cli.diagnose import agreement, diagnose
+from chaosgym.cli.figures import figures
 from chaosgym.cli.info import info
 from chaosgym.cli.simulate import show, simulate
 from chaosgym.cli.sweep import sweep
@@ -28,7 +29,7 @@ def app() -> None:
 
 
 for command in (
-    simulate, show, diagnose, agreement, classify, sweep, dataset, train_classifier, demo, design, info, bench,
+    simulate, show, diagnose, agreement, classify, sweep, dataset, train_classifier, demo, design, figures, info, bench,
 ):  # fmt: skip
     app.add_command(command)
 
