@@ -9,11 +9,13 @@ import sys
 import click
 
 from chaosgym.cli.bench import bench
+from chaosgym.cli.calibrate import calibrate
 from chaosgym.cli.classify import classify, train_classifier
 from chaosgym.cli.demo import demo
 from chaosgym.cli.design import design
 from chaosgym.cli.diagnose import agreement, diagnose
 from chaosgym.cli.info import info
+from chaosgym.cli.scorecard import scorecard
 from chaosgym.cli.simulate import show, simulate
 from chaosgym.cli.sweep import sweep
 from chaosgym.errors import ChaosgymError, SimulationError
@@ -28,6 +30,7 @@ def app() -> None:
 
 for command in (
     simulate, show, diagnose, agreement, classify, sweep, train_classifier, demo, design, info, bench,
+    calibrate, scorecard,
 ):  # fmt: skip
     app.add_command(command)
 
