@@ -18,7 +18,7 @@ from chaosgym.core import status
 from chaosgym.core.crank_stepper import SteppedCrankModel
 from chaosgym.core.crank_stepper import advance as advance_stepped_crank
 from chaosgym.core.fixed_step import advance_fixed_step
-from chaosgym.core.impact_beam import CycleArrays, Episode, advance
+from chaosgym.core.impact_beam import CycleArrays, Episode, advance, cycle_arrays
 from chaosgym.core.slider_crank import advance as advance_slider_crank
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError, SimulationError
@@ -116,6 +116,13 @@ class CycleRecord:
         Where the run ended; pass it as ``initial_state`` to go on.
     history : (n_cycles, samples_per_cycle, 3) or None
         Displacement [m], velocity [m/s] and contact force [N] (upper side positive) at equal intervals.
+    peak_phase : (n_cycles, 2) or None
+        Phase [rad] of the cycle at which each peak force acted; None for a machine whose contact stays in one place.
+    peak_vector : (n_cycles, 2, 3) or None
+        Components [N] of each peak force. On the slider: along the guide, up, sideways. On the housing of a ball
+        joint: along the rod towards the slider, across it in its plane of swing, sideways.
+    sensor_peak : (n_cycles, n_sensors) or None
+        Largest force of the cycle [N] on each of the machine's ``sensors``; None for a machine without any.
     """
 
     machine: Machine
@@ -128,6 +135,9 @@ class CycleRecord:
     bounce_duration: Array
     final_state: MotionState
     history: Array | None = None
+    peak_phase: Array | None = None
+    peak_vector: Array | None = None
+    sensor_peak: Array | None = None
 
     def __len__(self) -> int:
         return len(self.section)
@@ -154,27 +164,14 @@ class CycleRecord:
         return later._with_rows(lambda name: np.concatenate([getattr(self, name), getattr(later, name)]))
 
     def _with_rows(self, rows: Callable[[str], Any]) -> "CycleRecord":
-        names = _PER_CYCLE if self.history is None else (*_PER_CYCLE, "history")
-        changes: dict[str, Any] = {name: rows(name) for name in names}
+        changes: dict[str, Any] = {name: rows(name) for name in _PER_CYCLE if getattr(self, name) is not None}
         return replace(self, **changes)
 
 
 _PER_CYCLE = (
-    "section", "displacement", "velocity", "peak_force", "impacts", "contact_fraction", "bounce_duration",
+    "section", "displacement", "velocity", "peak_force", "impacts", "contact_fraction", "bounce_duration", "history",
+    "peak_phase", "peak_vector", "sensor_peak",
 )  # fmt: skip
-
-
-def _cycle_arrays(cycles: int, states: int, samples: int) -> CycleArrays:
-    return CycleArrays(
-        section=np.empty((cycles, states)),
-        tip=np.empty((cycles, 2)),
-        peak_force=np.empty((cycles, 2)),
-        impacts=np.empty((cycles, 2), dtype=np.int64),
-        contact_time=np.empty((cycles, 2)),
-        bounce_time=np.empty((cycles, 2)),
-        events=np.empty(cycles, dtype=np.int64),
-        history=np.empty((cycles, samples, 3)),
-    )
 
 
 def _record(machine: Machine, arrays: CycleArrays, final_state: MotionState) -> CycleRecord:
@@ -201,7 +198,7 @@ def _run_impact_beam(
     tangents: Tangents | None = None,
 ) -> tuple[int, int, CycleRecord]:
     model = beam.reduce()
-    arrays = _cycle_arrays(cycles, 2 * beam.n_modes, samples)
+    arrays = cycle_arrays(cycles, 2 * beam.n_modes, samples)
     coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
     if isinstance(integrator, ExactEvents):
@@ -222,13 +219,18 @@ def _run_slider_crank(
         raise ParameterError(f"integrator = {integrator} does not run a slider crank; allowed: ExactEvents(...)")
     # its peaks and events are refined on the exact motion, so its steps may be twice as long as the beam's
     model = crank.reduce(2.0 * integrator.step_phase)
-    arrays = _cycle_arrays(cycles, 2 * len(crank.degrees_of_freedom), samples)
+    arrays = cycle_arrays(cycles, 2 * len(crank.degrees_of_freedom), samples, travels=True)
     coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
     tolerance, budget = integrator.event_tolerance / model.contact_rate, integrator.event_budget
     kernel = advance_stepped_crank if isinstance(model, SteppedCrankModel) else advance_slider_crank
     outcome, done = kernel(model, coordinates, episode, arrays, tolerance, budget)
-    return outcome, done, _record(crank, arrays, MotionState(coordinates, bouncing))
+    record = replace(
+        _record(crank, arrays, MotionState(coordinates, bouncing)),
+        peak_phase=arrays.peak_instant * crank.crank_rate,
+        peak_vector=arrays.peak_vector,
+    )
+    return outcome, done, record
 
 
 _Run = Callable[[Any, MotionState, int, int, Integrator], tuple[int, int, CycleRecord]]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chaosgym.core.crank_stepper import advance
-from chaosgym.core.impact_beam import CycleArrays, Episode
+from chaosgym.core.impact_beam import Episode, cycle_arrays
 from chaosgym.machines.crank_model import stepped_model
 from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.simulation import ExactEvents, simulate
@@ -22,11 +22,7 @@ BALL = replace(
 def stepped(machine, cycles, step_phase):
     """Run a piecewise linear machine by the stepper."""
     states = 2 * len(machine.degrees_of_freedom)
-    arrays = CycleArrays(
-        section=np.empty((cycles, states)), tip=np.empty((cycles, 2)), peak_force=np.empty((cycles, 2)),
-        impacts=np.empty((cycles, 2), dtype=np.int64), contact_time=np.empty((cycles, 2)),
-        bounce_time=np.empty((cycles, 2)), events=np.empty(cycles, dtype=np.int64), history=np.empty((cycles, 0, 3)),
-    )  # fmt: skip
+    arrays = cycle_arrays(cycles, states, travels=True)
     model = stepped_model(machine, step_phase)
     outcome, _ = advance(model, np.zeros(states), Episode(np.zeros(1), np.zeros(2)), arrays, 1e-13, 10_000)
     assert outcome == 0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from chaosgym.core.crank_propagator import propagator_table, series_order
-from chaosgym.core.impact_beam import CycleArrays, Episode
+from chaosgym.core.impact_beam import Episode, cycle_arrays
 from chaosgym.core.slider_crank import advance
 from chaosgym.errors import SimulationError
 from chaosgym.machines.crank_equations import equations
@@ -57,12 +57,15 @@ def test_a_very_stiff_rod_moves_like_a_rigid_one():
 
 
 def frozen_model(machine, duration):
-    """The model of a machine that stands still at 40 deg: one bin's matrices for ever, no forcing."""
+    """The model of an undamped machine that stands still at 40 deg: one bin's matrices for ever, no forcing.
+
+    Without damping every term with a velocity is one of the crank's rate, so those go too.
+    """
     model = machine.reduce(0.25)
     place = round(40.0 / machine.matrix_update_interval)
     acceleration = np.ascontiguousarray(model.acceleration[:, [place, place]])
     n = acceleration.shape[-2]
-    acceleration[..., 2 * n : 2 * n + 4] = 0.0
+    acceleration[..., n : 2 * n + 4] = 0.0
     step = duration / 2 / model.steps
     steps = math.ceil(step * model.contact_rate / 0.25) * model.steps
     step = duration / 2 / steps
@@ -76,7 +79,7 @@ def frozen_model(machine, duration):
 
 def test_energy_is_conserved_without_damping():
     """A standing mechanism that bounces between two springs keeps its energy to 1e-5 over hundreds of impacts."""
-    machine = replace(CRANK, crank_speed=1e-0, contact_damping_ratio=0.0, damping_ratio=0.0, damping_family="uniform")
+    machine = replace(CRANK, crank_speed=1.0, contact_damping_ratio=0.0, damping_ratio=0.0, damping_family="uniform")
     cycles, duration = 200, 0.05
     model = frozen_model(machine, duration)
     place = math.radians(round(40.0 / machine.matrix_update_interval) + 0.5) * machine.matrix_update_interval
@@ -85,11 +88,7 @@ def test_energy_is_conserved_without_damping():
     n = len(mass)
     state = np.zeros(2 * n)
     state[n : 2 * n] = [0.02, 0.1, 0.01, 0.0, 0.0]
-    arrays = CycleArrays(
-        section=np.empty((cycles, 2 * n)), tip=np.empty((cycles, 2)), peak_force=np.empty((cycles, 2)),
-        impacts=np.empty((cycles, 2), dtype=np.int64), contact_time=np.empty((cycles, 2)),
-        bounce_time=np.empty((cycles, 2)), events=np.empty(cycles, dtype=np.int64), history=np.empty((cycles, 0, 3)),
-    )  # fmt: skip
+    arrays = cycle_arrays(cycles, 2 * n, travels=True)
     outcome, _ = advance(model, state, Episode(np.zeros(1), np.zeros(2)), arrays, 1e-13, 10_000)
     assert outcome == 0
     assert arrays.impacts.sum() > 500
@@ -105,7 +104,7 @@ def test_energy_is_conserved_without_damping():
     ("change", "integrator", "tolerance"),
     [
         ({"n_modes": 5}, None, 0.02),
-        ({"matrix_update_interval": 0.5}, None, 0.006),
+        ({"matrix_update_interval": 0.5}, None, 2e-4),
         ({}, ExactEvents().refined(), 1e-3),
     ],
 )
@@ -114,6 +113,18 @@ def test_a_periodic_peak_force_converges(change, integrator, tolerance):
     peak = simulate(SMALL_GAP, 1, transient=30).peak_force.max()
     refined = simulate(replace(SMALL_GAP, **change), 1, transient=30, integrator=integrator).peak_force.max()
     assert refined == pytest.approx(peak, rel=tolerance)
+
+
+@pytest.mark.parametrize("speed", [200.0, 230.0, 250.0, 280.0])
+def test_matrices_held_over_5_degrees_are_enough(speed):
+    """At +-0.032 mm peaks recur at 5 deg as they do at 0.5 deg, and lie within 0.3 % of those."""
+    machine = replace(CRANK, crank_speed=speed, slider_clearance=0.032e-3)
+    coarse, fine = (
+        simulate(replace(machine, matrix_update_interval=w), 10, transient=60).peak_force.max(axis=1)
+        for w in (5.0, 0.5)
+    )
+    assert np.ptp(coarse) < 1e-3 * coarse.mean()
+    assert coarse.mean() == pytest.approx(fine.mean(), rel=3e-3)
 
 
 def test_a_run_can_be_continued_to_the_bit():

@@ -100,8 +100,11 @@ def _statistics(machine: Machine, comparison: Comparison, results: Results) -> F
     return Finding(float(results[0]["cycles"]))
 
 
-def _spread(machine: Machine, comparison: Comparison, results: Results) -> Finding:
-    return Finding(1e3 * results[0]["spread"])
+def _spread(unit: float) -> Quantity:
+    return Quantity(
+        lambda machine, *_: [Job(crank_runs.bearing_spread, machine)],
+        lambda machine, comparison, results: Finding(results[0]["spread"] / unit),
+    )
 
 
 # --- numbers of the machine itself ------------------------------------------------------------------------------------
@@ -131,7 +134,8 @@ CRANK_QUANTITIES = {
     "update_transient": Quantity(_updated, _update_transient),
     "update_test": Quantity(_tested, _update_test),
     "statistics_cycles": Quantity(lambda machine, *_: [Job(crank_runs.statistics, machine)], _statistics),
-    "guide_spread": Quantity(lambda machine, *_: [Job(crank_runs.guide_spread, machine)], _spread),
+    "guide_spread": _spread(1e-3),
+    "ball_spread": _spread(180.0),
     "first_frequency": _of_crank(lambda crank: float(frequencies_at(crank, 0.0)[0])),
     "range_of_first_frequency": _of_crank(_range_of_first_frequency),
 }

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.design.peak_impacts import peak_impacts
+from chaosgym.design.peak_impacts import peak_impacts, worn_side
 from chaosgym.design.statistics import cycles_needed
 from chaosgym.diagnosis import matrix_update_test
 from chaosgym.machines import SliderCrank
@@ -82,7 +82,7 @@ def statistics(crank: SliderCrank) -> dict[str, int]:
     return {"cycles": int(cycles_needed(simulate(crank, 400, transient=60).peak_force[:, 0]))}
 
 
-def guide_spread(crank: SliderCrank) -> dict[str, float]:
-    """Length of guide [m] over which the peak impacts of the upper side spread in 80 cycles: ``spread``."""
-    record = simulate(crank, 80, transient=60, samples_per_cycle=3600)
-    return {"spread": peak_impacts(record).spread}
+def bearing_spread(crank: SliderCrank) -> dict[str, float]:
+    """Length of guide [m], or angle of ball joint [deg], over which the peak impacts spread in 80 cycles: ``spread``."""
+    record = simulate(crank, 80, transient=60)
+    return {"spread": peak_impacts(record, worn_side(record)).spread}

@@ -20,7 +20,15 @@ from numba import njit
 
 from chaosgym.core import status
 from chaosgym.core.impact_beam import LOWER, UPPER, cubic, cubic_extremum, note_touch
-from chaosgym.core.slider_crank import RUNAWAY, crest_instant, note_peak, note_share, resultant
+from chaosgym.core.slider_crank import (
+    RUNAWAY,
+    begin_cycle,
+    crest_instant,
+    note_channel,
+    note_peak,
+    note_share,
+    resultant,
+)
 
 LINEAR, HERTZ = 0, 1
 
@@ -166,28 +174,30 @@ def leap(model, b, time, h, z, closed, direction, k, inner, moved):
 
 
 @njit(cache=True, inline="always")
+def push_of(model, j, z, dz, direction):
+    """Force of a closed joint and its rate; writes ``direction`` as ``measure`` does."""
+    n = model.row.shape[1]
+    depth, rate = measure(model, j, z, direction)
+    force = pressing(model, j, depth, rate)
+    bend = 0.0
+    for r in range(model.first[j], model.first[j + 1]):
+        for i in range(n):
+            bend += direction[r] * model.row[r, i] * dz[n + i]
+    if model.law == LINEAR:
+        return force, model.stiffness[j] * rate + model.damping[j] * bend
+    root = math.sqrt(max(depth, 0.0))
+    growth = 1.5 * rate * (1.0 + model.damping[j] * rate) + depth * model.damping[j] * bend
+    return force, model.stiffness[j] * root * growth
+
+
+@njit(cache=True, inline="always")
 def joint_force(model, z, dz, closed, direction):
     """``resultant`` of the monitored joint."""
-    n = model.row.shape[1]
     fx, fy, fz, rx, ry, rz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(closed.shape[0]):
         if not closed[j]:
             continue
-        depth, rate = measure(model, j, z, direction)
-        force = pressing(model, j, depth, rate)
-        bend = 0.0
-        for r in range(model.first[j], model.first[j + 1]):
-            for i in range(n):
-                bend += direction[r] * model.row[r, i] * dz[n + i]
-        if model.law == LINEAR:
-            change = model.stiffness[j] * rate + model.damping[j] * bend
-        else:
-            root = math.sqrt(max(depth, 0.0))
-            change = (
-                model.stiffness[j]
-                * root
-                * (1.5 * rate * (1.0 + model.damping[j] * rate) + depth * model.damping[j] * bend)
-            )
+        force, change = push_of(model, j, z, dz, direction)
         for r in range(model.first[j], model.first[j + 1]):
             fx += model.reading[r, 0] * direction[r] * force
             fy += model.reading[r, 1] * direction[r] * force
@@ -196,6 +206,17 @@ def joint_force(model, z, dz, closed, direction):
             ry += model.reading[r, 1] * direction[r] * change
             rz += model.reading[r, 2] * direction[r] * change
     return resultant(fx, fy, fz, rx, ry, rz)
+
+
+@njit(cache=True, inline="always")
+def note_joints(model, h, z, dz, moved, dz_moved, closed, direction, channel_peak):
+    """Raise the peaks (J, 2) of the closed joints over a step of length h."""
+    for j in range(channel_peak.shape[0]):
+        if closed[j]:
+            f0, r0 = push_of(model, j, z, dz, direction)
+            f1, r1 = push_of(model, j, moved, dz_moved, direction)
+            positive = not model.two_sided[j] or direction[model.first[j]] > 0.0
+            note_channel(channel_peak[j], positive, h, f0, r0, f1, r1)
 
 
 @njit(cache=True, inline="always")
@@ -264,11 +285,17 @@ def change_contacts(model, z, closed, direction, episode, time, impacts, bounce_
 
 
 @njit(cache=True, inline="always")
+def state_within(h, t, z, dz, moved, dz_moved, inner):
+    """Write the state at t in a step of length h, by the cubic through both ends."""
+    for i in range(inner.shape[0]):
+        inner[i] = cubic(z[i], dz[i], moved[i], dz_moved[i], h, t)[0]
+
+
+@njit(cache=True, inline="always")
 def take_sample(model, h, t, z, dz, moved, dz_moved, inner, closed, direction, sample):
     """Write displacement, velocity and signed resultant (positive where it points up) at t in a step of length h."""
     n = model.display.shape[0]
-    for i in range(2 * n):
-        inner[i] = cubic(z[i], dz[i], moved[i], dz_moved[i], h, t)[0]
+    state_within(h, t, z, dz, moved, dz_moved, inner)
     sample[0], sample[1] = 0.0, 0.0
     for i in range(n):
         sample[0] += model.display[i] * inner[i]
@@ -307,14 +334,9 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
 
     for cycle in range(arrays.section.shape[0]):
         z[:] = state
+        begin_cycle(model, state, arrays, cycle)
         peak, impacts = arrays.peak_force[cycle], arrays.impacts[cycle]
         contact_time, bounce_time = arrays.contact_time[cycle], arrays.bounce_time[cycle]
-        peak[:], impacts[:], contact_time[:], bounce_time[:] = 0.0, 0, 0.0, 0.0
-        arrays.section[cycle] = state
-        arrays.tip[cycle] = 0.0
-        for i in range(n):
-            arrays.tip[cycle, 0] += model.display[i] * state[i]
-            arrays.tip[cycle, 1] += model.display[i] * state[n + i]
         for j in range(joints):
             depth, rate = measure(model, j, z, direction)
             closed[j] = margin(model, j, False, depth, rate) < 0.0
@@ -342,10 +364,15 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                     sample += 1
                 end = joint_force(model, moved, k[3], closed, direction)
                 note_share(end, h, contact_time)
-                note_peak(peak, end)
-                _, crest = crest_instant(h, start, end)
-                column = UPPER if end[0] > 0.0 else LOWER
-                peak[column] = max(peak[column], crest)
+                note_peak(arrays, cycle, b * duration + time + h, end)
+                crest, size = crest_instant(h, start, end)
+                if size > peak[UPPER if end[0] > 0.0 else LOWER]:
+                    state_within(h, crest, z, k[0], moved, k[3], inner)
+                    there = joint_force(model, inner, k[3], closed, direction)
+                    share = size / there[1] if there[1] > 0.0 else 0.0
+                    at_crest = (share * there[0], size, 0.0, share * there[3], share * there[4])
+                    note_peak(arrays, cycle, b * duration + time + crest, at_crest)
+                note_joints(model, h, z, k[0], moved, k[3], closed, direction, arrays.channel_peak[cycle])
                 z, moved = moved, z
                 changes = change_contacts(
                     model, z, closed, direction, episode, b * duration + time + h, impacts, bounce_time
@@ -356,7 +383,7 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                         return status.EVENT_BUDGET, cycle
                     slope(model, b, time + h, z, closed, direction, k[0])
                     end = joint_force(model, z, k[0], closed, direction)
-                    note_peak(peak, end)
+                    note_peak(arrays, cycle, b * duration + time + h, end)
                 else:
                     k[0] = k[3]
                 start = end

@@ -96,6 +96,10 @@ class CycleArrays(NamedTuple):
     ``section`` (cycles, 2n) state at the start of each cycle; ``tip`` (cycles, 2) its tip displacement [m] and
     velocity [m/s]; ``peak_force`` [N], ``impacts``, ``contact_time`` [s], ``bounce_time`` [s] (cycles, 2); ``events``
     (cycles,); ``history`` (cycles, samples, 3) tip displacement, velocity and contact force at equal intervals.
+
+    Of machines whose contact travels: ``peak_instant`` (cycles, 2) [s] and ``peak_vector`` (cycles, 2, 3) [N] of each
+    peak force; of machines with sensors: ``channel_peak`` (cycles, channels, 2) [N], largest force of either side of
+    each contact channel. Without rows or channels these are not written.
     """
 
     section: np.ndarray
@@ -106,6 +110,29 @@ class CycleArrays(NamedTuple):
     bounce_time: np.ndarray
     events: np.ndarray
     history: np.ndarray
+    peak_instant: np.ndarray
+    peak_vector: np.ndarray
+    channel_peak: np.ndarray
+
+
+def cycle_arrays(
+    cycles: int, states: int, samples: int = 0, *, travels: bool = False, channels: int = 0
+) -> CycleArrays:
+    """Make ``CycleArrays`` for a number of cycles, states and samples a cycle."""
+    rows = cycles if travels else 0
+    return CycleArrays(
+        section=np.empty((cycles, states)),
+        tip=np.empty((cycles, 2)),
+        peak_force=np.empty((cycles, 2)),
+        impacts=np.empty((cycles, 2), dtype=np.int64),
+        contact_time=np.empty((cycles, 2)),
+        bounce_time=np.empty((cycles, 2)),
+        events=np.empty(cycles, dtype=np.int64),
+        history=np.empty((cycles, samples, 3)),
+        peak_instant=np.empty((rows, 2)),
+        peak_vector=np.empty((rows, 2, 3)),
+        channel_peak=np.empty((cycles, channels, 2)),
+    )
 
 
 @njit(cache=True, inline="always")

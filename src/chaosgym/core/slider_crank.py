@@ -289,10 +289,10 @@ def column_of(model, j, side):
 
 @njit(cache=True, inline="always")
 def resultant(fx, fy, fz, rx, ry, rz):
-    """(Upward part, size, rate of the size) of a force with components f and rates r."""
+    """(Upward part, size, rate of the size, other two parts) of a force with components f and rates r."""
     size = math.sqrt(fx * fx + fy * fy + fz * fz)
     growth = (fx * rx + fy * ry + fz * rz) / size if size > 0.0 else 0.0
-    return fy, size, growth
+    return fy, size, growth, fx, fz
 
 
 @njit(cache=True, inline="always")
@@ -303,10 +303,23 @@ def note_share(force, time, contact_time):
 
 
 @njit(cache=True, inline="always")
-def note_peak(peak, force):
-    """Raise ``peak`` (2,) to the size of the resultant."""
+def note_peak(arrays, cycle, time, force):
+    """Raise the peak of a revolution to the size of the resultant at ``time`` in it, and note when and whereto."""
     column = UPPER if force[0] > 0.0 else LOWER
-    peak[column] = max(peak[column], force[1])
+    if force[1] > arrays.peak_force[cycle, column]:
+        arrays.peak_force[cycle, column] = force[1]
+        arrays.peak_instant[cycle, column] = time
+        vector = arrays.peak_vector[cycle, column]
+        vector[0], vector[1], vector[2] = force[3], force[0], force[4]
+
+
+@njit(cache=True, inline="always")
+def note_channel(peak, positive, h, f0, r0, f1, r1):
+    """Raise the peak (2,) of a channel to its largest force in a step, by the cubic through both ends of it."""
+    crest = cubic_extremum(f0, r0, f1, r1, h, -1.0) if r0 > 0.0 and r1 < 0.0 else -1.0
+    top = max(f0, f1) if crest <= 0.0 else cubic(f0, r0, f1, r1, h, crest)[0]
+    column = 0 if positive else 1
+    peak[column] = max(peak[column], top)
 
 
 @njit(cache=True, inline="always")
@@ -339,8 +352,10 @@ def joint_force(model, side, reading):
 
 
 @njit(cache=True)
-def quiet_steps(model, chosen, b, side, z, moved, start, end, time, limit, peak, contact_time):
-    """Take up to ``limit`` whole steps in which no contact changes and no force passes ``peak`` (2,); how many.
+def quiet_steps(model, chosen, b, side, z, moved, start, end, time, limit, peak, channel_peak, contact_time):
+    """Take up to ``limit`` whole steps in which no contact changes and no force passes its peak; how many.
+
+    ``peak`` (2,) is that of the resultant, ``channel_peak`` (m, 2) those of the channels, or has no rows.
 
     Stops before a step that could do either, judged by its ends: between them, a cubic exceeds the larger end by no
     more than 4/27 of the step times the sum of both slopes. z and its reading ``start`` go along.
@@ -374,6 +389,8 @@ def quiet_steps(model, chosen, b, side, z, moved, start, end, time, limit, peak,
             f1 = k * (s * end[0, j] - gap) + d * s * end[1, j]
             turn = swing * (abs(r0) + abs(r1)) if r0 * r1 < 0.0 else 0.0
             if min(f0, f1) - turn <= 0.0:
+                return count
+            if channel_peak.shape[0] > 0 and max(f0, f1) + turn > channel_peak[j, 0 if s > 0.0 else 1]:
                 return count
             upward += model.reading[j, 1] * s * f1
             total += model.reach[j] * (max(f0, f1) + turn)
@@ -427,6 +444,24 @@ def begin_cycle(model, state, arrays, cycle):
         arrays.impacts[cycle, column] = 0
         arrays.contact_time[cycle, column] = 0.0
         arrays.bounce_time[cycle, column] = 0.0
+        arrays.peak_instant[cycle, column] = 0.0
+        for axis in range(3):
+            arrays.peak_vector[cycle, column, axis] = 0.0
+        for j in range(arrays.channel_peak.shape[1]):
+            arrays.channel_peak[cycle, j, column] = 0.0
+
+
+@njit(cache=True, inline="always")
+def note_channels(model, side, h, start, end, channel_peak):
+    """Raise the peaks (m, 2) of the closed channels over a step."""
+    for j in range(channel_peak.shape[0]):
+        s = side[j]
+        if s != 0.0:
+            k, d = model.stiffness[j], model.damping[j]
+            f0 = k * (s * start[0, j] - model.gap[j]) + d * s * start[1, j]
+            f1 = k * (s * end[0, j] - model.gap[j]) + d * s * end[1, j]
+            r0, r1 = s * (k * start[1, j] + d * start[2, j]), s * (k * end[1, j] + d * end[2, j])
+            note_channel(channel_peak[j], s > 0.0, h, f0, r0, f1, r1)
 
 
 @njit(cache=True, nogil=True)
@@ -456,6 +491,7 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
     for cycle in range(arrays.section.shape[0]):
         begin_cycle(model, state, arrays, cycle)
         peak, contact_time = arrays.peak_force[cycle], arrays.contact_time[cycle]
+        channel_peak = arrays.channel_peak[cycle]
         for i in range(2 * n):
             z[i] = state[i]
         find_sides(model, z, side)
@@ -474,7 +510,9 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                 time = origin + count * step
                 whole = int((duration - time) / step + 1e-9)
                 if whole > 0 and sample == samples:
-                    count += quiet_steps(model, chosen, b, side, z, moved, start, end, time, whole, peak, contact_time)
+                    count += quiet_steps(
+                        model, chosen, b, side, z, moved, start, end, time, whole, peak, channel_peak, contact_time
+                    )
                     time = origin + count * step
                     force = joint_force(model, side, start)
                 h = min(step, duration - time)
@@ -508,7 +546,8 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                 # record the step
                 before, force = force, joint_force(model, side, end)
                 note_share(force, h, contact_time)
-                note_peak(peak, force)
+                note_peak(arrays, cycle, b * duration + time + h, force)
+                note_channels(model, side, h, start, end, channel_peak)
                 crest, size_there = crest_instant(h, before, force)
                 sampled = sample < samples and sample * period < (b * duration + time + h) * samples
                 crested = size_there > 0.99 * peak[UPPER if force[0] > 0.0 else LOWER]
@@ -518,7 +557,8 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                     for c in range(2 * n, size):
                         there[c] = z[c]
                 if crested:
-                    note_peak(peak, refined_force(model, chosen, b, side, series, time, crest, there, spare))
+                    at_crest = refined_force(model, chosen, b, side, series, time, crest, there, spare)
+                    note_peak(arrays, cycle, b * duration + time + crest, at_crest)
                 while sample < samples and sample * period < (b * duration + time + h) * samples:
                     at = max(sample * period / samples - b * duration - time, 0.0)
                     at_sample = refined_force(model, chosen, b, side, series, time, at, there, spare)
@@ -547,7 +587,7 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                 curvature = model.curvature[chosen, b]
                 read_channels(row, curvature, side, z, start)
                 force = joint_force(model, side, start)
-                note_peak(peak, force)
+                note_peak(arrays, cycle, b * duration + time + h, force)
                 origin, count = time + h, 0
 
         arrays.events[cycle] = events

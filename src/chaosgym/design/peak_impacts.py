@@ -1,7 +1,8 @@
 r"""Where on the bearing do the peak impacts act? The Peak Impact Diagram (thesis 5.4.1 and 5.4.3).
 
-Each cycle gives one point: the place of its peak force on the bearing surface and the force. A periodic response gives
-a point or a few, a chaotic one a cloud. Its filling tells how many cycles a statistic needs: the diagram is divided
+Each cycle gives one point: the place of its peak force on the bearing surface and the force. In a slider joint that is
+the place of the slider on its guide, in a ball joint the polar angle on the housing. A periodic response gives a point
+or a few, a chaotic one a cloud. Its filling tells how many cycles a statistic needs: the diagram is divided
 into sections, and the share of impacts that fall into sections already visited is, by Good and Turing,
 
     coverage(n) = 1 - (sections visited exactly once in n cycles) / n
@@ -13,13 +14,15 @@ I. J. Good, The population frequencies of species and the estimation of populati
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.design.fatigue import LIFE_EXPONENT, rating_life
+from chaosgym.design.fatigue import rating_life
 from chaosgym.design.statistics import as_forces
 from chaosgym.errors import DesignError
+from chaosgym.life_law import LIFE_EXPONENT
 from chaosgym.simulation import CycleRecord
 
 Array = NDArray[np.float64]
@@ -42,7 +45,7 @@ class PeakImpactDiagram:
     force : (impacts,)
         [N].
     unit
-        "m" along the bearing, or "deg" of the cycle where a machine's contact does not travel.
+        "m" along a guide, "deg" around a bearing, or "deg of the cycle" where the contact stays in one place.
     """
 
     location: Array
@@ -56,37 +59,67 @@ class PeakImpactDiagram:
 
 
 def peak_impacts(
-    record: CycleRecord, side: int = 0, position: Callable[[Array], Array] | None = None
+    record: CycleRecord, side: int | None = None, position: Callable[[Array], Array] | None = None
 ) -> PeakImpactDiagram:
-    """Peak Impact Diagram of one bearing surface.
+    """Peak Impact Diagram of one bearing surface, or of a whole bearing.
 
     Parameters
     ----------
     record
-        With a time history; its samples are the resolution of the location.
+        Of a machine whose contact travels; of another one with a time history, whose samples are then the resolution of
+        the instant.
     side
-        Number of the surface, 0 for the one on which the contact force is positive.
+        Number of the surface, 0 for the one on which the contact force is positive. None takes the largest force of
+        the cycle, whichever surface carries it: a ball joint is one surface all around.
     position
-        Place on the bearing [m] at a phase [rad] of the cycle; the machine's own ``bearing_position`` if it has one,
-        and otherwise the phase itself [deg], relative to its mean.
+        Place on the bearing [m] at a phase [rad] of the cycle; the machine's own ``bearing_place`` if it has one, and
+        otherwise the phase itself [deg], relative to its mean.
 
     Raises
     ------
     SimulationError
-        If the record has no time history.
+        If the machine's contact stays in one place and the record has no time history.
     """
-    samples = len(record.time) // len(record)
-    assert record.history is not None
-    force = record.history[:, :, 2] * (1.0 if side == 0 else -1.0)
-    at = np.argmax(force, axis=1)
-    hit = force[np.arange(len(at)), at] > 0.0
-    phase = 2.0 * np.pi * at[hit] / samples
-    position = position or getattr(record.machine, "bearing_position", None)
-    peaks = record.peak_force[hit, side]
+    sides = np.argmax(record.peak_force, axis=1) if side is None else np.full(len(record), side)
+    peaks = record.peak_force[np.arange(len(record)), sides]
+    hit = np.flatnonzero(peaks > 0.0)
+    sides, peaks = sides[hit], peaks[hit]
+    phase = _phases(record, hit, sides)
     if position is not None:
         return PeakImpactDiagram(np.asarray(position(phase)), peaks, "m")
-    mean = np.angle(np.sum(np.exp(1j * phase)))
-    return PeakImpactDiagram(np.degrees(np.angle(np.exp(1j * (phase - mean)))), peaks, "deg")
+    if record.peak_vector is None:
+        return PeakImpactDiagram(np.degrees(_unrolled(phase) - _middle(phase)), peaks, "deg of the cycle")
+    machine: Any = record.machine
+    place, unit = machine.bearing_place(phase, record.peak_vector[hit, sides])
+    return PeakImpactDiagram(np.degrees(_unrolled(np.radians(place))) if unit == "deg" else place, peaks, unit)
+
+
+def worn_side(record: CycleRecord, exponent: float = LIFE_EXPONENT) -> int | None:
+    """Side for ``peak_impacts``: the surface that fatigues faster, or None if the bearing is one surface all around."""
+    if getattr(record.machine, "monitored_joint", None) == "ball":
+        return None
+    return int(np.argmax(np.sum(record.peak_force**exponent, axis=0)))
+
+
+def _phases(record: CycleRecord, cycles: NDArray[np.int64], sides: NDArray[np.int64]) -> Array:
+    """Phases [rad] at which the peaks of some cycles act, (n,)."""
+    if record.peak_phase is not None:
+        return np.asarray(record.peak_phase[cycles, sides])
+    samples = len(record.time) // len(record)
+    assert record.history is not None
+    force = record.history[cycles, :, 2] * np.where(sides == 0, 1.0, -1.0)[:, None]
+    return np.asarray(2.0 * np.pi * np.argmax(force, axis=1) / samples)
+
+
+def _middle(angle: Array) -> float:
+    """Mean direction [rad] of angles."""
+    return float(np.angle(np.sum(np.exp(1j * angle))))
+
+
+def _unrolled(angle: Array) -> Array:
+    """Angles [rad] within half a turn of their mean direction, so that no cluster is cut."""
+    middle = _middle(angle)
+    return np.asarray(middle + np.angle(np.exp(1j * (angle - middle))))
 
 
 def coverage(diagram: PeakImpactDiagram, sections: int = SECTIONS) -> Array:

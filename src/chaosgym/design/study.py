@@ -9,7 +9,7 @@ from chaosgym.design.brief import DesignBrief
 from chaosgym.design.fatigue import equivalent_force_of_history
 from chaosgym.design.improve import Improvement, improve
 from chaosgym.design.methodology import Assessment, assess
-from chaosgym.design.peak_impacts import PeakImpactDiagram, peak_impacts
+from chaosgym.design.peak_impacts import PeakImpactDiagram, peak_impacts, worn_side
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
 from chaosgym.design.trends import HISTORY_SAMPLES, LifeTrend, life_against
 from chaosgym.diagnosis import ResponseMap, response_map
@@ -145,10 +145,10 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
             progress=progress,
         )  # fmt: skip
     record = simulate(machine, DIAGRAM_CYCLES, transient=DIAGRAM_CYCLES, samples_per_cycle=HISTORY_SAMPLES)
-    side = int(np.argmax(np.sum(record.peak_force**3, axis=0)))
+    side = int(np.argmax(np.sum(record.peak_force**brief.criteria.life_exponent, axis=0)))
     return DesignStudy(
         brief, assessment, improvement, _map(brief, workers, progress), _life_over_speed(machine, workers, progress),
-        peak_impacts(record, side), _every_impact(record, side, brief), seed,
+        peak_impacts(record, worn_side(record, brief.criteria.life_exponent)), _every_impact(record, side, brief), seed,
     )  # fmt: skip
 
 

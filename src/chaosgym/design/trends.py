@@ -14,11 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.design.fatigue import CUBIC_EXPONENT, LIFE_EXPONENT, equivalent_force, relative_life
-from chaosgym.design.peak_impacts import peak_impacts, spot_life
+from chaosgym.design.fatigue import CUBIC_EXPONENT, equivalent_force, relative_life
+from chaosgym.design.peak_impacts import peak_impacts, spot_life, worn_side
 from chaosgym.design.runs import SettledRun, settled_run
 from chaosgym.diagnosis import Nature
 from chaosgym.errors import DesignError
+from chaosgym.life_law import LIFE_EXPONENT
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import parallel_map, simulate
@@ -155,8 +156,7 @@ def clearance_trade_off(
     def one(clearance: float) -> ClearancePoint:
         changed = with_settings(machine, {machine.clearance_field: clearance})
         record = simulate(changed, cycles, transient=transient, samples_per_cycle=HISTORY_SAMPLES)
-        forces = [equivalent_force(column, exponent) for column in record.peak_force.T]
-        diagram = peak_impacts(record, int(np.argmax(forces)))
+        diagram = peak_impacts(record, worn_side(record, exponent))
         if len(diagram.force) == 0:
             return ClearancePoint(clearance, 0.0, 0.0, diagram.unit, np.inf, np.inf)
         share = len(diagram.force) / len(record)

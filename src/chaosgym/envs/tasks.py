@@ -7,8 +7,8 @@ A step of n cycles of a job of N cycles earns
     - w_type_iii * n / N                     if the step counts as Type III
     - w_failure                              on fracture or a failed simulation
 
-Damage follows the basic rating life of a bearing: L = (C / F)^p million cycles with p = 10/3 for line contact, so that
-a cycle with peak force F uses up (F / C)^p / 10^6 of a life. The damage of a joint is that of its worse surface.
+Damage follows the basic rating life of a bearing (``life_law``), p = 10/3 for line contact. The damage of a joint is
+that of its worse surface.
 
 References
 ----------
@@ -24,12 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.errors import ParameterError
+from chaosgym.life_law import damage_in_a_million
 from chaosgym.machines.parameters import parameter, validate
 
 Array = NDArray[np.float64]
-
-LIFE_EXPONENT = 10.0 / 3.0
-"""Exponent p of the basic rating life, line contact."""
 
 LONGEST_PERIOD = 8
 """Longest period, in cycles, that counts as a repetition."""
@@ -100,7 +98,7 @@ def damage_of(peak_force: Array, load_rating: float, acceleration: float) -> Arr
     -------
     (sides,)
     """
-    shares: Array = ((peak_force / load_rating) ** LIFE_EXPONENT).sum(axis=0)
+    shares: Array = damage_in_a_million(peak_force, load_rating).sum(axis=0)
     return shares * (acceleration * 1e-6)
 
 

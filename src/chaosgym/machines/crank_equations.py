@@ -2,7 +2,11 @@ r"""Which equations govern small motions of the planar slider crank about its no
 
 Rod coordinates (ends and modes, ``connecting_rod``) and the slider's (x_S, y_S, pitch) follow from as few coordinates
 p as the scene requires, q = R(phi) p. Ball clearance opens the rod's end A in the frame of the rod, slider clearance
-opens the slider across the guide, both in the frames in which the bearing surfaces stand still. With
+opens the slider across the guide, both in the frames in which the bearing surfaces stand still; a flexible rod adds its
+stretch and its modes. Everything stiff, contacts and rod, then has a coordinate of its own: no elastic force depends on
+phi, so none jumps where matrices that are held over a bin of crank angle change to those of the next. (The slider's
+place along the guide instead of the stretch would make the rod's force jump by (E A / l) y d(tan phi) at every bin.)
+With
 
     R' = w phi_1 R_phi,   R'' = w^2 (phi_1^2 R_phiphi + phi_2 R_phi),   Omega = -w phi_1,   Omega' = -w^2 phi_2
 
@@ -48,7 +52,7 @@ ELEMENTS = 10
 
 BALL_ALONG = "ball along the rod"
 BALL_ACROSS = "ball across the rod"
-SLIDER_ALONG = "slider along the guide"
+ROD_STRETCH = "rod stretch"
 SLIDER_ACROSS = "slider across the guide"
 SLIDER_PITCH = "slider pitch"
 BALL_LATERAL = "ball sideways"
@@ -67,7 +71,7 @@ def degrees_of_freedom(machine: "SliderCrank", spatial: bool = False) -> tuple[s
         names += [BALL_ALONG, BALL_ACROSS]
         names += [BALL_LATERAL] if spatial else []
     if machine.rod == "flexible":
-        names.append(SLIDER_ALONG)
+        names.append(ROD_STRETCH)
     if machine.slider_joint != "ideal":
         names.append(SLIDER_ACROSS)
         names += [SLIDER_LATERAL] if spatial else []
@@ -156,30 +160,22 @@ def _coordinate_map(machine: "SliderCrank", phi: Array, size: int) -> Array:
     sine, cosine = np.sin(phi), np.cos(phi)
     secant, tangent = 1.0 / cosine, sine / cosine
     one = (np.ones_like(phi), np.zeros_like(phi), np.zeros_like(phi))
-    cos = (cosine, -sine, -cosine)
-    sin = (sine, cosine, -sine)
-    minus_sin = (-sine, -cosine, sine)
     tan = (tangent, secant**2, 2.0 * tangent * secant**2)
     sec = (secant, secant * tangent, secant * (1.0 + 2.0 * tangent**2))
     x_slider, y_slider, pitch = size - 3, size - 2, size - 1
-    flexible = machine.rod == "flexible"
+    # every coordinate but the stretch leaves the rod its length, and its end B follows the guide
     entries = {
+        BALL_ALONG: [(ALONG_A, one), (ALONG_B, one), (ACROSS_B, tan), (x_slider, sec)],
         BALL_ACROSS: [(ACROSS_A, one)],
-        SLIDER_ALONG: [(ALONG_B, cos), (ACROSS_B, sin), (x_slider, one)],
+        ROD_STRETCH: [(ALONG_B, one), (ACROSS_B, tan), (x_slider, sec)],
+        SLIDER_ACROSS: [(ACROSS_B, sec), (x_slider, tan), (y_slider, one)],
         SLIDER_PITCH: [(pitch, one)],
     }
-    if flexible:
-        entries[BALL_ALONG] = [(ALONG_A, one)]
-        entries[SLIDER_ACROSS] = [(ALONG_B, minus_sin), (ACROSS_B, cos), (y_slider, one)]
-    else:
-        # the rod keeps its length, u_A = u_B, so its end follows the guide
-        entries[BALL_ALONG] = [(ALONG_A, one), (ALONG_B, one), (ACROSS_B, tan), (x_slider, sec)]
-        entries[SLIDER_ACROSS] = [(ACROSS_B, sec), (x_slider, tan), (y_slider, one)]
+    modes = [name for name in names if name not in entries]
+    entries.update({name: [(MODES + mode, one)] for mode, name in enumerate(modes)})
     mapping = np.zeros((3, len(phi), size, len(names)))
     for column, name in enumerate(names):
-        for row, functions in entries.get(
-            name, [(MODES + column - names.index("rod mode 1"), one)] if flexible else []
-        ):
+        for row, functions in entries[name]:
             for order in range(3):
                 mapping[order, :, row, column] = functions[order]
     return mapping

@@ -19,7 +19,7 @@ P. Gu, Chaotic Vibration in Machine Systems and Its Implications for Design, PhD
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -32,7 +32,7 @@ from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.errors import ParameterError
 from chaosgym.machines.crank_equations import SLIDER_ACROSS, degrees_of_freedom, equations
 from chaosgym.machines.crank_model import exact_model, has_propagators, stepped_model
-from chaosgym.machines.kinematics import planar_motion
+from chaosgym.machines.kinematics import slider_position
 from chaosgym.machines.parameters import parameter, validate
 
 Array = NDArray[np.float64]
@@ -249,12 +249,26 @@ class SliderCrank:
         """Joint whose force is recorded: the slider joint if it has clearance, otherwise the ball joint."""
         return "slider" if self.slider_joint != "ideal" else "ball"
 
-    @property
-    def bearing_position(self) -> Callable[[Array], Array] | None:
-        """Place of the slider on its guide [m] by phase [rad] of the cycle; None if the ball joint is monitored."""
-        if self.monitored_joint != "slider":
-            return None
-        return lambda phase: planar_motion(phase, self.crank_radius, self.rod_length).slider
+    def bearing_place(self, phase: Array, force: Array) -> tuple[Array, str]:
+        """Where on its bearing the monitored joint carries a force, and the unit of that place.
+
+        Parameters
+        ----------
+        phase : (n,)
+            Phases [rad] of the cycle.
+        force : (n, 3)
+            Components of the force, as in ``CycleRecord.peak_vector``.
+
+        Returns
+        -------
+        (place, unit)
+            The slider's pivot on its guide, counted from the crank's axis, and "m"; or the polar angle on the ball
+            joint's housing, counted in the rod's plane of swing from the rod's axis, and "deg".
+        """
+        if self.monitored_joint == "slider":
+            tilt = math.radians(self.motor_angle)
+            return slider_position(phase, self.crank_radius, self.rod_length, tilt), "m"
+        return np.degrees(np.arctan2(force[:, 1], force[:, 0])), "deg"
 
     @property
     def clearance_field(self) -> str:

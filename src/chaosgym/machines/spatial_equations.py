@@ -26,8 +26,8 @@ from chaosgym.machines.connecting_rod import ConnectingRod, EndBody, connecting_
 from chaosgym.machines.crank_equations import (
     BALL_DIRECTIONS,
     ELEMENTS,
+    ROD_STRETCH,
     SLIDER_ACROSS,
-    SLIDER_ALONG,
     SLIDER_LATERAL,
     Equations,
     bar_of,
@@ -132,12 +132,12 @@ def _ends(machine: "SliderCrank", frame: _Frame) -> tuple[Array, Array]:
     for name, axis in zip(BALL_DIRECTIONS, (frame.along, frame.across, frame.sideways), strict=True):
         if name in names:
             at_a[:, :, names.index(name)] = axis
-    for k, name in enumerate((SLIDER_ALONG, SLIDER_ACROSS, SLIDER_LATERAL)):
+    for k, name in ((1, SLIDER_ACROSS), (2, SLIDER_LATERAL)):
         if name in names:
             at_b[:, k, names.index(name)] = 1.0
-    if machine.rod == "rigid":
-        stretch = np.einsum("bi,bin->bn", frame.along, at_b - at_a)
-        at_b[:, 0] -= stretch / frame.along[:, :1]
+    # end B follows the guide to where the rod has its length, or is stretched by its own coordinate
+    wanted = np.array([float(name == ROD_STRETCH) for name in names])
+    at_b[:, 0] = (wanted - np.einsum("bi,bin->bn", frame.along, at_b - at_a)) / frame.along[:, :1]
     return at_a, at_b
 
 

@@ -34,6 +34,13 @@ STYLE: Any = {
 }  # fmt: skip
 """Settings for ``matplotlib.rc_context`` around these figures."""
 
+PLACES = {
+    "m": ("place on the guide, from the crank's axis [mm]", 1e3, 4.0),
+    "deg": ("polar angle on the bearing [deg]", 1.0, 20.0),
+    "deg of the cycle": ("instant in the cycle, relative to the mean [deg]", 1.0, 20.0),
+}
+"""By unit of a Peak Impact Diagram: label, factor, and least width shown."""
+
 Array = NDArray[np.float64]
 
 
@@ -195,12 +202,13 @@ def series_life(assessment: Assessment, ax: Axes) -> Axes:
 
 def impact_diagram(diagram: PeakImpactDiagram, ax: Axes) -> Axes:
     """Peak Impact Diagram: force [N] against place on the bearing (thesis figures 5.10 and 5.11)."""
-    along = diagram.unit == "m"
-    ax.scatter((1e3 if along else 1.0) * diagram.location, diagram.force, s=14, color=ACCENT, alpha=0.7, lw=0)
-    label = "place on the bearing [mm]" if along else "instant in the cycle, relative to the mean [deg]"
+    label, factor, least = PLACES[diagram.unit]
+    place = factor * diagram.location
+    ax.scatter(place, diagram.force, s=14, color=ACCENT, alpha=0.7, lw=0)
     ax.set(xlabel=label, ylabel="peak force [N]", title="Peak Impact Diagram", ylim=(0.0, None))
-    if not along and diagram.spread < 10.0:
-        ax.set_xlim(-10.0, 10.0)
+    if np.ptp(place) < least:
+        middle = 0.5 * (np.min(place) + np.max(place))
+        ax.set_xlim(middle - 0.5 * least, middle + 0.5 * least)
     return ax
 
 
