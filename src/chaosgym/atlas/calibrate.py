@@ -271,7 +271,7 @@ def _threshold(finished: list[Any]) -> float:
 
 
 def _complete(finished: list[Any]) -> list[Any]:
-    return [trial for trial in finished if trial.value is not None]
+    return [trial for trial in finished if trial.state.name == "COMPLETE"]
 
 
 def _goes_on(budget: Budget, trials: int, began: float) -> bool:

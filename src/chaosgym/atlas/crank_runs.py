@@ -83,6 +83,6 @@ def statistics(crank: SliderCrank) -> dict[str, int]:
 
 
 def bearing_spread(crank: SliderCrank) -> dict[str, float]:
-    """Length of guide [m], or angle of ball joint [deg], over which the peak impacts spread in 80 cycles: ``spread``."""
+    """Length of guide [m] or angle of ball joint [deg] over which the peak impacts of 80 cycles spread: ``spread``."""
     record = simulate(crank, 80, transient=60)
     return {"spread": peak_impacts(record, worn_side(record)).spread}
