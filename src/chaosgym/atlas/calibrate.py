@@ -224,7 +224,7 @@ def _search(
         while _goes_on(budget, len(finished), began):
             study.sampler = optuna.samplers.TPESampler(
                 seed=int(np.random.SeedSequence([seed, len(finished)]).generate_state(1)[0]),
-                multivariate=True, n_startup_trials=STARTUP_TRIALS, warn_independent_sampling=False,
+                multivariate=True, n_startup_trials=STARTUP_TRIALS,
             )  # fmt: skip
             trial = study.ask()
             threshold = _threshold(finished)
