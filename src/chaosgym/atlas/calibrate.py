@@ -160,7 +160,7 @@ def calibrate(
     study = _open(folder, {"machine": name, "seed": seed, "version": __version__, "space": _described(space)}, space)
     finished = _search(study, space, budget, seed, workers, progress)
     cache = cache or default_folder()
-    values, best, present = _final(space, finished, workers, cache)
+    values, best, present = _final(space, finished, workers, cache, progress)
     machine = space.machine(values)
     result = Calibration(
         machine=machine, values=values, objective=best, present_objective=present, trials=len(finished),
@@ -289,7 +289,7 @@ def _unit(budget: Budget) -> str:
 
 
 def _final(
-    space: SearchSpace, finished: list[Any], workers: int | None, cache: Path
+    space: SearchSpace, finished: list[Any], workers: int | None, cache: Path, progress: bool
 ) -> tuple[Mapping[str, Any], float, float]:
     """Values of the best candidate by thorough runs, its objective, and that of the present constants."""
     statements = [one for stage in calibration_statements(space.base.name) for one in stage]
@@ -301,7 +301,8 @@ def _final(
 
     present = thorough(space.base)
     best: tuple[float, Mapping[str, Any]] = (present, space.starts[0])
-    for trial in sorted(_complete(finished), key=_value)[:FINALISTS]:
+    finalists = sorted(_complete(finished), key=_value)[:FINALISTS]
+    for trial in tqdm(finalists, desc="finalists", disable=not progress, unit="candidate"):
         reached = thorough(space.machine(trial.params))
         if reached < best[0]:
             best = (reached, trial.params)

@@ -17,14 +17,14 @@ ANGLE_SAMPLES, ANGLE_CYCLES = 720, 10
 
 
 def crank_angles(crank: SliderCrank, transient: int) -> dict[str, float | None]:
-    """At which crank angles [deg] is contact lost and resumed?
+    """At which crank angles [deg] of the first half revolution is contact lost and resumed?
 
     Returns
     -------
     dict
-        ``loss`` and ``resumption``: ends of the first gap in the contact force of the first half revolution;
-        ``settled``: end of the last gap there; ``impact``: largest force after the loss; ``impulse_down`` and
-        ``impulse_up``: largest force of either half revolution. None without a gap. Medians over the revolutions.
+        ``loss`` and ``resumption``: ends of the longest gap in the contact force; ``settled``: end of the last gap;
+        ``impact``: largest force after the loss; None in a revolution without a gap. ``impulse_down`` and
+        ``impulse_up``: largest force of either half revolution. Medians over the revolutions.
     """
     record = simulate(crank, ANGLE_CYCLES, transient=transient, samples_per_cycle=ANGLE_SAMPLES)
     assert record.history is not None
@@ -38,23 +38,22 @@ def crank_angles(crank: SliderCrank, transient: int) -> dict[str, float | None]:
 def _angles(force: NDArray[np.float64]) -> dict[str, Any]:
     degree = 360.0 / len(force)
     half = len(force) // 2
-    start = int(20.0 / degree)
-    gaps = np.flatnonzero(force[start:half] == 0.0) + start
-    found: dict[str, Any] = {
+    impulses = {
         "impulse_down": degree * int(np.argmax(force[:half])),
         "impulse_up": degree * (half + int(np.argmax(force[half:]))),
     }
-    if not len(gaps):
-        return {"loss": None, "resumption": None, "settled": None, "impact": None, **found}
-    loss = int(gaps[0])
-    contact = np.flatnonzero(force[loss:] > 0.0)
-    resumption = loss + int(contact[0]) if len(contact) else half
+    free = np.concatenate([[False], force[:half] == 0.0, [False]])
+    begins, ends = np.flatnonzero(free[1:] & ~free[:-1]), np.flatnonzero(free[:-1] & ~free[1:])
+    if not len(begins):
+        return {"loss": None, "resumption": None, "settled": None, "impact": None, **impulses}
+    longest = int(np.argmax(ends - begins))
+    loss = int(begins[longest])
     return {
         "loss": degree * loss,
-        "resumption": degree * resumption,
-        "settled": degree * (int(gaps[-1]) + 1),
+        "resumption": degree * int(ends[longest]),
+        "settled": degree * int(ends[-1]),
         "impact": degree * (loss + int(np.argmax(force[loss:half]))),
-        **found,
+        **impulses,
     }
 
 

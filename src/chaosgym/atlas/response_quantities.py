@@ -67,10 +67,13 @@ def _shown(seen: Observation) -> str:
 # --- curves -----------------------------------------------------------------------------------------------------------
 
 
-def _along(machine: Machine, comparison: Comparison, effort: Effort) -> list[Job]:
-    assert comparison.along is not None
-    field = comparison.along.field
-    return [Job(observation, with_settings(machine, {field: value}), effort) for value in comparison.along.values]
+def _over_axes(machine: Machine, comparison: Comparison, effort: Effort) -> list[Job]:
+    """Every combination of the axes; the one along varies fastest."""
+    machines = [machine]
+    for axis in (comparison.across, comparison.along):
+        if axis is not None:
+            machines = [with_settings(one, {axis.field: value}) for one in machines for value in axis.values]
+    return [Job(observation, one, effort) for one in machines]
 
 
 def _smooth_end(machine: Machine, comparison: Comparison, results: Results) -> Finding:
@@ -175,23 +178,14 @@ def _rise_of_maximum(machine: Machine, comparison: Comparison, results: Results)
 
 def _settling(machine: Machine, comparison: Comparison, results: Results) -> Finding:
     """Cycles after which all responses that become periodic repeat within the reading error."""
-    cycles = [one.settle_cycle for one in _curve(comparison, results)[1] if one.settle_cycle is not None]
+    seen = [as_observation(result) for result in results]
+    cycles = [one.settle_cycle for one in seen if one.settle_cycle is not None]
     if not cycles:
         return Finding(None, False, "none becomes periodic")
     return Finding(float(max(cycles)), True, f"{len(cycles)} periodic responses")
 
 
 # --- maps -------------------------------------------------------------------------------------------------------------
-
-
-def _over_map(machine: Machine, comparison: Comparison, effort: Effort) -> list[Job]:
-    assert comparison.along is not None
-    assert comparison.across is not None
-    return [
-        Job(observation, with_settings(machine, {comparison.across.field: one, comparison.along.field: other}), effort)
-        for one in comparison.across.values
-        for other in comparison.along.values
-    ]
 
 
 def _restless(comparison: Comparison, results: Results) -> np.ndarray:
@@ -228,18 +222,18 @@ RESPONSE_QUANTITIES = {
     "chaotic_maximum": Quantity(_at_point, _chaotic_maximum),
     "bounce_share": Quantity(_at_point, _bounce_share),
     "longest_bounce_share": Quantity(_at_point, _longest_bounce_share),
-    "smooth_end": Quantity(_along, _smooth_end),
-    "chaos_begin": Quantity(_along, _chaos_begin),
-    "periodic_end": Quantity(_along, _periodic_end),
-    "chaos_run": Quantity(_along, _chaos_run),
-    "chaos_present": Quantity(_along, _chaos_present),
-    "change_of_nature": Quantity(_along, _change_of_nature),
-    "resonance_speed": Quantity(_along, _resonance_speed),
-    "largest_force": Quantity(_along, _largest_force),
-    "spread_trend": Quantity(_along, _spread_trend),
-    "rise_of_maximum": Quantity(_along, _rise_of_maximum),
-    "settling": Quantity(_along, _settling),
-    "map_clearance": Quantity(_over_map, _map_clearance),
-    "map_speed": Quantity(_over_map, _map_speed),
+    "smooth_end": Quantity(_over_axes, _smooth_end),
+    "chaos_begin": Quantity(_over_axes, _chaos_begin),
+    "periodic_end": Quantity(_over_axes, _periodic_end),
+    "chaos_run": Quantity(_over_axes, _chaos_run),
+    "chaos_present": Quantity(_over_axes, _chaos_present),
+    "change_of_nature": Quantity(_over_axes, _change_of_nature),
+    "resonance_speed": Quantity(_over_axes, _resonance_speed),
+    "largest_force": Quantity(_over_axes, _largest_force),
+    "spread_trend": Quantity(_over_axes, _spread_trend),
+    "rise_of_maximum": Quantity(_over_axes, _rise_of_maximum),
+    "settling": Quantity(_over_axes, _settling),
+    "map_clearance": Quantity(_over_axes, _map_clearance),
+    "map_speed": Quantity(_over_axes, _map_speed),
 }
 """By name, as in ``reference/comparisons.toml``."""

@@ -10,13 +10,17 @@ from chaosgym.cli.output import emit
 @click.command()
 @click.option("--machine", type=click.Choice(["impact-beam", "slider-crank"]), multiple=True, help="Default: both.")
 @click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
+@click.option("--markdown", is_flag=True, help="Print the page of the documentation.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def scorecard(machine: tuple[str, ...], workers: int | None, as_json: bool) -> None:
+def scorecard(machine: tuple[str, ...], workers: int | None, markdown: bool, as_json: bool) -> None:
     """Compare every simulated statement of the thesis with the machines here; misses are shown."""
     from chaosgym.atlas.jobs import default_folder
+    from chaosgym.atlas.page import page
     from chaosgym.atlas.scorecard import scorecard as judge
 
     card = judge(machine or None, folder=default_folder(), workers=workers, progress=True)
+    if markdown:
+        return click.echo(page(card), nl=False)
     result = card.as_dict()
     emit(result, as_json, lambda: _lines(result))
 
