@@ -181,6 +181,8 @@ SEARCH_SPACES: Mapping[str, SearchSpace] = {
         (
             {**_present(THESIS_SLIDER_CRANK, _CRANK_FIELDS),
              "inertia_ratio": THESIS_SLIDER_CRANK.yoke_inertia / THESIS_SLIDER_CRANK.housing_inertia},
+            {**_present(THESIS_SLIDER_CRANK, _CRANK_FIELDS), "slider_mass": 0.12, "yoke_mass": 0.26,
+             "yoke_offset_along": 0.02, "inertia_ratio": 1.8},
         ),
     ),
 }  # fmt: skip
