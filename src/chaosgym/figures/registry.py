@@ -4,10 +4,34 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 from chaosgym.errors import ChaosgymError
-from chaosgym.figures import beam_chaos, beam_flexibility, beam_forces, beam_maps, beam_responses
+from chaosgym.figures import (
+    beam_chaos,
+    beam_flexibility,
+    beam_forces,
+    beam_maps,
+    beam_responses,
+    crank_design,
+    crank_forces,
+    crank_maps,
+    crank_resonances,
+    crank_responses,
+    crank_tests,
+)
 from chaosgym.figures.figure import ThesisFigure
 
-_MODULES = (beam_responses, beam_forces, beam_maps, beam_flexibility, beam_chaos)
+_MODULES = (
+    beam_responses,
+    beam_forces,
+    beam_maps,
+    beam_flexibility,
+    beam_chaos,
+    crank_responses,
+    crank_forces,
+    crank_maps,
+    crank_resonances,
+    crank_tests,
+    crank_design,
+)
 
 
 def _place(figure: ThesisFigure) -> tuple[int, int]:
