@@ -17,7 +17,7 @@ from chaosgym.cli.figures import figures
 from chaosgym.cli.info import info
 from chaosgym.cli.simulate import show, simulate
 from chaosgym.cli.sweep import sweep
-from chaosgym.errors import ChaosgymError, SimulationError
+from chaosgym.errors import ChaosgymError, SimulationError, UnfinishedError
 from chaosgym.version import __version__
 
 
@@ -45,4 +45,4 @@ def main() -> None:
         sys.exit(error.exit_code)
     except (ChaosgymError, OSError) as error:
         click.echo(f"Error: {error}", err=True)
-        sys.exit(1 if isinstance(error, SimulationError) else 2)
+        sys.exit(1 if isinstance(error, SimulationError | UnfinishedError) else 2)
