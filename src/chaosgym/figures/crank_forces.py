@@ -163,10 +163,8 @@ FORCE_WITH_FRICTION = ThesisFigure(
     shows="Friction of 0.1 turns 230 rpm from periodic to chaotic and 260 rpm from chaotic to periodic.",
     parts=lambda resolution: over_speed(resolution, **{"without": LOOSE, "with": RUBBING}),
     panels=(
-        force_diagram("(a) without friction", "without", CRANK_SPEED,
-                      marks=(Mark(230.0, "SSC-064", "periodic", "none"), Mark(260.0, "SSC-065", "chaotic", "none"))),
-        force_diagram("(b) with friction, coefficient 0.1", "with", CRANK_SPEED,
-                      marks=(Mark(230.0, "SSC-064", "chaotic", "none"), Mark(260.0, "SSC-065", "periodic", "none"))),
+        force_diagram("(a) without friction", "without", CRANK_SPEED),
+        force_diagram("(b) with friction, coefficient 0.1", "with", CRANK_SPEED),
     ),
     height=3.3,
     compare=friction_flips,

@@ -109,7 +109,7 @@ def paint_statistics(parts: Parts, ax: Axes) -> None:
     data = parts["runs"]
     peaks = side_peaks(data, BOTH)
     thesis.mean_and_deviation(data["matrix_update_interval"], peaks.mean(axis=1), peaks.std(axis=1), ax)
-    ax.set(xlabel="matrix update interval [deg]", xlim=(0.0, 11.0))
+    ax.set(xlabel="matrix update interval [deg]", xlim=(0.0, 11.0), ylim=(0.0, 1.2 * ax.get_ylim()[1]))
 
 
 def steady_statistics(parts: Parts) -> Sequence[Finding]:
