@@ -28,7 +28,7 @@ def figures(
     asked = chosen(ids)
     if only_list:
         titles = {figure.id: figure.title for figure in asked}
-        return emit({"figures": titles}, as_json, listing)
+        return emit({"figures": titles}, as_json, lambda: listing(asked))
     if out is None:
         raise click.UsageError("give a folder with --out, or --list")
     if gallery is not None and Path(gallery).exists() and not overwrite:

@@ -157,7 +157,7 @@ class Types:
     machine: Machine
     speeds: tuple[float, ...]
     clearances: tuple[float, ...]
-    budget: int = 400
+    budget: int = 200
     reading_error: float = READING_ERROR
 
     def run(self, workers: int | None = None) -> Data:

@@ -75,5 +75,6 @@ def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
 
 def write_gallery(drawn: Sequence[Drawn], path: Path) -> None:
     """Write the page; pictures in ``figures`` beside it are shown."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     page = gallery(drawn, path.parent / "figures")
     write_atomically(path, lambda temporary: temporary.write_text(page, encoding="utf-8"))

@@ -1,6 +1,6 @@
 """Which figures are there? By their number in the thesis, in its order."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 
 from chaosgym.errors import ChaosgymError
@@ -60,6 +60,6 @@ def chosen(ids: Sequence[str]) -> list[ThesisFigure]:
     return [figure for name, figure in FIGURES.items() if name in ids]
 
 
-def listing() -> list[str]:
-    """Number and title of every figure, one a line."""
-    return [f"  {figure.id:<6} {figure.title}" for figure in FIGURES.values()]
+def listing(figures: Iterable[ThesisFigure] = tuple(FIGURES.values())) -> list[str]:
+    """Number and title of figures, one a line."""
+    return [f"  {figure.id:<6} {figure.title}" for figure in figures]
