@@ -40,7 +40,7 @@ def figures(
         write_gallery(drawn, Path(gallery))
     count = totals(drawn)
     lines = [line for one in drawn for line in one.lines()]
-    lines.append(f"{len(drawn)} figures in {out}: {count['agree']} printed statements agree, {count['differ']} differ")
+    lines.append(f"{out}: of the printed statements {count['agree']} agree, {count['differ']} differ")
     emit({"folder": out, "figures": [one.as_dict() for one in drawn], "totals": count}, as_json, lambda: lines)
     if any(one.error for one in drawn):
         raise click.exceptions.Exit(1)
