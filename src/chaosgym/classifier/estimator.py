@@ -31,6 +31,9 @@ _Tick = Callable[[], object]
 ABSTAIN = 0.05
 """Share of the training machines' responses, the least confident ones, that are not answered."""
 
+CLEAR = 0.6
+"""Probability of a type that is always an answer."""
+
 COVERAGE = 0.90
 """Of the sets of plausible types."""
 
@@ -236,7 +239,7 @@ class ResponseClassifier:
                 self.temperatures_[question] = best_temperature(out_of_fold[question][counted], labels[rows][counted])
         chances = self.types_of(self._pairs(out_of_fold))
         self.plausible_ = conformal_threshold(chances, types[rows], COVERAGE)
-        self.least_confidence_ = float(np.quantile(chances.max(axis=1), ABSTAIN))
+        self.least_confidence_ = min(CLEAR, float(np.quantile(chances.max(axis=1), ABSTAIN)))
 
     def _train(self, question: int, features: Array, labels: Labels, rows: Labels) -> tuple[Scorer, ...]:
         """Scorers of one question from some rows; none where there is nothing to tell apart."""

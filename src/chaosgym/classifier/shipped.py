@@ -187,7 +187,7 @@ class MachineClassifier:
             period = found or None
         forces = known.predict_peak_force(features, values)[0] if not outside else ()
         plausible = tuple(str(kind) for kind, chance in zip(known.classes_, types, strict=True)
-                          if chance >= known.plausible_)  # fmt: skip
+                          if chance >= min(known.plausible_, confidence))  # fmt: skip
         return Classification(
             response_type=None if reason else best_type,
             nature=None if reason else best_nature,

@@ -29,8 +29,8 @@ from chaosgym.version import __version__
 CURVE = (0.125, 0.25, 0.5, 1.0)
 """Shares of the training machines of the learning curve."""
 
-RECORDS = 60_000
-"""Noisy training records made of the signals, at most and about."""
+RECORDS, COPIES = 60_000, 6
+"""Noisy training records made of the signals, about, and copies of a run at most."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def fit_records(
     """Train on noisy records of the training rows."""
     signals = examples.signals_where(~examples.test)
     runs = max(1, sum(len(peaks) for peaks, _, _ in signals.values()))
-    noisy = training_records(signals, max(1, round(RECORDS / runs)), seed)
+    noisy = training_records(signals, min(COPIES, max(1, round(RECORDS / runs))), seed)
     later = examples.signals["settled"]
     where = np.full(len(examples.values), -1)
     where[later[2]] = np.arange(len(later[2]))

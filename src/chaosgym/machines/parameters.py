@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any, Literal, TypeVar
 
 from chaosgym.errors import ParameterError
+from chaosgym.machines.fidelity import expand_fidelity
 
 Provenance = Literal["printed", "derived", "calibrated", "assumed"]
 """printed: in the thesis; derived: follows from printed numbers; calibrated: fitted to printed results; assumed."""
@@ -95,14 +96,16 @@ def validate(machine: Any) -> None:
 
 
 def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
-    """Return the machine with some fields replaced.
+    """Return the machine with some fields replaced, or with those of a rung of ``fidelity``.
 
     Raises
     ------
     ParameterError
-        If a name is no field of the machine (the nearest one is suggested) or a value is not allowed.
+        If a name is no field of the machine (the nearest one is suggested), a value is not allowed, or ``fidelity`` is
+        given together with a field that it sets.
     """
     known = parameters_of(machine)
+    settings = expand_fidelity(machine, settings)
     for name in settings:
         if name not in known:
             from difflib import get_close_matches
@@ -111,3 +114,14 @@ def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
             hint = f"; did you mean {near[0]}?" if near else f"; known fields: {', '.join(known)}"
             raise ParameterError(f"{type(machine).__name__} has no field {name!r}{hint}")
     return replace(machine, **settings)  # type: ignore[type-var]
+
+
+def markdown_table(machine: Any) -> list[str]:
+    """Lines of a table with every parameter of a machine, its value, unit, provenance and source."""
+    rows = ["| parameter | value | unit | provenance | source |", "|---|---|---|---|---|"]
+    for name, about in parameters_of(machine).items():
+        value = getattr(machine, name)
+        shown = value if isinstance(value, str) else f"{value:.6g}"
+        unit = "" if about.unit == "-" else about.unit
+        rows.append(f"| `{name}` | {shown} | {unit} | {about.provenance} | {about.source} |")
+    return rows

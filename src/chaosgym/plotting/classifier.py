@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chaosgym.classifier.calibration import BINS
 from chaosgym.classifier.train import TrainingResult
 from chaosgym.machines.parameters import parameters_of
-from chaosgym.plotting.overview import TYPE_COLOURS
+from chaosgym.plotting.overview import TYPE_COLOURS, plain_ticks
 
 Array = NDArray[np.float64]
 
@@ -41,21 +41,20 @@ def confusion(matrix: list[list[int]], classes: list[str], ax: Axes) -> Axes:
 
 
 def plane_of_types(trained: TrainingResult, kinds: NDArray[Any], ax: Axes, title: str) -> Axes:
-    """Held-out responses in the plane of speed and clearance by colour of their type; None is an abstention."""
+    """Held-out responses in the plane of speed and clearance, by colour of their kind (n,)."""
     examples = trained.examples
     machine = examples.machine
     axes = [machine.speed_field, machine.clearance_field]
     x, y = (examples.values[examples.test, examples.fields.index(name)] for name in axes)
-    for kind in (*TYPE_COLOURS, None):
+    for kind, colour in (*TYPE_COLOURS.items(), ("answered", "#cccccc"), ("too close to call", "#222222")):
         rows = kinds == kind
         if rows.any():
-            colour, label = (TYPE_COLOURS[kind], f"Type {kind}") if kind else ("black", "no answer")
-            ax.plot(x[rows], 1e3 * y[rows], "." if kind else "x", ms=2.5, color=colour, label=label)
+            ax.plot(x[rows], 1e3 * y[rows], ".", ms=2.5, color=colour, label=f"Type {kind}" if len(kind) < 4 else kind)
     unit = parameters_of(machine)[machine.speed_field].unit
-    ax.set(xscale="log", yscale="log", xlabel=f"{machine.speed_field.replace('_', ' ')} [{unit}]",
-           ylabel="clearance [mm]", title=title)  # fmt: skip
-    ax.legend(fontsize=7, markerscale=3, loc="upper left")
-    return ax
+    ax.set(yscale="log", xlabel=f"{machine.speed_field.replace('_', ' ')} [{unit}]", ylabel="clearance [mm]",
+           title=title)  # fmt: skip
+    ax.legend(fontsize=7, markerscale=4, loc="upper left")
+    return plain_ticks(ax)
 
 
 def learning_curve(points: list[dict[str, Any]], ax: Axes) -> Axes:
@@ -65,7 +64,7 @@ def learning_curve(points: list[dict[str, Any]], ax: Axes) -> Axes:
         values = np.array([point[name]["accuracy"] for point in points])
         ax.errorbar(rows, values[:, 0], yerr=np.abs(values[:, 1:].T - values[:, 0]), fmt="o-", ms=4, capsize=3,
                     label=name.replace("_", " "))  # fmt: skip
-    ax.set(xscale="log", xlabel="training points", ylabel="held-out accuracy", title="Learning curve, parameters")
+    ax.set(xlim=(0, None), xlabel="training points", ylabel="held-out accuracy", title="Learning curve, parameters")
     ax.legend(fontsize=8)
     return ax
 
@@ -79,10 +78,10 @@ def picture(trained: TrainingResult) -> Figure:
     truth, nature = examples.response_type[examples.test], examples.nature[examples.test]
     chances, natures = known.predict_proba(values), known.predict_nature_proba(values)
     guess = known.classes_[chances.argmax(axis=1)]
-    answers = trained.classifier.classify_table(values)["response_type"]
+    abstained = trained.classifier.classify_table(values)["abstained"]
     plane_of_types(trained, truth, axes[0, 0], "Simulation, held-out machines")
     plane_of_types(trained, guess, axes[0, 1], "Classifier, most probable type")
-    plane_of_types(trained, np.where(answers == None, None, "undetermined"), axes[0, 2], "Where it abstains")  # noqa: E711
+    plane_of_types(trained, np.where(abstained, "too close to call", "answered"), axes[0, 2], "Where it abstains")
     confusion(trained.report["parameters"]["confusion"], [str(kind) for kind in known.classes_], axes[1, 0])
     reliability_diagram(chances.max(axis=1), guess == truth, axes[1, 1], "type from parameters")
     right = known.natures_[natures.argmax(axis=1)] == nature

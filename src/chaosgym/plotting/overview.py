@@ -56,6 +56,11 @@ def classifier_map(classifier: MachineClassifier, ax: Axes) -> Axes:
 def _plane(ax: Axes, title: str) -> Axes:
     """Label a plane of excitation frequency and clearance."""
     ax.set(xscale="log", yscale="log", xlabel="excitation frequency [Hz]", ylabel="clearance [mm]", title=title)
+    return plain_ticks(ax)
+
+
+def plain_ticks(ax: Axes) -> Axes:
+    """Write the numbers of logarithmic axes as they are, not as powers of ten."""
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter("{x:g}")
