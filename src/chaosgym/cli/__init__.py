@@ -10,7 +10,7 @@ import click
 
 from chaosgym.cli.bench import bench
 from chaosgym.cli.calibrate import calibrate
-from chaosgym.cli.classify import classify, train_classifier
+from chaosgym.cli.classify import classify
 from chaosgym.cli.dataset import dataset
 from chaosgym.cli.demo import demo
 from chaosgym.cli.design import design
