@@ -1,12 +1,12 @@
 """What would simpler methods say of the same responses? Rules without learning, and models of scikit-learn.
 
-    majority                        the most frequent class of the training
-    criteria of 5.3.1               chaos where the printed criteria expect it (``diagnosis.criteria``)
-    3 N repeatability               the thesis' experiments: periodic if the peaks repeat within 3 N
-    one-threshold repeatability     periodic if the smallest repeat residual is below a threshold, chosen in training
-    0-1 test                        periodic if its statistic is below one half
-    catch22 + boosting              the 22 features of C. H. Lubba et al. (2019), level and spread added
-    logistic regression, nearest neighbours, gradient boosting    on the classifier's own features
+majority                        the most frequent class of the training
+criteria of 5.3.1               chaos where the printed criteria expect it (``diagnosis.criteria``)
+3 N repeatability               the thesis' experiments: periodic if the peaks repeat within 3 N
+one-threshold repeatability     periodic if the smallest repeat residual is below a threshold, chosen in training
+0-1 test                        periodic if its statistic is below one half
+catch22 + boosting              the 22 features of C. H. Lubba et al. (2019), level and spread added
+logistic regression, nearest neighbours, gradient boosting    on the classifier's own features
 """
 
 from collections.abc import Mapping

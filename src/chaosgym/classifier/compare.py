@@ -92,9 +92,7 @@ def compare_scene(
     pairs = classifier.chances(features[asked])
 
     def scores(chances: Array) -> dict[str, Any]:
-        return probability_scores(
-            classifier.natures_, classifier.natures_of(chances), natures[asked], groups[asked]
-        )
+        return probability_scores(classifier.natures_, classifier.natures_of(chances), natures[asked], groups[asked])
 
     found = {"classifier": scores(pairs), "classifier, sensor error not told": scores(classifier.chances(blind))}
     if baselines:

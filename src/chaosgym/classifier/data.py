@@ -99,12 +99,12 @@ def examples_of(sweep: LabelledSweep, seed: int) -> Examples:
             raise DatasetError(f"the {name} rows hold one response type only; sweep a wider range or more points")
     machine: Any = MACHINES[sweep.settings["machine"]]
     place = np.cumsum(usable) - 1
-    signals = {}
+    signals: dict[str, tuple[Array, Array, NDArray[np.int64]]] = {}
     if f"{WINDOWS[0]}_peak_force" in sweep.table.column_names:
         for window in WINDOWS:
-            peaks, section, rows = signals_of(sweep.table, window)
-            kept = usable[rows]
-            signals[window] = (peaks[kept], section[kept], place[rows[kept]])
+            peaks, section, at = signals_of(sweep.table, window)
+            kept = usable[at]
+            signals[window] = (peaks[kept], section[kept], place[at[kept]])
     return Examples(
         machine=machine(**sweep.settings["base"]), fields=fields, values=values, response_type=types[usable],
         nature=natures[usable], period=np.nan_to_num(sweep.column("period")[usable].astype(float)).astype(np.int64),

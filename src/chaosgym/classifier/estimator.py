@@ -1,11 +1,11 @@
 """A classifier of response type in scikit-learn's manner, for machine parameters and for records of peak forces.
 
 First the nature is learned, then the type of a response of such a nature; the probabilities of pairs such as (III,
-chaotic) are products, so that those of types and natures never contradict each other. Calibration is cross-fitted: every training row is judged by a model that has not seen its machine; temperature,
-conformal threshold and the least confidence of an answer come from these judgements. The model that is kept sees all
-rows.
+chaotic) are products, so that those of types and natures never contradict each other.
 
-Training needs scikit-learn (and torch for networks); everything else needs numpy and numba.
+Calibration is cross-fitted: every training row is judged by a model that has not seen its machine; temperatures,
+conformal threshold and the least confidence of an answer come from these judgements. The model that is kept sees all
+rows. Training needs scikit-learn (and torch for networks); everything else needs numpy and numba.
 """
 
 import inspect
@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.classifier.calibration import best_temperature, conformal_threshold, softmax
 from chaosgym.classifier.features import record_features
+from chaosgym.classifier.linear import Linear, linear_scores, train_linear
 from chaosgym.classifier.network import Network, network_scores
 from chaosgym.classifier.novelty import is_novel, neighbourhood
 from chaosgym.classifier.parameter_features import parameter_features, parameter_scaling
@@ -25,8 +26,10 @@ from chaosgym.machines import Machine
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
-Scorer = Forest | Network
+Scorer = Forest | Linear | Network
 _Tick = Callable[[], object]
+
+MODELS = ("boosting", "linear", "network")
 
 ABSTAIN = 0.05
 """Share of the training machines' responses, the least confident ones, that are not answered."""
@@ -55,7 +58,8 @@ class ResponseClassifier:
         "parameters": rows are values of machine fields in SI units. "records": rows are peak forces [N], one a cycle,
         8 to 64 of them; shorter ones end in NaN.
     model
-        "boosting": gradient boosted trees; "network": an ensemble of small networks; "both": mean of their scores.
+        "boosting": gradient boosted trees; "linear": multinomial logistic regression; "network": an ensemble of small
+        networks; or several of them joined by "+", whose scores are averaged.
     machine, fields
         The machine whose fields the columns are, for logarithms and dimensionless groups. None takes plain columns.
     rounds, leaves, learning_rate, least_rows
@@ -73,12 +77,14 @@ class ResponseClassifier:
         Labels in the order of the probabilities.
     n_features_in_
         Number of columns.
+    log_loss_
+        Mean surprise at type and nature in the cross-fitting: what tells models apart without the test rows.
     """
 
     def __init__(
         self,
         inputs: Literal["parameters", "records"] = "parameters",
-        model: Literal["boosting", "network", "both"] = "boosting",
+        model: str = "boosting",
         machine: Machine | None = None,
         fields: tuple[str, ...] | None = None,
         rounds: int = 150,
@@ -237,7 +243,12 @@ class ResponseClassifier:
             counted = counts[rows]
             if out_of_fold[question].shape[1] > 1 and counted.any():
                 self.temperatures_[question] = best_temperature(out_of_fold[question][counted], labels[rows][counted])
-        chances = self.types_of(self._pairs(out_of_fold))
+        pairs = self._pairs(out_of_fold)
+        true_pair = np.searchsorted(
+            self.nature_of_ * len(self.classes_) + self.type_of_, natures[rows] * len(self.classes_) + types[rows]
+        )
+        self.log_loss_ = float(-np.mean(np.log(pairs[np.arange(len(rows)), true_pair].clip(1e-12))))
+        chances = self.types_of(pairs)
         self.plausible_ = conformal_threshold(chances, types[rows], COVERAGE)
         self.least_confidence_ = min(CLEAR, float(np.quantile(chances.max(axis=1), ABSTAIN)))
 
@@ -251,19 +262,22 @@ class ResponseClassifier:
             shares = np.bincount(asked, minlength=count) / max(1, len(asked))
             return (constant_forest(np.log(shares.clip(1e-6))),)
         scorers: list[Scorer] = []
-        if self.model in ("boosting", "both"):
+        kinds = self.model.split("+")
+        if not set(kinds) <= set(MODELS):
+            raise ValueError(f"model = {self.model!r} is not made of {', '.join(MODELS)}")
+        if "boosting" in kinds:
             from chaosgym.classifier.boosting import train_forest
 
             scorers.append(train_forest(
                 known, asked, rounds=self.rounds, leaves=self.leaves, learning_rate=self.learning_rate,
                 least_rows=self.least_rows, seed=self.seed,
             ))  # fmt: skip
-        if self.model in ("network", "both"):
+        if "linear" in kinds:
+            scorers.append(train_linear(known, asked))
+        if "network" in kinds:
             from chaosgym.classifier.network import train_networks
 
             scorers.append(train_networks(known, asked, count, self.members, self.seed))
-        if not scorers:
-            raise ValueError(f"model = {self.model!r} is not one of 'boosting', 'network', 'both'")
         return tuple(scorers)
 
     def _fit_period(self, features: Array, period: ArrayLike | None) -> None:
@@ -336,7 +350,8 @@ class ResponseClassifier:
 
     def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, **record: Any) -> float:
         """Share of types that are right."""
-        return float(np.average(self.predict(X, **record) == np.asarray(y), weights=sample_weight))
+        weights = None if sample_weight is None else np.asarray(sample_weight, dtype=float)
+        return float(np.average(self.predict(X, **record) == np.asarray(y), weights=weights))
 
     def out_of_range(self, X: ArrayLike, **record: Any) -> NDArray[np.bool_]:
         """Whether each row (n,) lies outside what was trained on."""
@@ -354,7 +369,7 @@ class ResponseClassifier:
         if self.period_forest_ is None:
             return np.zeros(len(features), dtype=np.int64)
         chances = class_scores(self.period_forest_, features)
-        return np.array([*PERIODS, 0])[self.period_kinds_[chances.argmax(axis=1)]]
+        return np.asarray(np.array([*PERIODS, 0])[self.period_kinds_[chances.argmax(axis=1)]])
 
     def predict_peak_force(self, features: Array, values: Array) -> Array:
         """Quantiles (n, 3) of the peak force of a settled cycle [N]; (n, 0) if not trained."""
@@ -404,11 +419,16 @@ class ResponseClassifier:
 
 def _raw_scores(scorers: tuple[Scorer, ...], features: Array) -> Array:
     """Mean scores of the scorers, (n, n_classes); a single class where there are none."""
-    parts = [network_scores(scorer, features) if isinstance(scorer, Network) else class_scores(scorer, features)
-             for scorer in scorers]  # fmt: skip
+    parts = [_scores_of(scorer, features) for scorer in scorers]
     if not parts:
         return np.zeros((len(features), 1))
     return parts[0] if len(parts) == 1 else np.asarray(sum(parts) / len(parts))
+
+
+def _scores_of(scorer: Scorer, features: Array) -> Array:
+    if isinstance(scorer, Linear):
+        return linear_scores(scorer, features)
+    return network_scores(scorer, features) if isinstance(scorer, Network) else class_scores(scorer, features)
 
 
 def _pooled(chances: Array, group_of: Labels) -> Array:

@@ -99,9 +99,7 @@ def as_records(
     return np.ascontiguousarray(forces), np.ascontiguousarray(states), errors
 
 
-def record_features(
-    peaks: ArrayLike, section: ArrayLike | None = None, sensor_error: ArrayLike | None = None
-) -> Array:
+def record_features(peaks: ArrayLike, section: ArrayLike | None = None, sensor_error: ArrayLike | None = None) -> Array:
     """Figures of records, (n_records, n_features); see ``as_records`` for the arguments and errors."""
     forces, states, errors = as_records(peaks, section, sensor_error)
     features = np.full((len(forces), _COUNT), np.nan)
@@ -128,7 +126,7 @@ def _length(row: Array) -> int:
 
 @njit(cache=True, nogil=True)
 def _log(value: float) -> float:
-    return np.log10(max(value, _FLOOR))
+    return float(np.log10(max(value, _FLOOR)))
 
 
 @njit(cache=True, nogil=True)
@@ -159,7 +157,7 @@ def _difference(x: Array, lag: int) -> float:
     total = 0.0
     for i in range(pairs):
         total += (x[i + lag] - x[i]) ** 2
-    return np.sqrt(total / pairs)
+    return float(np.sqrt(total / pairs))
 
 
 @njit(cache=True, nogil=True)
@@ -174,7 +172,7 @@ def class_scatter(x: Array, period: int) -> float:
         mean /= count
         for i in range(first, len(x), period):
             total += (x[i] - mean) ** 2
-    return np.sqrt(total / max(1, len(x) - period))
+    return float(np.sqrt(total / max(1, len(x) - period)))
 
 
 @njit(cache=True, nogil=True)
@@ -248,7 +246,7 @@ def _flatness(x: Array) -> float:
         power = real * real + imaginary * imaginary + 1e-24
         logarithm += np.log(power)
         total += power
-    return np.exp(logarithm / lines) * lines / total
+    return float(np.exp(logarithm / lines) * lines / total)
 
 
 @njit(cache=True, nogil=True)
@@ -262,7 +260,7 @@ def _pattern_entropy(x: Array) -> float:
         if count > 0.0:
             share = count / (len(x) - 2)
             entropy -= share * np.log(share)
-    return entropy / np.log(6.0)
+    return float(entropy / np.log(6.0))
 
 
 @njit(cache=True, nogil=True)
@@ -279,7 +277,7 @@ def _distinct(ordered: Array, gap: float) -> float:
 @njit(cache=True, nogil=True)
 def _moments(x: Array) -> tuple[float, float, float, float]:
     """Mean, standard deviation, skewness, kurtosis."""
-    mean = np.mean(x)
+    mean = float(np.mean(x))
     second, third, fourth = 0.0, 0.0, 0.0
     for value in x:
         gap = value - mean
@@ -289,7 +287,7 @@ def _moments(x: Array) -> tuple[float, float, float, float]:
     second /= len(x)
     if second < 1e-24:
         return mean, 0.0, 0.0, 0.0
-    return mean, np.sqrt(second), third / len(x) / second**1.5, fourth / len(x) / second**2
+    return mean, float(np.sqrt(second)), third / len(x) / second**1.5, fourth / len(x) / second**2
 
 
 @njit(cache=True, nogil=True)

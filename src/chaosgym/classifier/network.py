@@ -62,9 +62,7 @@ def fourier_features(scaled: Single, waves: Single) -> Single:
     return out
 
 
-def train_networks(
-    features: Array, labels: NDArray[np.int64], classes: int, members: int, seed: int
-) -> Network:
+def train_networks(features: Array, labels: NDArray[np.int64], classes: int, members: int, seed: int) -> Network:
     """Train an ensemble on features (n, n_features) and class numbers (n,).
 
     One thread, so that the same seed gives the same weights.

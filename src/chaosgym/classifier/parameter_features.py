@@ -124,5 +124,3 @@ def _fill(
         clearance = values[row, places[1]] if places[1] >= 0 else 1.0
         push = clearance * speed * speed
         out[row, at] = np.log(push) if push > 0.0 else np.nan
-
-

@@ -10,6 +10,8 @@ def report_table(report: Mapping[str, Any]) -> list[str]:
     """Lines of the comparison on held-out rows."""
     rows = report["rows"]
     lines = [f"{rows['held_out']} held-out and {rows['training']} training points, 95 % bootstrap intervals"]
+    losses = ", ".join(f"{kind} {loss:.3f}" for kind, loss in report["cross_fitted_log_loss"].items())
+    lines += ["", f"parameters are judged by {report['model']}; cross-fitted log loss: {losses}"]
     for name in ("response_type", "nature"):
         lines += ["", *_block(f"{name.replace('_', ' ')} from parameters", report["parameters"][name])]
     refused = report["parameters"]["refused"]
@@ -55,7 +57,7 @@ def card_lines(card: Mapping[str, Any]) -> list[str]:
     return [
         f"# Classifier of the {card['machine']}'s response type",
         "",
-        "Use: type (I, II, III) and nature of a response from machine parameters, or from 8 to 64 measured peak forces.",
+        "Use: type (I, II, III) and nature of a response from machine parameters, or from 8 to 64 measured peaks.",
         f"Data: {card['rows']['parameters']} labelled responses, {card['rows']['records']} recorded windows; "
         f"{card['report']['machines']['training']} machines (or blocks) train, "
         f"{card['report']['machines']['held_out']} judge.",

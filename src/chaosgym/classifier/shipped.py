@@ -201,9 +201,7 @@ class MachineClassifier:
             peak_force=dict(zip(QUANTILE_NAMES, map(float, forces), strict=False)),
         )
 
-    def _columns(
-        self, known: ResponseClassifier, chances: Array, outside: NDArray[np.bool_]
-    ) -> dict[str, Any]:
+    def _columns(self, known: ResponseClassifier, chances: Array, outside: NDArray[np.bool_]) -> dict[str, Any]:
         types = np.zeros((len(chances), len(known.classes_)))
         natures = np.zeros((len(chances), len(known.natures_)))
         for pair in range(chances.shape[1]):

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from chaosgym.classifier.linear import Linear
 from chaosgym.classifier.network import Network
 from chaosgym.classifier.novelty import Neighbourhood
 from chaosgym.classifier.parameter_features import ParameterScaling
@@ -26,7 +27,7 @@ FORMAT = 2
 LARGEST = 50_000_000
 """Bytes that a model file may have."""
 
-_KINDS: Mapping[str, Any] = {kind.__name__: kind for kind in (Forest, Network, Neighbourhood, ParameterScaling)}
+_KINDS: Mapping[str, Any] = {kind.__name__: kind for kind in (Forest, Linear, Network, Neighbourhood, ParameterScaling)}
 """Values that a file may hold beside arrays, numbers, words, tuples and None."""
 
 
@@ -68,7 +69,16 @@ def read_model(path: str | Path) -> tuple[dict[str, Any], dict[str, dict[str, An
         parts = {name: {key: _restore(value, arrays) for key, value in part.items()}
                  for name, part in head["parts"].items()}  # fmt: skip
         return {**head["card"], "sha256": head["sha256"]}, parts
-    except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, zipfile.BadZipFile, EOFError) as error:
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        IndexError,
+        AttributeError,
+        zipfile.BadZipFile,
+        EOFError,
+    ) as error:
         if isinstance(error, ModelFileError):
             raise
         raise ModelFileError(f"{path} can't be read as a classifier: {error}") from error
@@ -92,7 +102,7 @@ def _describe(value: Any, name: str, arrays: dict[str, Any]) -> Any:
             return {"words": [str(word) for word in value]}
         arrays[name] = value
         return {"array": name}
-    if isinstance(value, tuple) and type(value).__name__ in _KINDS:
+    if type(value).__name__ in _KINDS:
         fields = {key: _describe(field, f"{name}.{key}", arrays) for key, field in value._asdict().items()}
         return {"kind": type(value).__name__, "fields": fields}
     if isinstance(value, tuple):

@@ -10,7 +10,7 @@ Fault = Callable[[Array, np.random.Generator], Array]
 
 
 def _white_noise(peaks: Array, generator: np.random.Generator) -> Array:
-    return np.abs(peaks.mean(axis=1, keepdims=True) * generator.standard_normal(peaks.shape))
+    return np.asarray(np.abs(peaks.mean(axis=1, keepdims=True) * generator.standard_normal(peaks.shape)))
 
 
 def _spikes(peaks: Array, generator: np.random.Generator) -> Array:

@@ -26,6 +26,9 @@ from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import LabelledSweep
 from chaosgym.version import __version__
 
+CANDIDATES = ("boosting", "linear", "boosting+linear")
+"""Models for parameters that are tried."""
+
 CURVE = (0.125, 0.25, 0.5, 1.0)
 """Shares of the training machines of the learning curve."""
 
@@ -56,7 +59,7 @@ def train_classifier(
     sweep: LabelledSweep,
     seed: int = 0,
     *,
-    model: str = "boosting",
+    model: str | None = None,
     curve: bool = True,
     transfer: LabelledSweep | None = None,
     progress: bool = False,
@@ -70,7 +73,8 @@ def train_classifier(
     seed
         Of split, noise, weights and baselines. Same seed, same weights.
     model
-        What judges parameters: "boosting", "network" or "both". Records are judged by boosting.
+        As of ``ResponseClassifier``, for parameters; by default the one of ``CANDIDATES`` with the least cross-fitted
+        log loss on the training machines. Records are always judged by boosting.
     curve
         Measure the learning curve too.
     transfer
@@ -84,13 +88,18 @@ def train_classifier(
         If there are too few rows or only one response type.
     """
     examples = examples_of(sweep, seed)
-    steps = 5 + (4 + len(SCENES) if examples.signals else 0) + (len(CURVE) if curve else 0)
+    candidates = CANDIDATES if model is None else (model,)
+    steps = 1 + 4 * len(candidates) + (4 + len(SCENES) if examples.signals else 0) + (len(CURVE) if curve else 0)
     with tqdm(total=steps, desc="train classifier", unit="step", disable=not progress, mininterval=0.5) as bar:
         began = time.perf_counter()
-        parameters = fit_parameters(examples, ~examples.test, model, seed, tick=bar.update)
+        tried = [fit_parameters(examples, ~examples.test, kind, seed, tick=bar.update) for kind in candidates]
+        parameters = min(tried, key=lambda classifier: classifier.log_loss_)
         records = fit_records(examples, seed, tick=bar.update) if examples.signals else None
         seconds = time.perf_counter() - began
-        report = _rows(examples) | {"training_seconds": round(seconds, 1)}
+        losses = {kind: classifier.log_loss_ for kind, classifier in zip(candidates, tried, strict=True)}
+        report = _rows(examples) | {
+            "training_seconds": round(seconds, 1), "model": parameters.model, "cross_fitted_log_loss": losses
+        }  # fmt: skip
         report["parameters"] = compare_parameters(examples, parameters, seed)
         report["parameters"]["refused"] = outside_parameters(examples, parameters, seed)
         bar.update()
@@ -103,7 +112,9 @@ def train_classifier(
             if transfer is not None:
                 report["transfer"] = _transfer(transfer, records, seed)
         if curve:
-            report["learning_curve"] = [_curve_point(examples, share, model, seed, bar.update) for share in CURVE]
+            report["learning_curve"] = [
+                _curve_point(examples, share, parameters.model, seed, bar.update) for share in CURVE
+            ]
     card = _card(sweep, examples, report, seed)
     return TrainingResult(MachineClassifier(examples.machine, parameters, records, card), report, examples)
 
@@ -116,9 +127,8 @@ def fit_parameters(
     if examples.signals:
         settled, _, at = examples.signals["settled"]
         peaks[at] = settled[np.arange(len(at)), np.random.default_rng(seed).integers(0, settled.shape[1], len(at))]
-    kind: Any = model
     classifier = ResponseClassifier(
-        "parameters", kind, examples.machine, examples.fields, least_rows=60, folds=folds, seed=seed
+        "parameters", model, examples.machine, examples.fields, least_rows=60, folds=folds, seed=seed
     )
     return classifier.fit(
         examples.values[rows], examples.response_type[rows], nature=examples.nature[rows],
@@ -146,9 +156,7 @@ def fit_records(
     )  # fmt: skip
 
 
-def _curve_point(
-    examples: Examples, share: float, model: str, seed: int, tick: Callable[[], object]
-) -> dict[str, Any]:
+def _curve_point(examples: Examples, share: float, model: str, seed: int, tick: Callable[[], object]) -> dict[str, Any]:
     """Scores on the held-out rows after training on a share of the training machines."""
     machines = np.unique(examples.groups[~examples.test])
     drawn = np.random.default_rng(seed).permutation(machines)[: max(1, round(share * len(machines)))]

@@ -96,7 +96,7 @@ def _walk(
         value = row[feature[node]]
         goes_left = value <= threshold[node] or (missing_left[node] and np.isnan(value))
         node = left[node] if goes_left else right[node]
-    return threshold[node]
+    return float(threshold[node])
 
 
 @njit(cache=True, nogil=True)

@@ -1,6 +1,7 @@
 """What does the learned classifier say of a machine, of measured records, of many at once, or live? ``classify``."""
 
 import functools
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -13,12 +14,16 @@ from chaosgym.cli.output import emit
 
 @click.command()
 @functools.partial(machine_command, required=False)
-@click.option("--peaks", type=click.Path(), help="Judge measured peak forces [N]: a CSV file, one run a column; - reads standard input.")  # fmt: skip
-@click.option("--follow", is_flag=True, help="Judge peaks from standard input as they come, one a line: a live monitor.")  # fmt: skip
+@click.option(
+    "--peaks", type=click.Path(), help="Judge measured peak forces [N]: CSV, one run a column; - is standard input."
+)
+@click.option("--follow", is_flag=True, help="Judge peaks from standard input as they come, one a line: a monitor.")
 @click.option("--sensor-error", type=click.FloatRange(0.0), help="Largest error of a measured peak [N], if known.")
 @click.option("--batch", type=click.Path(exists=True, dir_okay=False), help="Judge every row of a Parquet file.")
 @click.option("--out", type=click.Path(dir_okay=False), help="Parquet file for the answers of --batch.")
-@click.option("--model", type=click.Path(exists=True, dir_okay=False), help="Classifier file; default: the shipped one.")
+@click.option(
+    "--model", type=click.Path(exists=True, dir_okay=False), help="Classifier file; default: the shipped one."
+)
 def classify(
     machine: Any,
     peaks: str | None,
@@ -44,7 +49,7 @@ def classify(
     if classifier.machine.name != machine.name:
         raise click.UsageError(f"--model {model} knows {classifier.machine.name}, not {machine.name}")
     if follow:
-        _follow(classifier, click.get_text_stream("stdin"), sensor_error, as_json)
+        _follow(classifier, sys.stdin, sensor_error, as_json)
     elif peaks:
         _classify_peaks(classifier, peaks, sensor_error, as_json)
     elif batch and out:
@@ -75,7 +80,7 @@ def _classify_peaks(classifier: Any, source: str, sensor_error: float | None, as
     from chaosgym.classifier.peak_files import read_peaks
     from chaosgym.errors import DiagnosisError
 
-    runs = read_peaks(click.get_text_stream("stdin") if source == "-" else Path(source))
+    runs = read_peaks(sys.stdin if source == "-" else Path(source))
     answers = {}
     for name, record in runs.items():
         try:
@@ -129,4 +134,4 @@ def _emit_cycle(cycle: int, peak: float, answer: Any, missing: int, as_json: boo
         verdict = answer.reason if answer.abstained else told
         result = {"cycle": cycle, **answer.as_dict()}
     emit(result, as_json, lambda: [f"{cycle:6d}  {peak:9.2f} N  {verdict}"])
-    click.get_text_stream("stdout").flush()
+    sys.stdout.flush()

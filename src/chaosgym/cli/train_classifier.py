@@ -14,8 +14,8 @@ from chaosgym.cli.output import emit
 @click.option("--out", type=click.Path(), required=True, help="New folder for classifier, report, card and pictures.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.option(
-    "--model", type=click.Choice(["boosting", "network", "both"]), default="boosting", show_default=True,
-    help="What judges parameters; records are always judged by boosting.",
+    "--model", default=None,
+    help="boosting, linear, network, or several joined by +; default: the best of three in cross-validation.",
 )  # fmt: skip
 @click.option("--curve/--no-curve", default=True, show_default=True, help="Measure the learning curve.")
 @click.option(
@@ -23,7 +23,7 @@ from chaosgym.cli.output import emit
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def train_classifier(
-    data: str, out: str, seed: int, model: str, curve: bool, transfer: str | None, as_json: bool
+    data: str, out: str, seed: int, model: str | None, curve: bool, transfer: str | None, as_json: bool
 ) -> None:
     """Train the classifier on a sweep and judge it beside its baselines (needs the extra [learn])."""
     from chaosgym.classifier.report import report_table
