@@ -21,8 +21,9 @@ from chaosgym.classifier.linear import Linear, linear_scores, train_linear
 from chaosgym.classifier.network import Network, network_scores
 from chaosgym.classifier.novelty import is_novel, neighbourhood
 from chaosgym.classifier.parameter_features import parameter_features, parameter_scaling
-from chaosgym.classifier.trees import Forest, class_scores, constant_forest, forest_scores
+from chaosgym.classifier.trees import Forest, class_scores, constant_forest, forest_scores, joined
 from chaosgym.machines import Machine
+from chaosgym.simulation import parallel_map
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
@@ -30,6 +31,9 @@ Scorer = Forest | Linear | Network
 _Tick = Callable[[], object]
 
 MODELS = ("boosting", "linear", "network")
+
+CHUNK = 10_000
+"""Rows of a table that a thread takes at a time."""
 
 ABSTAIN = 0.05
 """Share of the training machines' responses, the least confident ones, that are not answered."""
@@ -62,8 +66,8 @@ class ResponseClassifier:
         networks; or several of them joined by "+", whose scores are averaged.
     machine, fields
         The machine whose fields the columns are, for logarithms and dimensionless groups. None takes plain columns.
-    rounds, leaves, learning_rate, least_rows
-        Of the boosting; ``least_rows`` in a leaf.
+    rounds, leaves, depth, learning_rate, least_rows
+        Of the boosting; ``leaves`` and ``depth`` of a tree at most, ``least_rows`` in a leaf.
     members
         Networks of the ensemble.
     folds
@@ -89,6 +93,7 @@ class ResponseClassifier:
         fields: tuple[str, ...] | None = None,
         rounds: int = 150,
         leaves: int = 15,
+        depth: int | None = None,
         learning_rate: float = 0.06,
         least_rows: int = 20,
         members: int = 1,
@@ -103,6 +108,7 @@ class ResponseClassifier:
         self.leaves = leaves
         self.learning_rate = learning_rate
         self.least_rows = least_rows
+        self.depth = depth
         self.members = members
         self.folds = folds
         self.seed = seed
@@ -270,7 +276,7 @@ class ResponseClassifier:
 
             scorers.append(train_forest(
                 known, asked, rounds=self.rounds, leaves=self.leaves, learning_rate=self.learning_rate,
-                least_rows=self.least_rows, seed=self.seed,
+                least_rows=self.least_rows, depth=self.depth, seed=self.seed,
             ))  # fmt: skip
         if "linear" in kinds:
             scorers.append(train_linear(known, asked))
@@ -294,17 +300,17 @@ class ResponseClassifier:
             self.period_forest_ = train_forest(features[rows], numbers, rounds=PERIOD_ROUNDS, seed=self.seed)
 
     def _fit_peak_force(self, features: Array, values: Array, peak_force: ArrayLike | None) -> None:
-        self.quantile_forests_: tuple[Forest, ...] = ()
+        self.quantile_forest_: Forest | None = None
         if peak_force is None:
             return
         from chaosgym.classifier.boosting import train_quantile_forest
 
         forces = np.asarray(peak_force, dtype=float) / self._level(values)
         rows = np.isfinite(forces) & (forces > 0.0)
-        self.quantile_forests_ = tuple(
+        self.quantile_forest_ = joined(tuple(
             train_quantile_forest(features[rows], np.log(forces[rows]), quantile, QUANTILE_ROUNDS, self.seed)
             for quantile in QUANTILES
-        )
+        ))  # fmt: skip
 
     def predict(self, X: ArrayLike, **record: Any) -> NDArray[Any]:
         """Most probable type (n,); ``section`` and ``sensor_error`` of records as in ``fit``."""
@@ -322,7 +328,11 @@ class ResponseClassifier:
 
     def predict_pairs(self, X: ArrayLike, **record: Any) -> Array:
         """Probabilities (n, n_pairs) of type ``classes_[type_of_]`` with nature ``natures_[nature_of_]``."""
-        return self.chances(self.features(X, **record))
+        values = self._checked(X)
+        if len(values) <= CHUNK or record:
+            return self.chances(self._features(values, **record))
+        chunks = [values[start : start + CHUNK] for start in range(0, len(values), CHUNK)]
+        return np.concatenate(parallel_map(lambda part: self.chances(self._features(part)), chunks))
 
     def chances(self, features: Array) -> Array:
         """Probabilities of the pairs from features that are computed already."""
@@ -373,9 +383,9 @@ class ResponseClassifier:
 
     def predict_peak_force(self, features: Array, values: Array) -> Array:
         """Quantiles (n, 3) of the peak force of a settled cycle [N]; (n, 0) if not trained."""
-        if not self.quantile_forests_:
+        if self.quantile_forest_ is None:
             return np.empty((len(features), 0))
-        logs = np.column_stack([forest_scores(forest, features)[:, 0] for forest in self.quantile_forests_])
+        logs = forest_scores(self.quantile_forest_, features)
         return np.asarray(np.sort(np.exp(logs), axis=1) * self._level(values)[:, None])
 
     def _level(self, values: Array) -> Array:

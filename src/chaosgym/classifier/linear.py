@@ -26,7 +26,7 @@ class Linear(NamedTuple):
 def linear_scores(linear: Linear, features: Array) -> Array:
     """Scores (n_rows, n_classes) of features (n_rows, n_features); NaN counts as the mean."""
     scaled = (features - linear.centre) / linear.spread
-    np.nan_to_num(scaled, copy=False, nan=0.0)
+    scaled[np.isnan(scaled)] = 0.0
     return np.asarray(scaled @ linear.weight + linear.bias)
 
 

@@ -26,6 +26,8 @@ def report_table(report: Mapping[str, Any]) -> list[str]:
     if "refused" in report:
         shares = ", ".join(f"{name} {share:.1%}" for name, share in report["refused"].items())
         lines += ["", f"records refused by fault: {shares}"]
+    if "speed" in report:
+        lines += ["", _speed(report["speed"])]
     if "learning_curve" in report:
         lines += ["", f"{'learning curve':{NAME_WIDTH}s}  type    nature"]
         lines += [
@@ -34,6 +36,19 @@ def report_table(report: Mapping[str, Any]) -> list[str]:
             for point in report["learning_curve"]
         ]
     return lines
+
+
+def _speed(speed: Mapping[str, Any]) -> str:
+    text = (
+        f"one machine {speed['query_us']:.0f} us, {speed['rows_per_second']:,.0f} rows a second on {speed['threads']} "
+        f"threads; Two-Step Test {speed['two_step_us']:.0f} us, {speed['times_faster']:,.0f} times as long"
+    )
+    if "record_us" not in speed:
+        return text
+    return text + (
+        f"; one record {speed['record_us']:.0f} us, {speed['cycles_saved']} cycles saved, "
+        f"{speed['times_faster_by_record']:.1f} times faster with its simulation"
+    )
 
 
 def _block(title: str, methods: Mapping[str, Any]) -> list[str]:

@@ -80,9 +80,8 @@ class MachineClassifier:
         """Classify many machines: columns of the answer by name, for field values (n, n_fields) in SI units."""
         rows = np.ascontiguousarray(values, dtype=float)
         known = self.parameters
-        features = parameter_features(known.scaling_, rows)
         outside = ((rows < known.low_) | (rows > known.high_) | ~np.isfinite(rows)).any(axis=1)
-        return self._columns(known, known.chances(features), outside)
+        return self._columns(known, known.predict_pairs(np.where(np.isfinite(rows), rows, 0.0)), outside)
 
     def classify_record(
         self, peaks: ArrayLike, *, section: ArrayLike | None = None, sensor_error: float | None = None

@@ -21,6 +21,7 @@ from chaosgym.classifier.evaluation import probability_scores
 from chaosgym.classifier.records import training_records
 from chaosgym.classifier.report import card_lines
 from chaosgym.classifier.shipped import MachineClassifier
+from chaosgym.classifier.speed import measure_speed
 from chaosgym.files import write_atomically
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import LabelledSweep
@@ -115,8 +116,9 @@ def train_classifier(
             report["learning_curve"] = [
                 _curve_point(examples, share, parameters.model, seed, bar.update) for share in CURVE
             ]
-    card = _card(sweep, examples, report, seed)
-    return TrainingResult(MachineClassifier(examples.machine, parameters, records, card), report, examples)
+    classifier = MachineClassifier(examples.machine, parameters, records, _card(sweep, examples, report, seed))
+    report["speed"] = measure_speed(classifier, seed)
+    return TrainingResult(classifier, report, examples)
 
 
 def fit_parameters(
@@ -128,7 +130,17 @@ def fit_parameters(
         settled, _, at = examples.signals["settled"]
         peaks[at] = settled[np.arange(len(at)), np.random.default_rng(seed).integers(0, settled.shape[1], len(at))]
     classifier = ResponseClassifier(
-        "parameters", model, examples.machine, examples.fields, least_rows=60, folds=folds, seed=seed
+        "parameters",
+        model,
+        examples.machine,
+        examples.fields,
+        rounds=50,
+        leaves=16,
+        depth=4,
+        learning_rate=0.15,
+        least_rows=60,
+        folds=folds,
+        seed=seed,
     )
     return classifier.fit(
         examples.values[rows], examples.response_type[rows], nature=examples.nature[rows],

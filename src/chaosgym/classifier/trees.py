@@ -1,77 +1,112 @@
-"""How are boosted trees evaluated without scikit-learn? As plain arrays, walked by a compiled loop.
+"""How are boosted trees evaluated without scikit-learn? As plain arrays, walked level by level, many rows at a time.
 
-The nodes of all trees stand in a row; a leaf has feature -1 and carries its value in place of a threshold. Missing
-values go where training sent them. Each tree adds to one score.
+The nodes of all trees stand in a row, children side by side. A leaf is its own child and lets everything pass to the
+left, so that all rows of a tree take the same number of steps and none needs a branch. Missing values go where training
+sent them. Each tree adds to one score.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import get_num_threads, njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-MANY_ROWS = 20_000
-"""Rows from which on threads pay."""
+BLOCK = 64
+"""Rows that walk a tree side by side."""
+
+
+FEW_ROWS = 8
+"""Rows below which each goes its own way, and stops at its leaf."""
 
 
 class Forest(NamedTuple):
     """Trees of a boosted model: scores = baseline + sum of the leaves.
 
-    ``feature`` (n_nodes,) -1 at a leaf; ``threshold`` (n_nodes,) or the leaf's value; ``left``, ``right`` (n_nodes,)
-    numbers of the children; ``missing_left`` (n_nodes,); ``roots`` (n_trees,); ``score`` (n_trees,) which score a tree
-    adds to; ``baseline`` (n_scores,).
+    ``feature`` (n_nodes,) to look at; ``threshold`` (n_nodes,) above which a row goes right, infinite at a leaf;
+    ``missing_right`` (n_nodes,) whether a missing value does; ``child`` (n_nodes,) number of the left child, the right
+    one follows it; ``value`` (n_nodes,) of a leaf; ``roots``, ``depths`` (n_trees,); ``score`` (n_trees,) which score a
+    tree adds to; ``baseline`` (n_scores,).
     """
 
     feature: NDArray[np.int32]
     threshold: Array
-    left: NDArray[np.int32]
-    right: NDArray[np.int32]
-    missing_left: NDArray[np.bool_]
+    missing_right: NDArray[np.bool_]
+    child: NDArray[np.int32]
+    value: Array
     roots: NDArray[np.int32]
+    depths: NDArray[np.int32]
     score: NDArray[np.int32]
     baseline: Array
 
 
 def forest_of(model: Any) -> Forest:
     """Plain arrays of a fitted ``HistGradientBoosting`` model of scikit-learn, without categorical features."""
-    parts, roots, scores, start = [], [], [], 0
-    for stage in model._predictors:
-        for score, tree in enumerate(stage):
-            nodes = tree.nodes
-            leaf = nodes["is_leaf"].astype(bool)
-            parts.append((
-                np.where(leaf, -1, nodes["feature_idx"].astype(np.int64)),
-                np.where(leaf, nodes["value"], nodes["num_threshold"]),
-                np.where(leaf, 0, nodes["left"].astype(np.int64) + start),
-                np.where(leaf, 0, nodes["right"].astype(np.int64) + start),
-                nodes["missing_go_to_left"].astype(bool),
-            ))  # fmt: skip
-            roots.append(start)
-            scores.append(score)
-            start += len(nodes)
-    feature, threshold, left, right, missing = (np.concatenate(column) for column in zip(*parts, strict=True))
+    trees = [(score, tree.nodes) for stage in model._predictors for score, tree in enumerate(stage)]
+    parts, roots, start = [], [], 0
+    for _, nodes in trees:
+        parts.append(_side_by_side(nodes, start))
+        roots.append(start)
+        start += len(nodes)
+    feature, threshold, missing_right, child, value = (np.concatenate(column) for column in zip(*parts, strict=True))
     return Forest(
-        feature.astype(np.int32), threshold.astype(float), left.astype(np.int32), right.astype(np.int32), missing,
-        np.array(roots, dtype=np.int32), np.array(scores, dtype=np.int32),
-        np.ascontiguousarray(model._baseline_prediction, dtype=float).ravel(),
-    )  # fmt: skip
+        feature=feature.astype(np.int32),
+        threshold=threshold.astype(float),
+        missing_right=missing_right,
+        child=child.astype(np.int32),
+        value=value.astype(float),
+        roots=np.array(roots, dtype=np.int32),
+        depths=np.array([nodes["depth"].max() for _, nodes in trees], dtype=np.int32),
+        score=np.array([score for score, _ in trees], dtype=np.int32),
+        baseline=np.ascontiguousarray(model._baseline_prediction, dtype=float).ravel(),
+    )
+
+
+def _side_by_side(nodes: Any, start: int) -> tuple[Any, ...]:
+    """Columns of one tree's nodes, numbered from ``start`` and so that a right child follows its left sister."""
+    order, places = [0], [0]
+    while places:
+        node = nodes[places.pop(0)]
+        if not node["is_leaf"]:
+            pair = [int(node["left"]), int(node["right"])]
+            order += pair
+            places += pair
+    place = np.empty(len(nodes), dtype=np.int64)
+    place[order] = np.arange(len(nodes))
+    nodes = nodes[order]
+    leaf = nodes["is_leaf"].astype(bool)
+    return (
+        np.where(leaf, 0, nodes["feature_idx"].astype(np.int64)),
+        np.where(leaf, np.inf, nodes["num_threshold"]),
+        ~leaf & ~nodes["missing_go_to_left"].astype(bool),
+        start + np.where(leaf, np.arange(len(nodes)), place[nodes["left"].astype(np.int64)]),
+        nodes["value"],
+    )
 
 
 def constant_forest(baseline: Array) -> Forest:
     """A forest without trees: the same scores (n_scores,) for every row."""
-    none = np.zeros(0, dtype=np.int32)
-    return Forest(none, np.zeros(0), none, none, np.zeros(0, dtype=np.bool_), none, none, baseline)
+    none, numbers, truths = np.zeros(0, dtype=np.int32), np.zeros(0), np.zeros(0, dtype=np.bool_)
+    return Forest(none, numbers, truths, none, numbers, none, none, none, baseline)
+
+
+def joined(forests: tuple[Forest, ...]) -> Forest:
+    """One forest whose scores are those of several, in their order."""
+    nodes = np.cumsum([0, *(len(forest.feature) for forest in forests)])
+    counts = np.cumsum([0, *(len(forest.baseline) for forest in forests)])
+    moved = [
+        forest._replace(child=forest.child + start, roots=forest.roots + start, score=forest.score + first)
+        for forest, start, first in zip(forests, nodes[:-1].astype(np.int32), counts[:-1].astype(np.int32), strict=True)
+    ]
+    return Forest(*(np.concatenate(column) for column in zip(*moved, strict=True)))
 
 
 def forest_scores(forest: Forest, features: Array) -> Array:
     """Scores (n_rows, n_scores) of features (n_rows, n_features)."""
     out = np.empty((len(features), len(forest.baseline)))
-    if len(features) >= MANY_ROWS and get_num_threads() > 1:
-        _walk_in_parallel(*forest, features, out)
-    else:
-        _walk_all(*forest, features, out)
+    walk = _walk_blocks if len(features) >= FEW_ROWS else _walk_rows
+    walk(*forest, features, out)
     return out
 
 
@@ -81,57 +116,85 @@ def class_scores(forest: Forest, features: Array) -> Array:
     return np.concatenate([np.zeros_like(found), found], axis=1) if found.shape[1] == 1 else found
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def _walk(
     feature: NDArray[np.int32],
     threshold: Array,
-    left: NDArray[np.int32],
-    right: NDArray[np.int32],
-    missing_left: NDArray[np.bool_],
-    root: int,
-    row: Array,
-) -> float:
-    node = root
-    while feature[node] >= 0:
-        value = row[feature[node]]
-        goes_left = value <= threshold[node] or (missing_left[node] and np.isnan(value))
-        node = left[node] if goes_left else right[node]
-    return float(threshold[node])
+    missing_right: NDArray[np.bool_],
+    child: NDArray[np.int32],
+    value: Array,
+    roots: NDArray[np.int32],
+    depths: NDArray[np.int32],
+    score: NDArray[np.int32],
+    baseline: Array,
+    features: Array,
+    out: Array,
+) -> None:
+    """Scores of one block of rows."""
+    rows = len(features)
+    known = np.ascontiguousarray(features.T)
+    total = np.zeros((len(baseline), rows))
+    node = np.empty(rows, dtype=np.int32)
+    for tree in range(len(roots)):
+        node[:] = roots[tree]
+        for _ in range(depths[tree]):
+            for row in range(rows):
+                at = node[row]
+                seen = known[feature[at], row]
+                right = (seen > threshold[at]) | ((seen != seen) & missing_right[at])
+                node[row] = child[at] + np.int32(right)
+        sums = total[score[tree]]
+        for row in range(rows):
+            sums[row] += value[node[row]]
+    for row in range(rows):
+        for place in range(len(baseline)):
+            out[row, place] = baseline[place] + total[place, row]
 
 
 @njit(cache=True, nogil=True)
-def _walk_all(
+def _walk_blocks(
     feature: NDArray[np.int32],
     threshold: Array,
-    left: NDArray[np.int32],
-    right: NDArray[np.int32],
-    missing_left: NDArray[np.bool_],
+    missing_right: NDArray[np.bool_],
+    child: NDArray[np.int32],
+    value: Array,
     roots: NDArray[np.int32],
+    depths: NDArray[np.int32],
     score: NDArray[np.int32],
     baseline: Array,
     features: Array,
     out: Array,
 ) -> None:
+    """Scores of all rows, block by block."""
+    for block in range((len(features) + BLOCK - 1) // BLOCK):
+        start, stop = block * BLOCK, min(len(features), (block + 1) * BLOCK)
+        _walk(
+            feature, threshold, missing_right, child, value, roots, depths, score, baseline, features[start:stop],
+            out[start:stop],
+        )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def _walk_rows(
+    feature: NDArray[np.int32],
+    threshold: Array,
+    missing_right: NDArray[np.bool_],
+    child: NDArray[np.int32],
+    value: Array,
+    roots: NDArray[np.int32],
+    depths: NDArray[np.int32],
+    score: NDArray[np.int32],
+    baseline: Array,
+    features: Array,
+    out: Array,
+) -> None:
+    """Scores of all rows, row by row."""
     for row in range(len(features)):
         out[row] = baseline
         for tree in range(len(roots)):
-            out[row, score[tree]] += _walk(feature, threshold, left, right, missing_left, roots[tree], features[row])
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def _walk_in_parallel(
-    feature: NDArray[np.int32],
-    threshold: Array,
-    left: NDArray[np.int32],
-    right: NDArray[np.int32],
-    missing_left: NDArray[np.bool_],
-    roots: NDArray[np.int32],
-    score: NDArray[np.int32],
-    baseline: Array,
-    features: Array,
-    out: Array,
-) -> None:
-    for row in prange(len(features)):
-        out[row] = baseline
-        for tree in range(len(roots)):
-            out[row, score[tree]] += _walk(feature, threshold, left, right, missing_left, roots[tree], features[row])
+            node = roots[tree]
+            while child[node] != node:
+                seen = features[row, feature[node]]
+                right = seen > threshold[node] or (np.isnan(seen) and missing_right[node])
+                node = child[node] + np.int32(right)
+            out[row, score[tree]] += value[node]
