@@ -25,8 +25,8 @@ def test_clone_keeps_the_settings():
     copy = clone(original)
     assert copy.get_params() == original.get_params()
     assert not hasattr(copy, "scorers_")
-    with pytest.raises(ValueError, match="'depth' is no parameter"):
-        original.set_params(depth=3)
+    with pytest.raises(ValueError, match="'colour' is no parameter"):
+        original.set_params(colour=3)
 
 
 @pytest.mark.parametrize("classes", [2, 3])

@@ -17,8 +17,8 @@ from chaosgym.sweeps import LabelledSweep
 Array = NDArray[np.float64]
 
 TYPES = ("I", "II", "III")
-LEAST_ROWS = 50
-"""Rows that a sweep, and a nature among them, must have to be learned."""
+LEAST_ROWS, RARE = 50, 0.01
+"""Rows that a sweep must have to be learned, and share of them below which a nature is left out as too rare."""
 
 BLOCKS = 12
 """Without machines, the held-out rows are rectangles of a BLOCKS x BLOCKS board over the first two fields."""
@@ -88,7 +88,7 @@ def examples_of(sweep: LabelledSweep, seed: int) -> Examples:
     natures = np.array([str(value) for value in sweep.column("nature")])
     usable = np.isin(types, TYPES)
     for nature in np.unique(natures[usable]):
-        if np.sum(natures[usable] == nature) < min(LEAST_ROWS, 0.01 * usable.sum()):
+        if np.mean(natures[usable] == nature) < RARE:
             usable &= natures != nature
     if usable.sum() < LEAST_ROWS:
         raise DatasetError(f"only {usable.sum()} rows have a response type; at least {LEAST_ROWS} are needed to train")
