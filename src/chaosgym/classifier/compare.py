@@ -128,7 +128,7 @@ def outside_parameters(examples: Examples, classifier: ResponseClassifier, seed:
     """Share refused of held-out machines moved out of the range in one random field, and of those as they are."""
     generator = np.random.default_rng(seed)
     values = examples.values[examples.test]
-    low, high = examples.values[~examples.test].min(axis=0), examples.values[~examples.test].max(axis=0)
+    low, high = examples.ranges
     moved, field = values.copy(), generator.integers(0, values.shape[1], len(values))
     up = generator.random(len(values)) < 0.5
     by = generator.uniform(0.02, 0.5, len(values)) * (high - low)[field]

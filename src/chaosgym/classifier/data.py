@@ -52,6 +52,8 @@ class Examples:
         By window, (peaks, section, rows); empty if the sweep has none.
     left_out
         Rows of the sweep that are not used.
+    ranges
+        Lowest and highest value of each field, (n_fields,) each: those of the sweep's axes and of its rows.
     """
 
     machine: Machine
@@ -65,6 +67,7 @@ class Examples:
     clear: NDArray[np.bool_]
     signals: dict[str, tuple[Array, Array, NDArray[np.int64]]]
     left_out: int
+    ranges: tuple[Array, Array]
 
     def signals_where(self, chosen: NDArray[np.bool_]) -> dict[str, tuple[Array, Array, NDArray[np.int64]]]:
         """Signals of the rows that are chosen (n,)."""
@@ -109,8 +112,15 @@ def examples_of(sweep: LabelledSweep, seed: int) -> Examples:
         machine=machine(**sweep.settings["base"]), fields=fields, values=values, response_type=types[usable],
         nature=natures[usable], period=np.nan_to_num(sweep.column("period")[usable].astype(float)).astype(np.int64),
         groups=groups, test=test, clear=_clear(sweep, usable, natures[usable]), signals=signals,
-        left_out=int(np.sum(~usable)),
+        left_out=int(np.sum(~usable)), ranges=_ranges(sweep.settings, values),
     )  # fmt: skip
+
+
+def _ranges(settings: dict[str, Any], values: Array) -> tuple[Array, Array]:
+    spans = (*settings["axes"], *settings.get("patches", ()))
+    low = [min(span.get("low", seen), seen) for span, seen in zip(spans, values.min(axis=0), strict=True)]
+    high = [max(span.get("high", seen), seen) for span, seen in zip(spans, values.max(axis=0), strict=True)]
+    return np.array(low, dtype=float), np.array(high, dtype=float)
 
 
 def _clear(sweep: LabelledSweep, usable: NDArray[np.bool_], nature: NDArray[np.str_]) -> NDArray[np.bool_]:

@@ -145,7 +145,7 @@ def fit_parameters(
     return classifier.fit(
         examples.values[rows], examples.response_type[rows], nature=examples.nature[rows],
         period=examples.period[rows], peak_force=peaks[rows] if np.isfinite(peaks[rows]).any() else None,
-        groups=examples.groups[rows], ranges=(examples.values.min(axis=0), examples.values.max(axis=0)), tick=tick,
+        groups=examples.groups[rows], ranges=examples.ranges, tick=tick,
     )  # fmt: skip
 
 
