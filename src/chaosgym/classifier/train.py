@@ -212,8 +212,8 @@ def _card(sweep: LabelledSweep, examples: Examples, report: dict[str, Any], seed
         "machine": examples.machine.name,
         "base": {name: getattr(examples.machine, name) for name in parameters_of(examples.machine)},
         "fields": list(examples.fields),
-        "ranges": {name: [float(column.min()), float(column.max())]
-                   for name, column in zip(examples.fields, examples.values[training].T, strict=True)},
+        "ranges": {name: [float(low), float(high)]
+                   for name, low, high in zip(examples.fields, *examples.ranges, strict=True)},
         "data": {key: sweep.settings[key] for key in kept if key in sweep.settings},
         "rows": {
             "parameters": int(training.sum()),
