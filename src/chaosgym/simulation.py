@@ -18,10 +18,12 @@ from chaosgym.core import status
 from chaosgym.core.crank_stepper import SteppedCrankModel
 from chaosgym.core.crank_stepper import advance as advance_stepped_crank
 from chaosgym.core.fixed_step import advance_fixed_step
-from chaosgym.core.impact_beam import CycleArrays, Episode, advance, cycle_arrays
+from chaosgym.core.impact_beam import CycleArrays, Episode, ImpactBeamModel, advance, cycle_arrays
+from chaosgym.core.restitution import advance_restitution
 from chaosgym.core.slider_crank import advance as advance_slider_crank
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError, SimulationError
+from chaosgym.machines.crank_joints import sensor_peaks
 from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
@@ -76,7 +78,15 @@ class RungeKutta4:
         return replace(self, steps_per_cycle=2 * self.steps_per_cycle)
 
 
+TIGHTEST_EVENTS = ExactEvents(step_phase=0.25, event_tolerance=1e-13)
+"""The default of machines whose ``event_accuracy`` is "tightest"."""
+
 Integrator = ExactEvents | RungeKutta4
+
+
+def default_integrator(machine: Machine) -> ExactEvents:
+    """Integrator of a machine where none is given."""
+    return TIGHTEST_EVENTS if getattr(machine, "event_accuracy", "standard") == "tightest" else ExactEvents()
 
 
 class MotionState(NamedTuple):
@@ -174,6 +184,12 @@ _PER_CYCLE = (
 )  # fmt: skip
 
 
+def batch_arrays(machine: Machine, count: int, cycles: int) -> CycleArrays:
+    """Return arrays for the kernels that run ``count`` variants of a machine: one more axis, the machines, in front."""
+    one = cycle_arrays(cycles, _states(machine))
+    return CycleArrays(*(np.empty((count, *array.shape), array.dtype) for array in one))
+
+
 def _record(machine: Machine, arrays: CycleArrays, final_state: MotionState) -> CycleRecord:
     return CycleRecord(
         machine=machine,
@@ -201,14 +217,20 @@ def _run_impact_beam(
     arrays = cycle_arrays(cycles, 2 * beam.n_modes, samples)
     coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
+    along = () if tangents is None else (tangents,)
+    motion = (model, coordinates, episode, arrays)
     if isinstance(integrator, ExactEvents):
         settings = (integrator.step_phase, integrator.event_tolerance, integrator.event_budget)
-        if tangents is None:
-            outcome, done = advance(model, coordinates, episode, arrays, *settings)
+        if isinstance(model, ImpactBeamModel):
+            outcome, done = advance(*motion, *settings, *along)
         else:
-            outcome, done = advance(model, coordinates, episode, arrays, *settings, tangents)
+            outcome, done = advance_restitution(*motion, integrator.step_phase, integrator.event_budget, *along)
+    elif isinstance(model, ImpactBeamModel):
+        outcome, done = advance_fixed_step(*motion, integrator.steps_per_cycle)
     else:
-        outcome, done = advance_fixed_step(model, coordinates, episode, arrays, integrator.steps_per_cycle)
+        raise ParameterError(
+            f"integrator = {integrator} does not run contact_law = 'restitution'; allowed: ExactEvents(...)"
+        )
     return outcome, done, _record(beam, arrays, MotionState(coordinates, bouncing))
 
 
@@ -219,7 +241,8 @@ def _run_slider_crank(
         raise ParameterError(f"integrator = {integrator} does not run a slider crank; allowed: ExactEvents(...)")
     # its peaks and events are refined on the exact motion, so its steps may be twice as long as the beam's
     model = crank.reduce(2.0 * integrator.step_phase)
-    arrays = cycle_arrays(cycles, 2 * len(crank.degrees_of_freedom), samples, travels=True)
+    channels = len(model.gap) if crank.sensors else 0
+    arrays = cycle_arrays(cycles, 2 * len(crank.degrees_of_freedom), samples, travels=True, channels=channels)
     coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
     tolerance, budget = integrator.event_tolerance / model.contact_rate, integrator.event_budget
@@ -229,6 +252,7 @@ def _run_slider_crank(
         _record(crank, arrays, MotionState(coordinates, bouncing)),
         peak_phase=arrays.peak_instant * crank.crank_rate,
         peak_vector=arrays.peak_vector,
+        sensor_peak=sensor_peaks(crank, arrays.channel_peak) if crank.sensors else None,
     )
     return outcome, done, record
 
@@ -243,7 +267,11 @@ _RUNS: dict[str, tuple[_Run, Callable[[Any], int]]] = {
 
 def rest_state(machine: Machine) -> MotionState:
     """Return the state of rest in the middle of the gap."""
-    return MotionState(np.zeros(_RUNS[machine.name][1](machine)), np.zeros(3))
+    return MotionState(np.zeros(_states(machine)), np.zeros(3))
+
+
+def _states(machine: Machine) -> int:
+    return _RUNS[machine.name][1](machine)
 
 
 def _initial(machine: Machine, given: MotionState | ArrayLike | None) -> MotionState:
@@ -304,7 +332,7 @@ def simulate(
     cycles = _count("cycles", cycles, 1)
     transient = _count("transient", transient, 0)
     samples_per_cycle = _count("samples_per_cycle", samples_per_cycle, 0)
-    integrator = integrator or ExactEvents()
+    integrator = integrator or default_integrator(machine)
     state = _initial(machine, initial_state)
     run, _ = _RUNS[machine.name]
     first = 0
@@ -357,7 +385,7 @@ def simulate_with_deviations(
             f"deviations have shape {vectors.shape}; allowed: (m, {len(state.coordinates)}), all values finite"
         )
     log_growth = np.empty((cycles, len(vectors) if orthonormal else 0))
-    integrator = integrator or ExactEvents()
+    integrator = integrator or default_integrator(machine)
     outcome, done, record = _run_impact_beam(
         machine, state, cycles, 0, integrator, Tangents(vectors, log_growth)
     )  # fmt: skip

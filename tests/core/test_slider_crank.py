@@ -11,7 +11,6 @@ from chaosgym.core.impact_beam import Episode, cycle_arrays
 from chaosgym.core.slider_crank import advance
 from chaosgym.errors import SimulationError
 from chaosgym.machines.crank_equations import equations
-from chaosgym.machines.crank_model import series_span
 from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.simulation import ExactEvents, simulate
 from tests.core.crank_twin import continuous_twin, rigid_twin
@@ -72,8 +71,8 @@ def frozen_model(machine, duration):
     spectrum = 2.0 * model.contact_rate
     table = propagator_table(acceleration, duration / 2, step, series_order(spectrum * step))
     return model._replace(
-        bin_duration=duration / 2, steps=steps, span=series_span(spectrum, step), acceleration=acceleration,
-        propagator=table, curvature=model.row @ acceleration,
+        bin_duration=duration / 2, steps=steps, order=series_order(spectrum * step), spectrum=spectrum,
+        acceleration=acceleration, propagator=table, curvature=model.row @ acceleration,
     )  # fmt: skip
 
 

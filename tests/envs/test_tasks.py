@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from chaosgym.design.fatigue import statistical_life
 from chaosgym.envs.tasks import Status, Step, Task, damage_of, does_not_repeat
 from chaosgym.errors import ParameterError
 
@@ -58,6 +59,13 @@ def test_damage_is_the_basic_rating_life() -> None:
     half = damage_of(np.full((1000, 2), 30.0), load_rating=60.0, acceleration=1000.0)
     assert full == pytest.approx([1.0, 1.0])
     assert full / half == pytest.approx([2 ** (10 / 3)] * 2)
+
+
+def test_an_agent_and_a_designer_see_the_same_life() -> None:
+    """Forces that vary from cycle to cycle break the bearing in a job after the life of eq. 5.4."""
+    forces = np.random.default_rng(3).uniform(20.0, 90.0, 500)
+    million_lives = damage_of(forces[:, None], load_rating=70.0, acceleration=1e6 / len(forces))
+    assert 1.0 / million_lives == pytest.approx([statistical_life(forces, 70.0)], rel=1e-12)
 
 
 def test_terms_add_up_to_the_reward() -> None:

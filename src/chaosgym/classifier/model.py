@@ -109,10 +109,13 @@ class ResponseClassifier:
                         f"{name} = {value:g} {unit} is outside what the classifier was trained on; "
                         f"allowed: {low:g} to {high:g} {unit}"
                     )
-            elif value != self.card["base"][name]:
+                continue
+            # a field that is younger than the classifier had its default value then
+            trained = self.card["base"].get(name, getattr(type(machine), name))
+            if value != trained:
                 raise ParameterError(
                     f"{name} = {value} differs from the classifier's training machine; allowed: "
-                    f"{self.card['base'][name]}. Use `chaosgym diagnose`, or train a classifier on such machines"
+                    f"{trained}. Use `chaosgym diagnose`, or train a classifier on such machines"
                 )
         row = np.array([[getattr(machine, name) for name in self.fields]])
         chances = self.predict_proba(row)[0]

@@ -27,12 +27,14 @@ _previous_cache_folder = config.CACHE_DIR
 config.CACHE_DIR = KERNEL_CACHE
 try:
     from chaosgym.core import (  # noqa: F401
+        batch,
         contact,
         crank_propagator,
         crank_stepper,
         fixed_step,
         impact_beam,
         propagator,
+        restitution,
         slider_crank,
         status,
         tangent,

@@ -33,7 +33,7 @@ from chaosgym.core.crank_contact import (
     polynomial,
     surfaces,
 )
-from chaosgym.core.crank_propagator import FORCING_TERMS, evaluate, expand, propagate
+from chaosgym.core.crank_propagator import FORCING_TERMS, evaluate, expand, order_for, propagate
 from chaosgym.core.crank_record import (
     begin_cycle,
     column_of,
@@ -67,8 +67,10 @@ class SliderCrankModel(NamedTuple):
         Exact steps in a bin without events.
     contact_rate : float
         Angular frequency of the masses next to the closed contacts [rad/s].
-    span : (order + 1,)
-        Longest time [s] that a Taylor series of each order sums to round-off; the last one covers a step.
+    order : int
+        Order of the Taylor series that sums a step to round-off.
+    spectrum : float
+        Largest modulus of an eigenvalue of the motion [1/s].
     row : (m, n)
         Displacement of each channel per unit coordinate.
     gap, stiffness, damping : (m,)
@@ -95,7 +97,8 @@ class SliderCrankModel(NamedTuple):
     bin_duration: float
     steps: int
     contact_rate: float
-    span: np.ndarray
+    order: int
+    spectrum: float
     row: np.ndarray
     gap: np.ndarray
     stiffness: np.ndarray
@@ -145,7 +148,7 @@ class Motion(NamedTuple):
 def motion_of(model):
     """Space for a motion."""
     size, n = model.acceleration.shape[3], model.acceleration.shape[2]
-    m, order = model.row.shape[0], model.span.shape[0] - 1
+    m, order = model.row.shape[0], model.order
     return Motion(
         np.zeros(size), np.zeros(size), np.zeros(m), np.zeros((3, m)), np.zeros((3, m)), np.zeros((3, m)),
         np.zeros((order + 1, n + m)), np.zeros(m), np.zeros(m), np.zeros((2, 5)),
@@ -279,15 +282,6 @@ def quiet_steps(
 
 
 @leaf
-def order_for(span, h):
-    """Order of the Taylor series that covers a time h."""
-    last = 4
-    while span[last] < h:
-        last += 1
-    return last
-
-
-@leaf
 def write_samples(display, surface, side, z, spare, series, last, since, until, spacing, sample, history):
     """Write the samples of a revolution that fall into the expanded step [since, until); the number of the next one.
 
@@ -365,13 +359,13 @@ def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
     """
     z, moved, side, start, end, spare = motion.z, motion.moved, motion.side, motion.start, motion.end, motion.spare
     series, until, towards = motion.series, motion.until, motion.towards
-    row, display, span, acceleration = model.row, model.display, model.span, model.acceleration
+    row, display, acceleration = model.row, model.display, model.acceleration
     propagator, curvatures = model.propagator, model.curvature
     history, impacts, bounce_time = arrays.history[cycle], arrays.impacts[cycle], arrays.bounce_time[cycle]
     channel_peak, contact_time = arrays.channel_peak[cycle], arrays.contact_time[cycle]
     peak = motion.peak
     peak[:] = 0.0
-    n, duration, steps, order = row.shape[1], model.bin_duration, model.steps, span.shape[0] - 1
+    n, duration, steps, order = row.shape[1], model.bin_duration, model.steps, model.order
     step = duration / steps
     bins = acceleration.shape[1]
     spacing = bins * duration / max(history.shape[0], 1)
@@ -408,7 +402,7 @@ def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
                 if taken == limit:
                     continue
             h = (done + 1) * step - time
-            last = order_for(span, h)
+            last = order_for(model.spectrum * h, order)
             expand(acceleration[chosen, b], row, z, duration, last, series)
             changed, h = careful_step(
                 surface, side, start, end, spare, series, last, until, towards, begin + time, h,

@@ -5,8 +5,9 @@ r"""How long does a bearing surface last under forces that vary from cycle to cy
     1 / L = sum p_i / L_i                  (5.4)  Palmgren-Miner over the distribution of forces
     C = [L sum p_i F_i^p]^(1/p)            (5.5)
 
-(5.4) and (5.5) are (5.2) and (5.3) with the equivalent force F_eq = (sum p_i F_i^p)^(1/p). The conservative life takes
-the largest force instead. p = 10/3 for line contact, 3 in figure 5.12 and for point contact.
+The law itself is in ``life_law``. (5.4) and (5.5) are (5.2) and (5.3) with the equivalent force
+F_eq = (sum p_i F_i^p)^(1/p). The conservative life takes the largest force instead. p = 10/3 for line contact,
+3 in figure 5.12 and for point contact.
 
 A cycle counts once, by its peak. ``equivalent_force_of_history`` counts every impact of a time history instead, by
 rainflow counting.
@@ -26,11 +27,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.design.statistics import as_forces
 from chaosgym.errors import DesignError
+from chaosgym.life_law import LIFE_EXPONENT, damage_in_a_million
 
 Array = NDArray[np.float64]
-
-LIFE_EXPONENT = 10.0 / 3.0
-"""Exponent p of eq. 5.2, line contact."""
 
 CUBIC_EXPONENT = 3.0
 """Exponent of figure 5.12 and of the 25 % criterion (5.5.2), point contact."""
@@ -46,7 +45,8 @@ def rating_life(force: float, load_rating: float, exponent: float = LIFE_EXPONEN
     """Life [10^6 cycles] under a constant force [N], eq. 5.2; infinite without force."""
     _positive("load_rating", load_rating, " N")
     _positive("exponent", exponent, "")
-    return math.inf if force == 0.0 else float((load_rating / force) ** exponent)
+    damage = float(damage_in_a_million(np.asarray(force, dtype=float), load_rating, exponent))
+    return math.inf if damage == 0.0 else 1.0 / damage
 
 
 def required_load_rating(force: float, life: float, exponent: float = LIFE_EXPONENT) -> float:

@@ -8,12 +8,18 @@ ENVIRONMENTS = {
 }
 """Entry point of each environment by id. A new machine adds one line."""
 
+VECTOR_ENVIRONMENTS = {
+    "chaosgym/ImpactBeam-v0": "chaosgym.envs.impact_beam:ImpactBeamVectorEnv",
+    "chaosgym/SliderCrank-v0": "chaosgym.envs.slider_crank:SliderCrankVectorEnv",
+}
+"""Entry point of each native vector environment by id."""
+
 
 def register_environments() -> None:
     """Make the environments known to ``gymnasium.make``; calling it again does nothing."""
     for name, entry_point in ENVIRONMENTS.items():
         if name not in registry:
-            register(id=name, entry_point=entry_point)
+            register(id=name, entry_point=entry_point, vector_entry_point=VECTOR_ENVIRONMENTS[name])
 
 
 register_environments()

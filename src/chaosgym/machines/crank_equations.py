@@ -57,7 +57,10 @@ SLIDER_ACROSS = "slider across the guide"
 SLIDER_PITCH = "slider pitch"
 BALL_LATERAL = "ball sideways"
 SLIDER_LATERAL = "slider sideways"
+SLIDER_ROLL = "slider roll"
+SLIDER_YAW = "slider yaw"
 BALL_DIRECTIONS = (BALL_ALONG, BALL_ACROSS, BALL_LATERAL)
+SLIDER_TURNS = (SLIDER_ROLL, SLIDER_YAW, SLIDER_PITCH)
 
 
 def degrees_of_freedom(machine: "SliderCrank", spatial: bool = False) -> tuple[str, ...]:
@@ -76,7 +79,7 @@ def degrees_of_freedom(machine: "SliderCrank", spatial: bool = False) -> tuple[s
         names.append(SLIDER_ACROSS)
         names += [SLIDER_LATERAL] if spatial else []
     if machine.slider_joint == "instrumented":
-        names.append(SLIDER_PITCH)
+        names += SLIDER_TURNS if spatial else (SLIDER_PITCH,)
     if machine.rod == "flexible":
         names += [f"rod mode {i + 1}" for i in range(machine.n_modes)]
         names += [f"sideways rod mode {i + 1}" for i in range(machine.n_modes)] if spatial else []
@@ -272,6 +275,8 @@ def equations(machine: "SliderCrank", crank_angle: Array, rod: ConnectingRod | N
     inertial = -acceleration * gyroscopic - rate**2 * translating
     if machine.geometric_stiffness == "on":
         geometric = embedded(_geometric_stiffness(machine, rod, motion.phi, inertia, load))
+        # the slider's centre of gravity is off its pivot and turns with it
+        geometric[..., -1, -1] = -machine.slider_mass * (x * inertia.slider_along + y * inertia.slider_across)
         static = static + geometric[0]
         inertial = inertial + geometric[1]
     gyro = -2.0 * rate * gyroscopic

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.core.crank_propagator import FORCING_TERMS, SERIES_PHASE, SQUARINGS, propagator_table, series_order
+from chaosgym.core.crank_propagator import FORCING_TERMS, SQUARINGS, propagator_table, series_order
 from chaosgym.core.crank_stepper import HERTZ, LINEAR, SteppedCrankModel
 from chaosgym.core.slider_crank import PIECES, SliderCrankModel
 from chaosgym.machines.crank_equations import Equations, equations, rod_of
@@ -36,6 +36,9 @@ MAX_PHASE = 8.0
 
 STABLE_PHASE = 2.0
 """Longest Runge-Kutta step times largest eigenvalue; the method is stable up to 2.7."""
+
+STEP_PHASE = 1.0
+"""Angle [rad] by which a closed contact turns in a piece of a step, by default."""
 
 MAX_SETS = 32
 """Contact sets for which propagators are made; a machine with more is left to the stepper."""
@@ -86,12 +89,25 @@ def has_propagators(machine: "SliderCrank") -> bool:
     return int(_radix(machine) ** len(gaps_of(machine))) <= MAX_SETS
 
 
+class ModelsBySpeed:
+    """Models of a machine that ``has_propagators`` at any speed, without its clearances.
+
+    A closed contact turns by ``step_phase`` [rad] in a piece of a step.
+    """
+
+    def __init__(self, machine: "SliderCrank", step_phase: float = STEP_PHASE) -> None:
+        self._structure = _key(machine)
+        self._step_phase = step_phase
+
+    def at(self, crank_speed: float) -> SliderCrankModel:
+        """Return the model at a speed [rpm]; its gaps are zero."""
+        key = (crank_speed, self._step_phase, self._structure)
+        return _recent.get(key, lambda: _at_speed(crank_speed, self._step_phase, _structure(*self._structure)))
+
+
 def exact_model(machine: "SliderCrank", step_phase: float) -> SliderCrankModel:
     """Model of a machine that ``has_propagators``; a contact turns by ``step_phase`` [rad] in a piece of a step."""
-    structure = _key(machine)
-    key = (machine.crank_speed, step_phase, structure)
-    model = _recent.get(key, lambda: _at_speed(machine.crank_speed, step_phase, _structure(*structure)))
-    return model._replace(gap=gaps_of(machine))
+    return ModelsBySpeed(machine, step_phase).at(machine.crank_speed)._replace(gap=gaps_of(machine))
 
 
 def _radix(machine: "SliderCrank") -> int:
@@ -279,7 +295,8 @@ def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> Slide
         bin_duration=duration,
         steps=steps,
         contact_rate=parts.contact,
-        span=series_span(parts.spectrum, step),
+        order=series_order(parts.spectrum * step),
+        spectrum=parts.spectrum,
         row=parts.channels.row,
         gap=np.zeros(m),
         stiffness=parts.channels.stiffness,
@@ -293,10 +310,3 @@ def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> Slide
         curvature=np.ascontiguousarray(parts.channels.row @ acceleration),
         propagator=propagator_table(acceleration, duration, step, series_order(parts.spectrum * step / 2**SQUARINGS)),
     )
-
-
-def series_span(spectrum: float, step: float) -> Array:
-    """Longest time [s] that a Taylor series of each order sums to round-off, up to the order that covers a step."""
-    span = SERIES_PHASE[: series_order(spectrum * step) + 1] / spectrum
-    span[-1] = math.inf
-    return np.asarray(span)

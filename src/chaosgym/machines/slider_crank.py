@@ -21,7 +21,7 @@ P. Gu, Chaotic Vibration in Machine Systems and Its Implications for Design, PhD
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy.linalg
@@ -31,7 +31,9 @@ from chaosgym.core.crank_stepper import SteppedCrankModel
 from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.errors import ParameterError
 from chaosgym.machines.crank_equations import SLIDER_ACROSS, degrees_of_freedom, equations
-from chaosgym.machines.crank_model import exact_model, has_propagators, stepped_model
+from chaosgym.machines.crank_joints import sensors_of
+from chaosgym.machines.crank_model import STEP_PHASE, exact_model, has_propagators, stepped_model
+from chaosgym.machines.fidelity import FidelityLadder
 from chaosgym.machines.kinematics import slider_position
 from chaosgym.machines.parameters import parameter, validate
 
@@ -42,7 +44,7 @@ _STEEL = "steel"
 
 
 @dataclass(frozen=True, kw_only=True)
-class SliderCrank:
+class SliderCrank(FidelityLadder):
     """The Spatial Slider Crank; the defaults are the planar mechanism of the thesis with clearance at the slider.
 
     Raises
@@ -50,6 +52,13 @@ class SliderCrank:
     ParameterError
         On construction, if a field is outside its range; names the field, the value and the range.
     """
+
+    fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "rigid": {"rod": "rigid", "matrix_update_interval": 5.0},
+        "flexible-5deg": {"rod": "flexible", "matrix_update_interval": 5.0},
+        "flexible-1deg": {"rod": "flexible", "matrix_update_interval": 1.0},
+        "reference": {"rod": "flexible", "matrix_update_interval": 0.25},
+    }
 
     name: ClassVar[str] = "slider-crank"
     speed_field: ClassVar[str] = "crank_speed"
@@ -123,6 +132,13 @@ class SliderCrank:
         2e-4, unit="kg m^2", low=1e-9, high=10.0, provenance="assumed", source="a block 100 mm long"
     )
     """Moment of inertia of the slider about its pivot, in the plane of the mechanism [kg m^2]."""
+    slider_roll_inertia: float = parameter(
+        6e-5, unit="kg m^2", low=1e-9, high=10.0, provenance="assumed", source="a block 40 mm wide and high"
+    )
+    """Moment of inertia of the slider about the guide [kg m^2], which matters at a motor angle alone.
+
+    About the vertical it has the pitch inertia: it is as wide as it is high.
+    """
     slider_offset_along: float = parameter(0.0, unit="m", low=-0.1, high=0.1, provenance="assumed", source="symmetry")
     """Centre of gravity of the slider from its pivot along the guide [m]."""
     slider_offset_across: float = parameter(0.0, unit="m", low=-0.1, high=0.1, provenance="assumed", source="symmetry")
@@ -130,7 +146,7 @@ class SliderCrank:
     slider_joint: str = parameter(
         "clearance", choices=("ideal", "clearance", "instrumented"), provenance="printed", source="thesis 4.3.2"
     )
-    """"ideal": tight; "clearance": one gap above and below the pivot; "instrumented": two stations of sensors."""
+    """"ideal": tight; "clearance": one gap around the pivot; "instrumented": eight sensors at two stations."""
     ball_joint: str = parameter(
         "ideal", choices=("ideal", "spherical", "instrumented"), provenance="printed", source="thesis 4.3.2"
     )
@@ -157,6 +173,10 @@ class SliderCrank:
         0.040, unit="m", low=1e-3, high=0.5, provenance="assumed", source="bearing length of about 100 mm"
     )
     """From the slider pivot to either station of an instrumented slider joint, along the guide [m]."""
+    sensor_offset: float = parameter(
+        0.006, unit="m", low=0.0, high=0.1, provenance="assumed", source="thesis 4.2: off-center, no size in print"
+    )
+    """From the middle of the guide's face to a sensor, across the guide [m]; matters at a motor angle alone."""
     ball_sensor_angle: float = parameter(
         -90.0, unit="deg", low=-180.0, high=180.0, provenance="calibrated",
         source="impacts from 100 and from 300 deg on, figure 4.10",
@@ -195,7 +215,8 @@ class SliderCrank:
     )
     """Crank angle over which mass, damping and stiffness matrices are held [deg]; divides 360."""
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, fidelity: str | None) -> None:
+        super().__post_init__(fidelity)
         validate(self)
         if self.rod_length <= self.crank_radius:
             raise ParameterError(
@@ -215,23 +236,26 @@ class SliderCrank:
         for body in ("housing", "yoke", "slider"):
             field = "slider_pitch_inertia" if body == "slider" else f"{body}_inertia"
             offset = math.hypot(getattr(self, f"{body}_offset_along"), getattr(self, f"{body}_offset_across"))
-            least = getattr(self, f"{body}_mass") * offset**2
-            if getattr(self, field) < least:
-                raise ParameterError(
-                    f"{field} = {getattr(self, field):g} kg m^2 is out of range; "
-                    f"allowed: from mass times squared offset, {least:g} kg m^2, on"
-                )
-        if self.is_spatial and self.slider_joint == "instrumented":
+            self._check_inertia(field, getattr(self, f"{body}_mass") * offset**2)
+        if self.is_spatial:
+            self._check_inertia("slider_roll_inertia", self.slider_mass * self.slider_offset_across**2)
+
+    def _check_inertia(self, field: str, least: float) -> None:
+        if getattr(self, field) < least:
             raise ParameterError(
-                "slider_joint = 'instrumented' needs a motor at 0 deg; allowed at an angle: 'ideal', 'clearance'"
+                f"{field} = {getattr(self, field):g} kg m^2 is out of range; "
+                f"allowed: from mass times squared offset, {least:g} kg m^2, on"
             )
-        if self.is_spatial and self.geometric_stiffness == "on":
-            raise ParameterError("geometric_stiffness = 'on' needs a motor at 0 deg; allowed at an angle: 'off'")
 
     @property
     def cycle_period(self) -> float:
         """Duration of one revolution [s]."""
-        return 60.0 / self.crank_speed
+        return float(self.period_at(self.crank_speed))
+
+    @staticmethod
+    def period_at(speed: Any) -> Any:
+        """Duration of one operating cycle [s] at a speed [rpm], or at many."""
+        return 60.0 / speed
 
     @property
     def crank_rate(self) -> float:
@@ -271,6 +295,11 @@ class SliderCrank:
         return np.degrees(np.arctan2(force[:, 1], force[:, 0])), "deg"
 
     @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the force sensors of the instrumented joints; ``CycleRecord.sensor_peak`` has their columns."""
+        return sensors_of(self)
+
+    @property
     def clearance_field(self) -> str:
         """Field that holds the clearance of the monitored joint."""
         return f"{self.monitored_joint}_clearance"
@@ -290,7 +319,7 @@ class SliderCrank:
         """True if the motor stands at an angle, so that the rod swings in two planes."""
         return self.motor_angle > 0.0
 
-    def reduce(self, step_phase: float = 1.0) -> SliderCrankModel | SteppedCrankModel:
+    def reduce(self, step_phase: float = STEP_PHASE) -> SliderCrankModel | SteppedCrankModel:
         """Return the model in whose steps changes of contact are searched for every ``step_phase`` [rad] of a contact.
 
         With exact propagators if contact is linear and does not turn with the ball, for the Runge-Kutta stepper

@@ -1,0 +1,25 @@
+r"""What does a cycle cost a bearing surface? The basic rating life, the one law behind every life and every damage.
+
+    L = (C / F)^p                          life in millions of cycles under a constant peak force F (thesis eq. 5.2)
+    1 / L = (F / C)^p                      damage: lives used up in a million cycles
+
+References
+----------
+ISO 281:2007, Rolling bearings - Dynamic load ratings and rating life.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LIFE_EXPONENT = 10.0 / 3.0
+"""Exponent p of eq. 5.2, line contact."""
+
+
+def damage_in_a_million(force: Array, load_rating: float, exponent: float = LIFE_EXPONENT) -> Array:
+    """Lives that a million cycles with each of the peak forces [N] use up.
+
+    ``load_rating`` C [N] is the force under which a surface lasts a million cycles.
+    """
+    return np.asarray((force / load_rating) ** exponent)

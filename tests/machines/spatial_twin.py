@@ -1,0 +1,134 @@
+"""The rigid slider crank in space once more, without any linearisation: exact positions of its particles."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from chaosgym.machines.kinematics import crank_pin
+
+STENCIL = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
+SECOND = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560])
+POINTS = np.arange(-4, 5)
+ANGLE_STEP, SHIFT = 0.02, 1e-3
+
+
+class Equations(NamedTuple):
+    """Linearised equations: M, D and K per powers of the crank rate, and the load, as in ``crank_equations``."""
+
+    mass: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    load: np.ndarray
+
+
+class RigidMechanism:
+    """A tight ball joint, and a slider that moves by q = (y, z) or (y, z, roll, yaw, pitch)."""
+
+    def __init__(self, machine, coordinates):
+        self.machine, self.size = machine, coordinates
+        gauss, weight = np.polynomial.legendre.leggauss(3)
+        self.share = 0.5 * (1.0 + gauss)
+        bar = machine.density * math.pi * machine.rod_diameter**2 / 4 * machine.rod_length
+        offsets = [
+            math.hypot(getattr(machine, f"{body}_offset_along"), getattr(machine, f"{body}_offset_across"))
+            for body in ("housing", "yoke")
+        ]
+        bodies = [machine.housing_mass, machine.yoke_mass, machine.slider_mass]
+        central = [
+            machine.housing_inertia - machine.housing_mass * offsets[0] ** 2,
+            machine.yoke_inertia - machine.yoke_mass * offsets[1] ** 2,
+        ]
+        self.mass = np.concatenate([0.5 * weight * bar, bodies, central])
+        up = math.radians(machine.gravity_angle)
+        self.weight = machine.gravity * np.array([-math.sin(up), math.cos(up), 0.0]) * np.ones((len(self.mass), 1))
+        self.weight[-2:] = 0.0
+        along, across = machine.slider_offset_along, machine.slider_offset_across
+        pitch = machine.slider_pitch_inertia - machine.slider_mass * (along**2 + across**2)
+        self.turning = np.diag([0.0, 0.0, machine.slider_roll_inertia - machine.slider_mass * across**2, pitch, pitch])
+        self.turning = self.turning[:coordinates, :coordinates]
+
+    def places(self, theta, q):
+        """Positions (B, k, 3) of bar points, housing, yoke, slider, and the unit vectors along rod and yoke."""
+        machine = self.machine
+        pin = crank_pin(theta, machine.crank_radius, math.radians(machine.motor_angle))
+        y, z = q[:, 0] - pin[:, 1], q[:, 1] - pin[:, 2]
+        x = pin[:, 0] + np.sqrt(machine.rod_length**2 - y**2 - z**2)
+        pivot = np.stack([x, q[:, 0], q[:, 1]], axis=1)
+        turn = Rotation.from_rotvec(q[:, 2:5] if self.size == 5 else np.zeros((len(theta), 3)))
+        along = (pivot - pin) / machine.rod_length
+        axis = turn.apply([0.0, 0.0, 1.0])
+        yoke = along - np.sum(along * axis, axis=1)[:, None] * axis
+        yoke /= np.linalg.norm(yoke, axis=1)[:, None]
+        across = np.cross(axis, yoke)
+        bar = pin[:, None] + machine.rod_length * self.share[:, None] * along[:, None]
+        bodies = [
+            pin + machine.housing_offset_along * along + machine.housing_offset_across * across,
+            pivot + machine.yoke_offset_along * yoke + machine.yoke_offset_across * across,
+            pivot + turn.apply([machine.slider_offset_along, machine.slider_offset_across, 0.0]),
+            along,
+            yoke,
+        ]
+        return np.concatenate([bar, np.stack(bodies, axis=1)], axis=1)
+
+    def jacobian(self, theta, q):
+        """(k, 3, m) at one angle and position."""
+        shifts = (SHIFT * POINTS[:, None, None] * np.eye(self.size)).reshape(-1, self.size)
+        around = self.places(np.full(len(shifts), theta), q + shifts).reshape(9, self.size, -1, 3)
+        return np.einsum("p,pjki->kij", STENCIL / SHIFT, around)
+
+    def along_path(self, theta, q, angle_rate, q_rate):
+        """Second derivative (k, 3) of the positions along a straight path of theta and q."""
+        step = ANGLE_STEP / abs(angle_rate)
+        around = self.places(theta + step * POINTS * angle_rate, q + step * POINTS[:, None] * q_rate)
+        return np.einsum("p,pki->ki", SECOND / step**2, around)
+
+    def linearised(self, theta):
+        """``Equations`` about the nominal motion at one crank angle."""
+        rest, none = np.zeros(self.size), np.zeros(self.size)
+        shape = self.jacobian(theta, rest)
+        around = np.stack([self.jacobian(theta + ANGLE_STEP * k, rest) for k in POINTS])
+        turning = np.einsum("p,pkij->kij", STENCIL / ANGLE_STEP, around)
+
+        def load(q):
+            there = self.jacobian(theta, q)
+            forces = [self.weight, self.along_path(theta, q, 1.0, none)]
+            return np.stack([np.einsum("k,ki,kij->j", self.mass, force, there) for force in forces])
+
+        slopes = [
+            sum(STENCIL[k] / SHIFT * load(SHIFT * POINTS[k] * axis) for k in range(9)) for axis in np.eye(self.size)
+        ]
+        stiffness = np.stack(slopes, axis=-1)
+        return Equations(
+            mass=np.einsum("k,kia,kib->ab", self.mass, shape, shape) + self.turning,
+            damping=2.0 * np.einsum("k,kia,kib->ab", self.mass, shape, turning),
+            stiffness=np.stack([stiffness[0], stiffness[1]]),
+            load=load(rest),
+        )
+
+    def run(self, instants):
+        """Motion (len(instants), 2) of the slider from rest, pressed by its guide in both directions; DOP853."""
+        machine = self.machine
+        rate, gap = machine.crank_rate, machine.slider_clearance
+        k, d = machine.contact_stiffness, machine.contact_damping
+
+        def slope(t, state):
+            q, q_rate = state[:2], state[2:]
+            there = self.jacobian(rate * t, q)
+            inertia = self.along_path(rate * t, q, rate, q_rate) + self.weight
+            force = -np.einsum("k,ki,kij->j", self.mass, inertia, there)
+            for axis in range(2):
+                side = math.copysign(1.0, q[axis])
+                force[axis] -= (
+                    side * max(0.0, k * (side * q[axis] - gap) + d * side * q_rate[axis]) * (side * q[axis] > gap)
+                )
+            mass = np.einsum("k,kia,kib->ab", self.mass, there, there)
+            return np.concatenate([q_rate, np.linalg.solve(mass, force)])
+
+        run = solve_ivp(
+            slope, (0.0, instants[-1]), np.zeros(4), method="DOP853", t_eval=instants, rtol=1e-8, atol=1e-12,
+            max_step=2e-4,
+        )  # fmt: skip
+        return run.y[:2].T
