@@ -46,37 +46,51 @@ MAX_SETS = 32
 KEPT = 32
 """Machines whose assembled equations are kept, whatever their speed and clearance."""
 
+KEPT_STRUCTURES = 1024
+"""Machines whose models are looked up by speed alone."""
+
+TABLES = ("acceleration", "curvature", "propagator")
+"""Large arrays of a model."""
+
 KEPT_BYTES = 256_000_000
 """Memory for the propagators of machines at one speed; those used longest ago go first."""
 
 _NOT_IN_THE_MATRICES = ("crank_speed", "slider_clearance", "ball_clearance")
 
 
+class KeptModel(NamedTuple):
+    """A model without its clearances, and the addresses of its large ``TABLES``, which live as long as it does."""
+
+    model: SliderCrankModel
+    addresses: tuple[int, ...]
+
+
 class _RecentModels:
     """Models by key within ``KEPT_BYTES``; several threads may ask at once."""
 
     def __init__(self) -> None:
-        self._models: OrderedDict[Hashable, SliderCrankModel] = OrderedDict()
+        self._models: OrderedDict[Hashable, KeptModel] = OrderedDict()
         self._bytes = 0
         self._lock = Lock()
 
-    def get(self, key: Hashable, make: Callable[[], SliderCrankModel]) -> SliderCrankModel:
+    def get(self, key: Hashable, make: Callable[[], SliderCrankModel]) -> KeptModel:
         with self._lock:
             if key in self._models:
                 self._models.move_to_end(key)
                 return self._models[key]
         model = make()
+        kept = KeptModel(model, tuple(getattr(model, name).ctypes.data for name in TABLES))
         with self._lock:
             if key not in self._models:
-                self._models[key] = model
+                self._models[key] = kept
                 self._bytes += _size(model)
             while self._bytes > KEPT_BYTES and len(self._models) > 1:
-                self._bytes -= _size(self._models.popitem(last=False)[1])
-        return model
+                self._bytes -= _size(self._models.popitem(last=False)[1].model)
+        return kept
 
 
 def _size(model: SliderCrankModel) -> int:
-    return model.acceleration.nbytes + model.curvature.nbytes + model.propagator.nbytes
+    return sum(int(getattr(model, name).nbytes) for name in TABLES)
 
 
 _recent = _RecentModels()
@@ -90,24 +104,31 @@ def has_propagators(machine: "SliderCrank") -> bool:
 
 
 class ModelsBySpeed:
-    """Models of a machine that ``has_propagators`` at any speed, without its clearances.
+    """Models, at any speed, of machines that differ in speed and clearance alone; from ``models_by_speed``."""
 
-    A closed contact turns by ``step_phase`` [rad] in a piece of a step.
-    """
+    def __init__(self, step_phase: float, structure: tuple[Any, ...]) -> None:
+        self._step_phase, self._structure = step_phase, structure
 
-    def __init__(self, machine: "SliderCrank", step_phase: float = STEP_PHASE) -> None:
-        self._structure = _key(machine)
-        self._step_phase = step_phase
-
-    def at(self, crank_speed: float) -> SliderCrankModel:
+    def at(self, crank_speed: float) -> KeptModel:
         """Return the model at a speed [rpm]; its gaps are zero."""
-        key = (crank_speed, self._step_phase, self._structure)
-        return _recent.get(key, lambda: _at_speed(crank_speed, self._step_phase, _structure(*self._structure)))
+        return _recent.get(
+            (crank_speed, self), lambda: _at_speed(crank_speed, self._step_phase, _structure(*self._structure))
+        )
+
+
+@lru_cache(maxsize=KEPT_STRUCTURES)
+def _models_by_speed(step_phase: float, *structure: Any) -> ModelsBySpeed:
+    return ModelsBySpeed(step_phase, structure)
+
+
+def models_by_speed(machine: "SliderCrank", step_phase: float = STEP_PHASE) -> ModelsBySpeed:
+    """Models of a machine that ``has_propagators``; a contact turns by ``step_phase`` [rad] in a piece of a step."""
+    return _models_by_speed(step_phase, *_key(machine))
 
 
 def exact_model(machine: "SliderCrank", step_phase: float) -> SliderCrankModel:
     """Model of a machine that ``has_propagators``; a contact turns by ``step_phase`` [rad] in a piece of a step."""
-    return ModelsBySpeed(machine, step_phase).at(machine.crank_speed)._replace(gap=gaps_of(machine))
+    return models_by_speed(machine, step_phase).at(machine.crank_speed).model._replace(gap=gaps_of(machine))
 
 
 def _radix(machine: "SliderCrank") -> int:
