@@ -18,7 +18,8 @@ from chaosgym.core import status
 from chaosgym.core.crank_stepper import SteppedCrankModel
 from chaosgym.core.crank_stepper import advance as advance_stepped_crank
 from chaosgym.core.fixed_step import advance_fixed_step
-from chaosgym.core.impact_beam import CycleArrays, Episode, advance, cycle_arrays
+from chaosgym.core.impact_beam import CycleArrays, Episode, ImpactBeamModel, advance, cycle_arrays
+from chaosgym.core.restitution import advance_restitution
 from chaosgym.core.slider_crank import advance as advance_slider_crank
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError, SimulationError
@@ -77,7 +78,15 @@ class RungeKutta4:
         return replace(self, steps_per_cycle=2 * self.steps_per_cycle)
 
 
+TIGHTEST_EVENTS = ExactEvents(step_phase=0.25, event_tolerance=1e-13)
+"""The default of machines whose ``event_accuracy`` is "tightest"."""
+
 Integrator = ExactEvents | RungeKutta4
+
+
+def default_integrator(machine: Machine) -> ExactEvents:
+    """Integrator of a machine where none is given."""
+    return TIGHTEST_EVENTS if getattr(machine, "event_accuracy", "standard") == "tightest" else ExactEvents()
 
 
 class MotionState(NamedTuple):
@@ -202,14 +211,20 @@ def _run_impact_beam(
     arrays = cycle_arrays(cycles, 2 * beam.n_modes, samples)
     coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
+    along = () if tangents is None else (tangents,)
+    motion = (model, coordinates, episode, arrays)
     if isinstance(integrator, ExactEvents):
         settings = (integrator.step_phase, integrator.event_tolerance, integrator.event_budget)
-        if tangents is None:
-            outcome, done = advance(model, coordinates, episode, arrays, *settings)
+        if isinstance(model, ImpactBeamModel):
+            outcome, done = advance(*motion, *settings, *along)
         else:
-            outcome, done = advance(model, coordinates, episode, arrays, *settings, tangents)
+            outcome, done = advance_restitution(*motion, integrator.step_phase, integrator.event_budget, *along)
+    elif isinstance(model, ImpactBeamModel):
+        outcome, done = advance_fixed_step(*motion, integrator.steps_per_cycle)
     else:
-        outcome, done = advance_fixed_step(model, coordinates, episode, arrays, integrator.steps_per_cycle)
+        raise ParameterError(
+            f"integrator = {integrator} does not run contact_law = 'restitution'; allowed: ExactEvents(...)"
+        )
     return outcome, done, _record(beam, arrays, MotionState(coordinates, bouncing))
 
 
@@ -307,7 +322,7 @@ def simulate(
     cycles = _count("cycles", cycles, 1)
     transient = _count("transient", transient, 0)
     samples_per_cycle = _count("samples_per_cycle", samples_per_cycle, 0)
-    integrator = integrator or ExactEvents()
+    integrator = integrator or default_integrator(machine)
     state = _initial(machine, initial_state)
     run, _ = _RUNS[machine.name]
     first = 0
@@ -360,7 +375,7 @@ def simulate_with_deviations(
             f"deviations have shape {vectors.shape}; allowed: (m, {len(state.coordinates)}), all values finite"
         )
     log_growth = np.empty((cycles, len(vectors) if orthonormal else 0))
-    integrator = integrator or ExactEvents()
+    integrator = integrator or default_integrator(machine)
     outcome, done, record = _run_impact_beam(
         machine, state, cycles, 0, integrator, Tangents(vectors, log_growth)
     )  # fmt: skip

@@ -101,8 +101,6 @@ class ResponseClassifier:
             raise ParameterError(f"this classifier knows {self.card['machine']}, not {machine.name}")
         for name in parameters_of(machine):
             value = getattr(machine, name)
-            # a field that is younger than the classifier had its default
-            base = self.card["base"].get(name, getattr(type(machine), name))
             if name in self.fields:
                 low, high = self.card["ranges"][name]
                 if not low <= value <= high:
@@ -111,10 +109,13 @@ class ResponseClassifier:
                         f"{name} = {value:g} {unit} is outside what the classifier was trained on; "
                         f"allowed: {low:g} to {high:g} {unit}"
                     )
-            elif value != base:
+                continue
+            # a field that is younger than the classifier had its default value then
+            trained = self.card["base"].get(name, getattr(type(machine), name))
+            if value != trained:
                 raise ParameterError(
                     f"{name} = {value} differs from the classifier's training machine; allowed: "
-                    f"{base}. Use `chaosgym diagnose`, or train a classifier on such machines"
+                    f"{trained}. Use `chaosgym diagnose`, or train a classifier on such machines"
                 )
         row = np.array([[getattr(machine, name) for name in self.fields]])
         chances = self.predict_proba(row)[0]

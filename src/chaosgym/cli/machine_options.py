@@ -1,6 +1,7 @@
 """How does a command line describe a machine? Short options in shop-floor units, ``--set FIELD=VALUE`` for the rest.
 
-A number option sets one field; a choice option sets several at once, such as which joints have clearance.
+A number option sets one field; a choice option sets several at once, such as which joints have clearance, and
+``--fidelity`` those that make the model a rung of the machine's ladder.
 """
 
 import functools
@@ -87,16 +88,19 @@ def machine_command(function: Callable[..., None], *, required: bool = True) -> 
             kinds[name] = kind
 
     @functools.wraps(function)
-    def wrapped(machine: str | None, settings: tuple[str, ...], **others: Any) -> None:
+    def wrapped(machine: str | None, settings: tuple[str, ...], fidelity: str | None, **others: Any) -> None:
         given = {name: others.pop(name.lstrip("-").replace("-", "_")) for name in kinds}
         given = {name: value for name, value in given.items() if value is not None}
-        if machine is None and (settings or given):
+        if machine is None and (settings or given or fidelity):
             raise click.UsageError(f"these options need a machine: {', '.join(MACHINE_OPTIONS)}")
-        function(machine=machine and build_machine(machine, given, settings), **others)
+        function(machine=machine and build_machine(machine, given, settings, fidelity), **others)
 
     for name, kind in reversed(kinds.items()):
         values: Any = click.Choice(list(kind.words)) if isinstance(kind, Choice) else float
         wrapped = click.option(name, type=values, default=None, help=f"[{', '.join(owners[name])}]")(wrapped)
+    wrapped = click.option(
+        "--fidelity", metavar="RUNG", help="Rung of the machine's ladder of models, such as rigid or reference."
+    )(wrapped)
     wrapped = click.option(
         "--set", "settings", multiple=True, metavar="FIELD=VALUE", help="Any field of the machine, in SI; repeatable."
     )(wrapped)
@@ -104,7 +108,7 @@ def machine_command(function: Callable[..., None], *, required: bool = True) -> 
     return click.argument("machine", type=click.Choice(sorted(MACHINE_OPTIONS)), required=required)(wrapped)
 
 
-def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...]) -> Any:
+def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...], fidelity: str | None = None) -> Any:
     """Build the machine that a command line describes; what is not given is as in the thesis.
 
     Raises
@@ -145,7 +149,7 @@ def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...]
         if field in numbers:
             raise click.UsageError(f"{field} is given twice: by {numbers[field]} and by --set")
         fields[field] = value
-    return with_settings(owner(), fields)
+    return with_settings(owner(), fields if fidelity is None else {**fields, "fidelity": fidelity})
 
 
 def _checked(owner: Any, option: str, number: Number, value: float) -> float:

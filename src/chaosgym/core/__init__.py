@@ -33,6 +33,7 @@ try:
         fixed_step,
         impact_beam,
         propagator,
+        restitution,
         slider_crank,
         status,
         tangent,

@@ -10,7 +10,7 @@ from typing import Any
 from chaosgym.diagnosis.response import Diagnosis
 from chaosgym.diagnosis.two_step import two_step_test
 from chaosgym.machines import Machine
-from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, simulate
+from chaosgym.simulation import CycleRecord, Integrator, default_integrator, simulate
 
 SPREAD_CHANGE = 0.05
 """Largest change of the spread of the peak force, as a share of the largest peak, that counts as none."""
@@ -87,9 +87,9 @@ def step_check(
     cycles, transient
         Cycles to judge, and to run before.
     integrator
-        ``ExactEvents()`` by default.
+        ``default_integrator(machine)`` by default.
     """
-    chosen = integrator or ExactEvents()
+    chosen = integrator or default_integrator(machine)
     given = simulate(machine, cycles, transient=transient, integrator=chosen)
     finer = simulate(machine, cycles, transient=transient, integrator=chosen.refined())
     return StepCheck(

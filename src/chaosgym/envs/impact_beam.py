@@ -138,7 +138,11 @@ class ImpactBeamEnv(MachineEnv):
     | `tolerance`       | **bool, float** | `False` | draw the machine at each reset within manufacturing tolerances |
     | `sensor_error`    | **float**       | `3.0`   | half width of the uniform error of a measured peak force [N]   |
     | `render_mode`     | **str**         | `None`  | `"rgb_array"` or `"human"`                                     |
+    | `fidelity`        | **str**         | `None`  | rung of the ladder of models; none is "modes-5"                |
     | any field         | **float**       |         | of `chaosgym.machines.impact_beam.ImpactBeam`, in SI units     |
+
+    The rungs of `fidelity` are `"restitution"`, `"rigid"`, `"modes-3"`, `"modes-5"`, `"modes-8"` and `"reference"`; a
+    field that a rung sets may not be given beside it.
 
     Tolerances are +-20 % of the clearance, +-20 % of the damping ratio and +-0.2 % of the length; a number for
     `tolerance` multiplies them, up to 4. The agent is not told which machine it got.
@@ -170,11 +174,12 @@ class ImpactBeamEnv(MachineEnv):
         force_limit: float = Task.force_limit,
         tolerance: bool | float = False,
         sensor_error: float = SENSOR_ERROR,
+        fidelity: str | None = None,
         render_mode: str | None = None,
         **parameters: Any,
     ) -> None:
         super().__init__(
-            nominal_machine(THESIS_IMPACT_BEAM, parameters),
+            nominal_machine(THESIS_IMPACT_BEAM, {"fidelity": fidelity, **parameters}),
             SpeedDrive(lowest_speed=lowest_speed, highest_speed=highest_speed, slew_limit=slew_limit),
             Task(job_cycles=job_cycles, cycles_per_step=cycles_per_step, force_limit=force_limit),
             tolerances=TOLERANCES,

@@ -156,13 +156,15 @@ class SliderCrankEnv(MachineEnv):
     | `tolerance`              | **bool, float** | `False` | draw the machine at each reset within tolerances          |
     | `sensor_error`           | **float**       | `3.0`   | half width of the uniform error of a measured peak [N]    |
     | `contact_damping_ratio`  | **float**       | `0.1`   | damping ratio of a joint in contact                       |
-    | `matrix_update_interval` | **float**       | `5.0`   | crank angle over which matrices are held [deg]            |
+    | `fidelity`               | **str**         | `None`  | rung of the ladder of models; none is "flexible-5deg"     |
     | `render_mode`            | **str**         | `None`  | `"rgb_array"` or `"human"`                                |
     | any field                | **float, str**  |         | of `chaosgym.machines.slider_crank.SliderCrank`           |
 
     Fields are in SI units, angles in degrees. They include the motor angle, the joints (`slider_joint`, `ball_joint`),
     their clearances, the rod (`rod`, `rod_diameter`, `rod_length`), friction and gravity. The slider joint has a
-    clearance of +-0.254 mm, the ball joint none, and there is no gravity.
+    clearance of +-0.254 mm, the ball joint none, and there is no gravity. Matrices are held over 5 deg of crank angle
+    (`matrix_update_interval`). The rungs of `fidelity` are `"rigid"`,
+    `"flexible-5deg"`, `"flexible-1deg"` and `"reference"`; a field that a rung sets may not be given beside it.
 
     The contact damping ratio is assumed: twice the larger printed value. At the printed 2.5 and 5 % as many as 96 and
     90 % of the settled steps at +-0.254 mm count. Matrices held over 5 deg are those of the thesis (5.2.2) and make a
@@ -202,12 +204,15 @@ class SliderCrankEnv(MachineEnv):
         tolerance: bool | float = False,
         sensor_error: float = SENSOR_ERROR,
         contact_damping_ratio: float = CONTACT_DAMPING_RATIO,
-        matrix_update_interval: float = MATRIX_UPDATE_INTERVAL,
+        fidelity: str | None = None,
         render_mode: str | None = None,
         **parameters: Any,
     ) -> None:
         parameters["contact_damping_ratio"] = contact_damping_ratio
-        parameters["matrix_update_interval"] = matrix_update_interval
+        if fidelity is None:
+            parameters.setdefault("matrix_update_interval", MATRIX_UPDATE_INTERVAL)
+        else:
+            parameters["fidelity"] = fidelity
         super().__init__(
             nominal_machine(THESIS_SLIDER_CRANK, parameters),
             SpeedDrive(

@@ -23,8 +23,11 @@ from numpy.typing import NDArray
 
 from chaosgym.core.impact_beam import ImpactBeamModel
 from chaosgym.core.propagator import Regimes
+from chaosgym.core.restitution import RestitutionModel
 from chaosgym.errors import ParameterError
+from chaosgym.machines.fidelity import FidelityLadder
 from chaosgym.machines.finite_element import bending_matrices, graded_mesh
+from chaosgym.machines.linear_impact import linear_impact
 from chaosgym.machines.parameters import parameter, validate
 
 Array = NDArray[np.float64]
@@ -39,7 +42,7 @@ _FIT = "five-mode fit to the printed natures and forces of figures 3.8 to 3.12"
 
 
 @dataclass(frozen=True, kw_only=True)
-class ImpactBeam:
+class ImpactBeam(FidelityLadder):
     """The Impact Beam System; the defaults are the beam of the thesis at 30 Hz and +-0.127 mm.
 
     Raises
@@ -47,6 +50,15 @@ class ImpactBeam:
     ParameterError
         On construction, if a field is outside its range; names the field, the value and the range.
     """
+
+    fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "restitution": {"contact_law": "restitution", "n_modes": 1, "event_accuracy": "standard"},
+        "rigid": {"contact_law": "linear", "n_modes": 1, "event_accuracy": "standard"},
+        "modes-3": {"contact_law": "linear", "n_modes": 3, "event_accuracy": "standard"},
+        "modes-5": {"contact_law": "linear", "n_modes": 5, "event_accuracy": "standard"},
+        "modes-8": {"contact_law": "linear", "n_modes": 8, "event_accuracy": "standard"},
+        "reference": {"contact_law": "linear", "n_modes": 12, "event_accuracy": "tightest"},
+    }
 
     name: ClassVar[str] = "impact-beam"
     speed_field: ClassVar[str] = "excitation_frequency"
@@ -107,11 +119,24 @@ class ImpactBeam:
     """Linearised Hertzian stiffness of a sensor surface [N/m]."""
     contact_damping: float = parameter(20.0, unit="N s/m", low=0.0, high=1e6, provenance="printed", source="thesis 3.3")
     """Damping of a sensor surface [N s/m]."""
+    contact_law: str = parameter("linear", choices=("linear", "restitution"), provenance="printed", source="thesis 3.3")
+    """"linear": spring and damper; "restitution": impacts of a rigid beam that take no time, with what the same spring
+    and damper restore of the speed."""
+    event_accuracy: str = parameter(
+        "standard", choices=("standard", "tightest"), provenance="assumed", source="a matter of computing"
+    )
+    """How closely contact events are placed where no integrator is given."""
     n_modes: int = parameter(5, low=1, high=40, provenance="printed", source="thesis 5.2.3: 5 degrees of freedom")
     """Modes kept, the rocking mode included."""
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, fidelity: str | None) -> None:
+        super().__post_init__(fidelity)
         validate(self)
+        if self.contact_law == "restitution" and self.n_modes > 1:
+            raise ParameterError(
+                f"n_modes = {self.n_modes} is out of range; allowed: 1 with contact_law = 'restitution', whose beam is "
+                "rigid"
+            )
         if self.force_position > self.length:
             raise ParameterError(
                 f"force_position = {self.force_position:g} m lies beyond the tip; allowed: 0.001 to {self.length:g} m"
@@ -132,9 +157,11 @@ class ImpactBeam:
         """Natural frequencies [Hz] of the kept modes between the sensors, (n_modes,)."""
         return np.asarray(np.sqrt(self.reduce().stiffness) / (2.0 * math.pi))
 
-    def reduce(self) -> ImpactBeamModel:
+    def reduce(self) -> ImpactBeamModel | RestitutionModel:
         """Return the modal model; machines that differ in frequency, force or clearance share the costly part."""
-        structure = _structure(*(getattr(self, field) for field in _STRUCTURE_FIELDS))
+        structure: ImpactBeamModel | RestitutionModel = _structure(
+            *(getattr(self, field) for field in _STRUCTURE_FIELDS)
+        )
         return structure._replace(
             excitation_frequency=self.excitation_frequency,
             force_amplitude=self.force_amplitude,
@@ -145,7 +172,7 @@ class ImpactBeam:
 _STRUCTURE_FIELDS = (
     "length", "height", "width", "youngs_modulus", "density", "force_position", "pivot_rotational_stiffness",
     "pivot_translational_stiffness", "shaker_stiffness", "shaker_damping", "shaker_mass", "damping_ratio",
-    "damping_family", "contact_stiffness", "contact_damping", "n_modes",
+    "damping_family", "contact_stiffness", "contact_damping", "contact_law", "n_modes",
 )  # fmt: skip
 
 THESIS_IMPACT_BEAM = ImpactBeam()
@@ -274,19 +301,13 @@ def _bound(rotates: Array, row: Array) -> Array:
     return np.where(rotates[:, None], turning, pairs).ravel()
 
 
-@lru_cache(maxsize=256)
-def _structure(*structure: Any) -> ImpactBeamModel:
-    beam = ImpactBeam(**dict(zip(_STRUCTURE_FIELDS, structure, strict=True)))
-    modes = modal_analysis(beam)
-    n = beam.n_modes
+def _regimes(modes: ModalAnalysis, *systems: tuple[Array, Array]) -> Regimes:
+    """Regimes of several (stiffness, damping) of the same modes."""
     tip = modes.tip_shape
-    stiffness = modes.angular_frequency**2
-    pressed_stiffness = np.diag(stiffness) + beam.contact_stiffness * np.outer(tip, tip)
-    pressed_damping = modes.damping + beam.contact_damping * np.outer(tip, tip)
+    n = len(tip)
     load = np.concatenate([np.zeros(n), modes.force_shape])
-
     parts = []
-    for matrices in ((np.diag(stiffness), modes.damping), (pressed_stiffness, pressed_damping)):
+    for matrices in systems:
         rotates, rate, from_modal = _modal_blocks(*matrices)
         to_modal = np.linalg.inv(from_modal)
         derivative = _derivative(rotates, rate)
@@ -297,8 +318,39 @@ def _structure(*structure: Any) -> ImpactBeamModel:
         magnitude = np.stack([_bound(rotates, rows[2]), _bound(rotates, rows[3])])
         fastest = np.max(np.where(rotates, np.hypot(rate[:, 0], rate[:, 1]), np.max(np.abs(rate), axis=1)))
         parts.append((rotates, rate, to_modal, from_modal, np.stack(rows[:3]), magnitude, to_modal @ load, fastest))
-    regimes = Regimes(*(np.ascontiguousarray(np.stack(part)) for part in zip(*parts, strict=True)))
+    return Regimes(*(np.ascontiguousarray(np.stack(part)) for part in zip(*parts, strict=True)))
 
+
+@lru_cache(maxsize=256)
+def _structure(*structure: Any) -> ImpactBeamModel | RestitutionModel:
+    beam = ImpactBeam(**dict(zip(_STRUCTURE_FIELDS, structure, strict=True)))
+    modes = modal_analysis(beam)
+    return _rigid_model(beam, modes) if beam.contact_law == "restitution" else _flexible_model(beam, modes)
+
+
+def _rigid_model(beam: ImpactBeam, modes: ModalAnalysis) -> RestitutionModel:
+    stiffness = modes.angular_frequency**2
+    impact = linear_impact(1.0 / float(modes.tip_shape[0]) ** 2, beam.contact_stiffness, beam.contact_damping)
+    return RestitutionModel(
+        excitation_frequency=beam.excitation_frequency,
+        force_amplitude=beam.force_amplitude,
+        clearance=beam.clearance,
+        stiffness=stiffness,
+        damping=modes.damping,
+        tip_shape=modes.tip_shape,
+        force_shape=modes.force_shape,
+        regimes=_regimes(modes, (np.diag(stiffness), modes.damping)),
+        restitution=impact.restitution,
+        contact_duration=impact.duration,
+        force_per_speed=impact.force_per_speed,
+    )
+
+
+def _flexible_model(beam: ImpactBeam, modes: ModalAnalysis) -> ImpactBeamModel:
+    n, tip, stiffness = beam.n_modes, modes.tip_shape, modes.angular_frequency**2
+    pressed_stiffness = np.diag(stiffness) + beam.contact_stiffness * np.outer(tip, tip)
+    pressed_damping = modes.damping + beam.contact_damping * np.outer(tip, tip)
+    regimes = _regimes(modes, (np.diag(stiffness), modes.damping), (pressed_stiffness, pressed_damping))
     # rest with one surface pressing: (K + k p p') q = k c p, so x - c = -c / (1 + k p' K^-1 p)
     compliance = beam.contact_stiffness * float(np.sum(tip**2 / stiffness))
     position = beam.contact_stiffness * (tip / stiffness) / (1.0 + compliance)

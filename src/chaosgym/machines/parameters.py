@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any, Literal, TypeVar
 
 from chaosgym.errors import ParameterError
+from chaosgym.machines.fidelity import expand_fidelity
 
 Provenance = Literal["printed", "derived", "calibrated", "assumed"]
 """printed: in the thesis; derived: follows from printed numbers; calibrated: fitted to printed results; assumed."""
@@ -95,14 +96,16 @@ def validate(machine: Any) -> None:
 
 
 def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
-    """Return the machine with some fields replaced.
+    """Return the machine with some fields replaced, or with those of a rung of ``fidelity``.
 
     Raises
     ------
     ParameterError
-        If a name is no field of the machine (the nearest one is suggested) or a value is not allowed.
+        If a name is no field of the machine (the nearest one is suggested), a value is not allowed, or ``fidelity`` is
+        given together with a field that it sets.
     """
     known = parameters_of(machine)
+    settings = expand_fidelity(machine, settings)
     for name in settings:
         if name not in known:
             from difflib import get_close_matches

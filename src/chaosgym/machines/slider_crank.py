@@ -21,7 +21,7 @@ P. Gu, Chaotic Vibration in Machine Systems and Its Implications for Design, PhD
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy.linalg
@@ -33,6 +33,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.crank_equations import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom, equations
 from chaosgym.machines.crank_joints import sensors_of
 from chaosgym.machines.crank_model import exact_model, has_propagators, stepped_model
+from chaosgym.machines.fidelity import FidelityLadder
 from chaosgym.machines.kinematics import slider_position
 from chaosgym.machines.parameters import parameter, validate
 from chaosgym.machines.spatial_equations import spatial_equations
@@ -44,7 +45,7 @@ _STEEL = "steel"
 
 
 @dataclass(frozen=True, kw_only=True)
-class SliderCrank:
+class SliderCrank(FidelityLadder):
     """The Spatial Slider Crank; the defaults are the planar mechanism of the thesis with clearance at the slider.
 
     Raises
@@ -52,6 +53,13 @@ class SliderCrank:
     ParameterError
         On construction, if a field is outside its range; names the field, the value and the range.
     """
+
+    fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "rigid": {"rod": "rigid", "matrix_update_interval": 5.0},
+        "flexible-5deg": {"rod": "flexible", "matrix_update_interval": 5.0},
+        "flexible-1deg": {"rod": "flexible", "matrix_update_interval": 1.0},
+        "reference": {"rod": "flexible", "matrix_update_interval": 0.25},
+    }
 
     name: ClassVar[str] = "slider-crank"
     speed_field: ClassVar[str] = "crank_speed"
@@ -208,7 +216,8 @@ class SliderCrank:
     )
     """Crank angle over which mass, damping and stiffness matrices are held [deg]; divides 360."""
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, fidelity: str | None) -> None:
+        super().__post_init__(fidelity)
         validate(self)
         if self.rod_length <= self.crank_radius:
             raise ParameterError(

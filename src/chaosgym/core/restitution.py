@@ -1,0 +1,384 @@
+r"""How does a rigid beam move whose impacts take no time?
+
+Its one degree of freedom, written for the tip between two surfaces at +-c, obeys
+
+    x'' = -K x - D x' + G sin(w t)          |x| < c
+    v -> -e v                               at |x| = c
+    x = s c, v = 0                          while G sin(w t) presses on surface s harder than K c pulls away
+
+Free flights are exact (``propagator``). Those that start at a surface and are short are summed as a Taylor series from
+there, so that none of the bounces drowns in the rounding of c. Infinitely many ever shorter bounces end in rest on the
+surface; as soon as all that are left would be over within ``CHATTER_PHASE``, the tip is put to rest.
+
+A force that takes no time has no size. What stands in the records is the largest force of the compliant contact from
+which e was derived: ``force_per_speed`` times the speed before; while the tip rests, it is the force that holds it.
+
+References
+----------
+A. B. Nordmark, P. T. Piiroinen, Simulation and stability analysis of impacting systems with complete chattering,
+Nonlinear Dynamics 58 (2009) 85-106.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from chaosgym.core import status
+from chaosgym.core.impact_beam import LOWER, UPPER, note_touch, suspect
+from chaosgym.core.propagator import Regimes, move, safe_time, with_force
+from chaosgym.core.tangent import carry, orthonormalise
+
+CHATTER_PHASE = 0.01
+"""Angle [rad] of the faster of force and beam within which the bounces that are left out would be over."""
+
+SHORT_FLIGHT = 0.02
+"""Longest flight, as an angle [rad] of the faster of force and beam, that the Taylor series sums to rounding."""
+
+FORGOTTEN = 1e-12
+"""What rest on a surface leaves of a deviation: nothing; this keeps its logarithm finite."""
+
+MAX_POLISH = 60
+"""Iterations to polish one impact."""
+
+
+class RestitutionModel(NamedTuple):
+    """All that the kernel knows of a rigid beam whose impacts take no time.
+
+    As ``ImpactBeamModel`` with one mode and the free regime alone; ``restitution``, ``contact_duration`` [s] and
+    ``force_per_speed`` [N s/m] are those of the compliant contact.
+    """
+
+    excitation_frequency: float
+    force_amplitude: float
+    clearance: float
+    stiffness: np.ndarray
+    damping: np.ndarray
+    tip_shape: np.ndarray
+    force_shape: np.ndarray
+    regimes: Regimes
+    restitution: float
+    contact_duration: float
+    force_per_speed: float
+
+
+class Tip(NamedTuple):
+    """Equation of motion of the tip; ``fastest`` is the faster of force and beam [rad/s], ``mass`` that of the tip."""
+
+    spring: float
+    damper: float
+    load: float
+    omega: float
+    fastest: float
+    mass: float
+
+
+@njit(cache=True, inline="always")
+def acceleration(tip, x, v, time):
+    """Acceleration of the free tip [m/s^2]."""
+    return -tip.spring * x - tip.damper * v + tip.load * math.sin(tip.omega * time)
+
+
+@njit(cache=True)
+def short_flight(tip, v, a, time, t):
+    """Way and velocity after a short time t, from x, v, a: a Taylor series to the sixth power."""
+    sine, cosine = math.sin(tip.omega * time), math.cos(tip.omega * time)
+    w2 = tip.omega * tip.omega
+    a1 = -tip.spring * v - tip.damper * a + tip.load * tip.omega * cosine
+    a2 = -tip.spring * a - tip.damper * a1 - tip.load * w2 * sine
+    a3 = -tip.spring * a1 - tip.damper * a2 - tip.load * w2 * tip.omega * cosine
+    a4 = -tip.spring * a2 - tip.damper * a3 + tip.load * w2 * w2 * sine
+    way = t * (v + t / 2 * (a + t / 3 * (a1 + t / 4 * (a2 + t / 5 * (a3 + t / 6 * a4)))))
+    velocity = v + t * (a + t / 2 * (a1 + t / 3 * (a2 + t / 4 * (a3 + t / 5 * a4))))
+    return way, velocity
+
+
+@njit(cache=True)
+def landing(tip, v, a, time):
+    """Duration of a short flight that leaves a surface with v against a, or inf if it does not come back soon.
+
+    Newton's method on the mean velocity, way over time.
+    """
+    guess = -2.0 * v / a
+    t = guess
+    for _ in range(8):
+        way, velocity = short_flight(tip, v, a, time, t)
+        if velocity * a <= 0.0:
+            return math.inf
+        change = -way / (velocity - way / t)
+        t += change
+        if not 0.0 < t < 2.0 * guess:
+            return math.inf
+        if abs(change) <= 1e-14 * t:
+            return t
+    return math.inf
+
+
+@njit(cache=True)
+def enter(model, regimes, x, v, time, omega, u):
+    """Modal coordinates u (4,) of tip displacement x and velocity v."""
+    cosine, sine = math.cos(omega * time), math.sin(omega * time)
+    q, p = x / model.tip_shape[0], v / model.tip_shape[0]
+    to_modal = regimes.to_modal
+    for i in range(2):
+        u[i] = to_modal[0, i, 0] * q + to_modal[0, i, 1] * p + to_modal[0, i, 2] * cosine + to_modal[0, i, 3] * sine
+    u[2], u[3] = cosine, sine
+
+
+@njit(cache=True, inline="always")
+def tip_of(regimes, row, u):
+    """Displacement, velocity or acceleration of the tip, by row of the output."""
+    return (
+        regimes.output[0, row, 0] * u[0] + regimes.output[0, row, 1] * u[1]
+        + regimes.output[0, row, 2] * u[2] + regimes.output[0, row, 3] * u[3]
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def crossing(regimes, clearance, side, u, moved, low, until, h):
+    """Instant up to h at which the tip reaches a surface, or inf if it only comes close by ``until``."""
+    high = until
+    for _ in range(MAX_POLISH):
+        move(regimes, 0, u, high, moved)
+        e, rate = clearance - side * tip_of(regimes, 0, moved), -side * tip_of(regimes, 1, moved)
+        bend = -side * tip_of(regimes, 2, moved)
+        if e <= 0.0:
+            break
+        if bend <= 0.0 or rate * rate < 0.5 * bend * e or not 0.0 < high - rate / bend <= h:
+            return math.inf
+        high -= rate / bend
+    else:
+        return math.inf
+    low = min(low, high)
+    t = high
+    for _ in range(MAX_POLISH):
+        if e > 0.0:
+            low = t
+        else:
+            high = t
+        newton = t - e / rate if rate < 0.0 else low
+        if not low < newton < high:
+            newton = 0.5 * (low + high)
+        if abs(newton - t) <= 1e-15 * high or newton in (low, high):
+            break
+        t = newton
+        move(regimes, 0, u, t, moved)
+        e, rate = clearance - side * tip_of(regimes, 0, moved), -side * tip_of(regimes, 1, moved)
+    return t
+
+
+@njit(cache=True)
+def long_flight(model, regimes, tip, x, v, time, remaining, step_phase, u, moved, spare):
+    """Fly on to the next surface or to the end: (elapsed, side or 0, x, v)."""
+    c = model.clearance
+    shortest = step_phase / tip.fastest
+    doubt = step_phase * step_phase / 384.0
+    enter(model, regimes, x, v, time, tip.omega, u)
+    elapsed = 0.0
+    while True:
+        bend = 0.0
+        for j in range(4):
+            bend += regimes.magnitude[0, 0, j] * abs(u[j])
+        safe = min(safe_time(c - x, -v, bend), safe_time(c + x, v, bend))
+        h = max(safe, shortest)
+        last = h >= remaining - elapsed
+        if last:
+            h = remaining - elapsed
+        move(regimes, 0, u, h, moved)
+        x1, v1 = tip_of(regimes, 0, moved), tip_of(regimes, 1, moved)
+        if h > safe:
+            first, struck = math.inf, 0.0
+            for side in (1.0, -1.0):
+                until = suspect(c - side * x, -side * v, c - side * x1, -side * v1, h, doubt * bend * h * h)
+                if until >= 0.0:
+                    t = crossing(regimes, c, side, u, spare, safe, until, h)
+                    if t < first:
+                        first, struck = t, side
+            if struck != 0.0:
+                move(regimes, 0, u, first, moved)
+                return elapsed + first, struck, struck * c, struck * max(0.0, struck * tip_of(regimes, 1, moved))
+        elapsed += h
+        for j in range(4):
+            u[j] = moved[j]
+        x, v = x1, v1
+        if last:
+            return elapsed, 0.0, x, v
+
+
+@njit(cache=True)
+def fly(model, regimes, tip, x, v, time, remaining, step_phase, u, moved, spare):
+    """From x, v to the next surface or for ``remaining`` seconds: (elapsed, side or 0, x, v)."""
+    side = 1.0 if x > 0.0 else -1.0
+    a = acceleration(tip, x, v, time)
+    if abs(x) == model.clearance and side * v < 0.0 < side * a:
+        guess = -2.0 * v / a
+        if 2.0 * guess * tip.fastest < SHORT_FLIGHT and abs(v) * guess < model.clearance:
+            t = landing(tip, v, a, time)
+            if t < math.inf:
+                way, velocity = short_flight(tip, v, a, time, min(t, remaining))
+                return (t, side, x, velocity) if t <= remaining else (remaining, 0.0, x + way, velocity)
+    return long_flight(model, regimes, tip, x, v, time, remaining, step_phase, u, moved, spare)
+
+
+@njit(cache=True)
+def hold(tip, clearance, side, time):
+    """How long the force goes on pressing a tip that rests on a surface: the sine falls to the share that it needs."""
+    if tip.load == 0.0:
+        return math.inf
+    needed = min(1.0, tip.spring * clearance / abs(tip.load))
+    phase = tip.omega * time + (0.0 if side * tip.load > 0.0 else math.pi)
+    phase -= 2.0 * math.pi * math.floor(phase / (2.0 * math.pi) + 0.25)
+    return max(0.0, math.pi - math.asin(needed) - phase) / tip.omega
+
+
+@njit(cache=True)
+def largest_hold(tip, clearance, side, time, elapsed):
+    """Largest force that held the tip on a surface [N]."""
+    phase = tip.omega * time + (0.0 if side * tip.load > 0.0 else math.pi)
+    phase -= 2.0 * math.pi * math.floor(phase / (2.0 * math.pi) + 0.25)
+    end = phase + tip.omega * elapsed
+    sine = 1.0 if phase <= 0.5 * math.pi <= end else max(math.sin(phase), math.sin(end))
+    return max(0.0, tip.mass * (abs(tip.load) * sine - tip.spring * clearance))
+
+
+@njit(cache=True)
+def rebound(model, tip, x, v, time, vectors):
+    """Saltation at an impact with velocity v."""
+    e = model.restitution
+    before, after = acceleration(tip, x, v, time), acceleration(tip, x, -e * v, time)
+    for m in range(vectors.shape[0]):
+        q, p = vectors[m, 0], vectors[m, 1]
+        vectors[m, 0] = -e * q
+        vectors[m, 1] = -e * p + (after + e * before) / v * q
+
+
+@njit(cache=True)
+def sample_flight(model, regimes, tip, x, v, time, span, rests, first, period, u, moved, rows):
+    """Write the samples from number ``first`` on that lie in ``span``; returns the number of the next one."""
+    samples = rows.shape[0]
+    sample = first
+    side = 1.0 if x > 0.0 else -1.0
+    while sample < samples and sample * period < (time + span) * samples:
+        t = sample * period / samples - time
+        if rests:
+            rows[sample, 0], rows[sample, 1] = x, 0.0
+            push = tip.load * math.sin(tip.omega * (time + t)) - tip.spring * x
+            rows[sample, 2] = side * max(0.0, side * push) * tip.mass
+        else:
+            enter(model, regimes, x, v, time, tip.omega, u)
+            move(regimes, 0, u, t, moved)
+            rows[sample, 0] = min(max(tip_of(regimes, 0, moved), -model.clearance), model.clearance)
+            rows[sample, 1], rows[sample, 2] = tip_of(regimes, 1, moved), 0.0
+        sample += 1
+    return sample
+
+
+@njit(cache=True)
+def comes_to_rest(model, tip, side, speed, push):
+    """True if a tip that leaves surface ``side`` with ``speed`` against an acceleration ``push`` is done bouncing."""
+    if push <= 0.0:
+        return False
+    if speed == 0.0:
+        return True
+    left = 1.0 - model.restitution
+    return 2.0 * speed * tip.fastest < CHATTER_PHASE * push * left
+
+
+@njit(cache=True, nogil=True)
+def advance_restitution(model, state, episode, arrays, step_phase, event_budget, tangents=None):
+    """Advance ``state`` (2,) and ``episode`` in place by whole cycles; see ``impact_beam.advance``.
+
+    A tip that starts beyond a surface is put on it.
+    """
+    shape = model.tip_shape[0]
+    omega = 2.0 * math.pi * model.excitation_frequency
+    period = 1.0 / model.excitation_frequency
+    c, e = model.clearance, model.restitution
+    regimes = with_force(model.regimes, model.force_amplitude, omega)
+    load = shape * model.force_shape[0] * model.force_amplitude
+    tip = Tip(model.stiffness[0], model.damping[0, 0], load, omega, regimes.fastest[0], 1.0 / shape**2)
+    u, moved, spare = np.empty(4), np.empty(4), np.empty(4)
+
+    for cycle in range(arrays.section.shape[0]):
+        arrays.section[cycle] = state
+        x = min(max(shape * state[0], -c), c)
+        if abs(x) >= c * (1.0 - 4e-16):
+            x = math.copysign(c, x)
+        v = shape * state[1]
+        arrays.tip[cycle, 0], arrays.tip[cycle, 1] = x, v
+        for column in range(2):
+            arrays.peak_force[cycle, column] = 0.0
+            arrays.impacts[cycle, column] = 0
+            arrays.contact_time[cycle, column] = 0.0
+            arrays.bounce_time[cycle, column] = 0.0
+        if tangents is not None:
+            vectors, growth = tangents.vectors, tangents.log_growth[cycle]
+            growth[:] = 0.0
+        time, sample, events = 0.0, 0, 0
+        side = 1.0 if x > 0.0 else -1.0
+        struck = side if abs(x) == c and side * v > 0.0 else 0.0
+        touched, released = False, False
+        if c == 0.0:
+            v = 0.0
+
+        while True:
+            push = side * acceleration(tip, x, 0.0, time)
+            if struck != 0.0:
+                side = struck
+                column = UPPER if side > 0.0 else LOWER
+                speed = abs(v)
+                arrays.peak_force[cycle, column] = max(arrays.peak_force[cycle, column], model.force_per_speed * speed)
+                arrays.impacts[cycle, column] += 1
+                note_touch(episode, side, time, arrays.bounce_time[cycle])
+                v, touched = -e * v, True
+                push = side * acceleration(tip, x, 0.0, time)
+                if comes_to_rest(model, tip, side, abs(v), push):
+                    v = 0.0
+                if tangents is not None and v != 0.0:
+                    rebound(model, tip, x, side * speed, time, vectors)
+            column = UPPER if side > 0.0 else LOWER
+            rests = c == 0.0 or (v == 0.0 and abs(x) == c and push > 0.0 and not released)
+            struck = 0.0
+            if rests:
+                elapsed = min(hold(tip, c, side, time), period - time)
+                last, released = elapsed == period - time, True
+                if tangents is not None:
+                    vectors *= FORGOTTEN
+                arrays.peak_force[cycle, column] = max(
+                    arrays.peak_force[cycle, column], largest_hold(tip, c, side, time, elapsed)
+                )
+                arrays.contact_time[cycle, column] += elapsed
+                sample = sample_flight(model, regimes, tip, x, v, time, elapsed, True, sample, period, u, moved,
+                                       arrays.history[cycle])  # fmt: skip
+                if c == 0.0 and not last:
+                    side = -side
+                    note_touch(episode, side, time + elapsed, arrays.bounce_time[cycle])
+            else:
+                elapsed, struck, x1, v1 = fly(model, regimes, tip, x, v, time, period - time, step_phase, u, moved,
+                                              spare)  # fmt: skip
+                last = struck == 0.0
+                if touched:
+                    arrays.contact_time[cycle, column] += min(elapsed, model.contact_duration)
+                sample = sample_flight(model, regimes, tip, x, v, time, elapsed, False, sample, period, u, moved,
+                                       arrays.history[cycle])  # fmt: skip
+                if tangents is not None:
+                    carry(model.stiffness, regimes, 0, elapsed, vectors, growth, spare)
+                x, v, released = x1, v1, False
+            time += elapsed
+            touched = False
+            if last:
+                break
+            events += 1
+            if events > event_budget:
+                return status.EVENT_BUDGET, cycle
+
+        arrays.events[cycle] = events
+        state[0], state[1] = x / shape, v / shape
+        if tangents is not None:
+            orthonormalise(model.stiffness, vectors, growth)
+        if not (math.isfinite(state[0]) and math.isfinite(state[1])):
+            return status.DIVERGED, cycle
+        episode.touch[0] -= period
+        episode.touch[1] -= period
+    return status.OK, arrays.section.shape[0]
