@@ -14,7 +14,8 @@ import pytest
 from gymnasium.envs.registration import load_env_creator
 from gymnasium.utils.env_checker import check_env
 
-from chaosgym.envs import ENVIRONMENTS, machine_env
+from chaosgym import fleet
+from chaosgym.envs import ENVIRONMENTS
 from chaosgym.envs.documentation import environments_page
 from chaosgym.envs.machine_env import MachineEnv
 from chaosgym.envs.tasks import Status
@@ -166,7 +167,7 @@ def test_a_failed_simulation_ends_the_job(name: str, monkeypatch: pytest.MonkeyP
     def fail(*_: Any, **__: Any) -> None:
         raise SimulationError("the motion grew beyond every bound")
 
-    monkeypatch.setattr(machine_env, "simulate", fail)
+    monkeypatch.setattr(fleet, "simulate", fail)
     observation, reward, terminated, truncated, info = env.step(np.zeros(1, np.float32))
     assert (terminated, truncated, info["status"]) == (True, False, Status.SIMULATION_FAILED)
     assert observation in env.observation_space

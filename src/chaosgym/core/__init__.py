@@ -27,6 +27,7 @@ _previous_cache_folder = config.CACHE_DIR
 config.CACHE_DIR = KERNEL_CACHE
 try:
     from chaosgym.core import (  # noqa: F401
+        batch,
         contact,
         crank_propagator,
         crank_stepper,

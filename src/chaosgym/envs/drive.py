@@ -24,7 +24,10 @@ def checked_number(name: str, value: Any, low: float, high: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedDrive:
-    """Speed range and slew limit of a drive, in the unit of the machine's speed field."""
+    """Speed range and slew limit of a drive, in the unit of the machine's speed field.
+
+    Speeds and actions may be numbers or arrays of any shape.
+    """
 
     lowest_speed: float
     """Target speed of action -1."""
@@ -55,34 +58,33 @@ class SpeedDrive:
                 f"{self.highest_speed:g}"
             )
 
-    def target_of(self, action: Any) -> tuple[float, float]:
-        """Return the action, clipped to [-1, 1], and the target speed that it stands for.
+    def target_of(self, action: Any) -> tuple[Any, Any]:
+        """Return actions, clipped to [-1, 1], and the target speeds that they stand for, (...) for actions (..., 1).
 
         Raises
         ------
         ParameterError
-            If the action is not one finite number.
+            If an action is not finite.
         """
-        value = float(action[0]) if np.shape(action) == (1,) else math.nan
-        if not math.isfinite(value):
-            raise ParameterError(f"action = {action!r} is not usable; allowed: one number from -1 to 1, shape (1,)")
-        value = min(max(value, -1.0), 1.0)
-        target = self.lowest_speed + 0.5 * (value + 1.0) * (self.highest_speed - self.lowest_speed)
-        return value, self.rounded(target)
+        value = np.asarray(action, dtype=float)[..., 0]
+        if not np.all(np.isfinite(value)):
+            raise ParameterError(f"action = {action!r} is not usable; allowed: numbers from -1 to 1")
+        value = np.clip(value, -1.0, 1.0)
+        return value, self.rounded(self.lowest_speed + 0.5 * (value + 1.0) * (self.highest_speed - self.lowest_speed))
 
     def action_for(self, speed: float) -> float:
         """Return the action whose target is ``speed``."""
         return 2.0 * (speed - self.lowest_speed) / (self.highest_speed - self.lowest_speed) - 1.0
 
-    def rounded(self, speed: float) -> float:
-        """Return the speed nearest to ``speed`` that can be commanded."""
+    def rounded(self, speed: Any) -> Any:
+        """Return the speeds nearest to ``speed`` that can be commanded."""
         if self.speed_grid == 0.0:
             return speed
-        return self.lowest_speed + self.speed_grid * round((speed - self.lowest_speed) / self.speed_grid)
+        return self.lowest_speed + self.speed_grid * np.rint((speed - self.lowest_speed) / self.speed_grid)
 
-    def approach(self, speed: float, target: float) -> float:
-        """Return the speed of the next step, between two speeds that can be commanded."""
+    def approach(self, speed: Any, target: Any) -> Any:
+        """Return the speeds of the next step, between speeds that can be commanded."""
         limit = self.slew_limit
         if self.speed_grid > 0.0:
             limit = self.speed_grid * math.floor(limit / self.speed_grid * (1.0 + 1e-12))
-        return self.rounded(speed + min(max(target - speed, -limit), limit))
+        return self.rounded(speed + np.clip(target - speed, -limit, limit))

@@ -5,6 +5,7 @@ from typing import Any
 from chaosgym.envs.drive import SpeedDrive
 from chaosgym.envs.machine_env import SENSOR_ERROR, MachineEnv, nominal_machine
 from chaosgym.envs.tasks import Task
+from chaosgym.envs.vector_env import MachineVectorEnv
 from chaosgym.machines.impact_beam import THESIS_IMPACT_BEAM, ImpactBeam
 
 TOLERANCES = {"clearance": 0.2, "damping_ratio": 0.2, "length": 0.002}
@@ -187,3 +188,9 @@ class ImpactBeamEnv(MachineEnv):
             sensor_error=sensor_error,
             render_mode=render_mode,
         )
+
+
+class ImpactBeamVectorEnv(MachineVectorEnv):
+    """Many ``ImpactBeamEnv`` in one compiled call."""
+
+    single = ImpactBeamEnv

@@ -6,7 +6,6 @@ changes and the motion goes on from the state in which the last step ended.
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
@@ -15,20 +14,19 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
 from chaosgym.envs.drive import SpeedDrive, checked_number
-from chaosgym.envs.observation import Observation, measured_peaks, observation_names, observation_space, observe
-from chaosgym.envs.tasks import LONGEST_PERIOD, Status, Step, Task, does_not_repeat, judged_cycles
-from chaosgym.errors import ParameterError, SimulationError
+from chaosgym.envs.jobs import Jobs, Rules
+from chaosgym.envs.observation import Observation, observation_names, observation_space
+from chaosgym.envs.tasks import Status, Step, Task, does_not_repeat
+from chaosgym.errors import ParameterError
+from chaosgym.fleet import SerialFleet, at_speed
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import with_settings
-from chaosgym.simulation import CycleRecord, MotionState, simulate
+from chaosgym.simulation import CycleRecord, simulate
 
 if TYPE_CHECKING:
     from chaosgym.envs.rendering import Dashboard
 
 Action = NDArray[np.float32]
-
-RUN_IN_CYCLES = 20
-"""Cycles at the starting speed before the job begins; at least a step."""
 
 SENSOR_ERROR = 3.0
 """Half width [N] of the error of a force sensor (thesis 3.5.2)."""
@@ -42,8 +40,8 @@ WIDEST_TOLERANCE = 4.0
 RENDER_SAMPLES = 1000
 """Samples of the motion kept in each cycle for rendering."""
 
-KEPT_MACHINES = 256
-"""Machines at one speed that are kept: checking all fields of a new one takes longer than a look-up."""
+THE_ONE = np.zeros(1, np.int64)
+"""Number of the one job."""
 
 METADATA: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}
 
@@ -63,9 +61,24 @@ def nominal_machine(reference: Machine, parameters: Mapping[str, Any]) -> Machin
     return with_settings(reference, parameters)
 
 
-@lru_cache(maxsize=KEPT_MACHINES)
-def _at_speed(machine: Machine, speed: float) -> Machine:
-    return with_settings(machine, {machine.speed_field: speed})
+def starting_speed(drive: SpeedDrive, options: Mapping[str, Any]) -> float:
+    """Return the speed at which a job starts, by the options of a reset.
+
+    Raises
+    ------
+    ParameterError
+        If an option is unknown or the speed lies outside the range of the drive.
+    """
+    for name in options:
+        if name != "speed":
+            raise ParameterError(f"options has no entry {name!r}; allowed: speed")
+    low, high = drive.lowest_speed, drive.highest_speed
+    return float(drive.rounded(checked_number("options['speed']", options.get("speed", low), low, high)))
+
+
+def _first(info: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+    """Return the info of the one job as plain numbers."""
+    return {name: values[0].item() for name, values in info.items()}
 
 
 class MachineEnv(gym.Env[Observation, Action]):
@@ -87,7 +100,7 @@ class MachineEnv(gym.Env[Observation, Action]):
     sensor_error
         Half width [N] of the uniform error of each measured peak force.
     is_type_iii
-        Tells whether a step counts as Type III; anything from the measured peaks to a table of regimes by speed.
+        Tells which steps count as Type III; anything from the measured peaks to a table of regimes by speed.
     render_mode
         None, "rgb_array" or "human".
 
@@ -108,65 +121,54 @@ class MachineEnv(gym.Env[Observation, Action]):
         tolerances: Mapping[str, float],
         tolerance: bool | float = False,
         sensor_error: float = SENSOR_ERROR,
-        is_type_iii: Callable[[Step], bool] = does_not_repeat,
+        is_type_iii: Callable[[Step], NDArray[np.bool_]] = does_not_repeat,
         render_mode: str | None = None,
     ) -> None:
         if render_mode is not None and render_mode not in METADATA["render_modes"]:
             raise ParameterError(f"render_mode = {render_mode!r} is not one of None, human, rgb_array")
         self.render_mode = render_mode
-        self.nominal, self.drive, self.task = machine, drive, task
-        self.tolerances, self._is_type_iii = dict(tolerances), is_type_iii
-        self._tolerance = checked_number("tolerance", tolerance, 0.0, WIDEST_TOLERANCE)
-        self._sensor_error = checked_number("sensor_error", sensor_error, 0.0, FORCE_RANGE * task.force_limit)
+        self.nominal, self.drive, self.task, self.tolerances = machine, drive, task, dict(tolerances)
+        for speed in (drive.highest_speed, drive.lowest_speed):
+            at_speed(machine, speed)
         self.observation_names = observation_names(task.cycles_per_step)
-        self._space = observation_space(
+        space = observation_space(
             drive.lowest_speed, drive.highest_speed, FORCE_RANGE * task.force_limit, task.cycles_per_step
         )
-        self.observation_space = cast(Space[Observation], self._space)
+        self.observation_space = cast(Space[Observation], space)
         self.action_space = cast(Space[Action], Box(-1.0, 1.0, (1,), np.float32))
-        self.machine = _at_speed(machine, drive.lowest_speed)
-        self._job_time = task.job_cycles * _at_speed(machine, drive.highest_speed).cycle_period
-        self._damage = np.zeros(len(machine.sides))
-        self._motion: MotionState | None = None
+        self.rules = Rules(
+            machine, drive, task, space, self.tolerances,
+            tolerance=checked_number("tolerance", tolerance, 0.0, WIDEST_TOLERANCE),
+            sensor_error=checked_number("sensor_error", sensor_error, 0.0, FORCE_RANGE * task.force_limit),
+            is_type_iii=is_type_iii,
+        )  # fmt: skip
+        self._fleet = SerialFleet(1)
+        self._job = Jobs(self.rules, self._fleet)
+        self._runs = False
         self._dashboard: Dashboard | None = None
 
     @property
     def speed(self) -> float:
         """Speed of the machine, in the unit of its speed field."""
-        return float(getattr(self.machine, self.machine.speed_field))
+        return float(self._job.speed[0])
+
+    @property
+    def machine(self) -> Machine:
+        """Machine of the current job, at its current speed."""
+        return self._job.machine_at(0)
 
     @property
     def damage(self) -> float:
         """Share of its life that the worse surface of the joint has used up."""
-        return float(self._damage.max())
-
-    def _draw_machine(self) -> Machine:
-        if self._tolerance == 0.0:
-            return self.nominal
-        factors = 1.0 + self._tolerance * self.np_random.uniform(-1.0, 1.0, len(self.tolerances)) * np.array(
-            list(self.tolerances.values())
-        )
-        drawn = {
-            name: getattr(self.nominal, name) * float(factor)
-            for name, factor in zip(self.tolerances, factors, strict=True)
-        }
-        return with_settings(self.nominal, drawn)
-
-    def _run(self, cycles: int) -> CycleRecord:
-        record = simulate(self.machine, cycles, self._motion)
-        self._motion = record.final_state
-        return record
+        return float(self._job.damage.max())
 
     def _shown(self) -> CycleRecord:
         """Last step with a time history, each cycle run once more from its start: showing it changes no bit of it."""
-        machine = self._record.machine
-        runs = [simulate(machine, 1, state, samples_per_cycle=RENDER_SAMPLES) for state in self._record.section]
-        return replace(self._record, history=np.concatenate([run.history for run in runs if run.history is not None]))
-
-    def _observe(self) -> Observation:
-        measured = measured_peaks(self._record, self._sensor_error, self.np_random)
-        remaining = 1.0 - self._cycles_done / self.task.job_cycles
-        return observe(self._space, self.speed, self._action, remaining, measured, self._record)
+        record = self._fleet.records[0]
+        assert record is not None
+        record = record.after(len(record) - self.task.cycles_per_step)
+        runs = [simulate(record.machine, 1, state, samples_per_cycle=RENDER_SAMPLES) for state in record.section]
+        return replace(record, history=np.concatenate([run.history for run in runs if run.history is not None]))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -188,28 +190,15 @@ class MachineEnv(gym.Env[Observation, Action]):
             If the machine can't be simulated at its starting speed.
         """
         super().reset(seed=seed)
-        speed = self._starting_speed(options or {})
-        self._drawn = self._draw_machine()
-        self.machine = _at_speed(self._drawn, speed)
-        self._motion = None
-        self._action = self.drive.action_for(speed)
-        self._cycles_done = 0
-        self._damage = np.zeros(len(self.machine.sides))
-        run_in = self._run(max(RUN_IN_CYCLES, self.task.cycles_per_step))
-        self._recent_peaks = run_in.peak_force[:, 0]
-        self._record = run_in.after(len(run_in) - self.task.cycles_per_step)
+        speed = starting_speed(self.drive, options or {})
+        self._runs = False
+        observation, info = self._job.start(THE_ONE, speed, [self.np_random])
+        self._runs = True
         if self.render_mode is not None:
             self._show().start(self._shown())
             if self.render_mode == "human":
                 self.render()
-        return self._observe(), {"speed": speed, "damage": 0.0, "status": int(Status.RUNNING)}
-
-    def _starting_speed(self, options: dict[str, Any]) -> float:
-        for name in options:
-            if name != "speed":
-                raise ParameterError(f"options has no entry {name!r}; allowed: speed")
-        low, high = self.drive.lowest_speed, self.drive.highest_speed
-        return self.drive.rounded(checked_number("options['speed']", options.get("speed", low), low, high))
+        return observation[0], _first(info)
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Run one step; a simulation that fails ends the job instead of raising.
@@ -221,50 +210,18 @@ class MachineEnv(gym.Env[Observation, Action]):
         gymnasium.error.ResetNeeded
             Before the first reset and after the end of a job.
         """
-        if self._motion is None:
+        if not self._runs:
             raise gym.error.ResetNeeded("no job is running; call reset() first")
-        self._action, target = self.drive.target_of(action)
-        speed = self.drive.approach(self.speed, target)
-        if speed != self.speed:
-            self.machine = _at_speed(self._drawn, speed)
-        cycles = self.task.cycles_per_step
-        damage_before = self.damage
-        try:
-            self._record = self._run(cycles)
-        except SimulationError:
-            status = Status.SIMULATION_FAILED
-            peak_force = np.empty((0, len(self._damage)))
-        else:
-            peak_force = self._record.peak_force
-            self._damage = self._damage + self.task.damage(peak_force)
-            self._cycles_done += cycles
-            kept = judged_cycles(cycles) + LONGEST_PERIOD
-            self._recent_peaks = np.concatenate([self._recent_peaks, peak_force[:, 0]])[-kept:]
-            status = self._status()
-        step = Step(speed, cycles * self.machine.cycle_period, peak_force, self._recent_peaks)
-        type_iii = status != Status.SIMULATION_FAILED and self._is_type_iii(step)
-        reward, named = self.task.judge(
-            step, status, type_iii=type_iii, damage_increase=self.damage - damage_before, job_time=self._job_time
-        )
-        info = named | {
-            "speed": speed,
-            "damage": self.damage,
-            "status": int(status),
-            "is_success": status == Status.JOB_DONE,
-        }
-        observation = self._observe()
-        if status != Status.RUNNING:
-            self._motion = None
+        if np.shape(action) != (1,):
+            raise ParameterError(f"action = {action!r} is not usable; allowed: one number from -1 to 1, shape (1,)")
+        outcome = self._job.step(THE_ONE, np.asarray(action)[None], [self.np_random])
+        info = _first(outcome.info)
+        self._runs = info["status"] == Status.RUNNING
         if self.render_mode is not None:
-            self._show().add(self._shown(), type_iii)
+            self._show().add(self._shown(), info["cost_type_iii"] > 0.0)
             if self.render_mode == "human":
                 self.render()
-        return observation, reward, status != Status.RUNNING, False, info
-
-    def _status(self) -> Status:
-        if self.damage >= 1.0:
-            return Status.FRACTURE
-        return Status.JOB_DONE if self._cycles_done >= self.task.job_cycles else Status.RUNNING
+        return outcome.observation[0], float(outcome.reward[0]), not self._runs, False, info
 
     def _show(self) -> "Dashboard":
         if self._dashboard is None:

@@ -1,11 +1,12 @@
 """What does the agent see? The speed, the progress of the job, and what a force sensor reports of a step."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from chaosgym.simulation import CycleRecord
-
+Array = NDArray[np.float64]
 Observation = NDArray[np.float32]
 
 IMPACT_RANGE = 200.0
@@ -28,31 +29,41 @@ def observation_space(lowest_speed: float, highest_speed: float, force_range: fl
     return Box(np.array(low, np.float32), np.array(high, np.float32))
 
 
-def measured_peaks(record: CycleRecord, sensor_error: float, generator: np.random.Generator) -> NDArray[np.float64]:
-    """Peak force of each cycle [N] on the monitored surface, the first, as a sensor with uniform error reads it."""
-    error = generator.uniform(-sensor_error, sensor_error, len(record))
-    return np.maximum(record.peak_force[:, 0] + error, 0.0)
+def sensor_readings(peaks: Array, sensor_error: float, generators: Sequence[np.random.Generator]) -> Array:
+    """Peak forces (k, cycles) [N] as sensors with uniform error read them, each machine's by a generator of its own."""
+    share = np.empty_like(peaks)
+    for row, generator in zip(share, generators, strict=True):
+        generator.random(out=row)
+    return np.maximum(peaks + (2.0 * sensor_error * share - sensor_error), 0.0)
 
 
 def observe(
-    space: Box, speed: float, action: float, remaining: float, peaks: NDArray[np.float64], record: CycleRecord
+    space: Box, speed: Array, action: Array, remaining: Array, impacts: Array, bouncing: Array, peaks: Array
 ) -> Observation:
-    """Compose the observation of a step, clipped to its space.
+    """Compose the observations of k machines, clipped to their space.
 
     Parameters
     ----------
     space
         From ``observation_space``.
-    speed, action, remaining
+    speed, action, remaining : (k,)
         Speed of the step, the action behind it, and the share of the job still to do.
-    peaks : (cycles_per_step,)
+    impacts, bouncing : (k,)
+        Contacts begun in a cycle, and the share of the half cycle spent bouncing on one side.
+    peaks : (k, cycles_per_step)
         Measured peak forces [N].
-    record
-        The step's cycles.
+
+    Returns
+    -------
+    (k, 8 + cycles_per_step)
     """
-    mean = float(peaks.sum()) / len(peaks)
-    deviation = float(np.sqrt(((peaks - mean) ** 2).sum() / len(peaks)))
-    impacts = float(record.impacts.sum()) / len(peaks)
-    bouncing = 2.0 * float(record.bounce_duration.mean()) / record.machine.cycle_period
-    values = np.array([speed, action, remaining, peaks.max(), mean, deviation, impacts, bouncing, *peaks], np.float32)
-    return np.minimum(np.maximum(values, space.low), space.high)
+    cycles = peaks.shape[-1]
+    mean = peaks.sum(axis=-1) / cycles
+    deviation = np.sqrt(((peaks - mean[:, None]) ** 2).sum(axis=-1) / cycles)
+    values = np.empty((len(peaks), 8 + cycles), np.float32)
+    for column, entry in enumerate(
+        (speed, action, remaining, peaks.max(axis=-1), mean, deviation, impacts, bouncing)
+    ):  # fmt: skip
+        values[:, column] = entry
+    values[:, 8:] = peaks
+    return np.clip(values, space.low, space.high, out=values)

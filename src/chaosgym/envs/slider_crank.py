@@ -5,6 +5,7 @@ from typing import Any
 from chaosgym.envs.drive import SpeedDrive
 from chaosgym.envs.machine_env import SENSOR_ERROR, MachineEnv, nominal_machine
 from chaosgym.envs.tasks import Task
+from chaosgym.envs.vector_env import MachineVectorEnv
 from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK, SliderCrank
 
 CONTACT_DAMPING_RATIO = 0.1
@@ -226,3 +227,9 @@ class SliderCrankEnv(MachineEnv):
             sensor_error=sensor_error,
             render_mode=render_mode,
         )
+
+
+class SliderCrankVectorEnv(MachineVectorEnv):
+    """Many ``SliderCrankEnv`` in one compiled call."""
+
+    single = SliderCrankEnv

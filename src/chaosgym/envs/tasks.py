@@ -18,7 +18,7 @@ ISO 281:2007, Rolling bearings - Dynamic load ratings and rating life.
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,32 +49,33 @@ class Status(IntEnum):
 
 
 class Step(NamedTuple):
-    """What a task is told of one step.
+    """What a task is told of one step, of one machine or of many: leading axes (...) are machines.
 
-    ``speed`` in the machine's unit, ``duration`` [s], ``peak_force`` (cycles, sides) true peak forces [N], empty where
-    the simulation failed; ``recent_peaks`` (n,) those of the monitored surface up to now, this step's included.
+    ``speed`` (...) in the machine's unit, ``duration`` (...) [s], ``peak_force`` (..., cycles, sides) true peak forces
+    [N], zero where the simulation failed; ``recent_peaks`` (..., n) those of the monitored surface up to now, this
+    step's included.
     """
 
-    speed: float
-    duration: float
+    speed: Array
+    duration: Array
     peak_force: Array
     recent_peaks: Array
 
 
-def does_not_repeat(step: Step) -> bool:
+def does_not_repeat(step: Step) -> NDArray[np.bool_]:
     """Tell whether the peak forces fail to repeat within 5 % after any number of cycles up to ``LONGEST_PERIOD``.
 
     The last cycles of the step, its first one left out because a change of speed disturbs it, are compared with the
     cycles 1, 2, ... before them, whatever the speed was then.
     """
-    judged = judged_cycles(len(step.peak_force))
     peaks = step.recent_peaks
-    last = peaks[-judged:]
-    tolerance = REPEATABILITY * last.max()
-    for period in range(1, LONGEST_PERIOD + 1):
-        if np.abs(last - peaks[-judged - period : -period]).max() <= tolerance:
-            return False
-    return True
+    judged = judged_cycles(step.peak_force.shape[-2])
+    last = peaks[..., None, -judged:]
+    before = np.arange(1, LONGEST_PERIOD + 1)[:, None]
+    earlier = peaks[..., np.arange(-judged, 0) - before]
+    deviation = np.abs(last - earlier).max(axis=-1)
+    repeats: NDArray[np.bool_] = (deviation <= REPEATABILITY * last.max(axis=-1)).any(axis=-1)
+    return ~repeats
 
 
 def judged_cycles(cycles_per_step: int) -> int:
@@ -87,7 +88,7 @@ def damage_of(peak_force: Array, load_rating: float, acceleration: float) -> Arr
 
     Parameters
     ----------
-    peak_force : (cycles, sides)
+    peak_force : (..., cycles, sides)
         True peak forces [N].
     load_rating
         Force under which a surface lasts a million cycles [N].
@@ -96,9 +97,9 @@ def damage_of(peak_force: Array, load_rating: float, acceleration: float) -> Arr
 
     Returns
     -------
-    (sides,)
+    (..., sides)
     """
-    shares: Array = damage_in_a_million(peak_force, load_rating).sum(axis=0)
+    shares: Array = damage_in_a_million(peak_force, load_rating).sum(axis=-2)
     return shares * (acceleration * 1e-6)
 
 
@@ -141,38 +142,41 @@ class Task:
             )
 
     def damage(self, peak_force: Array) -> Array:
-        """Share of its life that each surface uses up, (sides,)."""
+        """Share of its life that each surface uses up, (..., sides)."""
         return damage_of(peak_force, self.load_rating, self.damage_acceleration)
 
+    def status(self, failed: Any, cycles_done: Any, damage: Any) -> Any:
+        """Where jobs stand (...), by whether their simulation failed, cycles done, and damage of the joint."""
+        done = np.where(cycles_done >= self.job_cycles, int(Status.JOB_DONE), int(Status.RUNNING))
+        return np.where(failed, int(Status.SIMULATION_FAILED), np.where(damage >= 1.0, int(Status.FRACTURE), done))
+
     def judge(
-        self, step: Step, status: Status, *, type_iii: bool, damage_increase: float, job_time: float
-    ) -> tuple[float, dict[str, float]]:
-        """Return the reward of a step, and its terms and costs by name.
+        self, step: Step, status: Any, *, type_iii: Any, damage_increase: Any, job_time: float
+    ) -> tuple[Array, dict[str, Array]]:
+        """Return the rewards of a step (...), and its terms and costs by name.
 
         Parameters
         ----------
         step
             What happened.
-        status
-            Where the job stands after it.
-        type_iii
-            Whether the step counts as Type III.
-        damage_increase
+        status : (...)
+            Where the jobs stand after it.
+        type_iii : (...)
+            Whether the step counts as Type III; never where the simulation failed.
+        damage_increase : (...)
             By how much the damage of the joint grew.
         job_time
             Duration of the whole job at top speed [s].
         """
-        failed = status == Status.SIMULATION_FAILED
-        overload = not failed and bool(step.peak_force.max() > self.force_limit)
+        failed = status == int(Status.SIMULATION_FAILED)
+        type_iii = type_iii & ~failed
+        overload = ~failed & (step.peak_force.max(axis=(-2, -1)) > self.force_limit)
         terms = {
             "reward_time": -self.time_weight * step.duration / job_time,
             "reward_damage": 0.0 - self.damage_weight * damage_increase,
             "reward_type_iii": 0.0 - self.type_iii_weight * type_iii * self.cycles_per_step / self.job_cycles,
-            "reward_failure": 0.0 - self.failure_weight * (failed or status == Status.FRACTURE),
+            "reward_failure": 0.0 - self.failure_weight * (failed | (status == int(Status.FRACTURE))),
         }
-        costs = {
-            "cost": float(type_iii or overload or failed),
-            "cost_type_iii": float(type_iii),
-            "cost_force": float(overload),
-        }
-        return sum(terms.values()), terms | costs
+        costs = {"cost": type_iii | overload | failed, "cost_type_iii": type_iii, "cost_force": overload}
+        named = terms | {name: np.asarray(cost, dtype=float) for name, cost in costs.items()}
+        return np.asarray(sum(terms.values())), named

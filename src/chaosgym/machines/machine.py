@@ -33,6 +33,11 @@ class Machine(Protocol):
         """Duration of one operating cycle [s]."""
         ...
 
+    @staticmethod
+    def period_at(speed: Any) -> Any:
+        """Duration of one operating cycle [s] at a speed, in the unit of the speed field, or at many."""
+        ...
+
     @property
     def natural_frequencies(self) -> NDArray[np.float64]:
         """Natural frequencies [Hz] of the machine free of contact, those of the kept modes."""

@@ -32,7 +32,7 @@ from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.errors import ParameterError
 from chaosgym.machines.crank_equations import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom, equations
 from chaosgym.machines.crank_joints import sensors_of
-from chaosgym.machines.crank_model import exact_model, has_propagators, stepped_model
+from chaosgym.machines.crank_model import STEP_PHASE, exact_model, has_propagators, stepped_model
 from chaosgym.machines.fidelity import FidelityLadder
 from chaosgym.machines.kinematics import slider_position
 from chaosgym.machines.parameters import parameter, validate
@@ -251,7 +251,12 @@ class SliderCrank(FidelityLadder):
     @property
     def cycle_period(self) -> float:
         """Duration of one revolution [s]."""
-        return 60.0 / self.crank_speed
+        return float(self.period_at(self.crank_speed))
+
+    @staticmethod
+    def period_at(speed: Any) -> Any:
+        """Duration of one operating cycle [s] at a speed [rpm], or at many."""
+        return 60.0 / speed
 
     @property
     def crank_rate(self) -> float:
@@ -318,8 +323,8 @@ class SliderCrank(FidelityLadder):
         """True if the motor stands at an angle, so that the rod swings in two planes."""
         return self.motor_angle > 0.0
 
-    def reduce(self, step_phase: float = 1.0) -> SliderCrankModel | SteppedCrankModel:
-        """Return the model for steps in which a closed contact turns by at most ``step_phase`` [rad].
+    def reduce(self, step_phase: float = STEP_PHASE) -> SliderCrankModel | SteppedCrankModel:
+        """Return the model in whose steps changes of contact are searched for every ``step_phase`` [rad] of a contact.
 
         With exact propagators if contact is linear and does not turn with the ball, for the Runge-Kutta stepper
         otherwise. Machines that differ in clearance alone share all of it; those that differ in speed

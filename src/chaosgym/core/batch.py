@@ -1,0 +1,139 @@
+"""How do many machines move at once? Each by its own ``advance``, side by side on all threads.
+
+A batch of models is a model whose fields have one more axis, the machines, in front. The large tables of a slider crank
+stay where they are, and its batch holds their addresses: machines at equal speeds share them.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import carray, njit, prange, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from chaosgym.core.crank_propagator import FORCING_TERMS
+from chaosgym.core.crank_stepper import SteppedCrankModel
+from chaosgym.core.crank_stepper import advance as advance_stepped_crank
+from chaosgym.core.impact_beam import CycleArrays, Episode, ImpactBeamModel
+from chaosgym.core.impact_beam import advance as advance_beam
+from chaosgym.core.propagator import Regimes
+from chaosgym.core.slider_crank import SliderCrankModel
+from chaosgym.core.slider_crank import advance as advance_crank
+
+
+class Motions(NamedTuple):
+    """Where N machines are: ``coordinates`` (N, n_states), ``bouncing`` (N, 3), as in a ``MotionState``."""
+
+    coordinates: np.ndarray
+    bouncing: np.ndarray
+
+
+class Settings(NamedTuple):
+    """Accuracy and budget of exact events, as in ``ExactEvents``."""
+
+    step_phase: float
+    event_tolerance: float
+    event_budget: int
+
+
+@njit(cache=True, inline="always")
+def rows_of(arrays, k):
+    """Arrays of the machine in row k."""
+    return CycleArrays(
+        arrays.section[k], arrays.tip[k], arrays.peak_force[k], arrays.impacts[k], arrays.contact_time[k],
+        arrays.bounce_time[k], arrays.events[k], arrays.history[k], arrays.peak_instant[k], arrays.peak_vector[k],
+        arrays.channel_peak[k],
+    )  # fmt: skip
+
+
+@njit(cache=True, inline="always")
+def episode_of(motions, i):
+    """Bouncing of machine i."""
+    return Episode(motions.bouncing[i, :1], motions.bouncing[i, 1:])
+
+
+@njit(cache=True, inline="always")
+def beam_of(batch, regimes, i):
+    """Model of machine i."""
+    own = Regimes(
+        regimes.rotates[i], regimes.rate[i], regimes.to_modal[i], regimes.from_modal[i], regimes.output[i],
+        regimes.magnitude[i], regimes.forcing[i], regimes.fastest[i],
+    )  # fmt: skip
+    return ImpactBeamModel(
+        batch.excitation_frequency[i], batch.force_amplitude[i], batch.clearance[i], batch.contact_stiffness[i],
+        batch.contact_damping[i], batch.stiffness[i], batch.damping[i], batch.tip_shape[i], batch.force_shape[i],
+        own, batch.rest[i], batch.rest_penetration[i],
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def advance_beams(batch, regimes, which, motions, arrays, settings, outcome):
+    """Advance the machines ``which`` (k,) of a batch in place by whole cycles; rows of ``arrays`` in that order.
+
+    Writes the status of each into ``outcome`` (k,). The batch comes without its regimes, and they by themselves: a
+    parallel loop takes no tuples of tuples.
+    """
+    for k in prange(which.shape[0]):
+        i = which[k]
+        outcome[k] = advance_beam(
+            beam_of(batch, regimes, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
+            settings.step_phase, settings.event_tolerance, settings.event_budget,
+        )[0]  # fmt: skip
+
+
+@intrinsic
+def pointer(typing_context, address):
+    """Turn an integer into a pointer."""
+
+    def build(context, builder, signature, arguments):
+        return builder.inttoptr(arguments[0], cgutils.voidptr_t)
+
+    return types.voidptr(types.intp), build
+
+
+@njit(cache=True, inline="always")
+def crank_of(batch, bins, i):
+    """Model of machine i of a batch that holds the addresses of the tables."""
+    m, n = batch.row.shape[1:]
+    size = 2 * n + FORCING_TERMS + m
+    sets = batch.radix[i] ** m
+    return SliderCrankModel(
+        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.order[i], batch.span[i], batch.row[i],
+        batch.gap[i], batch.stiffness[i], batch.damping[i], batch.two_sided[i], batch.radix[i], batch.reading[i],
+        batch.reach[i], batch.display[i],
+        carray(pointer(batch.acceleration[i]), (sets, bins, n, size), np.float64),
+        carray(pointer(batch.curvature[i]), (sets, bins, m, size), np.float64),
+        carray(pointer(batch.propagator[i]), (sets, bins, size, 2 * n), np.float64),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def advance_cranks(batch, bins, which, motions, arrays, settings, outcome):
+    """As ``advance_beams``, for slider cranks with ``bins`` bins of crank angle."""
+    for k in prange(which.shape[0]):
+        i = which[k]
+        outcome[k] = advance_crank(
+            crank_of(batch, bins, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
+            settings.event_tolerance / batch.contact_rate[i], settings.event_budget,
+        )[0]  # fmt: skip
+
+
+@njit(cache=True, inline="always")
+def stepped_crank_of(batch, i):
+    """Model of machine i."""
+    return SteppedCrankModel(
+        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.acceleration[i], batch.first[i],
+        batch.row[i], batch.answer[i], batch.friction[i], batch.gap[i], batch.stiffness[i], batch.damping[i],
+        batch.law[i], batch.two_sided[i], batch.reading[i], batch.monitored[i], batch.display[i],
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def advance_stepped_cranks(batch, which, motions, arrays, settings, outcome):
+    """As ``advance_beams``, for slider cranks that need the stepper."""
+    for k in prange(which.shape[0]):
+        i = which[k]
+        outcome[k] = advance_stepped_crank(
+            stepped_crank_of(batch, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
+            settings.event_tolerance / batch.contact_rate[i], settings.event_budget,
+        )[0]  # fmt: skip

@@ -1,0 +1,246 @@
+"""How do many agents' machines run at once? All jobs step in one compiled call, on all processors.
+
+envs = gym.make_vec("chaosgym/ImpactBeam-v0", num_envs=256)
+
+Every sub-environment does what a single environment with its seed does, bit for bit, and has a generator of its own.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, cast
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils.seeding import np_random
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from chaosgym.envs.jobs import Indices, Jobs
+from chaosgym.envs.machine_env import METADATA, MachineEnv, starting_speed
+from chaosgym.envs.observation import Observation
+from chaosgym.errors import ParameterError
+from chaosgym.fleet import fleet_of
+
+Actions = NDArray[np.float32]
+Flags = NDArray[np.bool_]
+
+SHARED = (
+    "action_space", "drive", "nominal", "observation_names", "observation_space", "render_mode", "rules", "task",
+    "tolerances",
+)  # fmt: skip
+"""Attributes that all sub-environments have in common."""
+
+
+class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]]):
+    """Sub-environments of one kind, as ``gymnasium.make_vec`` asks for them.
+
+    Parameters
+    ----------
+    num_envs
+        Number of sub-environments.
+    max_episode_steps
+        Steps after which a sub-environment is truncated; None for no limit.
+    autoreset_mode
+        When a sub-environment that has ended is reset: in the next step, in the same step, or by the user with
+        ``reset(options={"reset_mask": ...})``.
+    keywords
+        Those of the single environment, ``render_mode`` excepted.
+
+    Raises
+    ------
+    ParameterError
+        If a value is out of range; names it and the allowed range.
+    """
+
+    single: ClassVar[Callable[..., MachineEnv]]
+    """Makes the single environment whose jobs are run; a class for each environment sets it."""
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        max_episode_steps: int | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        **keywords: Any,
+    ) -> None:
+        if keywords.get("render_mode") is not None:
+            raise ParameterError(
+                f"render_mode = {keywords['render_mode']!r} is not one of None; pictures come from "
+                "vectorization_mode='sync'"
+            )
+        for name, count in (("num_envs", num_envs), ("max_episode_steps", max_episode_steps)):
+            if count is not None and (isinstance(count, bool) or int(count) != count or count < 1):
+                raise ParameterError(f"{name} = {count!r} is out of range; allowed: whole numbers from 1 on")
+        modes = [mode.value for mode in AutoresetMode]
+        if autoreset_mode not in (*AutoresetMode, *modes):
+            raise ParameterError(f"autoreset_mode = {autoreset_mode!r} is not one of {', '.join(modes)}")
+        self._single = type(self).single(**keywords)
+        self._jobs = Jobs(self._single.rules, fleet_of(self._single.machine, num_envs))
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
+        self._limit = max_episode_steps
+        self._elapsed = np.zeros(num_envs, np.int64)
+        self._needs_reset = np.ones(num_envs, np.bool_)
+        self._has_begun = False
+        self.num_envs = num_envs
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**METADATA, "render_modes": [], "autoreset_mode": self.autoreset_mode}
+        self.single_action_space = self._single.action_space
+        self.single_observation_space = self._single.observation_space
+        self.action_space = batch_space(self._single.action_space, num_envs)
+        self.observation_space = batch_space(self._single.observation_space, num_envs)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start all jobs, or those that ``options["reset_mask"]`` marks.
+
+        Parameters
+        ----------
+        seed
+            One for each sub-environment, or s for s, s + 1, s + 2, ...
+        options
+            As for the single environment, and ``"reset_mask"``: (num_envs,) bool.
+
+        Raises
+        ------
+        ParameterError, SimulationError
+            As the single environment.
+        """
+        options = dict(options or {})
+        which = self._masked(options.pop("reset_mask", None))
+        seeds = self._seeds(seed)
+        speed = starting_speed(self._single.drive, options)
+        observation, info = self._start(which, [seeds[i] for i in which.tolist()], speed)
+        if not self._has_begun:
+            self._last = np.zeros(cast(tuple[int, ...], self.observation_space.shape), np.float32)
+            self._has_begun = True
+        self._last[which] = observation
+        infos: dict[str, Any] = {}
+        self._add(infos, which, info)
+        return self._last.copy(), infos
+
+    def step(self, actions: Actions) -> tuple[Observation, NDArray[Any], Flags, Flags, dict[str, Any]]:
+        """Run one step of all jobs; those that have ended start anew as ``autoreset_mode`` says.
+
+        Raises
+        ------
+        ParameterError
+            If the actions are not numbers of shape (num_envs, 1).
+        gymnasium.error.ResetNeeded
+            Before the first reset, and without autoreset after the end of a job.
+        """
+        actions = np.asarray(actions)
+        if actions.shape != (self.num_envs, 1):
+            raise ParameterError(
+                f"actions have shape {actions.shape}; allowed: ({self.num_envs}, 1), numbers from -1 to 1"
+            )
+        over = np.flatnonzero(self._needs_reset)
+        if not self._has_begun or (len(over) and self.autoreset_mode is not AutoresetMode.NEXT_STEP):
+            raise gym.error.ResetNeeded(f"no job is running in sub-environments {over.tolist()}; call reset() first")
+        running = np.flatnonzero(~self._needs_reset)
+        observations = self._last.copy()
+        rewards = np.zeros(self.num_envs)
+        terminated, truncated = np.zeros(self.num_envs, np.bool_), np.zeros(self.num_envs, np.bool_)
+        infos: dict[str, Any] = {}
+        if len(running):
+            outcome = self._jobs.step(running, actions[running], self._generators_of(running))
+            self._elapsed[running] += 1
+            observations[running], rewards[running] = outcome.observation, outcome.reward
+            terminated[running] = outcome.terminated
+            if self._limit is not None:
+                truncated[running] = self._elapsed[running] >= self._limit
+            self._report(infos, observations, running, outcome.info, terminated | truncated)
+        if len(over):
+            observations[over], info = self._start(over, [None] * len(over))
+            self._add(infos, over, info)
+        self._last = observations
+        return observations.copy(), rewards, terminated, truncated, infos
+
+    def _report(
+        self, infos: dict[str, Any], observations: Observation, running: Indices, info: Mapping[str, Any], ended: Flags
+    ) -> None:
+        """Write the info of a step, and start the jobs that have ended if that is to happen in the same step."""
+        fresh = np.flatnonzero(ended)
+        if self.autoreset_mode is not AutoresetMode.SAME_STEP or len(fresh) == 0:
+            self._needs_reset = ended
+            self._add(infos, running, info)
+            return
+        final = np.full(self.num_envs, None, dtype=object)
+        last: dict[str, Any] = {}
+        for i in fresh.tolist():
+            final[i] = observations[i].copy()
+        self._add(last, fresh, {name: values[fresh] for name, values in info.items()})
+        infos |= {"final_obs": final, "_final_obs": ended.copy(), "final_info": last, "_final_info": ended.copy()}
+        if len(fresh) < self.num_envs:
+            going = np.flatnonzero(~ended)
+            self._add(infos, going, {name: values[going] for name, values in info.items()})
+        observations[fresh], started = self._start(fresh, [None] * len(fresh))
+        self._add(infos, fresh, started)
+
+    def _start(
+        self, which: Indices, seeds: Sequence[int | None], speed: float | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start jobs, at the lowest speed by default."""
+        for i, seed in zip(which.tolist(), seeds, strict=True):
+            if seed is not None or self._generators[i] is None:
+                self._generators[i] = np_random(seed)[0]
+        lowest = self._single.drive.lowest_speed
+        result = self._jobs.start(which, lowest if speed is None else speed, self._generators_of(which))
+        self._elapsed[which] = 0
+        self._needs_reset[which] = False
+        return result
+
+    def _generators_of(self, which: Indices) -> list[np.random.Generator]:
+        return [cast(np.random.Generator, self._generators[i]) for i in which.tolist()]
+
+    def _add(self, infos: dict[str, Any], which: Indices, named: Mapping[str, Any]) -> None:
+        """Write values (k,) of some sub-environments into arrays by name, each with a mask of who has one."""
+        for name, values in named.items():
+            if len(which) == self.num_envs:
+                infos[name], infos[f"_{name}"] = values, np.ones(self.num_envs, np.bool_)
+                continue
+            if name not in infos:
+                infos[name], infos[f"_{name}"] = np.zeros(self.num_envs, values.dtype), np.zeros(self.num_envs, bool)
+            infos[name][which] = values
+            infos[f"_{name}"][which] = True
+
+    def _masked(self, mask: Any) -> Indices:
+        if mask is None:
+            return np.arange(self.num_envs)
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
+            raise ParameterError(f"options['reset_mask'] = {mask!r} is not an array ({self.num_envs},) of bool")
+        if not mask.any():
+            raise ParameterError("options['reset_mask'] marks no sub-environment; allowed: at least one")
+        if not self._has_begun and not mask.all():
+            raise ParameterError("options['reset_mask'] leaves sub-environments without a job; allowed: all at first")
+        return np.flatnonzero(mask)
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            return [int(seed) + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ParameterError(f"seed has {len(seed)} entries; allowed: one number, or {self.num_envs}")
+        return seed
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Return an attribute of each sub-environment: speed, damage, machine, np_random, or one that all share.
+
+        Raises
+        ------
+        AttributeError
+            If there is no such attribute; names those that there are.
+        """
+        count = range(self.num_envs)
+        if name in SHARED:
+            return (getattr(self._single, name),) * self.num_envs
+        own: dict[str, Callable[[int], Any]] = {
+            "speed": lambda i: float(self._jobs.speed[i]),
+            "damage": lambda i: float(self._jobs.damage[i].max()),
+            "machine": self._jobs.machine_at,
+            "np_random": lambda i: self._generators[i],
+        }
+        if name not in own:
+            raise AttributeError(f"a sub-environment has no attribute {name!r}; known: {', '.join((*own, *SHARED))}")
+        return tuple(own[name](i) for i in count)
