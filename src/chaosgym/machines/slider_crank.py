@@ -30,12 +30,13 @@ from numpy.typing import NDArray
 from chaosgym.core.crank_stepper import SteppedCrankModel
 from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.errors import ParameterError
-from chaosgym.machines.crank_equations import SLIDER_ACROSS, degrees_of_freedom, equations
+from chaosgym.machines.crank_equations import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom, equations
 from chaosgym.machines.crank_joints import sensors_of
 from chaosgym.machines.crank_model import STEP_PHASE, exact_model, has_propagators, stepped_model
 from chaosgym.machines.fidelity import FidelityLadder
 from chaosgym.machines.kinematics import slider_position
 from chaosgym.machines.parameters import parameter, validate
+from chaosgym.machines.spatial_equations import spatial_equations
 
 Array = NDArray[np.float64]
 
@@ -306,7 +307,10 @@ class SliderCrank(FidelityLadder):
 
     @property
     def natural_frequencies(self) -> Array:
-        """Natural frequencies [Hz] at rest at crank angle zero, every joint tight, (n_modes + 1,)."""
+        """Natural frequencies [Hz] at rest at crank angle zero, every joint tight, (n_modes + 1,).
+
+        At a motor angle (2 n_modes + 1,): those of bending sideways too.
+        """
         return frequencies_at(self, 0.0)
 
     @property
@@ -344,8 +348,9 @@ SUPERHARMONIC_SLIDER_CRANK = replace(
 def frequencies_at(machine: SliderCrank, crank_angle: float) -> Array:
     """Natural frequencies [Hz] of the mechanism at rest at a crank angle [deg], every joint tight."""
     bound = replace(machine, slider_joint="clearance", ball_joint="ideal", rod="flexible")
-    system = equations(bound, np.array([math.radians(crank_angle)]))
-    free = [i for i, name in enumerate(bound.degrees_of_freedom) if name != SLIDER_ACROSS]
+    assemble = spatial_equations if machine.is_spatial else equations
+    system = assemble(bound, np.array([math.radians(crank_angle)]))
+    free = [i for i, name in enumerate(bound.degrees_of_freedom) if name not in (SLIDER_ACROSS, SLIDER_LATERAL)]
     at = np.ix_(free, free)
     squares = scipy.linalg.eigh(system.stiffness[0, 0][at], system.mass[0][at], eigvals_only=True)
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi))
