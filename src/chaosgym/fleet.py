@@ -22,7 +22,7 @@ from chaosgym.core.crank_stepper import SteppedCrankModel
 from chaosgym.core.impact_beam import CycleArrays, ImpactBeamModel
 from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.errors import SimulationError
-from chaosgym.machines.crank_model import ModelsBySpeed
+from chaosgym.machines.crank_model import TABLES, KeptModel, models_by_speed
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import CycleRecord, ExactEvents, MotionState, batch_arrays, rest_state, simulate
@@ -32,9 +32,6 @@ Indices = NDArray[np.int64]
 
 KEPT_MACHINES = 256
 """Machines at one speed that are kept: checking all fields of a new one takes longer than a look-up."""
-
-TABLES = ("acceleration", "curvature", "propagator")
-"""Large arrays of a slider crank that a batch refers to by address."""
 
 
 class Cycles(NamedTuple):
@@ -199,6 +196,10 @@ class BeamFleet(_CompiledFleet):
         advance_beams(self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
 
 
+SPEED_FIELDS = ("bin_duration", "steps", "order", "span")
+"""Fields of a slider crank's model that change with its speed, apart from the tables."""
+
+
 class CrankFleet(_CompiledFleet):
     """Slider cranks that ``has_propagators``."""
 
@@ -206,38 +207,34 @@ class CrankFleet(_CompiledFleet):
         super().__init__(machine, count)
         model = machine.reduce()
         self._bins = model.acceleration.shape[1]
-        self._batch = stacked([_without_tables(model)] * count)
+        self._batch = stacked([model._replace(**dict.fromkeys(TABLES, 0))] * count)
+        self._models = [models_by_speed(machine)] * count
         self._speeds = np.full(count, np.nan)
-        self._models = [ModelsBySpeed(machine)] * count
-        # the tables stay alive as long as the batch holds their addresses
-        self._current = [model] * count
+        # the tables live as long as the batch holds their addresses
+        self._kept: list[KeptModel | None] = [None] * count
 
     def _enter(self, i: int, machine: Any) -> None:
-        self._models[i] = ModelsBySpeed(machine)
-        model = machine.reduce()
-        put(self._batch, i, _without_tables(model))
-        self._current[i] = model
-        self._speeds[i] = getattr(machine, machine.speed_field)
+        put(self._batch, i, machine.reduce()._replace(**dict.fromkeys(TABLES, 0)))
+        self._models[i] = models_by_speed(machine)
+        self._speeds[i] = np.nan
+        self.set_speeds(np.array([i]), np.array([machine.crank_speed]))
 
     def set_speeds(self, which: Indices, speeds: Array) -> None:
         """Change the speeds of the cranks [rpm]."""
         changed = self._speeds[which] != speeds
         self._speeds[which] = speeds
-        batch = self._batch
+        fields = [getattr(self._batch, name) for name in SPEED_FIELDS]
+        tables = [getattr(self._batch, name) for name in TABLES]
         for i, speed in zip(which[changed].tolist(), speeds[changed].tolist(), strict=True):
-            model = self._models[i].at(speed)
-            self._current[i] = model
-            batch.bin_duration[i], batch.steps[i], batch.order[i] = model.bin_duration, model.steps, model.order
-            for name in TABLES:
-                getattr(batch, name)[i] = getattr(model, name).__array_interface__["data"][0]
+            kept = self._models[i].at(speed)
+            self._kept[i] = kept
+            for field, name in zip(fields, SPEED_FIELDS, strict=True):
+                field[i] = getattr(kept.model, name)
+            for table, address in zip(tables, kept.addresses, strict=True):
+                table[i] = address
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         advance_cranks(self._batch, self._bins, which, self._motions, arrays, self._settings, outcome)
-
-
-def _without_tables(model: SliderCrankModel) -> SliderCrankModel:
-    """Model with the addresses of its tables in their place."""
-    return model._replace(**{name: getattr(model, name).__array_interface__["data"][0] for name in TABLES})
 
 
 class SteppedCrankFleet(_CompiledFleet):

@@ -184,9 +184,17 @@ _PER_CYCLE = (
 )  # fmt: skip
 
 
+def _arrays(machine: Machine, model: Any, cycles: int, samples: int = 0) -> CycleArrays:
+    """Return the arrays into which the kernels write what a machine does."""
+    if isinstance(machine, SliderCrank):
+        channels = len(model.gap) if machine.sensors else 0
+        return cycle_arrays(cycles, _states(machine), samples, travels=True, channels=channels)
+    return cycle_arrays(cycles, _states(machine), samples)
+
+
 def batch_arrays(machine: Machine, count: int, cycles: int) -> CycleArrays:
-    """Return arrays for the kernels that run ``count`` variants of a machine: one more axis, the machines, in front."""
-    one = cycle_arrays(cycles, _states(machine))
+    """Return arrays for ``count`` variants of a machine: those of one, with one more axis, the machines, in front."""
+    one = _arrays(machine, machine.reduce(), cycles)
     return CycleArrays(*(np.empty((count, *array.shape), array.dtype) for array in one))
 
 
@@ -214,7 +222,7 @@ def _run_impact_beam(
     tangents: Tangents | None = None,
 ) -> tuple[int, int, CycleRecord]:
     model = beam.reduce()
-    arrays = cycle_arrays(cycles, 2 * beam.n_modes, samples)
+    arrays = _arrays(beam, model, cycles, samples)
     coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
     along = () if tangents is None else (tangents,)
@@ -241,8 +249,7 @@ def _run_slider_crank(
         raise ParameterError(f"integrator = {integrator} does not run a slider crank; allowed: ExactEvents(...)")
     # its peaks and events are refined on the exact motion, so its steps may be twice as long as the beam's
     model = crank.reduce(2.0 * integrator.step_phase)
-    channels = len(model.gap) if crank.sensors else 0
-    arrays = cycle_arrays(cycles, 2 * len(crank.degrees_of_freedom), samples, travels=True, channels=channels)
+    arrays = _arrays(crank, model, cycles, samples)
     coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
     tolerance, budget = integrator.event_tolerance / model.contact_rate, integrator.event_budget

@@ -57,7 +57,7 @@ def beam_of(batch, regimes, i):
     """Model of machine i."""
     own = Regimes(
         regimes.rotates[i], regimes.rate[i], regimes.to_modal[i], regimes.from_modal[i], regimes.output[i],
-        regimes.magnitude[i], regimes.forcing[i], regimes.fastest[i],
+        regimes.magnitude[i], regimes.forcing[i], regimes.modulus[i], regimes.fastest[i],
     )  # fmt: skip
     return ImpactBeamModel(
         batch.excitation_frequency[i], batch.force_amplitude[i], batch.clearance[i], batch.contact_stiffness[i],
@@ -98,9 +98,9 @@ def crank_of(batch, bins, i):
     size = 2 * n + FORCING_TERMS + m
     sets = batch.radix[i] ** m
     return SliderCrankModel(
-        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.order[i], batch.row[i], batch.gap[i],
-        batch.stiffness[i], batch.damping[i], batch.two_sided[i], batch.radix[i], batch.reading[i], batch.reach[i],
-        batch.display[i],
+        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.order[i], batch.span[i], batch.row[i],
+        batch.gap[i], batch.stiffness[i], batch.damping[i], batch.two_sided[i], batch.radix[i], batch.reading[i],
+        batch.reach[i], batch.display[i],
         carray(pointer(batch.acceleration[i]), (sets, bins, n, size), np.float64),
         carray(pointer(batch.curvature[i]), (sets, bins, m, size), np.float64),
         carray(pointer(batch.propagator[i]), (sets, bins, size, 2 * n), np.float64),

@@ -1,4 +1,9 @@
-"""Which Gymnasium environments are there? Importing this registers them, without importing numba or matplotlib."""
+"""Which Gymnasium environments are there? Importing this registers them, without importing numba or matplotlib.
+
+``SB3VecEnv``, for stable-baselines3, is imported when it is asked for.
+"""
+
+from typing import Any
 
 from gymnasium.envs.registration import register, registry
 
@@ -13,6 +18,14 @@ VECTOR_ENVIRONMENTS = {
     "chaosgym/SliderCrank-v0": "chaosgym.envs.slider_crank:SliderCrankVectorEnv",
 }
 """Entry point of each native vector environment by id."""
+
+
+def __getattr__(name: str) -> Any:
+    if name == "SB3VecEnv":
+        from chaosgym.envs.sb3 import SB3VecEnv
+
+        return SB3VecEnv
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def register_environments() -> None:

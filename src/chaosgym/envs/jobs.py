@@ -142,8 +142,8 @@ class Jobs:
             step, status, type_iii=self.rules.is_type_iii(step), damage_increase=worse - before.max(axis=-1),
             job_time=self._job_time,
         )  # fmt: skip
-        info = named | {"speed": speed, "damage": worse, "status": status, "is_success": status == Status.JOB_DONE}
-        return Outcome(self._observe(which, generators), reward, status != Status.RUNNING, info)
+        info = named | {"speed": speed, "damage": worse, "status": status, "is_success": status == int(Status.JOB_DONE)}
+        return Outcome(self._observe(which, generators), reward, status != int(Status.RUNNING), info)
 
     def _draw_machine(self, generator: np.random.Generator) -> Machine:
         rules = self.rules

@@ -147,9 +147,8 @@ class Task:
 
     def status(self, failed: Any, cycles_done: Any, damage: Any) -> Any:
         """Where jobs stand (...), by whether their simulation failed, cycles done, and damage of the joint."""
-        done = np.where(cycles_done >= self.job_cycles, Status.JOB_DONE, Status.RUNNING)
-        broken = np.where(damage >= 1.0, Status.FRACTURE, done)
-        return np.where(failed, Status.SIMULATION_FAILED, broken)
+        done = np.where(cycles_done >= self.job_cycles, int(Status.JOB_DONE), int(Status.RUNNING))
+        return np.where(failed, int(Status.SIMULATION_FAILED), np.where(damage >= 1.0, int(Status.FRACTURE), done))
 
     def judge(
         self, step: Step, status: Any, *, type_iii: Any, damage_increase: Any, job_time: float
@@ -169,14 +168,14 @@ class Task:
         job_time
             Duration of the whole job at top speed [s].
         """
-        failed = status == Status.SIMULATION_FAILED
+        failed = status == int(Status.SIMULATION_FAILED)
         type_iii = type_iii & ~failed
         overload = ~failed & (step.peak_force.max(axis=(-2, -1)) > self.force_limit)
         terms = {
             "reward_time": -self.time_weight * step.duration / job_time,
             "reward_damage": 0.0 - self.damage_weight * damage_increase,
             "reward_type_iii": 0.0 - self.type_iii_weight * type_iii * self.cycles_per_step / self.job_cycles,
-            "reward_failure": 0.0 - self.failure_weight * (failed | (status == Status.FRACTURE)),
+            "reward_failure": 0.0 - self.failure_weight * (failed | (status == int(Status.FRACTURE))),
         }
         costs = {"cost": type_iii | overload | failed, "cost_type_iii": type_iii, "cost_force": overload}
         named = terms | {name: np.asarray(cost, dtype=float) for name, cost in costs.items()}

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.core.crank_propagator import FORCING_TERMS, propagator_table, series_order
+from chaosgym.core.crank_propagator import FORCING_TERMS, SERIES_PHASE, SQUARINGS, propagator_table, series_order
 from chaosgym.core.crank_stepper import HERTZ, LINEAR, SteppedCrankModel
-from chaosgym.core.slider_crank import SliderCrankModel
+from chaosgym.core.slider_crank import PIECES, SliderCrankModel
 from chaosgym.machines.crank_equations import Equations, equations, rod_of
 from chaosgym.machines.crank_joints import Channels, channels_of, display_of, gaps_of, hertz_constants, joints_of
 from chaosgym.machines.kinematics import slider_rate
@@ -46,37 +46,51 @@ MAX_SETS = 32
 KEPT = 32
 """Machines whose assembled equations are kept, whatever their speed and clearance."""
 
+KEPT_STRUCTURES = 1024
+"""Machines whose models are looked up by speed alone."""
+
+TABLES = ("acceleration", "curvature", "propagator")
+"""Large arrays of a model."""
+
 KEPT_BYTES = 256_000_000
 """Memory for the propagators of machines at one speed; those used longest ago go first."""
 
 _NOT_IN_THE_MATRICES = ("crank_speed", "slider_clearance", "ball_clearance")
 
 
+class KeptModel(NamedTuple):
+    """A model without its clearances, and the addresses of its large ``TABLES``, which live as long as it does."""
+
+    model: SliderCrankModel
+    addresses: tuple[int, ...]
+
+
 class _RecentModels:
     """Models by key within ``KEPT_BYTES``; several threads may ask at once."""
 
     def __init__(self) -> None:
-        self._models: OrderedDict[Hashable, SliderCrankModel] = OrderedDict()
+        self._models: OrderedDict[Hashable, KeptModel] = OrderedDict()
         self._bytes = 0
         self._lock = Lock()
 
-    def get(self, key: Hashable, make: Callable[[], SliderCrankModel]) -> SliderCrankModel:
+    def get(self, key: Hashable, make: Callable[[], SliderCrankModel]) -> KeptModel:
         with self._lock:
             if key in self._models:
                 self._models.move_to_end(key)
                 return self._models[key]
         model = make()
+        kept = KeptModel(model, tuple(getattr(model, name).ctypes.data for name in TABLES))
         with self._lock:
             if key not in self._models:
-                self._models[key] = model
+                self._models[key] = kept
                 self._bytes += _size(model)
             while self._bytes > KEPT_BYTES and len(self._models) > 1:
-                self._bytes -= _size(self._models.popitem(last=False)[1])
-        return model
+                self._bytes -= _size(self._models.popitem(last=False)[1].model)
+        return kept
 
 
 def _size(model: SliderCrankModel) -> int:
-    return model.acceleration.nbytes + model.curvature.nbytes + model.propagator.nbytes
+    return sum(int(getattr(model, name).nbytes) for name in TABLES)
 
 
 _recent = _RecentModels()
@@ -90,24 +104,31 @@ def has_propagators(machine: "SliderCrank") -> bool:
 
 
 class ModelsBySpeed:
-    """Models of a machine that ``has_propagators`` at any speed, without its clearances.
+    """Models, at any speed, of machines that differ in speed and clearance alone; from ``models_by_speed``."""
 
-    A closed contact turns by ``step_phase`` [rad] in a step.
-    """
+    def __init__(self, step_phase: float, structure: tuple[Any, ...]) -> None:
+        self._step_phase, self._structure = step_phase, structure
 
-    def __init__(self, machine: "SliderCrank", step_phase: float = STEP_PHASE) -> None:
-        self._structure = _key(machine)
-        self._step_phase = step_phase
-
-    def at(self, crank_speed: float) -> SliderCrankModel:
+    def at(self, crank_speed: float) -> KeptModel:
         """Return the model at a speed [rpm]; its gaps are zero."""
-        key = (crank_speed, self._step_phase, self._structure)
-        return _recent.get(key, lambda: _at_speed(crank_speed, self._step_phase, _structure(*self._structure)))
+        return _recent.get(
+            (crank_speed, self), lambda: _at_speed(crank_speed, self._step_phase, _structure(*self._structure))
+        )
+
+
+@lru_cache(maxsize=KEPT_STRUCTURES)
+def _models_by_speed(step_phase: float, *structure: Any) -> ModelsBySpeed:
+    return ModelsBySpeed(step_phase, structure)
+
+
+def models_by_speed(machine: "SliderCrank", step_phase: float = STEP_PHASE) -> ModelsBySpeed:
+    """Models of a machine that ``has_propagators``; a contact turns by ``step_phase`` [rad] in a piece of a step."""
+    return _models_by_speed(step_phase, *_key(machine))
 
 
 def exact_model(machine: "SliderCrank", step_phase: float) -> SliderCrankModel:
-    """Model of a machine that ``has_propagators``; a closed contact turns by ``step_phase`` [rad] in a step."""
-    return ModelsBySpeed(machine, step_phase).at(machine.crank_speed)._replace(gap=gaps_of(machine))
+    """Model of a machine that ``has_propagators``; a contact turns by ``step_phase`` [rad] in a piece of a step."""
+    return models_by_speed(machine, step_phase).at(machine.crank_speed).model._replace(gap=gaps_of(machine))
 
 
 def _radix(machine: "SliderCrank") -> int:
@@ -289,14 +310,14 @@ def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> Slide
     columns[:, :, : 2 * n] += parts.push[:, :, : 2 * n]
     columns[:, :, 2 * n + FORCING_TERMS :] = parts.push[:, :, 2 * n :]
     acceleration = np.ascontiguousarray(np.swapaxes(columns, -1, -2))
-    steps = max(1, math.ceil(duration * max(parts.contact / step_phase, parts.spectrum / MAX_PHASE)))
+    steps = max(1, math.ceil(duration * max(parts.contact / (PIECES * step_phase), parts.spectrum / MAX_PHASE)))
     step = duration / steps
-    order = series_order(parts.spectrum * step)
     return SliderCrankModel(
         bin_duration=duration,
         steps=steps,
         contact_rate=parts.contact,
-        order=order,
+        order=series_order(parts.spectrum * step),
+        span=series_span(parts.spectrum, step),
         row=parts.channels.row,
         gap=np.zeros(m),
         stiffness=parts.channels.stiffness,
@@ -308,5 +329,12 @@ def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> Slide
         display=parts.display,
         acceleration=acceleration,
         curvature=np.ascontiguousarray(parts.channels.row @ acceleration),
-        propagator=propagator_table(acceleration, duration, step, order),
+        propagator=propagator_table(acceleration, duration, step, series_order(parts.spectrum * step / 2**SQUARINGS)),
     )
+
+
+def series_span(spectrum: float, step: float) -> Array:
+    """Longest time [s] that a Taylor series of each order sums to round-off; no end from that of a whole step on."""
+    span = SERIES_PHASE / spectrum
+    span[series_order(spectrum * step) :] = math.inf
+    return np.asarray(span)
