@@ -8,8 +8,8 @@ the range that the machine usually runs in:
                   distributions: what a statistical answer (life, damage, reward) depends on
     labels        share of the points whose nature, and whose type over the tolerance neighbourhood, are the reference's
 
-Every setting sees the points in the same order. One that is too slow for its share of the budget stops early, is compared
-with the reference at the points that it reached, and stays off the Pareto front.
+Every setting sees the points in the same order. One that is too slow for its share of the budget stops early, is
+compared with the reference at the points that it reached, and stays off the Pareto front.
 """
 
 import math
