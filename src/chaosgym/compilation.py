@@ -37,15 +37,19 @@ def prepare(kernel: Any, *arguments: Any) -> None:
     signature = (*types, *(numba.types.Omitted(default) for default in defaults))
     with _alone():
         if not is_cached(kernel):
-            logger.warning("compiling %s: once on this computer, some ten seconds", kernel.py_func.__qualname__)
+            logger.warning("compiling %s: once on this computer, some ten seconds", name_of(kernel))
         kernel.compile(signature)
 
 
 def is_cached(kernel: Any) -> bool:
     """True if machine code of a kernel lies on the disk, for arguments of some types."""
+    return any(Path(KERNEL_CACHE).glob(f"*/{name_of(kernel)}-*.nbi"))
+
+
+def name_of(kernel: Any) -> str:
+    """Module and name of a kernel."""
     function = kernel.py_func
-    name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}-*.nbi"
-    return any(Path(KERNEL_CACHE).glob(f"*/{name}"))
+    return f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
 
 
 @contextmanager

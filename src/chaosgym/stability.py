@@ -183,7 +183,10 @@ def runs_of(machine: Machine) -> list[Run]:
         for rung in ladder
     ]
     default = str(getattr(type(machine)(), "rung", ""))
-    runs += [Run(f"{count} modes", default, _changed(machine, {}, {"n_modes": count}), None) for count in MODES]
+    runs += [
+        Run("1 mode" if count == 1 else f"{count} modes", default, _changed(machine, {}, {"n_modes": count}), None)
+        for count in MODES
+    ]
     if machine.name == ImpactBeam.name:
         runs += [
             Run(f"{steps} steps a cycle", rung, _changed(machine, {"fidelity": rung}, {}), RungeKutta4(steps))
