@@ -21,6 +21,10 @@ class DatasetError(ChaosgymError, ValueError):
     """A dataset folder or file is missing, damaged, or belongs to another run."""
 
 
+class UnfinishedError(ChaosgymError, RuntimeError):
+    """A long computation stopped before its end: a full disk, a lost cluster. The same command goes on from there."""
+
+
 class ModelFileError(ChaosgymError, ValueError):
     """A classifier or policy file is missing, damaged, or of another version."""
 

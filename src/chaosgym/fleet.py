@@ -17,9 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.core import status
-from chaosgym.core.batch import Motions, Settings, advance_beams, advance_cranks, advance_stepped_cranks
+from chaosgym.core.batch import (
+    Motions,
+    Settings,
+    advance_beams,
+    advance_cranks,
+    advance_rigid_beams,
+    advance_stepped_cranks,
+)
 from chaosgym.core.crank_stepper import SteppedCrankModel
 from chaosgym.core.impact_beam import CycleArrays, ImpactBeamModel
+from chaosgym.core.restitution import RestitutionModel
 from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.errors import SimulationError
 from chaosgym.machines.crank_model import TABLES, KeptModel, models_by_speed
@@ -196,7 +204,14 @@ class BeamFleet(_CompiledFleet):
         advance_beams(self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
 
 
-SPEED_FIELDS = ("bin_duration", "steps", "order")
+class RigidBeamFleet(BeamFleet):
+    """Impact beams whose impacts take no time."""
+
+    def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
+        advance_rigid_beams(self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
+
+
+SPEED_FIELDS = ("bin_duration", "steps")
 """Fields of a slider crank's model that change with its speed, apart from the tables."""
 
 
@@ -208,6 +223,7 @@ class CrankFleet(_CompiledFleet):
         model = machine.reduce()
         self._bins = model.acceleration.shape[1]
         self._batch = stacked([model._replace(**dict.fromkeys(TABLES, 0))] * count)
+        self._terms = np.full(count, len(model.span))
         self._models = [models_by_speed(machine)] * count
         self._speeds = np.full(count, np.nan)
         # the tables live as long as the batch holds their addresses
@@ -232,9 +248,10 @@ class CrankFleet(_CompiledFleet):
                 field[i] = getattr(kept.model, name)
             for table, address in zip(tables, kept.addresses, strict=True):
                 table[i] = address
+            self._terms[i] = len(kept.model.span)
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
-        advance_cranks(self._batch, self._bins, which, self._motions, arrays, self._settings, outcome)
+        advance_cranks(self._batch, self._bins, self._terms, which, self._motions, arrays, self._settings, outcome)
 
 
 class SteppedCrankFleet(_CompiledFleet):
@@ -261,6 +278,7 @@ class SteppedCrankFleet(_CompiledFleet):
 
 _COMPILED: dict[type, type[BeamFleet] | type[CrankFleet] | type[SteppedCrankFleet]] = {
     ImpactBeamModel: BeamFleet,
+    RestitutionModel: RigidBeamFleet,
     SliderCrankModel: CrankFleet,
     SteppedCrankModel: SteppedCrankFleet,
 }

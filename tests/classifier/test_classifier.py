@@ -24,7 +24,7 @@ def made_up_sweep():
     table = pa.table({"excitation_frequency": speed, "clearance": clearance, "response_type": types})
     axes = [{"field": "excitation_frequency", "count": 40}, {"field": "clearance", "count": 25}]
     base = {name: getattr(THESIS_IMPACT_BEAM, name) for name in parameters_of(ImpactBeam)}
-    settings = {"machine": "impact-beam", "base": base, "axes": axes, "sampling": "grid", "transient": 0, "cycles": 0}
+    settings = {"machine": "impact-beam", "base": base, "axes": axes, "sampling": "grid", "budget": 0}
     settings["type_reach"] = {"excitation_frequency": 1, "clearance": 1}
     return LabelledSweep(table, settings)
 

@@ -72,7 +72,7 @@ def test_sweep_writes_parquet_and_resumes(tmp_path):
     """A sweep fills its folder; the same command again is done at once; another one leaves it alone."""
     command = (
         "sweep", "impact-beam", "--axis", "excitation_frequency=18:30:3", "--axis", "clearance=1e-4:1.3e-4:2",
-        "--transient", "20", "--cycles", "30", "--out", str(tmp_path / "s"),
+        "--budget", "100", "--out", str(tmp_path / "s"),
     )  # fmt: skip
     first = run_json(*command)
     assert first["points"] == 6

@@ -11,6 +11,7 @@ from chaosgym.core.impact_beam import Episode, cycle_arrays
 from chaosgym.core.slider_crank import advance
 from chaosgym.errors import SimulationError
 from chaosgym.machines.crank_equations import equations
+from chaosgym.machines.crank_model import series_span
 from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.simulation import ExactEvents, simulate
 from tests.core.crank_twin import continuous_twin, rigid_twin
@@ -66,14 +67,13 @@ def frozen_model(machine, duration):
     acceleration = np.ascontiguousarray(model.acceleration[:, [place, place]])
     n = acceleration.shape[-2]
     acceleration[..., n : 2 * n + 4] = 0.0
-    step = duration / 2 / model.steps
-    steps = math.ceil(step * model.contact_rate / 0.25) * model.steps
+    steps = math.ceil(duration / 2 * model.contact_rate / 0.5)
     step = duration / 2 / steps
-    order = series_order(2.0 * model.contact_rate * step)
-    table = propagator_table(acceleration, duration / 2, step, order)
+    spectrum = 2.0 * model.contact_rate
+    table = propagator_table(acceleration, duration / 2, step, series_order(spectrum * step))
     return model._replace(
-        bin_duration=duration / 2, steps=steps, order=order, acceleration=acceleration, propagator=table,
-        curvature=model.row @ acceleration,
+        bin_duration=duration / 2, steps=steps, span=series_span(spectrum, step), acceleration=acceleration,
+        propagator=table, curvature=model.row @ acceleration,
     )  # fmt: skip
 
 
@@ -135,6 +135,25 @@ def test_a_run_can_be_continued_to_the_bit():
     assert np.array_equal(whole.section[20:], second.section)
     assert np.array_equal(whole.peak_force[20:], second.peak_force)
     assert np.array_equal(whole.bounce_duration[20:], second.bounce_duration)
+
+
+@pytest.mark.parametrize("change", [{}, {"slider_clearance": 0.032e-3}, {"slider_joint": "instrumented"}])
+def test_sampling_only_reads(change):
+    """A time history of any density changes nothing else by a bit: states, peaks, impacts, times in contact."""
+    machine = replace(CRANK, **change)
+    plain = simulate(machine, 4)
+    for samples in (1, 77, 3600):
+        sampled = simulate(machine, 4, samples_per_cycle=samples)
+        for field in ("section", "peak_force", "impacts", "contact_fraction", "bounce_duration"):
+            assert np.array_equal(getattr(plain, field), getattr(sampled, field)), (field, samples)
+        np.testing.assert_array_equal(sampled.history[:, 0, 0], plain.displacement)
+
+
+def test_times_in_contact_are_those_of_the_history():
+    """The share of a revolution in contact with each side is that of the samples with force on it."""
+    record = simulate(SMALL_GAP, 1, transient=60, samples_per_cycle=20_000)
+    force = record.history[0, :, 2]
+    assert record.contact_fraction[0] == pytest.approx([np.mean(force > 0.0), np.mean(force < 0.0)], abs=5e-3)
 
 
 def test_an_exhausted_event_budget_is_an_error():

@@ -1,23 +1,41 @@
 """Running sweeps: what a row says, resuming, and never touching what is not ours."""
 
+import errno
 import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-import chaosgym.sweeps.run as run_module
-from chaosgym.diagnosis import two_step_test
-from chaosgym.errors import DatasetError
+import chaosgym.sweeps.label as label_module
+import chaosgym.sweeps.plan as plan_module
+from chaosgym.diagnosis import diagnose, response_type
+from chaosgym.errors import DatasetError, SimulationError, UnfinishedError
 from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam
 from chaosgym.simulation import simulate
-from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
+from chaosgym.sweeps import Axis, Patch, SweepPlan, read_sweep, relabel, run_sweep
 
 PLAN = SweepPlan(
     THESIS_IMPACT_BEAM,
     (Axis("excitation_frequency", 18.0, 30.0, 5), Axis("clearance", 0.1e-3, 0.14e-3, 3)),
-    transient=50,
-    cycles=60,
+    budget=100,
+)
+LATTICE = SweepPlan(
+    THESIS_IMPACT_BEAM,
+    (Axis("damping_ratio", 0.01, 0.05, scale="log"),),
+    "lattice",
+    size=5,
+    seed=1,
+    patches=(Patch("excitation_frequency", 18.0, 30.0, 3), Patch("clearance", 1e-4, 1.4e-4, 4, scale="log")),
+    budget=100,
+    signals=0.5,
+    full_types=0.3,
 )
 
 
@@ -28,16 +46,91 @@ def swept(tmp_path_factory):
     return folder, run_sweep(PLAN, folder)
 
 
+@pytest.fixture(scope="module")
+def lattice(tmp_path_factory):
+    """A small lattice with signals and full types, run once."""
+    return run_sweep(LATTICE, tmp_path_factory.mktemp("sweep") / "lattice")
+
+
+def beam_of(row):
+    """The beam of a row."""
+    return ImpactBeam(**{name: row[name] for name in LATTICE.fields})
+
+
 def test_rows_are_what_simulation_and_diagnosis_say(swept):
-    """A row holds the fields in SI and the verdict on that very machine."""
+    """A row holds the fields in SI, the verdict on that very machine, and figures of the run that was judged."""
     _, sweep = swept
     row = sweep.table.slice(7, 1).to_pylist()[0]
     beam = ImpactBeam(excitation_frequency=row["excitation_frequency"], clearance=row["clearance"])
-    record = simulate(beam, 60, transient=50)
-    verdict = two_step_test(record)
-    assert (row["nature"], row["period"]) == (verdict.nature, verdict.period)
-    assert row["peak_force_max"] == record.peak_force[:, 0].max()
-    assert row["status"] in ("labelled", "undetermined")
+    verdict = diagnose(beam, budget=100)
+    judged = simulate(beam, 100).after(50)
+    assert (row["nature"], row["period"], row["status"]) == (verdict.nature, verdict.period, verdict.status)
+    assert row["peak_force_max"] == np.float32(judged.peak_force[:, 0].max())
+    assert row["horizon"] == 100
+    exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
+    assert row["exponent"] == np.float32(exponent["value"])
+
+
+def test_signals_are_the_cycles_of_the_run_from_rest(lattice):
+    """Cycles 0 to 63 and 200 to 263 in float32, for about half of the rows."""
+    rows = [row for row in lattice.table.to_pylist() if row["settled_velocity"] is not None]
+    assert 0.4 < len(rows) / len(LATTICE) < 0.6
+    record = simulate(beam_of(rows[3]), 264)
+    for window, cycles in (("start", slice(0, 64)), ("settled", slice(200, 264))):
+        np.testing.assert_array_equal(rows[3][f"{window}_velocity"], record.velocity[cycles].astype(np.float32))
+        np.testing.assert_array_equal(rows[3][f"{window}_displacement"], record.displacement[cycles].astype(np.float32))
+        np.testing.assert_array_equal(rows[3][f"{window}_peak_force"], record.peak_force[cycles, 0].astype(np.float32))
+
+
+def test_lattice_types_are_those_of_runs_around_the_point(lattice):
+    """Inside a patch the shared neighbours give the type of a one-state window of the same points."""
+    for row in (5, 17):
+        line = lattice.table.slice(row, 1).to_pylist()[0]
+        natures, peaks = lattice.column("nature"), lattice.column("largest_peak")
+        beside = [row - 1, row + 1, row - 4, row + 4]
+        assert line["type_neighbours"] == 4
+        assert {line["machine"]} == set(lattice.column("machine")[beside])
+        rises = [peaks[near] > 1.1 * peaks[row] for near in beside]
+        restless = [natures[near] != "periodic" for near in beside]
+        if line["nature"] != "periodic" or (restless[0] and restless[1]) or (restless[2] and restless[3]):
+            assert line["response_type"] == "III"
+        else:
+            assert line["response_type"] == ("II" if any(rises) or any(restless) else "I")
+
+
+def test_full_types_are_judged_over_all_tolerances(lattice):
+    """They equal ``response_type`` and stand only where all neighbours are in the sweep."""
+    rows = [row for row in lattice.table.to_pylist() if row["full_response_type"] is not None]
+    assert rows
+    assert {row["type_neighbours"] for row in rows} == {4}
+    assert rows[0]["full_response_type"] == response_type(beam_of(rows[0]), budget=100).type
+
+
+def test_a_split_never_cuts_a_machine(lattice):
+    """All rows of a machine lie in one part, and most machines are for training."""
+    parts = {}
+    for number, part in zip(lattice.column("machine"), lattice.column("split"), strict=True):
+        parts.setdefault(int(number), set()).add(part)
+    assert [len(part) for part in parts.values()] == [1] * 5
+    assert [part for part in parts.values()].count({"train"}) in (3, 4)
+
+
+def test_random_points_are_typed_over_the_full_window(tmp_path):
+    """Points without neighbours get their response type from runs of their own, where that is asked for."""
+    axes = tuple(Axis(axis.field, axis.low, axis.high) for axis in PLAN.axes)
+    plan = SweepPlan(THESIS_IMPACT_BEAM, axes, "random", size=4, budget=100, full_types=1.0)
+    sweep = run_sweep(plan, tmp_path / "s")
+    beam = ImpactBeam(**{name: float(sweep.column(name)[2]) for name in plan.fields})
+    assert sweep.column("response_type")[2] == response_type(beam, budget=100).type
+    bare = run_sweep(replace(plan, full_types=0.0), tmp_path / "t")
+    assert set(bare.column("response_type")) == {None}
+
+
+def test_rows_can_be_computed_again_bit_for_bit(lattice):
+    """What stands in a row follows from the settings in the file and the row's number."""
+    again = relabel(lattice, (3, 41))
+    names = [name for name in again.schema.names if name not in ("response_type", "type_neighbours")]
+    assert again.select(names).equals(lattice.table.take([3, 41]).select(names))
 
 
 def test_every_point_has_a_type_and_chaos_is_type_iii(swept):
@@ -70,20 +163,20 @@ def test_same_command_again_reads_the_finished_sweep(swept):
     assert read_sweep(folder).shape == (5, 3)
 
 
-def test_stopped_sweep_goes_on_and_ends_with_the_same_bytes(swept, tmp_path, monkeypatch):
-    """After an interruption only the missing chunks are computed, and the file equals that of an undisturbed run."""
+def test_stopped_sweep_goes_on_and_ends_with_the_same_rows(swept, tmp_path, monkeypatch):
+    """After an interruption only the missing chunks are computed, and the rows equal those of an undisturbed run."""
     whole, _ = swept
-    monkeypatch.setattr(run_module, "CHUNK_SIZE", 4)
+    monkeypatch.setattr(plan_module, "CHUNK_SIZE", 4)
     computed = []
-    honest = run_module.label_point
+    honest = label_module.label_point
 
-    def interrupted(machine, transient, cycles):
+    def interrupted(machine, budget, *, signals):
         if len(computed) == 9:
             raise KeyboardInterrupt
         computed.append(machine)
-        return honest(machine, transient, cycles)
+        return honest(machine, budget, signals=signals)
 
-    monkeypatch.setattr(run_module, "label_point", interrupted)
+    monkeypatch.setattr(label_module, "label_point", interrupted)
     with pytest.raises(KeyboardInterrupt):
         run_sweep(PLAN, tmp_path / "s", workers=1)
     kept = sorted((tmp_path / "s" / "chunks").glob("*.parquet"))
@@ -91,33 +184,118 @@ def test_stopped_sweep_goes_on_and_ends_with_the_same_bytes(swept, tmp_path, mon
     with pytest.raises(DatasetError, match="no finished sweep"):
         read_sweep(tmp_path / "s")
     computed.clear()
-    monkeypatch.setattr(run_module, "label_point", lambda *a: computed.append(a) or honest(*a))
+    monkeypatch.setattr(label_module, "label_point", lambda *a, **k: computed.append(a) or honest(*a, **k))
     run_sweep(PLAN, tmp_path / "s", workers=2)
     assert len(computed) == 15 - 8
     monkeypatch.undo()
     assert pq.read_table(tmp_path / "s" / "sweep.parquet").equals(pq.read_table(whole / "sweep.parquet"))
+    assert pq.ParquetFile(tmp_path / "s" / "sweep.parquet").num_row_groups == 4
+    assert not (tmp_path / "s" / "chunks").exists()
+
+
+def test_a_full_disk_loses_nothing(swept, tmp_path, monkeypatch):
+    """The third chunk finds no space: what was kept stays, no half file is left, and the same call ends the sweep."""
+    whole, _ = swept
+    monkeypatch.setattr(plan_module, "CHUNK_SIZE", 4)
+    honest, tables = pq.ParquetWriter.write_table, []
+
+    def full(writer, table, *arguments, **options):
+        tables.append(table)
+        if len(tables) == 3:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        honest(writer, table, *arguments, **options)
+
+    monkeypatch.setattr(pq.ParquetWriter, "write_table", full)
+    with pytest.raises(UnfinishedError, match="no space left"):
+        run_sweep(PLAN, tmp_path / "s", workers=1)
+    assert len(list((tmp_path / "s" / "chunks").iterdir())) == 2
+    monkeypatch.setattr(pq.ParquetWriter, "write_table", honest)
+    run_sweep(PLAN, tmp_path / "s")
+    assert pq.read_table(tmp_path / "s" / "sweep.parquet").equals(pq.read_table(whole / "sweep.parquet"))
+
+
+@pytest.mark.slow
+def test_a_killed_sweep_goes_on(tmp_path):
+    """kill -9 in the middle; the same command again ends with the rows of an undisturbed run."""
+    axes = (Axis("excitation_frequency", 10.0, 30.0), Axis("clearance", 5e-5, 2e-4))
+    plan = SweepPlan(THESIS_IMPACT_BEAM, axes, "sobol", size=900, seed=2, budget=100)
+    command = [
+        sys.executable, "-m", "chaosgym", "sweep", "impact-beam", "--axis", "excitation_frequency=10:30",
+        "--axis", "clearance=5e-5:2e-4", "--sobol", "900", "--seed", "2", "--budget", "100",
+        "--out", str(tmp_path / "s"),
+    ]  # fmt: skip
+    run = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    deadline = time.monotonic() + 120.0
+    while len(list(tmp_path.glob("s/chunks/0*.parquet"))) < 2 and time.monotonic() < deadline:
+        time.sleep(0.02)
+    run.send_signal(signal.SIGKILL)
+    assert run.wait() == -signal.SIGKILL
+    kept = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("s/chunks/0*.parquet")}
+    assert 2 <= len(kept) < 4
+    again = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "complete, 900 points" in again.stdout
+    undisturbed = run_sweep(plan, tmp_path / "t")
+    assert read_sweep(tmp_path / "s").table.equals(undisturbed.table)
+
+
+def test_damage_is_named_and_repaired(tmp_path, monkeypatch):
+    """A flipped bit in a chunk, kept or joined, is found by its checksum; with repair that chunk is computed again."""
+    monkeypatch.setattr(plan_module, "CHUNK_SIZE", 4)
+    whole = run_sweep(PLAN, tmp_path / "s").table
+    file = tmp_path / "s" / "sweep.parquet"
+    column = pq.ParquetFile(file).metadata.row_group(2).column(0)
+    place = column.data_page_offset + column.total_compressed_size - 3
+    sound = file.read_bytes()
+    file.write_bytes(sound[:place] + bytes([sound[place] ^ 1]) + sound[place + 1 :])
+    with pytest.raises(DatasetError, match=r"row group 2 of sweep.parquet damaged.*--repair"):
+        run_sweep(PLAN, tmp_path / "s")
+    computed = []
+    honest = label_module.label_point
+    monkeypatch.setattr(label_module, "label_point", lambda *a, **k: computed.append(a) or honest(*a, **k))
+    assert run_sweep(PLAN, tmp_path / "s", repair=True).table.equals(whole)
+    assert len(computed) == 4
+    file.write_bytes(b"PAR1 no")
+    with pytest.raises(DatasetError, match=r"sweep.parquet damaged"):
+        run_sweep(PLAN, tmp_path / "s")
+    assert run_sweep(PLAN, tmp_path / "s", repair=True).table.equals(whole)
+
+    store = tmp_path / "t"
+    with monkeypatch.context() as context:
+        context.setattr("chaosgym.sweeps.folder.SweepFolder.finish", lambda self: None)
+        with pytest.raises(DatasetError, match="no finished sweep"):
+            run_sweep(PLAN, store)
+    (store / "chunks" / "000000000004.parquet").write_bytes(b"PAR1 no")
+    with pytest.raises(DatasetError, match=r"000000000004.parquet damaged.*--repair"):
+        run_sweep(PLAN, store)
+    assert run_sweep(PLAN, store, repair=True).table.equals(whole)
 
 
 def test_failed_runs_are_rows(tmp_path, monkeypatch):
     """A machine that can't be simulated is a row with status failed and the reason, not a missing one."""
-    monkeypatch.setattr(run_module, "simulate", _fail)
+    monkeypatch.setattr(label_module, "diagnosed_run", _fail)
     sweep = run_sweep(PLAN, tmp_path / "s")
     assert set(sweep.column("status")) == {"failed"}
     assert np.all([reason.startswith("no luck") for reason in sweep.column("reason")])
     assert set(sweep.column("response_type")) == {"undetermined"}
 
 
-def _fail(machine, cycles, transient):
-    from chaosgym.errors import SimulationError
-
+def _fail(machine, *, budget):
     raise SimulationError("no luck")
+
+
+def test_impossible_machines_are_rows(tmp_path):
+    """A point that is no machine, here one whose shaker pushes beyond the tip, fails by itself."""
+    plan = SweepPlan(THESIS_IMPACT_BEAM, (Axis("length", 0.17, 0.28, 2),), budget=100)
+    sweep = run_sweep(plan, tmp_path / "s")
+    assert list(sweep.column("status")) == ["failed", "agreed"]
+    assert "force_position" in sweep.column("reason")[0]
 
 
 def test_other_settings_and_foreign_folders_are_refused(swept, tmp_path):
     """Another plan, or a folder with anything else in it, is left alone."""
     folder, _ = swept
-    other = SweepPlan(PLAN.machine, PLAN.axes, transient=51, cycles=60)
-    with pytest.raises(DatasetError, match=r"another sweep.*transient"):
+    other = replace(PLAN, budget=101)
+    with pytest.raises(DatasetError, match=r"another sweep.*budget"):
         run_sweep(other, folder)
     (tmp_path / "note.txt").write_text("mine")
     with pytest.raises(DatasetError, match="is no run of this sweep"):

@@ -100,7 +100,7 @@ def train_classifier(sweep: LabelledSweep, seed: int = 0, *, progress: bool = Fa
         "fields": fields,
         "ranges": {name: [float(column.min()), float(column.max())]
                    for name, column in zip(fields, values.T, strict=True)},
-        "label": {key: sweep.settings[key] for key in ("transient", "cycles", "sampling", "axes", "type_reach")},
+        "label": {key: sweep.settings[key] for key in ("budget", "sampling", "axes", "type_reach")},
         "seed": seed,
         "version": __version__,
         "report": report,

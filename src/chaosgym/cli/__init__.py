@@ -13,10 +13,11 @@ from chaosgym.cli.classify import classify, train_classifier
 from chaosgym.cli.demo import demo
 from chaosgym.cli.design import design
 from chaosgym.cli.diagnose import agreement, diagnose
+from chaosgym.cli.figures import figures
 from chaosgym.cli.info import info
 from chaosgym.cli.simulate import show, simulate
 from chaosgym.cli.sweep import sweep
-from chaosgym.errors import ChaosgymError, SimulationError
+from chaosgym.errors import ChaosgymError, SimulationError, UnfinishedError
 from chaosgym.version import __version__
 
 
@@ -27,7 +28,7 @@ def app() -> None:
 
 
 for command in (
-    simulate, show, diagnose, agreement, classify, sweep, train_classifier, demo, design, info, bench,
+    simulate, show, diagnose, agreement, classify, sweep, train_classifier, demo, design, figures, info, bench,
 ):  # fmt: skip
     app.add_command(command)
 
@@ -44,4 +45,4 @@ def main() -> None:
         sys.exit(error.exit_code)
     except (ChaosgymError, OSError) as error:
         click.echo(f"Error: {error}", err=True)
-        sys.exit(1 if isinstance(error, SimulationError) else 2)
+        sys.exit(1 if isinstance(error, SimulationError | UnfinishedError) else 2)

@@ -14,10 +14,23 @@ from chaosgym.cli.output import emit
 @click.option("--grid", "sampling", flag_value="grid", default="grid", help="All combinations (default).")
 @click.option("--random", "random_size", type=click.IntRange(1), metavar="N", help="N random points.")
 @click.option("--sobol", "sobol_size", type=click.IntRange(1), metavar="N", help="N points of a Sobol sequence.")
+@click.option(
+    "--machines", "machine_count", type=click.IntRange(1), metavar="N",
+    help="N machines of a Sobol sequence over the axes, each on a small lattice of its own (--patch).",
+)  # fmt: skip
+@click.option(
+    "--patch", "patches", multiple=True, metavar="FIELD=LOW:HIGH:COUNT[:STEP][:lin|log]",
+    help="A dimension of the lattice, at a random place of the range; STEP 2% or 10, default one tolerance.",
+)  # fmt: skip
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
-@click.option("--transient", type=click.IntRange(0, 10**7), default=200, show_default=True, help="Cycles to skip.")
-@click.option("--cycles", type=click.IntRange(16, 10**7), default=200, show_default=True, help="Cycles to judge.")
+@click.option(
+    "--budget", type=click.IntRange(100, 10**7), default=400, show_default=True, help="Cycles at the most, by point."
+)
+@click.option("--signals", type=float, default=0.0, help="Share of the points whose signals are kept, 0 to 1.")
+@click.option("--full-types", type=float, default=0.0, help="Share of the points typed over all tolerances, 0 to 1.")
 @click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
+@click.option("--scheduler", metavar="tcp://HOST:PORT", help="Compute on a Dask cluster (extra [cluster]).")
+@click.option("--repair", is_flag=True, help="Compute damaged chunks again.")
 @click.option("--out", type=click.Path(file_okay=False), required=True, help="Folder for the labelled points.")
 def sweep(
     machine: Any,
@@ -25,30 +38,40 @@ def sweep(
     sampling: str,
     random_size: int | None,
     sobol_size: int | None,
+    machine_count: int | None,
+    patches: tuple[str, ...],
     seed: int,
-    transient: int,
-    cycles: int,
+    budget: int,
+    signals: float,
+    full_types: float,
     workers: int | None,
+    scheduler: str | None,
+    repair: bool,
     out: str,
     as_json: bool,
 ) -> None:
     """Label many machines and keep them as Parquet; the same command again resumes."""
     from collections import Counter
 
-    from chaosgym.sweeps import Axis, SweepPlan, run_sweep
+    from chaosgym.sweeps import Axis, Patch, SweepPlan, run_sweep
     from chaosgym.sweeps.plan import default_axes
 
-    if random_size and sobol_size:
-        raise click.UsageError("--random and --sobol exclude each other")
-    kind: Any = "random" if random_size else "sobol" if sobol_size else sampling
-    chosen = tuple(Axis.parse(text) for text in axes) or default_axes(machine, kind)
-    plan = SweepPlan(machine, chosen, kind, random_size or sobol_size or 0, seed, transient, cycles)
-    labelled = run_sweep(plan, out, workers=workers, progress=True)
+    sizes = {"random": random_size, "sobol": sobol_size, "lattice": machine_count}
+    given = [name for name, size in sizes.items() if size]
+    if len(given) > 1:
+        raise click.UsageError("--random, --sobol and --machines exclude each other")
+    if bool(patches) != bool(machine_count):
+        raise click.UsageError("--machines N and --patch belong together: give both or neither")
+    kind: Any = given[0] if given else sampling
+    lattice = tuple(Patch.parse(text) for text in patches)
+    chosen = tuple(Axis.parse(text) for text in axes) or (() if lattice else default_axes(machine, kind))
+    plan = SweepPlan(machine, chosen, kind, sizes.get(kind) or 0, seed, lattice, budget, signals, full_types)
+    labelled = run_sweep(plan, out, workers=workers, scheduler=scheduler, repair=repair, progress=True)
     counts = {name: dict(Counter(str(value) for value in labelled.column(name)))
               for name in ("nature", "response_type", "status")}  # fmt: skip
-    result = {"machine": machine.name, "folder": out, "points": len(labelled.table), **counts}
+    result = {"machine": machine.name, "folder": out, "complete": True, "points": len(labelled.table), **counts}
     emit(result, as_json, lambda: [
-        f"{machine.name}: {len(labelled.table)} points in {out}",
+        f"{machine.name}: complete, {len(labelled.table)} points in {out}",
         *(f"  {name:14s}" + ", ".join(f"{key} {count}" for key, count in sorted(counts[name].items()))
           for name in counts),
     ])  # fmt: skip

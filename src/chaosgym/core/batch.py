@@ -17,6 +17,7 @@ from chaosgym.core.crank_stepper import advance as advance_stepped_crank
 from chaosgym.core.impact_beam import CycleArrays, Episode, ImpactBeamModel
 from chaosgym.core.impact_beam import advance as advance_beam
 from chaosgym.core.propagator import Regimes
+from chaosgym.core.restitution import RestitutionModel, advance_restitution
 from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.core.slider_crank import advance as advance_crank
 
@@ -53,16 +54,21 @@ def episode_of(motions, i):
 
 
 @njit(cache=True, inline="always")
+def regimes_of(regimes, i):
+    """Regimes of machine i."""
+    return Regimes(
+        regimes.rotates[i], regimes.rate[i], regimes.to_modal[i], regimes.from_modal[i], regimes.output[i],
+        regimes.magnitude[i], regimes.forcing[i], regimes.modulus[i], regimes.fastest[i],
+    )  # fmt: skip
+
+
+@njit(cache=True, inline="always")
 def beam_of(batch, regimes, i):
     """Model of machine i."""
-    own = Regimes(
-        regimes.rotates[i], regimes.rate[i], regimes.to_modal[i], regimes.from_modal[i], regimes.output[i],
-        regimes.magnitude[i], regimes.forcing[i], regimes.fastest[i],
-    )  # fmt: skip
     return ImpactBeamModel(
         batch.excitation_frequency[i], batch.force_amplitude[i], batch.clearance[i], batch.contact_stiffness[i],
         batch.contact_damping[i], batch.stiffness[i], batch.damping[i], batch.tip_shape[i], batch.force_shape[i],
-        own, batch.rest[i], batch.rest_penetration[i],
+        regimes_of(regimes, i), batch.rest[i], batch.rest_penetration[i],
     )  # fmt: skip
 
 
@@ -81,6 +87,27 @@ def advance_beams(batch, regimes, which, motions, arrays, settings, outcome):
         )[0]  # fmt: skip
 
 
+@njit(cache=True, inline="always")
+def rigid_beam_of(batch, regimes, i):
+    """Model of machine i."""
+    return RestitutionModel(
+        batch.excitation_frequency[i], batch.force_amplitude[i], batch.clearance[i], batch.stiffness[i],
+        batch.damping[i], batch.tip_shape[i], batch.force_shape[i], regimes_of(regimes, i), batch.restitution[i],
+        batch.contact_duration[i], batch.force_per_speed[i],
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def advance_rigid_beams(batch, regimes, which, motions, arrays, settings, outcome):
+    """As ``advance_beams``, for beams whose impacts take no time."""
+    for k in prange(which.shape[0]):
+        i = which[k]
+        outcome[k] = advance_restitution(
+            rigid_beam_of(batch, regimes, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
+            settings.step_phase, settings.event_budget,
+        )[0]  # fmt: skip
+
+
 @intrinsic
 def pointer(typing_context, address):
     """Turn an integer into a pointer."""
@@ -92,15 +119,16 @@ def pointer(typing_context, address):
 
 
 @njit(cache=True, inline="always")
-def crank_of(batch, bins, i):
-    """Model of machine i of a batch that holds the addresses of the tables."""
+def crank_of(batch, bins, terms, i):
+    """Model of machine i of a batch that holds the addresses of the tables; ``terms`` (N,) are lengths of ``span``."""
     m, n = batch.row.shape[1:]
     size = 2 * n + FORCING_TERMS + m
     sets = batch.radix[i] ** m
     return SliderCrankModel(
-        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.order[i], batch.row[i], batch.gap[i],
-        batch.stiffness[i], batch.damping[i], batch.two_sided[i], batch.radix[i], batch.reading[i], batch.reach[i],
-        batch.display[i],
+        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i],
+        carray(pointer(batch.span[i]), (terms[i],), np.float64),
+        batch.row[i], batch.gap[i], batch.stiffness[i], batch.damping[i], batch.two_sided[i], batch.radix[i],
+        batch.reading[i], batch.reach[i], batch.display[i],
         carray(pointer(batch.acceleration[i]), (sets, bins, n, size), np.float64),
         carray(pointer(batch.curvature[i]), (sets, bins, m, size), np.float64),
         carray(pointer(batch.propagator[i]), (sets, bins, size, 2 * n), np.float64),
@@ -108,12 +136,12 @@ def crank_of(batch, bins, i):
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def advance_cranks(batch, bins, which, motions, arrays, settings, outcome):
+def advance_cranks(batch, bins, terms, which, motions, arrays, settings, outcome):
     """As ``advance_beams``, for slider cranks with ``bins`` bins of crank angle."""
     for k in prange(which.shape[0]):
         i = which[k]
         outcome[k] = advance_crank(
-            crank_of(batch, bins, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
+            crank_of(batch, bins, terms, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
             settings.event_tolerance / batch.contact_rate[i], settings.event_budget,
         )[0]  # fmt: skip
 

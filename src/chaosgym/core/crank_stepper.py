@@ -19,16 +19,17 @@ import numpy as np
 from numba import njit
 
 from chaosgym.core import status
-from chaosgym.core.impact_beam import LOWER, UPPER, cubic, cubic_extremum, note_touch
-from chaosgym.core.slider_crank import (
-    RUNAWAY,
+from chaosgym.core.crank_record import (
     begin_cycle,
     crest_instant,
     note_channel,
     note_peak,
     note_share,
     resultant,
+    write_peaks,
 )
+from chaosgym.core.impact_beam import LOWER, UPPER, cubic, cubic_extremum, note_touch
+from chaosgym.core.slider_crank import RUNAWAY
 
 LINEAR, HERTZ = 0, 1
 
@@ -331,11 +332,13 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
     z, moved, inner, k = np.empty(n2), np.empty(n2), np.empty(n2), np.empty((4, n2))
     direction = np.empty(model.row.shape[0])
     closed = np.zeros(joints, dtype=np.bool_)
+    peak = np.zeros((2, 5))
 
     for cycle in range(arrays.section.shape[0]):
         z[:] = state
         begin_cycle(model, state, arrays, cycle)
-        peak, impacts = arrays.peak_force[cycle], arrays.impacts[cycle]
+        peak[:] = 0.0
+        impacts = arrays.impacts[cycle]
         contact_time, bounce_time = arrays.contact_time[cycle], arrays.bounce_time[cycle]
         for j in range(joints):
             depth, rate = measure(model, j, z, direction)
@@ -363,15 +366,15 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                     )
                     sample += 1
                 end = joint_force(model, moved, k[3], closed, direction)
-                note_share(end, h, contact_time)
-                note_peak(arrays, cycle, b * duration + time + h, end)
+                note_share(start, end, h, contact_time)
+                note_peak(peak, b * duration + time + h, end)
                 crest, size = crest_instant(h, start, end)
-                if size > peak[UPPER if end[0] > 0.0 else LOWER]:
+                if size > peak[UPPER if end[0] > 0.0 else LOWER, 0]:
                     state_within(h, crest, z, k[0], moved, k[3], inner)
                     there = joint_force(model, inner, k[3], closed, direction)
                     share = size / there[1] if there[1] > 0.0 else 0.0
                     at_crest = (share * there[0], size, 0.0, share * there[3], share * there[4])
-                    note_peak(arrays, cycle, b * duration + time + crest, at_crest)
+                    note_peak(peak, b * duration + time + crest, at_crest)
                 note_joints(model, h, z, k[0], moved, k[3], closed, direction, arrays.channel_peak[cycle])
                 z, moved = moved, z
                 changes = change_contacts(
@@ -383,7 +386,7 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                         return status.EVENT_BUDGET, cycle
                     slope(model, b, time + h, z, closed, direction, k[0])
                     end = joint_force(model, z, k[0], closed, direction)
-                    note_peak(arrays, cycle, b * duration + time + h, end)
+                    note_peak(peak, b * duration + time + h, end)
                 else:
                     k[0] = k[3]
                 start = end
@@ -392,6 +395,7 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
                 else:
                     count += 1
 
+        write_peaks(peak, arrays, cycle)
         arrays.events[cycle] = events
         state[:] = z
         for i in range(n2):

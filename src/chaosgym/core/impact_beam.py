@@ -14,6 +14,7 @@ GAP and DETACHED share the free regime; CONTACT has its own, since k and d act a
 exactly within a regime (``propagator``), so the only error is in the instant at which e vanishes, and that is
 polished to ``event_tolerance``. No event is missed: a step is taken only if a bound of e'' shows that e keeps its
 sign, or else it is as short as the fastest mode requires and is searched for a dip as well as for a change of sign.
+Modes that have died down to ``NEGLIGIBLE`` require nothing.
 """
 
 import math
@@ -31,14 +32,20 @@ FREE, PRESSED = 0, 1
 GAP, CONTACT, DETACHED = 0, 1, 2
 UPPER, LOWER = 0, 1
 
-STEP_LEVELS = 16
-"""Exact steps come in lengths h, 2h, 4h ... 2^15 h."""
+MAX_STEP_LEVELS = 64
+"""Exact steps come in lengths h, 2h, 4h ... up to a cycle."""
+
+STEPS_PER_EVENT = 1000
+"""Steps that one cycle may take for each event that it may have."""
+
+NEGLIGIBLE = 1e-9
+"""Share of the bounds of the tip's second and third derivative below which a mode does not shorten the steps."""
 
 NUDGE_LIMIT = 0.02
 """Largest angle [rad] of the fastest mode that a Taylor series bridges: its error is below 1e-12."""
 
 CREST_STEPS = 2.0
-"""Longest step, in shortest steps, whose cubic still shows a crest of the contact force."""
+"""Longest step, in steps of ``step_phase``, whose cubic still shows a crest of the contact force."""
 
 MAX_POLISH = 60
 """Iterations to polish one event; safeguarded Newton needs two or three, bisection about fifty."""
@@ -212,6 +219,26 @@ def curvature_bounds(model, magnitude, tip_state, r, u):
 
 
 @njit(cache=True, inline="always")
+def matters(model, regimes, tip_state, r, j, u, curvature1, curvature2):
+    """True if modal coordinate j has a share in the bounds of e'' that is not ``NEGLIGIBLE``."""
+    size2, size3 = regimes.magnitude[r, 0, j] * abs(u[j]), regimes.magnitude[r, 1, j] * abs(u[j])
+    force_curvature = model.contact_stiffness * size2 + model.contact_damping * size3
+    if tip_state == CONTACT:
+        return force_curvature > NEGLIGIBLE * curvature1
+    return size2 > NEGLIGIBLE * curvature1 or (tip_state == DETACHED and force_curvature > NEGLIGIBLE * curvature2)
+
+
+@njit(cache=True)
+def rate_that_matters(model, regimes, tip_state, r, u, curvature1, curvature2, slowest):
+    """Rate [1/s] of the fastest modal coordinate that ``matters``, at least ``slowest``."""
+    rate = slowest
+    for j in range(u.shape[0]):
+        if regimes.modulus[r, j] > rate and matters(model, regimes, tip_state, r, j, u, curvature1, curvature2):
+            rate = regimes.modulus[r, j]
+    return rate
+
+
+@njit(cache=True, inline="always")
 def cubic(e0, d0, e1, d1, h, t):
     """Value and slope at t of the cubic with values e0, e1 and slopes d0, d1 at 0 and h."""
     s = t / h
@@ -251,15 +278,15 @@ def suspect(e0, d0, e1, d1, h, doubt):
 
 
 @njit(cache=True)
-def locate(model, regimes, tip_state, side, which, u, moved, h, until, safe, e0, d0, e1, d1, tolerance):
+def locate(model, regimes, tip_state, side, which, u, moved, h, until, safe, e0, d0, e1, d1, fastest, tolerance):
     """Instant in [safe, until] at which event function ``which`` falls to zero, or inf if it only comes close.
 
     Leaves the state of that instant in ``moved``. The first guess is the root of the cubic through both ends of the
-    step; then Newton's method on the exact motion, kept inside a shrinking bracket.
+    step; then Newton's method on the exact motion, kept inside a shrinking bracket. ``fastest`` is the rate of the
+    fastest mode that matters, ``tolerance`` an angle of it.
     """
     r = PRESSED if tip_state == CONTACT else FREE
     shift = origin_shift(model, tip_state, side)
-    fastest = regimes.fastest[r]
     low, high = min(safe, until), until
     if until < h:
         # a dip between two positive ends: find its lowest point first
@@ -307,7 +334,7 @@ def locate(model, regimes, tip_state, side, which, u, moved, h, until, safe, e0,
         if abs(change) * fastest <= tolerance:
             break
         t += change
-        if abs(change) * fastest <= NUDGE_LIMIT:
+        if abs(change) * regimes.fastest[r] <= NUDGE_LIMIT:
             nudge(regimes, r, moved, change)
         else:
             move(regimes, r, u, t, moved)
@@ -370,9 +397,9 @@ def leave_regime(model, regimes, tip_state, side, u, state):
 def advance(model, state, episode, arrays, step_phase, event_tolerance, event_budget, tangents=None):
     """Advance ``state`` (2n,) and ``episode`` in place by whole cycles, one for each row of ``arrays``.
 
-    Every cycle starts at phase zero of the force. ``step_phase`` is the angle [rad] by which the fastest mode turns in
-    the shortest step, ``event_tolerance`` the error of an event's instant as an angle of the fastest mode. ``tangents``
-    travel with the motion; None compiles to a kernel without them.
+    Every cycle starts at phase zero of the force. ``step_phase`` is the angle [rad] by which the fastest mode that
+    matters turns in a step that may hide an event, ``event_tolerance`` the error of an event's instant as such an
+    angle. ``tangents`` travel with the motion; None compiles to a kernel without them.
 
     Returns
     -------
@@ -385,7 +412,10 @@ def advance(model, state, episode, arrays, step_phase, event_tolerance, event_bu
     regimes = with_force(model.regimes, model.force_amplitude, omega)
     output, magnitude = regimes.output, regimes.magnitude
     shortest = step_phase / regimes.fastest
-    table = step_table(regimes, shortest, STEP_LEVELS)
+    levels = min(MAX_STEP_LEVELS, 2 + max(0, int(math.log2(period / np.min(shortest)))))
+    table = step_table(regimes, shortest, levels)
+    top = (np.argmax(regimes.modulus[FREE]), np.argmax(regimes.modulus[PRESSED]))
+    step_budget = STEPS_PER_EVENT * event_budget
     # error of a cubic through both ends of a step: max e'''' h^4 / 384 <= max e'' (fastest h)^2 h^2 / 384
     doubt = step_phase * step_phase / 384.0
     samples = arrays.history.shape[1]
@@ -402,7 +432,7 @@ def advance(model, state, episode, arrays, step_phase, event_tolerance, event_bu
             arrays.impacts[cycle, column] = 0
             arrays.contact_time[cycle, column] = 0.0
             arrays.bounce_time[cycle, column] = 0.0
-        events = 0
+        events, steps = 0, 0
         sample = 0
         time = 0.0
         carried = 0.0
@@ -421,18 +451,27 @@ def advance(model, state, episode, arrays, step_phase, event_tolerance, event_bu
             safe2 = safe_time(e2, d2, curvature2) if tip_state != CONTACT else math.inf
             safe = min(safe1, safe2)
             column = UPPER if side > 0.0 else LOWER
-            reach = safe
-            peakless = math.inf
+            # go on while nothing can happen, and while no new peak can hide inside the step; otherwise by steps in
+            # which the fastest mode that matters shows its events and crests
+            reach, peakless = safe, math.inf
             if tip_state == CONTACT:
                 peak = max(arrays.peak_force[cycle, column], e1)
                 arrays.peak_force[cycle, column] = peak
-                # go on while no new peak can hide inside the step; otherwise by steps that show their crests
                 peakless = safe_time(peak - e1, -d1, curvature1)
-                reach = min(safe, max(peakless, CREST_STEPS * shortest[r]))
+                reach = min(safe, peakless)
+            fastest = regimes.fastest[r]
+            if reach < CREST_STEPS * shortest[r]:
+                if not matters(model, regimes, tip_state, r, top[r], u, curvature1, curvature2):
+                    fastest = rate_that_matters(model, regimes, tip_state, r, u, curvature1, curvature2, omega)
+                least = step_phase / fastest
+                reach = max(least, min(safe, CREST_STEPS * least)) if tip_state == CONTACT else max(reach, least)
 
             # step
+            steps += 1
+            if steps > step_budget:
+                return status.STEP_BUDGET, cycle
             h, level = shortest[r], 0
-            while level + 1 < STEP_LEVELS and 2.0 * h <= reach:
+            while level + 1 < levels and 2.0 * h <= reach:
                 h *= 2.0
                 level += 1
             last = max(h, reach) >= period - time
@@ -455,13 +494,13 @@ def advance(model, state, episode, arrays, step_phase, event_tolerance, event_bu
                 instant = math.inf
                 if until1 >= 0.0:
                     instant = locate(model, regimes, tip_state, side, 1, u, spare, h, until1, safe1,
-                                     e1, d1, g1, k1, event_tolerance)  # fmt: skip
+                                     e1, d1, g1, k1, fastest, event_tolerance)  # fmt: skip
                     if instant < math.inf:
                         event = 1
                         moved[:] = spare
                 if until2 >= 0.0:
                     instant2 = locate(model, regimes, tip_state, side, 2, u, spare, h, until2, safe2,
-                                      e2, d2, g2, k2, event_tolerance)  # fmt: skip
+                                      e2, d2, g2, k2, fastest, event_tolerance)  # fmt: skip
                     if instant2 < instant:
                         event, instant = 2, instant2
                         moved[:] = spare

@@ -38,8 +38,10 @@ class Regimes(NamedTuple):
         Bounds of the second and third derivative of the tip displacement per unit modal coordinate.
     forcing : (R, 2n)
         Modal coordinates of b for a unit force amplitude.
+    modulus : (R, 2m)
+        Modulus of the eigenvalue of each modal coordinate [1/s].
     fastest : (R,)
-        Largest modulus of an eigenvalue [1/s].
+        Largest of them.
     """
 
     rotates: np.ndarray
@@ -49,6 +51,7 @@ class Regimes(NamedTuple):
     output: np.ndarray
     magnitude: np.ndarray
     forcing: np.ndarray
+    modulus: np.ndarray
     fastest: np.ndarray
 
 
@@ -70,6 +73,8 @@ def with_force(regimes, amplitude, angular_frequency):
     from_modal[:, :, : 2 * n] = regimes.from_modal
     output[:, :, : 2 * n] = regimes.output
     magnitude[:, :, : 2 * n] = regimes.magnitude
+    modulus = np.full((count, 2 * n + 2), w)
+    modulus[:, : 2 * n] = regimes.modulus
     fastest = np.maximum(regimes.fastest, w)
     steady = np.empty((2 * n, 2))
     for r in range(count):
@@ -103,7 +108,7 @@ def with_force(regimes, amplitude, angular_frequency):
         size = math.hypot(x_cosine, x_sine)
         magnitude[r, 0, 2 * n :] = w**2 * size
         magnitude[r, 1, 2 * n :] = w**3 * size
-    return Regimes(rotates, rate, to_modal, from_modal, output, magnitude, regimes.forcing, fastest)
+    return Regimes(rotates, rate, to_modal, from_modal, output, magnitude, regimes.forcing, modulus, fastest)
 
 
 @njit(cache=True, inline="always")

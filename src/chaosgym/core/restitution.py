@@ -353,6 +353,7 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
                                        arrays.history[cycle])  # fmt: skip
                 if c == 0.0 and not last:
                     side = -side
+                    arrays.impacts[cycle, UPPER if side > 0.0 else LOWER] += 1
                     note_touch(episode, side, time + elapsed, arrays.bounce_time[cycle])
             else:
                 elapsed, struck, x1, v1 = fly(model, regimes, tip, x, v, time, period - time, step_phase, u, moved,

@@ -7,26 +7,53 @@ its clearance c_j on one side or on both; closed on side s = +-1 it pushes with
 
 so it pushes and never pulls: beyond the surface it detaches when spring and damper together would pull. The matrices
 are held over each bin of crank angle, the forcing is continuous, and between two changes of contact the motion is
-propagated exactly (``crank_propagator``). Changes of contact are located on the Taylor series of the motion. They are
-looked for once a step by a cubic through both ends of it, whose error is (w h)^4 / 384 of the motion's amplitude
-for a mode of angular frequency w and a step h; shorter touches than that can escape.
+propagated exactly (``crank_propagator``).
+
+A step is quiet if a bound by its two ends shows that no contact changes and no force exceeds the peak of the
+revolution. Any other step is expanded in its Taylor series and looked at piece by piece (``crank_contact``). Recording
+only reads: a time history does not change the motion by a bit.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from chaosgym.core import status
+from chaosgym.core.crank_contact import (
+    DAMPING,
+    GAP,
+    REACH,
+    STIFFNESS,
+    TWO_SIDED,
+    UP,
+    find_sides,
+    find_suspects,
+    first_change,
+    polynomial,
+    surfaces,
+)
 from chaosgym.core.crank_propagator import FORCING_TERMS, evaluate, expand, propagate
-from chaosgym.core.impact_beam import LOWER, UPPER, cubic, cubic_extremum, note_touch
+from chaosgym.core.crank_record import (
+    begin_cycle,
+    column_of,
+    crest_instant,
+    joint_force,
+    monitored,
+    note_channels,
+    note_peak,
+    note_share,
+    write_peaks,
+    write_sample,
+)
+from chaosgym.core.impact_beam import LOWER, UPPER, note_touch
+from chaosgym.core.kernel import leaf
 
 RUNAWAY = 1e3
 """Coordinate [m] that counts as divergence."""
 
-POLISH = 60
-"""Iterations to locate one event; safeguarded Newton needs two to four, bisection about fifty."""
+PIECES = 2
+"""Pieces of a whole step that are searched for changes of contact one by one."""
 
 
 class SliderCrankModel(NamedTuple):
@@ -40,8 +67,8 @@ class SliderCrankModel(NamedTuple):
         Exact steps in a bin without events.
     contact_rate : float
         Angular frequency of the masses next to the closed contacts [rad/s].
-    order : int
-        Order of the Taylor series that sums a step to round-off.
+    span : (order + 1,)
+        Longest time [s] that a Taylor series of each order sums to round-off; the last one covers a step.
     row : (m, n)
         Displacement of each channel per unit coordinate.
     gap, stiffness, damping : (m,)
@@ -68,7 +95,7 @@ class SliderCrankModel(NamedTuple):
     bin_duration: float
     steps: int
     contact_rate: float
-    order: int
+    span: np.ndarray
     row: np.ndarray
     gap: np.ndarray
     stiffness: np.ndarray
@@ -83,36 +110,70 @@ class SliderCrankModel(NamedTuple):
     propagator: np.ndarray
 
 
-@njit(cache=True, inline="always")
-def closes(model, j, side, y, v):
-    """True if channel j at displacement y and velocity v presses on ``side``."""
-    depth = side * y - model.gap[j]
-    return depth > 0.0 and model.stiffness[j] * depth + model.damping[j] * side * v > 0.0
+class Motion(NamedTuple):
+    """Where the motion is, and space to move it: n coordinates, m channels.
+
+    Attributes
+    ----------
+    z, moved : (2n + 4 + m,)
+        Augmented states of ``crank_propagator``: now, and after the step.
+    side : (m,)
+        Closed side of each channel, +1 or -1, or 0.
+    start, end, spare : (3, m)
+        Displacement, velocity and acceleration of the channels: now, after the step or a piece of it, and anywhere.
+    series : (order + 1, n + m)
+        Taylor coefficients of coordinates and channels about the state now.
+    until, towards : (m,)
+        Of ``crank_contact.find_suspects``.
+    peak : (2, 5)
+        Of ``crank_record.note_peak``.
+    """
+
+    z: np.ndarray
+    moved: np.ndarray
+    side: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+    spare: np.ndarray
+    series: np.ndarray
+    until: np.ndarray
+    towards: np.ndarray
+    peak: np.ndarray
 
 
-@njit(cache=True, inline="always")
-def contact_set(model, side):
+@njit(cache=True)
+def motion_of(model):
+    """Space for a motion."""
+    size, n = model.acceleration.shape[3], model.acceleration.shape[2]
+    m, order = model.row.shape[0], model.span.shape[0] - 1
+    return Motion(
+        np.zeros(size), np.zeros(size), np.zeros(m), np.zeros((3, m)), np.zeros((3, m)), np.zeros((3, m)),
+        np.zeros((order + 1, n + m)), np.zeros(m), np.zeros(m), np.zeros((2, 5)),
+    )  # fmt: skip
+
+
+@leaf
+def contact_set(side, radix):
     """Index of the matrices of a contact set: closed sides as digits."""
     index, place = 0, 1
     for j in range(side.shape[0]):
         if side[j] > 0.0:
             index += place
         elif side[j] < 0.0:
-            index += place * (model.radix - 1)
-        place *= model.radix
+            index += place * (radix - 1)
+        place *= radix
     return index
 
 
-@njit(cache=True, inline="always")
-def put_sides(model, side, z):
+@leaf
+def put_sides(surface, side, z):
     """Write the clearance columns of z."""
-    m = side.shape[0]
-    first = z.shape[0] - m
-    for j in range(m):
-        z[first + j] = side[j] * model.gap[j]
+    first = z.shape[0] - side.shape[0]
+    for j in range(side.shape[0]):
+        z[first + j] = side[j] * surface[j, GAP]
 
 
-@njit(cache=True, inline="always")
+@leaf
 def put_time(z, n, x):
     """Write the forcing columns of z for time x as a share of the bin."""
     z[2 * n] = 1.0
@@ -120,282 +181,93 @@ def put_time(z, n, x):
         z[2 * n + k] = z[2 * n + k - 1] * x
 
 
-@njit(cache=True, inline="always")
-def read_channels(row, curvature, side, z, reading):
-    """Fill ``reading`` (3, m): displacement, velocity and, where closed, acceleration of the channels in the state z.
+@leaf
+def read_channels(row, curvature, z, reading):
+    """Fill ``reading`` (3, m): displacement, velocity and acceleration of the channels in the state z.
 
     ``row`` and ``curvature`` are those of the model, the latter of one contact set and bin.
     """
     m, n = row.shape
     for j in range(m):
-        y, v = 0.0, 0.0
+        y, v, a = 0.0, 0.0, 0.0
         for i in range(n):
             y += row[j, i] * z[i]
             v += row[j, i] * z[n + i]
-        reading[0, j], reading[1, j] = y, v
-        if side[j] != 0.0:
-            a = 0.0
-            for c in range(z.shape[0]):
-                a += curvature[j, c] * z[c]
-            reading[2, j] = a
+        for c in range(z.shape[0]):
+            a += curvature[j, c] * z[c]
+        reading[0, j], reading[1, j], reading[2, j] = y, v, a
 
 
-@njit(cache=True, inline="always")
-def find_sides(model, z, side):
-    """Write which side of every channel is closed in the state z."""
-    m, n = model.row.shape
+@leaf
+def read_series(series, last, t, reading):
+    """Fill ``reading`` at t from the channels' Taylor series up to order ``last``."""
+    m = reading.shape[1]
     for j in range(m):
-        y, v = 0.0, 0.0
-        for i in range(n):
-            y += model.row[j, i] * z[i]
-            v += model.row[j, i] * z[n + i]
-        side[j] = 0.0
-        if closes(model, j, 1.0, y, v):
-            side[j] = 1.0
-        elif model.two_sided[j] and closes(model, j, -1.0, y, v):
-            side[j] = -1.0
+        reading[0, j], reading[1, j], reading[2, j] = polynomial(series, series.shape[1] - m + j, last, t)
 
 
-@njit(cache=True)
-def polynomial(coefficients, t):
-    """Value, first and second derivative at t."""
-    last = coefficients.shape[0] - 1
-    value, slope, bend = coefficients[last], 0.0, 0.0
-    for k in range(last - 1, -1, -1):
-        bend = bend * t + slope
-        slope = slope * t + value
-        value = value * t + coefficients[k]
-    return value, slope, 2.0 * bend
+@leaf
+def bend(h, start, end, j):
+    """How far channel j may stray in a step of length h from the cubic through both ends of it.
 
-
-@njit(cache=True, inline="always")
-def margin(stiffness, damping, gap, side, closed, coefficients, t):
-    """(value, slope) of what is positive as long as a channel keeps its contact state on ``side``.
-
-    Closed: the contact force. Open: how much is missing until the surface pushes, a penetration without force
-    included.
+    The polynomial of fifth order that has the right accelerations too differs from it by t^2 (h - t)^2 / (2 h^2) times
+    what the cubic's second derivative lacks at the ends.
     """
-    y, v, a = polynomial(coefficients, t)
-    spring, damper = stiffness * (side * y - gap), damping * side * v
-    if closed:
-        return spring + damper, side * (stiffness * v + damping * a)
-    if damper < 0.0:
-        return -spring - damper, -side * (stiffness * v + damping * a)
-    return -spring, -side * stiffness * v
+    chord = (end[0, j] - start[0, j]) / h
+    first = start[2, j] - (6.0 * chord - 4.0 * start[1, j] - 2.0 * end[1, j]) / h
+    second = end[2, j] - (2.0 * start[1, j] + 4.0 * end[1, j] - 6.0 * chord) / h
+    return h * h / 32.0 * max(abs(first), abs(second))
 
 
-@njit(cache=True)
-def locate(stiffness, damping, gap, side, closed, coefficients, until, tolerance):
-    """Instant in [0, until] at which the margin of a channel has fallen to zero, or inf if it has not."""
-    low, high = 0.0, until
-    value, slope = margin(stiffness, damping, gap, side, closed, coefficients, until)
-    if value > 0.0:
-        return math.inf
-    t = until
-    for _ in range(POLISH):
-        guess = t - value / slope if slope < 0.0 else math.inf
-        change = guess - t
-        if not low <= guess <= high:
-            guess = 0.5 * (low + high)
-            change = high - low
-        t = guess
-        if abs(change) <= tolerance:
-            break
-        value, slope = margin(stiffness, damping, gap, side, closed, coefficients, t)
-        if value > 0.0:
-            low = t
-        else:
-            high = t
-    return t
-
-
-@njit(cache=True, inline="always")
-def suspect_closed(model, j, side, h, start, end):
-    """Instant in (0, h] until which a closed channel may have lost its force, or -1."""
-    k, d, c = model.stiffness[j], model.damping[j], model.gap[j]
-    f1 = k * (side * end[0, j] - c) + d * side * end[1, j]
-    if f1 <= 0.0:
-        return h
-    r0, r1 = side * (k * start[1, j] + d * start[2, j]), side * (k * end[1, j] + d * end[2, j])
-    if r0 >= 0.0 or r1 <= 0.0:
-        return -1.0
-    f0 = k * (side * start[0, j] - c) + d * side * start[1, j]
-    dip = cubic_extremum(f0, r0, f1, r1, h, 1.0)
-    return dip if dip > 0.0 and cubic(f0, r0, f1, r1, h, dip)[0] <= 0.0 else -1.0
-
-
-@njit(cache=True, inline="always")
-def suspect_open(model, j, side, h, start, end):
-    """Instant in (0, h] until which an open channel may have begun to push on ``side``, or -1."""
-    if closes(model, j, side, end[0, j], end[1, j]):
-        return h
-    v0, v1 = side * start[1, j], side * end[1, j]
-    if v0 <= 0.0 or v1 >= 0.0:
-        return -1.0
-    depth0, depth1 = side * start[0, j] - model.gap[j], side * end[0, j] - model.gap[j]
-    top = cubic_extremum(depth0, v0, depth1, v1, h, -1.0)
-    return top if top > 0.0 and cubic(depth0, v0, depth1, v1, h, top)[0] > 0.0 else -1.0
-
-
-@njit(cache=True, inline="always")
-def find_suspects(model, side, h, start, end, until, towards):
-    """How many channels may have changed their contact in a step; writes until when (or -1) and on which side."""
-    count = 0
-    for j in range(side.shape[0]):
-        if side[j] != 0.0:
-            towards[j] = side[j]
-            until[j] = suspect_closed(model, j, side[j], h, start, end)
-        else:
-            towards[j] = 1.0
-            until[j] = suspect_open(model, j, 1.0, h, start, end)
-            if until[j] < 0.0 and model.two_sided[j]:
-                towards[j] = -1.0
-                until[j] = suspect_open(model, j, -1.0, h, start, end)
-        if until[j] >= 0.0:
-            count += 1
-    return count
-
-
-@njit(cache=True, inline="always")
-def first_change(model, side, series, until, towards, channel, tolerance):
-    """(Channel or -1, instant) of the first change among the suspects, on the Taylor series of the step."""
-    first, instant = -1, math.inf
-    for j in range(side.shape[0]):
-        if until[j] < 0.0:
-            continue
-        for k in range(channel.shape[0]):
-            channel[k] = 0.0
-            for i in range(series.shape[1]):
-                channel[k] += model.row[j, i] * series[k, i]
-        found = locate(
-            model.stiffness[j], model.damping[j], model.gap[j], towards[j], side[j] != 0.0, channel, until[j], tolerance
-        )
-        if found < instant:
-            first, instant = j, found
-    return first, instant
-
-
-@njit(cache=True, inline="always")
-def monitored(model, j):
-    """True if channel j belongs to the joint that is recorded."""
-    return model.reach[j] > 0.0
-
-
-@njit(cache=True, inline="always")
-def column_of(model, j, side):
-    """Side of the record on which a touch of channel j counts: UPPER where the force points up."""
-    return UPPER if model.reading[j, 1] * side > 0.0 else LOWER
-
-
-@njit(cache=True, inline="always")
-def resultant(fx, fy, fz, rx, ry, rz):
-    """(Upward part, size, rate of the size, other two parts) of a force with components f and rates r."""
-    size = math.sqrt(fx * fx + fy * fy + fz * fz)
-    growth = (fx * rx + fy * ry + fz * rz) / size if size > 0.0 else 0.0
-    return fy, size, growth, fx, fz
-
-
-@njit(cache=True, inline="always")
-def note_share(force, time, contact_time):
-    """Add ``time`` to the side of the record (2,) towards which the resultant points."""
-    if force[1] > 0.0:
-        contact_time[UPPER if force[0] > 0.0 else LOWER] += time
-
-
-@njit(cache=True, inline="always")
-def note_peak(arrays, cycle, time, force):
-    """Raise the peak of a revolution to the size of the resultant at ``time`` in it, and note when and whereto."""
-    column = UPPER if force[0] > 0.0 else LOWER
-    if force[1] > arrays.peak_force[cycle, column]:
-        arrays.peak_force[cycle, column] = force[1]
-        arrays.peak_instant[cycle, column] = time
-        vector = arrays.peak_vector[cycle, column]
-        vector[0], vector[1], vector[2] = force[3], force[0], force[4]
-
-
-@njit(cache=True, inline="always")
-def note_channel(peak, positive, h, f0, r0, f1, r1):
-    """Raise the peak (2,) of a channel to its largest force in a step, by the cubic through both ends of it."""
-    crest = cubic_extremum(f0, r0, f1, r1, h, -1.0) if r0 > 0.0 and r1 < 0.0 else -1.0
-    top = max(f0, f1) if crest <= 0.0 else cubic(f0, r0, f1, r1, h, crest)[0]
-    column = 0 if positive else 1
-    peak[column] = max(peak[column], top)
-
-
-@njit(cache=True, inline="always")
-def crest_instant(h, start, end):
-    """(Instant, size) of the crest of the resultant in a step, by the cubic through both ends; (-1, 0) if none."""
-    if start[1] == 0.0 or end[1] == 0.0 or start[2] <= 0.0 or end[2] >= 0.0:
-        return -1.0, 0.0
-    crest = cubic_extremum(start[1], start[2], end[1], end[2], h, -1.0)
-    if crest <= 0.0:
-        return -1.0, 0.0
-    return crest, cubic(start[1], start[2], end[1], end[2], h, crest)[0]
-
-
-@njit(cache=True, inline="always")
-def joint_force(model, side, reading):
-    """``resultant`` of the monitored joint."""
-    fx, fy, fz, rx, ry, rz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(side.shape[0]):
-        if side[j] != 0.0:
-            k, d = model.stiffness[j], model.damping[j]
-            force = k * (reading[0, j] - side[j] * model.gap[j]) + d * reading[1, j]
-            rate = k * reading[1, j] + d * reading[2, j]
-            fx += model.reading[j, 0] * force
-            fy += model.reading[j, 1] * force
-            fz += model.reading[j, 2] * force
-            rx += model.reading[j, 0] * rate
-            ry += model.reading[j, 1] * rate
-            rz += model.reading[j, 2] * rate
-    return resultant(fx, fy, fz, rx, ry, rz)
-
-
-@njit(cache=True)
-def quiet_steps(model, chosen, b, side, z, moved, start, end, time, limit, peak, channel_peak, contact_time):
+@leaf
+def quiet_steps(
+    table, row, curvature, surface, side, z, moved, start, end, duration, step, first, limit,
+    peak, channel_peak, contact_time,
+):  # fmt: skip
     """Take up to ``limit`` whole steps in which no contact changes and no force passes its peak; how many.
 
-    ``peak`` (2,) is that of the resultant, ``channel_peak`` (m, 2) those of the channels, or has no rows.
+    ``first`` steps of the bin have been taken. ``peak`` (2, 5) are those of the resultant, ``channel_peak`` (m, 2)
+    those of the channels, or has no rows.
 
     Stops before a step that could do either, judged by its ends: between them, a cubic exceeds the larger end by no
-    more than 4/27 of the step times the sum of both slopes. z and its reading ``start`` go along.
+    more than 4/27 of the step times the sum of both slopes, and the motion the cubic by ``bend``.
     """
-    n = model.row.shape[1]
-    m = side.shape[0]
-    step = model.bin_duration / model.steps
-    row, table, curvature = model.row, model.propagator[chosen, b], model.curvature[chosen, b]
+    m, n = row.shape
     swing = 4.0 / 27.0 * step
     for c in range(2 * n + FORCING_TERMS, z.shape[0]):
         moved[c] = z[c]
     for count in range(limit):
         propagate(table, z, moved)
-        put_time(moved, n, (time + (count + 1) * step) / model.bin_duration)
-        read_channels(row, curvature, side, moved, end)
+        put_time(moved, n, (first + count + 1) * step / duration)
+        read_channels(row, curvature, moved, end)
         upward, total = 0.0, 0.0
         for j in range(m):
-            gap = model.gap[j]
+            gap = surface[j, GAP]
+            doubt = bend(step, start, end, j)
             if side[j] == 0.0:
                 reach = max(start[0, j], end[0, j])
-                if model.two_sided[j]:
+                if surface[j, TWO_SIDED] != 0.0:
                     reach = max(abs(start[0, j]), abs(end[0, j]))
                 if start[1, j] * end[1, j] < 0.0:
                     reach += swing * (abs(start[1, j]) + abs(end[1, j]))
-                if reach >= gap:
+                if reach + doubt >= gap:
                     return count
                 continue
-            k, d, s = model.stiffness[j], model.damping[j], side[j]
+            k, d, s = surface[j, STIFFNESS], surface[j, DAMPING], side[j]
             r0, r1 = s * (k * start[1, j] + d * start[2, j]), s * (k * end[1, j] + d * end[2, j])
             f0 = k * (s * start[0, j] - gap) + d * s * start[1, j]
             f1 = k * (s * end[0, j] - gap) + d * s * end[1, j]
-            turn = swing * (abs(r0) + abs(r1)) if r0 * r1 < 0.0 else 0.0
+            turn = k * doubt
+            if r0 * r1 < 0.0:
+                turn += swing * (abs(r0) + abs(r1))
             if min(f0, f1) - turn <= 0.0:
                 return count
             if channel_peak.shape[0] > 0 and max(f0, f1) + turn > channel_peak[j, 0 if s > 0.0 else 1]:
                 return count
-            upward += model.reading[j, 1] * s * f1
-            total += model.reach[j] * (max(f0, f1) + turn)
+            upward += surface[j, UP] * s * f1
+            total += surface[j, REACH] * (max(f0, f1) + turn)
         column = UPPER if upward > 0.0 else LOWER
-        if total > peak[column]:
+        if total > peak[column, 0]:
             return count
         if total > 0.0:
             contact_time[column] += step
@@ -406,62 +278,165 @@ def quiet_steps(model, chosen, b, side, z, moved, start, end, time, limit, peak,
     return limit
 
 
-@njit(cache=True, inline="always")
-def refined_force(model, chosen, b, side, series, time, at, there, reading):
-    """Resultant at time ``at`` in a step that began at ``time``; leaves the state in ``there``.
+@leaf
+def order_for(span, h):
+    """Order of the Taylor series that covers a time h."""
+    last = 4
+    while span[last] < h:
+        last += 1
+    return last
 
-    The clearance columns of ``there`` must be those of the step.
+
+@leaf
+def write_samples(display, surface, side, z, spare, series, last, since, until, spacing, sample, history):
+    """Write the samples of a revolution that fall into the expanded step [since, until); the number of the next one.
+
+    ``history`` (samples, 3) is that of the revolution; z and ``spare`` are overwritten.
     """
-    evaluate(series, at, there)
-    put_time(there, series.shape[1], (time + at) / model.bin_duration)
-    read_channels(model.row, model.curvature[chosen, b], side, there, reading)
-    return joint_force(model, side, reading)
+    while sample < history.shape[0] and sample * spacing < until:
+        at = max(sample * spacing - since, 0.0)
+        evaluate(series, display.shape[0], last, at, z)
+        read_series(series, last, at, spare)
+        write_sample(display, z, joint_force(surface, side, spare), history[sample])
+        sample += 1
+    return sample
 
 
-@njit(cache=True, inline="always")
-def write_sample(model, z, force, sample):
-    """Write displacement, velocity and signed resultant (positive where it points up) of the monitored joint."""
-    n = model.display.shape[0]
-    sample[0], sample[1] = 0.0, 0.0
-    for i in range(n):
-        sample[0] += model.display[i] * z[i]
-        sample[1] += model.display[i] * z[n + i]
-    sample[2] = math.copysign(force[1], force[0])
+@leaf
+def careful_step(
+    surface, side, start, end, spare, series, last, until, towards, now, h, pieces, tolerance,
+    peak, channel_peak, contact_time,
+):  # fmt: skip
+    """Follow the expanded motion for at most h, up to the first change of contact, and record what happens.
+
+    ``now`` is the time in the revolution. Leaves the reading ``start`` somewhere in the step.
+
+    Returns
+    -------
+    (changed, h) : the channel whose contact changes or -1, and how long the step was.
+    """
+    force = joint_force(surface, side, start)
+    done = 0.0
+    for k in range(pieces):
+        high = h if k == pieces - 1 else (k + 1) * (h / pieces)
+        read_series(series, last, high, end)
+        changed = -1
+        if find_suspects(surface, side, high - done, start, end, until, towards) > 0:
+            changed, instant = first_change(surface, side, series, last, done, until, towards, tolerance)
+            if changed >= 0:
+                high = instant
+                read_series(series, last, high, end)
+        length = high - done
+        before, force = force, joint_force(surface, side, end)
+        if before[1] + force[1] > 0.0:
+            note_share(before, force, length, contact_time)
+            note_peak(peak, now + high, force)
+            note_channels(surface, side, length, start, end, channel_peak)
+            crest, size = crest_instant(length, before, force)
+            if size > 0.99 * peak[UPPER if force[0] > 0.0 else LOWER, 0]:
+                read_series(series, last, done + crest, spare)
+                note_peak(peak, now + done + crest, joint_force(surface, side, spare))
+        done = high
+        if changed >= 0:
+            return changed, done
+        for i in range(3):
+            for j in range(start.shape[1]):
+                start[i, j] = end[i, j]
+    return -1, done
 
 
-@njit(cache=True, inline="always")
-def begin_cycle(model, state, arrays, cycle):
-    """Write the section of a revolution and clear its row."""
-    n = model.display.shape[0]
-    for i in range(2 * n):
-        arrays.section[cycle, i] = state[i]
-    arrays.tip[cycle, 0], arrays.tip[cycle, 1] = 0.0, 0.0
-    for i in range(n):
-        arrays.tip[cycle, 0] += model.display[i] * state[i]
-        arrays.tip[cycle, 1] += model.display[i] * state[n + i]
-    for column in range(2):
-        arrays.peak_force[cycle, column] = 0.0
-        arrays.impacts[cycle, column] = 0
-        arrays.contact_time[cycle, column] = 0.0
-        arrays.bounce_time[cycle, column] = 0.0
-        arrays.peak_instant[cycle, column] = 0.0
-        for axis in range(3):
-            arrays.peak_vector[cycle, column, axis] = 0.0
-        for j in range(arrays.channel_peak.shape[1]):
-            arrays.channel_peak[cycle, j, column] = 0.0
+@leaf
+def change_side(surface, side, changed, towards, z, now, episode, impacts, bounce_time):
+    """Close or open a channel at the time ``now`` in the revolution, and record a touch."""
+    side[changed] = towards[changed] if side[changed] == 0.0 else 0.0
+    if side[changed] != 0.0 and monitored(surface, changed):
+        column = column_of(surface, changed, side[changed])
+        impacts[column] += 1
+        note_touch(episode, 1.0 if column == UPPER else -1.0, now, bounce_time)
+    put_sides(surface, side, z)
 
 
-@njit(cache=True, inline="always")
-def note_channels(model, side, h, start, end, channel_peak):
-    """Raise the peaks (m, 2) of the closed channels over a step."""
-    for j in range(channel_peak.shape[0]):
-        s = side[j]
-        if s != 0.0:
-            k, d = model.stiffness[j], model.damping[j]
-            f0 = k * (s * start[0, j] - model.gap[j]) + d * s * start[1, j]
-            f1 = k * (s * end[0, j] - model.gap[j]) + d * s * end[1, j]
-            r0, r1 = s * (k * start[1, j] + d * start[2, j]), s * (k * end[1, j] + d * end[2, j])
-            note_channel(channel_peak[j], s > 0.0, h, f0, r0, f1, r1)
+@leaf
+def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
+    """Move through one revolution; how many changes of contact it had.
+
+    Within a bin, steps end on a grid of ``model.steps``; what is left of one after a change of contact is a careful
+    step.
+    """
+    z, moved, side, start, end, spare = motion.z, motion.moved, motion.side, motion.start, motion.end, motion.spare
+    series, until, towards = motion.series, motion.until, motion.towards
+    row, display, span, acceleration = model.row, model.display, model.span, model.acceleration
+    propagator, curvatures = model.propagator, model.curvature
+    history, impacts, bounce_time = arrays.history[cycle], arrays.impacts[cycle], arrays.bounce_time[cycle]
+    channel_peak, contact_time = arrays.channel_peak[cycle], arrays.contact_time[cycle]
+    peak = motion.peak
+    peak[:] = 0.0
+    n, duration, steps, order = row.shape[1], model.bin_duration, model.steps, span.shape[0] - 1
+    step = duration / steps
+    bins = acceleration.shape[1]
+    spacing = bins * duration / max(history.shape[0], 1)
+    events, sample = 0, 0
+    chosen = contact_set(side, model.radix)
+    for b in range(bins):
+        begin = b * duration
+        curvature = curvatures[chosen, b]
+        put_time(z, n, 0.0)
+        read_channels(row, curvature, z, start)
+        time, done, on_grid = 0.0, 0, True
+        while done < steps:
+            if on_grid:
+                limit = steps - done
+                sampled = False
+                if sample < history.shape[0]:
+                    # up to the step into which the next sample falls, or only that one
+                    ahead = int((sample * spacing - begin - time) / step)
+                    sampled = ahead < 1
+                    limit = min(limit, max(ahead, 1))
+                if sampled:
+                    expand(acceleration[chosen, b], row, z, duration, order, series)
+                taken = quiet_steps(
+                    propagator[chosen, b], row, curvature, surface, side, z, moved, start, end, duration, step,
+                    done, limit, peak, channel_peak, contact_time,
+                )  # fmt: skip
+                if sampled and taken == 1:
+                    sample = write_samples(
+                        display, surface, side, moved, spare, series, order, begin + time,
+                        begin + (done + 1) * step, spacing, sample, history,
+                    )  # fmt: skip
+                done += taken
+                time = done * step
+                if taken == limit:
+                    continue
+            h = (done + 1) * step - time
+            last = order_for(span, h)
+            expand(acceleration[chosen, b], row, z, duration, last, series)
+            changed, h = careful_step(
+                surface, side, start, end, spare, series, last, until, towards, begin + time, h,
+                PIECES if PIECES * h > step else 1, tolerance, peak, channel_peak, contact_time,
+            )  # fmt: skip
+            if sample < history.shape[0]:
+                sample = write_samples(
+                    display, surface, side, moved, spare, series, last, begin + time, begin + time + h, spacing,
+                    sample, history,
+                )  # fmt: skip
+            evaluate(series, n, last, h, z)
+            if changed < 0:
+                done += 1
+                time, on_grid = done * step, True
+            else:
+                time, on_grid = time + h, False
+                events += 1
+                if events > budget:
+                    return events
+                change_side(surface, side, changed, towards, z, begin + time, episode, impacts, bounce_time)
+                chosen = contact_set(side, model.radix)
+                curvature = curvatures[chosen, b]
+            put_time(z, n, time / duration)
+            read_channels(row, curvature, z, start)
+            if changed >= 0:
+                note_peak(peak, begin + time, joint_force(surface, side, start))
+    write_peaks(peak, arrays, cycle)
+    return events
 
 
 @njit(cache=True, nogil=True)
@@ -474,125 +449,20 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
     -------
     (status, cycle) : the cycle is the first one not finished.
     """
-    _, bins, n, size = model.acceleration.shape
-    row = model.row
-    m = row.shape[0]
-    duration = model.bin_duration
-    step = duration / model.steps
-    samples = arrays.history.shape[1]
-    period = bins * duration
-    z, moved, there, side = np.empty(size), np.empty(size), np.empty(size), np.empty(m)
-    until, towards = np.empty(m), np.empty(m)
-    series, channel = np.empty((model.order + 1, n)), np.empty(model.order + 1)
-    start = np.zeros((3, m))
-    end = np.zeros((3, m))
-    spare = np.zeros((3, m))
-
+    period = model.acceleration.shape[1] * model.bin_duration
+    motion, surface = motion_of(model), surfaces(model)
     for cycle in range(arrays.section.shape[0]):
         begin_cycle(model, state, arrays, cycle)
-        peak, contact_time = arrays.peak_force[cycle], arrays.contact_time[cycle]
-        channel_peak = arrays.channel_peak[cycle]
-        for i in range(2 * n):
-            z[i] = state[i]
-        find_sides(model, z, side)
-        put_sides(model, side, z)
-        chosen = contact_set(model, side)
-        events, sample = 0, 0
-
-        for b in range(bins):
-            curvature = model.curvature[chosen, b]
-            put_time(z, n, 0.0)
-            read_channels(row, curvature, side, z, start)
-            force = joint_force(model, side, start)
-            # steps are counted from the last event
-            origin, count = 0.0, 0
-            while True:
-                time = origin + count * step
-                whole = int((duration - time) / step + 1e-9)
-                if whole > 0 and sample == samples:
-                    count += quiet_steps(
-                        model, chosen, b, side, z, moved, start, end, time, whole, peak, channel_peak, contact_time
-                    )
-                    time = origin + count * step
-                    force = joint_force(model, side, start)
-                h = min(step, duration - time)
-                if h <= 1e-12 * duration:
-                    break
-                fits = h >= (1.0 - 1e-9) * step
-                expanded = not fits
-                for c in range(2 * n, size):
-                    moved[c] = z[c]
-                if fits:
-                    propagate(model.propagator[chosen, b], z, moved)
-                else:
-                    expand(model.acceleration[chosen, b], z, duration, series)
-                    evaluate(series, h, moved)
-                put_time(moved, n, (time + h) / duration)
-                read_channels(row, curvature, side, moved, end)
-
-                # did a contact begin or end on the way?
-                changed = -1
-                if find_suspects(model, side, h, start, end, until, towards) > 0:
-                    if not expanded:
-                        expand(model.acceleration[chosen, b], z, duration, series)
-                        expanded = True
-                    changed, instant = first_change(model, side, series, until, towards, channel, event_tolerance)
-                    if changed >= 0:
-                        h = instant
-                        evaluate(series, h, moved)
-                        put_time(moved, n, (time + h) / duration)
-                        read_channels(row, curvature, side, moved, end)
-
-                # record the step
-                before, force = force, joint_force(model, side, end)
-                note_share(force, h, contact_time)
-                note_peak(arrays, cycle, b * duration + time + h, force)
-                note_channels(model, side, h, start, end, channel_peak)
-                crest, size_there = crest_instant(h, before, force)
-                sampled = sample < samples and sample * period < (b * duration + time + h) * samples
-                crested = size_there > 0.99 * peak[UPPER if force[0] > 0.0 else LOWER]
-                if sampled or crested:
-                    if not expanded:
-                        expand(model.acceleration[chosen, b], z, duration, series)
-                    for c in range(2 * n, size):
-                        there[c] = z[c]
-                if crested:
-                    at_crest = refined_force(model, chosen, b, side, series, time, crest, there, spare)
-                    note_peak(arrays, cycle, b * duration + time + crest, at_crest)
-                while sample < samples and sample * period < (b * duration + time + h) * samples:
-                    at = max(sample * period / samples - b * duration - time, 0.0)
-                    at_sample = refined_force(model, chosen, b, side, series, time, at, there, spare)
-                    write_sample(model, there, at_sample, arrays.history[cycle, sample])
-                    sample += 1
-                z, moved = moved, z
-                start, end = end, start
-                if changed < 0:
-                    if not fits:
-                        break
-                    count += 1
-                    continue
-
-                # the contact set changes
-                events += 1
-                if events > event_budget:
-                    return status.EVENT_BUDGET, cycle
-                side[changed] = towards[changed] if side[changed] == 0.0 else 0.0
-                if side[changed] != 0.0 and monitored(model, changed):
-                    column = column_of(model, changed, side[changed])
-                    arrays.impacts[cycle, column] += 1
-                    upward = 1.0 if column == UPPER else -1.0
-                    note_touch(episode, upward, b * duration + time + h, arrays.bounce_time[cycle])
-                put_sides(model, side, z)
-                chosen = contact_set(model, side)
-                curvature = model.curvature[chosen, b]
-                read_channels(row, curvature, side, z, start)
-                force = joint_force(model, side, start)
-                note_peak(arrays, cycle, b * duration + time + h, force)
-                origin, count = time + h, 0
-
-        arrays.events[cycle] = events
-        for i in range(2 * n):
-            state[i] = z[i]
+        for i in range(state.shape[0]):
+            motion.z[i] = state[i]
+        read_channels(model.row, model.curvature[0, 0], motion.z, motion.start)
+        find_sides(surface, motion.start, motion.side)
+        put_sides(surface, motion.side, motion.z)
+        arrays.events[cycle] = turn(model, surface, motion, episode, arrays, cycle, event_tolerance, event_budget)
+        if arrays.events[cycle] > event_budget:
+            return status.EVENT_BUDGET, cycle
+        for i in range(state.shape[0]):
+            state[i] = motion.z[i]
             if not abs(state[i]) < RUNAWAY:
                 return status.DIVERGED, cycle
         episode.touch[0] -= period

@@ -4,9 +4,11 @@ OK = 0
 DIVERGED = 1
 EVENT_BUDGET = 2
 STEP_TOO_COARSE = 3
+STEP_BUDGET = 4
 
 MESSAGES = {
     DIVERGED: "the motion grew beyond every bound",
     EVENT_BUDGET: "one cycle needed more contact events than its budget allows",
+    STEP_BUDGET: "one cycle needed more steps than its budget allows",
     STEP_TOO_COARSE: "the step is too coarse for the fastest mode in contact",
 }

@@ -104,6 +104,21 @@ def diagnose(
     SimulationError
         If the motion can't be followed.
     """
+    verdict, record = diagnosed_run(
+        machine, initial_state=initial_state, budget=budget, sensor_error=sensor_error, integrator=integrator
+    )
+    return _with_update_test(machine, verdict, record, sensor_error) if depends_on_configuration(machine) else verdict
+
+
+def diagnosed_run(
+    machine: Machine,
+    *,
+    initial_state: MotionState | ArrayLike | None = None,
+    budget: int = DEFAULT_BUDGET,
+    sensor_error: float = 0.0,
+    integrator: Integrator | None = None,
+) -> tuple[Diagnosis, CycleRecord]:
+    """``diagnose`` without the vote of the Matrix Update Test, and the very run that was judged."""
     if budget < FIRST_STAGE:
         raise DiagnosisError(f"budget = {budget} cycles is out of range; allowed: {FIRST_STAGE} or more")
     deviation = Deviation(machine, initial_state, integrator)
@@ -118,22 +133,27 @@ def diagnose(
         more, more_growth = deviation.run(len(record))
         record, growth = record.followed_by(more), np.concatenate([growth, more_growth])
     verdict = verdict or _not_periodic(stage)
-    votes, evidence = _votes(stage), _evidence(stage, verdict, initial_state)
+    evidence = _evidence(stage, verdict, initial_state)
     if stage.orbit is not None:
         evidence["largest_peak"] = float(np.max(simulate(machine, stage.orbit.period, stage.orbit.state).peak_force))
+    return replace(verdict, votes=_votes(stage), horizon=len(record), evidence=evidence), record
+
+
+def _with_update_test(machine: Machine, verdict: Diagnosis, record: CycleRecord, sensor_error: float) -> Diagnosis:
+    """Let the Matrix Update Test vote on a verdict, from the state in which the run ended."""
+    interval = getattr(machine, FIELD)
+    update = matrix_update_test(
+        machine, intervals=(interval, neighbouring_interval(interval)), transient=0, cycles=UPDATE_CYCLES,
+        initial_state=record.final_state,
+    )  # fmt: skip
+    evidence = {**verdict.evidence, "matrix_update": update.reason}
+    evidence["cycles_used"] += 4 * UPDATE_CYCLES
     status = verdict.status
-    if depends_on_configuration(machine):
-        interval = getattr(machine, FIELD)
-        update = matrix_update_test(
-            machine, intervals=(interval, neighbouring_interval(interval)), transient=0, cycles=UPDATE_CYCLES,
-            initial_state=record.final_state,
-        )  # fmt: skip
-        votes["matrix_update"] = update.nature
-        evidence["matrix_update"] = update.reason
-        evidence["cycles_used"] += 4 * UPDATE_CYCLES
-        if status == "agreed" and sensor_error == 0.0 and update.nature not in (verdict.nature, "undetermined"):
-            status = "disputed"
-    return replace(verdict, votes=votes, status=status, horizon=len(record), evidence=evidence)
+    if status == "agreed" and sensor_error == 0.0 and update.nature not in (verdict.nature, "undetermined"):
+        status = "disputed"
+    return replace(
+        verdict, status=status, votes={**verdict.votes, "matrix_update": update.nature}, evidence=evidence
+    )  # fmt: skip
 
 
 def _stage(machine: Machine, record: CycleRecord, growth: Array, searched: int) -> _Stage:

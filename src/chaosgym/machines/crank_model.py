@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.core.crank_propagator import FORCING_TERMS, propagator_table, series_order
+from chaosgym.core.crank_propagator import FORCING_TERMS, SERIES_PHASE, SQUARINGS, propagator_table, series_order
 from chaosgym.core.crank_stepper import HERTZ, LINEAR, SteppedCrankModel
-from chaosgym.core.slider_crank import SliderCrankModel
+from chaosgym.core.slider_crank import PIECES, SliderCrankModel
 from chaosgym.machines.crank_equations import Equations, equations, rod_of
 from chaosgym.machines.crank_joints import Channels, channels_of, display_of, gaps_of, hertz_constants, joints_of
 from chaosgym.machines.kinematics import slider_rate
@@ -49,8 +49,8 @@ KEPT = 32
 KEPT_STRUCTURES = 1024
 """Machines whose models are looked up by speed alone."""
 
-TABLES = ("acceleration", "curvature", "propagator")
-"""Large arrays of a model."""
+TABLES = ("span", "acceleration", "curvature", "propagator")
+"""Arrays of a model that are large, or longer at one speed than at another."""
 
 KEPT_BYTES = 256_000_000
 """Memory for the propagators of machines at one speed; those used longest ago go first."""
@@ -59,7 +59,7 @@ _NOT_IN_THE_MATRICES = ("crank_speed", "slider_clearance", "ball_clearance")
 
 
 class KeptModel(NamedTuple):
-    """A model without its clearances, and the addresses of its large ``TABLES``, which live as long as it does."""
+    """A model without its clearances, and the addresses of its ``TABLES``, which live as long as it does."""
 
     model: SliderCrankModel
     addresses: tuple[int, ...]
@@ -122,12 +122,12 @@ def _models_by_speed(step_phase: float, *structure: Any) -> ModelsBySpeed:
 
 
 def models_by_speed(machine: "SliderCrank", step_phase: float = STEP_PHASE) -> ModelsBySpeed:
-    """Models of a machine that ``has_propagators``; a closed contact turns by ``step_phase`` [rad] in a step."""
+    """Models of a machine that ``has_propagators``; a contact turns by ``step_phase`` [rad] in a piece of a step."""
     return _models_by_speed(step_phase, *_key(machine))
 
 
 def exact_model(machine: "SliderCrank", step_phase: float) -> SliderCrankModel:
-    """Model of a machine that ``has_propagators``; a closed contact turns by ``step_phase`` [rad] in a step."""
+    """Model of a machine that ``has_propagators``; a contact turns by ``step_phase`` [rad] in a piece of a step."""
     return models_by_speed(machine, step_phase).at(machine.crank_speed).model._replace(gap=gaps_of(machine))
 
 
@@ -310,14 +310,13 @@ def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> Slide
     columns[:, :, : 2 * n] += parts.push[:, :, : 2 * n]
     columns[:, :, 2 * n + FORCING_TERMS :] = parts.push[:, :, 2 * n :]
     acceleration = np.ascontiguousarray(np.swapaxes(columns, -1, -2))
-    steps = max(1, math.ceil(duration * max(parts.contact / step_phase, parts.spectrum / MAX_PHASE)))
+    steps = max(1, math.ceil(duration * max(parts.contact / (PIECES * step_phase), parts.spectrum / MAX_PHASE)))
     step = duration / steps
-    order = series_order(parts.spectrum * step)
     return SliderCrankModel(
         bin_duration=duration,
         steps=steps,
         contact_rate=parts.contact,
-        order=order,
+        span=series_span(parts.spectrum, step),
         row=parts.channels.row,
         gap=np.zeros(m),
         stiffness=parts.channels.stiffness,
@@ -329,5 +328,12 @@ def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> Slide
         display=parts.display,
         acceleration=acceleration,
         curvature=np.ascontiguousarray(parts.channels.row @ acceleration),
-        propagator=propagator_table(acceleration, duration, step, order),
+        propagator=propagator_table(acceleration, duration, step, series_order(parts.spectrum * step / 2**SQUARINGS)),
     )
+
+
+def series_span(spectrum: float, step: float) -> Array:
+    """Longest time [s] that a Taylor series of each order sums to round-off, up to the order that covers a step."""
+    span = SERIES_PHASE[: series_order(spectrum * step) + 1] / spectrum
+    span[-1] = math.inf
+    return np.asarray(span)

@@ -229,9 +229,18 @@ def modal_analysis(beam: ImpactBeam, elements: int | None = None) -> ModalAnalys
     wanted = max(beam.n_modes, 2)
     # the inverse problem, M s = K s / w^2, keeps the slow rocking mode exact on fine meshes
     size = len(mass)
-    inverse_squares, shapes = scipy.linalg.eigh(mass, stiffness, subset_by_index=[size - wanted, size - 1])
+    scale = 1.0 / np.sqrt(np.diag(stiffness))
+    try:
+        inverse_squares, shapes = scipy.linalg.eigh(
+            mass * np.outer(scale, scale), stiffness * np.outer(scale, scale),
+            subset_by_index=[size - wanted, size - 1],
+        )  # fmt: skip
+    except np.linalg.LinAlgError as error:
+        raise _inseparable(beam) from error
+    if inverse_squares[0] < 1e-14 * inverse_squares[-1]:
+        raise _inseparable(beam)
     angular = 1.0 / np.sqrt(inverse_squares[::-1])
-    shapes = (shapes / np.sqrt(inverse_squares))[:, ::-1]
+    shapes = (scale[:, None] * shapes / np.sqrt(inverse_squares))[:, ::-1]
     shapes = shapes * np.where(shapes[tip] < 0.0, -1.0, 1.0)
     if beam.damping_family == "uniform":
         ratio = np.full(wanted, beam.damping_ratio)
@@ -241,6 +250,15 @@ def modal_analysis(beam: ImpactBeam, elements: int | None = None) -> ModalAnalys
     angular, ratio, force_shape = angular[kept], ratio[kept], shapes[at_force, kept]
     damping = np.diag(2.0 * ratio * angular) + beam.shaker_damping * np.outer(force_shape, force_shape)
     return ModalAnalysis(angular, ratio, damping, shapes[tip, kept].copy(), force_shape.copy())
+
+
+def _inseparable(beam: ImpactBeam) -> ParameterError:
+    return ParameterError(
+        f"n_modes = {beam.n_modes} of a beam with length = {beam.length:g} m, height = {beam.height:g} m, "
+        f"pivot_rotational_stiffness = {beam.pivot_rotational_stiffness:g} N m/rad and shaker_stiffness = "
+        f"{beam.shaker_stiffness:g} N/m differ so much in frequency that rounding hides the slowest; "
+        "allowed: fewer modes, or stiffer springs"
+    )
 
 
 def static_tip_deflection(beam: ImpactBeam) -> float:
@@ -321,8 +339,20 @@ def _regimes(modes: ModalAnalysis, *systems: tuple[Array, Array]) -> Regimes:
         for _ in range(3):
             rows.append(rows[-1] @ derivative)
         magnitude = np.stack([_bound(rotates, rows[2]), _bound(rotates, rows[3])])
-        fastest = np.max(np.where(rotates, np.hypot(rate[:, 0], rate[:, 1]), np.max(np.abs(rate), axis=1)))
-        parts.append((rotates, rate, to_modal, from_modal, np.stack(rows[:3]), magnitude, to_modal @ load, fastest))
+        modulus = np.where(rotates[:, None], np.hypot(rate[:, :1], rate[:, 1:]), np.abs(rate)).ravel()
+        parts.append(
+            (
+                rotates,
+                rate,
+                to_modal,
+                from_modal,
+                np.stack(rows[:3]),
+                magnitude,
+                to_modal @ load,
+                modulus,
+                modulus.max(),
+            )
+        )
     return Regimes(*(np.ascontiguousarray(np.stack(part)) for part in zip(*parts, strict=True)))
 
 

@@ -320,7 +320,7 @@ class SliderCrank(FidelityLadder):
         return self.motor_angle > 0.0
 
     def reduce(self, step_phase: float = STEP_PHASE) -> SliderCrankModel | SteppedCrankModel:
-        """Return the model for steps in which a closed contact turns by at most ``step_phase`` [rad].
+        """Return the model in whose steps changes of contact are searched for every ``step_phase`` [rad] of a contact.
 
         With exact propagators if contact is linear and does not turn with the ball, for the Runge-Kutta stepper
         otherwise. Machines that differ in clearance alone share all of it; those that differ in speed

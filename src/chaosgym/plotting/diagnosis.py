@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.diagnosis import TYPES, LyapunovExponent, ResponseMap, power_spectrum
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.plotting.overview import TYPE_COLOURS
+from chaosgym.plotting.thesis import cell_edges, phase_plane, section_points
 from chaosgym.simulation import CycleRecord
 
 
@@ -50,17 +50,16 @@ def phase_portrait(record: CycleRecord, ax: Axes | None = None) -> Axes:
     time = record.time
     history = record.history
     assert history is not None
-    ax.plot(1e3 * history[..., 0].ravel(), history[..., 1].ravel(), lw=0.5)
-    ax.set(xlabel="displacement [mm]", ylabel="velocity [m/s]", title=f"Phase portrait, {time[-1]:.2f} s")
+    phase_plane(history[..., 0].ravel(), history[..., 1].ravel(), ax)
+    ax.set(title=f"Phase portrait, {time[-1]:.2f} s")
     return ax
 
 
 def poincare_section(record: CycleRecord, ax: Axes | None = None) -> Axes:
     """Displacement and velocity once a cycle: step II of the Two-Step Test."""
     ax = _axes(ax)
-    ax.plot(1e3 * record.displacement, record.velocity, ".", ms=3)
-    ax.set(xlabel="displacement [mm]", ylabel="velocity [m/s]", title="Poincaré section")
-    ax.locator_params(nbins=5)
+    section_points(record.displacement, record.velocity, ax)
+    ax.set(title="Poincaré section")
     return ax
 
 
@@ -115,19 +114,10 @@ def response_map(result: ResponseMap, ax: Axes | None = None) -> Axes:
     codes = np.array([[TYPES.index(kind) for kind in row] for row in result.type.tolist()])
     colours = ListedColormap([TYPE_COLOURS[kind] for kind in TYPES])
     norm = BoundaryNorm(np.arange(len(TYPES) + 1) - 0.5, len(TYPES))
-    ax.pcolormesh(_edges(result.speed), 1e3 * _edges(result.clearance), codes.T, cmap=colours, norm=norm)
+    ax.pcolormesh(cell_edges(result.speed), 1e3 * cell_edges(result.clearance), codes.T, cmap=colours, norm=norm)
     field = result.machine.speed_field
     unit = parameters_of(result.machine)[field].unit
     ax.set(xlabel=f"{field.replace('_', ' ')} [{unit}]", ylabel="clearance [mm]", title="Response types")
     handles = [Patch(color=colour, label=kind) for kind, colour in TYPE_COLOURS.items() if kind in result.type]
     ax.legend(handles=handles, loc="upper left", fontsize=8, ncols=4)
     return ax
-
-
-def _edges(centres: ArrayLike) -> NDArray[np.float64]:
-    """Edges of the cells about ascending centres."""
-    values = np.asarray(centres, dtype=float)
-    if len(values) == 1:
-        return np.array([0.99 * values[0], 1.01 * values[0]])
-    middle = 0.5 * (values[1:] + values[:-1])
-    return np.concatenate([[2.0 * values[0] - middle[0]], middle, [2.0 * values[-1] - middle[-1]]])

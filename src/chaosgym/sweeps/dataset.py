@@ -1,10 +1,12 @@
-"""How is a labelled sweep kept? One Parquet file whose schema says units, definitions and provenance.
+"""How is a labelled sweep kept and read? One Parquet file whose schema says units, definitions and provenance.
 
-Any Parquet reader opens it; the columns are the swept fields in SI units, then the labels and their evidence.
+Any Parquet reader opens it; the columns are the swept fields in SI units, then the labels, their evidence and the
+signals. Every page has a checksum, so that damage is found and named. Row groups are the chunks of the run.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,25 +15,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from chaosgym.errors import DatasetError
+from chaosgym.sweeps.plan import SweepPlan
 
 DATA_FILE = "sweep.parquet"
 
-LABELS: Mapping[str, tuple[pa.DataType, str, str]] = {
-    "nature": (pa.string(), "-", "Two-Step Test: periodic, quasiperiodic, chaotic or undetermined; null if failed"),
-    "period": (pa.int32(), "cycles", "cycles after which a periodic response repeats; null otherwise"),
-    "response_type": (pa.string(), "-", "I, II, III or undetermined, over the neighbours in speed and clearance"),
-    "status": (pa.string(), "-", "labelled, undetermined or failed"),
-    "margin": (pa.float64(), "-", "distance of the verdict from its threshold; 0 on the threshold"),
-    "peak_force_min": (pa.float64(), "N", "smallest peak force of a judged cycle, first side of the joint"),
-    "peak_force_max": (pa.float64(), "N", "largest peak force of a judged cycle, first side"),
-    "peak_force_mean": (pa.float64(), "N", "mean peak force, first side"),
-    "peak_force_std": (pa.float64(), "N", "standard deviation of the peak force, first side"),
-    "impacts_per_cycle": (pa.float64(), "-", "contacts that begin in a cycle, all sides"),
-    "contact_fraction": (pa.float64(), "-", "share of the time in contact, all sides"),
-    "bounce_fraction": (pa.float64(), "-", "longest bouncing before sustained contact, in half cycles"),
-    "reason": (pa.string(), "-", "why the verdict is what it is, or why the run failed"),
-}
-"""Label columns: type, unit, meaning."""
+DAMAGE = (pa.ArrowException, KeyError, TypeError, ValueError, OSError)
+"""What a damaged file raises."""
 
 
 @dataclass(frozen=True)
@@ -47,22 +36,36 @@ class LabelledSweep:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of the grid, or (n_points,) if the points were drawn."""
+        """Shape of the grid, or (n_points,) if the points do not form one."""
         if self.settings["sampling"] != "grid":
             return (len(self.table),)
         return tuple(axis["count"] for axis in self.settings["axes"])
 
+    @property
+    def plan(self) -> SweepPlan:
+        """What was labelled."""
+        return SweepPlan.from_settings(self.settings)
 
-def schema(axis_units: Mapping[str, str], settings: Mapping[str, Any]) -> pa.Schema:
-    """Schema of a sweep over some fields: units and meanings on the columns, provenance on the whole."""
-    fields = [pa.field(name, pa.float64(), metadata={"unit": unit}) for name, unit in axis_units.items()]
-    fields += [pa.field(name, kind, metadata={"unit": unit, "meaning": meaning})
-               for name, (kind, unit, meaning) in LABELS.items()]  # fmt: skip
-    return pa.schema(fields, metadata={"chaosgym": json.dumps(settings, sort_keys=True)})
+    @property
+    def provenance(self) -> list[dict[str, str]]:
+        """Every installation that computed some of the rows."""
+        found: list[dict[str, str]] = json.loads(self.table.schema.metadata[b"provenance"])
+        return found
 
 
-def read_sweep(folder: str | Path) -> LabelledSweep:
-    """Read a finished sweep.
+@contextmanager
+def parquet_writer(path: Path, schema: pa.Schema) -> Iterator[pq.ParquetWriter]:
+    """Open a Parquet file with checksums and zstandard compression; numbers that hardly repeat are split by byte."""
+    numbers = [field.name for field in schema if pa.types.is_floating(field.type)]
+    words = [field.name for field in schema if field.name not in numbers]
+    with pq.ParquetWriter(
+        path, schema, compression="zstd", compression_level=9, write_page_checksum=True, use_dictionary=words
+    ) as writer:
+        yield writer
+
+
+def read_sweep(folder: str | Path, columns: list[str] | None = None) -> LabelledSweep:
+    """Read a finished sweep, or some columns of it.
 
     Raises
     ------
@@ -75,8 +78,8 @@ def read_sweep(folder: str | Path) -> LabelledSweep:
             f"{folder} holds no finished sweep (no {DATA_FILE}); run `chaosgym sweep` again to finish it"
         )
     try:
-        table = pq.read_table(path)
+        table = pq.read_table(path, columns=columns, page_checksum_verification=True)
         settings = json.loads(table.schema.metadata[b"chaosgym"])
-    except (pa.ArrowException, KeyError, TypeError, ValueError, OSError) as error:
+    except DAMAGE as error:
         raise DatasetError(f"{path} can't be read as a chaosgym sweep: {error}") from error
     return LabelledSweep(table, settings)

@@ -1,0 +1,17 @@
+"""How is a kernel compiled that only computes?
+
+Numba counts references to every array that a function is handed, two atomic operations each, which cost more than the
+arithmetic of a short kernel. One that neither allocates nor returns an array needs no count: its caller keeps what it
+works on alive.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import njit
+
+
+def leaf(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a kernel that allocates no array and returns none, without reference counts."""
+    compiled: Callable[..., Any] = njit(cache=True, nogil=True, _nrt=False)(function)
+    return compiled

@@ -1,0 +1,138 @@
+"""How does the beam move at one operating point? Figures 3.6, 3.7, 3.17 and 5.6."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from chaosgym.figures.beam import BEAM, LARGE, TRANSIENT, runs
+from chaosgym.figures.computations import Computation, ForcePointHistory, History
+from chaosgym.figures.figure import Finding, Panel, Parts, ThesisFigure
+from chaosgym.figures.findings import compare_nature, words
+from chaosgym.figures.panels import (
+    UPPER,
+    force_panel,
+    motion_panel,
+    phase_panel,
+    section_panel,
+    side_peaks,
+    spectrum_panel,
+)
+from chaosgym.figures.printed import printed
+from chaosgym.plotting import thesis
+
+Array = NDArray[np.float64]
+
+
+def one_response(frequency: float, resolution: float) -> Mapping[str, Computation]:
+    """Time history, spectrum, section and nature of the beam at the large clearance."""
+    beam = replace(BEAM, excitation_frequency=frequency, clearance=LARGE)
+    return {
+        "history": History(machine=beam, cycles=6, transient=TRANSIENT, samples=2000),
+        "long": History(machine=beam, cycles=256, transient=TRANSIENT, samples=128),
+        "section": History(machine=beam, cycles=round(2000 * resolution), transient=TRANSIENT, samples=1),
+        "response": runs([beam], cycles=300),
+    }
+
+
+def nature_of(where: str, target: str, nature: str, parts: Parts) -> Sequence[Finding]:
+    """Compare the nature of the one response."""
+    data = parts["response"]
+    return [compare_nature(where, target, (side_peaks(data, UPPER)[0], data["nature"][0], data["period"][0]), nature)]
+
+
+PERIODIC_RESPONSE = ThesisFigure(
+    id="3.6",
+    title="A periodic response: 19 Hz, ±0.127 mm",
+    shows="Time history, phase plane, line spectrum and impact force of a periodic response.",
+    parts=partial(one_response, 19.0),
+    panels=(
+        motion_panel("(a) displacement of the beam tip", "history"),
+        phase_panel("(b) phase plane of the beam tip", "history"),
+        spectrum_panel("(c) spectrum of the displacement; triangles: multiples of the excitation", "long", 19.0, 600.0),
+        force_panel("(d) impact force on one side", "history"),
+    ),
+    columns=2,
+    compare=partial(nature_of, "19 Hz", "IBS-013", "periodic"),
+)
+
+CHAOTIC_RESPONSE = ThesisFigure(
+    id="3.7",
+    title="A chaotic response: 30 Hz, ±0.127 mm",
+    shows="Time history, phase plane, broad spectrum, irregular Poincaré map and impact force of a chaotic response.",
+    parts=partial(one_response, 30.0),
+    panels=(
+        motion_panel("(a) displacement of the beam tip", "history"),
+        phase_panel("(b) phase plane of the beam tip", "history"),
+        spectrum_panel("(c) spectrum of the displacement; triangles: multiples of the excitation", "long", 30.0, 600.0),
+        section_panel("(d) Poincaré map of the beam tip", "section"),
+        force_panel("(e) impact force on one side", "history", levels="IBS-062"),
+    ),
+    columns=2,
+    compare=partial(nature_of, "30 Hz", "IBS-014", "chaotic"),
+)
+
+
+def force_point(resolution: float) -> Mapping[str, Computation]:
+    """Motion where the shaker pushes."""
+    beam = replace(BEAM, excitation_frequency=30.0, clearance=LARGE)
+    return {
+        "motion": ForcePointHistory(machine=beam, cycles=12, transient=TRANSIENT),
+        "response": runs([beam], cycles=300),
+    }
+
+
+def with_levels(panel: Panel, target: str, *, vertical: bool = False) -> Panel:
+    """A panel with a printed range of its vertical or, if ``vertical``, also of its horizontal axis."""
+
+    def paint(parts: Parts, ax: Axes) -> None:
+        panel.paint(parts, ax)
+        thesis.printed_level(*printed(target), ax, "printed range")
+        if vertical:
+            for level in printed("IBS-060"):
+                ax.axvline(level, ls="--", lw=1.1, **thesis.PRINTED)
+        else:
+            thesis.legend(ax, "upper right")
+
+    return Panel(panel.title, paint)
+
+
+def motion_ranges(parts: Parts) -> Sequence[Finding]:
+    """Ranges of displacement, velocity and peak force."""
+    motion = parts["motion"]
+    peaks = side_peaks(parts["response"], UPPER)[0]
+    place, speed = 1e3 * np.max(np.abs(motion["displacement"])), np.max(np.abs(motion["velocity"]))
+    wanted = printed("IBS-062")
+    ends = (float(peaks.min()), float(peaks.max()))
+    return [
+        Finding(f"displacement {words(printed('IBS-060'))} mm", f"±{place:.3f} mm",
+                bool(abs(place - 0.2) <= 0.03), ("IBS-060",)),
+        Finding(f"velocity {words(printed('IBS-061'))} m/s", f"±{speed:.3f} m/s",
+                bool(abs(speed - 0.1) <= 0.015), ("IBS-061",)),
+        Finding(f"peaks of {words(wanted)} N", f"{ends[0]:.3g} to {ends[1]:.3g} N",
+                bool(abs(ends[0] - wanted.low) <= 6.0 and abs(ends[1] - wanted.high) <= 15.0), ("IBS-062",)),
+    ]  # fmt: skip
+
+
+FORCE_POINT_MOTION = ThesisFigure(
+    id="3.17",
+    title="Motion where the shaker pushes: 30 Hz, ±0.127 mm",
+    shows="Displacement, phase plane and impact force of the numerical model beside those of the experiment.",
+    parts=force_point,
+    panels=(
+        with_levels(motion_panel("(a) displacement of the beam", "motion"), "IBS-060"),
+        with_levels(phase_panel("(b) phase plane of the beam", "motion"), "IBS-061", vertical=True),
+        force_panel("(c) impact force on one side", "motion", levels="IBS-062"),
+    ),
+    compare=motion_ranges,
+    remark="the numerical half; the measured records are not in print",
+)
+
+FIGURES = (
+    PERIODIC_RESPONSE,
+    CHAOTIC_RESPONSE,
+    FORCE_POINT_MOTION,
+)

@@ -1,0 +1,176 @@
+"""What has to be computed for a figure? Frozen descriptions that run, and give plain arrays.
+
+A description holds everything that its result depends on, so that the result can be kept under it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import scipy.signal
+from numpy.typing import NDArray
+
+from chaosgym.design.peak_impacts import peak_impacts
+from chaosgym.diagnosis import response_map, two_step_test
+from chaosgym.errors import SimulationError
+from chaosgym.machines import ImpactBeam, Machine
+from chaosgym.machines.impact_beam import modal_analysis
+from chaosgym.simulation import CycleRecord, parallel_map, simulate
+
+Array = NDArray[np.float64]
+Data = Mapping[str, NDArray[Any]]
+"""Arrays by name; every computation documents its own."""
+
+
+class Computation(Protocol):
+    """A frozen dataclass that describes a computation, and runs it."""
+
+    def run(self, workers: int | None = None) -> Data:
+        """Compute; ``workers`` threads, all processors by default."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class History:
+    """Time history of one machine.
+
+    Gives ``time`` [s], ``displacement`` [m], ``velocity`` [m/s] and ``force`` [N] (upper side positive), (samples,), of
+    all cycles in a row; ``section`` (cycles, 2) [m, m/s]; ``bounce`` (cycles, 2): ``bounce_duration`` in half cycles.
+    """
+
+    machine: Machine
+    cycles: int
+    transient: int
+    samples: int = 720
+
+    def run(self, workers: int | None = None) -> Data:
+        """Simulate."""
+        record = simulate(self.machine, self.cycles, transient=self.transient, samples_per_cycle=self.samples)
+        return _history(record)
+
+
+def _history(record: CycleRecord) -> dict[str, NDArray[Any]]:
+    assert record.history is not None
+    columns = record.history.reshape(-1, 3).T
+    return {
+        "time": record.time,
+        **dict(zip(("displacement", "velocity", "force"), map(np.ascontiguousarray, columns), strict=True)),
+        "section": np.column_stack([record.displacement, record.velocity]),
+        "bounce": record.bounce_duration / (0.5 * record.machine.cycle_period),
+    }
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForcePointHistory:
+    """Motion of an impact beam where the shaker pushes.
+
+    The recorded contact force and the shaker's force drive the linear modes from the state in which the record begins;
+    nothing is integrated twice but the forces in between the samples, which are taken as straight lines.
+
+    Gives what ``History`` gives, with ``displacement`` and ``velocity`` of the force point, and beside them
+    ``tip_displacement`` of the kernel and ``tip_check``, the same by this route.
+    """
+
+    machine: ImpactBeam
+    cycles: int
+    transient: int
+    samples: int = 6000
+
+    def run(self, workers: int | None = None) -> Data:
+        """Simulate, and follow the modes."""
+        record = simulate(self.machine, self.cycles, transient=self.transient, samples_per_cycle=self.samples)
+        data = _history(record)
+        modes = modal_analysis(self.machine)
+        n = self.machine.n_modes
+        rate = 2.0 * np.pi * self.machine.excitation_frequency
+        shaker = self.machine.force_amplitude * np.sin(rate * data["time"])
+        system = np.block(
+            [[np.zeros((n, n)), np.eye(n)], [-np.diag(modes.angular_frequency**2), -modes.damping]]
+        )  # fmt: skip
+        inputs = np.zeros((2 * n, 2))
+        inputs[n:, 0], inputs[n:, 1] = modes.force_shape, -modes.tip_shape
+        outputs = np.zeros((3, 2 * n))
+        outputs[0, :n], outputs[1, n:], outputs[2, :n] = modes.force_shape, modes.force_shape, modes.tip_shape
+        _, followed, _ = scipy.signal.lsim(
+            (system, inputs, outputs, np.zeros((3, 2))),
+            np.column_stack([shaker, data["force"]]), data["time"], record.section[0],
+        )  # fmt: skip
+        data["tip_displacement"] = data["displacement"]
+        data["displacement"], data["velocity"], data["tip_check"] = (np.ascontiguousarray(row) for row in followed.T)
+        return data
+
+
+@dataclass(frozen=True, kw_only=True)
+class Runs:
+    """Peak forces of many machines, one run from rest each.
+
+    Gives every field of ``fields`` (machines,), ``peaks`` (machines, cycles, 2) [N], ``nature`` and ``period``
+    (machines,) of the recorded cycles by the Two-Step Test (0 where there is none), ``settle`` (machines,): the cycle
+    from which the record repeats, -1 if it does not; ``impacts`` and ``contact`` (machines,): impacts a cycle and share
+    of the cycle in contact, both sides together. A run that fails has NaN and the nature "failed".
+    """
+
+    machines: tuple[Machine, ...]
+    fields: tuple[str, ...]
+    cycles: int
+    transient: int
+
+    def run(self, workers: int | None = None) -> Data:
+        """Simulate and judge each."""
+        rows = parallel_map(self._row, self.machines, workers=workers)
+        data: dict[str, NDArray[Any]] = {
+            field: np.array([getattr(machine, field) for machine in self.machines]) for field in self.fields
+        }
+        for column, name in enumerate(("peaks", "nature", "period", "settle", "impacts", "contact")):
+            data[name] = np.array([row[column] for row in rows])
+        return data
+
+    def _row(self, machine: Machine) -> tuple[Array, str, int, int, float, float]:
+        try:
+            record = simulate(machine, self.cycles, transient=self.transient)
+        except SimulationError:
+            return np.full((self.cycles, 2), np.nan), "failed", 0, -1, np.nan, np.nan
+        nature, period, settle = "undetermined", 0, -1
+        if self.cycles >= 16:
+            verdict = two_step_test(record)
+            nature, period = verdict.nature, verdict.period or 0
+            settle = -1 if verdict.settle_cycle is None else verdict.settle_cycle
+        impacts = float(record.impacts.sum(axis=1).mean())
+        contact = float(record.contact_fraction.sum(axis=1).mean())
+        return record.peak_force, nature, period, settle, impacts, contact
+
+
+@dataclass(frozen=True, kw_only=True)
+class Types:
+    """Natures and types over speed and clearance.
+
+    Gives ``speed`` (m,) in the machine's unit, ``clearance`` (n,) [m], ``nature`` and ``type`` (m, n).
+    """
+
+    machine: Machine
+    speeds: tuple[float, ...]
+    clearances: tuple[float, ...]
+    budget: int = 400
+
+    def run(self, workers: int | None = None) -> Data:
+        """Judge every point and its neighbourhood."""
+        found = response_map(self.machine, self.speeds, self.clearances, budget=self.budget, workers=workers)
+        return {"speed": found.speed, "clearance": found.clearance, "nature": found.nature, "type": found.type}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeakImpacts:
+    """Place and size of the peak force of every cycle; ``location`` (impacts,) [m or deg], ``force`` (impacts,) [N]."""
+
+    machine: Machine
+    cycles: int
+    transient: int
+    side: int = 0
+    samples: int = 3600
+
+    def run(self, workers: int | None = None) -> Data:
+        """Simulate."""
+        record = simulate(self.machine, self.cycles, transient=self.transient, samples_per_cycle=self.samples)
+        diagram = peak_impacts(record, self.side)
+        return {"location": diagram.location, "force": diagram.force, "unit": np.array(diagram.unit)}

@@ -1,0 +1,79 @@
+"""What do the figures say, all together? A page with what agrees with the print and what does not."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from chaosgym.figures.figure import Finding
+from chaosgym.figures.produce import Drawn, picture_path
+from chaosgym.files import write_atomically
+
+_WORDS = {True: "agrees", False: "**differs**", None: "no number in print"}
+
+_OPENING = """# The simulated figures of the thesis, drawn again
+
+P. Gu, *Chaotic Vibration in Machine Systems and Its Implications for Design*, PhD thesis, MIT, 1994. The pixels of its
+figures are not available; axes and ranges follow the text, and everything that the text prints about a figure is
+compared with the machine here. Written by
+
+    chaosgym figures all --out FOLDER --gallery docs/figures.md
+
+which draws every figure (`chaosgym figures --list` names them) and keeps what it computed in `FOLDER/results`. A force
+agrees within 15 % or 3 N, a range if both its ends do, a nature if it is the same word. Natures are those of the
+Two-Step Test on the plotted cycles; it tells bands of 0.1 N from a period, which no reader of a plot can.
+"""
+
+
+def totals(drawn: Sequence[Drawn]) -> dict[str, int]:
+    """How many statements agree, and how many do not."""
+    judged = [finding.agrees for one in drawn for finding in one.findings]
+    return {"agree": judged.count(True), "differ": judged.count(False), "without_number": judged.count(None)}
+
+
+def sensitivities(drawn: Sequence[Drawn]) -> dict[str, list[tuple[str, Finding]]]:
+    """Statements about sensitivity by parameter, each with its figure; one that two figures share stands once."""
+    found: dict[str, list[tuple[str, Finding]]] = {}
+    for one in drawn:
+        for finding in one.findings:
+            known = [other for _, other in found.get(finding.sensitivity, [])]
+            if finding.sensitivity and finding not in known:
+                found.setdefault(finding.sensitivity, []).append((one.figure.id, finding))
+    return found
+
+
+def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
+    """The page; pictures that lie in the folder ``pictures`` beside it are shown."""
+    count = totals(drawn)
+    lines = [
+        _OPENING,
+        f"Of {count['agree'] + count['differ']} printed statements about these figures {count['agree']} agree and "
+        f"{count['differ']} differ.",
+        "",
+        "## Sensitivities as printed",
+        "",
+        "| parameter | printed | here | figure | |",
+        "|---|---|---|---|---|",
+    ]
+    for parameter, entries in sensitivities(drawn).items():
+        for number, finding in entries:
+            lines.append(f"| {parameter} | {finding.printed} | {finding.here} | {number} | {_WORDS[finding.agrees]} |")
+    for one in drawn:
+        figure = one.figure
+        lines += ["", f"## {figure.label}. {figure.title}", "", figure.shows]
+        if figure.remark:
+            lines += ["", f"Not as in the thesis: {figure.remark}."]
+        if one.error:
+            lines += ["", f"Not computed: {one.error}"]
+        if one.findings:
+            lines.append("")
+        for finding in one.findings:
+            lines.append(f"- {finding.printed}. Here {finding.here}: {_WORDS[finding.agrees]}.")
+        picture = picture_path(figure, pictures)
+        if picture.exists():
+            lines += ["", f"![{figure.label}: {figure.title}]({pictures.name}/{picture.name})"]
+    return "\n".join(lines) + "\n"
+
+
+def write_gallery(drawn: Sequence[Drawn], path: Path) -> None:
+    """Write the page; pictures in ``figures`` beside it are shown."""
+    page = gallery(drawn, path.parent / "figures")
+    write_atomically(path, lambda temporary: temporary.write_text(page, encoding="utf-8"))

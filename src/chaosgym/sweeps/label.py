@@ -1,0 +1,98 @@
+"""What is said of one point? One run from rest, judged in stages; its evidence and its signals come from that run."""
+
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from chaosgym.diagnosis import bounce_fraction, response_type
+from chaosgym.diagnosis.diagnose import diagnosed_run
+from chaosgym.errors import ParameterError, SimulationError
+from chaosgym.machines import Machine
+from chaosgym.simulation import CycleRecord, simulate
+from chaosgym.sweeps.columns import SIGNALS, WINDOW, WINDOWS, schema
+from chaosgym.sweeps.plan import SweepPlan
+from chaosgym.sweeps.provenance import provenance
+
+RETRY = 8
+"""Budgets that a point may take which is undetermined after one."""
+
+
+def label_point(machine: Machine, budget: int, *, signals: bool = False) -> dict[str, Any]:
+    """Label one machine; a run that fails is a row with status "failed"."""
+    try:
+        verdict, record = diagnosed_run(machine, budget=budget)
+        if verdict.nature == "undetermined":
+            verdict, record = diagnosed_run(machine, budget=RETRY * budget)
+    except SimulationError as error:
+        return {"status": "failed", "reason": str(error)}
+    judged = record.after(len(record) // 2)
+    peaks = judged.peak_force[:, 0]
+    exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
+    label = {
+        "nature": verdict.nature,
+        "period": verdict.period,
+        "status": verdict.status,
+        "margin": verdict.margin,
+        "exponent": exponent["value"],
+        "exponent_error": exponent["standard_error"],
+        "peak_force_min": peaks.min(),
+        "peak_force_max": peaks.max(),
+        "peak_force_mean": peaks.mean(),
+        "peak_force_std": peaks.std(),
+        "largest_peak": verdict.evidence["largest_peak"],
+        "impacts_per_cycle": judged.impacts.sum(axis=1).mean(),
+        "contact_fraction": judged.contact_fraction.sum(axis=1).mean(),
+        "bounce_fraction": bounce_fraction(judged),
+        "settle_cycle": verdict.settle_cycle,
+        "horizon": verdict.horizon,
+        "cycles_used": verdict.evidence["cycles_used"],
+        "reason": verdict.reason,
+    }
+    return label | _signals(machine, record) if signals else label
+
+
+def _signals(machine: Machine, record: CycleRecord) -> dict[str, Any]:
+    """Signals of a run from rest, which goes on if it ended before their last cycle; none if it can't."""
+    missing = max(WINDOWS.values()) + WINDOW - len(record)
+    try:
+        if missing > 0:
+            record = record.followed_by(simulate(machine, missing, record.final_state))
+    except SimulationError:
+        return {}
+    series = {"peak_force": record.peak_force[:, 0], "displacement": record.displacement, "velocity": record.velocity}
+    return {
+        f"{window}_{name}": series[name][first : first + WINDOW].astype(np.float32)
+        for window, first in WINDOWS.items()
+        for name in SIGNALS
+    }
+
+
+def _full_type(machine: Machine, budget: int) -> str | None:
+    try:
+        return response_type(machine, budget=budget, workers=1).type
+    except (ParameterError, SimulationError):
+        return None
+
+
+def label_rows(plan: SweepPlan, rows: range) -> pa.Table:
+    """Label some rows of a plan; response types that rest on neighbours are left to the end of the sweep."""
+    points = plan.points(rows)
+    lines: list[dict[str, Any]] = []
+    with_signals, with_full_type = plan.with_signals(rows), plan.with_full_type(rows)
+    for index in range(len(rows)):
+        point = {name: float(column[index]) for name, column in points.items()}
+        try:
+            machine = plan.machine_at(point)
+        except ParameterError as error:
+            lines.append({**point, "status": "failed", "reason": str(error)})
+            continue
+        label = label_point(machine, plan.budget, signals=bool(with_signals[index]))
+        if with_full_type[index]:
+            label["full_response_type"] = _full_type(machine, plan.budget)
+        lines.append(point | label)
+    if plan.sampling == "lattice":
+        for line, number, part in zip(lines, plan.machine_numbers(rows), plan.splits(rows), strict=True):
+            line |= {"machine": int(number), "split": part}
+    described = schema(plan, {"rows": [rows.start, rows.stop], "provenance": provenance()})
+    return pa.Table.from_pylist(lines, schema=described)

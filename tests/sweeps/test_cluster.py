@@ -1,0 +1,88 @@
+"""A sweep on a Dask cluster: a real scheduler and two worker processes on loopback."""
+
+import json
+import subprocess
+import sys
+import time
+
+import pytest
+
+from chaosgym.machines import THESIS_IMPACT_BEAM
+from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
+
+POINTS = 1100
+COMMAND = (
+    sys.executable, "-m", "chaosgym", "sweep", "impact-beam", "--axis", "excitation_frequency=10:30",
+    "--axis", "clearance=5e-5:2e-4", "--random", str(POINTS), "--seed", "4", "--budget", "100",
+)  # fmt: skip
+
+
+def start(log, *arguments):
+    """Start a process whose output goes to a file."""
+    with log.open("w") as output:
+        return subprocess.Popen([sys.executable, "-m", *arguments], stdout=output, stderr=subprocess.STDOUT)
+
+
+def wait_until(condition, seconds=120.0):
+    """Wait, and say so if it was in vain."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.05)
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """Address of a scheduler, and its two workers."""
+    file = tmp_path / "scheduler.json"
+    scheduler = start(
+        tmp_path / "scheduler.log", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0",
+        "--no-dashboard", "--scheduler-file", str(file),
+    )  # fmt: skip
+    wait_until(file.exists)
+    address = json.loads(file.read_text())["address"]
+    workers = [
+        start(
+            tmp_path / f"worker-{number}.log", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny",
+            "--no-dashboard", "--local-directory", str(tmp_path / f"worker-{number}"),
+        )
+        for number in range(2)
+    ]  # fmt: skip
+    wait_until(lambda: scheduler_workers(address) == 2)
+    yield address, workers
+    for process in (*workers, scheduler):
+        process.kill()
+        process.wait()
+
+
+def scheduler_workers(address):
+    """How many workers a scheduler has."""
+    script = f"from distributed import Client\nwith Client({address!r}) as c: print(len(c.scheduler_info()['workers']))"
+    asked = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    return int(asked.stdout)
+
+
+@pytest.mark.slow
+def test_rows_of_a_cluster_that_loses_a_worker_are_those_of_one_process(cluster, tmp_path):
+    """One of two workers is killed half way: nothing is lost, nothing twice, and every row is the local run's."""
+    address, workers = cluster
+    run = subprocess.Popen(
+        [*COMMAND, "--scheduler", address, "--out", str(tmp_path / "c")], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    wait_until(lambda: list(tmp_path.glob("c/chunks/0*.parquet")), 400.0)
+    workers[0].kill()
+    _, errors = run.communicate(timeout=600)
+    assert run.returncode == 0, errors.decode()
+    axes = (Axis("excitation_frequency", 10.0, 30.0), Axis("clearance", 5e-5, 2e-4))
+    local = run_sweep(SweepPlan(THESIS_IMPACT_BEAM, axes, "random", POINTS, 4, budget=100), tmp_path / "l")
+    assert read_sweep(tmp_path / "c").table.equals(local.table)
+    assert len(local.table) == POINTS
+
+
+def test_a_missing_scheduler_is_one_line(tmp_path):
+    """Nobody listens at port 1: exit code 2, the address is named, and the folder can be used without a cluster."""
+    command = [*COMMAND, "--scheduler", "tcp://127.0.0.1:1", "--out", str(tmp_path / "c")]
+    run = subprocess.run(command, capture_output=True, text=True)
+    assert run.returncode == 2
+    assert "no Dask scheduler answers at tcp://127.0.0.1:1" in run.stderr
+    assert "Traceback" not in run.stderr
