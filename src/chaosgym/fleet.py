@@ -211,7 +211,7 @@ class RigidBeamFleet(BeamFleet):
         advance_rigid_beams(self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
 
 
-SPEED_FIELDS = ("bin_duration", "steps")
+SPEED_FIELDS = ("bin_duration", "steps", "order", "span")
 """Fields of a slider crank's model that change with its speed, apart from the tables."""
 
 
@@ -223,7 +223,6 @@ class CrankFleet(_CompiledFleet):
         model = machine.reduce()
         self._bins = model.acceleration.shape[1]
         self._batch = stacked([model._replace(**dict.fromkeys(TABLES, 0))] * count)
-        self._terms = np.full(count, len(model.span))
         self._models = [models_by_speed(machine)] * count
         self._speeds = np.full(count, np.nan)
         # the tables live as long as the batch holds their addresses
@@ -248,10 +247,9 @@ class CrankFleet(_CompiledFleet):
                 field[i] = getattr(kept.model, name)
             for table, address in zip(tables, kept.addresses, strict=True):
                 table[i] = address
-            self._terms[i] = len(kept.model.span)
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
-        advance_cranks(self._batch, self._bins, self._terms, which, self._motions, arrays, self._settings, outcome)
+        advance_cranks(self._batch, self._bins, which, self._motions, arrays, self._settings, outcome)
 
 
 class SteppedCrankFleet(_CompiledFleet):

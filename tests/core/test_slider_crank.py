@@ -70,10 +70,11 @@ def frozen_model(machine, duration):
     steps = math.ceil(duration / 2 * model.contact_rate / 0.5)
     step = duration / 2 / steps
     spectrum = 2.0 * model.contact_rate
-    table = propagator_table(acceleration, duration / 2, step, series_order(spectrum * step))
+    order = series_order(spectrum * step)
+    table = propagator_table(acceleration, duration / 2, step, order)
     return model._replace(
-        bin_duration=duration / 2, steps=steps, span=series_span(spectrum, step), acceleration=acceleration,
-        propagator=table, curvature=model.row @ acceleration,
+        bin_duration=duration / 2, steps=steps, order=order, span=series_span(spectrum, step),
+        acceleration=acceleration, propagator=table, curvature=model.row @ acceleration,
     )  # fmt: skip
 
 

@@ -119,16 +119,15 @@ def pointer(typing_context, address):
 
 
 @njit(cache=True, inline="always")
-def crank_of(batch, bins, terms, i):
-    """Model of machine i of a batch that holds the addresses of the tables; ``terms`` (N,) are lengths of ``span``."""
+def crank_of(batch, bins, i):
+    """Model of machine i of a batch that holds the addresses of the tables."""
     m, n = batch.row.shape[1:]
     size = 2 * n + FORCING_TERMS + m
     sets = batch.radix[i] ** m
     return SliderCrankModel(
-        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i],
-        carray(pointer(batch.span[i]), (terms[i],), np.float64),
-        batch.row[i], batch.gap[i], batch.stiffness[i], batch.damping[i], batch.two_sided[i], batch.radix[i],
-        batch.reading[i], batch.reach[i], batch.display[i],
+        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.order[i], batch.span[i], batch.row[i],
+        batch.gap[i], batch.stiffness[i], batch.damping[i], batch.two_sided[i], batch.radix[i], batch.reading[i],
+        batch.reach[i], batch.display[i],
         carray(pointer(batch.acceleration[i]), (sets, bins, n, size), np.float64),
         carray(pointer(batch.curvature[i]), (sets, bins, m, size), np.float64),
         carray(pointer(batch.propagator[i]), (sets, bins, size, 2 * n), np.float64),
@@ -136,12 +135,12 @@ def crank_of(batch, bins, terms, i):
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def advance_cranks(batch, bins, terms, which, motions, arrays, settings, outcome):
+def advance_cranks(batch, bins, which, motions, arrays, settings, outcome):
     """As ``advance_beams``, for slider cranks with ``bins`` bins of crank angle."""
     for k in prange(which.shape[0]):
         i = which[k]
         outcome[k] = advance_crank(
-            crank_of(batch, bins, terms, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
+            crank_of(batch, bins, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
             settings.event_tolerance / batch.contact_rate[i], settings.event_budget,
         )[0]  # fmt: skip
 

@@ -67,8 +67,10 @@ class SliderCrankModel(NamedTuple):
         Exact steps in a bin without events.
     contact_rate : float
         Angular frequency of the masses next to the closed contacts [rad/s].
-    span : (order + 1,)
-        Longest time [s] that a Taylor series of each order sums to round-off; the last one covers a step.
+    order : int
+        Order of the Taylor series that covers a step.
+    span : (64 + 1,)
+        Longest time [s] that a Taylor series of each order sums to round-off; no end from ``order`` on.
     row : (m, n)
         Displacement of each channel per unit coordinate.
     gap, stiffness, damping : (m,)
@@ -95,6 +97,7 @@ class SliderCrankModel(NamedTuple):
     bin_duration: float
     steps: int
     contact_rate: float
+    order: int
     span: np.ndarray
     row: np.ndarray
     gap: np.ndarray
@@ -145,7 +148,7 @@ class Motion(NamedTuple):
 def motion_of(model):
     """Space for a motion."""
     size, n = model.acceleration.shape[3], model.acceleration.shape[2]
-    m, order = model.row.shape[0], model.span.shape[0] - 1
+    m, order = model.row.shape[0], model.order
     return Motion(
         np.zeros(size), np.zeros(size), np.zeros(m), np.zeros((3, m)), np.zeros((3, m)), np.zeros((3, m)),
         np.zeros((order + 1, n + m)), np.zeros(m), np.zeros(m), np.zeros((2, 5)),
@@ -371,7 +374,7 @@ def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
     channel_peak, contact_time = arrays.channel_peak[cycle], arrays.contact_time[cycle]
     peak = motion.peak
     peak[:] = 0.0
-    n, duration, steps, order = row.shape[1], model.bin_duration, model.steps, span.shape[0] - 1
+    n, duration, steps, order = row.shape[1], model.bin_duration, model.steps, model.order
     step = duration / steps
     bins = acceleration.shape[1]
     spacing = bins * duration / max(history.shape[0], 1)

@@ -49,8 +49,8 @@ KEPT = 32
 KEPT_STRUCTURES = 1024
 """Machines whose models are looked up by speed alone."""
 
-TABLES = ("span", "acceleration", "curvature", "propagator")
-"""Arrays of a model that are large, or longer at one speed than at another."""
+TABLES = ("acceleration", "curvature", "propagator")
+"""Large arrays of a model."""
 
 KEPT_BYTES = 256_000_000
 """Memory for the propagators of machines at one speed; those used longest ago go first."""
@@ -59,7 +59,7 @@ _NOT_IN_THE_MATRICES = ("crank_speed", "slider_clearance", "ball_clearance")
 
 
 class KeptModel(NamedTuple):
-    """A model without its clearances, and the addresses of its ``TABLES``, which live as long as it does."""
+    """A model without its clearances, and the addresses of its large ``TABLES``, which live as long as it does."""
 
     model: SliderCrankModel
     addresses: tuple[int, ...]
@@ -316,6 +316,7 @@ def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> Slide
         bin_duration=duration,
         steps=steps,
         contact_rate=parts.contact,
+        order=series_order(parts.spectrum * step),
         span=series_span(parts.spectrum, step),
         row=parts.channels.row,
         gap=np.zeros(m),
@@ -333,7 +334,7 @@ def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> Slide
 
 
 def series_span(spectrum: float, step: float) -> Array:
-    """Longest time [s] that a Taylor series of each order sums to round-off, up to the order that covers a step."""
-    span = SERIES_PHASE[: series_order(spectrum * step) + 1] / spectrum
-    span[-1] = math.inf
+    """Longest time [s] that a Taylor series of each order sums to round-off; no end from that of a whole step on."""
+    span = SERIES_PHASE / spectrum
+    span[series_order(spectrum * step) :] = math.inf
     return np.asarray(span)
