@@ -9,12 +9,15 @@ import sys
 import click
 
 from chaosgym.cli.bench import bench
+from chaosgym.cli.calibrate import calibrate
 from chaosgym.cli.classify import classify, train_classifier
+from chaosgym.cli.dataset import dataset
 from chaosgym.cli.demo import demo
 from chaosgym.cli.design import design
 from chaosgym.cli.diagnose import agreement, diagnose
 from chaosgym.cli.figures import figures
 from chaosgym.cli.info import info
+from chaosgym.cli.scorecard import scorecard
 from chaosgym.cli.simulate import show, simulate
 from chaosgym.cli.sweep import sweep
 from chaosgym.errors import ChaosgymError, SimulationError, UnfinishedError
@@ -28,7 +31,8 @@ def app() -> None:
 
 
 for command in (
-    simulate, show, diagnose, agreement, classify, sweep, train_classifier, demo, design, figures, info, bench,
+    simulate, show, diagnose, agreement, classify, sweep, dataset, train_classifier, demo, design, figures, calibrate,
+    scorecard, info, bench,
 ):  # fmt: skip
     app.add_command(command)
 

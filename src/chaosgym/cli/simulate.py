@@ -37,10 +37,13 @@ def simulate(machine: Any, cycles: int, transient: int, as_json: bool) -> None:
 
 @click.command()
 @machine_command
-def show(machine: Any, as_json: bool) -> None:
+@click.option("--markdown", is_flag=True, help="Print the table of the documentation.")
+def show(machine: Any, markdown: bool, as_json: bool) -> None:
     """Print every parameter of a machine with its unit and where the number comes from."""
-    from chaosgym.machines.parameters import parameters_of
+    from chaosgym.machines.parameters import markdown_table, parameters_of
 
+    if markdown:
+        return click.echo("\n".join(markdown_table(machine)))
     described = parameters_of(machine)
     frequencies = machine.natural_frequencies.tolist()
     default = type(machine)()

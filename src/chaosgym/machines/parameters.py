@@ -114,3 +114,14 @@ def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
             hint = f"; did you mean {near[0]}?" if near else f"; known fields: {', '.join(known)}"
             raise ParameterError(f"{type(machine).__name__} has no field {name!r}{hint}")
     return replace(machine, **settings)  # type: ignore[type-var]
+
+
+def markdown_table(machine: Any) -> list[str]:
+    """Lines of a table with every parameter of a machine, its value, unit, provenance and source."""
+    rows = ["| parameter | value | unit | provenance | source |", "|---|---|---|---|---|"]
+    for name, about in parameters_of(machine).items():
+        value = getattr(machine, name)
+        shown = value if isinstance(value, str) else f"{value:.6g}"
+        unit = "" if about.unit == "-" else about.unit
+        rows.append(f"| `{name}` | {shown} | {unit} | {about.provenance} | {about.source} |")
+    return rows

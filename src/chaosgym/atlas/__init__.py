@@ -1,0 +1,1 @@
+"""How close are the machines here to the published ones? Calibration, scorecard and figures of the thesis."""

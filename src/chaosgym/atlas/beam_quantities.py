@@ -1,0 +1,60 @@
+"""Which quantities are the Impact Beam System's own? Its scales, the motion of the force point, long transients."""
+
+from collections.abc import Callable
+
+from chaosgym.atlas import beam_runs
+from chaosgym.atlas.findings import Finding, Quantity, Results, no_jobs
+from chaosgym.atlas.jobs import Job
+from chaosgym.atlas.observation import Effort
+from chaosgym.machines import ImpactBeam, Machine
+from chaosgym.machines.impact_beam import pinned_pinned_frequency
+from chaosgym.reference import Comparison
+
+LONG = 4000
+"""Cycles of the longest run of the thesis (5.2.3)."""
+
+
+def _of_beam(number: Callable[[ImpactBeam], float]) -> Quantity:
+    def finding(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+        assert isinstance(machine, ImpactBeam)
+        return Finding(number(machine))
+
+    return Quantity(no_jobs, finding)
+
+
+def _long(cycles: int) -> Callable[[Machine, Comparison, Effort], list[Job]]:
+    return lambda machine, comparison, effort: [Job(beam_runs.long_run, machine, (cycles,))]
+
+
+def _irregular_cycles(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    period = results[0]["period"]
+    ending = f"then period {period}" if period else "irregular to the end"
+    return Finding(float(results[0]["irregular_cycles"]), True, ending)
+
+
+def _final_period(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    period = results[0]["period"]
+    cycles = results[0]["irregular_cycles"]
+    return Finding(None if period is None else float(period), period is not None, f"irregular for {cycles} cycles")
+
+
+def _moving(machine: Machine, comparison: Comparison, effort: Effort) -> list[Job]:
+    return [Job(beam_runs.force_point_motion, machine, (200,))]
+
+
+def _motion(which: str, unit: float) -> Callable[[Machine, Comparison, Results], Finding]:
+    def finding(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+        low, high = results[0][which]
+        return Finding((low / unit, high / unit))
+
+    return finding
+
+
+BEAM_QUANTITIES = {
+    "irregular_cycles": Quantity(_long(LONG), _irregular_cycles),
+    "final_period": Quantity(_long(LONG), _final_period),
+    "force_point_displacement": Quantity(_moving, _motion("displacement", 1e-3)),
+    "force_point_velocity": Quantity(_moving, _motion("velocity", 1.0)),
+    "pinned_pinned_frequency": _of_beam(lambda beam: pinned_pinned_frequency(beam, beam.length)),
+}
+"""By name, as in ``reference/comparisons.toml``."""

@@ -1,0 +1,87 @@
+"""Which runs do statements about the crank need, beyond the peak forces of a settled response?"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.design.peak_impacts import peak_impacts, worn_side
+from chaosgym.design.statistics import cycles_needed
+from chaosgym.diagnosis import matrix_update_test
+from chaosgym.machines import SliderCrank
+from chaosgym.simulation import simulate
+
+ANGLE_SAMPLES, ANGLE_CYCLES = 720, 10
+"""Samples of crank angle in a revolution, and revolutions of which the median is taken."""
+
+
+def crank_angles(crank: SliderCrank, transient: int) -> dict[str, float | None]:
+    """At which crank angles [deg] of the first half revolution is contact lost and resumed?
+
+    Returns
+    -------
+    dict
+        ``loss`` and ``resumption``: ends of the longest gap in the contact force; ``settled``: end of the last gap;
+        ``impact``: largest force after the loss; None in a revolution without a gap. ``impulse_down`` and
+        ``impulse_up``: largest force of either half revolution. Medians over the revolutions.
+    """
+    record = simulate(crank, ANGLE_CYCLES, transient=transient, samples_per_cycle=ANGLE_SAMPLES)
+    assert record.history is not None
+    found = [_angles(np.abs(force)) for force in record.history[:, :, 2]]
+    return {
+        name: None if any(one[name] is None for one in found) else float(np.median([one[name] for one in found]))
+        for name in found[0]
+    }
+
+
+def _angles(force: NDArray[np.float64]) -> dict[str, Any]:
+    degree = 360.0 / len(force)
+    half = len(force) // 2
+    impulses = {
+        "impulse_down": degree * int(np.argmax(force[:half])),
+        "impulse_up": degree * (half + int(np.argmax(force[half:]))),
+    }
+    free = np.concatenate([[False], force[:half] == 0.0, [False]])
+    begins, ends = np.flatnonzero(free[1:] & ~free[:-1]), np.flatnonzero(free[:-1] & ~free[1:])
+    if not len(begins):
+        return {"loss": None, "resumption": None, "settled": None, "impact": None, **impulses}
+    longest = int(np.argmax(ends - begins))
+    loss = int(begins[longest])
+    return {
+        "loss": degree * loss,
+        "resumption": degree * int(ends[longest]),
+        "settled": degree * int(ends[-1]),
+        "impact": degree * (loss + int(np.argmax(force[loss:half]))),
+        **impulses,
+    }
+
+
+def contact_loss(crank: SliderCrank) -> dict[str, float]:
+    """Mean share of a settled revolution without contact: ``lost``."""
+    record = simulate(crank, 10, transient=20)
+    return {"lost": float(1.0 - record.contact_fraction.sum(axis=1).mean())}
+
+
+def update_pair(crank: SliderCrank, first: float, second: float, cycles: int) -> dict[str, list[float]]:
+    """Peak forces from rest with two intervals [deg] between matrix updates: ``first`` and ``second``."""
+    runs = [simulate(replace(crank, matrix_update_interval=interval), cycles) for interval in (first, second)]
+    peaks = [[float(peak) for peak in run.peak_force.max(axis=1)] for run in runs]
+    return {"first": peaks[0], "second": peaks[1]}
+
+
+def update_test(crank: SliderCrank, first: float, second: float) -> dict[str, str]:
+    """Verdict of the Matrix Update Test with two intervals [deg]: ``nature`` and ``reason``."""
+    verdict = matrix_update_test(crank, intervals=(first, second), transient=100)
+    return {"nature": verdict.nature, "reason": verdict.reason}
+
+
+def statistics(crank: SliderCrank) -> dict[str, int]:
+    """Cycles that the mean and the standard deviation of the peak force need to converge: ``cycles``."""
+    return {"cycles": int(cycles_needed(simulate(crank, 400, transient=60).peak_force[:, 0]))}
+
+
+def bearing_spread(crank: SliderCrank) -> dict[str, float]:
+    """Length of guide [m] or angle of ball joint [deg] over which the peak impacts of 80 cycles spread: ``spread``."""
+    record = simulate(crank, 80, transient=60)
+    return {"spread": peak_impacts(record, worn_side(record)).spread}

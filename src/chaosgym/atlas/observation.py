@@ -1,0 +1,100 @@
+"""What does a run look like to a reader of the thesis' figures? Its nature and the peak forces of 100 cycles.
+
+The thesis judges a response by the dots of its figures: one dot is periodic, a few are a subharmonic, a distribution is
+chaos (3.5.1). Two dots closer than the width of a dot are one; ``READING_ERROR`` is that width, for every figure. What
+the exact tests say is kept beside it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from chaosgym.diagnosis import diagnose, two_step_test
+from chaosgym.errors import SimulationError
+from chaosgym.machines import Machine
+from chaosgym.simulation import simulate
+
+READING_ERROR = 0.5
+"""Half the width of a dot [N]: half a per cent of a force axis of 100 N."""
+
+
+class Effort(NamedTuple):
+    """How long a run is: cycles skipped, cycles recorded, and the budget of the diagnosis (0: Two-Step Test alone)."""
+
+    transient: int
+    cycles: int
+    budget: int
+
+
+THOROUGH: Mapping[str, Effort] = {"impact-beam": Effort(200, 100, 800), "slider-crank": Effort(60, 50, 200)}
+"""For the scorecard, by machine: 100 and 50 cycles recorded, as in the thesis (3.5.1, 4.4.1)."""
+
+QUICK: Mapping[str, Effort] = {"impact-beam": Effort(60, 48, 0), "slider-crank": Effort(30, 32, 0)}
+"""For a calibration, which makes many thousand runs."""
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What one run shows.
+
+    Attributes
+    ----------
+    nature
+        As read from a figure: "periodic", "quasiperiodic", "chaotic" or "undetermined"; "failed" if the run could not
+        be finished.
+    period
+        Cycles after which it repeats; None if it does not.
+    exact_nature
+        By the Two-Step Test without a reading error; with a budget of 0, ``nature`` again.
+    low, mean, high
+        Smallest, mean and largest peak force of a cycle, upper side [N].
+    bounce_share, longest_bounce_share
+        Median and largest duration of bouncing, as a share of half the cycle.
+    settle_cycle
+        Cycle from which on the run from rest repeats within the reading error; None if it does not.
+    """
+
+    nature: str
+    period: int | None = None
+    exact_nature: str = "failed"
+    low: float = 0.0
+    mean: float = 0.0
+    high: float = 0.0
+    bounce_share: float = 0.0
+    longest_bounce_share: float = 0.0
+    settle_cycle: int | None = None
+
+    @property
+    def is_periodic(self) -> bool:
+        """True if a reader of the figure sees one dot or a few."""
+        return self.nature == "periodic"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return asdict(self)
+
+
+def observe(machine: Machine, effort: Effort) -> Observation:
+    """Run a machine from rest and read its peak forces as from a figure of the thesis."""
+    try:
+        record = simulate(machine, effort.transient + effort.cycles)
+        settled = record.after(effort.transient)
+        read = two_step_test(settled, sensor_error=READING_ERROR)
+        exact, settle = read, None
+        if effort.budget:
+            exact = two_step_test(settled)
+            read = diagnose(machine, budget=effort.budget, sensor_error=READING_ERROR)
+            settle = two_step_test(record, sensor_error=READING_ERROR).settle_cycle
+    except SimulationError:
+        return Observation("failed")
+    peaks = settled.peak_force[:, 0]
+    shares = settled.bounce_duration[settled.bounce_duration > 0.0] / (0.5 * machine.cycle_period)
+    return Observation(
+        nature=read.nature, period=read.period, exact_nature=exact.nature,
+        low=float(peaks.min()), mean=float(peaks.mean()), high=float(peaks.max()),
+        bounce_share=float(np.median(shares)) if len(shares) else 0.0,
+        longest_bounce_share=float(shares.max()) if len(shares) else 0.0,
+        settle_cycle=settle if read.nature == "periodic" else None,
+    )  # fmt: skip

@@ -1,0 +1,115 @@
+"""The scorecard runs what the thesis ran, and runs it once."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chaosgym.atlas import jobs
+from chaosgym.atlas.beam_runs import force_point_motion, long_run
+from chaosgym.atlas.jobs import Job, observation, run_jobs
+from chaosgym.atlas.observation import QUICK, THOROUGH, Effort, Observation, observe
+from chaosgym.atlas.quantities import clearance_unit
+from chaosgym.atlas.response_quantities import RESPONSE_QUANTITIES
+from chaosgym.atlas.scorecard import evaluate
+from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK
+from chaosgym.reference import read_comparisons
+
+COMPARED = {one.id: one for one in read_comparisons().compared}
+
+
+def curve(natures, forces):
+    """Results of observation jobs along an axis."""
+    return [
+        Observation(nature=nature, exact_nature=nature, low=force, mean=force, high=force).as_dict()
+        for nature, force in zip(natures, forces, strict=True)
+    ]
+
+
+def test_beam_scales_and_natures_are_those_of_the_thesis():
+    """Chaos at 30 Hz, the dimensionless clearance of 0.127 mm, the frequency at 284.0 mm: hit by the thesis' beam."""
+    wanted = [COMPARED[name] for name in ("IBS-014", "IBS-017", "IBS-034")]
+    judged = evaluate(wanted, {"impact-beam": THESIS_IMPACT_BEAM}, efforts=THOROUGH)
+    assert [one.verdict for one in judged] == ["hit", "hit", "hit"]
+
+
+def test_dots_closer_than_the_width_of_a_dot_are_one():
+    """A spread below 1 N reads as periodic from a figure; without the reading error the same run is judged exactly."""
+    seen = observe(replace(THESIS_IMPACT_BEAM, excitation_frequency=30.0, clearance=0.127e-3), Effort(100, 60, 0))
+    assert not seen.is_periodic
+    assert seen.low < seen.mean < seen.high
+    quiet = observe(replace(THESIS_IMPACT_BEAM, excitation_frequency=6.0, clearance=0.03175e-3), Effort(60, 60, 0))
+    assert quiet.is_periodic
+    assert quiet.high - quiet.low < 1.0
+
+
+def test_type_one_ends_where_the_force_first_falls():
+    """Forces that rise to 8 Hz and fall at 9 end Type I at 8 Hz; so does a response that is not periodic."""
+    comparison = COMPARED["IBS-020"]
+    rising = [10.0 + n for n in range(8)]
+    natures = ["periodic"] * 30
+    smooth_end = RESPONSE_QUANTITIES["smooth_end"].finding
+    falls = curve(natures, rising + [16.0] * 22)
+    assert smooth_end(THESIS_IMPACT_BEAM, comparison, falls).value == 8.0
+    breaks = curve(natures[:8] + ["chaotic"] * 22, rising + [30.0] * 22)
+    assert smooth_end(THESIS_IMPACT_BEAM, comparison, breaks).value == 8.0
+
+
+def test_chaos_begins_at_the_first_response_that_is_not_periodic():
+    """From 16 Hz on, with a periodic window at 19 Hz."""
+    comparison = COMPARED["IBS-023"]
+    natures = ["periodic"] * 15 + ["chaotic"] * 3 + ["periodic"] + ["chaotic"] * 11
+    found = RESPONSE_QUANTITIES["chaos_begin"].finding(THESIS_IMPACT_BEAM, comparison, curve(natures, [40.0] * 30))
+    assert found.value == 16.0
+    none = RESPONSE_QUANTITIES["chaos_begin"].finding(
+        THESIS_IMPACT_BEAM, comparison, curve(["periodic"] * 30, [40.0] * 30)
+    )
+    assert none.value == 31.0
+
+
+def test_modes_driven_by_the_recorded_force_follow_the_tip():
+    """The motion of the force point is rebuilt from the contact force; the rebuilt tip lies within 1 % of the gap."""
+    found = force_point_motion(THESIS_IMPACT_BEAM, 20)
+    assert found["tip_error"] < 0.01 * THESIS_IMPACT_BEAM.clearance
+    assert found["velocity"][1] == pytest.approx(-found["velocity"][0], rel=0.3)
+
+
+def test_a_long_run_tells_how_long_it_was_irregular():
+    """At 30 Hz and +-0.127 mm the chaos of the thesis lasts; at 4 Hz the motion repeats after a few cycles."""
+    chaotic = long_run(replace(THESIS_IMPACT_BEAM, excitation_frequency=30.0, clearance=0.127e-3), 400)
+    assert chaotic == {"irregular_cycles": 400, "period": None}
+    settled = long_run(replace(THESIS_IMPACT_BEAM, excitation_frequency=4.0, clearance=0.03175e-3), 200)
+    assert settled["period"] == 1
+    assert settled["irregular_cycles"] < 50
+
+
+def test_crank_clearance_unit_is_the_thrust_of_the_slider():
+    """r m / M: the whole crank radius for a slider without a yoke (thesis 4.5.1)."""
+    alone = replace(THESIS_SLIDER_CRANK, yoke_mass=0.0, yoke_inertia=1e-3, yoke_offset_along=0.0)
+    assert clearance_unit(alone) == pytest.approx(alone.crank_radius)
+    assert clearance_unit(THESIS_SLIDER_CRANK) < alone.crank_radius
+
+
+def test_results_are_kept_and_found_again(tmp_path, monkeypatch):
+    """The second call runs nothing and gives the same result; another machine or an edited source does."""
+    job = Job(observation, THESIS_IMPACT_BEAM, QUICK["impact-beam"])
+    first = run_jobs([job, job], folder=tmp_path)
+    assert len(first) == 1
+    kept = list(tmp_path.glob("*.json"))
+    assert len(kept) == 1
+    kept[0].write_text(json.dumps({**first[job], "mean": -1.0}))
+    assert run_jobs([job], folder=tmp_path)[job]["mean"] == -1.0
+    monkeypatch.setattr(jobs, "_digest", lambda: "edited")
+    assert run_jobs([job], folder=tmp_path)[job]["mean"] == first[job]["mean"]
+    assert len(list(tmp_path.glob("*.json"))) == 2
+    kept[0].write_text("{")
+    monkeypatch.undo()
+    assert run_jobs([job], folder=tmp_path)[job] == first[job]
+
+
+def test_same_machine_same_bytes():
+    """Two runs of one job give the same result."""
+    one, other = (observe(THESIS_IMPACT_BEAM, Effort(20, 30, 0)) for _ in range(2))
+    assert one == other
+    assert np.isfinite(one.mean)
