@@ -11,6 +11,7 @@ import click
 from chaosgym.cli.bench import bench
 from chaosgym.cli.calibrate import calibrate
 from chaosgym.cli.classify import classify, train_classifier
+from chaosgym.cli.dataset import dataset
 from chaosgym.cli.demo import demo
 from chaosgym.cli.design import design
 from chaosgym.cli.diagnose import agreement, diagnose
@@ -30,8 +31,8 @@ def app() -> None:
 
 
 for command in (
-    simulate, show, diagnose, agreement, classify, sweep, train_classifier, demo, design, figures, info, bench,
-    calibrate, scorecard,
+    simulate, show, diagnose, agreement, classify, sweep, dataset, train_classifier, demo, design, figures, calibrate,
+    scorecard, info, bench,
 ):  # fmt: skip
     app.add_command(command)
 

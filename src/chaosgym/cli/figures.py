@@ -28,7 +28,7 @@ def figures(
     asked = chosen(ids)
     if only_list:
         titles = {figure.id: figure.title for figure in asked}
-        return emit({"figures": titles}, as_json, listing)
+        return emit({"figures": titles}, as_json, lambda: listing(asked))
     if out is None:
         raise click.UsageError("give a folder with --out, or --list")
     if gallery is not None and Path(gallery).exists() and not overwrite:
@@ -40,7 +40,7 @@ def figures(
         write_gallery(drawn, Path(gallery))
     count = totals(drawn)
     lines = [line for one in drawn for line in one.lines()]
-    lines.append(f"{len(drawn)} figures in {out}: {count['agree']} printed statements agree, {count['differ']} differ")
+    lines.append(f"{out}: of the printed statements {count['agree']} agree, {count['differ']} differ")
     emit({"folder": out, "figures": [one.as_dict() for one in drawn], "totals": count}, as_json, lambda: lines)
     if any(one.error for one in drawn):
         raise click.exceptions.Exit(1)

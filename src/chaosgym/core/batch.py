@@ -57,7 +57,7 @@ def beam_of(batch, regimes, i):
     """Model of machine i."""
     own = Regimes(
         regimes.rotates[i], regimes.rate[i], regimes.to_modal[i], regimes.from_modal[i], regimes.output[i],
-        regimes.magnitude[i], regimes.forcing[i], regimes.fastest[i],
+        regimes.magnitude[i], regimes.forcing[i], regimes.modulus[i], regimes.fastest[i],
     )  # fmt: skip
     return ImpactBeamModel(
         batch.excitation_frequency[i], batch.force_amplitude[i], batch.clearance[i], batch.contact_stiffness[i],

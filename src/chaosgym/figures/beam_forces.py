@@ -2,8 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +10,11 @@ from chaosgym.figures.beam import BEAM, DAMPING, LARGE, LENGTH, SMALL, sweep
 from chaosgym.figures.computations import Computation
 from chaosgym.figures.figure import Finding, Parts, ThesisFigure, steps
 from chaosgym.figures.findings import describe_forces
+from chaosgym.figures.flips import flips
 from chaosgym.figures.panels import (
     FREQUENCY,
     UPPER,
     Mark,
-    ParameterAxis,
     force_diagram,
     response_at,
     side_peaks,
@@ -80,18 +78,6 @@ def length_sweep(resolution: float) -> Mapping[str, Computation]:
     """Beam lengths 279 to 304 mm."""
     beam = replace(BEAM, excitation_frequency=29.0, clearance=LARGE)
     return {"lengths": sweep(beam, "length", steps(0.279, 0.304, 0.0025 / max(1, round(resolution))))}
-
-
-def flips(data: Any, axis: ParameterAxis, step: float) -> str:
-    """Where the nature changes over one step of the axis, in words."""
-    values, nature = axis.factor * data[axis.field], data["nature"]
-    known = [(value, kind) for value, kind in zip(values, nature, strict=True) if kind in ("periodic", "chaotic")]
-    places = [
-        f"{a[0]:.5g} to {b[0]:.5g} {axis.unit} ({a[1]} to {b[1]})"
-        for a, b in pairwise(known)
-        if a[1] != b[1] and abs(b[0] - a[0]) <= 1.01 * step
-    ]
-    return "; ".join(places) if places else "nowhere"
 
 
 def length_flip(parts: Parts) -> Sequence[Finding]:

@@ -11,9 +11,7 @@ from chaosgym.diagnosis.criteria import criterion_rate
 from chaosgym.figures.beam import BEAM, LARGE
 from chaosgym.figures.computations import Computation, Types
 from chaosgym.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
-from chaosgym.figures.panels import (
-    FREQUENCY,
-)
+from chaosgym.figures.panels import FREQUENCY
 from chaosgym.figures.printed import printed
 from chaosgym.machines.impact_beam import static_tip_deflection
 from chaosgym.plotting import thesis

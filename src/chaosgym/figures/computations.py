@@ -11,7 +11,7 @@ import numpy as np
 import scipy.signal
 from numpy.typing import NDArray
 
-from chaosgym.design.peak_impacts import peak_impacts
+from chaosgym.design.peak_impacts import peak_impacts, worn_side
 from chaosgym.diagnosis import response_map, two_step_test
 from chaosgym.errors import SimulationError
 from chaosgym.machines import ImpactBeam, Machine
@@ -19,6 +19,10 @@ from chaosgym.machines.impact_beam import modal_analysis
 from chaosgym.simulation import CycleRecord, parallel_map, simulate
 
 Array = NDArray[np.float64]
+
+READING_ERROR = 0.5
+"""Half the width of a dot of the figures [N]: peak forces closer than a dot are one to the reader."""
+
 Data = Mapping[str, NDArray[Any]]
 """Arrays by name; every computation documents its own."""
 
@@ -106,15 +110,17 @@ class Runs:
     """Peak forces of many machines, one run from rest each.
 
     Gives every field of ``fields`` (machines,), ``peaks`` (machines, cycles, 2) [N], ``nature`` and ``period``
-    (machines,) of the recorded cycles by the Two-Step Test (0 where there is none), ``settle`` (machines,): the cycle
-    from which the record repeats, -1 if it does not; ``impacts`` and ``contact`` (machines,): impacts a cycle and share
-    of the cycle in contact, both sides together. A run that fails has NaN and the nature "failed".
+    (machines,) of the recorded cycles by the Two-Step Test with the reader's error (period 0 where there is none),
+    ``settle`` (machines,): the cycle from which the record repeats, -1 if it does not; ``impacts`` and ``contact``
+    (machines,): impacts a cycle and share of the cycle in contact, both sides together. A run that fails has NaN and
+    the nature "failed".
     """
 
     machines: tuple[Machine, ...]
     fields: tuple[str, ...]
     cycles: int
     transient: int
+    reading_error: float = READING_ERROR
 
     def run(self, workers: int | None = None) -> Data:
         """Simulate and judge each."""
@@ -133,7 +139,7 @@ class Runs:
             return np.full((self.cycles, 2), np.nan), "failed", 0, -1, np.nan, np.nan
         nature, period, settle = "undetermined", 0, -1
         if self.cycles >= 16:
-            verdict = two_step_test(record)
+            verdict = two_step_test(record, sensor_error=self.reading_error)
             nature, period = verdict.nature, verdict.period or 0
             settle = -1 if verdict.settle_cycle is None else verdict.settle_cycle
         impacts = float(record.impacts.sum(axis=1).mean())
@@ -151,26 +157,28 @@ class Types:
     machine: Machine
     speeds: tuple[float, ...]
     clearances: tuple[float, ...]
-    budget: int = 400
+    budget: int = 200
+    reading_error: float = READING_ERROR
 
     def run(self, workers: int | None = None) -> Data:
         """Judge every point and its neighbourhood."""
-        found = response_map(self.machine, self.speeds, self.clearances, budget=self.budget, workers=workers)
+        found = response_map(
+            self.machine, self.speeds, self.clearances, budget=self.budget, sensor_error=self.reading_error,
+            workers=workers,
+        )  # fmt: skip
         return {"speed": found.speed, "clearance": found.clearance, "nature": found.nature, "type": found.type}
 
 
 @dataclass(frozen=True, kw_only=True)
 class PeakImpacts:
-    """Place and size of the peak force of every cycle; ``location`` (impacts,) [m or deg], ``force`` (impacts,) [N]."""
+    """Peak Impact Diagram: ``location`` (impacts,) in ``unit`` and ``force`` (impacts,) [N]."""
 
     machine: Machine
     cycles: int
     transient: int
-    side: int = 0
-    samples: int = 3600
 
     def run(self, workers: int | None = None) -> Data:
         """Simulate."""
-        record = simulate(self.machine, self.cycles, transient=self.transient, samples_per_cycle=self.samples)
-        diagram = peak_impacts(record, self.side)
+        record = simulate(self.machine, self.cycles, transient=self.transient)
+        diagram = peak_impacts(record, worn_side(record))
         return {"location": diagram.location, "force": diagram.force, "unit": np.array(diagram.unit)}

@@ -1,5 +1,6 @@
 """What is a figure of the thesis, and what does its comparison with the print say?"""
 
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -96,7 +97,8 @@ class ThesisFigure:
             figure = Figure(
                 figsize=(8.4 if self.columns == 1 else 10.4, self.height * rows + 0.5), layout="constrained"
             )
-            figure.suptitle(f"{self.label}   {self.title}", x=0.01, ha="left", fontsize=11.5, fontweight="bold")
+            title = textwrap.fill(f"{self.label}   {self.title}", 84 if self.columns == 1 else 104)
+            figure.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold")
             grid = figure.subplots(rows, self.columns, squeeze=False).ravel()
             for panel, ax in zip(self.panels, grid, strict=False):
                 panel.paint(parts, ax)

@@ -47,13 +47,17 @@ def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
         _OPENING,
         f"Of {count['agree'] + count['differ']} printed statements about these figures {count['agree']} agree and "
         f"{count['differ']} differ.",
-        "",
-        "## Sensitivities as printed",
-        "",
-        "| parameter | printed | here | figure | |",
-        "|---|---|---|---|---|",
     ]
-    for parameter, entries in sensitivities(drawn).items():
+    answered = sensitivities(drawn)
+    if answered:
+        lines += [
+            "",
+            "## Sensitivities as printed",
+            "",
+            "| parameter | printed | here | figure | |",
+            "|---|---|---|---|---|",
+        ]
+    for parameter, entries in answered.items():
         for number, finding in entries:
             lines.append(f"| {parameter} | {finding.printed} | {finding.here} | {number} | {_WORDS[finding.agrees]} |")
     for one in drawn:
@@ -75,5 +79,6 @@ def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
 
 def write_gallery(drawn: Sequence[Drawn], path: Path) -> None:
     """Write the page; pictures in ``figures`` beside it are shown."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     page = gallery(drawn, path.parent / "figures")
     write_atomically(path, lambda temporary: temporary.write_text(page, encoding="utf-8"))

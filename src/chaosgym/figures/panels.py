@@ -188,18 +188,16 @@ def spectrum_panel(title: str, part: str, frequency: float, highest: float) -> P
     return Panel(title, paint)
 
 
-def angle_panel(title: str, part: str, crank_speed: float, label: str, *, sign: bool, extra: Any = None) -> Panel:
+def angle_panel(title: str, part: str, label: str, *, sign: bool, extra: Any = None) -> Panel:
     """Contact force over one revolution against the crank angle; ``sign`` tells upper from lower surface."""
 
     def paint(parts: Parts, ax: Axes) -> None:
-        data = parts[part]
-        angle = np.degrees(data["time"] * crank_speed * np.pi / 30.0)
-        once = angle < 360.0 - 1e-9
-        force = data["force"] if sign else np.abs(data["force"])
-        thesis.curve(angle[once], force[once], ax)
+        force = parts[part]["force"]
+        thesis.curve(np.arange(len(force)) * (360.0 / len(force)), force if sign else np.abs(force), ax)
         if extra is not None:
             extra(ax)
-        ax.set(xlabel="crank angle [deg]", ylabel=label, xlim=(0.0, 360.0))
+        low, high = ax.get_ylim()
+        ax.set(xlabel="crank angle [deg]", ylabel=label, xlim=(0.0, 360.0), ylim=(low if sign else 0.0, 1.2 * high))
         ax.set_xticks(np.arange(0.0, 361.0, 45.0))
         thesis.legend(ax, "upper right")
 
@@ -224,11 +222,12 @@ def cycles_panel(
             style = "-o" if joined else "o"
             ax.plot(number, peaks, style, ms=3.0 if joined else 1.8, lw=0.8, mew=0.0, color=colour, label=label,
                     rasterized=not joined)  # fmt: skip
-        ax.set(xlabel="cycle", ylabel="peak impact force [N]", ylim=(0.0, None))
+        ax.set(xlabel="cycle", ylabel="peak impact force [N]")
         if cycles is not None:
             ax.set_xlim(*cycles)
         if extra is not None:
             extra(parts, ax)
+        ax.set_ylim(0.0, 1.1 * ax.get_ylim()[1])
         thesis.legend(ax, "lower right")
 
     return Panel(title, paint)
@@ -249,13 +248,18 @@ def histogram_panel(title: str, part: str, row: int, *, side: str = UPPER, suppo
 
 
 def impact_panel(title: str, part: str, cycles: int | None = None) -> Panel:
-    """Peak Impact Diagram of the first ``cycles`` impacts; places count from their mean."""
+    """Peak Impact Diagram of the first ``cycles`` impacts; places count from the mean of all."""
 
     def paint(parts: Parts, ax: Axes) -> None:
         data = parts[part]
         unit = str(data["unit"])
-        place = data["location"][:cycles]
-        impact_diagram(PeakImpactDiagram(place - np.mean(data["location"]), data["force"][:cycles], unit), ax)
-        ax.set_xlabel("relative location of the peak impact " + ("[mm]" if unit == "m" else "[deg]"))
+        place = data["location"] - np.mean(data["location"])
+        impact_diagram(PeakImpactDiagram(place[:cycles], data["force"][:cycles], unit), ax)
+        shown = "mm" if unit == "m" else "deg"
+        factor = 1e3 if unit == "m" else 1.0
+        margin = 0.1 * factor * float(np.ptp(place)) + 0.5
+        ax.set_xlim(factor * float(np.min(place)) - margin, factor * float(np.max(place)) + margin)
+        ax.set(xlabel=f"relative location of the peak impact [{shown}]", ylabel="peak impact force [N]")
+        ax.set_ylim(0.0, 1.1 * float(np.max(data["force"])))
 
     return Panel(title, paint)

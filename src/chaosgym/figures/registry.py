@@ -1,13 +1,37 @@
 """Which figures are there? By their number in the thesis, in its order."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 
 from chaosgym.errors import ChaosgymError
-from chaosgym.figures import beam_chaos, beam_flexibility, beam_forces, beam_maps, beam_responses
+from chaosgym.figures import (
+    beam_chaos,
+    beam_flexibility,
+    beam_forces,
+    beam_maps,
+    beam_responses,
+    crank_design,
+    crank_forces,
+    crank_maps,
+    crank_resonances,
+    crank_responses,
+    crank_tests,
+)
 from chaosgym.figures.figure import ThesisFigure
 
-_MODULES = (beam_responses, beam_forces, beam_maps, beam_flexibility, beam_chaos)
+_MODULES = (
+    beam_responses,
+    beam_forces,
+    beam_maps,
+    beam_flexibility,
+    beam_chaos,
+    crank_responses,
+    crank_forces,
+    crank_maps,
+    crank_resonances,
+    crank_tests,
+    crank_design,
+)
 
 
 def _place(figure: ThesisFigure) -> tuple[int, int]:
@@ -36,6 +60,6 @@ def chosen(ids: Sequence[str]) -> list[ThesisFigure]:
     return [figure for name, figure in FIGURES.items() if name in ids]
 
 
-def listing() -> list[str]:
-    """Number and title of every figure, one a line."""
-    return [f"  {figure.id:<6} {figure.title}" for figure in FIGURES.values()]
+def listing(figures: Iterable[ThesisFigure] = tuple(FIGURES.values())) -> list[str]:
+    """Number and title of figures, one a line."""
+    return [f"  {figure.id:<6} {figure.title}" for figure in figures]

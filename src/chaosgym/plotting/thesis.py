@@ -189,7 +189,7 @@ def histogram_bars(found: Histogram, ax: Axes) -> Axes:
 def mean_and_deviation(x: Array, mean: Array, deviation: Array, ax: Axes) -> Axes:
     """Mean peak force [N] with one standard deviation either side."""
     ax.errorbar(x, mean, deviation, fmt="o", ms=4.0, lw=1.0, capsize=3.0, color=ACCENT)
-    ax.set(ylabel="mean and one STD [N]", ylim=(0.0, None))
+    ax.set_ylabel("mean and one STD [N]")
     return ax
 
 

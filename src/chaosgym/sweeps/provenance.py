@@ -1,4 +1,4 @@
-"""What computed these rows? Version, commit, packages and processor: the same ones give the same bytes again."""
+"""What computed these rows? Version, sources, packages and processor: the same ones give the same bytes again."""
 
 import platform
 import subprocess
@@ -8,7 +8,10 @@ from pathlib import Path
 
 import llvmlite.binding
 
+from chaosgym.core import source_digest
 from chaosgym.version import __version__
+
+SOURCES = Path(__file__).resolve().parents[1]
 
 PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "pyarrow")
 
@@ -19,6 +22,7 @@ def provenance() -> dict[str, str]:
     return {
         "chaosgym": __version__,
         "commit": source_commit(),
+        "physics": "-".join(source_digest(SOURCES / floor) for floor in ("core", "machines")),
         "python": platform.python_version(),
         **{name: version(name) for name in PACKAGES},
         "platform": f"{platform.system()} {platform.machine()}",
@@ -28,10 +32,9 @@ def provenance() -> dict[str, str]:
 
 def source_commit() -> str:
     """Commit that last changed the package's sources; "+" if they have changed since, "unknown" without Git."""
-    source = Path(__file__).resolve().parents[1]
 
     def git(*arguments: str) -> str:
-        command = ["git", "-C", str(source), *arguments, "--", "."]
+        command = ["git", "-C", str(SOURCES), *arguments, "--", "."]
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
     try:

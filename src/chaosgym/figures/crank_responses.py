@@ -1,0 +1,212 @@
+"""How does the slider crank's contact force run over a revolution? Figures 4.7, 4.10 to 4.12 and 4.25."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from chaosgym.figures.computations import Computation, Data, History
+from chaosgym.figures.crank import LOW_DAMPING, MIDDLE, SMALL, TRANSIENT, WIDE, ball, runs, slider
+from chaosgym.figures.figure import Finding, Parts, ThesisFigure
+from chaosgym.figures.findings import compare_nature
+from chaosgym.figures.panels import (
+    UPPER,
+    angle_panel,
+    force_panel,
+    motion_panel,
+    phase_panel,
+    section_panel,
+    side_peaks,
+)
+from chaosgym.figures.printed import printed
+from chaosgym.machines import SliderCrank
+from chaosgym.machines.slider_crank import frequencies_at
+from chaosgym.plotting import thesis
+
+ANGLE = 15.0
+"""Crank angles [deg] agree within this: a third of the axes' spacing."""
+
+SPHERICAL = ball(MIDDLE, crank_speed=120.0)
+INSTRUMENTED = ball(WIDE, "instrumented", crank_speed=100.0)
+SLIDER = slider(SMALL, crank_speed=230.0, contact_damping_ratio=LOW_DAMPING)
+THIN_ROD = ball(WIDE, "instrumented", crank_speed=200.0, rod_diameter=3.175e-3)
+
+
+def revolution(machine: SliderCrank, resolution: float) -> Mapping[str, Computation]:
+    """One settled revolution."""
+    return {"force": History(machine=machine, cycles=1, transient=TRANSIENT, samples=3600)}
+
+
+def gaps(data: Data) -> list[tuple[float, float]]:
+    """Crank angles [deg] between which there is no contact, in the order of the revolution."""
+    force = data["force"]
+    open_ = np.concatenate([[False], force == 0.0, [False]])
+    edges = np.flatnonzero(open_[1:] != open_[:-1]) * (360.0 / len(force))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def angle_finding(text: str, here: float | None, wanted: float, target: str) -> Finding:
+    """Compare a crank angle [deg]."""
+    if here is None:
+        return Finding(text, "contact is never lost", False, (target,))
+    return Finding(text, f"{here:.0f} deg", abs(here - wanted) <= ANGLE, (target,))
+
+
+def ball_angles(parts: Parts) -> Sequence[Finding]:
+    """Where is contact lost, resumed, and kept for good?"""
+    found = gaps(parts["force"])
+    low, high = printed("SSC-025")
+    end = printed("SSC-026").high
+    longest = max(found, key=lambda gap: gap[1] - gap[0], default=(None, None))
+    bounces = [gap[1] for gap in found if longest[1] is not None and 0.0 <= gap[1] - longest[1] < 120.0]
+    return [
+        angle_finding(f"contact lost at {low:g} deg", longest[0], low, "SSC-025"),
+        angle_finding(f"contact resumed at {high:g} deg", longest[1], high, "SSC-025"),
+        angle_finding(f"bouncing until {end:g} deg", max(bounces, default=None), end, "SSC-026"),
+    ]
+
+
+def ball_spans(ax: Axes) -> None:
+    """Printed ranges of crank angle."""
+    thesis.printed_span(*printed("SSC-025"), ax, "no contact, printed")
+    for angle in printed("SSC-026"):
+        ax.axvline(angle, lw=1.0, ls=":", **thesis.PRINTED)
+
+
+BALL_FORCE = ThesisFigure(
+    id="4.7",
+    title="Contact force in the ball joint, spherical clearance: ±0.0635 mm, 120 rpm",
+    shows="Contact to 70 deg, none to 95 deg, then an impact and bouncing until 130 deg.",
+    parts=partial(revolution, SPHERICAL),
+    panels=(angle_panel("dotted: bouncing from 95 to 130 deg, printed", "force", "contact force [N]",
+                        sign=False, extra=ball_spans),),
+    compare=ball_angles,
+)  # fmt: skip
+
+
+def impulse_angles(parts: Parts) -> Sequence[Finding]:
+    """Where do the largest forces of both half revolutions stand, and is contact ever lost?"""
+    force = np.abs(parts["force"]["force"])
+    half = len(force) // 2
+    degree = 360.0 / len(force)
+    first, second = printed("SSC-037")
+    down, up = degree * int(np.argmax(force[:half])), degree * (half + int(np.argmax(force[half:])))
+    lost = float(np.mean(force == 0.0))
+    return [
+        angle_finding(f"impulse at {first:g} deg", down, first, "SSC-037"),
+        angle_finding(f"impulse at {second:g} deg", up, second, "SSC-037"),
+        Finding("no contact loss before the impulses", f"no contact in {lost:.1%} of the revolution", lost < 0.01,
+                ("SSC-037",)),
+    ]  # fmt: skip
+
+
+def impulse_lines(ax: Axes) -> None:
+    """Printed crank angles of the impulses."""
+    for k, angle in enumerate(printed("SSC-037")):
+        thesis.printed_span(angle, angle, ax, None if k else "impulses, printed")
+
+
+INSTRUMENTED_FORCE = ThesisFigure(
+    id="4.10",
+    title="Contact force in the instrumented ball joint: ±0.127 mm, 100 rpm",
+    shows="Two large impulses, at 100 and at 300 deg, without a loss of contact before them.",
+    parts=partial(revolution, INSTRUMENTED),
+    panels=(angle_panel("", "force", "contact force [N]", sign=False, extra=impulse_lines),),
+    compare=impulse_angles,
+)
+
+
+def slider_angles(parts: Parts) -> Sequence[Finding]:
+    """Where is contact lost, and where does the large impact stand?"""
+    data = parts["force"]
+    half = [gap for gap in gaps(data) if 20.0 <= gap[0] < 180.0]
+    loss, impact = printed("SSC-038").low, printed("SSC-039").low
+    if not half:
+        return [
+            angle_finding(f"contact lost at {loss:g} deg", None, loss, "SSC-038"),
+            angle_finding(f"large impact at {impact:g} deg", None, impact, "SSC-039"),
+        ]
+    force = np.abs(data["force"])
+    degree = 360.0 / len(force)
+    after = slice(int(half[0][0] / degree), len(force) // 2)
+    largest = half[0][0] + degree * int(np.argmax(force[after]))
+    return [
+        angle_finding(f"contact lost at {loss:g} deg", half[0][0], loss, "SSC-038"),
+        angle_finding(f"large impact at {impact:g} deg", largest, impact, "SSC-039"),
+    ]
+
+
+def slider_lines(ax: Axes) -> None:
+    """Printed crank angles of loss and resumption."""
+    low, high = printed("SSC-038").low, printed("SSC-039").low
+    thesis.printed_span(low, high, ax, "no contact, printed")
+
+
+SLIDER_FORCE = ThesisFigure(
+    id="4.11",
+    title="Contact force in the slider joint: ±0.032 mm, 230 rpm",
+    shows="Contact lost at 55 deg and resumed at 75 deg with a large impact; upper surface positive, lower negative.",
+    parts=partial(revolution, SLIDER),
+    panels=(angle_panel("", "force", "contact force [N]", sign=True, extra=slider_lines),),
+    compare=slider_angles,
+)
+
+
+def slider_response(resolution: float) -> Mapping[str, Computation]:
+    """Time history, section and nature."""
+    return {
+        "history": History(machine=SLIDER, cycles=6, transient=TRANSIENT, samples=2000),
+        "section": History(machine=SLIDER, cycles=round(1000 * resolution), transient=TRANSIENT, samples=1),
+        "response": runs([SLIDER], cycles=200),
+    }
+
+
+def slider_nature(parts: Parts) -> Sequence[Finding]:
+    """Is the response chaotic?"""
+    data = parts["response"]
+    response = side_peaks(data, UPPER)[0], data["nature"][0], data["period"][0]
+    return [compare_nature("230 rpm, contact damping 2.5 %", "SSC-040", response, "chaotic")]
+
+
+SLIDER_RESPONSE = ThesisFigure(
+    id="4.12",
+    title="Vibration of the slider across its guide: ±0.032 mm, 230 rpm",
+    shows="Irregular time history, phase plane, Poincaré map and impact force.",
+    parts=slider_response,
+    panels=(
+        motion_panel("(a) displacement of the slider", "history"),
+        phase_panel("(b) phase plane of the slider", "history"),
+        section_panel("(c) Poincaré map of the slider", "section"),
+        force_panel("(d) impact force on the upper surface", "history"),
+    ),
+    columns=2,
+    compare=slider_nature,
+    remark="chaotic here, but periodic at the same speed without friction in 4.5.3: the text contradicts itself",
+)
+
+
+def thin_rod(parts: Parts) -> Sequence[Finding]:
+    """Is the model stiffer than the rod that was measured?"""
+    longer = ball(WIDE, "instrumented", rod_diameter=3.175e-3, rod_length=0.240)
+    first = float(frequencies_at(longer, 0.0)[0])
+    force = np.abs(parts["force"]["force"])
+    return [
+        Finding("the model's first natural frequency lies above the measured 18 Hz (rod of 240 mm)",
+                f"{first:.1f} Hz", first > 18.0, ("SSC-108",)),
+        Finding("similar pattern and order of magnitude as measured", f"largest force {force.max():.0f} N", None,
+                ("SSC-107",)),
+    ]  # fmt: skip
+
+
+THIN_ROD_FORCE = ThesisFigure(
+    id="4.25",
+    title="Contact force in the instrumented ball joint, rod of 3.18 mm: ±0.127 mm, 200 rpm",
+    shows="Measured and numerical contact force; the numerical ripples are faster than the measured ones.",
+    parts=partial(revolution, THIN_ROD),
+    panels=(angle_panel("(b) numerical result", "force", "contact force [N]", sign=False),),
+    compare=thin_rod,
+    remark="the numerical half; the measured record is not in print",
+)
+
+FIGURES = (BALL_FORCE, INSTRUMENTED_FORCE, SLIDER_FORCE, SLIDER_RESPONSE, THIN_ROD_FORCE)

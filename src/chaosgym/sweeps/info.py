@@ -1,0 +1,105 @@
+"""What is in a sweep's folder? Rows, classes, settings, label definitions, provenance and faults, without computing."""
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chaosgym.errors import DatasetError
+from chaosgym.sweeps.dataset import DATA_FILE, LabelledSweep, read_sweep
+from chaosgym.sweeps.folder import CHUNK_FOLDER, PLAN_FILE, read_plan_file
+from chaosgym.sweeps.plan import SweepPlan
+
+CLASSES = ("nature", "response_type", "full_response_type", "status", "split")
+
+
+def dataset_info(folder: str | Path) -> dict[str, Any]:
+    """Describe a sweep's folder as JSON values.
+
+    Returns
+    -------
+    dict
+        ``machine``, ``complete``, ``rows`` (finished and planned), ``classes`` (counts by label column; by split too),
+        ``faults``, ``types`` (agreement of the two type columns), ``settings``, ``definitions`` and ``provenance``; of
+        an unfinished sweep without classes and faults.
+
+    Raises
+    ------
+    DatasetError
+        If the folder holds no sweep, or its file is damaged.
+    """
+    folder = Path(folder)
+    if (folder / DATA_FILE).is_file():
+        return _finished(read_sweep(folder), (folder / DATA_FILE).stat().st_size)
+    if not (folder / PLAN_FILE).is_file():
+        raise DatasetError(f"{folder} holds no sweep: neither {DATA_FILE} nor {PLAN_FILE}")
+    settings = read_plan_file(folder / PLAN_FILE)
+    plan = SweepPlan.from_settings(settings)
+    kept = {path.name for path in (folder / CHUNK_FOLDER).glob("*.parquet")}
+    rows = sum(len(chunk) for chunk in plan.chunks() if f"{chunk.start:012d}.parquet" in kept)
+    return {
+        "machine": settings["machine"],
+        "complete": False,
+        "rows": {"finished": rows, "planned": len(plan)},
+        "settings": settings,
+    }
+
+
+def _finished(sweep: LabelledSweep, size: int) -> dict[str, Any]:
+    present = [name for name in CLASSES if name in sweep.table.column_names]
+    classes: dict[str, Any] = {name: _counts(sweep.column(name)) for name in present}
+    if "split" in present:
+        parts = sweep.column("split")
+        for name in ("nature", "response_type"):
+            values = sweep.column(name)
+            classes[f"{name}_by_split"] = {str(part): _counts(values[parts == part]) for part in np.unique(parts)}
+    metadata = sweep.table.schema.metadata
+    return {
+        "machine": sweep.settings["machine"],
+        "complete": True,
+        "rows": {"finished": len(sweep.table), "planned": len(sweep.plan)},
+        "bytes": size,
+        "classes": classes,
+        "faults": _faults(sweep),
+        "types": compare_types(sweep),
+        "settings": sweep.settings,
+        "definitions": json.loads(metadata[b"definitions"]),
+        "provenance": sweep.provenance,
+    }
+
+
+def _counts(values: Any) -> dict[str, int]:
+    """Counts by class, the most frequent first; rows without one are left out."""
+    return dict(Counter(str(value) for value in values if value is not None).most_common())
+
+
+def _faults(sweep: LabelledSweep) -> dict[str, int]:
+    """Rows that a reader may want to leave out."""
+    status, nature, neighbours = (sweep.column(name) for name in ("status", "nature", "type_neighbours"))
+    reach = sweep.plan.type_reach()
+    faults = {name: int(np.sum(status == name)) for name in ("failed", "disputed", "unresolved", "transient")}
+    faults["undetermined"] = int(np.sum(nature == "undetermined"))
+    if reach:
+        faults["without_all_neighbours"] = int(np.sum(neighbours != 2 * sum(reach.values())))
+    if sweep.plan.signals:
+        wanted = sweep.plan.with_signals(range(len(sweep.table)))
+        faults["without_promised_signals"] = int(wanted.sum()) - (
+            len(sweep.table) - sweep.table.column("start_velocity").null_count
+        )
+    return faults
+
+
+def compare_types(sweep: LabelledSweep) -> dict[str, Any] | None:
+    """Types from neighbours against types over the full window, where both stand; None if nowhere."""
+    shared, full = sweep.column("response_type"), sweep.column("full_response_type")
+    both = np.array([a is not None and b is not None for a, b in zip(shared, full, strict=True)])
+    if not sweep.plan.type_reach() or not both.any():
+        return None
+    pairs = Counter((str(a), str(b)) for a, b in zip(shared[both], full[both], strict=True))
+    return {
+        "points": int(both.sum()),
+        "disagreement": float(np.mean(shared[both] != full[both])),
+        "pairs": {f"{a} against {b}": count for (a, b), count in sorted(pairs.items())},
+    }

@@ -1,0 +1,108 @@
+"""The commands around a dataset: what is in it, its card, its label noise, its map."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.cli.test_cli import run, run_json
+
+SWEEP = (
+    "sweep", "impact-beam", "--axis", "damping_ratio=0.01:0.05:log", "--machines", "6", "--patch",
+    "excitation_frequency=18:30:3", "--patch", "clearance=1e-4:1.4e-4:3:log", "--budget", "100", "--full-types", "0.9",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A small lattice dataset, made by the command line."""
+    path = tmp_path_factory.mktemp("dataset") / "beam"
+    assert run(*SWEEP, "--out", str(path))[0] == 0
+    return path
+
+
+def test_info_tells_rows_classes_settings_and_faults(folder):
+    """JSON for programs, lines for people."""
+    info = run_json("dataset", "info", str(folder))
+    assert info["rows"] == {"finished": 54, "planned": 54}
+    assert sum(info["classes"]["nature"].values()) == 54
+    assert sum(sum(part.values()) for part in info["classes"]["nature_by_split"].values()) == 54
+    assert info["faults"]["without_all_neighbours"] == 6 * 8
+    assert info["faults"]["failed"] == 0
+    assert info["types"]["points"] == 6
+    assert info["settings"]["type_reach"] == {"excitation_frequency": 1, "clearance": 1}
+    _, out, _ = run("dataset", "info", str(folder))
+    assert "54 of 54 points, complete" in out
+
+
+def test_an_unfinished_folder_says_how_far_it_is(folder, tmp_path):
+    """Only the plan is there: nothing is finished."""
+    (tmp_path / "plan.json").write_text((folder / "plan.json").read_text())
+    info = run_json("dataset", "info", str(tmp_path))
+    assert (info["complete"], info["rows"]["finished"]) == (False, 0)
+    assert "unfinished" in run("dataset", "info", str(tmp_path))[1]
+
+
+def test_card_holds_the_command_that_makes_the_dataset_again(folder, tmp_path):
+    """The command in the card, run again, finds the folder complete; noise and split are reported."""
+    noise = run_json("dataset", "noise", str(folder), "--points", "4")
+    assert noise["points"] == 4
+    assert set(noise["changes"]) >= {"mirrored initial state", "twice the cycles", "0.1 % in every parameter"}
+    assert all(0.0 <= change["nature"] <= 1.0 for change in noise["changes"].values())
+    assert run("dataset", "card", str(folder))[0] == 0
+    card = (folder / "CARD.md").read_text()
+    command = next(line for line in card.splitlines() if line.startswith("    chaosgym sweep"))
+    code, out, _ = run(*command.split()[1:])
+    assert code == 0
+    assert "complete, 54 points" in out
+    for heading in ("How it was made", "Class balance", "How far to trust", "Label noise", "Split", "Licence"):
+        assert f"## {heading}" in card
+    (tmp_path / "keep").mkdir()
+    (folder / "noise.json").write_text("{")
+    code, _, err = run("dataset", "card", str(folder))
+    assert code == 2
+    assert "noise.json is damaged" in err
+    (folder / "noise.json").write_text(json.dumps(noise))
+
+
+def test_cost_is_measured_against_every_axis(folder):
+    """Mean cost, cost by axis, and what larger sweeps would take."""
+    cost = run_json("dataset", "cost", str(folder), "--points", "6")
+    assert 1e-4 < cost["seconds"] < 10.0
+    assert set(cost["by"]) == {"nature", "damping_ratio", "excitation_frequency", "clearance"}
+    assert cost["hours"]["1e+09"]["64"] == pytest.approx(1e9 * cost["seconds"] / 64 / 3600)
+    code, _, err = run("dataset", "cost", str(folder), "--points", "55")
+    assert code == 2
+    assert "3 to 54" in err
+
+
+def test_map_is_drawn(folder, tmp_path):
+    """A lattice and a grid give a picture; an unknown kind of picture is refused."""
+    assert run("dataset", "map", str(folder), "--out", str(tmp_path / "m.png"))[0] == 0
+    assert (tmp_path / "m.png").read_bytes().startswith(b"\x89PNG")
+    grid = ("sweep", "impact-beam", "--axis", "excitation_frequency=18:30:3", "--axis", "clearance=1e-4:1.4e-4:2")
+    run(*grid, "--budget", "100", "--out", str(tmp_path / "g"))
+    assert run("dataset", "map", str(tmp_path / "g"), "--out", str(tmp_path / "g.png"))[0] == 0
+    assert run("dataset", "map", str(folder), "--out", str(tmp_path / "m.xyz"))[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("dataset", "info", "nowhere"), "'nowhere' does not exist"),
+        (("dataset", "info", "."), "holds no sweep"),
+        (("dataset", "card", "."), "holds no finished sweep"),
+        (("sweep", "impact-beam", "--machines", "3", "--out", "o"), "belong together"),
+        (("sweep", "impact-beam", "--patch", "clearance=1e-4:2e-4:3", "--out", "o"), "belong together"),
+        (("sweep", "impact-beam", "--random", "3", "--axis", "lenth=0.27:0.28", "--out", "o"), "'lenth' is no field"),
+        (("sweep", "impact-beam", "--random", "3", "--signals", "2", "--out", "o"), "signals = 2 is out of range"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, message, tmp_path, monkeypatch):
+    """Exit code 2, nothing on standard output, nothing written."""
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
+    assert list(Path().iterdir()) == []
