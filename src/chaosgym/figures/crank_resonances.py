@@ -12,7 +12,7 @@ from chaosgym.figures.computations import Computation, Data
 from chaosgym.figures.crank import WIDE, slider, sweep
 from chaosgym.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
 from chaosgym.figures.panels import CRANK_SPEED, UPPER, side_peaks
-from chaosgym.figures.printed import printed
+from chaosgym.figures.printed import printed, within
 from chaosgym.machines.slider_crank import SUPERHARMONIC_SLIDER_CRANK
 from chaosgym.plotting import thesis
 from chaosgym.plotting.design import ACCENT, MUTED, NATURE_COLOURS
@@ -111,7 +111,7 @@ def orders_found(parts: Parts) -> Sequence[Finding]:
     _, plain, _ = resonance(parts["thesis"], 3)
     found.append(
         Finding(f"up to {wanted:g} N at 1500 rpm", f"{force:.0f} N with offset end bodies, {plain:.0f} N without",
-                abs(force / wanted - 1.0) <= 0.15, ("SSC-073",), "flexibility")
+                within("SSC-073", force), ("SSC-073",), "flexibility")
     )  # fmt: skip
     _, free, _ = resonance(parts["tight"], 3)
     found.append(
