@@ -29,14 +29,14 @@ SPEEDS = {5: 900.0, 4: 1140.0, 3: 1500.0}
 WINDOW = 0.04
 """Share of the speed within which a resonance is sought."""
 
-SETTLING = 250
+SETTLING = 150
 """Revolutions in which a lightly damped rod settles."""
 
 
 def speeds(resolution: float) -> tuple[float, ...]:
     """Speeds [rpm] to 1600, dense around the resonances."""
-    dense = [speed for centre in ORDERS.values() for speed in steps(0.94 * centre, 1.06 * centre, 6.0 / resolution)]
-    return steps(100.0, 1600.0, 25.0 / resolution, *(float(f"{speed:.6g}") for speed in dense))
+    dense = [speed for centre in ORDERS.values() for speed in steps(0.94 * centre, 1.06 * centre, 9.0 / resolution)]
+    return steps(100.0, 1600.0, 50.0 / resolution, *(float(f"{speed:.6g}") for speed in dense))
 
 
 def superharmonics(resolution: float) -> Mapping[str, Computation]:
