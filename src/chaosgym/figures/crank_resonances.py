@@ -35,7 +35,12 @@ SETTLING = 150
 
 def speeds(resolution: float) -> tuple[float, ...]:
     """Speeds [rpm] to 1600, dense around the resonances."""
-    dense = [speed for centre in ORDERS.values() for speed in steps(0.94 * centre, 1.06 * centre, 9.0 / resolution)]
+    dense = [
+        speed
+        for centre in ORDERS.values()
+        for share, step in ((0.06, 15.0), (0.012, 2.0))
+        for speed in steps((1.0 - share) * centre, (1.0 + share) * centre, step / resolution)
+    ]
     return steps(100.0, 1600.0, 50.0 / resolution, *(float(f"{speed:.6g}") for speed in dense))
 
 
