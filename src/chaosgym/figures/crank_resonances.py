@@ -103,8 +103,8 @@ def orders_found(parts: Parts) -> Sequence[Finding]:
         for part, name in (("thesis", "thesis machine"), ("offset", "offset end bodies"), ("tight", "the same, tight")):
             at, force, ratio = resonance(parts[part], order)
             if ratio > 1.02:
-                texts.append(f"{name}: {force:.0f} N at {at:.0f} rpm, {ratio:.2g} times the background")
-                seen = seen or (part == "offset" and abs(at / ORDERS[order] - 1.0) <= 0.015)
+                texts.append(f"{name}: {force:.0f} N at {at:.0f} rpm, {ratio:.3g} times the background")
+                seen = seen or (part == "offset" and within(TARGETS[order], at))
             else:
                 texts.append(f"{name}: no local maximum")
         where = "600 rpm (15 Hz, that is 900 rpm)" if order == 5 else f"{SPEEDS[order]:g} rpm"
