@@ -97,6 +97,7 @@ def test_the_force_limit_counts_above_240_rpm() -> None:
         {"slider_joint": "ideal", "ball_joint": "instrumented", "gravity": 9.81},
         {"ball_joint": "instrumented"},
         {"motor_angle": 25.0},
+        {"motor_angle": 25.0, "slider_joint": "instrumented", "geometric_stiffness": "on"},
     ],
 )
 def test_every_joint_can_be_operated_and_shown(keywords: dict[str, Any]) -> None:

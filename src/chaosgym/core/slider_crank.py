@@ -21,7 +21,6 @@ from numba import njit
 
 from chaosgym.core import status
 from chaosgym.core.crank_contact import (
-    DAMPING,
     GAP,
     REACH,
     STIFFNESS,
@@ -36,11 +35,12 @@ from chaosgym.core.crank_contact import (
 from chaosgym.core.crank_propagator import FORCING_TERMS, evaluate, expand, order_for, propagate
 from chaosgym.core.crank_record import (
     begin_cycle,
+    channel_crest,
+    channel_force,
     column_of,
     crest_instant,
     joint_force,
     monitored,
-    note_channels,
     note_peak,
     note_share,
     write_peaks,
@@ -256,11 +256,10 @@ def quiet_steps(
                 if reach + doubt >= gap:
                     return count
                 continue
-            k, d, s = surface[j, STIFFNESS], surface[j, DAMPING], side[j]
-            r0, r1 = s * (k * start[1, j] + d * start[2, j]), s * (k * end[1, j] + d * end[2, j])
-            f0 = k * (s * start[0, j] - gap) + d * s * start[1, j]
-            f1 = k * (s * end[0, j] - gap) + d * s * end[1, j]
-            turn = k * doubt
+            s = side[j]
+            f0, r0 = channel_force(surface, s, start, j)
+            f1, r1 = channel_force(surface, s, end, j)
+            turn = surface[j, STIFFNESS] * doubt
             if r0 * r1 < 0.0:
                 turn += swing * (abs(r0) + abs(r1))
             if min(f0, f1) - turn <= 0.0:
@@ -297,6 +296,25 @@ def write_samples(display, surface, side, z, spare, series, last, since, until, 
 
 
 @leaf
+def note_channels(surface, side, start, end, spare, series, last, since, h, channel_peak):
+    """Raise the peaks (m, 2) of the closed channels, or of none if there are no rows, over h of an expanded step.
+
+    ``since`` is where the piece begins in the step; ``spare`` is overwritten.
+    """
+    for j in range(channel_peak.shape[0]):
+        s = side[j]
+        if s != 0.0:
+            f0, r0 = channel_force(surface, s, start, j)
+            f1, r1 = channel_force(surface, s, end, j)
+            crest, top = channel_crest(h, f0, r0, f1, r1)
+            column = 0 if s > 0.0 else 1
+            if crest > 0.0 and top > 0.99 * channel_peak[j, column]:
+                read_series(series, last, since + crest, spare)
+                top = channel_force(surface, s, spare, j)[0]
+            channel_peak[j, column] = max(channel_peak[j, column], top)
+
+
+@leaf
 def careful_step(
     surface, side, start, end, spare, series, last, until, towards, now, h, pieces, tolerance,
     peak, channel_peak, contact_time,
@@ -325,11 +343,11 @@ def careful_step(
         if before[1] + force[1] > 0.0:
             note_share(before, force, length, contact_time)
             note_peak(peak, now + high, force)
-            note_channels(surface, side, length, start, end, channel_peak)
             crest, size = crest_instant(length, before, force)
             if size > 0.99 * peak[UPPER if force[0] > 0.0 else LOWER, 0]:
                 read_series(series, last, done + crest, spare)
                 note_peak(peak, now + done + crest, joint_force(surface, side, spare))
+        note_channels(surface, side, start, end, spare, series, last, done, length, channel_peak)
         done = high
         if changed >= 0:
             return changed, done
