@@ -32,7 +32,7 @@ from chaosgym.core.crank_contact import (
     polynomial,
     surfaces,
 )
-from chaosgym.core.crank_propagator import FORCING_TERMS, evaluate, expand, propagate
+from chaosgym.core.crank_propagator import FORCING_TERMS, evaluate, expand, order_for, propagate
 from chaosgym.core.crank_record import (
     begin_cycle,
     channel_crest,
@@ -68,9 +68,9 @@ class SliderCrankModel(NamedTuple):
     contact_rate : float
         Angular frequency of the masses next to the closed contacts [rad/s].
     order : int
-        Order of the Taylor series that covers a step.
-    span : (64 + 1,)
-        Longest time [s] that a Taylor series of each order sums to round-off; no end from ``order`` on.
+        Order of the Taylor series that sums a step to round-off.
+    spectrum : float
+        Largest modulus of an eigenvalue of the motion [1/s].
     row : (m, n)
         Displacement of each channel per unit coordinate.
     gap, stiffness, damping : (m,)
@@ -98,7 +98,7 @@ class SliderCrankModel(NamedTuple):
     steps: int
     contact_rate: float
     order: int
-    span: np.ndarray
+    spectrum: float
     row: np.ndarray
     gap: np.ndarray
     stiffness: np.ndarray
@@ -281,15 +281,6 @@ def quiet_steps(
 
 
 @leaf
-def order_for(span, h):
-    """Order of the Taylor series that covers a time h."""
-    last = 4
-    while span[last] < h:
-        last += 1
-    return last
-
-
-@leaf
 def write_samples(display, surface, side, z, spare, series, last, since, until, spacing, sample, history):
     """Write the samples of a revolution that fall into the expanded step [since, until); the number of the next one.
 
@@ -386,7 +377,7 @@ def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
     """
     z, moved, side, start, end, spare = motion.z, motion.moved, motion.side, motion.start, motion.end, motion.spare
     series, until, towards = motion.series, motion.until, motion.towards
-    row, display, span, acceleration = model.row, model.display, model.span, model.acceleration
+    row, display, acceleration = model.row, model.display, model.acceleration
     propagator, curvatures = model.propagator, model.curvature
     history, impacts, bounce_time = arrays.history[cycle], arrays.impacts[cycle], arrays.bounce_time[cycle]
     channel_peak, contact_time = arrays.channel_peak[cycle], arrays.contact_time[cycle]
@@ -429,7 +420,7 @@ def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
                 if taken == limit:
                     continue
             h = (done + 1) * step - time
-            last = order_for(span, h)
+            last = order_for(model.spectrum * h, order)
             expand(acceleration[chosen, b], row, z, duration, last, series)
             changed, h = careful_step(
                 surface, side, start, end, spare, series, last, until, towards, begin + time, h,

@@ -91,9 +91,9 @@ class SliderCrank(FidelityLadder):
     """Angle between the motor axis and the normal of the guide [deg]; planar motion at 0."""
     rod: str = parameter("flexible", choices=("flexible", "rigid"), provenance="printed", source="thesis 4.3.1")
     """Whether the rod bends and stretches."""
-    n_modes: int = parameter(3, low=1, high=12, provenance="calibrated", source=_FIT)
+    n_modes: int = parameter(3, low=1, high=40, provenance="calibrated", source=_FIT)
     """Bending modes of the flexible rod."""
-    damping_ratio: float = parameter(0.027, low=0.0, high=1.0, provenance="calibrated", source=_FIT)
+    damping_ratio: float = parameter(0.027, low=0.0, high=100.0, provenance="calibrated", source=_FIT)
     """Structural damping ratio of the rod's first mode."""
     damping_family: str = parameter("stiffness", choices=("uniform", "stiffness"), provenance="calibrated", source=_FIT)
     """"uniform": the same ratio in every mode; "stiffness": proportional to the mode's frequency."""
@@ -156,7 +156,7 @@ class SliderCrank(FidelityLadder):
         0.254e-3,
         unit="m",
         low=0.0,
-        high=1e-3,
+        high=1.0,
         provenance="printed",
         source="thesis figure 4.14; adjustable to 1 mm, 4.2",
     )
@@ -165,7 +165,7 @@ class SliderCrank(FidelityLadder):
         0.127e-3,
         unit="m",
         low=0.0,
-        high=1e-3,
+        high=1.0,
         provenance="printed",
         source="thesis figure 4.8; adjustable to 1 mm, 4.2",
     )
@@ -190,11 +190,11 @@ class SliderCrank(FidelityLadder):
     )
     """Force [N] at which the Hertzian law has the linear law's secant stiffness and restitution."""
     contact_stiffness: float = parameter(
-        1.5e7, unit="N/m", low=1e3, high=1e10, provenance="printed", source="thesis 3.3"
+        1.5e7, unit="N/m", low=1e3, high=1e12, provenance="printed", source="thesis 3.3"
     )
     """Linearised Hertzian stiffness of a joint [N/m]; the stations of an instrumented slider joint share it."""
     contact_damping_ratio: float = parameter(
-        0.05, low=0.0, high=1.0, provenance="printed", source="thesis 4.5.4: 2.5 % and 5 %"
+        0.05, low=0.0, high=100.0, provenance="printed", source="thesis 4.5.4: 2.5 % and 5 %"
     )
     """Damping ratio of a joint in contact, related to the mass of slider and yoke."""
     friction_coefficient: float = parameter(
