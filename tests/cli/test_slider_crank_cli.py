@@ -44,6 +44,11 @@ def test_the_models_of_both_joints_can_be_chosen():
     assert (fields["slider_clearance"], fields["ball_clearance"]) == pytest.approx((1e-4, 5e-5))
     assert len(shown["sensors"]) == 12
     assert "slider roll" in shown["degrees_of_freedom"]
+    result = run_json("simulate", *CRANK, "--slider-model", "instrumented", "--cycles", "5")
+    sensors = result["largest_sensor_force_N"]
+    assert len(sensors) == 8
+    assert sensors["front upper"] > 1.0
+    assert sensors["front left"] == 0.0
 
 
 def test_diagnose_tells_the_printed_nature_and_runs_the_matrix_update_test():
