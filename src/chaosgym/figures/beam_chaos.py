@@ -27,7 +27,7 @@ HISTOGRAM_FREQUENCIES = (22.0, 25.0, 30.0)
 def transient_chaos(resolution: float) -> Mapping[str, Computation]:
     """Runs from rest at the two printed dampings, and over the dampings around them."""
     beam = replace(BEAM, excitation_frequency=30.0, clearance=LARGE)
-    around = steps(0.0090, 0.0130, 0.00005 / resolution, BRIEF_DAMPING, ENDLESS_DAMPING)
+    around = steps(0.0090, 0.0130, 0.0001 / resolution, BRIEF_DAMPING, ENDLESS_DAMPING)
     return {
         "printed": sweep(
             beam, "damping_ratio", (BRIEF_DAMPING, ENDLESS_DAMPING), cycles=LONGEST, transient=0
@@ -151,7 +151,7 @@ def beam_histograms(resolution: float) -> Mapping[str, Computation]:
     return {
         "long": runs(
             [replace(BEAM, excitation_frequency=frequency, clearance=LARGE) for frequency in HISTOGRAM_FREQUENCIES],
-            "excitation_frequency", cycles=round(4000 * resolution),
+            "excitation_frequency", cycles=round(3000 * resolution),
         )
     }  # fmt: skip
 

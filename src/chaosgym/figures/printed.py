@@ -1,12 +1,15 @@
-"""Which values does the text print? By the name of the statement."""
+"""Which values does the text print, and which statements does it contradict itself? By the name of the statement."""
 
+from functools import cache
 from typing import NamedTuple
 
-from chaosgym.reference import read_statements
+from chaosgym.atlas import findings as atlas
+from chaosgym.atlas.verdicts import error_of
+from chaosgym.reference import Comparison, read_comparisons, read_statements
 
 
 class Printed(NamedTuple):
-    """A printed number, or both ends of a range."""
+    """A printed number, or both ends of a range, in the printed unit."""
 
     low: float
     high: float
@@ -24,3 +27,21 @@ def printed(target: str) -> Printed:
     if statement.low is None or statement.high is None:
         raise KeyError(f"{target} prints no number")
     return Printed(statement.low, statement.high)
+
+
+@cache
+def _comparisons() -> dict[str, Comparison]:
+    return {one.id: one for one in read_comparisons().compared}
+
+
+def within(target: str, here: float | tuple[float, float] | None) -> bool:
+    """Whether a value here, or both ends of a range, agrees with the statement: a hit of the scorecard."""
+    return error_of(_comparisons()[target], atlas.Finding(here)) <= 1.0
+
+
+def contradiction(targets: tuple[str, ...]) -> str:
+    """What the text itself says against one of these statements; empty if nothing."""
+    known = _comparisons()
+    return "; ".join(
+        known[target].contradictory for target in targets if target in known and known[target].contradictory
+    )
