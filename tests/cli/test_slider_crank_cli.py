@@ -69,7 +69,7 @@ def test_classify_knows_the_crank():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--clearance-mm", "5"), "--clearance-mm = 5 is out of range; allowed: 0 to 1 mm"),
+        (("--clearance-mm", "50"), "--clearance-mm = 50 is out of range; allowed: 0 to 20 mm"),
         (("--motor-angle-deg", "30"), "--motor-angle-deg = 30 is out of range; allowed: 0 to 25 deg"),
         (("--set", "rod_length=0.04"), "rod_length = 0.04 m is out of range; allowed: above the crank radius"),
         (("--frequency-hz", "3"), "--frequency-hz is no option of slider-crank"),

@@ -134,7 +134,7 @@ def test_checkers_find_nothing_to_complain_about_in_space(keywords: dict[str, An
     [
         ({"rod_length": 0.03}, "rod_length = 0.03 m is out of range"),
         ({"motor_angle": 30.0}, "motor_angle = 30 deg is out of range"),
-        ({"slider_clearance": 2e-3}, "slider_clearance = 0.002 m is out of range"),
+        ({"slider_clearance": 5e-2}, "slider_clearance = 0.05 m is out of range"),
         ({"matrix_update_interval": 7.0}, "matrix_update_interval = 7 deg is out of range"),
         ({"speed_grid": 20.0}, "speed_grid = 20 is out of range"),
     ],
