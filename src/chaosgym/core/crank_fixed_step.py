@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from chaosgym.core import status
-from chaosgym.core.crank_record import begin_cycle, note_channel, note_peak, note_share, write_peaks, write_sample
+from chaosgym.core.crank_record import begin_cycle, note_peak, note_share, write_peaks, write_sample
 from chaosgym.core.crank_stepper import joint_force, margin, measure, push_of, slope
 from chaosgym.core.fixed_step import STABILITY_LIMIT
 from chaosgym.core.impact_beam import LOWER, UPPER, note_touch
@@ -53,8 +53,8 @@ def note_joint_peaks(model, z, dz, closed, direction, channel_peak):
     for j in range(channel_peak.shape[0]):
         if closed[j]:
             force, _ = push_of(model, j, z, dz, direction)
-            positive = not model.two_sided[j] or direction[model.first[j]] > 0.0
-            note_channel(channel_peak[j], positive, 1.0, force, 0.0, force, 0.0)
+            column = 0 if not model.two_sided[j] or direction[model.first[j]] > 0.0 else 1
+            channel_peak[j, column] = max(channel_peak[j, column], force)
 
 
 @njit(cache=True, nogil=True)
