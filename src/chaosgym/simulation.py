@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
+from chaosgym.compilation import call
 from chaosgym.core import status
 from chaosgym.core.crank_stepper import SteppedCrankModel
 from chaosgym.core.crank_stepper import advance as advance_stepped_crank
@@ -230,11 +231,11 @@ def _run_impact_beam(
     if isinstance(integrator, ExactEvents):
         settings = (integrator.step_phase, integrator.event_tolerance, integrator.event_budget)
         if isinstance(model, ImpactBeamModel):
-            outcome, done = advance(*motion, *settings, *along)
+            outcome, done = call(advance, *motion, *settings, *along)
         else:
-            outcome, done = advance_restitution(*motion, integrator.step_phase, integrator.event_budget, *along)
+            outcome, done = call(advance_restitution, *motion, integrator.step_phase, integrator.event_budget, *along)
     elif isinstance(model, ImpactBeamModel):
-        outcome, done = advance_fixed_step(*motion, integrator.steps_per_cycle)
+        outcome, done = call(advance_fixed_step, *motion, integrator.steps_per_cycle)
     else:
         raise ParameterError(
             f"integrator = {integrator} does not run contact_law = 'restitution'; allowed: ExactEvents(...)"
@@ -254,7 +255,7 @@ def _run_slider_crank(
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
     tolerance, budget = integrator.event_tolerance / model.contact_rate, integrator.event_budget
     kernel = advance_stepped_crank if isinstance(model, SteppedCrankModel) else advance_slider_crank
-    outcome, done = kernel(model, coordinates, episode, arrays, tolerance, budget)
+    outcome, done = call(kernel, model, coordinates, episode, arrays, tolerance, budget)
     record = replace(
         _record(crank, arrays, MotionState(coordinates, bouncing)),
         peak_phase=arrays.peak_instant * crank.crank_rate,

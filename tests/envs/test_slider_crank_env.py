@@ -30,7 +30,7 @@ def test_the_machine_is_that_of_the_thesis_but_for_contact_damping() -> None:
     env = gym.make(ID, rod_diameter=3.175e-3, friction_coefficient=0.1).unwrapped
     assert env.nominal == replace(
         THESIS_SLIDER_CRANK,
-        contact_damping_ratio=0.1, matrix_update_interval=5.0, rod_diameter=3.175e-3, friction_coefficient=0.1,
+        contact_damping_ratio=0.075, matrix_update_interval=5.0, rod_diameter=3.175e-3, friction_coefficient=0.1,
     )  # fmt: skip
 
 
@@ -47,13 +47,13 @@ def test_speeds_lie_on_the_grid_and_are_remembered() -> None:
         assert tables.setdefault(speed, table) is table
 
 
-@pytest.mark.parametrize("speed", [82.5, 235.0, 280.0])
+@pytest.mark.parametrize("speed", [82.5, 160.0, 215.0, 247.5])
 def test_periodic_speeds_cost_nothing(speed: float) -> None:
     """In the calm windows between irregular speeds no settled step counts as Type III."""
     assert _type_iii_share(SliderCrankEnv(), speed, 40) == 0.0
 
 
-@pytest.mark.parametrize("speed", [70.0, 150.0, 242.5])
+@pytest.mark.parametrize("speed", [57.5, 200.0, 222.5])
 def test_chaotic_speeds_cost(speed: float) -> None:
     """Most steps of an irregular response count."""
     assert _type_iii_share(SliderCrankEnv(), speed, 60) > 0.45
@@ -97,6 +97,7 @@ def test_the_force_limit_counts_above_240_rpm() -> None:
         {"slider_joint": "ideal", "ball_joint": "instrumented", "gravity": 9.81},
         {"ball_joint": "instrumented"},
         {"motor_angle": 25.0},
+        {"motor_angle": 25.0, "slider_joint": "instrumented", "geometric_stiffness": "on"},
     ],
 )
 def test_every_joint_can_be_operated_and_shown(keywords: dict[str, Any]) -> None:

@@ -70,12 +70,15 @@ class SearchSpace:
         Machine from the base and one value for each dimension; raises ``ParameterError`` if there is none.
     starts
         Candidates to try first; the first one gives the present constants.
+    random_trials
+        Candidates before the estimator takes over from chance: fewer where a candidate costs more.
     """
 
     base: Machine
     dimensions: tuple[Dimension, ...]
     build: Callable[[Any, Mapping[str, Any]], Machine]
     starts: tuple[Mapping[str, Any], ...]
+    random_trials: int
 
     def machine(self, values: Mapping[str, Any]) -> Machine:
         """Build the machine of one candidate."""
@@ -175,6 +178,7 @@ SEARCH_SPACES: Mapping[str, SearchSpace] = {
             {"width": 25.4e-3, "force_position": 0.209, "shaker_mass": 0.1, "shaker_damping": 30.0,
              "pivot_translational_stiffness": 1e8, "damping_family": "uniform", "n_modes": 5},
         ),
+        60,
     ),
     SliderCrank.name: SearchSpace(
         THESIS_SLIDER_CRANK, _CRANK_FIELDS, _crank,
@@ -184,6 +188,7 @@ SEARCH_SPACES: Mapping[str, SearchSpace] = {
             {**_present(THESIS_SLIDER_CRANK, _CRANK_FIELDS), "slider_mass": 0.12, "yoke_mass": 0.26,
              "yoke_offset_along": 0.02, "inertia_ratio": 1.8},
         ),
+        20,
     ),
 }  # fmt: skip
 """By machine. Ranges and candidates: algebra on printed numbers, and fits that preceded this one."""

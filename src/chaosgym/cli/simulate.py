@@ -39,7 +39,7 @@ def simulate(machine: Any, cycles: int, transient: int, as_json: bool) -> None:
 @machine_command
 @click.option("--markdown", is_flag=True, help="Print the table of the documentation.")
 def show(machine: Any, markdown: bool, as_json: bool) -> None:
-    """Print every parameter of a machine with its unit and where the number comes from."""
+    """Print every parameter of a machine, where the number comes from, and what follows from them."""
     from chaosgym.machines.parameters import markdown_table, parameters_of
 
     if markdown:
@@ -58,6 +58,7 @@ def show(machine: Any, markdown: bool, as_json: bool) -> None:
         "parameters": {name: getattr(machine, name) for name in described},
         "natural_frequencies_hz": frequencies,
         "provenance": provenance,
+        **{name: getattr(machine, name) for name in ("degrees_of_freedom", "sensors") if hasattr(machine, name)},
     }
 
     def lines() -> list[str]:
@@ -68,6 +69,10 @@ def show(machine: Any, markdown: bool, as_json: bool) -> None:
             unit = "" if about.unit == "-" else about.unit
             origin = provenance[name]
             rows.append(f"{name:30s} {shown:>11s} {unit:8s} {origin['grade']:10s} {origin['source']}")
-        return [*rows, "natural frequencies [Hz]: " + ", ".join(f"{value:.1f}" for value in frequencies)]
+        rows.append("natural frequencies [Hz]: " + ", ".join(f"{value:.1f}" for value in frequencies))
+        for name in ("degrees_of_freedom", "sensors"):
+            if names := getattr(machine, name, ()):
+                rows.append(f"{len(names)} {name.replace('_', ' ')}: {', '.join(names)}")
+        return rows
 
     emit(result, as_json, lines)

@@ -21,8 +21,8 @@ from numba import njit
 from chaosgym.core import status
 from chaosgym.core.crank_record import (
     begin_cycle,
+    channel_crest,
     crest_instant,
-    note_channel,
     note_peak,
     note_share,
     resultant,
@@ -217,7 +217,8 @@ def note_joints(model, h, z, dz, moved, dz_moved, closed, direction, channel_pea
             f0, r0 = push_of(model, j, z, dz, direction)
             f1, r1 = push_of(model, j, moved, dz_moved, direction)
             positive = not model.two_sided[j] or direction[model.first[j]] > 0.0
-            note_channel(channel_peak[j], positive, h, f0, r0, f1, r1)
+            column = 0 if positive else 1
+            channel_peak[j, column] = max(channel_peak[j, column], channel_crest(h, f0, r0, f1, r1)[1])
 
 
 @njit(cache=True, inline="always")
