@@ -71,8 +71,8 @@ def transients(parts: Parts) -> Sequence[Finding]:
     return [
         Finding(
             f"at 1.1 % damping chaos for about {wanted:g} cycles, then period {period}",
-            f"{settled_words(data, 0)}; of {len(long)} dampings from 0.9 to 1.3 % chaos ends between cycles 100 and 1000"
-            f" at {elsewhere}",
+            f"{settled_words(data, 0)}; of {len(long)} dampings from 0.9 to 1.3 % chaos ends between "
+            f"cycles 100 and 1000 at {elsewhere}",
             bool(0.5 * wanted <= settle <= 2.0 * wanted and data["period"][0] == period),
             ("IBS-069", "IBS-070"), "structural damping",
         ),
