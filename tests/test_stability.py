@@ -127,6 +127,15 @@ def test_coarse_fixed_steps_are_refused(steps):
         simulate(THESIS_IMPACT_BEAM, 1, integrator=RungeKutta4(steps))
 
 
+def test_more_samples_than_fixed_steps_are_all_written():
+    """Samples after the last step's start are those of the cycle's end, not whatever lay in the memory before."""
+    beam = ImpactBeam(fidelity="rigid")
+    coarse = simulate(beam, 3, samples_per_cycle=1000, integrator=RungeKutta4(400)).history
+    fine = simulate(beam, 3, samples_per_cycle=1000, integrator=RungeKutta4(16_000)).history
+    assert np.abs(coarse[..., 0]).max() < 1.1 * np.abs(fine[..., 0]).max()
+    assert np.abs(coarse[0, -2:, 0] - fine[0, -2:, 0]).max() < 0.2 * beam.clearance
+
+
 @pytest.mark.parametrize("steps", [600, 1000, 10_000])
 def test_the_coarsest_fixed_steps_that_run_make_no_energy(steps):
     """Just above the stability limit the motion stays within what the force can give."""

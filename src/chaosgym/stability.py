@@ -64,7 +64,7 @@ EXTREMES: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     SliderCrank.name: {
         "clearance 0": {"slider_clearance": 0.0},
         "clearance 1e-9 m": {"slider_clearance": 1e-9},
-        "clearance 1 m": {"slider_clearance": 1.0},
+        "clearance 20 mm": {"slider_clearance": 0.02},
         "1 rpm": {"crank_speed": 1.0},
         "5000 rpm": {"crank_speed": 5000.0},
         "contact stiffness 1e3 N/m": {"contact_stiffness": 1e3},

@@ -44,6 +44,11 @@ def test_the_models_of_both_joints_can_be_chosen():
     assert (fields["slider_clearance"], fields["ball_clearance"]) == pytest.approx((1e-4, 5e-5))
     assert len(shown["sensors"]) == 12
     assert "slider roll" in shown["degrees_of_freedom"]
+    result = run_json("simulate", *CRANK, "--slider-model", "instrumented", "--cycles", "5")
+    sensors = result["largest_sensor_force_N"]
+    assert len(sensors) == 8
+    assert sensors["front upper"] > 1.0
+    assert sensors["front left"] == 0.0
 
 
 def test_diagnose_tells_the_printed_nature_and_runs_the_matrix_update_test():
@@ -64,7 +69,7 @@ def test_classify_knows_the_crank():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--clearance-mm", "5"), "--clearance-mm = 5 is out of range; allowed: 0 to 1 mm"),
+        (("--clearance-mm", "50"), "--clearance-mm = 50 is out of range; allowed: 0 to 20 mm"),
         (("--motor-angle-deg", "30"), "--motor-angle-deg = 30 is out of range; allowed: 0 to 25 deg"),
         (("--set", "rod_length=0.04"), "rod_length = 0.04 m is out of range; allowed: above the crank radius"),
         (("--frequency-hz", "3"), "--frequency-hz is no option of slider-crank"),

@@ -137,7 +137,13 @@ def test_a_run_can_be_continued_to_the_bit():
     assert np.array_equal(whole.bounce_duration[20:], second.bounce_duration)
 
 
-@pytest.mark.parametrize("change", [{}, {"slider_clearance": 0.032e-3}, {"slider_joint": "instrumented"}])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {}, {"slider_clearance": 0.032e-3}, {"slider_joint": "instrumented"},
+        {"slider_joint": "ideal", "ball_joint": "spherical", "rod": "rigid", "gravity": 9.81},
+    ],
+)  # fmt: skip
 def test_sampling_only_reads(change):
     """A time history of any density changes nothing else by a bit: states, peaks, impacts, times in contact."""
     machine = replace(CRANK, **change)

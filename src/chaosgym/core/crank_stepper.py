@@ -27,6 +27,7 @@ from chaosgym.core.crank_record import (
     note_share,
     resultant,
     write_peaks,
+    write_sample,
 )
 from chaosgym.core.impact_beam import LOWER, UPPER, cubic, cubic_extremum, note_touch
 from chaosgym.core.slider_crank import RUNAWAY
@@ -296,14 +297,8 @@ def state_within(h, t, z, dz, moved, dz_moved, inner):
 @njit(cache=True, inline="always")
 def take_sample(model, h, t, z, dz, moved, dz_moved, inner, closed, direction, sample):
     """Write displacement, velocity and signed resultant (positive where it points up) at t in a step of length h."""
-    n = model.display.shape[0]
     state_within(h, t, z, dz, moved, dz_moved, inner)
-    sample[0], sample[1] = 0.0, 0.0
-    for i in range(n):
-        sample[0] += model.display[i] * inner[i]
-        sample[1] += model.display[i] * inner[n + i]
-    force = joint_force(model, inner, dz, closed, direction)
-    sample[2] = math.copysign(force[1], force[0])
+    write_sample(model.display, inner, joint_force(model, inner, dz, closed, direction), sample)
 
 
 @njit(cache=True, inline="always")

@@ -16,10 +16,16 @@ class Printed(NamedTuple):
 
 
 def printed(target: str) -> Printed:
-    """Value of a statement."""
+    """Value of a statement in its printed unit.
+
+    Raises
+    ------
+    KeyError
+        If there is no such statement, or it prints no number.
+    """
     statement = read_statements()[target]
-    assert statement.low is not None
-    assert statement.high is not None
+    if statement.low is None or statement.high is None:
+        raise KeyError(f"{target} prints no number")
     return Printed(statement.low, statement.high)
 
 

@@ -223,6 +223,17 @@ def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankMode
     )
 
 
+def fastest_rate(machine: "SliderCrank", model: SteppedCrankModel) -> float:
+    """Largest modulus [1/s] of an eigenvalue with every contact closed."""
+    some = [0, len(model.answer) // 4]
+    n = model.row.shape[1]
+    system = np.zeros((len(some), 2 * n, 2 * n))
+    system[:, :n, n:] = np.eye(n)
+    system[:, n:] = model.acceleration[some][:, :, : 2 * n]
+    system[:, n:, :n] -= machine.contact_stiffness * np.swapaxes(model.answer[some], -1, -2) @ model.row
+    return float(np.max(np.abs(np.linalg.eigvals(system))))
+
+
 class _Structure(NamedTuple):
     """Accelerations of all bins by powers of the crank rate, whatever the speed and the clearance.
 

@@ -156,16 +156,16 @@ class SliderCrank(FidelityLadder):
         0.254e-3,
         unit="m",
         low=0.0,
-        high=1.0,
+        high=0.02,
         provenance="printed",
         source="thesis figure 4.14; adjustable to 1 mm, 4.2",
     )
-    """Half the gap of the slider joint [m]."""
+    """Half the gap of the slider joint [m]; in one of 20 mm the slider of the thesis touches nothing."""
     ball_clearance: float = parameter(
         0.127e-3,
         unit="m",
         low=0.0,
-        high=1.0,
+        high=0.02,
         provenance="printed",
         source="thesis figure 4.8; adjustable to 1 mm, 4.2",
     )
