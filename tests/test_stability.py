@@ -11,6 +11,7 @@ from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
 from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam, SliderCrank
 from chaosgym.simulation import ExactEvents, RungeKutta4, simulate
 from chaosgym.stability import Run, admissible_box, runs_of, share_of_bound, stability_map, try_run
+from tests.core.crank_twin import continuous_twin
 
 UNDAMPED = replace(THESIS_IMPACT_BEAM, force_amplitude=0.0, damping_ratio=0.0, shaker_damping=0.0, contact_damping=0.0)
 
@@ -63,6 +64,16 @@ def test_a_gap_too_wide_to_touch_leaves_the_linear_response(rung):
     expected, size = _linear_response(beam, np.arange(50) / 50 * 2 * np.pi)
     assert record.peak_force.max() == 0.0
     np.testing.assert_allclose(record.history[0, :, 0], expected, rtol=0, atol=1e-9 * size)
+
+
+def test_a_guide_too_wide_to_touch_lets_the_slider_swing():
+    """At +-20 mm the slider moves freely: as continuous matrices by Runge-Kutta have it, and without any force."""
+    crank = SliderCrank(slider_clearance=0.02, rod="rigid", matrix_update_interval=0.25)
+    twin, peak = continuous_twin(crank, 360.0, 8000, 80)
+    record = simulate(crank, 1, samples_per_cycle=100)
+    assert record.peak_force.max() == peak == 0.0
+    assert np.abs(twin[:, 0]).max() > 0.005
+    np.testing.assert_allclose(record.history[0, :, 0], twin[:100, 0], atol=1e-4 * np.abs(twin[:, 0]).max())
 
 
 @pytest.mark.parametrize("clearance", [0.0, 1e-9])

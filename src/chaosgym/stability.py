@@ -187,13 +187,12 @@ def runs_of(machine: Machine) -> list[Run]:
         Run("1 mode" if count == 1 else f"{count} modes", default, _changed(machine, {}, {"n_modes": count}), None)
         for count in MODES
     ]
-    if machine.name == ImpactBeam.name:
-        runs += [
-            Run(f"{steps} steps a cycle", rung, _changed(machine, {"fidelity": rung}, {}), RungeKutta4(steps))
-            for steps in COARSE_STEPS
-            for rung in ladder
-            if rung != "restitution"
-        ]
+    runs += [
+        Run(f"{steps} steps a cycle", rung, _changed(machine, {"fidelity": rung}, {}), RungeKutta4(steps))
+        for steps in COARSE_STEPS
+        for rung in ladder
+        if rung != "restitution"
+    ]
     runs += [
         Run("longest exact steps", rung, _changed(machine, {"fidelity": rung}, {}), ExactEvents(step_phase=1.0))
         for rung in ladder

@@ -26,7 +26,8 @@ from chaosgym.diagnosis.response_type import SHARES, default_tolerances
 from chaosgym.diagnosis.two_step import two_step_test
 from chaosgym.diagnosis.type_rule import Neighbour, judge_type
 from chaosgym.errors import ChaosgymError, ParameterError
-from chaosgym.machines import ImpactBeam, Machine
+from chaosgym.machines import ImpactBeam, Machine, SliderCrank
+from chaosgym.machines.crank_model import STEP_PHASE, fastest_rate, stepped_model
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, RungeKutta4, parallel_map, simulate
 
@@ -60,9 +61,15 @@ class Setting(NamedTuple):
         if self.method == "exact":
             given = ExactEvents(step_phase=self.step)
             return replace(given, event_tolerance=1e-13) if self.rung == REFERENCE else given
-        assert isinstance(machine, ImpactBeam)
-        fastest = float(np.max(machine.reduce().regimes.fastest))
-        return RungeKutta4(math.ceil(machine.cycle_period * fastest / self.step))
+        return RungeKutta4(math.ceil(machine.cycle_period * _fastest(machine) / self.step))
+
+
+def _fastest(machine: Machine) -> float:
+    """Largest modulus [1/s] of an eigenvalue, contacts closed."""
+    if isinstance(machine, SliderCrank):
+        return float(fastest_rate(machine, stepped_model(machine, STEP_PHASE)))
+    assert isinstance(machine, ImpactBeam)
+    return float(np.max(machine.reduce().regimes.fastest))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,11 +202,9 @@ def settings_of(machine: Machine) -> list[Setting]:
     """Every rung with every integrator that runs it and every step."""
     rungs: Sequence[str] = list(getattr(machine, "fidelity_ladder", {}))
     chosen = [Setting(rung, "exact", step) for rung in rungs for step in EXACT_STEPS]
-    if machine.name == ImpactBeam.name:
-        chosen += [
-            Setting(rung, "Runge-Kutta 4", step) for rung in rungs if rung != "restitution" for step in FIXED_STEPS
-        ]
-    return chosen
+    return chosen + [
+        Setting(rung, "Runge-Kutta 4", step) for rung in rungs if rung != "restitution" for step in FIXED_STEPS
+    ]
 
 
 def operating_points(machine: Machine, count: int) -> Array:

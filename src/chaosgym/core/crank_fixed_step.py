@@ -53,7 +53,8 @@ def note_joint_peaks(model, z, dz, closed, direction, channel_peak):
     for j in range(channel_peak.shape[0]):
         if closed[j]:
             force, _ = push_of(model, j, z, dz, direction)
-            column = 0 if not model.two_sided[j] or direction[model.first[j]] > 0.0 else 1
+            positive = not model.two_sided[j] or direction[model.first[j]] > 0.0
+            column = UPPER if positive else LOWER
             channel_peak[j, column] = max(channel_peak[j, column], force)
 
 

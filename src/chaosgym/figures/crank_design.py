@@ -138,7 +138,7 @@ def guide_spread(parts: Parts) -> Sequence[Finding]:
     """Length of guide over which the impacts spread."""
     wanted, here = printed("SSC-124").low, 1e3 * float(np.ptp(parts["cloud"]["location"]))
     return [
-        Finding(f"impacts spread over {wanted:g} mm of the guide", f"{here:.2g} mm",
+        Finding(f"impacts spread over {wanted:g} mm of the guide", f"{here:.1f} mm",
                 within("SSC-124", here), ("SSC-124",))
     ]  # fmt: skip
 
