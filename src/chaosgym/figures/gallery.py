@@ -6,6 +6,7 @@ from pathlib import Path
 from chaosgym.figures.figure import Finding
 from chaosgym.figures.printed import contradiction
 from chaosgym.figures.produce import Drawn, picture_path
+from chaosgym.figures.registry import FIGURES
 from chaosgym.files import write_atomically
 
 _WORDS = {True: "agrees", False: "**differs**", None: "nothing to decide it by"}
@@ -63,6 +64,10 @@ def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
         f"Of {count['agree'] + count['differ']} printed statements about these figures {count['agree']} agree and "
         f"{count['differ']} differ.",
     ]
+    shown = {one.figure.id for one in drawn}
+    missing = [number for number in FIGURES if number not in shown]
+    if missing:
+        lines.append(f"Not drawn for this page: {', '.join(missing)}.")
     answered = sensitivities(drawn)
     if answered:
         lines += [
