@@ -45,11 +45,13 @@ def _slope(model, state, sine, slope):
     return force
 
 
-@njit(cache=True)
-def _sample(model, state, row):
+@njit(cache=True, inline="always")
+def _sample(model, state, history, cycle, sample):
     """Write tip displacement, velocity and contact force."""
     x, v = tip_of_state(model, state)
-    row[0], row[1], row[2] = x, v, surface_force(model, x, v)
+    history[cycle, sample, 0] = x
+    history[cycle, sample, 1] = v
+    history[cycle, sample, 2] = surface_force(model, x, v)
 
 
 @njit(cache=True, nogil=True)
@@ -80,7 +82,7 @@ def advance_fixed_step(model, state, episode, arrays, steps):
         before = surface_force(model, arrays.tip[cycle, 0], arrays.tip[cycle, 1])
         for step in range(steps):
             while sample < samples and sample * steps <= step * samples:
-                _sample(model, state, arrays.history[cycle, sample])
+                _sample(model, state, arrays.history, cycle, sample)
                 sample += 1
             sine0 = math.sin(omega * h * step)
             sine1 = math.sin(omega * h * (step + 0.5))
@@ -109,7 +111,7 @@ def advance_fixed_step(model, state, episode, arrays, steps):
                     note_touch(episode, side, (step + 1) * h, arrays.bounce_time[cycle])
             before = force
         while sample < samples:
-            _sample(model, state, arrays.history[cycle, sample])
+            _sample(model, state, arrays.history, cycle, sample)
             sample += 1
         arrays.events[cycle] = 0
         if not abs(x) < RUNAWAY:
