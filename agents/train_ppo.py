@@ -18,9 +18,10 @@ import stable_baselines3
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.env_util import make_vec_env
+from stable_baselines3.common.vec_env import VecMonitor
 
 import chaosgym
+from chaosgym.envs import SB3VecEnv
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def main() -> None:
     gym.spec(arguments.env)
     out.mkdir(parents=True)
     torch.set_num_threads(arguments.threads)
-    envs = make_vec_env(arguments.env, n_envs=arguments.envs, seed=arguments.seed)
+    envs = VecMonitor(SB3VecEnv(arguments.env, arguments.envs))
     model = PPO(
         "MlpPolicy", envs, n_steps=arguments.rollout, batch_size=arguments.batch, n_epochs=arguments.epochs,
         learning_rate=arguments.learning_rate, gamma=arguments.gamma, ent_coef=arguments.entropy, seed=arguments.seed,

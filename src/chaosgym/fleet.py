@@ -17,9 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.core import status
-from chaosgym.core.batch import Motions, Settings, advance_beams, advance_cranks, advance_stepped_cranks
+from chaosgym.core.batch import (
+    Motions,
+    Settings,
+    advance_beams,
+    advance_cranks,
+    advance_rigid_beams,
+    advance_stepped_cranks,
+)
 from chaosgym.core.crank_stepper import SteppedCrankModel
 from chaosgym.core.impact_beam import CycleArrays, ImpactBeamModel
+from chaosgym.core.restitution import RestitutionModel
 from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.errors import SimulationError
 from chaosgym.machines.crank_model import TABLES, KeptModel, models_by_speed
@@ -196,7 +204,14 @@ class BeamFleet(_CompiledFleet):
         advance_beams(self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
 
 
-SPEED_FIELDS = ("bin_duration", "steps", "order", "span")
+class RigidBeamFleet(BeamFleet):
+    """Impact beams whose impacts take no time."""
+
+    def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
+        advance_rigid_beams(self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
+
+
+SPEED_FIELDS = ("bin_duration", "steps", "order")
 """Fields of a slider crank's model that change with its speed, apart from the tables."""
 
 
@@ -261,6 +276,7 @@ class SteppedCrankFleet(_CompiledFleet):
 
 _COMPILED: dict[type, type[BeamFleet] | type[CrankFleet] | type[SteppedCrankFleet]] = {
     ImpactBeamModel: BeamFleet,
+    RestitutionModel: RigidBeamFleet,
     SliderCrankModel: CrankFleet,
     SteppedCrankModel: SteppedCrankFleet,
 }

@@ -15,7 +15,7 @@ from gymnasium.envs.registration import load_env_creator
 from gymnasium.utils.env_checker import check_env
 
 from chaosgym import fleet
-from chaosgym.envs import ENVIRONMENTS
+from chaosgym.envs import ENVIRONMENTS, machine_env
 from chaosgym.envs.documentation import environments_page
 from chaosgym.envs.machine_env import MachineEnv
 from chaosgym.envs.tasks import Status
@@ -245,6 +245,23 @@ def test_rendering_does_not_touch_the_physics(name: str) -> None:
     assert frames[0].dtype == np.uint8
     assert np.any(frames[0] != frames[1])
     shown.close()
+
+
+def test_a_render_mode_alone_costs_nothing(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """stable-baselines3's make_vec_env always asks for pictures; the motion is run again only when one is drawn."""
+    env = _make(name, render_mode="rgb_array")
+    env.reset(seed=0)
+    again: list[Any] = []
+
+    def counted(*arguments: Any, **keywords: Any) -> Any:
+        again.append(simulate(*arguments, **keywords))
+        return again[-1]
+
+    monkeypatch.setattr(machine_env, "simulate", counted)
+    env.step(np.zeros(1, np.float32))
+    assert again == []
+    env.render()
+    assert len(again) == env.task.cycles_per_step
 
 
 def test_human_mode_runs_without_a_screen(name: str) -> None:

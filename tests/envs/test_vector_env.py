@@ -103,6 +103,12 @@ def test_every_kind_of_slider_crank(keywords: dict[str, Any]) -> None:
     assert _assert_same_episodes(envs, 4) >= 3
 
 
+def test_a_beam_whose_impacts_take_no_time() -> None:
+    """The cheapest rung of the ladder of fidelity runs side by side too."""
+    envs = _pair(BEAM, AutoresetMode.SAME_STEP, fidelity="restitution", job_cycles=20, tolerance=True)
+    assert _assert_same_episodes(envs, 9) == 6
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_whole_jobs_equal_those_of_single_environments(name: str) -> None:

@@ -1,5 +1,8 @@
 """How fast is this computer? ``bench``."""
 
+from dataclasses import asdict
+from typing import Any
+
 import click
 
 from chaosgym.cli.output import emit
@@ -7,12 +10,67 @@ from chaosgym.cli.output import emit
 
 @click.command()
 @click.option("--repeats", type=click.IntRange(1, 100), default=5, show_default=True, help="Timed runs per figure.")
+@click.option("--against", type=click.Choice(["exudyn"]), help="Run the same machines there; needs chaosgym[peers].")
+@click.option("--scenes", is_flag=True, help="The scenes of the slider crank instead: degrees of freedom and cost.")
+@click.option("--set-up", "set_up", is_flag=True, help="The times to make a slider crank ready instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def bench(repeats: int, as_json: bool) -> None:
-    """Time the simulation on this computer: microseconds per operating cycle, one core."""
-    from chaosgym.bench import benchmark
+def bench(repeats: int, against: str | None, scenes: bool, set_up: bool, as_json: bool) -> None:
+    """Rates on this computer: cycles, environment steps, sweep points, classifier rows; or against a peer."""
+    if (against is not None) + scenes + set_up > 1:
+        raise click.UsageError("--against, --scenes and --set-up exclude each other")
+    if against is not None:
+        from chaosgym.bench.against_exudyn import against_exudyn
 
-    result = benchmark(repeats)
-    emit({"microseconds_per_cycle": result}, as_json, lambda: [
-        f"{name:45s} {value:8.1f} us per cycle {1e6 / value:10.0f} cycles/s" for name, value in result.items()
-    ])  # fmt: skip
+        rows = against_exudyn(repeats=repeats, progress=True)
+        return emit({"against": against, "settings": rows}, as_json, lambda: _comparison(rows))
+    from chaosgym.bench import benchmark, scene_costs, set_up_times
+
+    if scenes:
+        costs = scene_costs()
+        return emit({"scenes": [asdict(cost) for cost in costs]}, as_json, lambda: _scene_table(costs))
+    if set_up:
+        times = set_up_times(repeats)
+        return emit({"set_up_microseconds": times}, as_json, lambda: [
+            f"{name:40s} {value:10.1f} us" for name, value in times.items()
+        ])  # fmt: skip
+    result = benchmark(repeats, progress=True)
+    return emit(result, as_json, lambda: _rates(result))
+
+
+def _rates(result: dict[str, Any]) -> list[str]:
+    load = result["load_average"]
+    lines = [f"{'':64s}{'per second':>12s}{'per CPU second':>16s}"]
+    for quantity, figures in result.items():
+        if quantity == "load_average":
+            continue
+        lines.append(quantity.replace("_", " "))
+        for name, rates in figures.items():
+            lines.append(f"  {name:62s}{_shown(rates['per_second']):>12s}{_shown(rates['per_processor_second']):>16s}")
+    return [*lines, f"load average of this computer: {load['before']:.1f} before, {load['after']:.1f} after"]
+
+
+def _shown(figure: float) -> str:
+    return f"{figure:.1f}" if figure < 100.0 else f"{figure:,.0f}"
+
+
+def _comparison(rows: list[dict[str, Any]]) -> list[str]:
+    lines = [f"{'':76s}{'cycles per CPU second':>24s}{'ratio':>8s}{'goal':>6s}  same verdict (period)"]
+    for row in rows:
+        rates = row["cycles_per_processor_second"]
+        wrong = ", ".join(f"{speed:g}" for speed in row["differs_at"])
+        lines.append(
+            f"{row['machine']}: {row['setting']:62s}"
+            f"{rates['chaosgym']:14,.1f}{rates['exudyn']:10,.1f}{row['ratio']:8.0f}{row['goal']:6.0f}"
+            f"  {row['same_class']} ({row['same_period']}) of {row['speeds']}" + (f", not at {wrong}" if wrong else "")
+        )
+    return lines
+
+
+def _scene_table(costs: list[Any]) -> list[str]:
+    head = f"{'slider crank, 200 rpm, 5 deg bins':41s} {'DOF':>3s}  {'method':11s} {'set-up':>9s} {'revolution':>12s}"
+    rows = [
+        f"{cost.scene:41s} {len(cost.degrees_of_freedom):3d}  {cost.method:11s} {1e3 * cost.setup:6.1f} ms "
+        f"{1e3 * cost.revolution:9.2f} ms"
+        for cost in costs
+    ]
+    return [head, *rows, "the degrees of freedom of a scene by name: chaosgym show slider-crank, and --json"]

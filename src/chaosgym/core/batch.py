@@ -17,6 +17,7 @@ from chaosgym.core.crank_stepper import advance as advance_stepped_crank
 from chaosgym.core.impact_beam import CycleArrays, Episode, ImpactBeamModel
 from chaosgym.core.impact_beam import advance as advance_beam
 from chaosgym.core.propagator import Regimes
+from chaosgym.core.restitution import RestitutionModel, advance_restitution
 from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.core.slider_crank import advance as advance_crank
 
@@ -53,16 +54,21 @@ def episode_of(motions, i):
 
 
 @njit(cache=True, inline="always")
-def beam_of(batch, regimes, i):
-    """Model of machine i."""
-    own = Regimes(
+def regimes_of(regimes, i):
+    """Regimes of machine i."""
+    return Regimes(
         regimes.rotates[i], regimes.rate[i], regimes.to_modal[i], regimes.from_modal[i], regimes.output[i],
         regimes.magnitude[i], regimes.forcing[i], regimes.modulus[i], regimes.fastest[i],
     )  # fmt: skip
+
+
+@njit(cache=True, inline="always")
+def beam_of(batch, regimes, i):
+    """Model of machine i."""
     return ImpactBeamModel(
         batch.excitation_frequency[i], batch.force_amplitude[i], batch.clearance[i], batch.contact_stiffness[i],
         batch.contact_damping[i], batch.stiffness[i], batch.damping[i], batch.tip_shape[i], batch.force_shape[i],
-        own, batch.rest[i], batch.rest_penetration[i],
+        regimes_of(regimes, i), batch.rest[i], batch.rest_penetration[i],
     )  # fmt: skip
 
 
@@ -78,6 +84,27 @@ def advance_beams(batch, regimes, which, motions, arrays, settings, outcome):
         outcome[k] = advance_beam(
             beam_of(batch, regimes, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
             settings.step_phase, settings.event_tolerance, settings.event_budget,
+        )[0]  # fmt: skip
+
+
+@njit(cache=True, inline="always")
+def rigid_beam_of(batch, regimes, i):
+    """Model of machine i."""
+    return RestitutionModel(
+        batch.excitation_frequency[i], batch.force_amplitude[i], batch.clearance[i], batch.stiffness[i],
+        batch.damping[i], batch.tip_shape[i], batch.force_shape[i], regimes_of(regimes, i), batch.restitution[i],
+        batch.contact_duration[i], batch.force_per_speed[i],
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def advance_rigid_beams(batch, regimes, which, motions, arrays, settings, outcome):
+    """As ``advance_beams``, for beams whose impacts take no time."""
+    for k in prange(which.shape[0]):
+        i = which[k]
+        outcome[k] = advance_restitution(
+            rigid_beam_of(batch, regimes, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
+            settings.step_phase, settings.event_budget,
         )[0]  # fmt: skip
 
 
@@ -98,7 +125,7 @@ def crank_of(batch, bins, i):
     size = 2 * n + FORCING_TERMS + m
     sets = batch.radix[i] ** m
     return SliderCrankModel(
-        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.order[i], batch.span[i], batch.row[i],
+        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.order[i], batch.spectrum[i], batch.row[i],
         batch.gap[i], batch.stiffness[i], batch.damping[i], batch.two_sided[i], batch.radix[i], batch.reading[i],
         batch.reach[i], batch.display[i],
         carray(pointer(batch.acceleration[i]), (sets, bins, n, size), np.float64),

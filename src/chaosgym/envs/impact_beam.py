@@ -151,10 +151,31 @@ class ImpactBeamEnv(MachineEnv):
     ## Vectorized environment
 
     ```python
-    >>> envs = gym.make_vec("chaosgym/ImpactBeam-v0", num_envs=2, vectorization_mode="async")
-    >>> envs.close()
+    >>> envs = gym.make_vec("chaosgym/ImpactBeam-v0", num_envs=16, autoreset_mode="SameStep", max_episode_steps=100)
+    >>> observations, infos = envs.reset(seed=1)
+    >>> observations, rewards, terminated, truncated, infos = envs.step(envs.action_space.sample())
 
     ```
+
+    All machines step in one compiled call on all processors. Sub-environment i does, bit for bit, what a single
+    environment reset with seed + i does, and has a generator of its own. `autoreset_mode` is `"NextStep"` (default),
+    `"SameStep"` or `"Disabled"` (with `reset(options={"reset_mask": ...})`); `max_episode_steps` truncates; all other
+    keywords are those above, except that there is no rendering. `envs.unwrapped.get_attr(name)` returns `speed`,
+    `damage`, `machine` and `np_random` of each sub-environment, and what they share.
+
+    stable-baselines3 trains on it through its own interface:
+
+    ```python
+    from chaosgym.envs import SB3VecEnv
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    PPO("MlpPolicy", VecMonitor(SB3VecEnv("chaosgym/ImpactBeam-v0", num_envs=16))).learn(100_000)
+    ```
+
+    The number of threads is numba's (`NUMBA_NUM_THREADS`, `numba.set_num_threads`). With GNU OpenMP underneath, a
+    process that was forked after a step can't run this environment itself; spawned workers, and single environments
+    in any worker, are not affected. `vectorization_mode="sync"` and `"async"` make single environments instead.
 
     Where another library makes the environment in a fresh process, the id names the package to import:
     `chaosgym:chaosgym/ImpactBeam-v0`.

@@ -162,11 +162,14 @@ class MachineEnv(gym.Env[Observation, Action]):
         """Share of its life that the worse surface of the joint has used up."""
         return float(self._job.damage.max())
 
-    def _shown(self) -> CycleRecord:
-        """Last step with a time history, each cycle run once more from its start: showing it changes no bit of it."""
+    def _last_step(self) -> CycleRecord:
         record = self._fleet.records[0]
         assert record is not None
-        record = record.after(len(record) - self.task.cycles_per_step)
+        return record.after(len(record) - self.task.cycles_per_step)
+
+    def _shown(self) -> CycleRecord:
+        """Last step with a time history, each cycle run once more from its start: showing it changes no bit of it."""
+        record = self._last_step()
         runs = [simulate(record.machine, 1, state, samples_per_cycle=RENDER_SAMPLES) for state in record.section]
         return replace(record, history=np.concatenate([run.history for run in runs if run.history is not None]))
 
@@ -195,7 +198,7 @@ class MachineEnv(gym.Env[Observation, Action]):
         observation, info = self._job.start(THE_ONE, speed, [self.np_random])
         self._runs = True
         if self.render_mode is not None:
-            self._show().start(self._shown())
+            self._show().start()
             if self.render_mode == "human":
                 self.render()
         return observation[0], _first(info)
@@ -218,7 +221,7 @@ class MachineEnv(gym.Env[Observation, Action]):
         info = _first(outcome.info)
         self._runs = info["status"] == Status.RUNNING
         if self.render_mode is not None:
-            self._show().add(self._shown(), info["cost_type_iii"] > 0.0)
+            self._show().add(self._last_step(), info["cost_type_iii"] > 0.0)
             if self.render_mode == "human":
                 self.render()
         return outcome.observation[0], float(outcome.reward[0]), not self._runs, False, info
@@ -239,7 +242,7 @@ class MachineEnv(gym.Env[Observation, Action]):
             return None
         if self._dashboard is None:
             raise gym.error.ResetNeeded("there is nothing to show yet; call reset() first")
-        return self._dashboard.draw()
+        return self._dashboard.draw(self._shown())
 
     def close(self) -> None:
         """Close the window, if there is one."""

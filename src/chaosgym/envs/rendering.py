@@ -53,13 +53,12 @@ class Dashboard:
         self._panels = [self._figure.add_subplot(grid[cell]) for cell in range(4)]
         self._speed_axis = self._panels[3].twinx()
 
-    def start(self, record: CycleRecord) -> None:
+    def start(self) -> None:
         """Begin a job."""
         self._speeds: list[float] = []
         self._peaks: list[NDArray[np.float64]] = []
         self._wild: list[bool] = []
         self._top_velocity = self._top_force = 0.0
-        self._record = record
 
     def add(self, record: CycleRecord, type_iii: bool) -> None:
         """Take in a step."""
@@ -67,11 +66,9 @@ class Dashboard:
         self._peaks.append(record.peak_force[:, 0])
         self._top_force = max(self._top_force, float(record.peak_force.max()))
         self._wild.append(type_iii)
-        self._record = record
 
-    def draw(self) -> NDArray[np.uint8] | None:
-        """Draw the last step; return the picture (height, width, 3), or None for a window."""
-        record = self._record
+    def draw(self, record: CycleRecord) -> NDArray[np.uint8] | None:
+        """Draw the last step, given with its time history; return (height, width, 3), or None for a window."""
         colour = WILD if self._wild and self._wild[-1] else CALM
         for panel in (*self._panels, self._speed_axis):
             panel.clear()

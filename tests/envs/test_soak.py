@@ -1,0 +1,50 @@
+"""Long runs of the native vector environment."""
+
+import resource
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from chaosgym.envs.tasks import Status
+
+COUNT = 256
+
+WARM_UP = 0.4
+"""Share of a run after which caches are full."""
+
+
+def _peak_memory() -> float:
+    """Largest resident memory of this process so far, in units of a million bytes."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "machine_steps"), [("chaosgym/ImpactBeam-v0", 1_000_000), ("chaosgym/SliderCrank-v0", 100_000)]
+)
+def test_no_step_is_invalid_and_memory_stays(name: str, machine_steps: int) -> None:
+    """Steps of one cycle at random speeds, with random resets, on machines drawn anew, leave no invalid value."""
+    envs = gym.make_vec(name, num_envs=COUNT, cycles_per_step=1, tolerance=True, sensor_error=3.0)
+    generator = np.random.default_rng(0)
+    envs.reset(seed=0)
+    steps = -(-machine_steps // COUNT)
+    memory, jobs = 0.0, 0
+    for step in range(steps):
+        observations, rewards, terminated, truncated, infos = envs.step(
+            generator.uniform(-1.0, 1.0, (COUNT, 1)).astype(np.float32)
+        )
+        assert observations in envs.observation_space
+        assert np.all(np.isfinite(rewards))
+        assert np.all(rewards <= 0.0)
+        for key, values in infos.items():
+            assert np.all(np.isfinite(values)), key
+        assert Status.SIMULATION_FAILED not in infos["status"]
+        assert not truncated.any()
+        jobs += int(terminated.sum())
+        if step % 10 == 0:
+            envs.reset(options={"reset_mask": generator.random(COUNT) < 0.02})
+        if step == int(WARM_UP * steps):
+            memory = _peak_memory()
+    assert jobs > 0 or name == "chaosgym/SliderCrank-v0"
+    assert _peak_memory() - memory < 10.0
