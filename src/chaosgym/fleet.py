@@ -211,7 +211,7 @@ class RigidBeamFleet(BeamFleet):
         advance_rigid_beams(self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
 
 
-SPEED_FIELDS = ("bin_duration", "steps", "order", "span")
+SPEED_FIELDS = ("bin_duration", "steps", "order")
 """Fields of a slider crank's model that change with its speed, apart from the tables."""
 
 

@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
+from chaosgym.compilation import call
 from chaosgym.core import status
+from chaosgym.core.crank_fixed_step import advance_crank_fixed_step
 from chaosgym.core.crank_stepper import SteppedCrankModel
 from chaosgym.core.crank_stepper import advance as advance_stepped_crank
 from chaosgym.core.fixed_step import advance_fixed_step
@@ -24,6 +26,7 @@ from chaosgym.core.slider_crank import advance as advance_slider_crank
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines.crank_joints import sensor_peaks
+from chaosgym.machines.crank_model import STEP_PHASE, fastest_rate, stepped_model
 from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
@@ -230,11 +233,11 @@ def _run_impact_beam(
     if isinstance(integrator, ExactEvents):
         settings = (integrator.step_phase, integrator.event_tolerance, integrator.event_budget)
         if isinstance(model, ImpactBeamModel):
-            outcome, done = advance(*motion, *settings, *along)
+            outcome, done = call(advance, *motion, *settings, *along)
         else:
-            outcome, done = advance_restitution(*motion, integrator.step_phase, integrator.event_budget, *along)
+            outcome, done = call(advance_restitution, *motion, integrator.step_phase, integrator.event_budget, *along)
     elif isinstance(model, ImpactBeamModel):
-        outcome, done = advance_fixed_step(*motion, integrator.steps_per_cycle)
+        outcome, done = call(advance_fixed_step, *motion, integrator.steps_per_cycle)
     else:
         raise ParameterError(
             f"integrator = {integrator} does not run contact_law = 'restitution'; allowed: ExactEvents(...)"
@@ -245,16 +248,20 @@ def _run_impact_beam(
 def _run_slider_crank(
     crank: SliderCrank, state: MotionState, cycles: int, samples: int, integrator: Integrator
 ) -> tuple[int, int, CycleRecord]:
-    if not isinstance(integrator, ExactEvents):
-        raise ParameterError(f"integrator = {integrator} does not run a slider crank; allowed: ExactEvents(...)")
-    # its peaks and events are refined on the exact motion, so its steps may be twice as long as the beam's
-    model = crank.reduce(2.0 * integrator.step_phase)
-    arrays = _arrays(crank, model, cycles, samples)
     coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
-    tolerance, budget = integrator.event_tolerance / model.contact_rate, integrator.event_budget
-    kernel = advance_stepped_crank if isinstance(model, SteppedCrankModel) else advance_slider_crank
-    outcome, done = kernel(model, coordinates, episode, arrays, tolerance, budget)
+    if isinstance(integrator, ExactEvents):
+        # its peaks and events are refined on the exact motion, so its steps may be twice as long as the beam's
+        model = crank.reduce(2.0 * integrator.step_phase)
+        arrays = _arrays(crank, model, cycles, samples)
+        kernel = advance_stepped_crank if isinstance(model, SteppedCrankModel) else advance_slider_crank
+        tolerance, budget = integrator.event_tolerance / model.contact_rate, integrator.event_budget
+        outcome, done = call(kernel, model, coordinates, episode, arrays, tolerance, budget)
+    else:
+        stepped = stepped_model(crank, STEP_PHASE)
+        arrays = _arrays(crank, stepped, cycles, samples)
+        fastest, steps = fastest_rate(crank, stepped), integrator.steps_per_cycle
+        outcome, done = call(advance_crank_fixed_step, stepped, coordinates, episode, arrays, steps, fastest)
     record = replace(
         _record(crank, arrays, MotionState(coordinates, bouncing)),
         peak_phase=arrays.peak_instant * crank.crank_rate,

@@ -112,6 +112,7 @@ TOY = SearchSpace(
     ),
     lambda base, values: replace(base, **values),
     ({"width": 17.58e-3, "shaker_damping": 22.5, "n_modes": 5, "damping_family": "stiffness"},),
+    20,
 )
 
 

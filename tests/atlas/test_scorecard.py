@@ -100,7 +100,7 @@ def test_results_are_kept_and_found_again(tmp_path, monkeypatch):
     assert len(kept) == 1
     kept[0].write_text(json.dumps({**first[job], "mean": -1.0}))
     assert run_jobs([job], folder=tmp_path)[job]["mean"] == -1.0
-    monkeypatch.setattr(jobs, "_digest", lambda: "edited")
+    monkeypatch.setattr(jobs, "SOURCES", "edited")
     assert run_jobs([job], folder=tmp_path)[job]["mean"] == first[job]["mean"]
     assert len(list(tmp_path.glob("*.json"))) == 2
     kept[0].write_text("{")

@@ -11,7 +11,6 @@ from chaosgym.core.impact_beam import Episode, cycle_arrays
 from chaosgym.core.slider_crank import advance
 from chaosgym.errors import SimulationError
 from chaosgym.machines.crank_equations import equations
-from chaosgym.machines.crank_model import series_span
 from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.simulation import ExactEvents, simulate
 from tests.core.crank_twin import continuous_twin, rigid_twin
@@ -73,7 +72,7 @@ def frozen_model(machine, duration):
     order = series_order(spectrum * step)
     table = propagator_table(acceleration, duration / 2, step, order)
     return model._replace(
-        bin_duration=duration / 2, steps=steps, order=order, span=series_span(spectrum, step),
+        bin_duration=duration / 2, steps=steps, order=order, spectrum=spectrum,
         acceleration=acceleration, propagator=table, curvature=model.row @ acceleration,
     )  # fmt: skip
 
@@ -138,7 +137,13 @@ def test_a_run_can_be_continued_to_the_bit():
     assert np.array_equal(whole.bounce_duration[20:], second.bounce_duration)
 
 
-@pytest.mark.parametrize("change", [{}, {"slider_clearance": 0.032e-3}, {"slider_joint": "instrumented"}])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {}, {"slider_clearance": 0.032e-3}, {"slider_joint": "instrumented"},
+        {"slider_joint": "ideal", "ball_joint": "spherical", "rod": "rigid", "gravity": 9.81},
+    ],
+)  # fmt: skip
 def test_sampling_only_reads(change):
     """A time history of any density changes nothing else by a bit: states, peaks, impacts, times in contact."""
     machine = replace(CRANK, **change)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from chaosgym.design.peak_impacts import PeakImpactDiagram, coverage, filling_cycles, peak_impacts, spot_life
 from chaosgym.design.statistics import convergence
@@ -10,6 +11,7 @@ from chaosgym.errors import DesignError, SimulationError
 from chaosgym.machines import MACHINES, ImpactBeam
 from chaosgym.machines.kinematics import slider_position
 from chaosgym.machines.parameters import with_settings
+from chaosgym.plotting.design import impact_diagram
 from chaosgym.simulation import simulate
 
 
@@ -111,6 +113,19 @@ def test_a_ball_joint_is_struck_at_polar_angles(model):
     along, across, _ = record.peak_vector[largest, np.argmax(record.peak_force[largest])]
     turns = (diagram.location[largest] - np.degrees(np.arctan2(across, along))) / 360.0
     assert turns == pytest.approx(round(turns), abs=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.0, 25.0])
+def test_impacts_lean_out_of_the_plane_only_at_a_motor_angle(angle):
+    """At 25 deg and 120 rpm the ball strikes the housing up to tens of degrees beside the plane of swing."""
+    diagram = peak_impacts(simulate(ball(crank_speed=120.0, motor_angle=angle), 10, transient=10))
+    if angle == 0.0:
+        assert diagram.elevation is None
+    else:
+        assert 10.0 < np.abs(diagram.elevation).max() < 60.0
+    ax = impact_diagram(diagram, Figure().add_subplot())
+    assert ax.get_xlabel() == "polar angle on the bearing [deg]"
+    assert (len(ax.figure.axes) == 2) == (angle > 0.0)
 
 
 def test_slow_cranking_presses_the_housing_from_above():

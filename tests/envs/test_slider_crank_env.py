@@ -6,6 +6,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import check_env
 
 from chaosgym.envs.slider_crank import SliderCrankEnv
 from chaosgym.errors import ParameterError
@@ -30,7 +31,7 @@ def test_the_machine_is_that_of_the_thesis_but_for_contact_damping() -> None:
     env = gym.make(ID, rod_diameter=3.175e-3, friction_coefficient=0.1).unwrapped
     assert env.nominal == replace(
         THESIS_SLIDER_CRANK,
-        contact_damping_ratio=0.1, matrix_update_interval=5.0, rod_diameter=3.175e-3, friction_coefficient=0.1,
+        contact_damping_ratio=0.075, matrix_update_interval=5.0, rod_diameter=3.175e-3, friction_coefficient=0.1,
     )  # fmt: skip
 
 
@@ -47,13 +48,13 @@ def test_speeds_lie_on_the_grid_and_are_remembered() -> None:
         assert tables.setdefault(speed, table) is table
 
 
-@pytest.mark.parametrize("speed", [82.5, 235.0, 280.0])
+@pytest.mark.parametrize("speed", [82.5, 160.0, 215.0, 247.5])
 def test_periodic_speeds_cost_nothing(speed: float) -> None:
     """In the calm windows between irregular speeds no settled step counts as Type III."""
     assert _type_iii_share(SliderCrankEnv(), speed, 40) == 0.0
 
 
-@pytest.mark.parametrize("speed", [70.0, 150.0, 242.5])
+@pytest.mark.parametrize("speed", [57.5, 200.0, 222.5])
 def test_chaotic_speeds_cost(speed: float) -> None:
     """Most steps of an irregular response count."""
     assert _type_iii_share(SliderCrankEnv(), speed, 60) > 0.45
@@ -97,6 +98,9 @@ def test_the_force_limit_counts_above_240_rpm() -> None:
         {"slider_joint": "ideal", "ball_joint": "instrumented", "gravity": 9.81},
         {"ball_joint": "instrumented"},
         {"motor_angle": 25.0},
+        pytest.param(
+            {"motor_angle": 25.0, "slider_joint": "instrumented", "geometric_stiffness": "on"}, marks=pytest.mark.slow
+        ),
     ],
 )
 def test_every_joint_can_be_operated_and_shown(keywords: dict[str, Any]) -> None:
@@ -111,11 +115,26 @@ def test_every_joint_can_be_operated_and_shown(keywords: dict[str, Any]) -> None
 
 
 @pytest.mark.parametrize(
+    "keywords",
+    [
+        {"motor_angle": 25.0},
+        pytest.param({"motor_angle": 25.0, "slider_joint": "instrumented"}, marks=pytest.mark.slow),
+        pytest.param({"motor_angle": 10.0, "ball_joint": "spherical", "rod": "rigid"}, marks=pytest.mark.slow),
+    ],
+)
+def test_checkers_find_nothing_to_complain_about_in_space(keywords: dict[str, Any]) -> None:
+    """check_env of Gymnasium and Stable-Baselines3 pass without a warning with other joints and angles too."""
+    check_env(gym.make(ID, **keywords).unwrapped, skip_render_check=True)
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    checker.check_env(gym.make(ID, **keywords), warn=True)
+
+
+@pytest.mark.parametrize(
     ("keywords", "message"),
     [
         ({"rod_length": 0.03}, "rod_length = 0.03 m is out of range"),
         ({"motor_angle": 30.0}, "motor_angle = 30 deg is out of range"),
-        ({"slider_clearance": 2e-3}, "slider_clearance = 0.002 m is out of range"),
+        ({"slider_clearance": 5e-2}, "slider_clearance = 0.05 m is out of range"),
         ({"matrix_update_interval": 7.0}, "matrix_update_interval = 7 deg is out of range"),
         ({"speed_grid": 20.0}, "speed_grid = 20 is out of range"),
     ],

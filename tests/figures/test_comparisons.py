@@ -7,17 +7,9 @@ from chaosgym.figures.beam import DAMPING
 from chaosgym.figures.computations import Runs, Types
 from chaosgym.figures.crank_maps import SLIDER_MAP
 from chaosgym.figures.crank_resonances import resonance
-from chaosgym.figures.crank_responses import gaps
 from chaosgym.figures.flips import flips
 from chaosgym.figures.gallery import gallery, sensitivities
 from chaosgym.machines import THESIS_IMPACT_BEAM
-
-
-def test_gaps_are_the_stretches_without_force():
-    """Contact that is lost from 90 to 180 deg and at the end of the revolution gives two gaps."""
-    force = np.ones(360)
-    force[90:180] = force[350:] = 0.0
-    assert gaps({"force": force}) == [(90.0, 180.0), (350.0, 360.0)]
 
 
 def test_a_resonance_stands_above_its_background():

@@ -107,7 +107,7 @@ def test_the_command_lists_draws_and_refuses(tmp_path):
         run(app, ["figures", "3.6", "--out", str(tmp_path), "--resolution", "0.1", "--json"]).stdout
     )  # fmt: skip
     assert [one["id"] for one in result["figures"]] == ["3.6"]
-    assert result["totals"] == {"agree": 1, "differ": 0, "without_number": 0}
+    assert result["totals"] == {"agree": 1, "differ": 0, "contradictory": 0, "undecided": 0}
     assert run(app, ["figures", "3.6"]).exit_code == 2
     assert isinstance(
         run(app, ["figures", "3.6", "--out", str(tmp_path), "--resolution", "0"]).exception, ChaosgymError

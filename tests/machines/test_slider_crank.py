@@ -164,7 +164,7 @@ def test_the_rigid_swing_is_the_linearised_pendulum(degrees):
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("rod_length", 0.04), ("motor_angle", 26.0), ("motor_angle", -1.0), ("slider_clearance", 2e-3),
+        ("rod_length", 0.04), ("motor_angle", 26.0), ("motor_angle", -1.0), ("slider_clearance", 5e-2),
         ("slider_clearance", -1e-6), ("crank_speed", 0.0), ("crank_speed", math.nan), ("matrix_update_interval", 7.0),
         ("slider_joint", "loose"), ("housing_inertia", 1e-9), ("n_modes", 2.5),
     ],

@@ -5,11 +5,14 @@ from typing import Any
 
 import numpy as np
 import scipy.signal
+from numpy.typing import NDArray
 
 from chaosgym.atlas.observation import READING_ERROR
 from chaosgym.diagnosis.stroboscopic import find_recurrence, scales
 from chaosgym.machines import ImpactBeam, Machine
-from chaosgym.simulation import simulate
+from chaosgym.simulation import CycleRecord, simulate
+
+Array = NDArray[np.float64]
 
 MOTION_CYCLES, MOTION_SAMPLES = 50, 4000
 """Cycles of the motion of the force point, and samples in each."""
@@ -35,30 +38,40 @@ def long_run(machine: Machine, cycles: int) -> dict[str, Any]:
     return {"irregular_cycles": int(last[-1]) + 1 if len(last) else 0, "period": found.period}
 
 
-def force_point_motion(beam: ImpactBeam, transient: int) -> dict[str, Any]:
-    """Range of displacement [m] and velocity [m/s] of the point where the shaker pushes a beam.
+def follow_modes(record: CycleRecord) -> tuple[Array, Array, Array]:
+    """Motion of the point where the shaker pushes a beam, from a record with a time history.
 
     The modes are driven once more by the shaker force and the contact force of the run, held linear between samples.
+
+    Returns
+    -------
+    (displacement, velocity, tip)
+        Of the force point [m, m/s], and displacement of the tip [m] by the same route; all (cycles * samples,).
     """
-    record = simulate(beam, MOTION_CYCLES, transient=transient, samples_per_cycle=MOTION_SAMPLES)
+    beam = record.machine
+    assert isinstance(beam, ImpactBeam)
     assert record.history is not None
-    model = beam.reduce()
-    n = beam.n_modes
-    time = np.arange(MOTION_CYCLES * MOTION_SAMPLES) * (beam.cycle_period / MOTION_SAMPLES)
+    model, n, time = beam.reduce(), beam.n_modes, record.time
     shaker = beam.force_amplitude * np.sin(2.0 * math.pi * beam.excitation_frequency * time)
-    contact = record.history[:, :, 2].ravel()
     system = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(model.stiffness), -model.damping]])
     load = np.zeros((2 * n, 2))
     load[n:] = np.column_stack([model.force_shape, -model.tip_shape])
     output = np.zeros((3, 2 * n))
     output[0, :n] = output[1, n:] = model.force_shape
     output[2, :n] = model.tip_shape
-    _, motion, _ = scipy.signal.lsim(
-        (system, load, output, np.zeros((3, 2))), np.column_stack([shaker, contact]), time, record.section[0]
-    )
-    tip_error = float(np.max(np.abs(motion[:, 2] - record.history[:, :, 0].ravel())))
+    forces = np.column_stack([shaker, record.history[:, :, 2].ravel()])
+    _, motion, _ = scipy.signal.lsim((system, load, output, np.zeros((3, 2))), forces, time, record.section[0])
+    displacement, velocity, tip = np.ascontiguousarray(motion.T)
+    return displacement, velocity, tip
+
+
+def force_point_motion(beam: ImpactBeam, transient: int) -> dict[str, Any]:
+    """Range of displacement [m] and velocity [m/s] of the point where the shaker pushes a beam."""
+    record = simulate(beam, MOTION_CYCLES, transient=transient, samples_per_cycle=MOTION_SAMPLES)
+    displacement, velocity, tip = follow_modes(record)
+    assert record.history is not None
     return {
-        "displacement": [float(motion[:, 0].min()), float(motion[:, 0].max())],
-        "velocity": [float(motion[:, 1].min()), float(motion[:, 1].max())],
-        "tip_error": tip_error,
+        "displacement": [float(displacement.min()), float(displacement.max())],
+        "velocity": [float(velocity.min()), float(velocity.max())],
+        "tip_error": float(np.max(np.abs(tip - record.history[:, :, 0].ravel()))),
     }

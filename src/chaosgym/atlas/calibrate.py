@@ -29,9 +29,6 @@ from chaosgym.version import __version__
 
 PLAN_FILE, JOURNAL_FILE, RESULT_FILE = "plan.json", "journal.log", "result.json"
 
-STARTUP_TRIALS = 60
-"""Random candidates before the estimator takes over."""
-
 PROMISING, EARLIEST = 0.15, 10
 """A candidate is given up unless its first stage is among this share of the earlier ones, once there are so many."""
 
@@ -224,7 +221,7 @@ def _search(
         while _goes_on(budget, len(finished), began):
             study.sampler = optuna.samplers.TPESampler(
                 seed=int(np.random.SeedSequence([seed, len(finished)]).generate_state(1)[0]),
-                multivariate=True, n_startup_trials=STARTUP_TRIALS,
+                multivariate=True, n_startup_trials=space.random_trials,
             )  # fmt: skip
             trial = study.ask()
             threshold = _threshold(finished)

@@ -28,14 +28,15 @@ def crank_angles(crank: SliderCrank, transient: int) -> dict[str, float | None]:
     """
     record = simulate(crank, ANGLE_CYCLES, transient=transient, samples_per_cycle=ANGLE_SAMPLES)
     assert record.history is not None
-    found = [_angles(np.abs(force)) for force in record.history[:, :, 2]]
+    found = [revolution_angles(np.abs(force)) for force in record.history[:, :, 2]]
     return {
         name: None if any(one[name] is None for one in found) else float(np.median([one[name] for one in found]))
         for name in found[0]
     }
 
 
-def _angles(force: NDArray[np.float64]) -> dict[str, Any]:
+def revolution_angles(force: NDArray[np.float64]) -> dict[str, Any]:
+    """Crank angles of one revolution, from the size of its contact force (samples,); see ``crank_angles``."""
     degree = 360.0 / len(force)
     half = len(force) // 2
     impulses = {

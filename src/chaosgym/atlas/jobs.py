@@ -8,7 +8,6 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -96,12 +95,11 @@ def _key(job: Job) -> str:
         "machine": job.machine.name,
         "parameters": {name: getattr(job.machine, name) for name in parameters_of(job.machine)},
         "settings": job.settings,
-        "sources": _digest(),
+        "sources": SOURCES,
     }
     return hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()[:32]
 
 
-@cache
 def _digest() -> str:
     root = Path(chaosgym.__file__).parent
     found = hashlib.sha256()
@@ -110,3 +108,7 @@ def _digest() -> str:
         for source in sorted(path.glob("*.py")) if path.is_dir() else [path]:
             found.update(source.read_bytes())
     return found.hexdigest()
+
+
+SOURCES = _digest()
+"""Digest of the sources at the time of import: those that run."""

@@ -1,8 +1,8 @@
 """What does a run look like to a reader of the thesis' figures? Its nature and the peak forces of 100 cycles.
 
 The thesis judges a response by the dots of its figures: one dot is periodic, a few are a subharmonic, a distribution is
-chaos (3.5.1). Two dots closer than the width of a dot are one; ``READING_ERROR`` is that width, for every figure. What
-the exact tests say is kept beside it.
+chaos (3.5.1). Two dots closer than the width of a dot are one; ``READING_ERROR`` is that width, for every figure. Dots
+that do not repeat are judged by the whole diagnosis. What the exact test says of the same cycles is kept beside it.
 """
 
 from collections.abc import Mapping
@@ -85,8 +85,9 @@ def observe(machine: Machine, effort: Effort) -> Observation:
         exact, settle = read, None
         if effort.budget:
             exact = two_step_test(settled)
-            read = diagnose(machine, budget=effort.budget, sensor_error=READING_ERROR)
             settle = two_step_test(record, sensor_error=READING_ERROR).settle_cycle
+            if read.nature != "periodic":
+                read = diagnose(machine, budget=effort.budget, sensor_error=READING_ERROR)
     except SimulationError:
         return Observation("failed")
     peaks = settled.peak_force[:, 0]

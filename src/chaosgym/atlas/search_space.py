@@ -70,12 +70,15 @@ class SearchSpace:
         Machine from the base and one value for each dimension; raises ``ParameterError`` if there is none.
     starts
         Candidates to try first; the first one gives the present constants.
+    random_trials
+        Candidates before the estimator takes over from chance: fewer where a candidate costs more.
     """
 
     base: Machine
     dimensions: tuple[Dimension, ...]
     build: Callable[[Any, Mapping[str, Any]], Machine]
     starts: tuple[Mapping[str, Any], ...]
+    random_trials: int
 
     def machine(self, values: Mapping[str, Any]) -> Machine:
         """Build the machine of one candidate."""
@@ -174,7 +177,11 @@ SEARCH_SPACES: Mapping[str, SearchSpace] = {
              "pivot_translational_stiffness": 3.6e7, "damping_family": "stiffness", "n_modes": 7},
             {"width": 25.4e-3, "force_position": 0.209, "shaker_mass": 0.1, "shaker_damping": 30.0,
              "pivot_translational_stiffness": 1e8, "damping_family": "uniform", "n_modes": 5},
+            {"width": 0.0210043483, "force_position": 0.2010367187, "shaker_mass": 0.1016893242,
+             "shaker_damping": 43.65022747, "pivot_translational_stiffness": 36299594.42, "damping_family": "stiffness",
+             "n_modes": 5},
         ),
+        60,
     ),
     SliderCrank.name: SearchSpace(
         THESIS_SLIDER_CRANK, _CRANK_FIELDS, _crank,
@@ -183,7 +190,11 @@ SEARCH_SPACES: Mapping[str, SearchSpace] = {
              "inertia_ratio": THESIS_SLIDER_CRANK.yoke_inertia / THESIS_SLIDER_CRANK.housing_inertia},
             {**_present(THESIS_SLIDER_CRANK, _CRANK_FIELDS), "slider_mass": 0.12, "yoke_mass": 0.26,
              "yoke_offset_along": 0.02, "inertia_ratio": 1.8},
+            {"slider_mass": 0.118758, "yoke_mass": 0.244289, "housing_mass": 0.545084,
+             "housing_offset_along": 0.0101523, "yoke_offset_along": 0.0114435, "inertia_ratio": 1.98658,
+             "damping_ratio": 0.0430875, "damping_family": "stiffness", "n_modes": 4, "geometric_stiffness": "off"},
         ),
+        20,
     ),
 }  # fmt: skip
 """By machine. Ranges and candidates: algebra on printed numbers, and fits that preceded this one."""

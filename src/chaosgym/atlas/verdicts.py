@@ -28,7 +28,6 @@ class Judged(NamedTuple):
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        statement = self.comparison.statement
         values = [_plain(finding.value) for finding in self.findings]
         return {
             "id": self.comparison.id,
@@ -36,7 +35,7 @@ class Judged(NamedTuple):
             "group": self.comparison.group,
             "printed": _plain(self.comparison.printed),
             "value": values[0] if len(values) == 1 else values or None,
-            "unit": statement.unit,
+            "unit": self.comparison.shown_unit,
             "tolerance": allowed(self.comparison),
             "verdict": self.verdict,
             "reason": self.reason,

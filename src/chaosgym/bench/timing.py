@@ -24,16 +24,16 @@ def timed_run(
     record : CycleRecord
         Equal to that of ``simulate(machine, cycles, transient=transient)``.
     seconds_per_cycle : float
-        Median computing time over blocks of the run; loading the compiled kernels is not counted.
+        Median processor time over blocks of the run; loading the compiled kernels is not counted.
     """
     simulate(machine, 1, integrator=integrator)
     state = simulate(machine, transient, integrator=integrator).final_state if transient else None
     record: CycleRecord | None = None
     seconds = []
     for block in np.array_split(np.arange(cycles), min(BLOCKS, cycles)):
-        start = time.perf_counter()
+        start = time.thread_time()
         part = simulate(machine, len(block), state, integrator=integrator)
-        seconds.append((time.perf_counter() - start) / len(block))
+        seconds.append((time.thread_time() - start) / len(block))
         record = part if record is None else record.followed_by(part)
         state = part.final_state
     assert record is not None

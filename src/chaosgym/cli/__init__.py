@@ -15,6 +15,7 @@ from chaosgym.cli.dataset import dataset
 from chaosgym.cli.demo import demo
 from chaosgym.cli.design import design
 from chaosgym.cli.diagnose import agreement, diagnose
+from chaosgym.cli.fidelity import stability, tradeoff
 from chaosgym.cli.figures import figures
 from chaosgym.cli.info import info
 from chaosgym.cli.scorecard import scorecard
@@ -32,7 +33,7 @@ def app() -> None:
 
 for command in (
     simulate, show, diagnose, agreement, classify, sweep, dataset, train_classifier, demo, design, figures, calibrate,
-    scorecard, info, bench,
+    scorecard, tradeoff, stability, info, bench,
 ):  # fmt: skip
     app.add_command(command)
 

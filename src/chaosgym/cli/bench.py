@@ -1,5 +1,6 @@
 """How fast is this computer? ``bench``."""
 
+from dataclasses import asdict
 from typing import Any
 
 import click
@@ -10,19 +11,30 @@ from chaosgym.cli.output import emit
 @click.command()
 @click.option("--repeats", type=click.IntRange(1, 100), default=5, show_default=True, help="Timed runs per figure.")
 @click.option("--against", type=click.Choice(["exudyn"]), help="Run the same machines there; needs chaosgym[peers].")
+@click.option("--scenes", is_flag=True, help="The scenes of the slider crank instead: degrees of freedom and cost.")
+@click.option("--set-up", "set_up", is_flag=True, help="The times to make a slider crank ready instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def bench(repeats: int, against: str | None, as_json: bool) -> None:
+def bench(repeats: int, against: str | None, scenes: bool, set_up: bool, as_json: bool) -> None:
     """Rates on this computer: cycles, environment steps, sweep points, classifier rows; or against a peer."""
-    if against is None:
-        from chaosgym.bench import benchmark
+    if (against is not None) + scenes + set_up > 1:
+        raise click.UsageError("--against, --scenes and --set-up exclude each other")
+    if against is not None:
+        from chaosgym.bench.against_exudyn import against_exudyn
 
-        result = benchmark(repeats, progress=True)
-        emit(result, as_json, lambda: _rates(result))
-        return
-    from chaosgym.bench.against_exudyn import against_exudyn
+        rows = against_exudyn(repeats=repeats, progress=True)
+        return emit({"against": against, "settings": rows}, as_json, lambda: _comparison(rows))
+    from chaosgym.bench import benchmark, scene_costs, set_up_times
 
-    rows = against_exudyn(repeats=repeats, progress=True)
-    emit({"against": against, "settings": rows}, as_json, lambda: _comparison(rows))
+    if scenes:
+        costs = scene_costs()
+        return emit({"scenes": [asdict(cost) for cost in costs]}, as_json, lambda: _scene_table(costs))
+    if set_up:
+        times = set_up_times(repeats)
+        return emit({"set_up_microseconds": times}, as_json, lambda: [
+            f"{name:40s} {value:10.1f} us" for name, value in times.items()
+        ])  # fmt: skip
+    result = benchmark(repeats, progress=True)
+    return emit(result, as_json, lambda: _rates(result))
 
 
 def _rates(result: dict[str, Any]) -> list[str]:
@@ -58,3 +70,13 @@ def _verdicts(row: dict[str, Any], side: str) -> str:
     wrong = ", ".join(f"{speed:g}" for speed in row["wrong_at"][side])
     share = f"  {row['right_class'][side]} ({row['right_period'][side]}) of {row['speeds']}"
     return share + (f", wrong at {wrong}" if wrong else "")
+
+
+def _scene_table(costs: list[Any]) -> list[str]:
+    head = f"{'slider crank, 200 rpm, 5 deg bins':41s} {'DOF':>3s}  {'method':11s} {'set-up':>9s} {'revolution':>12s}"
+    rows = [
+        f"{cost.scene:41s} {len(cost.degrees_of_freedom):3d}  {cost.method:11s} {1e3 * cost.setup:6.1f} ms "
+        f"{1e3 * cost.revolution:9.2f} ms"
+        for cost in costs
+    ]
+    return [head, *rows, "the degrees of freedom of a scene by name: chaosgym show slider-crank, and --json"]

@@ -16,11 +16,15 @@ STANDARD_GRAVITY = 9.81
 
 
 class Number(NamedTuple):
-    """A number: the field that it sets, its unit on the command line, and how many SI units that is."""
+    """A number: the field that it sets, its unit on the command line, and how many SI units that is.
+
+    ``joints`` are the words of ``--clearance-joint`` with which it makes sense; all if there are none.
+    """
 
     field: str
     unit: str
     factor: float = 1.0
+    joints: tuple[str, ...] = ()
 
 
 class Choice(NamedTuple):
@@ -28,6 +32,7 @@ class Choice(NamedTuple):
 
     words: Mapping[str, Mapping[str, Any]]
     redirects: Mapping[str, Mapping[str, str]] = {}
+    joints: tuple[str, ...] = ()
 
 
 _BALL_ALONE = {"slider_joint": "ideal", "gravity": STANDARD_GRAVITY}
@@ -50,13 +55,18 @@ MACHINE_OPTIONS: Mapping[str, Mapping[str, Number | Choice]] = {
                 "ball-instrumented": {"--clearance-mm": "ball_clearance"},
             },
         ),
+        "--slider-model": Choice(
+            {"plain": {"slider_joint": "clearance"}, "instrumented": {"slider_joint": "instrumented"}},
+            joints=("slider", "both"),
+        ),
         "--ball-model": Choice(
-            {"spherical": {"ball_joint": "spherical"}, "instrumented": {"ball_joint": "instrumented"}}
+            {"spherical": {"ball_joint": "spherical"}, "instrumented": {"ball_joint": "instrumented"}},
+            joints=("both",),
         ),
         "--gravity": Choice({"on": {"gravity": STANDARD_GRAVITY}, "off": {"gravity": 0.0}}),
         "--speed-rpm": Number("crank_speed", "rpm"),
         "--clearance-mm": Number("slider_clearance", "mm", 1e-3),
-        "--ball-clearance-mm": Number("ball_clearance", "mm", 1e-3),
+        "--ball-clearance-mm": Number("ball_clearance", "mm", 1e-3, ("ball-spherical", "ball-instrumented", "both")),
         "--motor-angle-deg": Number("motor_angle", "deg"),
         "--contact-damping-ratio": Number("contact_damping_ratio", "-"),
         "--friction": Number("friction_coefficient", "-"),
@@ -122,6 +132,9 @@ def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...]
     for option, kind in known.items():
         if option not in given:
             continue
+        joint = given.get("--clearance-joint", "slider")
+        if kind.joints and joint not in kind.joints:
+            raise click.UsageError(f"{option} goes with --clearance-joint {' or '.join(kind.joints)}, not with {joint}")
         if isinstance(kind, Choice):
             fields |= kind.words[given[option]]
             redirects |= kind.redirects.get(given[option], {})

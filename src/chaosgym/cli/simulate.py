@@ -25,21 +25,29 @@ def simulate(machine: Any, cycles: int, transient: int, as_json: bool) -> None:
         "contact_fraction": record.contact_fraction.sum(axis=1).tolist(),
         "seconds_per_cycle": seconds_per_cycle,
     }
+    sensors = dict(zip(getattr(machine, "sensors", ()), _largest(record.sensor_peak), strict=True))
+    if sensors:
+        result["largest_sensor_force_N"] = sensors
     emit(result, as_json, lambda: [
         f"{machine.name}: {cycles} cycles after {transient}",
         f"peak force, {machine.sides[0]} side   {peaks.min():.2f} to {peaks.max():.2f} N, mean {peaks.mean():.2f} N",
         f"last peaks                {' '.join(f'{peak:.2f}' for peak in peaks[-8:])}",
         f"impacts per cycle         {record.impacts.sum(axis=1).mean():.1f}",
         f"share in contact          {record.contact_fraction.sum(axis=1).mean():.2f}",
+        *(f"largest force, {name:16s} {force:.2f} N" for name, force in sensors.items()),
         f"computing time            {1e6 * seconds_per_cycle:.0f} us per cycle",
     ])  # fmt: skip
+
+
+def _largest(sensor_peak: Any) -> list[float]:
+    return [] if sensor_peak is None else [float(force) for force in sensor_peak.max(axis=0)]
 
 
 @click.command()
 @machine_command
 @click.option("--markdown", is_flag=True, help="Print the table of the documentation.")
 def show(machine: Any, markdown: bool, as_json: bool) -> None:
-    """Print every parameter of a machine with its unit and where the number comes from."""
+    """Print every parameter of a machine, where the number comes from, and what follows from them."""
     from chaosgym.machines.parameters import markdown_table, parameters_of
 
     if markdown:
@@ -58,6 +66,7 @@ def show(machine: Any, markdown: bool, as_json: bool) -> None:
         "parameters": {name: getattr(machine, name) for name in described},
         "natural_frequencies_hz": frequencies,
         "provenance": provenance,
+        **{name: getattr(machine, name) for name in ("degrees_of_freedom", "sensors") if hasattr(machine, name)},
     }
 
     def lines() -> list[str]:
@@ -68,6 +77,10 @@ def show(machine: Any, markdown: bool, as_json: bool) -> None:
             unit = "" if about.unit == "-" else about.unit
             origin = provenance[name]
             rows.append(f"{name:30s} {shown:>11s} {unit:8s} {origin['grade']:10s} {origin['source']}")
-        return [*rows, "natural frequencies [Hz]: " + ", ".join(f"{value:.1f}" for value in frequencies)]
+        rows.append("natural frequencies [Hz]: " + ", ".join(f"{value:.1f}" for value in frequencies))
+        for name in ("degrees_of_freedom", "sensors"):
+            if names := getattr(machine, name, ()):
+                rows.append(f"{len(names)} {name.replace('_', ' ')}: {', '.join(names)}")
+        return rows
 
     emit(result, as_json, lines)

@@ -29,6 +29,7 @@ try:
     from chaosgym.core import (  # noqa: F401
         batch,
         contact,
+        crank_fixed_step,
         crank_propagator,
         crank_stepper,
         fixed_step,

@@ -125,7 +125,7 @@ def crank_of(batch, bins, i):
     size = 2 * n + FORCING_TERMS + m
     sets = batch.radix[i] ** m
     return SliderCrankModel(
-        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.order[i], batch.span[i], batch.row[i],
+        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.order[i], batch.spectrum[i], batch.row[i],
         batch.gap[i], batch.stiffness[i], batch.damping[i], batch.two_sided[i], batch.radix[i], batch.reading[i],
         batch.reach[i], batch.display[i],
         carray(pointer(batch.acceleration[i]), (sets, bins, n, size), np.float64),

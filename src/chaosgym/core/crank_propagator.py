@@ -41,6 +41,15 @@ def series_order(phase: float) -> int:
 
 
 @leaf
+def order_for(phase, most):
+    """``series_order`` of a phase in a kernel, at most ``most``."""
+    order = 4
+    while order < most and SERIES_PHASE[order] < phase:
+        order += 1
+    return order
+
+
+@leaf
 def expand(a, row, z, duration, last, series):
     """Taylor coefficients about the instant of z, in seconds, up to the order ``last``.
 

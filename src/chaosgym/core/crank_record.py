@@ -61,12 +61,20 @@ def write_peaks(peak, arrays, cycle):
 
 
 @leaf
-def note_channel(peak, positive, h, f0, r0, f1, r1):
-    """Raise the peak (2,) of a channel to its largest force in a step, by the cubic through both ends of it."""
+def channel_force(surface, s, reading, j):
+    """Force of channel j, closed on side s, and its rate."""
+    k, d = surface[j, STIFFNESS], surface[j, DAMPING]
+    force = k * (s * reading[0, j] - surface[j, GAP]) + d * s * reading[1, j]
+    return force, s * (k * reading[1, j] + d * reading[2, j])
+
+
+@leaf
+def channel_crest(h, f0, r0, f1, r1):
+    """(Instant, size) of the largest force of a step, by the cubic through both ends of it; -1 if it is at an end."""
     crest = cubic_extremum(f0, r0, f1, r1, h, -1.0) if r0 > 0.0 and r1 < 0.0 else -1.0
-    top = max(f0, f1) if crest <= 0.0 else cubic(f0, r0, f1, r1, h, crest)[0]
-    column = 0 if positive else 1
-    peak[column] = max(peak[column], top)
+    if crest <= 0.0:
+        return -1.0, max(f0, f1)
+    return crest, cubic(f0, r0, f1, r1, h, crest)[0]
 
 
 @leaf
@@ -96,19 +104,6 @@ def joint_force(surface, side, reading):
             ry += surface[j, UP] * rate
             rz += surface[j, SIDEWAYS] * rate
     return resultant(fx, fy, fz, rx, ry, rz)
-
-
-@leaf
-def note_channels(surface, side, h, start, end, channel_peak):
-    """Raise the peaks (m, 2) of the closed channels over a step."""
-    for j in range(channel_peak.shape[0]):
-        s = side[j]
-        if s != 0.0:
-            k, d, gap = surface[j, STIFFNESS], surface[j, DAMPING], surface[j, GAP]
-            f0 = k * (s * start[0, j] - gap) + d * s * start[1, j]
-            f1 = k * (s * end[0, j] - gap) + d * s * end[1, j]
-            r0, r1 = s * (k * start[1, j] + d * start[2, j]), s * (k * end[1, j] + d * end[2, j])
-            note_channel(channel_peak[j], s > 0.0, h, f0, r0, f1, r1)
 
 
 @leaf

@@ -21,12 +21,13 @@ from numba import njit
 from chaosgym.core import status
 from chaosgym.core.crank_record import (
     begin_cycle,
+    channel_crest,
     crest_instant,
-    note_channel,
     note_peak,
     note_share,
     resultant,
     write_peaks,
+    write_sample,
 )
 from chaosgym.core.impact_beam import LOWER, UPPER, cubic, cubic_extremum, note_touch
 from chaosgym.core.slider_crank import RUNAWAY
@@ -217,7 +218,8 @@ def note_joints(model, h, z, dz, moved, dz_moved, closed, direction, channel_pea
             f0, r0 = push_of(model, j, z, dz, direction)
             f1, r1 = push_of(model, j, moved, dz_moved, direction)
             positive = not model.two_sided[j] or direction[model.first[j]] > 0.0
-            note_channel(channel_peak[j], positive, h, f0, r0, f1, r1)
+            column = 0 if positive else 1
+            channel_peak[j, column] = max(channel_peak[j, column], channel_crest(h, f0, r0, f1, r1)[1])
 
 
 @njit(cache=True, inline="always")
@@ -295,14 +297,8 @@ def state_within(h, t, z, dz, moved, dz_moved, inner):
 @njit(cache=True, inline="always")
 def take_sample(model, h, t, z, dz, moved, dz_moved, inner, closed, direction, sample):
     """Write displacement, velocity and signed resultant (positive where it points up) at t in a step of length h."""
-    n = model.display.shape[0]
     state_within(h, t, z, dz, moved, dz_moved, inner)
-    sample[0], sample[1] = 0.0, 0.0
-    for i in range(n):
-        sample[0] += model.display[i] * inner[i]
-        sample[1] += model.display[i] * inner[n + i]
-    force = joint_force(model, inner, dz, closed, direction)
-    sample[2] = math.copysign(force[1], force[0])
+    write_sample(model.display, inner, joint_force(model, inner, dz, closed, direction), sample)
 
 
 @njit(cache=True, inline="always")

@@ -45,11 +45,20 @@ def _slope(model, state, sine, slope):
     return force
 
 
+@njit(cache=True, inline="always")
+def _sample(model, state, history, cycle, sample):
+    """Write tip displacement, velocity and contact force."""
+    x, v = tip_of_state(model, state)
+    history[cycle, sample, 0] = x
+    history[cycle, sample, 1] = v
+    history[cycle, sample, 2] = surface_force(model, x, v)
+
+
 @njit(cache=True, nogil=True)
 def advance_fixed_step(model, state, episode, arrays, steps):
     """Advance ``state`` and ``episode`` by whole cycles of ``steps`` equal steps; see ``impact_beam.advance``.
 
-    Peaks and samples are taken at the ends of steps.
+    Peaks and samples are taken at the ends of steps, a sample at the next one after its instant.
     """
     n2 = state.shape[0]
     omega = 2.0 * math.pi * model.excitation_frequency
@@ -73,10 +82,7 @@ def advance_fixed_step(model, state, episode, arrays, steps):
         before = surface_force(model, arrays.tip[cycle, 0], arrays.tip[cycle, 1])
         for step in range(steps):
             while sample < samples and sample * steps <= step * samples:
-                x, v = tip_of_state(model, state)
-                arrays.history[cycle, sample, 0] = x
-                arrays.history[cycle, sample, 1] = v
-                arrays.history[cycle, sample, 2] = surface_force(model, x, v)
+                _sample(model, state, arrays.history, cycle, sample)
                 sample += 1
             sine0 = math.sin(omega * h * step)
             sine1 = math.sin(omega * h * (step + 0.5))
@@ -104,6 +110,9 @@ def advance_fixed_step(model, state, episode, arrays, steps):
                     arrays.impacts[cycle, column] += 1
                     note_touch(episode, side, (step + 1) * h, arrays.bounce_time[cycle])
             before = force
+        while sample < samples:
+            _sample(model, state, arrays.history, cycle, sample)
+            sample += 1
         arrays.events[cycle] = 0
         if not abs(x) < RUNAWAY:
             return status.DIVERGED, cycle

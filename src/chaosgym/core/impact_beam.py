@@ -25,6 +25,7 @@ from numba import njit
 
 from chaosgym.core import status
 from chaosgym.core.contact import pressing_force
+from chaosgym.core.kernel import leaf
 from chaosgym.core.propagator import Regimes, move, nudge, safe_time, step_table, with_force
 from chaosgym.core.tangent import carry, orthonormalise, touch
 
@@ -228,7 +229,7 @@ def matters(model, regimes, tip_state, r, j, u, curvature1, curvature2):
     return size2 > NEGLIGIBLE * curvature1 or (tip_state == DETACHED and force_curvature > NEGLIGIBLE * curvature2)
 
 
-@njit(cache=True)
+@leaf
 def rate_that_matters(model, regimes, tip_state, r, u, curvature1, curvature2, slowest):
     """Rate [1/s] of the fastest modal coordinate that ``matters``, at least ``slowest``."""
     rate = slowest
@@ -247,7 +248,7 @@ def cubic(e0, d0, e1, d1, h, t):
     return e0 + s * (h * d0 + s * (b + s * c)), d0 + s * (2.0 * b + 3.0 * s * c) / h
 
 
-@njit(cache=True)
+@leaf
 def cubic_extremum(e0, d0, e1, d1, h, sign):
     """Instant in (0, h) of the cubic's minimum (sign +1) or maximum (sign -1), or -1 if it has none there."""
     b = sign * (3.0 * (e1 - e0) - h * (2.0 * d0 + d1))
@@ -263,7 +264,7 @@ def cubic_extremum(e0, d0, e1, d1, h, sign):
     return s * h if 0.0 < s < 1.0 else -1.0
 
 
-@njit(cache=True)
+@leaf
 def suspect(e0, d0, e1, d1, h, doubt):
     """End of the interval in (0, h] where e may have fallen to zero, or -1 if it surely has not.
 
@@ -277,7 +278,7 @@ def suspect(e0, d0, e1, d1, h, doubt):
     return -1.0
 
 
-@njit(cache=True)
+@leaf
 def locate(model, regimes, tip_state, side, which, u, moved, h, until, safe, e0, d0, e1, d1, fastest, tolerance):
     """Instant in [safe, until] at which event function ``which`` falls to zero, or inf if it only comes close.
 
@@ -341,7 +342,7 @@ def locate(model, regimes, tip_state, side, which, u, moved, h, until, safe, e0,
     return t
 
 
-@njit(cache=True)
+@leaf
 def crest(model, regimes, side, u, moved, h, f0, r0, f1, r1, peak):
     """Largest force of a step that starts rising and ends falling, if it exceeds ``peak``; else ``peak``."""
     t = cubic_extremum(f0, r0, f1, r1, h, -1.0)
@@ -354,7 +355,7 @@ def crest(model, regimes, side, u, moved, h, f0, r0, f1, r1, peak):
     return max(peak, force - 0.5 * rate * rate / bend)
 
 
-@njit(cache=True)
+@leaf
 def sample_motion(model, regimes, tip_state, side, u, moved, time, sample):
     """Write tip displacement, velocity and contact force (upward force of the tip positive) at ``time``."""
     r = PRESSED if tip_state == CONTACT else FREE
@@ -365,7 +366,7 @@ def sample_motion(model, regimes, tip_state, side, u, moved, time, sample):
     sample[2] = side * max(0.0, pressing(model, side, x, v, a)[0]) if tip_state == CONTACT else 0.0
 
 
-@njit(cache=True)
+@leaf
 def enter_regime(model, regimes, tip_state, side, state, cosine, sine, u):
     """Modal coordinates u of a physical state at a phase of the force."""
     r = PRESSED if tip_state == CONTACT else FREE
@@ -378,7 +379,7 @@ def enter_regime(model, regimes, tip_state, side, state, cosine, sine, u):
     u[n2], u[n2 + 1] = cosine, sine
 
 
-@njit(cache=True)
+@leaf
 def leave_regime(model, regimes, tip_state, side, u, state):
     """Physical state of modal coordinates u; u is overwritten."""
     r = PRESSED if tip_state == CONTACT else FREE
@@ -568,7 +569,7 @@ def advance(model, state, episode, arrays, step_phase, event_tolerance, event_bu
     return status.OK, arrays.section.shape[0]
 
 
-@njit(cache=True)
+@leaf
 def note_touch(episode, side, time, bounce_time):
     """Extend the episode of bouncing, or close it and start the next one when the other surface is touched."""
     if episode.side[0] != side:

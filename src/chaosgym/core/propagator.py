@@ -16,6 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from chaosgym.core.kernel import leaf
+
 
 class Regimes(NamedTuple):
     """R linear regimes of one system with n degrees of freedom, each in its own m modal blocks.
@@ -137,7 +139,7 @@ def step_table(regimes, shortest, levels):
     return table
 
 
-@njit(cache=True)
+@leaf
 def move(regimes, r, u, time, moved):
     """moved = exp(B time) u, for any time."""
     for j in range(regimes.rotates.shape[1]):
@@ -146,7 +148,7 @@ def move(regimes, r, u, time, moved):
         moved[2 * j + 1] = e21 * u[2 * j] + e22 * u[2 * j + 1]
 
 
-@njit(cache=True)
+@leaf
 def nudge(regimes, r, u, time):
     """u = exp(B time) u in place by a Taylor series of order five: for times well below 1 / fastest."""
     for j in range(regimes.rotates.shape[1]):

@@ -33,8 +33,13 @@ from chaosgym.core.tangent import carry, orthonormalise
 CHATTER_PHASE = 0.01
 """Angle [rad] of the faster of force and beam within which the bounces that are left out would be over."""
 
-SHORT_FLIGHT = 0.02
+SHORT_FLIGHT = 0.5
 """Longest flight, as an angle [rad] of the faster of force and beam, that the Taylor series sums to rounding."""
+
+SERIES_TERMS = 13
+"""Terms of that series: the first one left out is 1e-14 of the flight's height."""
+
+FACTORIAL = tuple(float(math.factorial(k)) for k in range(SERIES_TERMS + 1))
 
 FORGOTTEN = 1e-12
 """What rest on a surface leaves of a deviation: nothing; this keeps its logarithm finite."""
@@ -81,32 +86,37 @@ def acceleration(tip, x, v, time):
 
 
 @njit(cache=True)
-def short_flight(tip, v, a, time, t):
-    """Way and velocity after a short time t, from x, v, a: a Taylor series to the sixth power."""
-    sine, cosine = math.sin(tip.omega * time), math.cos(tip.omega * time)
-    w2 = tip.omega * tip.omega
-    a1 = -tip.spring * v - tip.damper * a + tip.load * tip.omega * cosine
-    a2 = -tip.spring * a - tip.damper * a1 - tip.load * w2 * sine
-    a3 = -tip.spring * a1 - tip.damper * a2 - tip.load * w2 * tip.omega * cosine
-    a4 = -tip.spring * a2 - tip.damper * a3 + tip.load * w2 * w2 * sine
-    way = t * (v + t / 2 * (a + t / 3 * (a1 + t / 4 * (a2 + t / 5 * (a3 + t / 6 * a4)))))
-    velocity = v + t * (a + t / 2 * (a1 + t / 3 * (a2 + t / 4 * (a3 + t / 5 * a4))))
-    return way, velocity
+def expand(tip, v, a, time, series):
+    """Taylor series of the way from a surface, divided by t: derivative k + 1 of the displacement over (k + 1)!."""
+    sine, cosine = tip.load * math.sin(tip.omega * time), tip.load * math.cos(tip.omega * time)
+    series[0], series[1] = v, 0.5 * a
+    before, last = v, a
+    for k in range(2, series.shape[0]):
+        sine, cosine = tip.omega * cosine, -tip.omega * sine
+        before, last = last, -tip.spring * before - tip.damper * last + sine
+        series[k] = last / FACTORIAL[k + 1]
+
+
+@njit(cache=True, inline="always")
+def short_flight(series, t):
+    """Way over time, and velocity, after a time t."""
+    mean, velocity = 0.0, 0.0
+    for k in range(series.shape[0] - 1, -1, -1):
+        mean = mean * t + series[k]
+        velocity = velocity * t + (k + 1) * series[k]
+    return mean, velocity
 
 
 @njit(cache=True)
-def landing(tip, v, a, time):
-    """Duration of a short flight that leaves a surface with v against a, or inf if it does not come back soon.
-
-    Newton's method on the mean velocity, way over time.
-    """
-    guess = -2.0 * v / a
+def landing(series):
+    """Duration of a short flight, or inf if it does not come back soon: Newton's method on way over time."""
+    guess = -series[0] / series[1]
     t = guess
     for _ in range(8):
-        way, velocity = short_flight(tip, v, a, time, t)
-        if velocity * a <= 0.0:
+        mean, velocity = short_flight(series, t)
+        if velocity * series[1] <= 0.0:
             return math.inf
-        change = -way / (velocity - way / t)
+        change = -mean * t / (velocity - mean)
         t += change
         if not 0.0 < t < 2.0 * guess:
             return math.inf
@@ -207,17 +217,18 @@ def long_flight(model, regimes, tip, x, v, time, remaining, step_phase, u, moved
 
 
 @njit(cache=True)
-def fly(model, regimes, tip, x, v, time, remaining, step_phase, u, moved, spare):
+def fly(model, regimes, tip, x, v, time, remaining, step_phase, u, moved, spare, series):
     """From x, v to the next surface or for ``remaining`` seconds: (elapsed, side or 0, x, v)."""
     side = 1.0 if x > 0.0 else -1.0
     a = acceleration(tip, x, v, time)
     if abs(x) == model.clearance and side * v < 0.0 < side * a:
         guess = -2.0 * v / a
-        if 2.0 * guess * tip.fastest < SHORT_FLIGHT and abs(v) * guess < model.clearance:
-            t = landing(tip, v, a, time)
+        if guess * tip.fastest < SHORT_FLIGHT and abs(v) * guess < model.clearance:
+            expand(tip, v, a, time, series)
+            t = landing(series)
             if t < math.inf:
-                way, velocity = short_flight(tip, v, a, time, min(t, remaining))
-                return (t, side, x, velocity) if t <= remaining else (remaining, 0.0, x + way, velocity)
+                mean, velocity = short_flight(series, min(t, remaining))
+                return (t, side, x, velocity) if t <= remaining else (remaining, 0.0, x + mean * remaining, velocity)
     return long_flight(model, regimes, tip, x, v, time, remaining, step_phase, u, moved, spare)
 
 
@@ -298,7 +309,7 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
     regimes = with_force(model.regimes, model.force_amplitude, omega)
     load = shape * model.force_shape[0] * model.force_amplitude
     tip = Tip(model.stiffness[0], model.damping[0, 0], load, omega, regimes.fastest[0], 1.0 / shape**2)
-    u, moved, spare = np.empty(4), np.empty(4), np.empty(4)
+    u, moved, spare, series = np.empty(4), np.empty(4), np.empty(4), np.empty(SERIES_TERMS)
 
     for cycle in range(arrays.section.shape[0]):
         arrays.section[cycle] = state
@@ -357,7 +368,7 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
                     note_touch(episode, side, time + elapsed, arrays.bounce_time[cycle])
             else:
                 elapsed, struck, x1, v1 = fly(model, regimes, tip, x, v, time, period - time, step_phase, u, moved,
-                                              spare)  # fmt: skip
+                                              spare, series)  # fmt: skip
                 last = struck == 0.0
                 if touched:
                     arrays.contact_time[cycle, column] += min(elapsed, model.contact_duration)

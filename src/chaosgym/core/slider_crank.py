@@ -21,7 +21,6 @@ from numba import njit
 
 from chaosgym.core import status
 from chaosgym.core.crank_contact import (
-    DAMPING,
     GAP,
     REACH,
     STIFFNESS,
@@ -33,14 +32,15 @@ from chaosgym.core.crank_contact import (
     polynomial,
     surfaces,
 )
-from chaosgym.core.crank_propagator import FORCING_TERMS, evaluate, expand, propagate
+from chaosgym.core.crank_propagator import FORCING_TERMS, evaluate, expand, order_for, propagate
 from chaosgym.core.crank_record import (
     begin_cycle,
+    channel_crest,
+    channel_force,
     column_of,
     crest_instant,
     joint_force,
     monitored,
-    note_channels,
     note_peak,
     note_share,
     write_peaks,
@@ -68,9 +68,9 @@ class SliderCrankModel(NamedTuple):
     contact_rate : float
         Angular frequency of the masses next to the closed contacts [rad/s].
     order : int
-        Order of the Taylor series that covers a step.
-    span : (64 + 1,)
-        Longest time [s] that a Taylor series of each order sums to round-off; no end from ``order`` on.
+        Order of the Taylor series that sums a step to round-off.
+    spectrum : float
+        Largest modulus of an eigenvalue of the motion [1/s].
     row : (m, n)
         Displacement of each channel per unit coordinate.
     gap, stiffness, damping : (m,)
@@ -98,7 +98,7 @@ class SliderCrankModel(NamedTuple):
     steps: int
     contact_rate: float
     order: int
-    span: np.ndarray
+    spectrum: float
     row: np.ndarray
     gap: np.ndarray
     stiffness: np.ndarray
@@ -256,11 +256,10 @@ def quiet_steps(
                 if reach + doubt >= gap:
                     return count
                 continue
-            k, d, s = surface[j, STIFFNESS], surface[j, DAMPING], side[j]
-            r0, r1 = s * (k * start[1, j] + d * start[2, j]), s * (k * end[1, j] + d * end[2, j])
-            f0 = k * (s * start[0, j] - gap) + d * s * start[1, j]
-            f1 = k * (s * end[0, j] - gap) + d * s * end[1, j]
-            turn = k * doubt
+            s = side[j]
+            f0, r0 = channel_force(surface, s, start, j)
+            f1, r1 = channel_force(surface, s, end, j)
+            turn = surface[j, STIFFNESS] * doubt
             if r0 * r1 < 0.0:
                 turn += swing * (abs(r0) + abs(r1))
             if min(f0, f1) - turn <= 0.0:
@@ -282,15 +281,6 @@ def quiet_steps(
 
 
 @leaf
-def order_for(span, h):
-    """Order of the Taylor series that covers a time h."""
-    last = 4
-    while span[last] < h:
-        last += 1
-    return last
-
-
-@leaf
 def write_samples(display, surface, side, z, spare, series, last, since, until, spacing, sample, history):
     """Write the samples of a revolution that fall into the expanded step [since, until); the number of the next one.
 
@@ -303,6 +293,25 @@ def write_samples(display, surface, side, z, spare, series, last, since, until, 
         write_sample(display, z, joint_force(surface, side, spare), history[sample])
         sample += 1
     return sample
+
+
+@leaf
+def note_channels(surface, side, start, end, spare, series, last, since, h, channel_peak):
+    """Raise the peaks (m, 2) of the closed channels, or of none if there are no rows, over h of an expanded step.
+
+    ``since`` is where the piece begins in the step; ``spare`` is overwritten.
+    """
+    for j in range(channel_peak.shape[0]):
+        s = side[j]
+        if s != 0.0:
+            f0, r0 = channel_force(surface, s, start, j)
+            f1, r1 = channel_force(surface, s, end, j)
+            crest, top = channel_crest(h, f0, r0, f1, r1)
+            column = 0 if s > 0.0 else 1
+            if crest > 0.0 and top > 0.99 * channel_peak[j, column]:
+                read_series(series, last, since + crest, spare)
+                top = channel_force(surface, s, spare, j)[0]
+            channel_peak[j, column] = max(channel_peak[j, column], top)
 
 
 @leaf
@@ -334,11 +343,11 @@ def careful_step(
         if before[1] + force[1] > 0.0:
             note_share(before, force, length, contact_time)
             note_peak(peak, now + high, force)
-            note_channels(surface, side, length, start, end, channel_peak)
             crest, size = crest_instant(length, before, force)
             if size > 0.99 * peak[UPPER if force[0] > 0.0 else LOWER, 0]:
                 read_series(series, last, done + crest, spare)
                 note_peak(peak, now + done + crest, joint_force(surface, side, spare))
+        note_channels(surface, side, start, end, spare, series, last, done, length, channel_peak)
         done = high
         if changed >= 0:
             return changed, done
@@ -368,7 +377,7 @@ def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
     """
     z, moved, side, start, end, spare = motion.z, motion.moved, motion.side, motion.start, motion.end, motion.spare
     series, until, towards = motion.series, motion.until, motion.towards
-    row, display, span, acceleration = model.row, model.display, model.span, model.acceleration
+    row, display, acceleration = model.row, model.display, model.acceleration
     propagator, curvatures = model.propagator, model.curvature
     history, impacts, bounce_time = arrays.history[cycle], arrays.impacts[cycle], arrays.bounce_time[cycle]
     channel_peak, contact_time = arrays.channel_peak[cycle], arrays.contact_time[cycle]
@@ -411,7 +420,7 @@ def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
                 if taken == limit:
                     continue
             h = (done + 1) * step - time
-            last = order_for(span, h)
+            last = order_for(model.spectrum * h, order)
             expand(acceleration[chosen, b], row, z, duration, last, series)
             changed, h = careful_step(
                 surface, side, start, end, spare, series, last, until, towards, begin + time, h,

@@ -46,11 +46,14 @@ class PeakImpactDiagram:
         [N].
     unit
         "m" along a guide, "deg" around a bearing, or "deg of the cycle" where the contact stays in one place.
+    elevation : (impacts,) or None
+        Around a ball joint that moves in space: how far [deg] each impact leans out of the plane of ``location``.
     """
 
     location: Array
     force: Array
     unit: str
+    elevation: Array | None = None
 
     @property
     def spread(self) -> float:
@@ -90,8 +93,12 @@ def peak_impacts(
     if record.peak_vector is None:
         return PeakImpactDiagram(np.degrees(_unrolled(phase) - _middle(phase)), peaks, "deg of the cycle")
     machine: Any = record.machine
-    place, unit = machine.bearing_place(phase, record.peak_vector[hit, sides])
-    return PeakImpactDiagram(np.degrees(_unrolled(np.radians(place))) if unit == "deg" else place, peaks, unit)
+    vector = record.peak_vector[hit, sides]
+    place, unit = machine.bearing_place(phase, vector)
+    if unit == "m":
+        return PeakImpactDiagram(place, peaks, unit)
+    elevation = np.degrees(np.arcsin(vector[:, 2] / peaks)) if np.any(vector[:, 2]) else None
+    return PeakImpactDiagram(np.degrees(_unrolled(np.radians(place))), peaks, unit, elevation)
 
 
 def worn_side(record: CycleRecord, exponent: float = LIFE_EXPONENT) -> int | None:

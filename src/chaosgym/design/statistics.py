@@ -37,6 +37,9 @@ CONFIDENCE_FACTOR = 1.96
 MOST_LEVELS = 16
 """Values that repeat exactly up to which each is a mode of its own."""
 
+SAME_FORCE = 1e-4
+"""Spread, as a share of the largest force, below which all forces are one."""
+
 MODE_SIGNIFICANCE = 3.0
 """Standard errors of the estimated density by which a mode must stand out."""
 
@@ -213,7 +216,7 @@ def histogram(forces: ArrayLike, bins: int | None = None) -> Histogram:
     """
     values = as_forces(forces)
     low, high = float(np.min(values)), float(np.max(values))
-    if high - low <= 1e-6 * high:
+    if high - low <= SAME_FORCE * high:
         margin = 0.5e-2 * high or 0.5
         return Histogram(
             np.array([low - margin, high + margin]), np.array([len(values)]), np.array([float(np.mean(values))])

@@ -9,7 +9,7 @@ from chaosgym.design.brief import DesignBrief
 from chaosgym.design.fatigue import equivalent_force_of_history
 from chaosgym.design.improve import Improvement, improve
 from chaosgym.design.methodology import Assessment, assess
-from chaosgym.design.peak_impacts import PeakImpactDiagram, peak_impacts, worn_side
+from chaosgym.design.peak_impacts import PeakImpactDiagram, filling_cycles, peak_impacts, worn_side
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
 from chaosgym.design.trends import HISTORY_SAMPLES, LifeTrend, life_against
 from chaosgym.diagnosis import ResponseMap, response_map
@@ -61,6 +61,11 @@ class DesignStudy:
     force_of_every_impact: float
     seed: int
 
+    @property
+    def cycles_to_fill(self) -> int | None:
+        """Cycles after which the Peak Impact Diagram has taken shape (5.4.3); None if it has not, or has no impact."""
+        return filling_cycles(self.diagram) if len(self.diagram.force) else None
+
     def lines(self) -> list[str]:
         """Return lines for people."""
         found, best = self.assessment, self.improvement.best if self.improvement is not None else None
@@ -104,7 +109,9 @@ class DesignStudy:
                 "highest": _finite(self.life_over_speed.highest),
             },
             "force_of_every_impact_N": self.force_of_every_impact,
-            "peak_impacts": {"spread": self.diagram.spread, "unit": self.diagram.unit},
+            "peak_impacts": {
+                "spread": self.diagram.spread, "unit": self.diagram.unit, "cycles_to_fill": self.cycles_to_fill,
+            },
         }  # fmt: skip
 
 

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 def flexibility(resolution: float) -> Mapping[str, Computation]:
     """Three lengths at the tiny clearance."""
-    values = steps(1.0, 30.0, 0.1 / resolution)
+    values = steps(1.0, 30.0, 0.15 / resolution)
     return {
         f"{1e3 * length:g}": sweep(
             replace(BEAM, clearance=TINY, length=length), "excitation_frequency", values, cycles=50, transient=150

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 def force_against_frequency(resolution: float) -> Mapping[str, Computation]:
     """Both halves of figure 3.8."""
-    values = steps(1.0, 30.0, 0.25 / resolution, 18.0, 19.0, 20.0, 29.0)
+    values = steps(1.0, 30.0, 0.5 / resolution, 18.0, 19.0, 20.0, 29.0)
     return {
         name: sweep(replace(BEAM, clearance=clearance), "excitation_frequency", values)
         for name, clearance in (("a", SMALL), ("b", LARGE))

@@ -25,7 +25,7 @@ def beam_map(resolution: float) -> Mapping[str, Computation]:
     shares = steps(0.005, 0.05, 0.005 / resolution)
     return {
         "map": Types(
-            machine=BEAM, speeds=steps(2.0, 30.0, 1.0 / resolution), clearances=tuple(unit * share for share in shares)
+            machine=BEAM, speeds=steps(2.0, 30.0, 2.0 / resolution), clearances=tuple(unit * share for share in shares)
         )
     }
 

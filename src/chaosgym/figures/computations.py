@@ -8,20 +8,17 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import scipy.signal
 from numpy.typing import NDArray
 
+from chaosgym.atlas.beam_runs import follow_modes
+from chaosgym.atlas.observation import READING_ERROR
 from chaosgym.design.peak_impacts import peak_impacts, worn_side
 from chaosgym.diagnosis import response_map, two_step_test
 from chaosgym.errors import SimulationError
 from chaosgym.machines import ImpactBeam, Machine
-from chaosgym.machines.impact_beam import modal_analysis
 from chaosgym.simulation import CycleRecord, parallel_map, simulate
 
 Array = NDArray[np.float64]
-
-READING_ERROR = 0.5
-"""Half the width of a dot of the figures [N]: peak forces closer than a dot are one to the reader."""
 
 Data = Mapping[str, NDArray[Any]]
 """Arrays by name; every computation documents its own."""
@@ -67,10 +64,7 @@ def _history(record: CycleRecord) -> dict[str, NDArray[Any]]:
 
 @dataclass(frozen=True, kw_only=True)
 class ForcePointHistory:
-    """Motion of an impact beam where the shaker pushes.
-
-    The recorded contact force and the shaker's force drive the linear modes from the state in which the record begins;
-    nothing is integrated twice but the forces in between the samples, which are taken as straight lines.
+    """Motion of an impact beam where the shaker pushes; see ``follow_modes``.
 
     Gives what ``History`` gives, with ``displacement`` and ``velocity`` of the force point, and beside them
     ``tip_displacement`` of the kernel and ``tip_check``, the same by this route.
@@ -85,23 +79,8 @@ class ForcePointHistory:
         """Simulate, and follow the modes."""
         record = simulate(self.machine, self.cycles, transient=self.transient, samples_per_cycle=self.samples)
         data = _history(record)
-        modes = modal_analysis(self.machine)
-        n = self.machine.n_modes
-        rate = 2.0 * np.pi * self.machine.excitation_frequency
-        shaker = self.machine.force_amplitude * np.sin(rate * data["time"])
-        system = np.block(
-            [[np.zeros((n, n)), np.eye(n)], [-np.diag(modes.angular_frequency**2), -modes.damping]]
-        )  # fmt: skip
-        inputs = np.zeros((2 * n, 2))
-        inputs[n:, 0], inputs[n:, 1] = modes.force_shape, -modes.tip_shape
-        outputs = np.zeros((3, 2 * n))
-        outputs[0, :n], outputs[1, n:], outputs[2, :n] = modes.force_shape, modes.force_shape, modes.tip_shape
-        _, followed, _ = scipy.signal.lsim(
-            (system, inputs, outputs, np.zeros((3, 2))),
-            np.column_stack([shaker, data["force"]]), data["time"], record.section[0],
-        )  # fmt: skip
         data["tip_displacement"] = data["displacement"]
-        data["displacement"], data["velocity"], data["tip_check"] = (np.ascontiguousarray(row) for row in followed.T)
+        data["displacement"], data["velocity"], data["tip_check"] = follow_modes(record)
         return data
 
 

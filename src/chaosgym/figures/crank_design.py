@@ -26,7 +26,7 @@ from chaosgym.figures.crank import (
 from chaosgym.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
 from chaosgym.figures.findings import compare_response
 from chaosgym.figures.panels import CRANK_SPEED, UPPER, histogram_panel, impact_panel, side_peaks
-from chaosgym.figures.printed import printed
+from chaosgym.figures.printed import printed, within
 from chaosgym.plotting import thesis
 
 HISTOGRAM_CLEARANCES = (SMALL, MIDDLE, WIDE)
@@ -108,7 +108,7 @@ def ball_spread(parts: Parts) -> Sequence[Finding]:
         wanted, here = 180.0 * printed(target).low, float(np.ptp(parts[name]["location"]))
         found.append(
             Finding(f"{text}: impacts spread over {wanted:.0f} deg", f"{here:.0f} deg",
-                    abs(here / wanted - 1.0) <= 0.15, (target,), "clearance" if name == "b" else "")
+                    within(target, here / 180.0), (target,), "clearance" if name == "b" else "")
         )  # fmt: skip
     return found
 
@@ -138,8 +138,8 @@ def guide_spread(parts: Parts) -> Sequence[Finding]:
     """Length of guide over which the impacts spread."""
     wanted, here = printed("SSC-124").low, 1e3 * float(np.ptp(parts["cloud"]["location"]))
     return [
-        Finding(f"impacts spread over {wanted:g} mm of the guide", f"{here:.2g} mm",
-                abs(here / wanted - 1.0) <= 0.15, ("SSC-124",))
+        Finding(f"impacts spread over {wanted:g} mm of the guide", f"{here:.1f} mm",
+                within("SSC-124", here), ("SSC-124",))
     ]  # fmt: skip
 
 

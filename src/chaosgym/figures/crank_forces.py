@@ -22,7 +22,7 @@ RUBBING = slider(SMALL, contact_damping_ratio=LOW_DAMPING, friction_coefficient=
 def over_speed(resolution: float, **machines: SliderCrank) -> Mapping[str, Computation]:
     """Peak forces from 100 to 300 rpm."""
     printed_speeds = [float(speed) for speed in range(100, 301, 10)]
-    values = steps(100.0, 300.0, 5.0 / resolution, *printed_speeds)
+    values = steps(100.0, 300.0, 10.0 / resolution, *printed_speeds)
     return {name: sweep(machine, "crank_speed", values) for name, machine in machines.items()}
 
 

@@ -86,8 +86,8 @@ def ball_map(resolution: float) -> Mapping[str, Computation]:
     """Ball joint over speed and clearance."""
     machines = tuple(
         ball(clearance, crank_speed=speed)
-        for speed in steps(60.0, 340.0, 20.0 / resolution)
-        for clearance in (SMALL, MIDDLE, WIDE, 0.1905e-3, LARGE)
+        for speed in steps(80.0, 340.0, 20.0 / resolution)
+        for clearance in (SMALL, MIDDLE, WIDE, LARGE)
     )
     return {
         "map": Runs(
@@ -147,7 +147,7 @@ def slider_map(resolution: float) -> Mapping[str, Computation]:
     """Slider joint over speed and clearance."""
     machines = tuple(
         slider(clearance, crank_speed=speed, contact_damping_ratio=HIGH_DAMPING)
-        for speed in steps(60.0, 300.0, 5.0 / max(1, round(resolution)))
+        for speed in steps(60.0, 300.0, 10.0 / max(1, round(resolution)))
         for clearance in MAP_CLEARANCES
     )
     return {

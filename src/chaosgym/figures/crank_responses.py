@@ -6,10 +6,11 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 
-from chaosgym.figures.computations import Computation, Data, History
+from chaosgym.atlas.crank_runs import revolution_angles
+from chaosgym.figures.computations import Computation, History
 from chaosgym.figures.crank import LOW_DAMPING, MIDDLE, SMALL, TRANSIENT, WIDE, ball, runs, slider
 from chaosgym.figures.figure import Finding, Parts, ThesisFigure
-from chaosgym.figures.findings import compare_nature
+from chaosgym.figures.findings import compare_nature, words
 from chaosgym.figures.panels import (
     UPPER,
     angle_panel,
@@ -19,13 +20,10 @@ from chaosgym.figures.panels import (
     section_panel,
     side_peaks,
 )
-from chaosgym.figures.printed import printed
+from chaosgym.figures.printed import printed, within
 from chaosgym.machines import SliderCrank
 from chaosgym.machines.slider_crank import frequencies_at
 from chaosgym.plotting import thesis
-
-ANGLE = 15.0
-"""Crank angles [deg] agree within this: a third of the axes' spacing."""
 
 SPHERICAL = ball(MIDDLE, crank_speed=120.0)
 INSTRUMENTED = ball(WIDE, "instrumented", crank_speed=100.0)
@@ -38,32 +36,25 @@ def revolution(machine: SliderCrank, resolution: float) -> Mapping[str, Computat
     return {"force": History(machine=machine, cycles=1, transient=TRANSIENT, samples=3600)}
 
 
-def gaps(data: Data) -> list[tuple[float, float]]:
-    """Crank angles [deg] between which there is no contact, in the order of the revolution."""
-    force = data["force"]
-    open_ = np.concatenate([[False], force == 0.0, [False]])
-    edges = np.flatnonzero(open_[1:] != open_[:-1]) * (360.0 / len(force))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-
-
-def angle_finding(text: str, here: float | None, wanted: float, target: str) -> Finding:
-    """Compare a crank angle [deg]."""
-    if here is None:
+def angle_finding(text: str, target: str, *here: float | None) -> Finding:
+    """Compare one or two crank angles [deg] with the print."""
+    known = [angle for angle in here if angle is not None]
+    if len(known) < len(here):
         return Finding(text, "contact is never lost", False, (target,))
-    return Finding(text, f"{here:.0f} deg", abs(here - wanted) <= ANGLE, (target,))
+    value = known[0] if len(known) == 1 else (known[0], known[1])
+    return Finding(text, " to ".join(f"{angle:.0f}" for angle in known) + " deg", within(target, value), (target,))
 
 
 def ball_angles(parts: Parts) -> Sequence[Finding]:
     """Where is contact lost, resumed, and kept for good?"""
-    found = gaps(parts["force"])
-    low, high = printed("SSC-025")
-    end = printed("SSC-026").high
-    longest = max(found, key=lambda gap: gap[1] - gap[0], default=(None, None))
-    bounces = [gap[1] for gap in found if longest[1] is not None and 0.0 <= gap[1] - longest[1] < 120.0]
+    found = revolution_angles(np.abs(parts["force"]["force"]))
     return [
-        angle_finding(f"contact lost at {low:g} deg", longest[0], low, "SSC-025"),
-        angle_finding(f"contact resumed at {high:g} deg", longest[1], high, "SSC-025"),
-        angle_finding(f"bouncing until {end:g} deg", max(bounces, default=None), end, "SSC-026"),
+        angle_finding(
+            f"no contact from {words(printed('SSC-025'))} deg", "SSC-025", found["loss"], found["resumption"]
+        ),
+        angle_finding(
+            f"bouncing from {words(printed('SSC-026'))} deg", "SSC-026", found["resumption"], found["settled"]
+        ),
     ]
 
 
@@ -88,14 +79,12 @@ BALL_FORCE = ThesisFigure(
 def impulse_angles(parts: Parts) -> Sequence[Finding]:
     """Where do the largest forces of both half revolutions stand, and is contact ever lost?"""
     force = np.abs(parts["force"]["force"])
-    half = len(force) // 2
-    degree = 360.0 / len(force)
+    angles = revolution_angles(force)
     first, second = printed("SSC-037")
-    down, up = degree * int(np.argmax(force[:half])), degree * (half + int(np.argmax(force[half:])))
+    impulses = angles["impulse_down"], angles["impulse_up"]
     lost = float(np.mean(force == 0.0))
     return [
-        angle_finding(f"impulse at {first:g} deg", down, first, "SSC-037"),
-        angle_finding(f"impulse at {second:g} deg", up, second, "SSC-037"),
+        angle_finding(f"impulses at {first:g} and {second:g} deg", "SSC-037", *impulses),
         Finding("no contact loss before the impulses", f"no contact in {lost:.1%} of the revolution", lost < 0.01,
                 ("SSC-037",)),
     ]  # fmt: skip
@@ -119,21 +108,11 @@ INSTRUMENTED_FORCE = ThesisFigure(
 
 def slider_angles(parts: Parts) -> Sequence[Finding]:
     """Where is contact lost, and where does the large impact stand?"""
-    data = parts["force"]
-    half = [gap for gap in gaps(data) if 20.0 <= gap[0] < 180.0]
+    found = revolution_angles(np.abs(parts["force"]["force"]))
     loss, impact = printed("SSC-038").low, printed("SSC-039").low
-    if not half:
-        return [
-            angle_finding(f"contact lost at {loss:g} deg", None, loss, "SSC-038"),
-            angle_finding(f"large impact at {impact:g} deg", None, impact, "SSC-039"),
-        ]
-    force = np.abs(data["force"])
-    degree = 360.0 / len(force)
-    after = slice(int(half[0][0] / degree), len(force) // 2)
-    largest = half[0][0] + degree * int(np.argmax(force[after]))
     return [
-        angle_finding(f"contact lost at {loss:g} deg", half[0][0], loss, "SSC-038"),
-        angle_finding(f"large impact at {impact:g} deg", largest, impact, "SSC-039"),
+        angle_finding(f"contact lost at {loss:g} deg", "SSC-038", found["loss"]),
+        angle_finding(f"large impact at {impact:g} deg", "SSC-039", found["impact"]),
     ]
 
 

@@ -6,17 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.figures.figure import Finding
-from chaosgym.figures.printed import Printed, printed
+from chaosgym.figures.printed import Printed, printed, within
 
 Array = NDArray[np.float64]
-
-FORCE_SHARE, FORCE_ERROR = 0.15, 3.0
-"""A force agrees within this share or this many newtons, the sensor's error (thesis 3.6)."""
-
-
-def forces_agree(here: float, wanted: float) -> bool:
-    """Whether two forces [N] agree."""
-    return abs(here - wanted) <= max(FORCE_SHARE * wanted, FORCE_ERROR)
 
 
 def describe_forces(peaks: Array, nature: str, period: int) -> str:
@@ -54,13 +46,14 @@ def compare_response(
     """
     peaks, kind, period = np.asarray(response[0]), str(response[1]), int(response[2])
     wanted = printed(target)
+    here: float | tuple[float, float]
     if largest_only:
-        ends = [(float(np.max(peaks)), wanted.high)]
+        here = float(np.max(peaks))
     elif wanted.low == wanted.high:
-        ends = [(float(np.mean(peaks)), wanted.low)]
+        here = float(np.mean(peaks))
     else:
-        ends = [(float(np.min(peaks)), wanted.low), (float(np.max(peaks)), wanted.high)]
-    agrees = all(forces_agree(*pair) for pair in ends) and (nature is None or nature == kind)
+        here = (float(np.min(peaks)), float(np.max(peaks)))
+    agrees = within(target, here) and (nature is None or nature == kind)
     text = ("at most " if largest_only else "") + words(wanted) + " N" + (f", {nature}" if nature else "")
     return Finding(f"{where}: {text}", describe_forces(peaks, kind, period), agrees, (target,), sensitivity)
 

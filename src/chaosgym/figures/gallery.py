@@ -4,10 +4,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from chaosgym.figures.figure import Finding
+from chaosgym.figures.printed import contradiction
 from chaosgym.figures.produce import Drawn, picture_path
+from chaosgym.figures.registry import FIGURES
 from chaosgym.files import write_atomically
 
-_WORDS = {True: "agrees", False: "**differs**", None: "no number in print"}
+_WORDS = {True: "agrees", False: "**differs**", None: "nothing to decide it by"}
+
+
+def verdict(finding: Finding) -> str:
+    """Whether a statement is met, in words; one that the text contradicts is not judged."""
+    against = contradiction(finding.targets)
+    return f"not judged, the text contradicts itself: {against}" if against else _WORDS[finding.agrees]
+
 
 _OPENING = """# The simulated figures of the thesis, drawn again
 
@@ -17,16 +26,23 @@ compared with the machine here. Written by
 
     chaosgym figures all --out FOLDER --gallery docs/figures.md
 
-which draws every figure (`chaosgym figures --list` names them) and keeps what it computed in `FOLDER/results`. A force
-agrees within 15 % or 3 N, a range if both its ends do, a nature if it is the same word. Natures are those of the
-Two-Step Test on the plotted cycles; it tells bands of 0.1 N from a period, which no reader of a plot can.
+which draws every figure (`chaosgym figures --list` names them) and keeps what it computed in `FOLDER/results`. Numbers
+agree within the tolerances of the [scorecard](scorecard.md): a force within 15 % or 3 N, a range if both its ends do, a
+nature if it is the same word. Natures are those of the Two-Step Test on the plotted cycles, for a reader to whom forces
+within 0.5 N are one dot.
 """
 
 
 def totals(drawn: Sequence[Drawn]) -> dict[str, int]:
-    """How many statements agree, and how many do not."""
-    judged = [finding.agrees for one in drawn for finding in one.findings]
-    return {"agree": judged.count(True), "differ": judged.count(False), "without_number": judged.count(None)}
+    """How many statements agree, and how many do not; what the text contradicts, or does not decide, is not judged."""
+    found = [finding for one in drawn for finding in one.findings]
+    judged = [finding.agrees for finding in found if not contradiction(finding.targets)]
+    return {
+        "agree": judged.count(True),
+        "differ": judged.count(False),
+        "contradictory": len(found) - len(judged),
+        "undecided": judged.count(None),
+    }
 
 
 def sensitivities(drawn: Sequence[Drawn]) -> dict[str, list[tuple[str, Finding]]]:
@@ -48,6 +64,10 @@ def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
         f"Of {count['agree'] + count['differ']} printed statements about these figures {count['agree']} agree and "
         f"{count['differ']} differ.",
     ]
+    shown = {one.figure.id for one in drawn}
+    missing = [number for number in FIGURES if number not in shown]
+    if missing:
+        lines.append(f"Not drawn for this page: {', '.join(missing)}.")
     answered = sensitivities(drawn)
     if answered:
         lines += [
@@ -59,7 +79,7 @@ def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
         ]
     for parameter, entries in answered.items():
         for number, finding in entries:
-            lines.append(f"| {parameter} | {finding.printed} | {finding.here} | {number} | {_WORDS[finding.agrees]} |")
+            lines.append(f"| {parameter} | {finding.printed} | {finding.here} | {number} | {verdict(finding)} |")
     for one in drawn:
         figure = one.figure
         lines += ["", f"## {figure.label}. {figure.title}", "", figure.shows]
@@ -70,7 +90,7 @@ def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
         if one.findings:
             lines.append("")
         for finding in one.findings:
-            lines.append(f"- {finding.printed}. Here {finding.here}: {_WORDS[finding.agrees]}.")
+            lines.append(f"- {finding.printed}. Here {finding.here}: {verdict(finding)}.")
         picture = picture_path(figure, pictures)
         if picture.exists():
             lines += ["", f"![{figure.label}: {figure.title}]({pictures.name}/{picture.name})"]

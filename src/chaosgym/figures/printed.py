@@ -1,83 +1,47 @@
-"""Which values does the text print? By the name of the statement."""
+"""Which values does the text print, and which statements does it contradict itself? By the name of the statement."""
 
+from functools import cache
 from typing import NamedTuple
+
+from chaosgym.atlas import findings as atlas
+from chaosgym.atlas.verdicts import error_of
+from chaosgym.reference import Comparison, read_comparisons, read_statements
 
 
 class Printed(NamedTuple):
-    """A printed number, or both ends of a range."""
+    """A printed number, or both ends of a range, in the printed unit."""
 
     low: float
     high: float
 
 
-_VALUES: dict[str, tuple[float, float]] = {
-    "IBS-020": (1, 8),
-    "IBS-021": (8, 30),
-    "IBS-022": (8, 17),
-    "IBS-023": (16, 30),
-    "IBS-024": (30.5, 30.5),
-    "IBS-025": (15, 15),
-    "IBS-026": (28, 28),
-    "IBS-028": (70, 70),
-    "IBS-029": (30, 85),
-    "IBS-030": (0.02, 0.02),
-    "IBS-031": (16, 16),
-    "IBS-036": (15, 30),
-    "IBS-037": (15, 15),
-    "IBS-042": (70, 70),
-    "IBS-043": (95, 95),
-    "IBS-045": (1, 8),
-    "IBS-046": (8, 8),
-    "IBS-060": (-0.2, 0.2),
-    "IBS-061": (-0.1, 0.1),
-    "IBS-062": (40, 100),
-    "IBS-054": (4, 9),
-    "IBS-056": (4, 9),
-    "IBS-065": (19, 19),
-    "IBS-069": (350, 350),
-    "IBS-070": (4, 4),
-    "IBS-071": (4000, 4000),
-    "IBS-074": (0.142857, 0.142857),
-    "SSC-025": (70, 95),
-    "SSC-026": (95, 130),
-    "SSC-028": (110, 190),
-    "SSC-029": (280, 280),
-    "SSC-033": (100, 200),
-    "SSC-034": (300, 300),
-    "SSC-037": (100, 300),
-    "SSC-038": (55, 55),
-    "SSC-039": (75, 75),
-    "SSC-042": (110, 190),
-    "SSC-049": (100, 180),
-    "SSC-050": (190, 300),
-    "SSC-051": (35, 35),
-    "SSC-052": (48, 48),
-    "SSC-053": (40, 40),
-    "SSC-055": (100, 300),
-    "SSC-056": (85, 110),
-    "SSC-057": (105, 105),
-    "SSC-058": (110, 130),
-    "SSC-060": (34, 34),
-    "SSC-061": (33, 43),
-    "SSC-069": (600, 600),
-    "SSC-071": (1140, 1140),
-    "SSC-072": (1500, 1500),
-    "SSC-073": (2500, 2500),
-    "SSC-111": (6, 6),
-    "SSC-113": (85, 85),
-    "SSC-114": (105, 105),
-    "SSC-117": (0.004, 0.004),
-    "SSC-118": (100, 100),
-    "SSC-122": (0.1667, 0.1667),
-    "SSC-123": (1, 1),
-    "SSC-124": (6, 6),
-    "SSC-126": (0.001, 0.1),
-    "SSC-127": (0.001, 0.001),
-    "SSC-128": (0.0001, 0.01),
-    "SSC-130": (80, 80),
-}
-
-
 def printed(target: str) -> Printed:
-    """Value of a statement in its printed unit."""
-    return Printed(*_VALUES[target])
+    """Value of a statement in its printed unit.
+
+    Raises
+    ------
+    KeyError
+        If there is no such statement, or it prints no number.
+    """
+    statement = read_statements()[target]
+    if statement.low is None or statement.high is None:
+        raise KeyError(f"{target} prints no number")
+    return Printed(statement.low, statement.high)
+
+
+@cache
+def _comparisons() -> dict[str, Comparison]:
+    return {one.id: one for one in read_comparisons().compared}
+
+
+def within(target: str, here: float | tuple[float, float] | None) -> bool:
+    """Whether a value here, or both ends of a range, agrees with the statement: a hit of the scorecard."""
+    return error_of(_comparisons()[target], atlas.Finding(here)) <= 1.0
+
+
+def contradiction(targets: tuple[str, ...]) -> str:
+    """What the text itself says against one of these statements; empty if nothing."""
+    known = _comparisons()
+    return "; ".join(
+        known[target].contradictory for target in targets if target in known and known[target].contradictory
+    )

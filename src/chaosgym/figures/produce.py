@@ -11,6 +11,7 @@ from tqdm import tqdm
 from chaosgym.errors import ChaosgymError, SimulationError
 from chaosgym.figures.cache import computed
 from chaosgym.figures.figure import Finding, ThesisFigure
+from chaosgym.figures.printed import contradiction
 from chaosgym.files import write_atomically
 
 RESULTS = "results"
@@ -42,14 +43,17 @@ class Drawn:
             "path": str(self.path),
             "seconds": round(self.seconds, 3),
             "error": self.error,
-            "findings": [finding._asdict() for finding in self.findings],
+            "findings": [
+                {**finding._asdict(), "contradiction": contradiction(finding.targets)} for finding in self.findings
+            ],
         }
 
     def lines(self) -> list[str]:
         """Return the findings for people."""
         head = f"figure {self.figure.id}  {self.figure.title}" + (f": {self.error}" if self.error else "")
         signs = {True: "agrees ", False: "differs", None: "       "}
-        return [head, *(f"  {signs[found.agrees]}  {found.printed}; here {found.here}" for found in self.findings)]
+        judged = [(None if contradiction(found.targets) else found.agrees, found) for found in self.findings]
+        return [head, *(f"  {signs[agrees]}  {found.printed}; here {found.here}" for agrees, found in judged)]
 
 
 def picture_path(figure: ThesisFigure, folder: Path) -> Path:

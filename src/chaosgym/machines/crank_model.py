@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.core.crank_propagator import FORCING_TERMS, SERIES_PHASE, SQUARINGS, propagator_table, series_order
+from chaosgym.core.crank_propagator import FORCING_TERMS, SQUARINGS, propagator_table, series_order
 from chaosgym.core.crank_stepper import HERTZ, LINEAR, SteppedCrankModel
 from chaosgym.core.slider_crank import PIECES, SliderCrankModel
 from chaosgym.machines.crank_equations import Equations, equations, rod_of
@@ -38,7 +38,7 @@ STABLE_PHASE = 2.0
 """Longest Runge-Kutta step times largest eigenvalue; the method is stable up to 2.7."""
 
 STEP_PHASE = 1.0
-"""Angle [rad] by which a closed contact turns in a step, by default."""
+"""Angle [rad] by which a closed contact turns in a piece of a step, by default."""
 
 MAX_SETS = 32
 """Contact sets for which propagators are made; a machine with more is left to the stepper."""
@@ -223,6 +223,17 @@ def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankMode
     )
 
 
+def fastest_rate(machine: "SliderCrank", model: SteppedCrankModel) -> float:
+    """Largest modulus [1/s] of an eigenvalue with every contact closed."""
+    some = [0, len(model.answer) // 4]
+    n = model.row.shape[1]
+    system = np.zeros((len(some), 2 * n, 2 * n))
+    system[:, :n, n:] = np.eye(n)
+    system[:, n:] = model.acceleration[some][:, :, : 2 * n]
+    system[:, n:, :n] -= machine.contact_stiffness * np.swapaxes(model.answer[some], -1, -2) @ model.row
+    return float(np.max(np.abs(np.linalg.eigvals(system))))
+
+
 class _Structure(NamedTuple):
     """Accelerations of all bins by powers of the crank rate, whatever the speed and the clearance.
 
@@ -317,7 +328,7 @@ def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> Slide
         steps=steps,
         contact_rate=parts.contact,
         order=series_order(parts.spectrum * step),
-        span=series_span(parts.spectrum, step),
+        spectrum=parts.spectrum,
         row=parts.channels.row,
         gap=np.zeros(m),
         stiffness=parts.channels.stiffness,
@@ -331,10 +342,3 @@ def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> Slide
         curvature=np.ascontiguousarray(parts.channels.row @ acceleration),
         propagator=propagator_table(acceleration, duration, step, series_order(parts.spectrum * step / 2**SQUARINGS)),
     )
-
-
-def series_span(spectrum: float, step: float) -> Array:
-    """Longest time [s] that a Taylor series of each order sums to round-off; no end from that of a whole step on."""
-    span = SERIES_PHASE / spectrum
-    span[series_order(spectrum * step) :] = math.inf
-    return np.asarray(span)

@@ -30,12 +30,13 @@ from numpy.typing import NDArray
 from chaosgym.core.crank_stepper import SteppedCrankModel
 from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.errors import ParameterError
-from chaosgym.machines.crank_equations import SLIDER_ACROSS, degrees_of_freedom, equations
+from chaosgym.machines.crank_equations import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom, equations
 from chaosgym.machines.crank_joints import sensors_of
 from chaosgym.machines.crank_model import STEP_PHASE, exact_model, has_propagators, stepped_model
 from chaosgym.machines.fidelity import FidelityLadder
 from chaosgym.machines.kinematics import slider_position
 from chaosgym.machines.parameters import parameter, validate
+from chaosgym.machines.spatial_equations import spatial_equations
 
 Array = NDArray[np.float64]
 
@@ -90,9 +91,9 @@ class SliderCrank(FidelityLadder):
     """Angle between the motor axis and the normal of the guide [deg]; planar motion at 0."""
     rod: str = parameter("flexible", choices=("flexible", "rigid"), provenance="printed", source="thesis 4.3.1")
     """Whether the rod bends and stretches."""
-    n_modes: int = parameter(3, low=1, high=12, provenance="calibrated", source=_FIT)
+    n_modes: int = parameter(3, low=1, high=40, provenance="calibrated", source=_FIT)
     """Bending modes of the flexible rod."""
-    damping_ratio: float = parameter(0.027, low=0.0, high=1.0, provenance="calibrated", source=_FIT)
+    damping_ratio: float = parameter(0.027, low=0.0, high=100.0, provenance="calibrated", source=_FIT)
     """Structural damping ratio of the rod's first mode."""
     damping_family: str = parameter("stiffness", choices=("uniform", "stiffness"), provenance="calibrated", source=_FIT)
     """"uniform": the same ratio in every mode; "stiffness": proportional to the mode's frequency."""
@@ -155,16 +156,16 @@ class SliderCrank(FidelityLadder):
         0.254e-3,
         unit="m",
         low=0.0,
-        high=1e-3,
+        high=0.02,
         provenance="printed",
         source="thesis figure 4.14; adjustable to 1 mm, 4.2",
     )
-    """Half the gap of the slider joint [m]."""
+    """Half the gap of the slider joint [m]; in one of 20 mm the slider of the thesis touches nothing."""
     ball_clearance: float = parameter(
         0.127e-3,
         unit="m",
         low=0.0,
-        high=1e-3,
+        high=0.02,
         provenance="printed",
         source="thesis figure 4.8; adjustable to 1 mm, 4.2",
     )
@@ -189,11 +190,11 @@ class SliderCrank(FidelityLadder):
     )
     """Force [N] at which the Hertzian law has the linear law's secant stiffness and restitution."""
     contact_stiffness: float = parameter(
-        1.5e7, unit="N/m", low=1e3, high=1e10, provenance="printed", source="thesis 3.3"
+        1.5e7, unit="N/m", low=1e3, high=1e12, provenance="printed", source="thesis 3.3"
     )
     """Linearised Hertzian stiffness of a joint [N/m]; the stations of an instrumented slider joint share it."""
     contact_damping_ratio: float = parameter(
-        0.05, low=0.0, high=1.0, provenance="printed", source="thesis 4.5.4: 2.5 % and 5 %"
+        0.05, low=0.0, high=100.0, provenance="printed", source="thesis 4.5.4: 2.5 % and 5 %"
     )
     """Damping ratio of a joint in contact, related to the mass of slider and yoke."""
     friction_coefficient: float = parameter(
@@ -306,7 +307,10 @@ class SliderCrank(FidelityLadder):
 
     @property
     def natural_frequencies(self) -> Array:
-        """Natural frequencies [Hz] at rest at crank angle zero, every joint tight, (n_modes + 1,)."""
+        """Natural frequencies [Hz] at rest at crank angle zero, every joint tight, (n_modes + 1,).
+
+        At a motor angle (2 n_modes + 1,): those of bending sideways too.
+        """
         return frequencies_at(self, 0.0)
 
     @property
@@ -344,8 +348,9 @@ SUPERHARMONIC_SLIDER_CRANK = replace(
 def frequencies_at(machine: SliderCrank, crank_angle: float) -> Array:
     """Natural frequencies [Hz] of the mechanism at rest at a crank angle [deg], every joint tight."""
     bound = replace(machine, slider_joint="clearance", ball_joint="ideal", rod="flexible")
-    system = equations(bound, np.array([math.radians(crank_angle)]))
-    free = [i for i, name in enumerate(bound.degrees_of_freedom) if name != SLIDER_ACROSS]
+    assemble = spatial_equations if machine.is_spatial else equations
+    system = assemble(bound, np.array([math.radians(crank_angle)]))
+    free = [i for i, name in enumerate(bound.degrees_of_freedom) if name not in (SLIDER_ACROSS, SLIDER_LATERAL)]
     at = np.ix_(free, free)
     squares = scipy.linalg.eigh(system.stiffness[0, 0][at], system.mass[0][at], eigvals_only=True)
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi))

@@ -201,10 +201,19 @@ def series_life(assessment: Assessment, ax: Axes) -> Axes:
 
 
 def impact_diagram(diagram: PeakImpactDiagram, ax: Axes) -> Axes:
-    """Peak Impact Diagram: force [N] against place on the bearing (thesis figures 5.10 and 5.11)."""
+    """Peak Impact Diagram: force [N] against place on the bearing (thesis figures 5.10 and 5.11).
+
+    Colours show how far impacts on a ball joint lean out of the rod's plane of swing.
+    """
     label, factor, least = PLACES[diagram.unit]
     place = factor * diagram.location
-    ax.scatter(place, diagram.force, s=14, color=ACCENT, alpha=0.7, lw=0)
+    lean = diagram.elevation
+    colour: Any = {"color": ACCENT} if lean is None else {"c": lean, "cmap": "coolwarm"}
+    dots = ax.scatter(place, diagram.force, s=14, alpha=0.7, lw=0, **colour)
+    if lean is not None:
+        widest = float(np.max(np.abs(lean)))
+        dots.set_clim(-widest, widest)
+        ax.figure.colorbar(dots, ax=ax, label="sideways lean [deg]")
     ax.set(xlabel=label, ylabel="peak force [N]", title="Peak Impact Diagram", ylim=(0.0, None))
     if np.ptp(place) < least:
         middle = 0.5 * (np.min(place) + np.max(place))

@@ -308,7 +308,9 @@ def _figures(study: DesignStudy) -> str:
         )
         pictures.append(_picture(_drawn(lambda ax: figures.sensitivities(found, ax)), caption))
     if len(study.diagram.force):
-        caption = f"Where the peak of each of {len(study.diagram.force)} cycles acts."
+        filled = study.cycles_to_fill
+        shape = f"It has its shape from cycle {filled} on." if filled else "It has not yet its final shape."
+        caption = f"Where the peak of each of {len(study.diagram.force)} cycles acts. {shape}"
         pictures.append(_picture(_drawn(lambda ax: figures.impact_diagram(study.diagram, ax)), caption))
     if found.nominal.period is None:
         pictures.append(_picture(_figure_of_convergence(peaks, found.convergence.cycles), _CONVERGENCE))

@@ -81,6 +81,8 @@ class Comparison:
         What the text itself says against it; empty if nothing.
     not_computed
         Why it can't be computed here; empty if it is.
+    unit
+        Unit of the printed value; the statement's own unless the quantity is another one.
     """
 
     statement: Statement
@@ -95,11 +97,17 @@ class Comparison:
     across: Axis | None
     contradictory: str
     not_computed: str
+    unit: str
 
     @property
     def id(self) -> str:
         """Name of the statement."""
         return self.statement.id
+
+    @property
+    def shown_unit(self) -> str:
+        """Unit of printed and computed value; "-" for words and pure numbers."""
+        return "-" if isinstance(self.printed, str) else self.unit
 
 
 class Comparisons(NamedTuple):
@@ -149,7 +157,7 @@ def _tolerance(name: str, entry: Mapping[str, Any]) -> Tolerance:
 
 
 _REQUIRED = frozenset({"group", "part", "quantity", "tolerance", "at"})
-_OPTIONAL = frozenset({"printed", "along", "across", "contradictory", "not_computed"})
+_OPTIONAL = frozenset({"printed", "along", "across", "contradictory", "not_computed", "unit"})
 
 
 def _comparison(statement: Statement, entry: Mapping[str, Any], tolerances: Mapping[str, Tolerance]) -> Comparison:
@@ -168,6 +176,7 @@ def _comparison(statement: Statement, entry: Mapping[str, Any], tolerances: Mapp
         printed=_printed(statement, entry), tolerance=tolerances[entry["tolerance"]], at=tuple(entry["at"]),
         along=_axis(entry.get("along")), across=_axis(entry.get("across")),
         contradictory=entry.get("contradictory", ""), not_computed=entry.get("not_computed", ""),
+        unit=entry.get("unit", statement.unit),
     )  # fmt: skip
 
 

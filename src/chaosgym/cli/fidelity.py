@@ -1,0 +1,104 @@
+"""What does accuracy cost, and where does a model stop answering? ``tradeoff`` and ``stability``."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.output import emit
+
+if TYPE_CHECKING:
+    from chaosgym.stability import StabilityMap
+    from chaosgym.tradeoff import Tradeoff, TradeoffRow
+
+_FOLDER = click.Path(file_okay=False, path_type=Path)
+
+
+@click.command()
+@machine_command
+@click.option("--points", type=click.IntRange(1, 1000), default=12, show_default=True, help="Operating points.")
+@click.option("--cycles", type=click.IntRange(20, 10**5), default=120, show_default=True, help="Cycles that count.")
+@click.option("--transient", type=click.IntRange(0, 10**5), default=80, show_default=True, help="Cycles before them.")
+@click.option(
+    "--budget", type=click.FloatRange(0.0, min_open=True), default=10.0, show_default=True,
+    help="Processor time of each setting [s].",
+)  # fmt: skip
+@click.option("--workers", type=click.IntRange(1), default=None, help="Threads; all processors by default.")
+@click.option("--out", type=_FOLDER, default=None, help="Write tradeoff.json and tradeoff.png there.")
+def tradeoff(
+    machine: Any, points: int, cycles: int, transient: int, budget: float, workers: int | None, out: Path | None,
+    as_json: bool,
+) -> None:  # fmt: skip
+    """Measure every rung, integrator and step of a machine against its reference: cost, errors, Pareto front."""
+    from chaosgym.tradeoff import tradeoff as measure
+
+    result = measure(
+        machine, points=points, cycles=cycles, transient=transient, budget=budget, workers=workers, progress=True
+    )
+    if out is not None:
+        from chaosgym.plotting.fidelity import tradeoff_figure
+
+        _write(out, "tradeoff", result.as_dict(), tradeoff_figure(result))
+    emit(result.as_dict(), as_json, lambda: _tradeoff_lines(result))
+
+
+def _tradeoff_lines(result: "Tradeoff") -> list[str]:
+    title = (
+        f"{'rung':14s} {'method':13s} {'step':>4s} {'us/cycle':>9s} {'cycles/s':>8s} {'path':>8s} {'mean':>8s} "
+        f"{'spread':>8s} {'maximum':>8s} {'Wasserst.':>9s} {'nature':>6s} {'type':>5s} {'points':>6s}"
+    )
+    lines = [title]
+    for row in sorted(result.rows, key=lambda row: row.microseconds_per_cycle):
+        lines.append(_tradeoff_line(row))
+    lines += [f"not run: {setting}: {why}" for setting, why in result.refused.items()]
+    lines += ["", "* on the Pareto front of cost and Wasserstein distance; errors are shares of the reference", ""]
+    return lines + [f"{scene:28s} {cost:9.1f} us per cycle" for scene, cost in result.costs.items()]
+
+
+def _tradeoff_line(row: "TradeoffRow") -> str:
+    def share(value: float | None, width: int) -> str:
+        return f"{'-' if value is None else format(value, '.2g'):>{width}s}"
+
+    errors = (row.mean_error, row.spread_error, row.maximum_error)
+    return (
+        f"{row.rung:14s} {row.method:13s} {row.step:4g} {row.microseconds_per_cycle:9.1f} "
+        f"{row.cycles_per_second:8.0f} {share(row.trajectory_error, 8)} {' '.join(share(e, 8) for e in errors)} "
+        f"{share(row.wasserstein, 9)} {share(row.nature_agreement, 6)} {share(row.type_agreement, 5)} {row.points:6d}"
+        f"{' *' if row.on_front else ''}"
+    )
+
+
+@click.command()
+@machine_command
+@click.option("--workers", type=click.IntRange(1), default=None, help="Threads; all processors by default.")
+@click.option("--out", type=_FOLDER, default=None, help="Write stability.json and stability.png there.")
+def stability(machine: Any, workers: int | None, out: Path | None, as_json: bool) -> None:
+    """Run a machine at every extreme on every rung: an answer within physical bounds, or an error with a name."""
+    from chaosgym.stability import stability_map
+
+    result = stability_map(machine, workers=workers, progress=True)
+    if out is not None:
+        from chaosgym.plotting.fidelity import stability_figure
+
+        _write(out, "stability", result.as_dict(), stability_figure(result))
+    emit(result.as_dict(), as_json, lambda: _stability_lines(result))
+
+
+def _stability_lines(result: "StabilityMap") -> list[str]:
+    lines = []
+    for cell in result.cells:
+        ended = f"{cell.largest_peak:10.4g} N" if cell.largest_peak is not None else f"{cell.outcome}: {cell.detail}"
+        lines.append(f"{cell.extreme:28s} {cell.model:14s} {ended}")
+    counts = ", ".join(f"{result.count(outcome)} {outcome}s" for outcome in ("answer", "named error", "failure"))
+    return [*lines, f"{result.machine}: {counts}"]
+
+
+def _write(folder: Path, name: str, values: Any, figure: Any) -> None:
+    from chaosgym.files import write_atomically
+
+    folder.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(values, indent=1, allow_nan=False) + "\n"
+    write_atomically(folder / f"{name}.json", lambda path: path.write_text(text, encoding="utf-8"))
+    write_atomically(folder / f"{name}.png", lambda path: figure.savefig(path, format="png", dpi=120))
