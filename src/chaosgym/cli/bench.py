@@ -54,16 +54,22 @@ def _shown(figure: float) -> str:
 
 
 def _comparison(rows: list[dict[str, Any]]) -> list[str]:
-    lines = [f"{'':76s}{'cycles per CPU second':>24s}{'ratio':>8s}{'goal':>6s}  same verdict (period)"]
+    lines = [f"{'':78s}{'cycles per CPU second':>22s}{'ratio':>7s}{'goal':>6s}  right verdicts (periods)"]
+    shown = ""
     for row in rows:
-        rates = row["cycles_per_processor_second"]
-        wrong = ", ".join(f"{speed:g}" for speed in row["differs_at"])
-        lines.append(
-            f"{row['machine']}: {row['setting']:62s}"
-            f"{rates['chaosgym']:14,.1f}{rates['exudyn']:10,.1f}{row['ratio']:8.0f}{row['goal']:6.0f}"
-            f"  {row['same_class']} ({row['same_period']}) of {row['speeds']}" + (f", not at {wrong}" if wrong else "")
-        )
+        rates, own = row["cycles_per_processor_second"], f"{row['machine']}: chaosgym, exact events"
+        if row["machine"] != shown:
+            shown = row["machine"]
+            lines.append(f"{own:78s}{rates['chaosgym']:22,.1f}{'':13s}{_verdicts(row, 'chaosgym')}")
+        figures = f"{rates['exudyn']:22,.1f}{row['ratio']:7.0f}{row['goal']:6.0f}"
+        lines.append(f"  {row['setting']:76s}{figures}{_verdicts(row, 'exudyn')}")
     return lines
+
+
+def _verdicts(row: dict[str, Any], side: str) -> str:
+    wrong = ", ".join(f"{speed:g}" for speed in row["wrong_at"][side])
+    share = f"  {row['right_class'][side]} ({row['right_period'][side]}) of {row['speeds']}"
+    return share + (f", wrong at {wrong}" if wrong else "")
 
 
 def _scene_table(costs: list[Any]) -> list[str]:
