@@ -17,7 +17,7 @@ import numpy as np
 from tqdm import tqdm
 
 from chaosgym.bench.timing import Rate, rate
-from chaosgym.classifier.model import default_classifier
+from chaosgym.classifier import default_classifier
 from chaosgym.envs import ENVIRONMENTS
 from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, Machine
 from chaosgym.simulation import ExactEvents, Integrator, RungeKutta4, simulate
@@ -159,6 +159,11 @@ def sweep_rate(machine: Machine, repeats: int) -> Rate:
 def classifier_rate(machine_name: str, repeats: int) -> Rate:
     """Machines that the shipped classifier types, many at once."""
     classifier = default_classifier(machine_name)
-    low, high = np.array([classifier.card["ranges"][field] for field in classifier.fields]).T
+    low, high = classifier.parameters.low_, classifier.parameters.high_
     values = np.random.default_rng(0).uniform(low, high, (CLASSIFIER_ROWS, len(low)))
-    return rate(lambda: len(classifier.predict(values)), repeats)
+
+    def classify() -> int:
+        classifier.classify_table(values)
+        return len(values)
+
+    return rate(classify, repeats)
