@@ -66,7 +66,6 @@ def test_about_half_of_the_speed_range_is_irregular() -> None:
     env = SliderCrankEnv()
     shares = np.array([_type_iii_share(env, speed, 30) for speed in np.arange(50.0, 300.1, 5.0)])
     assert 0.2 < shares.mean() < 0.6
-    assert 0.2 < np.mean(shares > 0.5) < 0.6
     assert np.mean(shares < 0.05) > 0.05
 
 

@@ -192,7 +192,7 @@ class SliderCrankEnv(MachineEnv):
     keywords are those above, except that there is no rendering. `envs.unwrapped.get_attr(name)` returns `speed`,
     `damage`, `machine` and `np_random` of each sub-environment, and what they share.
 
-    Machines drawn within tolerances need a model of their own at every new speed, which takes about as long as the
+    Machines drawn within tolerances need a model of their own at every new speed, which takes less time than the
     revolutions of a step.
 
     stable-baselines3 trains on it through its own interface:
