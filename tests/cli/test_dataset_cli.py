@@ -106,3 +106,12 @@ def test_bad_input_is_one_line(arguments, message, tmp_path, monkeypatch):
     assert message in err
     assert len(err.strip().splitlines()) == 1
     assert list(Path().iterdir()) == []
+
+
+def test_check_labels_rows_again(folder):
+    """Where the rows were computed they come out the same."""
+    found = run_json("dataset", "check", str(folder), "--points", "5", "--seed", "3")
+    assert (found["points"], found["identical"], found["sound"]) == (5, 5, True)
+    code, _, error = run("dataset", "check", str(folder), "--points", "60")
+    assert code == 2
+    assert "allowed: 1 to 54" in error

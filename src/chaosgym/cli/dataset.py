@@ -1,4 +1,4 @@
-"""What is in a dataset, and how far may it be trusted? ``dataset info``, ``card``, ``noise``, ``cost`` and ``map``."""
+"""What is in a dataset, and how far may it be trusted? The commands ``chaosgym dataset ...``."""
 
 import json
 from pathlib import Path
@@ -60,6 +60,25 @@ def card(folder: str) -> None:
     from chaosgym.sweeps.card import write_card
 
     click.echo(f"wrote {write_card(folder)}")
+
+
+@dataset.command("check")
+@FOLDER
+@click.option("--points", type=click.IntRange(1, 10**6), default=50, show_default=True, help="Rows to label again.")
+@click.option("--seed", type=click.IntRange(0), default=None, help="Of the rows; default: other ones every time.")
+@AS_JSON
+def check(folder: str, points: int, seed: int | None, as_json: bool) -> None:
+    """Label some rows again and compare them; exit code 1 if they differ by more than another platform explains."""
+    from chaosgym.sweeps import read_sweep
+    from chaosgym.sweeps.check import check_rows
+
+    found = check_rows(read_sweep(folder), points, seed=seed, progress=True)
+    platform = "the same packages and processor" if found.same_platform else "other packages or another processor"
+    emit(found.as_dict(), as_json, lambda: [
+        f"{folder}: {found.identical} of {points} rows identical, {found.same_nature} of the same nature ({platform})"
+    ])  # fmt: skip
+    if not found.sound:
+        raise SystemExit(1)
 
 
 @dataset.command("noise")
