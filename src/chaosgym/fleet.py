@@ -76,6 +76,10 @@ class Fleet(Protocol):
         """Put a machine at rest into place i."""
         ...
 
+    def change(self, i: int, machine: Machine) -> None:
+        """Put another machine into place i, whose motion goes on."""
+        ...
+
     def set_speeds(self, which: Indices, speeds: Array) -> None:
         """Change the speeds of the machines ``which`` (k,) to ``speeds`` (k,), in the unit of their speed field."""
         ...
@@ -99,6 +103,10 @@ class SerialFleet:
     def start(self, i: int, machine: Machine) -> None:
         """Put a machine at rest into place i."""
         self._machines[i], self._motions[i] = machine, None
+
+    def change(self, i: int, machine: Machine) -> None:
+        """Put another machine into place i, whose motion goes on."""
+        self._machines[i] = machine
 
     def set_speeds(self, which: Indices, speeds: Array) -> None:
         """Change the speeds of the machines ``which`` (k,) to ``speeds`` (k,), in the unit of their speed field."""
@@ -144,7 +152,7 @@ _one_call_at_a_time = Lock()
 
 
 class _CompiledFleet:
-    """Machines that move in one compiled call; ``_enter``, ``set_speeds`` and ``_advance`` know their kind."""
+    """Machines that move in one compiled call; ``change``, ``set_speeds`` and ``_advance`` know their kind."""
 
     def __init__(self, machine: Machine, count: int, integrator: ExactEvents | None = None) -> None:
         integrator = integrator or ExactEvents()
@@ -160,7 +168,7 @@ class _CompiledFleet:
         """Put a machine at rest into place i."""
         self._motions.coordinates[i] = 0.0
         self._motions.bouncing[i] = 0.0
-        self._enter(i, machine)
+        self.change(i, machine)
 
     def run(self, which: Indices, cycles: int) -> Cycles:
         """Run the machines ``which`` (k,) for some cycles."""
@@ -175,7 +183,8 @@ class _CompiledFleet:
                 values[failed] = 0
         return results
 
-    def _enter(self, i: int, machine: Machine) -> None:
+    def change(self, i: int, machine: Machine) -> None:
+        """Put another machine into place i, whose motion goes on."""
         raise NotImplementedError
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
@@ -191,7 +200,8 @@ class BeamFleet(_CompiledFleet):
         self._regimes = stacked([model.regimes] * count)
         self._batch = stacked([model._replace(regimes=0.0)] * count)
 
-    def _enter(self, i: int, machine: Machine) -> None:
+    def change(self, i: int, machine: Machine) -> None:
+        """Put another machine into place i, whose motion goes on."""
         model = machine.reduce()
         put(self._regimes, i, model.regimes)
         put(self._batch, i, model._replace(regimes=0.0))
@@ -228,7 +238,8 @@ class CrankFleet(_CompiledFleet):
         # the tables live as long as the batch holds their addresses
         self._kept: list[KeptModel | None] = [None] * count
 
-    def _enter(self, i: int, machine: Any) -> None:
+    def change(self, i: int, machine: Any) -> None:
+        """Put another machine into place i, whose motion goes on."""
         put(self._batch, i, machine.reduce()._replace(**dict.fromkeys(TABLES, 0)))
         self._models[i] = models_by_speed(machine)
         self._speeds[i] = np.nan
@@ -260,7 +271,8 @@ class SteppedCrankFleet(_CompiledFleet):
         self._machines = [machine] * count
         self._batch = stacked([machine.reduce()] * count)
 
-    def _enter(self, i: int, machine: Machine) -> None:
+    def change(self, i: int, machine: Machine) -> None:
+        """Put another machine into place i, whose motion goes on."""
         self._machines[i] = machine
         put(self._batch, i, machine.reduce())
 
@@ -268,7 +280,7 @@ class SteppedCrankFleet(_CompiledFleet):
         """Change the speeds of the cranks [rpm]."""
         for i, speed in zip(which.tolist(), speeds.tolist(), strict=True):
             if getattr(self._machines[i], self._machine.speed_field) != speed:
-                self._enter(i, at_speed(self._machines[i], speed))
+                self.change(i, at_speed(self._machines[i], speed))
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         advance_stepped_cranks(self._batch, which, self._motions, arrays, self._settings, outcome)

@@ -23,8 +23,8 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecEnv, VecMonitor
 
 from chaosgym.envs import SB3VecEnv
 
-BEAM = "chaosgym/ImpactBeam-v0"
-SHORT: dict[str, Any] = {"lowest_speed": 15.0, "job_cycles": 30, "tolerance": True}
+BEAM = "chaosgym/ImpactBeamTolerance-v0"
+SHORT: dict[str, Any] = {"lowest_speed": 15.0, "job_cycles": 30}
 
 
 def _dummy(count: int, **keywords: Any) -> VecEnv:

@@ -18,6 +18,7 @@ from chaosgym.cli.diagnose import agreement, diagnose
 from chaosgym.cli.fidelity import stability, tradeoff
 from chaosgym.cli.figures import figures
 from chaosgym.cli.info import info
+from chaosgym.cli.regimes import regimes
 from chaosgym.cli.scorecard import scorecard
 from chaosgym.cli.simulate import show, simulate
 from chaosgym.cli.sweep import sweep
@@ -34,7 +35,7 @@ def app() -> None:
 
 for command in (
     simulate, show, diagnose, agreement, classify, sweep, dataset, train_classifier, demo, design, figures, calibrate,
-    scorecard, tradeoff, stability, info, bench,
+    scorecard, tradeoff, stability, regimes, info, bench,
 ):  # fmt: skip
     app.add_command(command)
 

@@ -7,17 +7,18 @@ from typing import Any
 
 from gymnasium.envs.registration import register, registry
 
-ENVIRONMENTS = {
-    "chaosgym/ImpactBeam-v0": "chaosgym.envs.impact_beam:ImpactBeamEnv",
-    "chaosgym/SliderCrank-v0": "chaosgym.envs.slider_crank:SliderCrankEnv",
-}
-"""Entry point of each environment by id. A new machine adds one line."""
+MACHINES = {"ImpactBeam": "chaosgym.envs.impact_beam", "SliderCrank": "chaosgym.envs.slider_crank"}
+"""Module of each machine's environment. A new machine adds one line."""
 
-VECTOR_ENVIRONMENTS = {
-    "chaosgym/ImpactBeam-v0": "chaosgym.envs.impact_beam:ImpactBeamVectorEnv",
-    "chaosgym/SliderCrank-v0": "chaosgym.envs.slider_crank:SliderCrankVectorEnv",
+TASKS: dict[str, dict[str, Any]] = {
+    "": {},
+    "Tolerance": {"pool": "training"},
+    "Wear": {"pool": "training", "wear": True},
 }
-"""Entry point of each native vector environment by id."""
+"""Keywords of each task: the nominal machine, one drawn within tolerances, one whose clearance grows."""
+
+ENVIRONMENTS = tuple(f"chaosgym/{machine}{task}-v0" for machine in MACHINES for task in TASKS)
+"""Their ids."""
 
 
 def __getattr__(name: str) -> Any:
@@ -30,9 +31,14 @@ def __getattr__(name: str) -> Any:
 
 def register_environments() -> None:
     """Make the environments known to ``gymnasium.make``; calling it again does nothing."""
-    for name, entry_point in ENVIRONMENTS.items():
-        if name not in registry:
-            register(id=name, entry_point=entry_point, vector_entry_point=VECTOR_ENVIRONMENTS[name])
+    for machine, module in MACHINES.items():
+        for task, keywords in TASKS.items():
+            name = f"chaosgym/{machine}{task}-v0"
+            if name not in registry:
+                register(
+                    id=name, entry_point=f"{module}:{machine}Env", vector_entry_point=f"{module}:{machine}VectorEnv",
+                    kwargs=keywords,
+                )  # fmt: skip
 
 
 register_environments()

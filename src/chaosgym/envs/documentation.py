@@ -6,7 +6,6 @@ python -m chaosgym.envs.documentation > docs/environments.md
 import inspect
 
 import gymnasium as gym
-from gymnasium.envs.registration import load_env_creator
 
 from chaosgym.envs import ENVIRONMENTS
 
@@ -15,9 +14,7 @@ def environments_page() -> str:
     """Return the page of all environments, in the format of Gymnasium's own pages (Markdown)."""
     sections = ["# Environments\n\nThis page is written by `python -m chaosgym.envs.documentation`.\n"]
     for name in ENVIRONMENTS:
-        entry_point = gym.spec(name).entry_point
-        assert isinstance(entry_point, str)
-        sections.append(f"# {name}\n\n{inspect.getdoc(load_env_creator(entry_point))}\n")
+        sections.append(f"# {name}\n\n{inspect.getdoc(type(gym.make(name).unwrapped))}\n")
     return "\n".join(sections)
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chaosgym.errors import ParameterError
 
@@ -37,10 +38,13 @@ class SpeedDrive:
     """Largest change of speed in one step."""
     speed_grid: float = 0.0
     """Spacing of the speeds that can be commanded, from the lowest one on; 0 if all can."""
+    regime_spacing: float = 1.0
+    """Spacing of the speeds at which the nature of a machine's response is looked up."""
 
     def __post_init__(self) -> None:
         for name in ("lowest_speed", "highest_speed", "slew_limit", "speed_grid"):
             object.__setattr__(self, name, checked_number(name, getattr(self, name), 0.0, 1e6))
+        object.__setattr__(self, "regime_spacing", checked_number("regime_spacing", self.regime_spacing, 1e-3, 1e6))
         if self.highest_speed <= self.lowest_speed:
             raise ParameterError(
                 f"highest_speed = {self.highest_speed:g} is out of range; allowed: above lowest_speed = "
@@ -57,6 +61,12 @@ class SpeedDrive:
                 f"{self.slew_limit:g} and a whole number of times in the range of {self.lowest_speed:g} to "
                 f"{self.highest_speed:g}"
             )
+
+    @property
+    def regime_speeds(self) -> NDArray[np.float64]:
+        """Speeds from the lowest one on, ``regime_spacing`` apart, that cover the range."""
+        spaces = math.ceil((self.highest_speed - self.lowest_speed) / self.regime_spacing - 1e-9)
+        return np.asarray(self.lowest_speed + self.regime_spacing * np.arange(spaces + 1))
 
     def target_of(self, action: Any) -> tuple[Any, Any]:
         """Return actions, clipped to [-1, 1], and the target speeds that they stand for, (...) for actions (..., 1).

@@ -124,7 +124,7 @@ class ImpactBeamEnv(MachineEnv):
     ## Arguments
 
     ```python
-    >>> env = gym.make("chaosgym/ImpactBeam-v0", clearance=0.0635e-3, tolerance=True)
+    >>> env = gym.make("chaosgym/ImpactBeam-v0", clearance=0.0635e-3)
 
     ```
 
@@ -136,7 +136,8 @@ class ImpactBeamEnv(MachineEnv):
     | `cycles_per_step` | **int**         | `5`     | operating cycles in one step                                   |
     | `job_cycles`      | **int**         | `1000`  | operating cycles of the job, a multiple of `cycles_per_step`   |
     | `force_limit`     | **float**       | `80.0`  | peak force above which a step costs [N]; sensors reach 5 times |
-    | `tolerance`       | **bool, float** | `False` | draw the machine at each reset within manufacturing tolerances |
+    | `pool`            | **str**         | `nominal`| the nominal machine, "training" or "held-out"                  |
+    | `wear`            | **bool**        | `False` | the clearance grows with the damage                            |
     | `sensor_error`    | **float**       | `3.0`   | half width of the uniform error of a measured peak force [N]   |
     | `render_mode`     | **str**         | `None`  | `"rgb_array"` or `"human"`                                     |
     | `fidelity`        | **str**         | `None`  | rung of the ladder of models; none is "modes-5"                |
@@ -194,7 +195,8 @@ class ImpactBeamEnv(MachineEnv):
         cycles_per_step: int = Task.cycles_per_step,
         job_cycles: int = Task.job_cycles,
         force_limit: float = Task.force_limit,
-        tolerance: bool | float = False,
+        pool: str = "nominal",
+        wear: bool = False,
         sensor_error: float = SENSOR_ERROR,
         fidelity: str | None = None,
         render_mode: str | None = None,
@@ -202,10 +204,16 @@ class ImpactBeamEnv(MachineEnv):
     ) -> None:
         super().__init__(
             nominal_machine(THESIS_IMPACT_BEAM, {"fidelity": fidelity, **parameters}),
-            SpeedDrive(lowest_speed=lowest_speed, highest_speed=highest_speed, slew_limit=slew_limit),
+            SpeedDrive(
+                lowest_speed=lowest_speed,
+                highest_speed=highest_speed,
+                slew_limit=slew_limit,
+                regime_spacing=0.5 if wear else 0.25,
+            ),
             Task(job_cycles=job_cycles, cycles_per_step=cycles_per_step, force_limit=force_limit),
             tolerances=TOLERANCES,
-            tolerance=tolerance,
+            pool=pool,
+            wear=wear,
             sensor_error=sensor_error,
             render_mode=render_mode,
         )

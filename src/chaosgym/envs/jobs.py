@@ -1,6 +1,6 @@
 """How do jobs go on? The bookkeeping of machines at work, whether one runs or a thousand side by side."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from chaosgym.envs.drive import SpeedDrive
 from chaosgym.envs.observation import Observation, observe, sensor_readings
-from chaosgym.envs.tasks import LONGEST_PERIOD, Status, Step, Task, judged_cycles
+from chaosgym.envs.pools import Pool, worn
+from chaosgym.envs.regimes import RegimeTable, nearest
+from chaosgym.envs.tasks import Status, Step, Task
 from chaosgym.errors import SimulationError
 from chaosgym.fleet import Cycles, Fleet, at_speed
 from chaosgym.machines.machine import Machine
-from chaosgym.machines.parameters import with_settings
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -26,19 +27,16 @@ RUN_IN_CYCLES = 20
 class Rules(NamedTuple):
     """What all jobs have in common.
 
-    ``machine`` the nominal one; ``drive``; ``task``; ``space`` of an observation; ``tolerances`` half width of each
-    field that varies, as a share of its nominal value, all multiplied by ``tolerance``; ``sensor_error`` [N] half width
-    of the error of a measured peak; ``is_type_iii`` tells which steps count as Type III.
+    ``machine`` the nominal one; ``drive``; ``task``; ``space`` of an observation; ``pool`` of the machines;
+    ``sensor_error`` [N] half width of the error of a measured peak.
     """
 
     machine: Machine
     drive: SpeedDrive
     task: Task
     space: Box
-    tolerances: Mapping[str, float]
-    tolerance: float
+    pool: Pool
     sensor_error: float
-    is_type_iii: Callable[[Step], NDArray[np.bool_]]
 
 
 class Outcome(NamedTuple):
@@ -56,7 +54,9 @@ class Jobs:
     Attributes
     ----------
     machines
-        As drawn for the current job of each, at its starting speed.
+        As drawn for the current job of each, with its present clearance, at its starting speed.
+    chosen : (N,)
+        Their numbers in the pool.
     speed : (N,)
         In the unit of the machine's speed field.
     damage : (N, sides)
@@ -67,11 +67,13 @@ class Jobs:
         count, cycles = len(fleet), rules.task.cycles_per_step
         self.rules, self.fleet = rules, fleet
         self.machines = [rules.machine] * count
+        self._new = [rules.machine] * count
+        self.chosen = np.zeros(count, np.int64)
         self.speed = np.full(count, rules.drive.lowest_speed)
         self.damage = np.zeros((count, len(rules.machine.sides)))
         self._action = np.zeros(count)
         self._cycles_done = np.zeros(count, np.int64)
-        self._recent_peaks = np.zeros((count, judged_cycles(cycles) + LONGEST_PERIOD))
+        self._type_iii = np.zeros((count, len(rules.pool.levels), len(rules.pool.speeds)), np.bool_)
         self._peaks = np.zeros((count, cycles))
         self._impacts = np.zeros(count)
         self._bouncing = np.zeros(count)
@@ -81,8 +83,20 @@ class Jobs:
         """Machine of job i at its current speed."""
         return at_speed(self.machines[i], float(self.speed[i]))
 
-    def start(self, which: Indices, speed: float, generators: Generators) -> tuple[Observation, dict[str, Any]]:
+    def regimes_at(self, i: int) -> RegimeTable:
+        """Regimes of the machine of job i with its present clearance."""
+        return self.rules.pool.regimes(int(self.chosen[i]))[int(self._levels(np.array([i]))[0])]
+
+    def nominal_regimes_at(self, i: int) -> RegimeTable:
+        """Regimes of the nominal machine, worn as that of job i is."""
+        return self.rules.pool.nominal_regimes[int(self._levels(np.array([i]))[0])]
+
+    def start(
+        self, which: Indices, speed: float, generators: Generators, chosen: Indices | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
         """Start the jobs ``which`` (k,), each on a new machine that is run in from rest at a speed.
+
+        ``chosen`` (k,) are the numbers of the machines in the pool; drawn by default.
 
         Returns
         -------
@@ -94,9 +108,12 @@ class Jobs:
         SimulationError
             If a machine can't be simulated at its starting speed.
         """
-        task = self.rules.task
-        for i, generator in zip(which.tolist(), generators, strict=True):
-            self.machines[i] = at_speed(self._draw_machine(generator), speed)
+        task, pool = self.rules.task, self.rules.pool
+        drawn = np.array([generator.integers(len(pool)) for generator in generators])
+        self.chosen[which] = drawn if chosen is None else chosen
+        for i, k in zip(which.tolist(), self.chosen[which].tolist(), strict=True):
+            self._type_iii[i] = [table.type_iii for table in pool.regimes(k)]
+            self.machines[i] = self._new[i] = at_speed(pool[k], speed)
             self.fleet.start(i, self.machines[i])
         speeds = np.full(len(which), speed)
         self.speed[which], self._action[which] = speeds, self.rules.drive.action_for(speed)
@@ -110,6 +127,7 @@ class Jobs:
             "speed": speeds,
             "damage": np.zeros(len(which)),
             "status": np.full(len(which), int(Status.RUNNING)),
+            "machine": self.chosen[which],
         }
         return self._observe(which, generators), info
 
@@ -126,6 +144,9 @@ class Jobs:
         speed = drive.approach(self.speed[which], target)
         self.speed[which] = speed
         self.fleet.set_speeds(which, speed)
+        if self.rules.pool.wears:
+            self._wear(which)
+        levels = self._levels(which)
         cycles = self.fleet.run(which, task.cycles_per_step)
 
         before = self.damage[which]
@@ -137,25 +158,26 @@ class Jobs:
         worse = after.max(axis=-1)
         status = task.status(cycles.failed, self._cycles_done[which], worse)
         duration = task.cycles_per_step * self.rules.machine.period_at(speed)
-        step = Step(speed, duration, cycles.peak_force, self._recent_peaks[which])
         reward, named = task.judge(
-            step, status, type_iii=self.rules.is_type_iii(step), damage_increase=worse - before.max(axis=-1),
-            job_time=self._job_time,
+            Step(speed, duration, cycles.peak_force), status,
+            type_iii=self._type_iii[which, levels, nearest(self.rules.pool.speeds, speed)],
+            damage_increase=worse - before.max(axis=-1), job_time=self._job_time,
         )  # fmt: skip
-        info = named | {"speed": speed, "damage": worse, "status": status, "is_success": status == int(Status.JOB_DONE)}
+        info = named | {
+            "speed": speed, "damage": worse, "status": status, "is_success": status == int(Status.JOB_DONE),
+            "machine": self.chosen[which],
+        }  # fmt: skip
         return Outcome(self._observe(which, generators), reward, status != int(Status.RUNNING), info)
 
-    def _draw_machine(self, generator: np.random.Generator) -> Machine:
-        rules = self.rules
-        if rules.tolerance == 0.0:
-            return rules.machine
-        widths = np.array(list(rules.tolerances.values()))
-        factors = 1.0 + rules.tolerance * generator.uniform(-1.0, 1.0, len(widths)) * widths
-        drawn = {
-            name: getattr(rules.machine, name) * float(factor)
-            for name, factor in zip(rules.tolerances, factors, strict=True)
-        }
-        return with_settings(rules.machine, drawn)
+    def _levels(self, which: Indices) -> Indices:
+        """Which regime tables hold at the present clearances (k,)."""
+        return nearest(self.rules.pool.levels, 1.0 + self.damage[which].max(axis=-1))
+
+    def _wear(self, which: Indices) -> None:
+        """Let clearances grow with the damage; the motion goes on."""
+        for i, damage in zip(which.tolist(), self.damage[which].max(axis=-1).tolist(), strict=True):
+            self.machines[i] = worn(self._new[i], 1.0 + damage)
+            self.fleet.change(i, self.machine_at(i))
 
     def _note(self, which: Indices, speed: Array, cycles: Cycles) -> None:
         """Keep what the next observation and judgement need, of the machines that did not fail."""
@@ -163,8 +185,6 @@ class Jobs:
             ran = ~cycles.failed
             which, speed, cycles = which[ran], speed[ran], cycles.of(ran)
         monitored = cycles.peak_force[..., 0]
-        kept = self._recent_peaks.shape[1]
-        self._recent_peaks[which] = np.concatenate([self._recent_peaks[which], monitored], axis=1)[:, -kept:]
         n = self._peaks.shape[1]
         self._peaks[which] = monitored[:, -n:]
         sides = (len(which), n * self.damage.shape[1])
@@ -178,4 +198,5 @@ class Jobs:
             rules.space, self.speed[which], self._action[which],
             1.0 - self._cycles_done[which] / rules.task.job_cycles, self._impacts[which], self._bouncing[which],
             sensor_readings(self._peaks[which], rules.sensor_error, generators),
+            self.damage[which].max(axis=-1) if rules.pool.wears else None,
         )  # fmt: skip

@@ -4,9 +4,9 @@ A step is a whole number of operating cycles at constant speed, so the phase of 
 changes and the motion goes on from the state in which the last step ended.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import gymnasium as gym
 import numpy as np
@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from chaosgym.envs.drive import SpeedDrive, checked_number
 from chaosgym.envs.jobs import Jobs, Rules
 from chaosgym.envs.observation import Observation, observation_names, observation_space
-from chaosgym.envs.tasks import Status, Step, Task, does_not_repeat
+from chaosgym.envs.pools import Pool
+from chaosgym.envs.regimes import RegimeTable
+from chaosgym.envs.tasks import Status, Task
 from chaosgym.errors import ParameterError
 from chaosgym.fleet import SerialFleet, at_speed
 from chaosgym.machines.machine import Machine
@@ -33,9 +35,6 @@ SENSOR_ERROR = 3.0
 
 FORCE_RANGE = 5.0
 """Range of the force sensors in units of the force limit."""
-
-WIDEST_TOLERANCE = 4.0
-"""Largest factor on the manufacturing tolerances."""
 
 RENDER_SAMPLES = 1000
 """Samples of the motion kept in each cycle for rendering."""
@@ -61,19 +60,29 @@ def nominal_machine(reference: Machine, parameters: Mapping[str, Any]) -> Machin
     return with_settings(reference, parameters)
 
 
-def starting_speed(drive: SpeedDrive, options: Mapping[str, Any]) -> float:
-    """Return the speed at which a job starts, by the options of a reset.
+class Start(NamedTuple):
+    """Speed at which jobs start, and the numbers of their machines in the pool, None if they are drawn."""
+
+    speed: float
+    machine: NDArray[np.int64] | None
+
+
+def start_of(pool: Pool, options: Mapping[str, Any]) -> Start:
+    """Return how jobs start, by the options of a reset.
 
     Raises
     ------
     ParameterError
-        If an option is unknown or the speed lies outside the range of the drive.
+        If an option is unknown, the speed lies outside the range of the drive or the machine is not in the pool.
     """
     for name in options:
-        if name != "speed":
-            raise ParameterError(f"options has no entry {name!r}; allowed: speed")
+        if name not in ("machine", "speed"):
+            raise ParameterError(f"options has no entry {name!r}; allowed: machine, speed")
+    drive = pool.drive
     low, high = drive.lowest_speed, drive.highest_speed
-    return float(drive.rounded(checked_number("options['speed']", options.get("speed", low), low, high)))
+    speed = checked_number("options['speed']", options.get("speed", low), low, high)
+    machine = options.get("machine")
+    return Start(float(drive.rounded(speed)), None if machine is None else pool.checked(machine))
 
 
 def _first(info: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
@@ -94,13 +103,13 @@ class MachineEnv(gym.Env[Observation, Action]):
         Job, reward and cost.
     tolerances
         Half width of the manufacturing tolerance of each field that varies, as a share of its nominal value.
-    tolerance
-        False for the nominal machine; True for a machine drawn uniformly within the tolerances at each reset; a number
-        multiplies their width.
+    pool
+        "nominal" for the nominal machine, or the pool that the machine of each job is drawn from: "training" or
+        "held-out".
+    wear
+        Whether the clearance grows with the damage, which the agent then sees.
     sensor_error
         Half width [N] of the uniform error of each measured peak force.
-    is_type_iii
-        Tells which steps count as Type III; anything from the measured peaks to a table of regimes by speed.
     render_mode
         None, "rgb_array" or "human".
 
@@ -119,9 +128,9 @@ class MachineEnv(gym.Env[Observation, Action]):
         task: Task,
         *,
         tolerances: Mapping[str, float],
-        tolerance: bool | float = False,
+        pool: str = "nominal",
+        wear: bool = False,
         sensor_error: float = SENSOR_ERROR,
-        is_type_iii: Callable[[Step], NDArray[np.bool_]] = does_not_repeat,
         render_mode: str | None = None,
     ) -> None:
         if render_mode is not None and render_mode not in METADATA["render_modes"]:
@@ -130,17 +139,16 @@ class MachineEnv(gym.Env[Observation, Action]):
         self.nominal, self.drive, self.task, self.tolerances = machine, drive, task, dict(tolerances)
         for speed in (drive.highest_speed, drive.lowest_speed):
             at_speed(machine, speed)
-        self.observation_names = observation_names(task.cycles_per_step)
+        self.pool = Pool(machine, drive, self.tolerances, pool, wear)
+        self.observation_names = observation_names(task.cycles_per_step, wear)
         space = observation_space(
-            drive.lowest_speed, drive.highest_speed, FORCE_RANGE * task.force_limit, task.cycles_per_step
+            drive.lowest_speed, drive.highest_speed, FORCE_RANGE * task.force_limit, task.cycles_per_step, wear
         )
         self.observation_space = cast(Space[Observation], space)
         self.action_space = cast(Space[Action], Box(-1.0, 1.0, (1,), np.float32))
         self.rules = Rules(
-            machine, drive, task, space, self.tolerances,
-            tolerance=checked_number("tolerance", tolerance, 0.0, WIDEST_TOLERANCE),
+            machine, drive, task, space, self.pool,
             sensor_error=checked_number("sensor_error", sensor_error, 0.0, FORCE_RANGE * task.force_limit),
-            is_type_iii=is_type_iii,
         )  # fmt: skip
         self._fleet = SerialFleet(1)
         self._job = Jobs(self.rules, self._fleet)
@@ -156,6 +164,16 @@ class MachineEnv(gym.Env[Observation, Action]):
     def machine(self) -> Machine:
         """Machine of the current job, at its current speed."""
         return self._job.machine_at(0)
+
+    @property
+    def regimes(self) -> RegimeTable:
+        """Regimes of the machine of the current job, with its present clearance."""
+        return self._job.regimes_at(0)
+
+    @property
+    def nominal_regimes(self) -> RegimeTable:
+        """Regimes of the nominal machine, with as much wear."""
+        return self._job.nominal_regimes_at(0)
 
     @property
     def damage(self) -> float:
@@ -181,21 +199,23 @@ class MachineEnv(gym.Env[Observation, Action]):
         Parameters
         ----------
         seed
-            Seed of the machine drawn within tolerances and of the sensor.
+            Seed of the machine's number in the pool and of the sensor.
         options
-            ``{"speed": ...}`` starts at that speed instead of the lowest one.
+            ``{"speed": ...}`` starts at that speed instead of the lowest one; ``{"machine": k}`` takes machine k of the
+            pool.
 
         Raises
         ------
         ParameterError
-            If an option is unknown or the starting speed lies outside the range of the drive.
+            If an option is unknown, the starting speed lies outside the range of the drive or the machine is not in
+            the pool.
         SimulationError
             If the machine can't be simulated at its starting speed.
         """
         super().reset(seed=seed)
-        speed = starting_speed(self.drive, options or {})
+        start = start_of(self.pool, options or {})
         self._runs = False
-        observation, info = self._job.start(THE_ONE, speed, [self.np_random])
+        observation, info = self._job.start(THE_ONE, start.speed, [self.np_random], start.machine)
         self._runs = True
         if self.render_mode is not None:
             self._show().start()

@@ -13,19 +13,22 @@ IMPACT_RANGE = 200.0
 """Impacts a cycle at which the counter saturates."""
 
 
-def observation_names(cycles_per_step: int) -> tuple[str, ...]:
-    """Name every entry of the observation."""
+def observation_names(cycles_per_step: int, wears: bool) -> tuple[str, ...]:
+    """Name every entry of the observation; the last one is the damage if the machine wears."""
     peaks = tuple(f"peak_force_{i + 1}" for i in range(cycles_per_step))
     return (
         "speed", "last_action", "remaining_share", "max_peak_force", "mean_peak_force", "std_peak_force",
-        "impacts_per_cycle", "bouncing_share", *peaks,
+        "impacts_per_cycle", "bouncing_share", *peaks, *(("damage",) if wears else ()),
     )  # fmt: skip
 
 
-def observation_space(lowest_speed: float, highest_speed: float, force_range: float, cycles_per_step: int) -> Box:
+def observation_space(
+    lowest_speed: float, highest_speed: float, force_range: float, cycles_per_step: int, wears: bool
+) -> Box:
     """Return the space of observations; forces end at ``force_range`` [N], the range of the sensor."""
-    low = [lowest_speed, -1.0] + [0.0] * (6 + cycles_per_step)
+    low = [lowest_speed, -1.0] + [0.0] * (6 + cycles_per_step + wears)
     high = [highest_speed, 1.0, 1.0] + [force_range] * 3 + [IMPACT_RANGE, 1.0] + [force_range] * cycles_per_step
+    high += [1.0] * wears
     return Box(np.array(low, np.float32), np.array(high, np.float32))
 
 
@@ -38,8 +41,9 @@ def sensor_readings(peaks: Array, sensor_error: float, generators: Sequence[np.r
 
 
 def observe(
-    space: Box, speed: Array, action: Array, remaining: Array, impacts: Array, bouncing: Array, peaks: Array
-) -> Observation:
+    space: Box, speed: Array, action: Array, remaining: Array, impacts: Array, bouncing: Array, peaks: Array,
+    damage: Array | None = None,
+) -> Observation:  # fmt: skip
     """Compose the observations of k machines, clipped to their space.
 
     Parameters
@@ -52,18 +56,22 @@ def observe(
         Contacts begun in a cycle, and the share of the half cycle spent bouncing on one side.
     peaks : (k, cycles_per_step)
         Measured peak forces [N].
+    damage : (k,)
+        Share of its life that the worse surface has used up, on machines that wear.
 
     Returns
     -------
-    (k, 8 + cycles_per_step)
+    (k, 8 + cycles_per_step), or one entry more with the damage.
     """
     cycles = peaks.shape[-1]
     mean = peaks.sum(axis=-1) / cycles
     deviation = np.sqrt(((peaks - mean[:, None]) ** 2).sum(axis=-1) / cycles)
-    values = np.empty((len(peaks), 8 + cycles), np.float32)
+    values = np.empty((len(peaks), len(space.low)), np.float32)
     for column, entry in enumerate(
         (speed, action, remaining, peaks.max(axis=-1), mean, deviation, impacts, bouncing)
     ):  # fmt: skip
         values[:, column] = entry
-    values[:, 8:] = peaks
+    values[:, 8 : 8 + cycles] = peaks
+    if damage is not None:
+        values[:, -1] = damage
     return np.clip(values, space.low, space.high, out=values)

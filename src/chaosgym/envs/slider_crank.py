@@ -8,9 +8,11 @@ from chaosgym.envs.tasks import Task
 from chaosgym.envs.vector_env import MachineVectorEnv
 from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK, SliderCrank
 
-CONTACT_DAMPING_RATIO = 0.075
-"""One and a half times the larger printed value; assumed. At the printed clearance of +-0.254 mm it leaves 48 % of the
-steps at constant speeds from 50 to 300 rpm irregular; at 5 %, four of five are."""
+SLIDER_CLEARANCE = 0.127e-3
+"""Half clearance [m] of the slider joint; printed (thesis 4.4.2)."""
+
+CONTACT_DAMPING_RATIO = 0.1
+"""Twice the larger printed value; assumed."""
 
 MATRIX_UPDATE_INTERVAL = 5.0
 """Crank angle [deg] over which matrices are held; printed (thesis 5.2.2)."""
@@ -22,9 +24,9 @@ LOAD_RATING = 145.0
 """Force [N] under which a surface lasts a million cycles; derived as the beam's: the largest equivalent force of a job
 at constant speed from 50 to 300 rpm, 143 N at 300 rpm, rounded up. The acceleration is that of ``Task``; assumed."""
 
-TOLERANCES = {"slider_clearance": 0.1, "ball_clearance": 0.2, "contact_damping_ratio": 0.2, "rod_length": 0.002}
-"""Half widths as shares of the nominal value. Clearances: +-0.0254 mm at +-0.254 and +-0.127 mm, the repeatability of
-the thesis' feeler gauges (3.4, printed); damping and length (+-0.47 mm at 235 mm): assumed."""
+TOLERANCES = {"slider_clearance": 0.2, "ball_clearance": 0.2, "contact_damping_ratio": 0.2, "rod_length": 0.002}
+"""Half widths as shares of the nominal value. Clearances: +-0.0254 mm at +-0.127 mm, the repeatability of the thesis'
+feeler gauges (3.4, printed); damping and length (+-0.47 mm at 235 mm): assumed."""
 
 
 class SliderCrankEnv(MachineEnv):
@@ -142,7 +144,7 @@ class SliderCrankEnv(MachineEnv):
     ## Arguments
 
     ```python
-    >>> env = gym.make("chaosgym/SliderCrank-v0", slider_clearance=0.127e-3, rod_diameter=3.175e-3, tolerance=True)
+    >>> env = gym.make("chaosgym/SliderCrank-v0", slider_clearance=0.127e-3, rod_diameter=3.175e-3)
 
     ```
 
@@ -155,9 +157,11 @@ class SliderCrankEnv(MachineEnv):
     | `cycles_per_step`        | **int**         | `5`     | revolutions in one step                                   |
     | `job_cycles`             | **int**         | `1000`  | revolutions of the job, multiple of `cycles_per_step`     |
     | `force_limit`            | **float**       | `120.0` | peak force above which a step costs [N]; sensors reach 5x |
-    | `tolerance`              | **bool, float** | `False` | draw the machine at each reset within tolerances          |
+    | `pool`                   | **str**         | `nominal`| the nominal machine, "training" or "held-out"             |
+    | `wear`                   | **bool**        | `False` | the clearance grows with the damage                       |
     | `sensor_error`           | **float**       | `3.0`   | half width of the uniform error of a measured peak [N]    |
-    | `contact_damping_ratio`  | **float**       | `0.075` | damping ratio of a joint in contact                       |
+    | `slider_clearance`       | **float**       | `0.000127`| half clearance of the slider joint [m]                    |
+    | `contact_damping_ratio`  | **float**       | `0.1`   | damping ratio of a joint in contact                       |
     | `fidelity`               | **str**         | `None`  | rung of the ladder of models; none is "flexible-5deg"     |
     | `render_mode`            | **str**         | `None`  | `"rgb_array"` or `"human"`                                |
     | any field                | **float, str**  |         | of `chaosgym.machines.slider_crank.SliderCrank`           |
@@ -227,14 +231,16 @@ class SliderCrankEnv(MachineEnv):
         cycles_per_step: int = Task.cycles_per_step,
         job_cycles: int = Task.job_cycles,
         force_limit: float = FORCE_LIMIT,
-        tolerance: bool | float = False,
+        pool: str = "nominal",
+        wear: bool = False,
         sensor_error: float = SENSOR_ERROR,
+        slider_clearance: float = SLIDER_CLEARANCE,
         contact_damping_ratio: float = CONTACT_DAMPING_RATIO,
         fidelity: str | None = None,
         render_mode: str | None = None,
         **parameters: Any,
     ) -> None:
-        parameters["contact_damping_ratio"] = contact_damping_ratio
+        parameters |= {"slider_clearance": slider_clearance, "contact_damping_ratio": contact_damping_ratio}
         if fidelity is None:
             parameters.setdefault("matrix_update_interval", MATRIX_UPDATE_INTERVAL)
         else:
@@ -242,13 +248,18 @@ class SliderCrankEnv(MachineEnv):
         super().__init__(
             nominal_machine(THESIS_SLIDER_CRANK, parameters),
             SpeedDrive(
-                lowest_speed=lowest_speed, highest_speed=highest_speed, slew_limit=slew_limit, speed_grid=speed_grid
+                lowest_speed=lowest_speed,
+                highest_speed=highest_speed,
+                slew_limit=slew_limit,
+                speed_grid=speed_grid,
+                regime_spacing=10.0 if wear else 5.0,
             ),
             Task(
                 job_cycles=job_cycles, cycles_per_step=cycles_per_step, force_limit=force_limit, load_rating=LOAD_RATING
             ),
             tolerances=TOLERANCES,
-            tolerance=tolerance,
+            pool=pool,
+            wear=wear,
             sensor_error=sensor_error,
             render_mode=render_mode,
         )

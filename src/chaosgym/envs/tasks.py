@@ -29,15 +29,6 @@ from chaosgym.machines.parameters import parameter, validate
 
 Array = NDArray[np.float64]
 
-LONGEST_PERIOD = 8
-"""Longest period, in cycles, that counts as a repetition."""
-
-LEAST_JUDGED = 4
-"""Fewest cycles that are compared with earlier ones."""
-
-REPEATABILITY = 0.05
-"""Largest deviation, as a share of the largest peak, at which two peak forces count as equal (thesis 3.5.2)."""
-
 
 class Status(IntEnum):
     """Where the job stands; ``info["status"]``."""
@@ -52,35 +43,12 @@ class Step(NamedTuple):
     """What a task is told of one step, of one machine or of many: leading axes (...) are machines.
 
     ``speed`` (...) in the machine's unit, ``duration`` (...) [s], ``peak_force`` (..., cycles, sides) true peak forces
-    [N], zero where the simulation failed; ``recent_peaks`` (..., n) those of the monitored surface up to now, this
-    step's included.
+    [N], zero where the simulation failed.
     """
 
     speed: Array
     duration: Array
     peak_force: Array
-    recent_peaks: Array
-
-
-def does_not_repeat(step: Step) -> NDArray[np.bool_]:
-    """Tell whether the peak forces fail to repeat within 5 % after any number of cycles up to ``LONGEST_PERIOD``.
-
-    The last cycles of the step, its first one left out because a change of speed disturbs it, are compared with the
-    cycles 1, 2, ... before them, whatever the speed was then.
-    """
-    peaks = step.recent_peaks
-    judged = judged_cycles(step.peak_force.shape[-2])
-    last = peaks[..., None, -judged:]
-    before = np.arange(1, LONGEST_PERIOD + 1)[:, None]
-    earlier = peaks[..., np.arange(-judged, 0) - before]
-    deviation = np.abs(last - earlier).max(axis=-1)
-    repeats: NDArray[np.bool_] = (deviation <= REPEATABILITY * last.max(axis=-1)).any(axis=-1)
-    return ~repeats
-
-
-def judged_cycles(cycles_per_step: int) -> int:
-    """Return how many cycles ``does_not_repeat`` compares with earlier ones."""
-    return max(cycles_per_step - 1, LEAST_JUDGED)
 
 
 def damage_of(peak_force: Array, load_rating: float, acceleration: float) -> Array:

@@ -16,7 +16,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from chaosgym.envs.jobs import Indices, Jobs
-from chaosgym.envs.machine_env import METADATA, MachineEnv, starting_speed
+from chaosgym.envs.machine_env import METADATA, MachineEnv, Start, start_of
 from chaosgym.envs.observation import Observation
 from chaosgym.errors import ParameterError
 from chaosgym.fleet import fleet_of
@@ -25,8 +25,8 @@ Actions = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 
 SHARED = (
-    "action_space", "drive", "nominal", "observation_names", "observation_space", "render_mode", "rules", "task",
-    "tolerances",
+    "action_space", "drive", "nominal", "observation_names", "observation_space", "pool", "render_mode", "rules",
+    "task", "tolerances",
 )  # fmt: skip
 """Attributes that all sub-environments have in common."""
 
@@ -99,7 +99,8 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         seed
             One for each sub-environment, or s for s, s + 1, s + 2, ...
         options
-            As for the single environment, and ``"reset_mask"``: (num_envs,) bool.
+            As for the single environment, with ``"machine"`` one number or (num_envs,), and ``"reset_mask"``:
+            (num_envs,) bool.
 
         Raises
         ------
@@ -109,8 +110,12 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         options = dict(options or {})
         which = self._masked(options.pop("reset_mask", None))
         seeds = self._seeds(seed)
-        speed = starting_speed(self._single.drive, options)
-        observation, info = self._start(which, [seeds[i] for i in which.tolist()], speed)
+        start = start_of(self._single.pool, options)
+        if start.machine is not None and start.machine.shape not in ((), (self.num_envs,)):
+            raise ParameterError(
+                f"options['machine'] has shape {start.machine.shape}; allowed: one number, or ({self.num_envs},)"
+            )
+        observation, info = self._start(which, [seeds[i] for i in which.tolist()], start)
         if not self._has_begun:
             self._last = np.zeros(cast(tuple[int, ...], self.observation_space.shape), np.float32)
             self._has_begun = True
@@ -178,14 +183,15 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         self._add(infos, fresh, started)
 
     def _start(
-        self, which: Indices, seeds: Sequence[int | None], speed: float | None = None
+        self, which: Indices, seeds: Sequence[int | None], start: Start | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start jobs, at the lowest speed by default."""
+        """Start jobs, at the lowest speed and on machines drawn by default."""
         for i, seed in zip(which.tolist(), seeds, strict=True):
             if seed is not None or self._generators[i] is None:
                 self._generators[i] = np_random(seed)[0]
-        lowest = self._single.drive.lowest_speed
-        result = self._jobs.start(which, lowest if speed is None else speed, self._generators_of(which))
+        speed, machine = start or start_of(self._single.pool, {})
+        chosen = None if machine is None else np.broadcast_to(machine, self.num_envs)[which]
+        result = self._jobs.start(which, speed, self._generators_of(which), chosen)
         self._elapsed[which] = 0
         self._needs_reset[which] = False
         return result
@@ -225,7 +231,7 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         return seed
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Return an attribute of each sub-environment: speed, damage, machine, np_random, or one that all share.
+        """Return an attribute of each sub-environment: its own (speed, machine, regimes ...) or one that all share.
 
         Raises
         ------
@@ -239,6 +245,8 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
             "speed": lambda i: float(self._jobs.speed[i]),
             "damage": lambda i: float(self._jobs.damage[i].max()),
             "machine": self._jobs.machine_at,
+            "regimes": self._jobs.regimes_at,
+            "nominal_regimes": self._jobs.nominal_regimes_at,
             "np_random": lambda i: self._generators[i],
         }
         if name not in own:
