@@ -42,12 +42,13 @@ def labelling_cost(sweep: LabelledSweep, points: int, *, seed: int = 0, progress
         raise DatasetError(f"points = {points} is out of range; allowed: {PARTS} to {len(sweep.table)}, the rows")
     rows = np.sort(np.random.default_rng(seed).choice(len(sweep.table), points, replace=False))
     values = {name: sweep.column(name)[rows] for name in plan.fields}
+    machines = [plan.machine_at({name: float(column[i]) for name, column in values.items()}) for i in range(points)]
+    label_point(machines[0], plan.budget)  # compiles what is not yet compiled
     seconds = np.empty(points)
     for index, row in enumerate(tqdm(rows, desc="cost", unit="point", disable=not progress)):
-        machine = plan.machine_at({name: float(column[index]) for name, column in values.items()})
-        machine.reduce()
+        machines[index].reduce()
         began = thread_time()
-        label_point(machine, plan.budget, signals=bool(plan.with_signals(range(row, row + 1))[0]))
+        label_point(machines[index], plan.budget, signals=bool(plan.with_signals(range(row, row + 1))[0]))
         seconds[index] = thread_time() - began
     by: dict[str, Any] = {"nature": _by_name([str(name) for name in sweep.column("nature")[rows]], seconds)}
     by |= {name: _by_part(column, seconds) for name, column in values.items()}
