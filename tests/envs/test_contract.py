@@ -4,7 +4,6 @@ import inspect
 import re
 import subprocess
 import sys
-from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -14,7 +13,6 @@ from gymnasium.utils.env_checker import check_env
 
 from chaosgym import fleet
 from chaosgym.envs import ENVIRONMENTS, machine_env
-from chaosgym.envs.documentation import environments_page
 from chaosgym.envs.machine_env import MachineEnv
 from chaosgym.envs.tasks import Status
 from chaosgym.errors import ParameterError, SimulationError
@@ -276,13 +274,6 @@ def test_stable_baselines3_workers_run_the_same_job(name: str) -> None:
     assert np.array_equal(envs.reset(), expected)
     envs.step(np.zeros((2, 1), np.float32))
     envs.close()
-
-
-def test_the_page_is_the_docstring(name: str) -> None:
-    """docs/environments.md is what the command in its first lines writes."""
-    page = (Path(__file__).parents[2] / "docs" / "environments.md").read_text(encoding="utf-8")
-    assert f"# {name}\n" in page
-    assert page == environments_page()
 
 
 def test_the_docstring_tells_the_defaults(name: str) -> None:

@@ -234,3 +234,15 @@ def test_bad_calls_are_named() -> None:
     assert envs.step(action)[2].all()
     with pytest.raises(gym.error.ResetNeeded, match=re.escape("[0, 1]")):
         envs.step(action)
+
+
+def test_clearance_grows_side_by_side_as_alone() -> None:
+    """On machines that wear fast, steps agree to the last bit, and so do the worn machines."""
+    envs = _pair("chaosgym/ImpactBeamWear-v0", AutoresetMode.SAME_STEP, count=2, lowest_speed=28.0)
+    for env in (envs[0]._single, *(single.unwrapped for single in envs[1].envs)):
+        object.__setattr__(env.task, "damage_acceleration", 1e4)
+    assert _assert_same_episodes(envs, 12) == 0
+    worn, same = (env.unwrapped.get_attr("machine") for env in envs)
+    assert worn == same
+    new = [envs[0].unwrapped.get_attr("pool")[0][int(k)] for k in envs[0].unwrapped._jobs.chosen]
+    assert all(old.clearance > 1.1 * machine.clearance for old, machine in zip(worn, new, strict=True))
