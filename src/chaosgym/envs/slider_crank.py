@@ -33,186 +33,186 @@ machines that are periodic at every speed."""
 
 class SliderCrankEnv(MachineEnv):
     """
-        ## Description
+    ## Description
 
-        A motor turns a crank at constant speed, a slender steel rod drives a slider along a straight guide, and the slider
-        rattles in its clearance across the guide: the Spatial Slider Crank of P. Gu's thesis (*Chaotic Vibration in Machine
-        Systems and Its Implications for Design*, MIT, 1994, chapter 4). The machine has a job of 1000 revolutions to do.
-        Running fast saves time, but forces grow with speed and wear the joint out, and at most speeds the impacts are
-        irregular, with a few calm windows between. The agent sets the speed and finds them.
+    A motor turns a crank at constant speed, a slender steel rod drives a slider along a straight guide, and the slider
+    rattles in its clearance across the guide: the Spatial Slider Crank of P. Gu's thesis (*Chaotic Vibration in Machine
+    Systems and Its Implications for Design*, MIT, 1994, chapter 4). The machine has a job of 1000 revolutions to do.
+    Running fast saves time, but forces grow with speed and wear the joint out, and at a third of the
+    speeds the impacts are irregular, in bands with calm windows between. The agent sets the speed and finds them.
 
-        The motion is computed exactly between contact events, with the same code that the rest of the package uses; a step
-        is a whole number of revolutions at constant speed and begins at the outer dead point, so the motion goes on across
-        a change of speed without a jump of the crank angle.
+    The motion is computed exactly between contact events, with the same code that the rest of the package uses; a step
+    is a whole number of revolutions at constant speed and begins at the outer dead point, so the motion goes on across
+    a change of speed without a jump of the crank angle.
 
-        ```python
-        >>> import gymnasium as gym
-        >>> import chaosgym
-        >>> env = gym.make("chaosgym/SliderCrank-v0")
-        >>> observation, info = env.reset(seed=1)
-        >>> observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+    ```python
+    >>> import gymnasium as gym
+    >>> import chaosgym
+    >>> env = gym.make("chaosgym/SliderCrank-v0")
+    >>> observation, info = env.reset(seed=1)
+    >>> observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
 
-        ```
+    ```
 
-        ## Action Space
+    ## Action Space
 
-        The action is an `ndarray` with shape `(1,)` and values in `[-1, 1]`: the target speed, mapped linearly to the range
-        of the drive and rounded to a grid of 2.5 rpm.
+    The action is an `ndarray` with shape `(1,)` and values in `[-1, 1]`: the target speed, mapped linearly to the range
+    of the drive and rounded to a grid of 2.5 rpm.
 
-        | Num | Action       | Min         | Max          |
-        |-----|--------------|-------------|--------------|
-        | 0   | Target speed | -1 (50 rpm) | +1 (300 rpm) |
+    | Num | Action       | Min         | Max          |
+    |-----|--------------|-------------|--------------|
+    | 0   | Target speed | -1 (50 rpm) | +1 (300 rpm) |
 
-        The speed approaches the target by at most 10 rpm a step and is constant within a step. Values beyond the range are
-        clipped; an action that is not finite raises an error. The grid keeps the number of speeds finite, for each of which
-        the matrices of the mechanism are assembled once; `speed_grid=0` does without it.
+    The speed approaches the target by at most 10 rpm a step and is constant within a step. Values beyond the range are
+    clipped; an action that is not finite raises an error. The grid keeps the number of speeds finite, for each of which
+    the matrices of the mechanism are assembled once; `speed_grid=0` does without it.
 
-        ## Observation Space
+    ## Observation Space
 
-        The observation is an `ndarray` with shape `(13,)`, `(14,)` in Wear; `env.unwrapped.observation_names` names its
-        entries. Forces are those that push the slider up, each peak with an error drawn uniformly from +-3 N and cut off at
-        zero.
-        `gymnasium.wrappers.RescaleObservation(env, -1, 1)` brings all entries to one scale.
+    The observation is an `ndarray` with shape `(13,)`, `(14,)` in Wear; `env.unwrapped.observation_names` names its
+    entries. Forces are those that push the slider up, each peak with an error drawn uniformly from +-3 N and cut off at
+    zero.
+    `gymnasium.wrappers.RescaleObservation(env, -1, 1)` brings all entries to one scale.
 
-        | Num  | Observation                                                           | Min | Max | Unit |
-        |------|-----------------------------------------------------------------------|-----|-----|------|
-        | 0    | `speed`: crank speed of the step                                      | 50  | 300 | rpm  |
-        | 1    | `last_action`: the action behind it, clipped                          | -1  | 1   | -    |
-        | 2    | `remaining_share`: share of the job still to do                       | 0   | 1   | -    |
-        | 3    | `max_peak_force`: largest measured peak force of the step             | 0   | 450 | N    |
-        | 4    | `mean_peak_force`: mean of the measured peak forces                   | 0   | 450 | N    |
-        | 5    | `std_peak_force`: their standard deviation                            | 0   | 450 | N    |
-        | 6    | `impacts_per_cycle`: contacts begun in a revolution, both surfaces    | 0   | 200 | -    |
-        | 7    | `bouncing_share`: share of the half turn spent bouncing on a surface  | 0   | 1   | -    |
-        | 8-12 | `peak_force_1` ... `peak_force_5`: measured peak force of each turn   | 0   | 450 | N    |
-        | 13   | `damage`: share of its life that the joint has used up, in Wear alone | 0   | 1   | -    |
+    | Num  | Observation                                                           | Min | Max | Unit |
+    |------|-----------------------------------------------------------------------|-----|-----|------|
+    | 0    | `speed`: crank speed of the step                                      | 50  | 300 | rpm  |
+    | 1    | `last_action`: the action behind it, clipped                          | -1  | 1   | -    |
+    | 2    | `remaining_share`: share of the job still to do                       | 0   | 1   | -    |
+    | 3    | `max_peak_force`: largest measured peak force of the step             | 0   | 450 | N    |
+    | 4    | `mean_peak_force`: mean of the measured peak forces                   | 0   | 450 | N    |
+    | 5    | `std_peak_force`: their standard deviation                            | 0   | 450 | N    |
+    | 6    | `impacts_per_cycle`: contacts begun in a revolution, both surfaces    | 0   | 200 | -    |
+    | 7    | `bouncing_share`: share of the half turn spent bouncing on a surface  | 0   | 1   | -    |
+    | 8-12 | `peak_force_1` ... `peak_force_5`: measured peak force of each turn   | 0   | 450 | N    |
+    | 13   | `damage`: share of its life that the joint has used up, in Wear alone | 0   | 1   | -    |
 
-        ## Rewards
+    ## Rewards
 
-        The reward of a step of n revolutions in a job of N is the sum of four terms, which `info` lists by name:
+    The reward of a step of n revolutions in a job of N is the sum of four terms, which `info` lists by name:
 
-        | Term              | Value                                                         | Weight w |
-        |-------------------|---------------------------------------------------------------|----------|
-        | `reward_time`     | -w (duration of the step) / (duration of the job at 300 rpm)  | 1        |
-        | `reward_damage`   | -w (increase of the damage of the joint)                      | 1        |
-        | `reward_type_iii` | -w n / N if the step counts as Type III                       | 1        |
-        | `reward_failure`  | -w on fracture or a failed simulation                         | 10       |
+    | Term              | Value                                                         | Weight w |
+    |-------------------|---------------------------------------------------------------|----------|
+    | `reward_time`     | -w (duration of the step) / (duration of the job at 300 rpm)  | 1        |
+    | `reward_damage`   | -w (increase of the damage of the joint)                      | 1        |
+    | `reward_type_iii` | -w n / N if the step counts as Type III                       | 1        |
+    | `reward_failure`  | -w on fracture or a failed simulation                         | 10       |
 
-        *Damage* follows the basic rating life of bearings: a revolution with peak force F uses up (F / C)^(10/3) / 10^6 of
-        the life of a bearing surface, times an acceleration of 1000. True peak forces count, of the worse surface. C =
-        95.7 N is the largest equivalent force of the nominal machine at constant speed, that of 300 rpm, so that this worst
-        speed uses up one life in one job.
+    *Damage* follows the basic rating life of bearings: a revolution with peak force F uses up (F / C)^(10/3) / 10^6 of
+    the life of a bearing surface, times an acceleration of 1000. True peak forces count, of the worse surface. C =
+    95.7 N is the largest equivalent force of the nominal machine at constant speed, that of 300 rpm, so that this worst
+    speed uses up one life in one job.
 
-        A step counts as *Type III* if a table of the machine says so: `diagnose` from rest, within 400 revolutions, at the
-        speeds from 50 to 300 rpm by 5 rpm (by 10 rpm in Wear, at six clearances from once to twice that of the new machine;
-        2.5 rpm would take 1.5 hours of a core for Tolerance alone). It counts if the response at the nearest speed is not
-        periodic, or if those at both its neighbours are not. Chaos that dies out within the 400 revolutions counts as
-        chaos. `env.unwrapped.regimes` is the table of the machine at work, `nominal_regimes` that of the nominal one. On
-        the nominal machine 35 % of the speeds are not periodic and 37 % count.
+    A step counts as *Type III* if a table of the machine says so: `diagnose` from rest, within 400 revolutions, at the
+    speeds from 50 to 300 rpm by 5 rpm (by 10 rpm in Wear, at six clearances from once to twice that of the new machine;
+    2.5 rpm would take 1.5 hours of a core for Tolerance alone). It counts if the response at the nearest speed is not
+    periodic, or if those at both its neighbours are not. Chaos that dies out within the 400 revolutions counts as
+    chaos. `env.unwrapped.regimes` is the table of the machine at work, `nominal_regimes` that of the nominal one. On
+    the nominal machine 35 % of the speeds are not periodic and 37 % count.
 
-        `info["cost"]` is 1 in a step that counts as Type III (`cost_type_iii`), has a peak force above the force limit on
-        either surface (`cost_force`, on the nominal machine from 280 rpm on) or fails, and 0 otherwise. `info` also holds
-        `speed` [rpm], `damage`, `machine` (its number in the pool), `status` (0 running, 1 job done, 2 fracture,
-        3 simulation failed) and `is_success`.
+    `info["cost"]` is 1 in a step that counts as Type III (`cost_type_iii`), has a peak force above the force limit on
+    either surface (`cost_force`, on the nominal machine from 280 rpm on) or fails, and 0 otherwise. `info` also holds
+    `speed` [rpm], `damage`, `machine` (its number in the pool), `status` (0 running, 1 job done, 2 fracture,
+    3 simulation failed) and `is_success`.
 
-        Loopholes considered; `chaosgym regimes audit chaosgym/SliderCrank-v0` plays them for a job each, from 50 rpm on:
+    Loopholes considered; `chaosgym regimes audit chaosgym/SliderCrank-v0` plays them for a job each, from 50 rpm on:
 
-        - *Farming*: no term is ever positive, and a job has a fixed number of revolutions, so there is nothing to collect.
+    - *Farming*: no term is ever positive, and a job has a fixed number of revolutions, so there is nothing to collect.
     AUDIT
-        - *Holding the response periodic by small corrections* (control of chaos) lowers the forces, and so damage, but not
-          the Type III term, which knows the speed alone.
+    - *Holding the response periodic by small corrections* (control of chaos) lowers the forces, and so damage, but not
+      the Type III term, which knows the speed alone.
 
-        ## Starting State
+    ## Starting State
 
-        The machine starts from rest in the middle of the gap and runs in for 20 revolutions at 50 rpm, which the first
-        observation reports. `env.reset(options={"speed": 190.0})` starts at another speed, rounded to the grid,
-        `{"machine": 3}` takes machine 3 of the pool instead of one drawn from it.
+    The machine starts from rest in the middle of the gap and runs in for 20 revolutions at 50 rpm, which the first
+    observation reports. `env.reset(options={"speed": 190.0})` starts at another speed, rounded to the grid,
+    `{"machine": 3}` takes machine 3 of the pool instead of one drawn from it.
 
-        ## Episode End
+    ## Episode End
 
-        1. Termination: the job is done.
-        2. Termination: fracture, the damage reaches 1.
-        3. Termination: the simulation fails; `step` never raises for that.
-        4. Truncation: only by `max_episode_steps` of `gymnasium.make`; there is no limit by default, a job has 200 steps.
+    1. Termination: the job is done.
+    2. Termination: fracture, the damage reaches 1.
+    3. Termination: the simulation fails; `step` never raises for that.
+    4. Truncation: only by `max_episode_steps` of `gymnasium.make`; there is no limit by default, a job has 200 steps.
 
-        ## Arguments
+    ## Arguments
 
-        ```python
-        >>> env = gym.make("chaosgym/SliderCrank-v0", slider_clearance=0.127e-3, rod_diameter=3.175e-3)
+    ```python
+    >>> env = gym.make("chaosgym/SliderCrank-v0", slider_clearance=0.127e-3, rod_diameter=3.175e-3)
 
-        ```
+    ```
 
-        | Parameter               | Type           | Default    | Description                                           |
-        |-------------------------|----------------|------------|-------------------------------------------------------|
-        | `lowest_speed`          | **float**      | `50.0`     | target speed of action -1 [rpm]                       |
-        | `highest_speed`         | **float**      | `300.0`    | target speed of action +1 [rpm]                       |
-        | `slew_limit`            | **float**      | `10.0`     | largest change of speed in one step [rpm]             |
-        | `speed_grid`            | **float**      | `2.5`      | spacing of the speeds [rpm], 0 for none               |
-        | `cycles_per_step`       | **int**        | `5`        | revolutions in one step                               |
-        | `job_cycles`            | **int**        | `1000`     | revolutions of the job, multiple of `cycles_per_step` |
-        | `force_limit`           | **float**      | `90.0`     | peak force above which a step costs [N]; sensors: 5x  |
-        | `pool`                  | **str**        | `nominal`  | the nominal machine, "training" or "held-out"         |
-        | `wear`                  | **bool**       | `False`    | the clearance grows with the damage                   |
-        | `sensor_error`          | **float**      | `3.0`      | half width of the error of a measured peak [N]        |
-        | `slider_clearance`      | **float**      | `0.000127` | half clearance of the slider joint [m]                |
-        | `contact_damping_ratio` | **float**      | `0.105`    | damping ratio of a joint in contact                   |
-        | `fidelity`              | **str**        | `None`     | rung of the ladder of models; none is "flexible-5deg" |
-        | `render_mode`           | **str**        | `None`     | `"rgb_array"` or `"human"`                            |
-        | any field               | **float, str** |            | of `chaosgym.machines.slider_crank.SliderCrank`       |
+    | Parameter               | Type           | Default    | Description                                           |
+    |-------------------------|----------------|------------|-------------------------------------------------------|
+    | `lowest_speed`          | **float**      | `50.0`     | target speed of action -1 [rpm]                       |
+    | `highest_speed`         | **float**      | `300.0`    | target speed of action +1 [rpm]                       |
+    | `slew_limit`            | **float**      | `10.0`     | largest change of speed in one step [rpm]             |
+    | `speed_grid`            | **float**      | `2.5`      | spacing of the speeds [rpm], 0 for none               |
+    | `cycles_per_step`       | **int**        | `5`        | revolutions in one step                               |
+    | `job_cycles`            | **int**        | `1000`     | revolutions of the job, multiple of `cycles_per_step` |
+    | `force_limit`           | **float**      | `90.0`     | peak force above which a step costs [N]; sensors: 5x  |
+    | `pool`                  | **str**        | `nominal`  | the nominal machine, "training" or "held-out"         |
+    | `wear`                  | **bool**       | `False`    | the clearance grows with the damage                   |
+    | `sensor_error`          | **float**      | `3.0`      | half width of the error of a measured peak [N]        |
+    | `slider_clearance`      | **float**      | `0.000127` | half clearance of the slider joint [m]                |
+    | `contact_damping_ratio` | **float**      | `0.105`    | damping ratio of a joint in contact                   |
+    | `fidelity`              | **str**        | `None`     | rung of the ladder of models; none is "flexible-5deg" |
+    | `render_mode`           | **str**        | `None`     | `"rgb_array"` or `"human"`                            |
+    | any field               | **float, str** |            | of `chaosgym.machines.slider_crank.SliderCrank`       |
 
-        Fields are in SI units, angles in degrees. They include the motor angle, the joints (`slider_joint`, `ball_joint`),
-        their clearances, the rod (`rod`, `rod_diameter`, `rod_length`), friction and gravity. The ball joint has no
-        clearance, and there is no gravity. Matrices are held over 5 deg of crank angle (`matrix_update_interval`), as in
-        the thesis (5.2.2), which makes a new speed cheap. The rungs of `fidelity` are `"rigid"`, `"flexible-5deg"`,
-        `"flexible-1deg"` and `"reference"`; a field that a rung sets may not be given beside it.
+    Fields are in SI units, angles in degrees. They include the motor angle, the joints (`slider_joint`, `ball_joint`),
+    their clearances, the rod (`rod`, `rod_diameter`, `rod_length`), friction and gravity. The ball joint has no
+    clearance, and there is no gravity. Matrices are held over 5 deg of crank angle (`matrix_update_interval`), as in
+    the thesis (5.2.2), which makes a new speed cheap. The rungs of `fidelity` are `"rigid"`, `"flexible-5deg"`,
+    `"flexible-1deg"` and `"reference"`; a field that a rung sets may not be given beside it.
 
-        The contact damping ratio is assumed: some twice the larger printed value. Of 51 speeds 65 % count as Type III at
-        0.1, 37 % at 0.105 and 0.11, 20 % at 0.115 and none at 0.125.
+    The contact damping ratio is assumed: some twice the larger printed value. Of 51 speeds 65 % count as Type III at
+    0.1, 37 % at 0.105 and 0.11, 20 % at 0.115 and none at 0.125.
 
-        Tolerances are +-20 % of the slider's clearance and of the ball's, +-10 % of the contact damping ratio and +-0.2 %
-        of the rod length. Their machines are fixed and seeded: 128 to train on and 32 held out, in Wear 32 and 16. The
-        agent is not told which machine it got. Tables are shipped; a machine that has none gets its own when it is first
-        used, which takes minutes and is kept on disk.
+    Tolerances are +-20 % of the slider's clearance and of the ball's, +-10 % of the contact damping ratio and +-0.2 %
+    of the rod length. Their machines are fixed and seeded: 128 to train on and 32 held out, in Wear 32 and 16. The
+    agent is not told which machine it got. Tables are shipped; a machine that has none gets its own when it is first
+    used, which takes minutes and is kept on disk.
 
-        ## Vectorized environment
+    ## Vectorized environment
 
-        ```python
-        >>> envs = gym.make_vec("chaosgym/SliderCrank-v0", num_envs=16, autoreset_mode="SameStep", max_episode_steps=100)
-        >>> observations, infos = envs.reset(seed=1)
-        >>> observations, rewards, terminated, truncated, infos = envs.step(envs.action_space.sample())
+    ```python
+    >>> envs = gym.make_vec("chaosgym/SliderCrank-v0", num_envs=16, autoreset_mode="SameStep", max_episode_steps=100)
+    >>> observations, infos = envs.reset(seed=1)
+    >>> observations, rewards, terminated, truncated, infos = envs.step(envs.action_space.sample())
 
-        ```
+    ```
 
-        All machines step in one compiled call on all processors. Sub-environment i does, bit for bit, what a single
-        environment reset with seed + i does, and has a generator of its own. `autoreset_mode` is `"NextStep"` (default),
-        `"SameStep"` or `"Disabled"` (with `reset(options={"reset_mask": ...})`); `max_episode_steps` truncates; all other
-        keywords are those above, except that there is no rendering. `envs.unwrapped.get_attr(name)` returns `speed`,
-        `damage`, `machine`, `regimes`, `nominal_regimes` and `np_random` of each sub-environment, and what they share.
-        `reset(options={"machine": [...]})` takes one number for each.
+    All machines step in one compiled call on all processors. Sub-environment i does, bit for bit, what a single
+    environment reset with seed + i does, and has a generator of its own. `autoreset_mode` is `"NextStep"` (default),
+    `"SameStep"` or `"Disabled"` (with `reset(options={"reset_mask": ...})`); `max_episode_steps` truncates; all other
+    keywords are those above, except that there is no rendering. `envs.unwrapped.get_attr(name)` returns `speed`,
+    `damage`, `machine`, `regimes`, `nominal_regimes` and `np_random` of each sub-environment, and what they share.
+    `reset(options={"machine": [...]})` takes one number for each.
 
-        Machines drawn within tolerances need a model of their own at every new speed, which takes less time than the
-        revolutions of a step.
+    Machines drawn within tolerances need a model of their own at every new speed, which takes less time than the
+    revolutions of a step.
 
-        stable-baselines3 trains on it through its own interface:
+    stable-baselines3 trains on it through its own interface:
 
-        ```python
-        from chaosgym.envs import SB3VecEnv
-        from stable_baselines3 import PPO
-        from stable_baselines3.common.vec_env import VecMonitor
+    ```python
+    from chaosgym.envs import SB3VecEnv
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import VecMonitor
 
-        PPO("MlpPolicy", VecMonitor(SB3VecEnv("chaosgym/SliderCrank-v0", num_envs=16))).learn(100_000)
-        ```
+    PPO("MlpPolicy", VecMonitor(SB3VecEnv("chaosgym/SliderCrank-v0", num_envs=16))).learn(100_000)
+    ```
 
-        The number of threads is numba's (`NUMBA_NUM_THREADS`, `numba.set_num_threads`). With GNU OpenMP underneath, a
-        process that was forked after a step can't run this environment itself; spawned workers, and single environments
-        in any worker, are not affected. `vectorization_mode="sync"` and `"async"` make single environments instead.
+    The number of threads is numba's (`NUMBA_NUM_THREADS`, `numba.set_num_threads`). With GNU OpenMP underneath, a
+    process that was forked after a step can't run this environment itself; spawned workers, and single environments
+    in any worker, are not affected. `vectorization_mode="sync"` and `"async"` make single environments instead.
 
-        Where another library makes the environment in a fresh process, the id names the package to import:
-        `chaosgym:chaosgym/SliderCrank-v0`.
+    Where another library makes the environment in a fresh process, the id names the package to import:
+    `chaosgym:chaosgym/SliderCrank-v0`.
 
-        ## Version History
+    ## Version History
 
-        * v0: Initial version.
+    * v0: Initial version.
     """
 
     def __init__(
