@@ -11,7 +11,6 @@ from pathlib import Path
 import gymnasium as gym
 
 from chaosgym.envs import ENVIRONMENTS
-from chaosgym.files import write_atomically
 
 TASKS = {
     "": "The nominal machine.",
@@ -44,8 +43,13 @@ def pages() -> Iterator[tuple[str, str]]:
     )
 
 
-if __name__ == "__main__":
+def write_pages(folder: Path) -> None:
+    """Write all pages into the folder of the documentation."""
     for file, page in pages():
-        path = Path(sys.argv[1], file)
+        path = folder / file
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, lambda temporary, page=page: temporary.write_text(page, encoding="utf-8"))
+        path.write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_pages(Path(sys.argv[1]))

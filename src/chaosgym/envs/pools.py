@@ -203,11 +203,13 @@ def make_pools(pool: Pool, folder: Path, command: str) -> tuple[Path, PoolFile]:
         "machine": repr(pool.nominal), "tolerances": pool.tolerances, "levels": pool.levels.tolist(),
         "seed": SEEDS[pool.task], "horizon": HORIZON, "chaosgym": __version__, "command": command,
     }  # fmt: skip
-    arrays = (
-        np.array([[getattr(table, name) for table in row] for row in tables], kind)
-        for name, kind in (("nature", np.int8), ("equivalent_force", np.float32), ("peak_force", np.float32))
+    nature, equivalent, peak = (
+        np.array([[getattr(table, name) for table in row] for row in tables])
+        for name in ("nature", "equivalent_force", "peak_force")
     )
-    file = PoolFile(about, pool.factors, pool.drive.regime_speeds, *arrays)
+    file = PoolFile(
+        about, pool.factors, pool.drive.regime_speeds, nature, equivalent.astype(np.float32), peak.astype(np.float32)
+    )
     path = folder / f"{pool.nominal.name}-{pool.task}.npz"
     write_atomically(path, lambda temporary: _save(temporary, file))
     return path, file
