@@ -23,6 +23,10 @@ BESIDE = 0.49
 """How far from the calm speed of an edge towards the other one, in units of the space between them."""
 
 
+READ = ("cost_type_iii", "cost_force", "damage", "status")
+"""What is read of the info of a step."""
+
+
 @dataclass(frozen=True)
 class Plan:
     """Speeds, in the machine's unit, that a schedule goes through in turn, each kept for ``hold`` steps."""
@@ -92,7 +96,7 @@ def audit(env: str) -> list[Score]:
         _, rewards, ended, _, infos = envs.step(actions)
         for i in np.flatnonzero(runs).tolist():
             source = infos["final_info"] if ended[i] else infos
-            scores[i].add(float(rewards[i]), {name: float(values[i]) for name, values in source.items()})
+            scores[i].add(float(rewards[i]), {name: float(source[name][i]) for name in READ})
         runs &= ~ended
         step += 1
     return scores

@@ -118,7 +118,12 @@ class SliderCrankEnv(MachineEnv):
     Loopholes considered; `chaosgym regimes audit chaosgym/SliderCrank-v0` plays them for a job each, from 50 rpm on:
 
     - *Farming*: no term is ever positive, and a job has a fixed number of revolutions, so there is nothing to collect.
-    AUDIT
+    - *Standing still*: 50 rpm returns -7.00; the best constant speed, 215 rpm, -1.83.
+    - *Giving up*: an early end costs 10, more than the rest of any job at 50 rpm. A lowest speed below a tenth of the
+      highest would change this.
+    - *Dithering* over the edge of a band: every other step counts. The best edge returns -2.29.
+    - *Beside an edge*, at a speed that the table still takes for the calm one: -1.85 at the best.
+    - *Crossing* bands: going up and down the range as fast as the drive can returns -2.82.
     - *Holding the response periodic by small corrections* (control of chaos) lowers the forces, and so damage, but not
       the Type III term, which knows the speed alone.
 
