@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.envs.registration import load_env_creator
 from gymnasium.utils.env_checker import check_env
 
 from chaosgym import fleet
@@ -22,7 +23,9 @@ pytestmark = pytest.mark.parametrize("name", ENVIRONMENTS)
 
 
 def _make(name: str, **keywords: Any) -> MachineEnv:
-    env = gym.make(name, **keywords).unwrapped
+    spec = gym.spec(name)
+    assert isinstance(spec.entry_point, str)
+    env = load_env_creator(spec.entry_point)(**(spec.kwargs | keywords))
     assert isinstance(env, MachineEnv)
     return env
 
