@@ -45,6 +45,8 @@ SEEDS = {"tolerance": 8_001, "wear": 8_002}
 class PoolFile:
     """Machines of the pools of one nominal machine and task, one row each, those of ``SIZES`` in turn.
 
+    Tables may be missing for the last rows.
+
     Attributes
     ----------
     about
@@ -53,7 +55,7 @@ class PoolFile:
         On the nominal values.
     speeds : (n,)
         Of the tables.
-    nature, equivalent_force, peak_force : (m, levels, n)
+    nature, equivalent_force, peak_force : (rows with tables, levels, n)
         As in ``RegimeTable``, at each clearance.
     """
 
@@ -183,7 +185,8 @@ class Pool:
 
     def _tables(self, row: int) -> tuple[RegimeTable, ...]:
         if row not in self._kept:
-            self._kept[row] = self.computed(row) if self._shipped is None else self._shipped.tables(row)
+            file = self._shipped
+            self._kept[row] = self.computed(row) if file is None or row >= len(file.nature) else file.tables(row)
         return self._kept[row]
 
     def computed(self, row: int) -> tuple[RegimeTable, ...]:
@@ -192,12 +195,13 @@ class Pool:
         return tuple(regimes_of(worn(machine, ratio), self.drive) for ratio in self.levels.tolist())
 
 
-def make_pools(pool: Pool, folder: Path, command: str) -> tuple[Path, PoolFile]:
-    """Compute the tables of all machines of a pool and its sisters, and write them to a file in a folder.
+def make_pools(pool: Pool, folder: Path, command: str, machines: int | None = None) -> tuple[Path, PoolFile]:
+    """Compute the tables of the machines of a pool and its sisters, and write them to a file in a folder.
 
     What is computed is kept on disk, so a run that was stopped goes on. ``command`` makes the file, for the record.
+    ``machines`` are looked at, the nominal one first; all by default.
     """
-    rows = trange(len(pool.factors), desc=f"{pool.task} pools of {pool.nominal.name}", unit="machine")
+    rows = trange(len(pool.factors[:machines]), desc=f"{pool.task} pools of {pool.nominal.name}", unit="machine")
     tables = [pool.computed(row) for row in rows]
     about = {
         "machine": repr(pool.nominal), "tolerances": pool.tolerances, "levels": pool.levels.tolist(),
