@@ -86,8 +86,8 @@ class ImpactBeamEnv(MachineEnv):
     *Damage* follows the basic rating life of bearings: a cycle with peak force F uses up (F / C)^(10/3) / 10^6 of the
     life of a sensor surface, times an acceleration of 1000. True peak forces count, of the worse surface. C = 67 N is
     the largest equivalent force of the nominal machine at constant speed, that of 26.75 Hz, so that this worst speed
-    uses up one life in one job. Several responses coexist near 29 Hz: reached from below, that speed
-    wears more than from rest and breaks the joint just before the job ends.
+    uses up one life in one job. Several responses coexist near 29 Hz: reached from below, that speed wears more than
+    from rest and breaks the joint just before the job ends.
 
     A step counts as *Type III* if a table of the machine says so: `diagnose` from rest, within 400 cycles, at the
     speeds from 4 to 30 Hz by 0.25 Hz (by 0.5 Hz in Wear, at six clearances from once to twice that of the new machine).
@@ -99,6 +99,10 @@ class ImpactBeamEnv(MachineEnv):
     `info["cost"]` is 1 in a step that counts as Type III (`cost_type_iii`), has a peak force above the force limit on
     either sensor (`cost_force`) or fails, and 0 otherwise. `info` also holds `speed` [Hz], `damage`, `machine` (its
     number in the pool), `status` (0 running, 1 job done, 2 fracture, 3 simulation failed) and `is_success`.
+
+    How far the table is right where agents go (`chaosgym regimes check chaosgym/ImpactBeamTolerance-v0`): of 200 steps
+    of random jobs on held-out machines, diagnosed from rest at their own speeds within 3200 cycles, 87.5 % agree; 19
+    counted though periodic, as a speed between two chaotic ones is meant to, and 6 did not though chaotic.
 
     Loopholes considered; `chaosgym regimes audit chaosgym/ImpactBeam-v0` plays them for a job each, from 4 Hz on:
 
