@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from chaosgym.bench.timing import Rate, rate
 from chaosgym.classifier import default_classifier
-from chaosgym.envs import ENVIRONMENTS
+from chaosgym.envs import MACHINES
 from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, Machine
 from chaosgym.simulation import ExactEvents, Integrator, RungeKutta4, simulate
 from chaosgym.sweeps import SweepPlan, run_sweep
@@ -101,7 +101,7 @@ def cycle_rate(point: tuple[Machine, Integrator, int], repeats: int) -> Rate:
 
 
 def _environments() -> list[str]:
-    names = list(ENVIRONMENTS)
+    names = [f"chaosgym/{machine}-v0" for machine in MACHINES]
     for name in OTHER_ENVIRONMENTS:
         try:
             gym.make(name).close()

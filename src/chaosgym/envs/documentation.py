@@ -1,22 +1,55 @@
-"""What does each environment's page say? What the docstring of its class says.
+"""What does each environment's page say? What its task adds, and the docstring of its machine's class.
 
-python -m chaosgym.envs.documentation > docs/environments.md
+python -m chaosgym.envs.documentation docs
 """
 
 import inspect
+import sys
+from collections.abc import Iterator
+from pathlib import Path
 
 import gymnasium as gym
 
 from chaosgym.envs import ENVIRONMENTS
 
+TASKS = {
+    "": "The nominal machine.",
+    "Tolerance": "A machine drawn within manufacturing tolerances for each job. The agent is not told which one.",
+    "Wear": "A machine drawn within tolerances, whose clearance grows with the damage: c0 (1 + damage), updated once a "
+    "step. The agent sees the damage.",
+}
+"""What each task adds, by the end of the id's name."""
 
-def environments_page() -> str:
-    """Return the page of all environments, in the format of Gymnasium's own pages (Markdown)."""
-    sections = ["# Environments\n\nThis page is written by `python -m chaosgym.envs.documentation`.\n"]
+
+def task_of(name: str) -> str:
+    """Return the key of ``TASKS`` for an id."""
+    return next((task for task in TASKS if task and f"{task}-" in name), "")
+
+
+def pages() -> Iterator[tuple[str, str]]:
+    """Names of the files, and the pages, in the format of Gymnasium's own (Markdown)."""
+    rows = []
     for name in ENVIRONMENTS:
-        sections.append(f"# {name}\n\n{inspect.getdoc(type(gym.make(name).unwrapped))}\n")
-    return "\n".join(sections)
+        task, file = task_of(name), f"environments/{name.removeprefix('chaosgym/')}.md"
+        nominal = name.replace(f"{task}-v", "-v")
+        text = inspect.getdoc(type(gym.make(name).unwrapped)) or ""
+        text = text.replace(f'("{nominal}"', f'("{name}"')
+        yield file, f"# {name}\n\n{TASKS[task]}\n\n{text}\n"
+        rows.append(f"| [{name}]({file}) | {TASKS[task]} |")
+    table = "\n".join(["| id | task |", "|---|---|", *rows])
+    yield (
+        "environments.md",
+        f"# Environments\n\n{table}\n\nThese pages are written by `python -m chaosgym.envs.documentation docs`.\n",
+    )
+
+
+def write_pages(folder: Path) -> None:
+    """Write all pages into the folder of the documentation."""
+    for file, page in pages():
+        path = folder / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":
-    print(environments_page(), end="")
+    write_pages(Path(sys.argv[1]))

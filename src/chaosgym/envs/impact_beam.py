@@ -13,6 +13,11 @@ TOLERANCES = {"clearance": 0.2, "damping_ratio": 0.2, "length": 0.002}
 feeler gauges (3.4, printed); damping and length (+-0.56 mm at 279 mm): assumed."""
 
 
+LOAD_RATING = 67.0
+"""Force [N] under which a surface lasts a million cycles; derived: the largest equivalent force of the nominal machine
+at constant speed, that of 26.75 Hz."""
+
+
 class ImpactBeamEnv(MachineEnv):
     """
     ## Description
@@ -50,9 +55,9 @@ class ImpactBeamEnv(MachineEnv):
 
     ## Observation Space
 
-    The observation is an `ndarray` with shape `(13,)`; `env.unwrapped.observation_names` names its entries. Forces are
-    those of the upper sensor, each peak with an error drawn uniformly from +-3 N and cut off at zero.
-    `gymnasium.wrappers.RescaleObservation(env, -1, 1)` brings all entries to one scale.
+    The observation is an `ndarray` with shape `(13,)`, `(14,)` in Wear; `env.unwrapped.observation_names` names its
+    entries. Forces are those of the upper sensor, each peak with an error drawn uniformly from +-3 N and cut off at
+    zero. `gymnasium.wrappers.RescaleObservation(env, -1, 1)` brings all entries to one scale.
 
     | Num  | Observation                                                            | Min | Max | Unit |
     |------|------------------------------------------------------------------------|-----|-----|------|
@@ -65,6 +70,7 @@ class ImpactBeamEnv(MachineEnv):
     | 6    | `impacts_per_cycle`: contacts begun in a cycle, both sensors           | 0   | 200 | -    |
     | 7    | `bouncing_share`: share of the half cycle spent bouncing on one sensor | 0   | 1   | -    |
     | 8-12 | `peak_force_1` ... `peak_force_5`: measured peak force of each cycle   | 0   | 400 | N    |
+    | 13   | `damage`: share of its life that the joint has used up, in Wear alone  | 0   | 1   | -    |
 
     ## Rewards
 
@@ -78,41 +84,43 @@ class ImpactBeamEnv(MachineEnv):
     | `reward_failure`  | -w on fracture or a failed simulation                         | 10       |
 
     *Damage* follows the basic rating life of bearings: a cycle with peak force F uses up (F / C)^(10/3) / 10^6 of the
-    life of a sensor surface, times an acceleration of 1000. With C = 70 N the worst constant speeds use up 0.8 to 1
-    life in one job: 26.6 to 26.8 Hz, and 28.8 to 29.1 Hz, where several periodic responses coexist and rounding
-    decides which one is reached. True peak forces count, of the worse surface.
+    life of a sensor surface, times an acceleration of 1000. True peak forces count, of the worse surface. C = 67 N is
+    the largest equivalent force of the nominal machine at constant speed, that of 26.75 Hz, so that this worst speed
+    uses up one life in one job. Several responses coexist near 29 Hz: reached from below, that speed wears more than
+    from rest and breaks the joint just before the job ends.
 
-    A step counts as *Type III* if its peak forces don't repeat: the last four true peaks of the upper sensor are
-    compared with the four that lie 1, 2, ... 8 cycles before them, and the step repeats if one of these comparisons
-    agrees within 5 % of the largest peak (the thesis measured less than 5 % in periodic responses, 3.5.2). Earlier
-    cycles count whatever the speed was then; the first cycle of the step, disturbed by the change of speed, is not
-    judged.
-
-    How far this agrees with the Two-Step Test on 400 cycles from rest, at constant speeds from 4 to 30 Hz by 0.25 Hz:
-    of the steps after the first 100 cycles it marks 1.4 % where the test says periodic (70 speeds; all of the marks
-    at 20.25 Hz, period 9) and 67 % where it says chaotic (34 speeds). It marks nine of ten steps of strongly chaotic
-    responses; narrow bands, chaos whose peaks stay within 5 %, and what settles after transient chaos pass.
+    A step counts as *Type III* if a table of the machine says so: `diagnose` from rest, within 400 cycles, at the
+    speeds from 4 to 30 Hz by 0.25 Hz (by 0.5 Hz in Wear, at six clearances from once to twice that of the new machine).
+    It counts if the response at the nearest speed is not periodic, or if those at both its neighbours are not. Chaos
+    that dies out within the 400 cycles counts as chaos. `env.unwrapped.regimes` is the table of the machine at work,
+    `nominal_regimes` that of the nominal one. On the nominal machine 31 % of the speeds are not periodic and 37 %
+    count.
 
     `info["cost"]` is 1 in a step that counts as Type III (`cost_type_iii`), has a peak force above the force limit on
-    either sensor (`cost_force`) or fails, and 0 otherwise. `info` also holds `speed` [Hz], `damage`, `status`
-    (0 running, 1 job done, 2 fracture, 3 simulation failed) and `is_success`.
+    either sensor (`cost_force`) or fails, and 0 otherwise. `info` also holds `speed` [Hz], `damage`, `machine` (its
+    number in the pool), `status` (0 running, 1 job done, 2 fracture, 3 simulation failed) and `is_success`.
 
-    Loopholes considered:
+    How far the table is right where agents go (`chaosgym regimes check chaosgym/ImpactBeamTolerance-v0`): of 200 steps
+    of random jobs on held-out machines, diagnosed from rest at their own speeds within 3200 cycles, 87.5 % agree; 19
+    counted though periodic, as a speed between two chaotic ones is meant to, and 6 did not though chaotic.
+
+    Loopholes considered; `chaosgym regimes audit chaosgym/ImpactBeam-v0` plays them for a job each, from 4 Hz on:
 
     - *Farming*: no term is ever positive, and a job has a fixed number of cycles, so there is nothing to collect.
-    - *Standing still*: the lowest speed costs 7.5 in time alone, the highest at most 3 without fracture.
+    - *Standing still*: 4 Hz returns -7.56; the best constant speed, 22.5 Hz, -1.61.
     - *Giving up*: an early end costs 10, more than the rest of any job at 4 Hz. A lowest speed below a tenth of the
       highest would change this.
-    - *Dithering*: comparing only cycles of equal speed would let small changes of speed wipe out the record, so earlier
-      cycles count at any speed. Alternating by 0.05 to 1 Hz about 24, 26.5, 28 and 29.5 Hz leaves 81 to 99 % of the
-      steps marked, as do the constant speeds with 84 to 98 %; speeds drawn at random from 22 to 30 Hz, 96 %.
-    - *Crossing chaos quickly* and *holding the response periodic by small corrections* (control of chaos) do reduce the
-      cost. Both are what one wants.
+    - *Dithering* over the edge of a band: every other step counts. The best edge returns -2.22.
+    - *Beside an edge*, at a speed that the table still takes for the calm one: -1.75 at the best.
+    - *Crossing* bands: going up and down the range as fast as the drive can returns -3.00.
+    - *Holding the response periodic by small corrections* (control of chaos) lowers the forces, and so damage, but not
+      the Type III term, which knows the speed alone.
 
     ## Starting State
 
     The machine starts from rest in the middle of the gap and runs in for 20 cycles at 4 Hz, which the first observation
-    reports. `env.reset(options={"speed": 19.0})` starts at another speed.
+    reports. `env.reset(options={"speed": 19.0})` starts at another speed, `{"machine": 3}` takes machine 3 of the pool
+    instead of one drawn from it.
 
     ## Episode End
 
@@ -128,26 +136,28 @@ class ImpactBeamEnv(MachineEnv):
 
     ```
 
-    | Parameter         | Type            | Default | Description                                                    |
-    |-------------------|-----------------|---------|----------------------------------------------------------------|
-    | `lowest_speed`    | **float**       | `4.0`   | target speed of action -1 [Hz]                                 |
-    | `highest_speed`   | **float**       | `30.0`  | target speed of action +1 [Hz]                                 |
-    | `slew_limit`      | **float**       | `1.0`   | largest change of speed in one step [Hz]                       |
-    | `cycles_per_step` | **int**         | `5`     | operating cycles in one step                                   |
-    | `job_cycles`      | **int**         | `1000`  | operating cycles of the job, a multiple of `cycles_per_step`   |
-    | `force_limit`     | **float**       | `80.0`  | peak force above which a step costs [N]; sensors reach 5 times |
-    | `pool`            | **str**         | `nominal`| the nominal machine, "training" or "held-out"                  |
-    | `wear`            | **bool**        | `False` | the clearance grows with the damage                            |
-    | `sensor_error`    | **float**       | `3.0`   | half width of the uniform error of a measured peak force [N]   |
-    | `render_mode`     | **str**         | `None`  | `"rgb_array"` or `"human"`                                     |
-    | `fidelity`        | **str**         | `None`  | rung of the ladder of models; none is "modes-5"                |
-    | any field         | **float**       |         | of `chaosgym.machines.impact_beam.ImpactBeam`, in SI units     |
+    | Parameter         | Type      | Default   | Description                                                  |
+    |-------------------|-----------|-----------|--------------------------------------------------------------|
+    | `lowest_speed`    | **float** | `4.0`     | target speed of action -1 [Hz]                               |
+    | `highest_speed`   | **float** | `30.0`    | target speed of action +1 [Hz]                               |
+    | `slew_limit`      | **float** | `1.0`     | largest change of speed in one step [Hz]                     |
+    | `cycles_per_step` | **int**   | `5`       | operating cycles in one step                                 |
+    | `job_cycles`      | **int**   | `1000`    | operating cycles of the job, a multiple of `cycles_per_step` |
+    | `force_limit`     | **float** | `80.0`    | peak force above which a step costs [N]; sensors: 5x         |
+    | `pool`            | **str**   | `nominal` | the nominal machine, "training" or "held-out"                |
+    | `wear`            | **bool**  | `False`   | the clearance grows with the damage                          |
+    | `sensor_error`    | **float** | `3.0`     | half width of the uniform error of a measured peak force [N] |
+    | `render_mode`     | **str**   | `None`    | `"rgb_array"` or `"human"`                                   |
+    | `fidelity`        | **str**   | `None`    | rung of the ladder of models; none is "modes-5"              |
+    | any field         | **float** |           | of `chaosgym.machines.impact_beam.ImpactBeam`, in SI units   |
 
     The rungs of `fidelity` are `"restitution"`, `"rigid"`, `"modes-3"`, `"modes-5"`, `"modes-8"` and `"reference"`; a
     field that a rung sets may not be given beside it.
 
-    Tolerances are +-20 % of the clearance, +-20 % of the damping ratio and +-0.2 % of the length; a number for
-    `tolerance` multiplies them, up to 4. The agent is not told which machine it got.
+    Tolerances are +-20 % of the clearance, +-20 % of the damping ratio and +-0.2 % of the length. Their machines are
+    fixed and seeded: 128 to train on and 32 held out, in Wear 32 and 16. The agent is not told which machine it got.
+    Tables of all of them are shipped; a machine with other fields gets its own when it is first used, which takes
+    seconds to minutes and is kept on disk.
 
     ## Vectorized environment
 
@@ -162,7 +172,8 @@ class ImpactBeamEnv(MachineEnv):
     environment reset with seed + i does, and has a generator of its own. `autoreset_mode` is `"NextStep"` (default),
     `"SameStep"` or `"Disabled"` (with `reset(options={"reset_mask": ...})`); `max_episode_steps` truncates; all other
     keywords are those above, except that there is no rendering. `envs.unwrapped.get_attr(name)` returns `speed`,
-    `damage`, `machine` and `np_random` of each sub-environment, and what they share.
+    `damage`, `machine`, `regimes`, `nominal_regimes` and `np_random` of each sub-environment, and what they share.
+    `reset(options={"machine": [...]})` takes one number for each.
 
     stable-baselines3 trains on it through its own interface:
 
@@ -210,7 +221,9 @@ class ImpactBeamEnv(MachineEnv):
                 slew_limit=slew_limit,
                 regime_spacing=0.5 if wear else 0.25,
             ),
-            Task(job_cycles=job_cycles, cycles_per_step=cycles_per_step, force_limit=force_limit),
+            Task(
+                job_cycles=job_cycles, cycles_per_step=cycles_per_step, force_limit=force_limit, load_rating=LOAD_RATING
+            ),
             tolerances=TOLERANCES,
             pool=pool,
             wear=wear,

@@ -45,6 +45,8 @@ SEEDS = {"tolerance": 8_001, "wear": 8_002}
 class PoolFile:
     """Machines of the pools of one nominal machine and task, one row each, those of ``SIZES`` in turn.
 
+    Tables may be missing for the last rows.
+
     Attributes
     ----------
     about
@@ -53,7 +55,7 @@ class PoolFile:
         On the nominal values.
     speeds : (n,)
         Of the tables.
-    nature, equivalent_force, peak_force : (m, levels, n)
+    nature, equivalent_force, peak_force : (rows with tables, levels, n)
         As in ``RegimeTable``, at each clearance.
     """
 
@@ -183,7 +185,8 @@ class Pool:
 
     def _tables(self, row: int) -> tuple[RegimeTable, ...]:
         if row not in self._kept:
-            self._kept[row] = self.computed(row) if self._shipped is None else self._shipped.tables(row)
+            file = self._shipped
+            self._kept[row] = self.computed(row) if file is None or row >= len(file.nature) else file.tables(row)
         return self._kept[row]
 
     def computed(self, row: int) -> tuple[RegimeTable, ...]:
@@ -192,22 +195,25 @@ class Pool:
         return tuple(regimes_of(worn(machine, ratio), self.drive) for ratio in self.levels.tolist())
 
 
-def make_pools(pool: Pool, folder: Path, command: str) -> tuple[Path, PoolFile]:
-    """Compute the tables of all machines of a pool and its sisters, and write them to a file in a folder.
+def make_pools(pool: Pool, folder: Path, command: str, machines: int | None = None) -> tuple[Path, PoolFile]:
+    """Compute the tables of the machines of a pool and its sisters, and write them to a file in a folder.
 
     What is computed is kept on disk, so a run that was stopped goes on. ``command`` makes the file, for the record.
+    ``machines`` are looked at, the nominal one first; all by default.
     """
-    rows = trange(len(pool.factors), desc=f"{pool.task} pools of {pool.nominal.name}", unit="machine")
+    rows = trange(len(pool.factors[:machines]), desc=f"{pool.task} pools of {pool.nominal.name}", unit="machine")
     tables = [pool.computed(row) for row in rows]
     about = {
         "machine": repr(pool.nominal), "tolerances": pool.tolerances, "levels": pool.levels.tolist(),
         "seed": SEEDS[pool.task], "horizon": HORIZON, "chaosgym": __version__, "command": command,
     }  # fmt: skip
-    arrays = (
-        np.array([[getattr(table, name) for table in row] for row in tables], kind)
-        for name, kind in (("nature", np.int8), ("equivalent_force", np.float32), ("peak_force", np.float32))
+    nature, equivalent, peak = (
+        np.array([[getattr(table, name) for table in row] for row in tables])
+        for name in ("nature", "equivalent_force", "peak_force")
     )
-    file = PoolFile(about, pool.factors, pool.drive.regime_speeds, *arrays)
+    file = PoolFile(
+        about, pool.factors, pool.drive.regime_speeds, nature, equivalent.astype(np.float32), peak.astype(np.float32)
+    )
     path = folder / f"{pool.nominal.name}-{pool.task}.npz"
     write_atomically(path, lambda temporary: _save(temporary, file))
     return path, file

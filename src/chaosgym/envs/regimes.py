@@ -40,7 +40,7 @@ def nearest(grid: Array, values: Any) -> NDArray[np.int64]:
     """Return the places of the entries of an evenly spaced grid (n,) that are nearest to values (...)."""
     spacing = grid[1] - grid[0] if len(grid) > 1 else 1.0
     places = np.rint((np.asarray(values) - grid[0]) / spacing)
-    return np.clip(places, 0, len(grid) - 1).astype(np.int64)
+    return np.asarray(np.clip(places, 0, len(grid) - 1), np.int64)
 
 
 @dataclass(frozen=True, eq=False)

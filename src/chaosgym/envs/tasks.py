@@ -85,11 +85,11 @@ class Task:
     """Peak force above which a step costs."""
     load_rating: float = parameter(
         70.0, unit="N", low=1e-6, high=1e9, provenance="derived",
-        source="largest equivalent force at constant speed, 66 to 69 N at 26.6 to 29.1 Hz, rounded up",
+        source="largest equivalent force of the nominal machine at constant speed; each environment has its own",
     )  # fmt: skip
     """Force under which a surface lasts a million cycles."""
     damage_acceleration: float = parameter(
-        1000.0, low=0.0, high=1e9, provenance="assumed", source="one life in a job of 1000 cycles at the load rating"
+        1000.0, low=0.0, high=1e9, provenance="assumed", source="the worst constant speed uses up one life in a job"
     )
     """Lives used up for each one of the life law."""
     time_weight: float = parameter(1.0, low=0.0, high=1e6, provenance="assumed", source="unit of the reward")

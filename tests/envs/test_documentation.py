@@ -1,0 +1,23 @@
+"""The pages of the environments are what their classes say."""
+
+from pathlib import Path
+
+from chaosgym.envs import ENVIRONMENTS
+from chaosgym.envs.documentation import pages
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def test_the_pages_are_the_docstrings() -> None:
+    """Every page is what the command named in docs/environments.md writes, and every environment has one."""
+    written = dict(pages())
+    assert len(written) == len(ENVIRONMENTS) + 1
+    for file, page in written.items():
+        assert (DOCS / file).read_text(encoding="utf-8") == page
+
+
+def test_every_page_makes_its_own_environment() -> None:
+    """The examples of a page name its id, not that of a sister."""
+    for name, page in zip(ENVIRONMENTS, dict(pages()).values(), strict=False):
+        assert f'gym.make("{name}")' in page
+        assert page.startswith(f"# {name}\n")
