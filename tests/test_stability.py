@@ -131,6 +131,17 @@ def test_a_million_cycles_drift_neither_in_phase_nor_in_energy():
     np.testing.assert_allclose(record.history[0, :, 0], expected, rtol=0, atol=1e-9 * size)
 
 
+@pytest.mark.slow
+def test_a_million_revolutions_of_the_crank_do_not_drift():
+    """A period-1 response of impacts is where it was, after a thousand revolutions and after a million in one run."""
+    crank = SliderCrank(rod="rigid", matrix_update_interval=30.0, crank_speed=600.0, contact_damping_ratio=1.0)
+    early = simulate(crank, 1, transient=1000)
+    late = simulate(crank, 1, transient=10**6)
+    assert early.impacts.sum() >= 2
+    np.testing.assert_allclose(late.section, early.section, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(late.peak_force, early.peak_force, rtol=1e-7)
+
+
 @pytest.mark.parametrize("steps", [1, 3, 10, 30, 100, 300])
 def test_coarse_fixed_steps_are_refused(steps):
     """Below its stability limit Runge-Kutta's method is refused before it diverges."""

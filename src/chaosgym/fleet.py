@@ -9,6 +9,7 @@ Every machine moves as ``simulate`` moves it, bit for bit. All machines of a fle
 numbers, not in the joints or in how many modes they have.
 """
 
+from abc import ABC, abstractmethod
 from functools import lru_cache
 from threading import Lock
 from typing import Any, NamedTuple, Protocol
@@ -16,6 +17,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.compilation import call
 from chaosgym.core import status
 from chaosgym.core.batch import (
     Motions,
@@ -151,7 +153,7 @@ _one_call_at_a_time = Lock()
 """Some of numba's threading layers abort the process if two threads call parallel kernels at once."""
 
 
-class _CompiledFleet:
+class _CompiledFleet(ABC):
     """Machines that move in one compiled call; ``change``, ``set_speeds`` and ``_advance`` know their kind."""
 
     def __init__(self, machine: Machine, count: int, integrator: ExactEvents | None = None) -> None:
@@ -183,12 +185,17 @@ class _CompiledFleet:
                 values[failed] = 0
         return results
 
+    @abstractmethod
     def change(self, i: int, machine: Machine) -> None:
         """Put another machine into place i, whose motion goes on."""
-        raise NotImplementedError
 
+    @abstractmethod
+    def set_speeds(self, which: Indices, speeds: Array) -> None:
+        """Change the speeds of the machines ``which`` (k,) to ``speeds`` (k,), in the unit of their speed field."""
+
+    @abstractmethod
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
-        raise NotImplementedError
+        """Run the machines ``which`` (k,) in place; rows of ``arrays`` and ``outcome`` (k,) in that order."""
 
 
 class BeamFleet(_CompiledFleet):
@@ -211,14 +218,14 @@ class BeamFleet(_CompiledFleet):
         self._batch.excitation_frequency[which] = speeds
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
-        advance_beams(self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
+        call(advance_beams, self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
 
 
 class RigidBeamFleet(BeamFleet):
     """Impact beams whose impacts take no time."""
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
-        advance_rigid_beams(self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
+        call(advance_rigid_beams, self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
 
 
 SPEED_FIELDS = ("bin_duration", "steps", "order")
@@ -248,19 +255,18 @@ class CrankFleet(_CompiledFleet):
     def set_speeds(self, which: Indices, speeds: Array) -> None:
         """Change the speeds of the cranks [rpm]."""
         changed = self._speeds[which] != speeds
+        which, speeds = which[changed], speeds[changed]
         self._speeds[which] = speeds
-        fields = [getattr(self._batch, name) for name in SPEED_FIELDS]
-        tables = [getattr(self._batch, name) for name in TABLES]
-        for i, speed in zip(which[changed].tolist(), speeds[changed].tolist(), strict=True):
-            kept = self._models[i].at(speed)
-            self._kept[i] = kept
-            for field, name in zip(fields, SPEED_FIELDS, strict=True):
-                field[i] = getattr(kept.model, name)
-            for table, address in zip(tables, kept.addresses, strict=True):
-                table[i] = address
+        kept = [self._models[i].at(speed) for i, speed in zip(which.tolist(), speeds.tolist(), strict=True)]
+        for name in SPEED_FIELDS:
+            getattr(self._batch, name)[which] = [getattr(each.model, name) for each in kept]
+        for k, name in enumerate(TABLES):
+            getattr(self._batch, name)[which] = [each.addresses[k] for each in kept]
+        for i, each in zip(which.tolist(), kept, strict=True):
+            self._kept[i] = each
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
-        advance_cranks(self._batch, self._bins, which, self._motions, arrays, self._settings, outcome)
+        call(advance_cranks, self._batch, self._bins, which, self._motions, arrays, self._settings, outcome)
 
 
 class SteppedCrankFleet(_CompiledFleet):
@@ -283,7 +289,7 @@ class SteppedCrankFleet(_CompiledFleet):
                 self.change(i, at_speed(self._machines[i], speed))
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
-        advance_stepped_cranks(self._batch, which, self._motions, arrays, self._settings, outcome)
+        call(advance_stepped_cranks, self._batch, which, self._motions, arrays, self._settings, outcome)
 
 
 _COMPILED: dict[type, type[BeamFleet] | type[CrankFleet] | type[SteppedCrankFleet]] = {

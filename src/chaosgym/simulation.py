@@ -7,8 +7,8 @@ record.peak_force          # (100, 2) newton, upper and lower surface
 import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,166 +25,31 @@ from chaosgym.core.restitution import advance_restitution
 from chaosgym.core.slider_crank import advance as advance_slider_crank
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError, SimulationError
+from chaosgym.integrators import ExactEvents, Integrator, RungeKutta4, default_integrator
 from chaosgym.machines.crank_joints import sensor_peaks
 from chaosgym.machines.crank_model import STEP_PHASE, fastest_rate, stepped_model
 from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.machines.slider_crank import SliderCrank
+from chaosgym.record import CycleRecord, MotionState
+
+__all__ = [
+    "CycleRecord",
+    "ExactEvents",
+    "Integrator",
+    "MotionState",
+    "RungeKutta4",
+    "batch_arrays",
+    "default_integrator",
+    "parallel_map",
+    "rest_state",
+    "simulate",
+    "simulate_many",
+    "simulate_with_deviations",
+]
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class ExactEvents:
-    """Exact propagation between contact events; the default.
-
-    Attributes
-    ----------
-    step_phase
-        Angle [rad] by which the fastest mode turns in the shortest step. Accuracy hardly depends on it.
-    event_tolerance
-        Error of the instant of an event, as an angle [rad] of the fastest mode.
-    event_budget
-        Contact events that one cycle may have before the run is given up.
-    """
-
-    step_phase: float = 0.5
-    event_tolerance: float = 1e-9
-    event_budget: int = 20_000
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.step_phase <= 1.0:
-            raise ParameterError(f"step_phase = {self.step_phase:g} rad is out of range; allowed: above 0, up to 1")
-        if not 1e-14 <= self.event_tolerance <= 1e-2:
-            raise ParameterError(f"event_tolerance = {self.event_tolerance:g} is out of range; allowed: 1e-14 to 0.01")
-        if self.event_budget < 1:
-            raise ParameterError(f"event_budget = {self.event_budget} is out of range; allowed: 1 or more")
-
-    def refined(self) -> "ExactEvents":
-        """Half the step and a tenth of the tolerance."""
-        return replace(self, step_phase=self.step_phase / 2, event_tolerance=max(self.event_tolerance / 10, 1e-14))
-
-
-@dataclass(frozen=True)
-class RungeKutta4:
-    """Fixed steps of the classical Runge-Kutta method, without event location; for comparison."""
-
-    steps_per_cycle: int = 4000
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.steps_per_cycle <= 10**9:
-            raise ParameterError(f"steps_per_cycle = {self.steps_per_cycle} is out of range; allowed: 1 to 1e9")
-
-    def refined(self) -> "RungeKutta4":
-        """Half the step."""
-        return replace(self, steps_per_cycle=2 * self.steps_per_cycle)
-
-
-TIGHTEST_EVENTS = ExactEvents(step_phase=0.25, event_tolerance=1e-13)
-"""The default of machines whose ``event_accuracy`` is "tightest"."""
-
-Integrator = ExactEvents | RungeKutta4
-
-
-def default_integrator(machine: Machine) -> ExactEvents:
-    """Integrator of a machine where none is given."""
-    return TIGHTEST_EVENTS if getattr(machine, "event_accuracy", "standard") == "tightest" else ExactEvents()
-
-
-class MotionState(NamedTuple):
-    """All that a run needs to go on, bit for bit, from the end of a cycle.
-
-    ``coordinates`` (n_states,) are the states of the equations of motion, ``bouncing`` (3,) the side of the current
-    episode of bouncing and the instants of its first and last touch [s] before now.
-    """
-
-    coordinates: Array
-    bouncing: Array
-
-
-@dataclass(frozen=True)
-class CycleRecord:
-    """What happened in each operating cycle; two columns are the two sides of the monitored joint.
-
-    Attributes
-    ----------
-    machine : Machine
-        What was simulated.
-    section : (n_cycles, n_states)
-        Stroboscopic section: the state at the start of each cycle.
-    displacement, velocity : (n_cycles,)
-        Stroboscopic displacement [m] and velocity [m/s] of the monitored joint.
-    peak_force : (n_cycles, 2)
-        Largest contact force of the cycle [N]; 0 without contact.
-    impacts : (n_cycles, 2) int
-        Contacts that began in the cycle.
-    contact_fraction : (n_cycles, 2)
-        Share of the cycle in contact.
-    bounce_duration : (n_cycles, 2)
-        Time [s] from the first touch of a surface to the beginning of its last contact before the other surface is
-        touched: how long the joint bounced before sustained contact (thesis 5.3.2). Stands in the cycle in which the
-        other surface is touched; 0 where no episode ends.
-    final_state : MotionState
-        Where the run ended; pass it as ``initial_state`` to go on.
-    history : (n_cycles, samples_per_cycle, 3) or None
-        Displacement [m], velocity [m/s] and contact force [N] (upper side positive) at equal intervals.
-    peak_phase : (n_cycles, 2) or None
-        Phase [rad] of the cycle at which each peak force acted; None for a machine whose contact stays in one place.
-    peak_vector : (n_cycles, 2, 3) or None
-        Components [N] of each peak force. On the slider: along the guide, up, sideways. On the housing of a ball
-        joint: along the rod towards the slider, across it in its plane of swing, sideways.
-    sensor_peak : (n_cycles, n_sensors) or None
-        Largest force of the cycle [N] on each of the machine's ``sensors``; None for a machine without any.
-    """
-
-    machine: Machine
-    section: Array
-    displacement: Array
-    velocity: Array
-    peak_force: Array
-    impacts: NDArray[np.int64]
-    contact_fraction: Array
-    bounce_duration: Array
-    final_state: MotionState
-    history: Array | None = None
-    peak_phase: Array | None = None
-    peak_vector: Array | None = None
-    sensor_peak: Array | None = None
-
-    def __len__(self) -> int:
-        return len(self.section)
-
-    @property
-    def time(self) -> Array:
-        """Instants [s] of the samples of ``history`` from the first recorded cycle on, (n_cycles * samples,)."""
-        if self.history is None:
-            raise SimulationError("the run kept no time history; simulate with samples_per_cycle above 0")
-        cycles, samples, _ = self.history.shape
-        instants: Array = np.arange(cycles * samples) * (self.machine.cycle_period / samples)
-        return instants
-
-    def after(self, cycles: int) -> "CycleRecord":
-        """Return the record without its first cycles."""
-        return self._with_rows(lambda name: getattr(self, name)[cycles:])
-
-    def until(self, cycles: int) -> "CycleRecord":
-        """Return the record's first cycles; ``final_state`` stays that of the whole."""
-        return self._with_rows(lambda name: getattr(self, name)[:cycles])
-
-    def followed_by(self, later: "CycleRecord") -> "CycleRecord":
-        """Return this record and the one that goes on from its final state, as one."""
-        return later._with_rows(lambda name: np.concatenate([getattr(self, name), getattr(later, name)]))
-
-    def _with_rows(self, rows: Callable[[str], Any]) -> "CycleRecord":
-        changes: dict[str, Any] = {name: rows(name) for name in _PER_CYCLE if getattr(self, name) is not None}
-        return replace(self, **changes)
-
-
-_PER_CYCLE = (
-    "section", "displacement", "velocity", "peak_force", "impacts", "contact_fraction", "bounce_duration", "history",
-    "peak_phase", "peak_vector", "sensor_peak",
-)  # fmt: skip
 
 
 def _arrays(machine: Machine, model: Any, cycles: int, samples: int = 0) -> CycleArrays:

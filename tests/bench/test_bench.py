@@ -7,11 +7,12 @@ import time
 from dataclasses import replace
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from chaosgym.bench import rates
+from chaosgym.bench import rates, scaling
 from chaosgym.bench.against_exudyn import Contest, against_exudyn, period_of
 from chaosgym.bench.exudyn_machines import ExudynSetting, load_exudyn, run_in_exudyn
 from chaosgym.bench.timing import processor_seconds, rate
@@ -57,6 +58,23 @@ def test_every_rate_comes_out_positive(monkeypatch: pytest.MonkeyPatch) -> None:
     ]
     assert len(figures) >= 16
     assert all(math.isfinite(figure) and figure > 0.0 for figure in figures)
+
+
+def test_threads_and_wrapping_of_vector_environments(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time inside and outside the kernels makes up a step on one thread, and the ideal is one thread's over theirs."""
+    monkeypatch.setattr(scaling, "SUB_ENVIRONMENTS", 3)
+    monkeypatch.setattr(scaling, "WARM_UP_STEPS", 1)
+    monkeypatch.setattr(scaling, "TIMED_STEPS", 2)
+    threads = numba.get_num_threads()
+    run = CliRunner().invoke(app, ["bench", "--scaling", "--repeats", "1", "--json"])
+    assert run.exit_code == 0, run.output
+    assert numba.get_num_threads() == threads
+    measured = json.loads(run.stdout)["scaling"]
+    assert [each["environment"] for each in measured] == ["chaosgym/ImpactBeam-v0", "chaosgym/SliderCrank-v0"]
+    for each in measured:
+        assert each["wrapper"] > 0.0
+        assert each["physics"] + each["wrapper"] <= 1.01 * each["one_thread"]
+        assert each["efficiency"] == pytest.approx(each["one_thread"] / each["all_threads"] / each["threads"])
 
 
 _points = rates._points

@@ -10,6 +10,7 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from chaosgym import fleet
+from chaosgym.compilation import call
 from chaosgym.core import status
 from chaosgym.envs import ENVIRONMENTS
 from chaosgym.envs.tasks import Status
@@ -134,14 +135,13 @@ def test_a_failed_simulation_ends_its_job_alone(monkeypatch: pytest.MonkeyPatch)
     """The others go on; the failed one reports what happened and holds no NaN."""
     envs = gym.make_vec(BEAM, num_envs=3, lowest_speed=15.0)
     envs.reset(seed=0)
-    advance = fleet.advance_beams
 
     def fail_second(*arguments: Any) -> None:
-        advance(*arguments)
-        arguments[4].peak_force[1] = np.nan
+        call(*arguments)
+        arguments[5].peak_force[1] = np.nan
         arguments[-1][1] = status.DIVERGED
 
-    monkeypatch.setattr(fleet, "advance_beams", fail_second)
+    monkeypatch.setattr(fleet, "call", fail_second)
     observation, reward, terminated, truncated, infos = envs.step(np.zeros((3, 1), np.float32))
     assert terminated.tolist() == [False, True, False]
     assert infos["status"].tolist() == [Status.RUNNING, Status.SIMULATION_FAILED, Status.RUNNING]

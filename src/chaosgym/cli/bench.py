@@ -13,17 +13,20 @@ from chaosgym.cli.output import emit
 @click.option("--against", type=click.Choice(["exudyn"]), help="Run the same machines there; needs chaosgym[peers].")
 @click.option("--scenes", is_flag=True, help="The scenes of the slider crank instead: degrees of freedom and cost.")
 @click.option("--set-up", "set_up", is_flag=True, help="The times to make a slider crank ready instead.")
+@click.option("--scaling", is_flag=True, help="What threads and wrapping make of the vector environments instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def bench(repeats: int, against: str | None, scenes: bool, set_up: bool, as_json: bool) -> None:
+def bench(
+    repeats: int, against: str | None, scenes: bool, set_up: bool, scaling: bool, as_json: bool
+) -> None:  # fmt: skip
     """Rates on this computer: cycles, environment steps, sweep points, classifier rows; or against a peer."""
-    if (against is not None) + scenes + set_up > 1:
-        raise click.UsageError("--against, --scenes and --set-up exclude each other")
+    if (against is not None) + scenes + set_up + scaling > 1:
+        raise click.UsageError("--against, --scenes, --set-up and --scaling exclude each other")
     if against is not None:
         from chaosgym.bench.against_exudyn import against_exudyn
 
         rows = against_exudyn(repeats=repeats, progress=True)
         return emit({"against": against, "settings": rows}, as_json, lambda: _comparison(rows))
-    from chaosgym.bench import benchmark, scene_costs, set_up_times
+    from chaosgym.bench import benchmark, scene_costs, set_up_times, vector_scaling
 
     if scenes:
         costs = scene_costs()
@@ -33,6 +36,9 @@ def bench(repeats: int, against: str | None, scenes: bool, set_up: bool, as_json
         return emit({"set_up_microseconds": times}, as_json, lambda: [
             f"{name:40s} {value:10.1f} us" for name, value in times.items()
         ])  # fmt: skip
+    if scaling:
+        measured = vector_scaling(repeats)
+        return emit({"scaling": [asdict(each) for each in measured]}, as_json, lambda: _scaling_table(measured))
     result = benchmark(repeats, progress=True)
     return emit(result, as_json, lambda: _rates(result))
 
@@ -80,3 +86,13 @@ def _scene_table(costs: list[Any]) -> list[str]:
         for cost in costs
     ]
     return [head, *rows, "the degrees of freedom of a scene by name: chaosgym show slider-crank, and --json"]
+
+
+def _scaling_table(measured: list[Any]) -> list[str]:
+    title = f"{'us a step of a machine':42s}{'one thread':>12s}{'all':>8s}{'of ideal':>11s}{'wrapper':>9s}"
+    rows = [
+        f"{f'{each.environment}, {each.machines} on {each.threads} threads':42s}{1e6 * each.one_thread:12.1f}"
+        f"{1e6 * each.all_threads:8.1f}{100.0 * each.efficiency:9.1f} %{1e6 * each.wrapper:9.2f}"
+        for each in measured
+    ]
+    return [title, *rows]

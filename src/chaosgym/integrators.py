@@ -1,0 +1,63 @@
+"""How does a simulation go through time? Exactly from one contact event to the next, or in fixed steps."""
+
+from dataclasses import dataclass, replace
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.machine import Machine
+
+
+@dataclass(frozen=True)
+class ExactEvents:
+    """Exact propagation between contact events; the default.
+
+    Attributes
+    ----------
+    step_phase
+        Angle [rad] by which the fastest mode turns in the shortest step. Accuracy hardly depends on it.
+    event_tolerance
+        Error of the instant of an event, as an angle [rad] of the fastest mode.
+    event_budget
+        Contact events that one cycle may have before the run is given up.
+    """
+
+    step_phase: float = 0.5
+    event_tolerance: float = 1e-9
+    event_budget: int = 20_000
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.step_phase <= 1.0:
+            raise ParameterError(f"step_phase = {self.step_phase:g} rad is out of range; allowed: above 0, up to 1")
+        if not 1e-14 <= self.event_tolerance <= 1e-2:
+            raise ParameterError(f"event_tolerance = {self.event_tolerance:g} is out of range; allowed: 1e-14 to 0.01")
+        if self.event_budget < 1:
+            raise ParameterError(f"event_budget = {self.event_budget} is out of range; allowed: 1 or more")
+
+    def refined(self) -> "ExactEvents":
+        """Half the step and a tenth of the tolerance."""
+        return replace(self, step_phase=self.step_phase / 2, event_tolerance=max(self.event_tolerance / 10, 1e-14))
+
+
+@dataclass(frozen=True)
+class RungeKutta4:
+    """Fixed steps of the classical Runge-Kutta method, without event location; for comparison."""
+
+    steps_per_cycle: int = 4000
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.steps_per_cycle <= 10**9:
+            raise ParameterError(f"steps_per_cycle = {self.steps_per_cycle} is out of range; allowed: 1 to 1e9")
+
+    def refined(self) -> "RungeKutta4":
+        """Half the step."""
+        return replace(self, steps_per_cycle=2 * self.steps_per_cycle)
+
+
+TIGHTEST_EVENTS = ExactEvents(step_phase=0.25, event_tolerance=1e-13)
+"""The default of machines whose ``event_accuracy`` is "tightest"."""
+
+Integrator = ExactEvents | RungeKutta4
+
+
+def default_integrator(machine: Machine) -> ExactEvents:
+    """Integrator of a machine where none is given."""
+    return TIGHTEST_EVENTS if getattr(machine, "event_accuracy", "standard") == "tightest" else ExactEvents()
