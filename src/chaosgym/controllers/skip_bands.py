@@ -70,7 +70,7 @@ class SkipBands(Controller):
         for low, high in self.bands:
             if not low < wanted < high:
                 continue
-            above = self._reference >= high or (self._reference > low and wanted > 0.5 * (low + high))
+            above = self._reference > 0.5 * (low + high)
             beyond = (wanted - 0.5 * (low + high)) * (-1.0 if above else 1.0)
             crosses = beyond >= self.hysteresis * (high - low)
             if high > self.drive.highest_speed:
