@@ -1,8 +1,8 @@
 """Which ways to set the speed are there without learning? From chance to one that knows everything.
 
-    from chaosgym.controllers import SkipBands
-    controller = SkipBands(env)          # after observation, info = env.reset(): controller.reset()
-    action = controller(observation)
+from chaosgym.controllers import SkipBands
+controller = SkipBands(env)          # after observation, info = env.reset(): controller.reset()
+action = controller(observation)
 """
 
 from chaosgym.controllers.constant import ClairvoyantConstant, ConstantSpeed, HighestSpeed, LowestSpeed, SafeConstant

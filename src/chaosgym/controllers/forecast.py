@@ -92,14 +92,14 @@ def forecast_of(pool: Pool, tables: Sequence[RegimeTable], task: Task) -> Foreca
 
 def forecast_for(env: Any, model: Model) -> Forecast:
     """Return the forecast of the environment's present machine, or of its nominal one."""
-    pool = env.rules.pool
+    pool = env.pool
     tables = pool.nominal_regimes if model == "nominal" else pool.regimes(env.machine_number)
     return forecast_of(pool, tables, env.task)
 
 
 def training_forecasts(env: Any) -> list[Forecast]:
     """Return the forecasts of all machines of the training pool."""
-    pool = Pool(env.nominal, env.drive, "training", env.rules.pool.wears)
+    pool = Pool(env.nominal, env.drive, env.tolerances, "training", env.pool.wears)
     return [forecast_of(pool, pool.regimes(k), env.task) for k in range(len(pool))]
 
 

@@ -26,7 +26,7 @@ class GreedyClassifier(Controller):
     def __init__(self, env: gym.Env[Any, Any]) -> None:
         super().__init__(env)
         self._classifier = default_classifier(self.env.nominal.name)
-        speeds = self.env.rules.pool.speeds
+        speeds = self.env.pool.speeds
         fields = self._classifier.fields
         machines = [at_speed(self.env.nominal, float(speed)) for speed in speeds]
         values = np.array([[getattr(machine, name) for name in fields] for machine in machines])

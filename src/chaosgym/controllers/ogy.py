@@ -34,7 +34,7 @@ from chaosgym.simulation import MotionState, simulate
 Array = NDArray[np.float64]
 
 SEARCHED_CYCLES, PASSES = 300, 12
-"""Cycles in which close returns are looked for, after as many as a run-in, and how many of them Newton's method tries."""
+"""Cycles in which close returns are looked for, after as many to settle, and how many of them Newton's method tries."""
 
 CLOSED = 1e-8
 """Largest miss of an orbit, relative to its size."""

@@ -1,7 +1,7 @@
 """What happened in each job? One row a job, the same machines and sensor errors for everybody."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 import gymnasium as gym
@@ -41,19 +41,14 @@ class JobRow:
     duration: float
     failed: bool
 
-    @classmethod
-    def read(cls, row: dict[str, Any]) -> "JobRow":
-        """Return the row of plain values, as ``as_dict`` gives them."""
-        return cls(**{field.name: row[field.name] for field in fields(cls)})
-
     def as_dict(self) -> dict[str, Any]:
         """Return plain values."""
         return asdict(self)
 
 
-def run_job(env: gym.Env[Any, Any], policy: Policy, machine: int, seed: int, options: dict[str, Any]) -> JobRow:
-    """Run one job to its end."""
-    observation, _ = env.reset(seed=seed, options=options)
+def run_job(env: gym.Env[Any, Any], policy: Policy, machine: int, seed: int) -> JobRow:
+    """Run one job on a machine of the environment's pool to its end."""
+    observation, _ = env.reset(seed=seed, options={"machine": machine})
     policy.reset()
     unwrapped: Any = env.unwrapped
     cycles_per_step, period_at = unwrapped.task.cycles_per_step, unwrapped.nominal.period_at
@@ -65,7 +60,7 @@ def run_job(env: gym.Env[Any, Any], policy: Policy, machine: int, seed: int, opt
         total += float(reward)
         type_iii += int(info["cost_type_iii"])
         cost += int(info["cost"])
-        duration += cycles_per_step * period_at(info["speed"])
+        duration += float(cycles_per_step * period_at(info["speed"]))
         steps += 1
         ended = terminated or truncated
     return JobRow(
@@ -78,19 +73,16 @@ def run_job(env: gym.Env[Any, Any], policy: Policy, machine: int, seed: int, opt
 def run_jobs(
     env: gym.Env[Any, Any],
     make_policy: Callable[[gym.Env[Any, Any]], Policy],
-    machines: Sequence[int | None],
+    machines: Sequence[int],
     first_seed: int,
     *,
     progress: str | None = None,
 ) -> list[JobRow]:
-    """Run a job on each machine of the environment's pool; None stands for the one machine of one without a pool.
+    """Run a job on each of some machines of the environment's pool.
 
     Job i is reset with ``first_seed`` + i, so that everybody meets the same sensor errors. ``progress`` names a
     progress bar on standard error.
     """
     policy = make_policy(env)
-    return [
-        run_job(env, policy, i if machine is None else machine, first_seed + i,
-                {} if machine is None else {"machine": machine})
-        for i, machine in enumerate(tqdm(machines, desc=progress, unit="job", disable=progress is None))
-    ]  # fmt: skip
+    bar = tqdm(machines, desc=progress, unit="job", disable=progress is None)
+    return [run_job(env, policy, machine, first_seed + i) for i, machine in enumerate(bar)]
