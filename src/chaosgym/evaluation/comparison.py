@@ -3,6 +3,7 @@
     score = (mean return - that of the safe constant) / (that of the reference - that of the safe constant)
 
 Means over all machines come first, then the ratio, one for each training seed; the interquartile mean is over seeds.
+Intervals over machines keep the scale and draw other machines, so that of the reference has a width too.
 Scores may exceed 1: the reference is the best schedule by the table of regimes, not a bound on what a job returns.
 """
 
@@ -49,10 +50,6 @@ class Scale:
     safe: Array
     reference: Array
 
-    def scores(self, returns: Array) -> Array:
-        """Score of each seed, (seeds,), from returns (seeds, machines)."""
-        return np.asarray((returns.mean(axis=-1) - self.safe.mean()) / (self.reference.mean() - self.safe.mean()))
-
     def job_scores(self, returns: Array) -> Array:
         """Score of each job, (seeds, machines), on the common scale: their mean is the score."""
         return (returns - self.safe) / (self.reference.mean() - self.safe.mean())
@@ -79,15 +76,15 @@ def _summary(result: Results, others: Mapping[str, Results], scale: Scale) -> di
     returns, shares = result.column("job_return"), result.column("type_iii_share")
     cycles, duration = result.column("cycles"), result.column("duration")
     seeds, machines = returns.shape
-    scores = scale.scores(returns)
+    jobs = scale.job_scores(returns)
+    scores = jobs.mean(axis=1)
 
     def over_seeds(drawn: NDArray[np.int64]) -> Array:
         return np.asarray(interquartile_mean(scores[drawn], axis=-1))
 
     def over_machines(drawn: NDArray[np.int64]) -> Array:
-        # (seeds, ..., machines): the same machines are drawn for everybody
-        gain = (returns[:, drawn] - scale.safe[drawn]).mean(axis=-1)
-        return np.asarray(interquartile_mean(gain / (scale.reference - scale.safe)[drawn].mean(axis=-1), axis=0))
+        # (seeds, ..., machines)
+        return np.asarray(interquartile_mean(jobs[:, drawn].mean(axis=-1), axis=0))
 
     return {
         "knows": result.knows,
@@ -108,7 +105,7 @@ def _summary(result: Results, others: Mapping[str, Results], scale: Scale) -> di
         "better_than": {
             name: probability_of_improvement(returns, other.column("job_return")) for name, other in others.items()
         },
-        "profile": performance_profile(scale.job_scores(returns), PROFILE_THRESHOLDS).tolist(),
+        "profile": performance_profile(jobs, PROFILE_THRESHOLDS).tolist(),
     }
 
 
