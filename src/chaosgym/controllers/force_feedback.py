@@ -8,11 +8,12 @@ import numpy as np
 from chaosgym.controllers.controller import Action, Controller, Observation
 from chaosgym.envs.drive import checked_number
 
-SET_POINT = 0.65
-"""Set point as a share of the force limit."""
+SET_POINT = 0.78
+"""Set point as a share of the force limit: the best of 5 from 0.55 to 0.86 on 6 training beams."""
 
-PROPORTIONAL, INTEGRAL = 0.01, 0.02
-"""Slew limits by which the speed changes for an error of 1 N: at once, and again in each step."""
+PROPORTIONAL, INTEGRAL = 0.01, 0.06
+"""Slew limits by which the speed changes for an error of 1 N: at once, and again in each step. 0.06 is the best of 4
+from 0.01 to 0.2 on the same beams."""
 
 
 class ForceFeedback(Controller):

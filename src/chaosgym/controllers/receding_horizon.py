@@ -38,7 +38,7 @@ class RecedingHorizon(Controller):
     knows = "nominal"
     model: Model = "nominal"
 
-    def __init__(self, env: gym.Env[Any, Any], *, horizon: int = 6, every: int = 3) -> None:
+    def __init__(self, env: gym.Env[Any, Any], *, horizon: int = 5, every: int = 5) -> None:
         super().__init__(env)
         self.horizon, self.every = horizon, every
 
