@@ -5,7 +5,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from chaosgym.controllers.controller import Action, Controller, Observation
+from chaosgym.controllers.controller import Action, Controller, Observation, single
 from chaosgym.controllers.forecast import constant_returns, forecast_for, training_forecasts
 from chaosgym.envs.drive import checked_number
 
@@ -39,16 +39,14 @@ class LowestSpeed(ConstantSpeed):
     """The drive's lowest speed."""
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
-        unwrapped: Any = env.unwrapped
-        super().__init__(env, unwrapped.drive.lowest_speed)
+        super().__init__(env, single(env).drive.lowest_speed)
 
 
 class HighestSpeed(ConstantSpeed):
     """The drive's highest speed."""
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
-        unwrapped: Any = env.unwrapped
-        super().__init__(env, unwrapped.drive.highest_speed)
+        super().__init__(env, single(env).drive.highest_speed)
 
 
 class SafeConstant(ConstantSpeed):
@@ -57,7 +55,7 @@ class SafeConstant(ConstantSpeed):
     knows = "tolerance range"
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
-        forecasts = training_forecasts(env.unwrapped)
+        forecasts = training_forecasts(single(env))
         speeds = forecasts[0].speeds
         mean = np.mean([constant_returns(forecast, 0) for forecast in forecasts], axis=0)
         super().__init__(env, float(speeds[mean.argmax()]))

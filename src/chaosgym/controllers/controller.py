@@ -29,6 +29,19 @@ Model = Literal["nominal", "machine"]
 """Machine that a planner takes for the true one: the nominal one, or this very machine."""
 
 
+def single(env: gym.Env[Any, Any]) -> MachineEnv:
+    """Return the environment without its wrappers.
+
+    Raises
+    ------
+    ParameterError
+        If it is none of chaosgym's, or a vectorised one.
+    """
+    if not isinstance(env.unwrapped, MachineEnv):
+        raise ParameterError(f"env = {env} is not one of chaosgym's environments for one machine")
+    return env.unwrapped
+
+
 class Controller:
     """A rule that drives one machine at a time.
 
@@ -46,9 +59,7 @@ class Controller:
     knows: ClassVar[Knowledge] = "nothing"
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
-        if not isinstance(env.unwrapped, MachineEnv):
-            raise ParameterError(f"env = {env} is not one of chaosgym's environments for one machine")
-        self.env: Any = env.unwrapped
+        self.env: Any = single(env)
         self.drive: SpeedDrive = self.env.drive
         self.task: Task = self.env.task
         self._place = {name: place for place, name in enumerate(self.env.observation_names)}
