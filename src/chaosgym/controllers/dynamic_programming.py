@@ -4,6 +4,8 @@ With this machine's own table it is the clairvoyant reference by which scores ar
 what a planner does who trusts the drawing.
 """
 
+from typing import ClassVar
+
 import numpy as np
 
 from chaosgym.controllers.controller import Action, Controller, Model, Observation
@@ -14,7 +16,7 @@ class DynamicProgramming(Controller):
     """Plays the best schedule of this machine's table; the slew limit is respected, transients are not foreseen."""
 
     knows = "machine"
-    model: Model = "machine"
+    model: ClassVar[Model] = "machine"
 
     def reset(self) -> None:
         """Solve the job from its end."""
@@ -28,7 +30,7 @@ class DynamicProgramming(Controller):
         within = forecast.within_reach(int(forecast.place_of(self.seen(observation, "speed"))))
         worth = forecast.worth_after(self._worth[step], np.full(len(within), self._damage), within)
         place = within[worth.argmax()]
-        self._damage += forecast.wear[forecast.level_of(self._damage), place]
+        self._damage += float(forecast.wear[forecast.level_of(self._damage), place])
         return self.command(float(forecast.speeds[place]))
 
 

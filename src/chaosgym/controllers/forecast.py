@@ -50,7 +50,7 @@ class Forecast(NamedTuple):
         """Return the places of the nearest speeds of the table, (...)."""
         return nearest(self.speeds, speed)
 
-    def level_of(self, damage: Array) -> Places:
+    def level_of(self, damage: Any) -> Places:
         """Return the nearest level of a damage (...)."""
         return nearest(self.damage, damage)
 

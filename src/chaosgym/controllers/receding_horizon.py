@@ -5,7 +5,7 @@ steps as many further copies as there are targets in reach go on from it, each t
 What they wear is simulated; what comes after the horizon is worth what dynamic programming on the table says.
 """
 
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -36,7 +36,7 @@ class RecedingHorizon(Controller):
     """
 
     knows = "nominal"
-    model: Model = "nominal"
+    model: ClassVar[Model] = "nominal"
 
     def __init__(self, env: gym.Env[Any, Any], *, horizon: int = 5, every: int = 5) -> None:
         super().__init__(env)

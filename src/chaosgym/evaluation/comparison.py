@@ -52,7 +52,7 @@ class Scale:
 
     def job_scores(self, returns: Array) -> Array:
         """Score of each job, (seeds, machines), on the common scale: their mean is the score."""
-        return (returns - self.safe) / (self.reference.mean() - self.safe.mean())
+        return np.asarray((returns - self.safe) / (self.reference.mean() - self.safe.mean()))
 
 
 def compare(results: Mapping[str, Results]) -> dict[str, dict[str, Any]]:
