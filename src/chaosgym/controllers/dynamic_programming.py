@@ -8,14 +8,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from chaosgym.controllers.controller import Action, Controller, Model, Observation
+from chaosgym.controllers.controller import Action, Controller, Knowledge, Model, Observation
 from chaosgym.controllers.forecast import forecast_for, worth_of_steps
 
 
 class DynamicProgramming(Controller):
     """Plays the best schedule of this machine's table; the slew limit is respected, transients are not foreseen."""
 
-    knows = "machine"
+    knows: ClassVar[Knowledge] = "machine"
     model: ClassVar[Model] = "machine"
 
     def reset(self) -> None:

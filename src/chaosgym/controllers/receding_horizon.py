@@ -11,7 +11,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.controllers.controller import Action, Controller, Model, Observation
+from chaosgym.controllers.controller import Action, Controller, Knowledge, Model, Observation
 from chaosgym.controllers.forecast import forecast_for, worth_of_steps
 from chaosgym.envs.jobs import RUN_IN_CYCLES
 from chaosgym.fleet import at_speed, fleet_of
@@ -35,7 +35,7 @@ class RecedingHorizon(Controller):
         Steps after which it searches again.
     """
 
-    knows = "nominal"
+    knows: ClassVar[Knowledge] = "nominal"
     model: ClassVar[Model] = "nominal"
 
     def __init__(self, env: gym.Env[Any, Any], *, horizon: int = 5, every: int = 5) -> None:
