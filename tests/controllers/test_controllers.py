@@ -79,6 +79,18 @@ def test_the_copy_of_the_clairvoyant_search_moves_as_the_machine_does(env):
         assert (controller._damage.max() == env.unwrapped.damage) == same
 
 
+def test_the_copy_wears_as_the_machine_does():
+    """With a clearance that grows the copy still moves as the machine, to the last bit."""
+    env = gym.make("chaosgym/ImpactBeamWear-v0", pool="held-out", lowest_speed=17.0, highest_speed=19.0)
+    controller = ClairvoyantHorizon(env, horizon=2, every=20)
+    observation, _ = env.reset(seed=1, options={"machine": 0})
+    controller.reset()
+    for _ in range(60):
+        observation = env.step(controller(observation))[0]
+    controller(observation)
+    assert controller._damage.max() == env.unwrapped.damage > 0.0
+
+
 def test_the_safe_constant_is_the_best_mean_over_the_training_pool(env):
     """No other speed of the table has a better mean return by the tables of the training machines."""
     safe = SafeConstant(env)

@@ -83,11 +83,8 @@ class OGY(Controller):
 
     def reset(self) -> None:
         """Find the orbit to hold, and start the copy."""
-        self._machine = self.env.machine
-        self.hold = held_orbit(self._machine, self._speeds_to_try(), 0.5 * self.drive.slew_limit)
-        self._speed: Any = float(self.env.speed)
-        self._state = simulate(self._machine, RUN_IN_CYCLES).final_state
-        self._action: Action | None = None
+        self.hold = held_orbit(self.env.machine, self._speeds_to_try(), 0.5 * self.drive.slew_limit)
+        self._state: MotionState | None = None
 
     def _speeds_to_try(self) -> list[float]:
         speeds = self.env.regimes.speeds
@@ -95,14 +92,10 @@ class OGY(Controller):
 
     def __call__(self, observation: Observation) -> Action:
         """Correct the speed if the motion is near the orbit."""
-        if self._action is not None:
-            self._speed = self.drive.approach(self._speed, self.drive.target_of(self._action)[1])
-            self._state = simulate(at_speed(self._machine, float(self._speed)), 1, self._state).final_state
-        self._machine = self.env.machine
-        near = abs(self._speed - self.hold.speed) <= self.hold.limit * (1.0 + 1e-9)
-        correction = self.hold.correction(self._state.coordinates) if near else 0.0
-        self._action = self.command(self.hold.speed + correction)
-        return self._action
+        cycles = RUN_IN_CYCLES if self._state is None else 1
+        self._state = simulate(self.env.machine, cycles, self._state).final_state
+        near = abs(self.env.speed - self.hold.speed) <= self.hold.limit * (1.0 + 1e-9)
+        return self.command(self.hold.speed + (self.hold.correction(self._state.coordinates) if near else 0.0))
 
 
 def needs_single_cycles(controller: Controller) -> None:

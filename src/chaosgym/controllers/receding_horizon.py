@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from chaosgym.controllers.controller import Action, Controller, Knowledge, Model, Observation
 from chaosgym.controllers.forecast import forecast_for, worth_of_steps
 from chaosgym.envs.jobs import RUN_IN_CYCLES
+from chaosgym.envs.pools import worn
 from chaosgym.fleet import at_speed, fleet_of
 
 Array = NDArray[np.float64]
@@ -45,6 +46,7 @@ class RecedingHorizon(Controller):
     def reset(self) -> None:
         """Start the copy as the environment starts its machine."""
         machine = self.env.nominal if self.model == "nominal" else self.env.machine
+        self._new = machine
         self._forecast = forecast_for(self.env, self.model)
         self._worth = worth_of_steps(self._forecast)
         self._speed: Any = np.array([self.env.speed])
@@ -58,13 +60,20 @@ class RecedingHorizon(Controller):
     def __call__(self, observation: Observation) -> Action:
         """Follow the step that the environment ran; search if it is time to."""
         if self._action is not None:
-            target = self.drive.target_of(self._action[None])[1]
-            self._speed, worn, _ = self._run(COPY, self._speed, target)
-            self._damage = self._damage + worn
+            self._wear(COPY)
+            self._speed, damage, _ = self._run(COPY, self._speed, self.drive.target_of(self._action[None])[1])
+            self._damage = self._damage + damage
         step = self.step_of(observation)
         if self._action is None or step % self.every == 0:
             self._action = self.command(self._best_target(step))
         return self._action
+
+    def _wear(self, which: NDArray[np.int64]) -> None:
+        """Let clearances be what the damage of the copy makes them, where they grow; not so within the horizon."""
+        if self.env.pool.wears:
+            machine = at_speed(worn(self._new, 1.0 + float(self._damage.max())), float(self._speed[0]))
+            for place in which.tolist():
+                self._fleet.change(place, machine)
 
     def _run(self, which: NDArray[np.int64], speed: Array, target: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Run some places (k,) for a step: speeds (k,), what each side wore (k, sides), whose simulation failed."""
@@ -79,13 +88,14 @@ class RecedingHorizon(Controller):
         at, reach = int(forecast.place_of(self._speed[0])), forecast.moves * self.horizon
         targets = forecast.speeds[max(0, at - reach) : at + reach + 1]
         which = np.arange(1, len(targets) + 1)
+        self._wear(which)
         self._fleet.branch(0, which)
         speed, damage = np.repeat(self._speed, len(which)), np.repeat(self._damage, len(which), axis=0)
         worth, failed = np.zeros(len(which)), np.zeros(len(which), np.bool_)
         for _ in range(ahead):
             worst = damage.max(axis=1)
-            speed, worn, failing = self._run(which, speed, targets)
-            damage, failed = damage + worn, failed | failing
+            speed, added, failing = self._run(which, speed, targets)
+            damage, failed = damage + added, failed | failing
             place = forecast.place_of(speed)
             worth += forecast.time[place] + forecast.type_iii[forecast.level_of(worst), place]
             worth -= forecast.damage_weight * (damage.max(axis=1) - worst)
