@@ -27,7 +27,7 @@ from chaosgym.evaluation.statistics import (
 
 Array = NDArray[np.float64]
 
-PROFILE_THRESHOLDS = np.linspace(-3.0, 1.5, 181)
+PROFILE_THRESHOLDS = np.linspace(-3.0, 3.0, 241)
 """Scores of single jobs at which the profile is drawn."""
 
 
