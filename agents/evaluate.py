@@ -1,55 +1,134 @@
-"""Compare a trained policy with constant speeds on the same jobs.
+"""Compare controllers and trained policies on the same held-out machines.
 
-    python agents/evaluate.py --policy runs/ppo-beam --jobs 10
+    python agents/evaluate.py --env chaosgym/ImpactBeamTolerance-v0 --out runs/evaluation-beam
+    python agents/evaluate.py --env chaosgym/ImpactBeamTolerance-v0 --out runs/evaluation-beam --policy "PPO=runs/ppo-*"
 
-Prints a table and writes evaluation.json beside the policy.
+Every contender runs one job on each machine; a training seed of a policy counts as a run of its own. The folder keeps
+the jobs of each contender (a run that was stopped goes on, and a later one adds contenders), report.json, table.md
+and comparison.png.
 """
 
 import argparse
 import json
+import re
+from collections.abc import Callable
+from glob import glob
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import gymnasium as gym
-import numpy as np
-import torch
-from stable_baselines3 import PPO
 
-import chaosgym  # noqa: F401  (registers the environments)
-from chaosgym.envs.evaluation import constant_speed, evaluate
+import chaosgym
+from chaosgym.controllers.ladder import LADDER, REFERENCE, SAFE_CONSTANT, each_cycle_keywords
+from chaosgym.evaluation.comparison import Results, compare, model_gap, table_lines
+from chaosgym.evaluation.jobs import JobRow, run_jobs
+from chaosgym.files import write_atomically
+
+FIRST_SEED = 10_000
+"""Of the sensor errors; job i has this seed + i."""
+
+
+class Contender(NamedTuple):
+    """Who runs: ``makes`` has an entry for each training seed."""
+
+    knows: str
+    makes: tuple[Callable[[gym.Env[Any, Any]], Any], ...]
+    each_cycle: bool = False
+
+
+def parse() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--env", default="chaosgym/ImpactBeamTolerance-v0", help="id of an environment")
+    parser.add_argument("--pool", default="held-out", help="pool of machines; the nominal tasks have one machine")
+    parser.add_argument("--machines", type=int, help="only the first ones of the pool")
+    parser.add_argument("--controllers", nargs="*", default=list(LADDER), help=f"some of: {', '.join(LADDER)}")
+    parser.add_argument(
+        "--policy", action="append", default=[], metavar="NAME=FOLDERS",
+        help="trained policies: a pattern of folders, one for each training seed; may be given again",
+    )  # fmt: skip
+    parser.add_argument("--out", type=Path, required=True, help="folder of the comparison")
+    parser.add_argument("--json", action="store_true", help="print report.json instead of the table")
+    return parser.parse_args()
+
+
+def contenders(arguments: argparse.Namespace) -> dict[str, Contender]:
+    """Return the asked controllers and policies by name; those that the scores need are always among them."""
+    unknown = set(arguments.controllers) - set(LADDER)
+    if unknown:
+        raise SystemExit(f"--controllers {', '.join(sorted(unknown))}: unknown; allowed: {', '.join(LADDER)}")
+    asked = {*arguments.controllers, SAFE_CONSTANT, REFERENCE}
+    chosen = {name: Contender(rung.knows, (rung.make,), rung.each_cycle)
+              for name, rung in LADDER.items() if name in asked}  # fmt: skip
+    for given in arguments.policy:
+        name, _, pattern = given.partition("=")
+        folders = sorted(glob(pattern))
+        if not folders or not re.fullmatch(r"[\w ,.-]+", name) or name in LADDER:
+            raise SystemExit(f"--policy {given}: allowed: NAME=FOLDERS, a new name and a pattern that folders match")
+        chosen[name] = Contender("tolerance range", tuple(_player(folder) for folder in folders))
+    return chosen
+
+
+def _player(folder: str) -> Callable[[gym.Env[Any, Any]], Any]:
+    from chaosgym.policies import load_policy
+
+    return lambda env: load_policy(folder)
+
+
+def rows_of(arguments: argparse.Namespace, name: str, contender: Contender) -> list[list[JobRow]]:
+    """Return the jobs of a contender, one list for each training seed: those kept in the folder, or run now."""
+    task = {} if _is_nominal(arguments.env) else {"pool": arguments.pool}
+    env = gym.make(arguments.env, **task)
+    if contender.each_cycle:
+        env = gym.make(arguments.env, **task, **each_cycle_keywords(env))
+    pool: Any = env.get_wrapper_attr("pool")
+    machines = range(min(len(pool), arguments.machines or len(pool)))
+    rows = []
+    for seed, make in enumerate(contender.makes):
+        path = arguments.out / "jobs" / f"{name}-{seed}.json"
+        setting = {"env": arguments.env, "pool": pool.name, "machines": len(machines), "first_seed": FIRST_SEED}
+        if path.is_file():
+            kept = json.loads(path.read_text())
+            if kept["setting"] != setting:
+                raise SystemExit(f"--out {arguments.out} holds another comparison, {kept['setting']}; choose another")
+            rows.append([JobRow(**row) for row in kept["jobs"]])
+            continue
+        jobs = run_jobs(env, make, machines, FIRST_SEED, progress=f"{name} {seed}")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        text = json.dumps({"setting": setting, "jobs": [job.as_dict() for job in jobs]}, indent=1) + "\n"
+        write_atomically(path, lambda file, text=text: file.write_text(text))
+        rows.append(jobs)
+    return rows
+
+
+def _is_nominal(env: str) -> bool:
+    return "pool" not in gym.spec(env).kwargs
 
 
 def main() -> None:
-    """Load, compare, print, save."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--policy", required=True, help="folder written by a training script")
-    parser.add_argument("--jobs", type=int, default=10)
-    parser.add_argument("--seed", type=int, default=10_000, help="first seed; training used others")
-    parser.add_argument("--speeds", type=int, default=14, help="constant speeds to try over the range")
-    arguments = parser.parse_args()
-    folder = Path(arguments.policy)
-    if not (folder / "policy.zip").is_file():
-        raise SystemExit(f"--policy {folder} holds no policy.zip; train one first")
-    torch.set_num_threads(1)
-    config = json.loads((folder / "config.json").read_text())["arguments"]
-    env = gym.make(config["env"])
-    model = PPO.load(folder / "policy.zip", device="cpu")
-    drive = env.get_wrapper_attr("drive")
-    contenders = {
-        f"constant {speed:5.1f}": constant_speed(env, speed)
-        for speed in np.linspace(drive.lowest_speed, drive.highest_speed, arguments.speeds)
-    }
-    contenders["policy"] = lambda observation: model.predict(observation, deterministic=True)[0]
+    """Run, compare, print, save."""
+    arguments = parse()
     results = {
-        name: evaluate(env, policy, arguments.jobs, arguments.seed, progress=name).summary()
-        for name, policy in contenders.items()
+        name: Results(contender.knows, rows_of(arguments, name, contender))
+        for name, contender in contenders(arguments).items()
     }
-    columns = ("return", "return_std", "type_iii_share", "cost_share", "damage", "time_cost")
-    print(f"{config['env']}, {arguments.jobs} jobs from seed {arguments.seed}")
-    print(" " * 16 + "".join(f"{column:>16}" for column in columns))
-    for name, row in results.items():
-        print(f"{name:16s}" + "".join(f"{row[column]:16.3f}" for column in columns))
-    report = {"jobs": arguments.jobs, "seed": arguments.seed, "results": results}
-    (folder / "evaluation.json").write_text(json.dumps(report, indent=2) + "\n")
+    summaries = compare(results)
+    report = {
+        "env": arguments.env, "chaosgym": chaosgym.__version__, "gap": model_gap(summaries), "contenders": summaries,
+    }  # fmt: skip
+    lines = [f"{arguments.env}, {len(next(iter(results.values())).rows[0])} machines of the pool", "",
+             *table_lines(summaries)]  # fmt: skip
+    if report["gap"]:
+        lines += ["", f"Searching with the nominal model costs {report['gap']['gap']:.3f}, "
+                      f"{report['gap']['share']:.0%} of the safe constant's return."]  # fmt: skip
+    text = json.dumps(report, indent=1) + "\n"
+    write_atomically(arguments.out / "report.json", lambda file: file.write_text(text))
+    write_atomically(arguments.out / "table.md", lambda file: file.write_text("\n".join(lines) + "\n"))
+    from chaosgym.plotting.evaluation import comparison_figure
+
+    figure = comparison_figure(summaries, arguments.env)
+    write_atomically(arguments.out / "comparison.png", lambda file: figure.savefig(file, dpi=130, format="png"))
+    print(text if arguments.json else "\n".join(lines))
 
 
 if __name__ == "__main__":

@@ -90,6 +90,10 @@ class Fleet(Protocol):
         """Run the machines ``which`` (k,) for some cycles."""
         ...
 
+    def branch(self, i: int, which: Indices) -> None:
+        """Let the machines ``which`` (k,), which differ from machine i in speed alone, go on from its motion."""
+        ...
+
 
 class SerialFleet:
     """Machines that run one after the other; ``records`` holds the last cycles of each that did not fail."""
@@ -136,6 +140,11 @@ class SerialFleet:
             results.impacts[k] = record.impacts
             results.bounce_duration[k] = record.bounce_duration
         return results
+
+    def branch(self, i: int, which: Indices) -> None:
+        """Let the machines ``which`` (k,), which differ from machine i in speed alone, go on from its motion."""
+        for k in which.tolist():
+            self._motions[k] = self._motions[i]
 
 
 def stacked(models: list[Any]) -> Any:
@@ -184,6 +193,11 @@ class _CompiledFleet(ABC):
             for values in results[1:]:
                 values[failed] = 0
         return results
+
+    def branch(self, i: int, which: Indices) -> None:
+        """Let the machines ``which`` (k,), which differ from machine i in speed alone, go on from its motion."""
+        for values in self._motions:
+            values[which] = values[i]
 
     @abstractmethod
     def change(self, i: int, machine: Machine) -> None:

@@ -17,8 +17,8 @@ def _run(script, *arguments):
 
 
 @pytest.mark.slow
-def test_a_policy_is_trained_saved_and_compared_with_constant_speeds(tmp_path):
-    """train_ppo.py writes policy, config and progress; evaluate.py a table in which top speed costs the least time."""
+def test_a_policy_is_trained_and_saved(tmp_path):
+    """train_ppo.py writes policy, config and progress."""
     out = tmp_path / "ppo"
     trained = _run("train_ppo.py", "--steps", "3200", "--rollout", "200", "--out", str(out), "--seed", "3")
     assert trained.returncode == 0, trained.stderr
@@ -28,20 +28,11 @@ def test_a_policy_is_trained_saved_and_compared_with_constant_speeds(tmp_path):
     episodes = list(csv.DictReader((out / "progress.csv").read_text().splitlines()))
     assert len(episodes) == 16
     assert all(float(row["return"]) < 0.0 for row in episodes)
-    evaluated = _run("evaluate.py", "--policy", str(out), "--jobs", "1", "--speeds", "2")
-    assert evaluated.returncode == 0, evaluated.stderr
-    results = json.loads((out / "evaluation.json").read_text())["results"]
-    assert set(results) == {"constant   4.0", "constant  30.0", "policy"}
-    assert (
-        results["constant  30.0"]["time_cost"] < results["policy"]["time_cost"] < results["constant   4.0"]["time_cost"]
-    )
 
 
 def test_an_existing_folder_is_left_alone(tmp_path):
-    """Training never writes into a folder that exists, and evaluation says what is missing."""
+    """Training never writes into a folder that exists."""
     refused = _run("train_ppo.py", "--out", str(tmp_path))
     assert refused.returncode != 0
     assert "choose another folder" in refused.stderr
-    missing = _run("evaluate.py", "--policy", str(tmp_path))
-    assert "holds no policy.zip" in missing.stderr
     assert list(tmp_path.iterdir()) == []

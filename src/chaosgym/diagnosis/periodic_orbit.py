@@ -42,6 +42,8 @@ class PeriodicOrbit:
         Miss after one period, relative to the size of the state in energy.
     multipliers : (n_states,) complex
         Floquet multipliers, largest modulus first.
+    derivative : (n_states, n_states)
+        Of the map of one period: what becomes of small deviations; its eigenvalues are the multipliers.
     distance
         How far the search moved, relative to the size.
     """
@@ -50,6 +52,7 @@ class PeriodicOrbit:
     state: Array
     residual: float
     multipliers: NDArray[np.complex128]
+    derivative: Array
     distance: float
 
     @property
@@ -112,6 +115,7 @@ def find_periodic_orbit(
     return PeriodicOrbit(
         period=period, state=state, residual=residual,
         multipliers=np.asarray(multipliers[np.argsort(-np.abs(multipliers))], dtype=complex),
+        derivative=monodromy,
         distance=float(np.linalg.norm(weight * (state - origin)) / np.linalg.norm(weight * origin)),
     )  # fmt: skip
 

@@ -166,6 +166,11 @@ class MachineEnv(gym.Env[Observation, Action]):
         return self._job.machine_at(0)
 
     @property
+    def machine_number(self) -> int:
+        """Number of the machine of the current job in the pool."""
+        return int(self._job.chosen[0])
+
+    @property
     def regimes(self) -> RegimeTable:
         """Regimes of the machine of the current job, with its present clearance."""
         return self._job.regimes_at(0)

@@ -1,0 +1,43 @@
+"""The comparison runs from the command line, goes on where it was stopped, and says what is wrong."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+SCRIPT = Path(__file__).parent.parent.parent / "agents" / "evaluate.py"
+
+
+def _run(*arguments):
+    command = [sys.executable, str(SCRIPT), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_controllers_are_compared_and_the_comparison_goes_on(tmp_path):
+    """Report, table and figure are written; jobs that are kept are not run again, and contenders can be added."""
+    out = ["--out", str(tmp_path / "comparison"), "--machines", "2"]
+    first = _run(*out, "--controllers", "lowest")
+    assert first.returncode == 0, first.stderr
+    assert "| lowest | nothing | 1 |" in first.stdout
+    folder = tmp_path / "comparison"
+    assert (folder / "comparison.png").read_bytes().startswith(b"\x89PNG")
+    kept = (folder / "jobs" / "lowest-0.json").stat().st_mtime_ns
+    second = _run(*out, "--controllers", "lowest", "highest", "--json")
+    report = json.loads(second.stdout)
+    assert set(report["contenders"]) == {"lowest", "highest", "safe constant", "dynamic programming"}
+    assert report["contenders"]["lowest"]["score"] < 0.0
+    assert report["contenders"]["dynamic programming"]["score"] == 1.0
+    assert report == json.loads((folder / "report.json").read_text())
+    assert (folder / "jobs" / "lowest-0.json").stat().st_mtime_ns == kept
+    other = _run("--out", str(folder), "--machines", "3", "--controllers", "lowest")
+    assert other.returncode != 0
+    assert "holds another comparison" in other.stderr
+
+
+def test_unknown_contenders_are_refused(tmp_path):
+    """The message lists the controllers; a pattern that no folder matches is named."""
+    refused = _run("--out", str(tmp_path / "a"), "--controllers", "best")
+    assert "allowed: random, lowest" in refused.stderr
+    missing = _run("--out", str(tmp_path / "b"), "--policy", f"PPO={tmp_path}/none-*")
+    assert "allowed: NAME=FOLDERS" in missing.stderr
+    assert list(tmp_path.iterdir()) == []
