@@ -2,8 +2,7 @@
 
 import pytest
 
-from chaosgym.classifier.train import train_classifier
-from tests.classifier.made_up import made_up_sweep
+from tests.classifier.made_up import made_up_sweep, trained_on
 
 
 @pytest.fixture(scope="session")
@@ -15,4 +14,4 @@ def sweep():
 @pytest.fixture(scope="session")
 def trained(sweep):
     """Trained once, with the learning curve."""
-    return train_classifier(sweep, seed=3)
+    return trained_on(sweep, seed=3)

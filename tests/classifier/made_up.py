@@ -2,7 +2,9 @@
 
 import numpy as np
 import pyarrow as pa
+import pytest
 
+from chaosgym.classifier import train
 from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import LabelledSweep
@@ -37,7 +39,7 @@ def made_up_sweep(seed=0):
     late = np.stack([settled(rate) for rate in rates])
     columns = {
         "excitation_frequency": speed, "clearance": clearance, "machine": machine,
-        "split": np.where(machine % 5 == 0, "test", "train"), "response_type": types,
+        "split": np.array(["test", "validation", "train", "train", "train"])[machine % 5], "response_type": types,
         "nature": np.where(types == "III", "chaotic", "periodic"),
         "period": pa.array([{"I": 1, "II": 2}.get(kind) for kind in types], pa.int32()),
         "exponent": np.where(types == "III", 0.5, -0.5), "peak_force_min": late.min(axis=1),
@@ -51,3 +53,10 @@ def made_up_sweep(seed=0):
     base = {name: getattr(THESIS_IMPACT_BEAM, name) for name in parameters_of(ImpactBeam)}
     axes = [{"field": "excitation_frequency"}, {"field": "clearance"}]
     return LabelledSweep(pa.table(columns), {"machine": "impact-beam", "base": base, "axes": axes})
+
+
+def trained_on(sweep, seed, **options):
+    """A classifier of a sweep whose pupil sees few made-up machines, which is quick."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(train, "PUPIL", 2000)
+        return train.train_classifier(sweep, seed=seed, **options)

@@ -12,7 +12,7 @@ from chaosgym.errors import DatasetError, ModelFileError, ParameterError
 from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, ImpactBeam
 from chaosgym.plotting.classifier import save_pictures
 from chaosgym.sweeps import LabelledSweep
-from tests.classifier.made_up import made_up_sweep, settled
+from tests.classifier.made_up import made_up_sweep, settled, trained_on
 
 
 def test_learns_a_known_border(trained):
@@ -38,7 +38,9 @@ def test_recognises_records_it_has_not_seen(trained):
 def test_no_machine_trains_and_judges(trained):
     """Rows of a held-out machine never train: neighbours don't leak."""
     examples = trained.examples
-    assert set(examples.groups[examples.test]).isdisjoint(examples.groups[~examples.test])
+    parts = [set(examples.groups[rows]) for rows in (examples.training, examples.calibration, examples.test)]
+    assert all(parts)
+    assert sum(map(len, parts)) == len(set.union(*parts))
 
 
 def test_held_out_rows_of_a_plain_grid_are_whole_blocks(sweep):
@@ -51,7 +53,7 @@ def test_held_out_rows_of_a_plain_grid_are_whole_blocks(sweep):
 
 def test_same_seed_same_answers(trained, sweep):
     """Training is reproducible bit for bit."""
-    again = train_classifier(sweep, seed=3, curve=False).classifier
+    again = trained_on(sweep, seed=3, curve=False).classifier
     for known, rows in (("parameters", trained.examples.values), ("records", trained.examples.signals["start"][0])):
         first, second = (getattr(one, known).predict_pairs(rows) for one in (trained.classifier, again))
         np.testing.assert_array_equal(first, second)

@@ -24,11 +24,10 @@ KEYS = {
 @pytest.fixture(scope="module")
 def model(tmp_path_factory):
     """A classifier of the made-up sweep, on disk."""
-    from chaosgym.classifier.train import train_classifier
-    from tests.classifier.made_up import made_up_sweep
+    from tests.classifier.made_up import made_up_sweep, trained_on
 
     folder = tmp_path_factory.mktemp("model")
-    train_classifier(made_up_sweep(), seed=1, curve=False).save(folder)
+    trained_on(made_up_sweep(), seed=1, curve=False).save(folder)
     return str(folder / "classifier.npz")
 
 
@@ -74,6 +73,17 @@ def test_one_run_a_column(model, tmp_path):
     answers = json.loads(out)["runs"]
     assert (answers["calm"]["nature"], answers["calm"]["period"]) == ("periodic", 2)
     assert answers["wild"]["nature"] == "chaotic"
+
+
+def test_a_fresh_process_answers_as_compiled_kernels_do(model):
+    """One question to a new process, which compiles nothing, has the answer of the compiled kernels."""
+    for arguments, stdin in ((("--frequency-hz", "20"), ""), (("--peaks", "-"), lines_of(settled(3.9, 40)))):
+        options = (*arguments, "--model", model, "--json")
+        command = [sys.executable, "-m", "chaosgym", "classify", "impact-beam", *options]
+        alone = subprocess.run(command, input=stdin, capture_output=True, text=True, check=True)
+        here, there = json.loads(run(*options, stdin=stdin)[1]), json.loads(alone.stdout)
+        assert here["response_type"] == there["response_type"]
+        assert here["confidence"] == pytest.approx(there["confidence"], rel=1e-4)
 
 
 def test_monitor_prints_a_verdict_each_cycle(model):

@@ -10,8 +10,12 @@ def report_table(report: Mapping[str, Any]) -> list[str]:
     """Lines of the comparison on held-out rows."""
     rows = report["rows"]
     lines = [f"{rows['held_out']} held-out and {rows['training']} training points, 95 % bootstrap intervals"]
-    losses = ", ".join(f"{kind} {loss:.3f}" for kind, loss in report["cross_fitted_log_loss"].items())
-    lines += ["", f"parameters are judged by {report['model']}; cross-fitted log loss: {losses}"]
+    losses = ", ".join(f"{kind} {loss:.3f}" for kind, loss in report["log_loss"].items())
+    lines += [
+        "",
+        f"parameters: one network, taught by {report['model']}; log loss on {rows['calibration']} other points: "
+        f"{losses}",
+    ]
     for name in ("response_type", "nature"):
         lines += ["", *_block(f"{name.replace('_', ' ')} from parameters", report["parameters"][name])]
     refused = report["parameters"]["refused"]
