@@ -119,8 +119,8 @@ def examples_of(sweep: LabelledSweep, seed: int) -> Examples:
     return Examples(
         machine=machine(**sweep.settings["base"]), fields=fields, values=values, response_type=types[usable],
         nature=natures[usable], period=np.nan_to_num(sweep.column("period")[usable].astype(float)).astype(np.int64),
-        groups=groups, calibration=calibration, test=test, clear=_clear(sweep, usable, natures[usable]), signals=signals,
-        left_out=int(np.sum(~usable)), ranges=_ranges(sweep.settings, values),
+        groups=groups, calibration=calibration, test=test, clear=_clear(sweep, usable, natures[usable]),
+        signals=signals, left_out=int(np.sum(~usable)), ranges=_ranges(sweep.settings, values),
     )  # fmt: skip
 
 
@@ -142,7 +142,7 @@ def _clear(sweep: LabelledSweep, usable: NDArray[np.bool_], nature: NDArray[np.s
 def _split(
     sweep: LabelledSweep, usable: NDArray[np.bool_], values: Array, seed: int
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Groups of the rows, which calibrate and which judge: the sweep's split by machine, or else blocks of the plane."""
+    """Groups of the rows, which calibrate, which judge: the sweep's split by machine, or else blocks of the plane."""
     if "split" in sweep.table.column_names:
         parts = np.array([str(part) for part in sweep.column("split")])[usable]
         return sweep.column("machine")[usable].astype(np.int64), parts == "validation", parts == "test"

@@ -18,6 +18,7 @@ def report_table(report: Mapping[str, Any]) -> list[str]:
     ]
     for name in ("response_type", "nature"):
         lines += ["", *_block(f"{name.replace('_', ' ')} from parameters", report["parameters"][name])]
+        lines += _ceiling(name, report["ceiling"])
     refused = report["parameters"]["refused"]
     lines.append(f"  refused: {refused['outside']:.1%} of machines outside the range, {refused['inside']:.1%} inside")
     for name, scene in report.get("records", {}).items():
@@ -40,6 +41,15 @@ def report_table(report: Mapping[str, Any]) -> list[str]:
             for point in report["learning_curve"]
         ]
     return lines
+
+
+def _ceiling(name: str, ceiling: Mapping[str, float]) -> list[str]:
+    if name not in ceiling:
+        return []
+    if name == "nature":
+        within = f"+-{ceiling['half_interval']:.3f}; label noise: the nature within 0.1 % in every parameter"
+        return [f"  {'ceiling':{NAME_WIDTH}s} {ceiling[name]:.3f} {within}"]
+    return [f"  {'two definitions of the type agree':{NAME_WIDTH}s} {ceiling[name]:.3f}"]
 
 
 def _speed(speed: Mapping[str, Any]) -> str:

@@ -6,7 +6,7 @@ training on a half, a quarter and an eighth of the machines.
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from chaosgym.classifier.ceiling import ceilings
 from chaosgym.classifier.compare import SCENES, compare_parameters, compare_scene, outside_parameters, refusals
 from chaosgym.classifier.data import Examples, examples_of
 from chaosgym.classifier.estimator import ResponseClassifier
@@ -71,6 +72,7 @@ def train_classifier(
     model: str | None = None,
     curve: bool = True,
     transfer: LabelledSweep | None = None,
+    noise: Mapping[str, Any] | None = None,
     progress: bool = False,
 ) -> TrainingResult:
     """Train on a labelled sweep and judge beside baselines.
@@ -88,6 +90,8 @@ def train_classifier(
         Measure the learning curve too.
     transfer
         Sweep of another machine, on whose held-out records the record classifier is tried.
+    noise
+        What ``label_noise`` found for the sweep, for the ceiling of any classifier.
     progress
         Show a progress bar on standard error.
 
@@ -107,6 +111,7 @@ def train_classifier(
             "training_seconds": round(seconds, 1), "model": parameters.model_,
             "log_loss": {**parameters.log_losses_, "its pupil": parameters.log_loss_},
         }  # fmt: skip
+        report["ceiling"] = ceilings(sweep, noise)
         report["parameters"] = compare_parameters(examples, parameters, seed)
         report["parameters"]["refused"] = outside_parameters(examples, parameters, seed)
         bar.update()

@@ -280,9 +280,7 @@ def pinned_pinned_frequency(beam: ImpactBeam, length: float) -> float:
         graded_mesh((0.0, length), MIN_ELEMENTS), bending_stiffness, beam.density * section
     )
     free = [i for i in range(len(mass)) if i not in (0, len(mass) - 2)]
-    lowest = eigh(
-        stiffness[np.ix_(free, free)], mass[np.ix_(free, free)], eigvals_only=True, subset_by_index=[0, 0]
-    )
+    lowest = eigh(stiffness[np.ix_(free, free)], mass[np.ix_(free, free)], eigvals_only=True, subset_by_index=[0, 0])
     return float(math.sqrt(lowest[0]) / (2.0 * math.pi))
 
 
