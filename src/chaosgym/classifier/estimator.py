@@ -27,7 +27,7 @@ from chaosgym.simulation import parallel_map
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
-CHUNK = 5_000
+CHUNK = 2_000
 """Rows of a table that a thread takes at a time."""
 
 CALIBRATION = 0.15

@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.classifier.kernels.scaling import fill_scaled
+
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 
@@ -46,10 +48,9 @@ def network_scores(network: Network, features: Array) -> Array:
 
 
 def _scaled(centre: Single, spread: Single, features: Array) -> Single:
-    scaled = np.asarray(features, dtype=np.float32) - centre
-    scaled /= spread
-    np.clip(scaled, -LIMIT, LIMIT, out=scaled)
-    return np.nan_to_num(scaled, copy=False, nan=0.0)
+    out = np.empty(features.shape, dtype=np.float32)
+    fill_scaled(features, centre, spread, LIMIT, out)
+    return out
 
 
 def train_network(features: Array, targets: Array, seed: int) -> Network:

@@ -5,4 +5,4 @@ from pathlib import Path
 from chaosgym.compilation import cached_by_content
 
 with cached_by_content(Path(__file__).parent):
-    from chaosgym.classifier.kernels import nearest, pairs, parameters, records, trees  # noqa: F401
+    from chaosgym.classifier.kernels import nearest, pairs, parameters, records, scaling, trees  # noqa: F401
