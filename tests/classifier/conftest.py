@@ -2,7 +2,8 @@
 
 import pytest
 
-from tests.classifier.made_up import made_up_sweep, trained_on
+from chaosgym.classifier.train import train_classifier
+from tests.classifier.made_up import made_up_sweep
 
 
 @pytest.fixture(scope="session")
@@ -14,4 +15,4 @@ def sweep():
 @pytest.fixture(scope="session")
 def trained(sweep):
     """Trained once, with the learning curve."""
-    return trained_on(sweep, seed=3)
+    return train_classifier(sweep, seed=3)

@@ -2,9 +2,7 @@
 
 import numpy as np
 import pyarrow as pa
-import pytest
 
-from chaosgym.classifier import train
 from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import LabelledSweep
@@ -53,10 +51,3 @@ def made_up_sweep(seed=0):
     base = {name: getattr(THESIS_IMPACT_BEAM, name) for name in parameters_of(ImpactBeam)}
     axes = [{"field": "excitation_frequency"}, {"field": "clearance"}]
     return LabelledSweep(pa.table(columns), {"machine": "impact-beam", "base": base, "axes": axes})
-
-
-def trained_on(sweep, seed, **options):
-    """A classifier of a sweep whose pupil sees few made-up machines, which is quick."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(train, "PUPIL", 2000)
-        return train.train_classifier(sweep, seed=seed, **options)

@@ -24,10 +24,11 @@ KEYS = {
 @pytest.fixture(scope="module")
 def model(tmp_path_factory):
     """A classifier of the made-up sweep, on disk."""
-    from tests.classifier.made_up import made_up_sweep, trained_on
+    from chaosgym.classifier.train import train_classifier
+    from tests.classifier.made_up import made_up_sweep
 
     folder = tmp_path_factory.mktemp("model")
-    trained_on(made_up_sweep(), seed=1, curve=False).save(folder)
+    train_classifier(made_up_sweep(), seed=1, curve=False).save(folder)
     return str(folder / "classifier.npz")
 
 

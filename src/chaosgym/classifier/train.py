@@ -30,8 +30,8 @@ from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import LabelledSweep
 from chaosgym.version import __version__
 
-PUPIL = 200_000
-"""Made-up machines from which the network that answers about parameters learns."""
+PUPIL = 3
+"""Made-up machines, for each training row, from which the network that answers about parameters learns."""
 
 CURVE = (0.125, 0.25, 0.5)
 """Shares of the training machines of the learning curve, before all of them."""
@@ -44,6 +44,10 @@ ROUNDS, RECORD_ROUNDS = 100, 150
 
 RECORDS, COPIES = 100_000, 6
 """Noisy training records made of the signals, about, and copies of a run at most."""
+
+
+TIMED = ("training_seconds", "speed")
+"""Parts of the report that differ from run to run; the card, and with it the model file, has none of them."""
 
 
 @dataclass(frozen=True)
@@ -139,8 +143,9 @@ def fit_parameters(
     if examples.signals:
         settled, _, at = examples.signals["settled"]
         peaks[at] = settled[np.arange(len(at)), np.random.default_rng(seed).integers(0, settled.shape[1], len(at))]
+    pupil = PUPIL * int((rows & examples.training).sum())
     classifier = ResponseClassifier(
-        "parameters", model, PUPIL, examples.machine, examples.fields, rounds=ROUNDS, least_rows=LEAST_ROWS, seed=seed
+        "parameters", model, pupil, examples.machine, examples.fields, rounds=ROUNDS, least_rows=LEAST_ROWS, seed=seed
     )
     return classifier.fit(
         examples.values[rows], examples.response_type[rows], nature=examples.nature[rows],
@@ -243,5 +248,5 @@ def _card(sweep: LabelledSweep, examples: Examples, report: dict[str, Any], seed
             "state; transient chaos counts as chaotic although a settled record of it is periodic; chaos weaker than "
             "the sensor's noise looks periodic"
         ),
-        "report": report,
+        "report": {name: value for name, value in report.items() if name not in TIMED},
     }  # fmt: skip
