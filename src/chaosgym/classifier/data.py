@@ -20,6 +20,9 @@ TYPES = ("I", "II", "III")
 LEAST_ROWS, RARE = 50, 0.01
 """Rows that a sweep must have to be learned, and share of them below which a nature is left out as too rare."""
 
+LARGE, THIRD = 50_000, 1.0 / 3.0
+"""Rows beyond which a lattice is thinned to train from parameters, and what is kept of it."""
+
 BLOCKS = 12
 """Without machines, the held-out rows are rectangles of a BLOCKS x BLOCKS board over the first two fields."""
 
@@ -81,6 +84,15 @@ class Examples:
         """Signals of the rows that are chosen (n,)."""
         return {window: tuple(part[chosen[rows]] for part in (peaks, section, rows))  # type: ignore[misc]
                 for window, (peaks, section, rows) in self.signals.items()}  # fmt: skip
+
+
+def thinned(sweep: LabelledSweep, seed: int) -> LabelledSweep:
+    """Every third row of a large sweep, by chance, and all that judge: neighbours on a lattice are near-copies."""
+    if len(sweep.table) <= LARGE or "split" not in sweep.table.column_names:
+        return sweep
+    judges = sweep.column("split").astype(str) == "test"
+    kept = (np.random.default_rng(seed).random(len(judges)) < THIRD) | judges
+    return LabelledSweep(sweep.table.filter(kept), sweep.settings)
 
 
 def examples_of(sweep: LabelledSweep, seed: int) -> Examples:

@@ -83,13 +83,14 @@ def _line(name: str, scores: Mapping[str, Any]) -> str:
 def card_lines(card: Mapping[str, Any]) -> list[str]:
     """Model card as Markdown."""
     ranges = ", ".join(f"{name} {low:.4g} to {high:.4g}" for name, (low, high) in card["ranges"].items())
+    machines = card["report"]["machines"]
     return [
         f"# Classifier of the {card['machine']}'s response type",
         "",
         "Use: type (I, II, III) and nature of a response from machine parameters, or from 8 to 64 measured peaks.",
         f"Data: {card['rows']['parameters']} labelled responses, {card['rows']['records']} recorded windows; "
-        f"{card['report']['machines']['training']} machines (or blocks) train, "
-        f"{card['report']['machines']['held_out']} judge.",
+        f"{machines['training']} machines (or blocks) train, {machines['calibration']} calibrate, "
+        f"{machines['held_out']} judge.",
         f"Range, SI: {ranges}.",
         f"Limits: {card['limits']}.",
         f"Made by chaosgym {card['version']}: `{card['command']}`.",

@@ -17,7 +17,7 @@ from tqdm import tqdm
 
 from chaosgym.classifier.ceiling import ceilings
 from chaosgym.classifier.compare import SCENES, compare_parameters, compare_scene, outside_parameters, refusals
-from chaosgym.classifier.data import Examples, examples_of
+from chaosgym.classifier.data import Examples, examples_of, thinned
 from chaosgym.classifier.estimator import ResponseClassifier
 from chaosgym.classifier.evaluation import probability_scores
 from chaosgym.classifier.records import training_records
@@ -30,8 +30,8 @@ from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import LabelledSweep
 from chaosgym.version import __version__
 
-PUPIL = 3
-"""Made-up machines, for each training row, from which the network that answers about parameters learns."""
+PUPIL, PUPIL_SHARE = 60_000, 3
+"""Made-up machines from which the network that answers about parameters learns, and at most for each training row."""
 
 CURVE = (0.125, 0.25, 0.5)
 """Shares of the training machines of the learning curve, before all of them."""
@@ -39,10 +39,10 @@ CURVE = (0.125, 0.25, 0.5)
 LEAST_ROWS = 60
 """In a leaf of a tree."""
 
-ROUNDS, RECORD_ROUNDS = 100, 150
-"""Of the boosting, from parameters and from records."""
+ROUNDS = 100
+"""Of the boosting."""
 
-RECORDS, COPIES = 100_000, 6
+RECORDS, COPIES = 30_000, 6
 """Noisy training records made of the signals, about, and copies of a run at most."""
 
 
@@ -104,20 +104,20 @@ def train_classifier(
     DatasetError
         If there are too few rows or only one response type.
     """
-    examples = examples_of(sweep, seed)
+    examples, sparse = examples_of(sweep, seed), examples_of(thinned(sweep, seed), seed)
     steps = 4 + (3 + len(SCENES) if examples.signals else 0) + (1 + len(CURVE) if curve else 0)
     with tqdm(total=steps, desc="train classifier", unit="step", disable=not progress, mininterval=0.5) as bar:
         began = time.perf_counter()
-        parameters = fit_parameters(examples, ~examples.test, model or "best", seed, tick=bar.update)
+        parameters = fit_parameters(sparse, ~sparse.test, model or "best", seed, tick=bar.update)
         records = fit_records(examples, seed, tick=bar.update) if examples.signals else None
         seconds = time.perf_counter() - began
-        report = _rows(examples) | {
+        report = _rows(sparse) | {
             "training_seconds": round(seconds, 1), "model": parameters.model_,
             "log_loss": {**parameters.log_losses_, "its pupil": parameters.log_loss_},
         }  # fmt: skip
         report["ceiling"] = ceilings(sweep, noise)
-        report["parameters"] = compare_parameters(examples, parameters, seed)
-        report["parameters"]["refused"] = outside_parameters(examples, parameters, seed)
+        report["parameters"] = compare_parameters(sparse, parameters, seed)
+        report["parameters"]["refused"] = outside_parameters(sparse, parameters, seed)
         bar.update()
         if records is not None:
             report["records"] = {}
@@ -128,10 +128,10 @@ def train_classifier(
             if transfer is not None:
                 report["transfer"] = _transfer(transfer, records, seed)
         if curve:
-            report["learning_curve"] = _learning_curve(examples, parameters, seed, bar.update)
-    classifier = MachineClassifier(examples.machine, parameters, records, _card(sweep, examples, report, seed))
+            report["learning_curve"] = _learning_curve(sparse, parameters, seed, bar.update)
+    classifier = MachineClassifier(examples.machine, parameters, records, _card(sweep, examples, sparse, report, seed))
     report["speed"] = measure_speed(classifier, seed)
-    return TrainingResult(classifier, report, examples)
+    return TrainingResult(classifier, report, sparse)
 
 
 def fit_parameters(
@@ -143,7 +143,7 @@ def fit_parameters(
     if examples.signals:
         settled, _, at = examples.signals["settled"]
         peaks[at] = settled[np.arange(len(at)), np.random.default_rng(seed).integers(0, settled.shape[1], len(at))]
-    pupil = PUPIL * int((rows & examples.training).sum())
+    pupil = min(PUPIL, PUPIL_SHARE * int((rows & examples.training).sum()))
     classifier = ResponseClassifier(
         "parameters", model, pupil, examples.machine, examples.fields, rounds=ROUNDS, least_rows=LEAST_ROWS, seed=seed
     )
@@ -163,7 +163,7 @@ def fit_records(examples: Examples, seed: int, tick: Callable[[], object] = lamb
     where = np.full(len(examples.values), -1)
     where[later[2]] = np.arange(len(later[2]))
     columns = np.random.default_rng(seed + 1).integers(0, later[0].shape[1], len(noisy.rows))
-    classifier = ResponseClassifier("records", "boosting", rounds=RECORD_ROUNDS, least_rows=LEAST_ROWS, seed=seed)
+    classifier = ResponseClassifier("records", "boosting", rounds=ROUNDS, least_rows=LEAST_ROWS, seed=seed)
     return classifier.fit(
         noisy.peaks, examples.response_type[noisy.rows], nature=examples.nature[noisy.rows],
         peak_force=later[0][where[noisy.rows], columns], groups=examples.groups[noisy.rows],
@@ -225,8 +225,9 @@ def _rows(examples: Examples) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _card(sweep: LabelledSweep, examples: Examples, report: dict[str, Any], seed: int) -> dict[str, Any]:
-    training = examples.training
+def _card(
+    sweep: LabelledSweep, examples: Examples, sparse: Examples, report: dict[str, Any], seed: int
+) -> dict[str, Any]:
     kept = ("sampling", "size", "seed", "budget", "signals", "transient", "cycles", "axes", "patches", "type_reach")
     return {
         "machine": examples.machine.name,
@@ -236,8 +237,8 @@ def _card(sweep: LabelledSweep, examples: Examples, report: dict[str, Any], seed
                    for name, low, high in zip(examples.fields, *examples.ranges, strict=True)},
         "data": {key: sweep.settings[key] for key in kept if key in sweep.settings},
         "rows": {
-            "parameters": int(training.sum()),
-            "records": sum(len(part[0]) for part in examples.signals_where(training).values()),
+            "parameters": int(sparse.training.sum()),
+            "records": sum(len(part[0]) for part in examples.signals_where(examples.training).values()),
         },
         "seed": seed,
         "version": __version__,
