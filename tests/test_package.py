@@ -51,6 +51,15 @@ def test_compiled_kernels_are_cached_by_their_sources():
     assert Path(KERNEL_CACHE).name == source_digest(Path(ROOT / "src/chaosgym/core"))
 
 
+def test_kernels_of_the_classifier_are_cached_by_their_content():
+    """The same holds for the classifier's kernels, in a folder beside that of the core."""
+    from chaosgym.classifier.kernels.trees import walk_rows
+    from chaosgym.core import KERNEL_CACHE, source_digest
+
+    folder = Path(KERNEL_CACHE).with_name(source_digest(ROOT / "src/chaosgym/classifier/kernels"))
+    assert Path(walk_rows.stats.cache_path).is_relative_to(folder)
+
+
 def test_editing_a_kernel_source_changes_the_digest(tmp_path):
     """The digest depends on every byte of every source."""
     from chaosgym.core import source_digest

@@ -13,7 +13,7 @@ from typing import Any
 
 import numba
 
-from chaosgym.core import KERNEL_CACHE
+from chaosgym.core import KERNEL_CACHE, source_digest
 
 logger = logging.getLogger("chaosgym")
 
@@ -50,6 +50,17 @@ def name_of(kernel: Any) -> str:
     """Module and name of a kernel."""
     function = kernel.py_func
     return f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
+
+
+@contextmanager
+def cached_by_content(folder: Path) -> Iterator[None]:
+    """Kernels imported meanwhile are cached, as those of ``core``, in a folder named by the hash of their sources."""
+    previous = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(Path(KERNEL_CACHE).with_name(source_digest(folder)))
+    try:
+        yield
+    finally:
+        numba.config.CACHE_DIR = previous
 
 
 @contextmanager

@@ -38,7 +38,9 @@ def test_recognises_records_it_has_not_seen(trained):
 def test_no_machine_trains_and_judges(trained):
     """Rows of a held-out machine never train: neighbours don't leak."""
     examples = trained.examples
-    assert set(examples.groups[examples.test]).isdisjoint(examples.groups[~examples.test])
+    parts = [set(examples.groups[rows]) for rows in (examples.training, examples.calibration, examples.test)]
+    assert all(parts)
+    assert sum(map(len, parts)) == len(set.union(*parts))
 
 
 def test_held_out_rows_of_a_plain_grid_are_whole_blocks(sweep):
@@ -49,12 +51,12 @@ def test_held_out_rows_of_a_plain_grid_are_whole_blocks(sweep):
     assert set(examples.groups[examples.test]).isdisjoint(examples.groups[~examples.test])
 
 
-def test_same_seed_same_answers(trained, sweep):
-    """Training is reproducible bit for bit."""
-    again = train_classifier(sweep, seed=3, curve=False).classifier
-    for known, rows in (("parameters", trained.examples.values), ("records", trained.examples.signals["start"][0])):
-        first, second = (getattr(one, known).predict_pairs(rows) for one in (trained.classifier, again))
-        np.testing.assert_array_equal(first, second)
+def test_same_seed_same_file(trained, sweep, tmp_path):
+    """Training is reproducible bit for bit: two model files are equal."""
+    for name, result in (("first", trained), ("second", train_classifier(sweep, seed=3))):
+        result.save(tmp_path / name)
+    first, second = ((tmp_path / name / "classifier.npz").read_bytes() for name in ("first", "second"))
+    assert first == second
 
 
 def test_probabilities_sum_to_one_even_without_an_answer(trained):
@@ -95,14 +97,14 @@ def test_refuses_faulty_records_and_keeps_sound_ones(trained):
     """Wrong units, spikes and growing records are refused nearly always, sound ones rarely."""
     refused = trained.report["refused"]
     assert refused["none"] < 0.1
-    for fault in ("millinewton", "kilonewton", "spikes", "growing"):
+    for fault in ("millinewton", "kilonewton", "spikes", "growing", "white noise"):
         assert refused[fault] > 0.9
     answer = trained.classifier.classify_record(1e6 * settled(3.9, 20))
     assert answer.abstained
     assert "wrong units suspected" in answer.reason
 
 
-def test_refuses_machines_it_was_not_trained_on(trained):
+def test_refuses_machines_it_was_not_train_classifier(trained):
     """A parameter that training did not vary makes it abstain; another machine is an error."""
     answer = trained.classifier.classify(ImpactBeam(length=0.28, excitation_frequency=10.0, clearance=5e-5))
     assert answer.abstained

@@ -76,6 +76,17 @@ def test_one_run_a_column(model, tmp_path):
     assert answers["wild"]["nature"] == "chaotic"
 
 
+def test_a_fresh_process_answers_as_compiled_kernels_do(model):
+    """One question to a new process, which compiles nothing, has the answer of the compiled kernels."""
+    for arguments, stdin in ((("--frequency-hz", "20"), ""), (("--peaks", "-"), lines_of(settled(3.9, 40)))):
+        options = (*arguments, "--model", model, "--json")
+        command = [sys.executable, "-m", "chaosgym", "classify", "impact-beam", *options]
+        alone = subprocess.run(command, input=stdin, capture_output=True, text=True, check=True)
+        here, there = json.loads(run(*options, stdin=stdin)[1]), json.loads(alone.stdout)
+        assert here["response_type"] == there["response_type"]
+        assert here["confidence"] == pytest.approx(there["confidence"], rel=1e-4)
+
+
 def test_monitor_prints_a_verdict_each_cycle(model):
     """One line a cycle: waiting up to the seventh, verdicts from the eighth on."""
     code, out, _ = run("--follow", "--model", model, "--json", stdin=lines_of(settled(3.9, 12)))

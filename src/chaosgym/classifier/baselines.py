@@ -35,7 +35,7 @@ CHAOTIC = 0.5
 """0-1 statistic from which on a record counts as chaotic."""
 
 NEIGHBOURS = 15
-MOST_ROWS = 30_000
+MOST_ROWS = 15_000
 """Training rows of the models whose cost grows fast with them."""
 
 

@@ -6,7 +6,6 @@ score 1 - p (LAC): M. Sadinle et al., J. Am. Stat. Assoc. 114 (2019).
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 Array = NDArray[np.float64]
 
@@ -23,6 +22,7 @@ def softmax(scores: Array) -> Array:
 
 def best_temperature(scores: Array, labels: NDArray[np.int64]) -> float:
     """Divisor of the scores (n, classes) under which the class numbers (n,) are most likely."""
+    from scipy.optimize import minimize_scalar
 
     def surprise(logarithm: float) -> float:
         chances = softmax(scores / np.exp(logarithm))[np.arange(len(labels)), labels]

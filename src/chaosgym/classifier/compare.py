@@ -12,6 +12,7 @@ from chaosgym.classifier.estimator import ResponseClassifier
 from chaosgym.classifier.evaluation import bootstrap_scores, confusion_matrix, probability_scores
 from chaosgym.classifier.features import record_features
 from chaosgym.classifier.records import NORMAL_DEVIATIONS
+from chaosgym.classifier.scorers import pair_scores
 from chaosgym.classifier.strange_records import FAULTS
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ SCENES = (
 
 def compare_parameters(examples: Examples, classifier: ResponseClassifier, seed: int) -> dict[str, Any]:
     """Scores on held-out machines from parameters: of types and of natures, by method."""
-    train, test = ~examples.test, examples.test
+    train, test = examples.training, examples.test
     features, groups = classifier.features(examples.values), examples.groups[test]
     types, natures = examples.response_type, examples.nature
     chances = classifier.predict_proba(examples.values[test])
@@ -66,6 +67,14 @@ def compare_parameters(examples: Examples, classifier: ResponseClassifier, seed:
         "response_type": {"classifier": probability_scores(classifier.classes_, chances, types[test], groups)},
         "nature": {"classifier": probability_scores(classifier.natures_, nature_chances, natures[test], groups)},
     }
+    if classifier.pupil:
+        taught = classifier.pairs_.chances(pair_scores(classifier.teachers_, features[test]))
+        for name, chances_of, kinds, truth in (
+            ("response_type", classifier.pairs_.types_from, classifier.classes_, types),
+            ("nature", classifier.pairs_.natures_from, classifier.natures_, natures),
+        ):
+            guess = kinds[chances_of(taught).argmax(axis=1)]
+            scored[name]["its teachers"] = bootstrap_scores(truth[test], guess, groups)
     for name, labels in (("response_type", types), ("nature", natures)):
         guesses: dict[str, Any] = model_guesses(features[train], labels[train], features[test], seed)
         if name == "nature":
@@ -84,7 +93,7 @@ def compare_scene(
     """Scores of natures on held-out machines from records of a scene, by method; of types by the classifier."""
     peaks, _, rows = examples.signals[scene.window]
     asked = examples.test[rows] & (examples.clear[rows] if scene.clear_only else True)
-    known = ~examples.test[rows]
+    known = examples.training[rows]
     forces, errors = scene.records(peaks, seed)
     natures, types, groups = (column[rows] for column in (examples.nature, examples.response_type, examples.groups))
     features = record_features(forces, sensor_error=errors)
@@ -92,7 +101,9 @@ def compare_scene(
     pairs = classifier.chances(features[asked])
 
     def scores(chances: Array) -> dict[str, Any]:
-        return probability_scores(classifier.natures_, classifier.natures_of(chances), natures[asked], groups[asked])
+        return probability_scores(
+            classifier.natures_, classifier.pairs_.natures_from(chances), natures[asked], groups[asked]
+        )
 
     found = {"classifier": scores(pairs), "classifier, sensor error not told": scores(classifier.chances(blind))}
     if baselines:
@@ -106,7 +117,7 @@ def compare_scene(
         "target": scene.target,
         "nature": found,
         "response_type": probability_scores(
-            classifier.classes_, classifier.types_of(pairs), types[asked], groups[asked]
+            classifier.classes_, classifier.pairs_.types_from(pairs), types[asked], groups[asked]
         ),
         "refused": float(classifier.unlike_training(features[asked]).mean()),
     }

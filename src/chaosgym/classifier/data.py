@@ -20,10 +20,15 @@ TYPES = ("I", "II", "III")
 LEAST_ROWS, RARE = 50, 0.01
 """Rows that a sweep must have to be learned, and share of them below which a nature is left out as too rare."""
 
+LARGE, THIRD = 50_000, 1.0 / 3.0
+"""Rows beyond which a lattice is thinned to train from parameters, and what is kept of it."""
+
 BLOCKS = 12
 """Without machines, the held-out rows are rectangles of a BLOCKS x BLOCKS board over the first two fields."""
 
-HELD_OUT = 0.25
+HELD_OUT, CALIBRATION = 0.25, 0.15
+"""Shares of the blocks that judge and that calibrate."""
+
 AWAY_EXPONENT, AWAY_SPREAD = 0.1, 6.0
 """Away from boundaries: exponent beyond 0.1 a cycle, and if chaotic a spread of the peaks above 6 N."""
 
@@ -44,8 +49,8 @@ class Examples:
         0 where there is none.
     groups : (n,)
         Machine or block of each row: never on both sides of the split.
-    test : (n,)
-        Rows that judge.
+    calibration, test : (n,)
+        Rows that calibrate and rows that judge; the others train.
     clear : (n,)
         Rows away from boundaries.
     signals
@@ -63,16 +68,31 @@ class Examples:
     nature: NDArray[np.str_]
     period: NDArray[np.int64]
     groups: NDArray[np.int64]
+    calibration: NDArray[np.bool_]
     test: NDArray[np.bool_]
     clear: NDArray[np.bool_]
     signals: dict[str, tuple[Array, Array, NDArray[np.int64]]]
     left_out: int
     ranges: tuple[Array, Array]
 
+    @property
+    def training(self) -> NDArray[np.bool_]:
+        """Rows that train (n,)."""
+        return np.asarray(~(self.calibration | self.test))
+
     def signals_where(self, chosen: NDArray[np.bool_]) -> dict[str, tuple[Array, Array, NDArray[np.int64]]]:
         """Signals of the rows that are chosen (n,)."""
         return {window: tuple(part[chosen[rows]] for part in (peaks, section, rows))  # type: ignore[misc]
                 for window, (peaks, section, rows) in self.signals.items()}  # fmt: skip
+
+
+def thinned(sweep: LabelledSweep, seed: int) -> LabelledSweep:
+    """Every third row of a large sweep, by chance, and all that judge: neighbours on a lattice are near-copies."""
+    if len(sweep.table) <= LARGE or "split" not in sweep.table.column_names:
+        return sweep
+    judges = sweep.column("split").astype(str) == "test"
+    kept = (np.random.default_rng(seed).random(len(judges)) < THIRD) | judges
+    return LabelledSweep(sweep.table.filter(kept), sweep.settings)
 
 
 def examples_of(sweep: LabelledSweep, seed: int) -> Examples:
@@ -96,8 +116,8 @@ def examples_of(sweep: LabelledSweep, seed: int) -> Examples:
     if usable.sum() < LEAST_ROWS:
         raise DatasetError(f"only {usable.sum()} rows have a response type; at least {LEAST_ROWS} are needed to train")
     values = np.column_stack([sweep.column(name)[usable].astype(float) for name in fields])
-    groups, test = _split(sweep, usable, values, seed)
-    for name, rows in (("training", ~test), ("held-out", test)):
+    groups, calibration, test = _split(sweep, usable, values, seed)
+    for name, rows in (("training", ~(test | calibration)), ("held-out", test)):
         if len(np.unique(types[usable][rows])) < 2:
             raise DatasetError(f"the {name} rows hold one response type only; sweep a wider range or more points")
     machine: Any = MACHINES[sweep.settings["machine"]]
@@ -111,8 +131,8 @@ def examples_of(sweep: LabelledSweep, seed: int) -> Examples:
     return Examples(
         machine=machine(**sweep.settings["base"]), fields=fields, values=values, response_type=types[usable],
         nature=natures[usable], period=np.nan_to_num(sweep.column("period")[usable].astype(float)).astype(np.int64),
-        groups=groups, test=test, clear=_clear(sweep, usable, natures[usable]), signals=signals,
-        left_out=int(np.sum(~usable)), ranges=_ranges(sweep.settings, values),
+        groups=groups, calibration=calibration, test=test, clear=_clear(sweep, usable, natures[usable]),
+        signals=signals, left_out=int(np.sum(~usable)), ranges=_ranges(sweep.settings, values),
     )  # fmt: skip
 
 
@@ -133,14 +153,16 @@ def _clear(sweep: LabelledSweep, usable: NDArray[np.bool_], nature: NDArray[np.s
 
 def _split(
     sweep: LabelledSweep, usable: NDArray[np.bool_], values: Array, seed: int
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Groups of the rows, and which are held out: the sweep's own split by machine, or else blocks of the plane."""
+) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Groups of the rows, which calibrate, which judge: the sweep's split by machine, or else blocks of the plane."""
     if "split" in sweep.table.column_names:
         parts = np.array([str(part) for part in sweep.column("split")])[usable]
-        return sweep.column("machine")[usable].astype(np.int64), parts == "test"
+        return sweep.column("machine")[usable].astype(np.int64), parts == "validation", parts == "test"
     board = _blocks(values)
     drawn = np.random.default_rng(seed).permutation(np.unique(board))
-    return board, np.isin(board, drawn[: max(1, round(HELD_OUT * len(drawn)))])
+    judges = max(1, round(HELD_OUT * len(drawn)))
+    calibrates = drawn[judges : judges + round(CALIBRATION * len(drawn))]
+    return board, np.isin(board, calibrates), np.isin(board, drawn[:judges])
 
 
 def _blocks(values: Array) -> NDArray[np.int64]:

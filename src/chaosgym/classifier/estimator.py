@@ -1,11 +1,10 @@
 """A classifier of response type in scikit-learn's manner, for machine parameters and for records of peak forces.
 
-First the nature is learned, then the type of a response of such a nature; the probabilities of pairs such as (III,
-chaotic) are products, so that those of types and natures never contradict each other.
+Pairs of type and nature are learned, so that the probabilities of types and natures never contradict each other.
 
-Calibration is cross-fitted: every training row is judged by a model that has not seen its machine; temperatures,
-conformal threshold and the least confidence of an answer come from these judgements. The model that is kept sees all
-rows. Training needs scikit-learn (and torch for networks); everything else needs numpy and numba.
+A share of the machines calibrates: no model is trained on them, and temperatures, conformal threshold and the least
+confidence of an answer come from what the model says of them. Training needs scikit-learn (and torch for networks);
+everything else needs numpy and numba.
 """
 
 import inspect
@@ -15,42 +14,33 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.classifier.calibration import best_temperature, conformal_threshold, softmax
+from chaosgym.classifier.calibration import conformal_threshold
+from chaosgym.classifier.expectations import expected_force, expected_period, learn_expectations
 from chaosgym.classifier.features import record_features
-from chaosgym.classifier.linear import Linear, linear_scores, train_linear
-from chaosgym.classifier.network import Network, network_scores
 from chaosgym.classifier.novelty import is_novel, neighbourhood
+from chaosgym.classifier.pairs import pairs_of
 from chaosgym.classifier.parameter_features import parameter_features, parameter_scaling
-from chaosgym.classifier.trees import Forest, class_scores, constant_forest, forest_scores, joined
+from chaosgym.classifier.scorers import Scorer, Trees, pair_scores, pupil, shuffled_columns, train_scorers
 from chaosgym.machines import Machine
 from chaosgym.simulation import parallel_map
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
-Scorer = Forest | Linear | Network
-_Tick = Callable[[], object]
 
-MODELS = ("boosting", "linear", "network")
-
-CHUNK = 10_000
+CHUNK = 2_000
 """Rows of a table that a thread takes at a time."""
 
+CALIBRATION = 0.15
+"""Share of the groups that calibrate where they are not named."""
+
 ABSTAIN = 0.05
-"""Share of the training machines' responses, the least confident ones, that are not answered."""
+"""Share of the calibrating responses, the least confident ones, that are not answered."""
 
 CLEAR = 0.6
 """Probability of a type that is always an answer."""
 
 COVERAGE = 0.90
 """Of the sets of plausible types."""
-
-QUANTILES = (0.05, 0.5, 0.95)
-"""Of the peak force of a settled cycle."""
-
-QUANTILE_ROUNDS = PERIOD_ROUNDS = 60
-
-PERIODS = (1, 2, 3, 4)
-"""Periods that parameters are asked for; longer ones are answered by None."""
 
 
 class ResponseClassifier:
@@ -62,16 +52,15 @@ class ResponseClassifier:
         "parameters": rows are values of machine fields in SI units. "records": rows are peak forces [N], one a cycle,
         8 to 64 of them; shorter ones end in NaN.
     model
-        "boosting": gradient boosted trees; "linear": multinomial logistic regression; "network": an ensemble of small
-        networks; or several of them joined by "+", whose scores are averaged.
+        "boosting": gradient boosted trees; "linear": multinomial logistic regression; "network": two small networks;
+        or several of them joined by "+", whose logarithmic probabilities are averaged; "best": what surprises itself
+        least on the rows that calibrate.
+    pupil
+        Made-up machines on which one network learns what the model says, to answer in its place; 0 for none.
     machine, fields
         The machine whose fields the columns are, for logarithms and dimensionless groups. None takes plain columns.
     rounds, leaves, depth, learning_rate, least_rows
         Of the boosting; ``leaves`` and ``depth`` of a tree at most, ``least_rows`` in a leaf.
-    members
-        Networks of the ensemble.
-    folds
-        Of the cross-fitting; below 2 there is none, and the probabilities are those of the model.
     seed
         Same seed, same model.
 
@@ -81,36 +70,34 @@ class ResponseClassifier:
         Labels in the order of the probabilities.
     n_features_in_
         Number of columns.
-    log_loss_
-        Mean surprise at type and nature in the cross-fitting: what tells models apart without the test rows.
+    model_, log_losses_, log_loss_
+        Chosen model; by model, and of what answers, the mean surprise at the pairs of the rows that calibrate.
     """
 
     def __init__(
         self,
         inputs: Literal["parameters", "records"] = "parameters",
         model: str = "boosting",
+        pupil: int = 0,
         machine: Machine | None = None,
         fields: tuple[str, ...] | None = None,
         rounds: int = 150,
-        leaves: int = 15,
+        leaves: int = 16,
         depth: int | None = None,
-        learning_rate: float = 0.06,
+        learning_rate: float = 0.1,
         least_rows: int = 20,
-        members: int = 1,
-        folds: int = 3,
         seed: int = 0,
     ) -> None:
         self.inputs = inputs
         self.model = model
+        self.pupil = pupil
         self.machine = machine
         self.fields = fields
         self.rounds = rounds
         self.leaves = leaves
+        self.depth = depth
         self.learning_rate = learning_rate
         self.least_rows = least_rows
-        self.depth = depth
-        self.members = members
-        self.folds = folds
         self.seed = seed
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
@@ -152,10 +139,11 @@ class ResponseClassifier:
         period: ArrayLike | None = None,
         peak_force: ArrayLike | None = None,
         groups: ArrayLike | None = None,
+        calibration: ArrayLike | None = None,
         ranges: tuple[ArrayLike, ArrayLike] | None = None,
         section: ArrayLike | None = None,
         sensor_error: ArrayLike | None = None,
-        tick: _Tick = lambda: None,
+        tick: Callable[[], object] = lambda: None,
     ) -> "ResponseClassifier":
         """Train.
 
@@ -172,13 +160,15 @@ class ResponseClassifier:
         peak_force : (n,), optional
             Peak force of some settled cycle of each row [N], for the predicted quantiles.
         groups : (n,), optional
-            Machine that a row belongs to; rows of one machine stay together in the cross-fitting.
+            Machine that a row belongs to; rows of one machine stay together.
+        calibration : (n,) of bool, optional
+            Rows that calibrate; those of some groups by default.
         ranges : two of (n_columns,), optional
             Lowest and highest parameters that count as known; those of the rows by default.
         section, sensor_error
             Of records; see ``record_features``.
         tick
-            Called after each of ``folds + 1`` trainings.
+            Called after every step: training, the pupil if there is one, expectations.
         """
         from sklearn.utils.multiclass import check_classification_targets
         from sklearn.utils.validation import check_X_y
@@ -187,8 +177,11 @@ class ResponseClassifier:
         values, types = check_X_y(X, y, dtype=np.float64, ensure_all_finite=finite, estimator=self)
         check_classification_targets(types)
         self.n_features_in_ = values.shape[1]
-        kinds, natures = self._encode(types, np.full(len(types), "any") if nature is None else np.asarray(nature))
-        parts = np.arange(len(kinds)) if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1]
+        self.pairs_, pair = pairs_of(types, np.full(len(types), "any") if nature is None else np.asarray(nature))
+        if len(self.classes_) < 2:
+            raise ValueError("y holds one class; ResponseClassifier needs at least 2 classes")
+        parts = np.arange(len(pair)) if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1]
+        held = self._held_back(pair, parts, calibration)
         if self.inputs == "parameters":
             self.scaling_ = parameter_scaling(self.machine, self.fields or (), values)
             low, high = (values.min(axis=0), values.max(axis=0)) if ranges is None else ranges
@@ -196,121 +189,58 @@ class ResponseClassifier:
         features = self._features(values, section, sensor_error)
         if self.inputs == "records":
             self.neighbourhood_ = neighbourhood(features, parts, self.seed)
-        self._calibrate(features, kinds, natures, parts, tick)
-        everything = np.arange(len(kinds))
-        self.scorers_ = tuple(
-            self._train(question, features, labels, everything[counts])
-            for question, (counts, labels) in enumerate(self._questions(kinds, natures))
+        trees = Trees(self.rounds, self.leaves, self.depth, self.learning_rate, self.least_rows)
+        trained = train_scorers(self.model, trees, features[~held], pair[~held], self.seed)
+        tick()
+        self.log_losses_ = {name: self._calibrate(scorers, features[held], pair[held])
+                            for name, scorers in trained.items()}  # fmt: skip
+        self.model_ = min(self.log_losses_, key=self.log_losses_.__getitem__)
+        self.scorers_ = trained[self.model_]
+        if self.pupil:
+            asked = np.concatenate([values[~held], shuffled_columns(values[~held], self.pupil, self.seed)])
+            self.teachers_ = self.scorers_
+            self.scorers_ = pupil(self.scorers_, self._features(asked), self.seed)
+            tick()
+        self.log_loss_ = self._calibrate(self.scorers_, features[held], pair[held])
+        force = None if peak_force is None else np.asarray(peak_force, dtype=float) / self._level(values)
+        self.expectations_ = learn_expectations(
+            features, None if period is None else np.asarray(period), force, self.seed
         )
-        self._fit_period(features, period)
-        self._fit_peak_force(features, values, peak_force)
         tick()
         return self
 
-    def _encode(self, types: NDArray[Any], natures: NDArray[Any]) -> tuple[Labels, Labels]:
-        """Number types and natures, (n,) each, and the pairs that occur."""
-        self.classes_, type_of = np.unique(types, return_inverse=True)
-        self.natures_, nature_of = np.unique(natures, return_inverse=True)
-        if len(self.classes_) < 2:
-            raise ValueError("y holds one class; ResponseClassifier needs at least 2 classes")
-        pairs = np.unique(nature_of * len(self.classes_) + type_of)
-        self.nature_of_, self.type_of_ = np.divmod(pairs, len(self.classes_))
-        return np.asarray(type_of), np.asarray(nature_of)
+    @property
+    def classes_(self) -> NDArray[Any]:
+        """Types in the order of the probabilities."""
+        return self.pairs_.types
 
-    def _questions(self, types: Labels, natures: Labels) -> list[tuple[NDArray[np.bool_], Labels]]:
-        """What is learned: the nature, and for each nature its type; (rows that count (n,), class numbers (n,))."""
-        asked = [(np.ones(len(types), dtype=bool), natures)]
-        for nature in range(len(self.natures_)):
-            known = self.type_of_[self.nature_of_ == nature]
-            asked.append((natures == nature, np.searchsorted(known, types).clip(max=len(known) - 1)))
-        return asked
+    @property
+    def natures_(self) -> NDArray[Any]:
+        """Natures in the order of the probabilities."""
+        return self.pairs_.natures
 
-    def _calibrate(self, features: Array, types: Labels, natures: Labels, parts: Labels, tick: _Tick) -> None:
-        questions = self._questions(types, natures)
-        self.temperatures_ = np.ones(len(questions))
+    def _held_back(self, pair: Labels, parts: Labels, calibration: ArrayLike | None) -> NDArray[np.bool_]:
+        """Rows (n,) that calibrate; none if the others would not hold every pair."""
+        if calibration is None:
+            drawn = np.random.default_rng(self.seed).permutation(parts.max() + 1)
+            held = np.isin(parts, drawn[: round(CALIBRATION * len(drawn))])
+        else:
+            held = np.asarray(calibration, dtype=bool)
+        complete = len(np.unique(pair[~held])) == pair.max() + 1
+        return held if complete else np.zeros(len(pair), dtype=bool)
+
+    def _calibrate(self, scorers: tuple[Scorer, ...], features: Array, pair: Labels) -> float:
+        """Mean surprise of calibrated scorers at the rows that calibrate; 0 without any."""
         self.plausible_, self.least_confidence_ = 0.0, 0.0
-        if self.folds < 2:
-            return
-        fold = (np.random.default_rng(self.seed).permutation(parts.max() + 1) % self.folds)[parts]
-        scores: list[list[Array]] = [[] for _ in questions]
-        order = []
-        for held in range(self.folds):
-            rows = np.flatnonzero(fold == held)
-            kept = np.flatnonzero(fold != held)
-            if len(rows) and len(kept):
-                order.append(rows)
-                for question, (counts, labels) in enumerate(questions):
-                    scorers = self._train(question, features, labels, kept[counts[kept]])
-                    scores[question].append(_raw_scores(scorers, features[rows]))
-            tick()
-        rows = np.concatenate(order)
-        out_of_fold = [np.concatenate(part) for part in scores]
-        for question, (counts, labels) in enumerate(questions):
-            counted = counts[rows]
-            if out_of_fold[question].shape[1] > 1 and counted.any():
-                self.temperatures_[question] = best_temperature(out_of_fold[question][counted], labels[rows][counted])
-        pairs = self._pairs(out_of_fold)
-        true_pair = np.searchsorted(
-            self.nature_of_ * len(self.classes_) + self.type_of_, natures[rows] * len(self.classes_) + types[rows]
-        )
-        self.log_loss_ = float(-np.mean(np.log(pairs[np.arange(len(rows)), true_pair].clip(1e-12))))
-        chances = self.types_of(pairs)
-        self.plausible_ = conformal_threshold(chances, types[rows], COVERAGE)
-        self.least_confidence_ = min(CLEAR, float(np.quantile(chances.max(axis=1), ABSTAIN)))
-
-    def _train(self, question: int, features: Array, labels: Labels, rows: Labels) -> tuple[Scorer, ...]:
-        """Scorers of one question from some rows; none where there is nothing to tell apart."""
-        count = int(labels.max()) + 1 if question == 0 else int(np.sum(self.nature_of_ == question - 1))
-        if count < 2:
-            return ()
-        known, asked = features[rows], labels[rows]
-        if len(np.unique(asked)) < count:
-            shares = np.bincount(asked, minlength=count) / max(1, len(asked))
-            return (constant_forest(np.log(shares.clip(1e-6))),)
-        scorers: list[Scorer] = []
-        kinds = self.model.split("+")
-        if not set(kinds) <= set(MODELS):
-            raise ValueError(f"model = {self.model!r} is not made of {', '.join(MODELS)}")
-        if "boosting" in kinds:
-            from chaosgym.classifier.boosting import train_forest
-
-            scorers.append(train_forest(
-                known, asked, rounds=self.rounds, leaves=self.leaves, learning_rate=self.learning_rate,
-                least_rows=self.least_rows, depth=self.depth, seed=self.seed,
-            ))  # fmt: skip
-        if "linear" in kinds:
-            scorers.append(train_linear(known, asked))
-        if "network" in kinds:
-            from chaosgym.classifier.network import train_networks
-
-            scorers.append(train_networks(known, asked, count, self.members, self.seed))
-        return tuple(scorers)
-
-    def _fit_period(self, features: Array, period: ArrayLike | None) -> None:
-        self.period_forest_: Forest | None = None
-        if period is None or self.inputs == "records":
-            return
-        from chaosgym.classifier.boosting import train_forest
-
-        periods = np.asarray(period)
-        rows = periods > 0
-        kinds = np.searchsorted(PERIODS, periods[rows])
-        self.period_kinds_, numbers = np.unique(kinds, return_inverse=True)
-        if len(self.period_kinds_) > 1:
-            self.period_forest_ = train_forest(features[rows], numbers, rounds=PERIOD_ROUNDS, seed=self.seed)
-
-    def _fit_peak_force(self, features: Array, values: Array, peak_force: ArrayLike | None) -> None:
-        self.quantile_forest_: Forest | None = None
-        if peak_force is None:
-            return
-        from chaosgym.classifier.boosting import train_quantile_forest
-
-        forces = np.asarray(peak_force, dtype=float) / self._level(values)
-        rows = np.isfinite(forces) & (forces > 0.0)
-        self.quantile_forest_ = joined(tuple(
-            train_quantile_forest(features[rows], np.log(forces[rows]), quantile, QUANTILE_ROUNDS, self.seed)
-            for quantile in QUANTILES
-        ))  # fmt: skip
+        if not len(pair):
+            return 0.0
+        scores = pair_scores(scorers, features)
+        self.pairs_ = self.pairs_.calibrated(scores, pair)
+        chances = self.pairs_.chances(scores)
+        types = self.pairs_.types_from(chances)
+        self.plausible_ = conformal_threshold(types, self.pairs_.type_of[pair], COVERAGE)
+        self.least_confidence_ = min(CLEAR, float(np.quantile(types.max(axis=1), ABSTAIN)))
+        return float(-np.mean(np.log(chances[np.arange(len(pair)), pair].clip(1e-12))))
 
     def predict(self, X: ArrayLike, **record: Any) -> NDArray[Any]:
         """Most probable type (n,); ``section`` and ``sensor_error`` of records as in ``fit``."""
@@ -320,14 +250,16 @@ class ResponseClassifier:
 
     def predict_proba(self, X: ArrayLike, **record: Any) -> Array:
         """Probabilities (n, n_types), in the order of ``classes_``."""
-        return self.types_of(self.predict_pairs(X, **record))
+        chances = self.predict_pairs(X, **record)
+        return self.pairs_.types_from(chances)
 
     def predict_nature_proba(self, X: ArrayLike, **record: Any) -> Array:
         """Probabilities (n, n_natures), in the order of ``natures_``."""
-        return self.natures_of(self.predict_pairs(X, **record))
+        chances = self.predict_pairs(X, **record)
+        return self.pairs_.natures_from(chances)
 
     def predict_pairs(self, X: ArrayLike, **record: Any) -> Array:
-        """Probabilities (n, n_pairs) of type ``classes_[type_of_]`` with nature ``natures_[nature_of_]``."""
+        """Probabilities (n, n_pairs) of pairs of type and nature, see ``Pairs``."""
         values = self._checked(X)
         if len(values) <= CHUNK or record:
             return self.chances(self._features(values, **record))
@@ -336,23 +268,7 @@ class ResponseClassifier:
 
     def chances(self, features: Array) -> Array:
         """Probabilities of the pairs from features that are computed already."""
-        return self._pairs([_raw_scores(scorers, features) for scorers in self.scorers_])
-
-    def _pairs(self, scores: list[Array]) -> Array:
-        """Probabilities of the pairs: that of the nature times that of the type of such a nature."""
-        parts = [softmax(score / temperature) for score, temperature in zip(scores, self.temperatures_, strict=True)]
-        chances = np.empty((len(scores[0]), len(self.type_of_)))
-        for nature in range(len(self.natures_)):
-            chances[:, self.nature_of_ == nature] = parts[0][:, nature : nature + 1] * parts[nature + 1]
-        return chances
-
-    def types_of(self, pairs: Array) -> Array:
-        """Probabilities of types (n, n_types) from those of pairs (n, n_pairs)."""
-        return _pooled(pairs, self.type_of_)
-
-    def natures_of(self, pairs: Array) -> Array:
-        """Probabilities of natures (n, n_natures) from those of pairs (n, n_pairs)."""
-        return _pooled(pairs, self.nature_of_)
+        return self.pairs_.chances(pair_scores(self.scorers_, features))
 
     def features(self, X: ArrayLike, **record: Any) -> Array:
         """Features (n, n_features) that the model sees."""
@@ -376,17 +292,11 @@ class ResponseClassifier:
 
     def predict_period(self, features: Array) -> Labels:
         """Most probable period (n,) of a periodic response from its features; 0 for a longer one or if not trained."""
-        if self.period_forest_ is None:
-            return np.zeros(len(features), dtype=np.int64)
-        chances = class_scores(self.period_forest_, features)
-        return np.asarray(np.array([*PERIODS, 0])[self.period_kinds_[chances.argmax(axis=1)]])
+        return expected_period(self.expectations_, features)
 
     def predict_peak_force(self, features: Array, values: Array) -> Array:
         """Quantiles (n, 3) of the peak force of a settled cycle [N]; (n, 0) if not trained."""
-        if self.quantile_forest_ is None:
-            return np.empty((len(features), 0))
-        logs = forest_scores(self.quantile_forest_, features)
-        return np.asarray(np.sort(np.exp(logs), axis=1) * self._level(values)[:, None])
+        return expected_force(self.expectations_, features) * self._level(values)[:, None]
 
     def _level(self, values: Array) -> Array:
         """Force [N] that predicted forces are relative to."""
@@ -425,25 +335,3 @@ class ResponseClassifier:
             if not np.isfinite(values).all():
                 raise ValueError("X holds NaN or infinity; allowed: finite numbers")
         return values
-
-
-def _raw_scores(scorers: tuple[Scorer, ...], features: Array) -> Array:
-    """Mean scores of the scorers, (n, n_classes); a single class where there are none."""
-    parts = [_scores_of(scorer, features) for scorer in scorers]
-    if not parts:
-        return np.zeros((len(features), 1))
-    return parts[0] if len(parts) == 1 else np.asarray(sum(parts) / len(parts))
-
-
-def _scores_of(scorer: Scorer, features: Array) -> Array:
-    if isinstance(scorer, Linear):
-        return linear_scores(scorer, features)
-    return network_scores(scorer, features) if isinstance(scorer, Network) else class_scores(scorer, features)
-
-
-def _pooled(chances: Array, group_of: Labels) -> Array:
-    """Sums of the probabilities of pairs (n, n_pairs) over the pairs of each group, (n, n_groups)."""
-    pooled = np.zeros((len(chances), int(group_of.max()) + 1))
-    for pair, group in enumerate(group_of):
-        pooled[:, group] += chances[:, pair]
-    return pooled

@@ -7,8 +7,9 @@ training records do from the records of other machines, or if one figure lies be
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from chaosgym.classifier.kernels.nearest import nearest
 
 Array = NDArray[np.float64]
 
@@ -21,7 +22,7 @@ LIMIT = 6.0
 BANDS = 4
 """Lengths of record with a threshold of their own."""
 
-FALSE_REFUSALS = 0.04
+FALSE_REFUSALS = 0.025
 """Share of the training rows that are told apart by mistake."""
 
 
@@ -80,7 +81,7 @@ def _drawn(features: Array, scale: Neighbourhood, generator: np.random.Generator
 
 def novelty(kept: Neighbourhood, features: Array) -> Array:
     """Distance (n,) of rows to the nearest kept row, root mean square over the figures; infinite beyond a range."""
-    distances = _nearest(_scaled(features, kept.centre, kept.spread), kept.prototypes)
+    distances = nearest(_scaled(features, kept.centre, kept.spread), kept.prototypes)
     with np.errstate(invalid="ignore"):
         beyond = ((features < kept.low) | (features > kept.high)).any(axis=1)
     return np.where(beyond, np.inf, distances)
@@ -88,22 +89,3 @@ def novelty(kept: Neighbourhood, features: Array) -> Array:
 
 def _scaled(features: Array, centre: Array, spread: Array) -> Array:
     return np.asarray(np.clip((features - centre) / spread, -LIMIT, LIMIT))
-
-
-@njit(cache=True, nogil=True)
-def _nearest(rows: Array, prototypes: Array) -> Array:
-    """Smallest root mean square difference over the figures that both rows have."""
-    out = np.empty(len(rows))
-    for i in range(len(rows)):
-        best = np.inf
-        for j in range(len(prototypes)):
-            total, count = 0.0, 0
-            for k in range(rows.shape[1]):
-                gap = rows[i, k] - prototypes[j, k]
-                if gap == gap:
-                    total += gap * gap
-                    count += 1
-            if count > 0:
-                best = min(best, total / count)
-        out[i] = np.sqrt(best)
-    return out

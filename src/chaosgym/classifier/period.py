@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chaosgym.classifier.features import as_records, class_scatter
+from chaosgym.classifier.features import as_records
+from chaosgym.classifier.kernels.records import class_scatter
 
 IMPROVEMENT = 0.5
 """A longer period counts if its classes scatter less than this share of any shorter one's: noise gains little."""

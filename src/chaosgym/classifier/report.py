@@ -10,10 +10,15 @@ def report_table(report: Mapping[str, Any]) -> list[str]:
     """Lines of the comparison on held-out rows."""
     rows = report["rows"]
     lines = [f"{rows['held_out']} held-out and {rows['training']} training points, 95 % bootstrap intervals"]
-    losses = ", ".join(f"{kind} {loss:.3f}" for kind, loss in report["cross_fitted_log_loss"].items())
-    lines += ["", f"parameters are judged by {report['model']}; cross-fitted log loss: {losses}"]
+    losses = ", ".join(f"{kind} {loss:.3f}" for kind, loss in report["log_loss"].items())
+    lines += [
+        "",
+        f"parameters: one network, taught by {report['model']}; log loss on {rows['calibration']} other points: "
+        f"{losses}",
+    ]
     for name in ("response_type", "nature"):
         lines += ["", *_block(f"{name.replace('_', ' ')} from parameters", report["parameters"][name])]
+        lines += _ceiling(name, report["ceiling"])
     refused = report["parameters"]["refused"]
     lines.append(f"  refused: {refused['outside']:.1%} of machines outside the range, {refused['inside']:.1%} inside")
     for name, scene in report.get("records", {}).items():
@@ -36,6 +41,15 @@ def report_table(report: Mapping[str, Any]) -> list[str]:
             for point in report["learning_curve"]
         ]
     return lines
+
+
+def _ceiling(name: str, ceiling: Mapping[str, float]) -> list[str]:
+    if name not in ceiling:
+        return []
+    if name == "nature":
+        within = f"+-{ceiling['half_interval']:.3f}; label noise: the nature within 0.1 % in every parameter"
+        return [f"  {'ceiling':{NAME_WIDTH}s} {ceiling[name]:.3f} {within}"]
+    return [f"  {'two definitions of the type agree':{NAME_WIDTH}s} {ceiling[name]:.3f}"]
 
 
 def _speed(speed: Mapping[str, Any]) -> str:
@@ -69,13 +83,14 @@ def _line(name: str, scores: Mapping[str, Any]) -> str:
 def card_lines(card: Mapping[str, Any]) -> list[str]:
     """Model card as Markdown."""
     ranges = ", ".join(f"{name} {low:.4g} to {high:.4g}" for name, (low, high) in card["ranges"].items())
+    machines = card["report"]["machines"]
     return [
         f"# Classifier of the {card['machine']}'s response type",
         "",
         "Use: type (I, II, III) and nature of a response from machine parameters, or from 8 to 64 measured peaks.",
         f"Data: {card['rows']['parameters']} labelled responses, {card['rows']['records']} recorded windows; "
-        f"{card['report']['machines']['training']} machines (or blocks) train, "
-        f"{card['report']['machines']['held_out']} judge.",
+        f"{machines['training']} machines (or blocks) train, {machines['calibration']} calibrate, "
+        f"{machines['held_out']} judge.",
         f"Range, SI: {ranges}.",
         f"Limits: {card['limits']}.",
         f"Made by chaosgym {card['version']}: `{card['command']}`.",

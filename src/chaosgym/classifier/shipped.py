@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.classifier.answer import Classification
-from chaosgym.classifier.estimator import QUANTILES, ResponseClassifier
+from chaosgym.classifier.estimator import ResponseClassifier
+from chaosgym.classifier.expectations import QUANTILES
 from chaosgym.classifier.features import MAX_PLAUSIBLE, as_records, record_features
 from chaosgym.classifier.parameter_features import parameter_features
 from chaosgym.classifier.period import repeat_period
@@ -171,10 +172,11 @@ class MachineClassifier:
     def _answer(
         self, known: ResponseClassifier, features: Array, chances: Array, values: Array, outside: str
     ) -> Classification:
-        types, natures = [0.0] * len(known.classes_), [0.0] * len(known.natures_)
-        for pair, chance in enumerate(chances.tolist()):
-            types[known.type_of_[pair]] += chance
-            natures[known.nature_of_[pair]] += chance
+        pairs = known.pairs_
+        types, natures = [0.0] * len(pairs.types), [0.0] * len(pairs.natures)
+        for chance, kind, nature in zip(chances.tolist(), pairs.type_of, pairs.nature_of, strict=True):
+            types[kind] += chance
+            natures[nature] += chance
         confidence = max(types)
         best_type = str(known.classes_[types.index(confidence)])
         best_nature = str(known.natures_[natures.index(max(natures))])
@@ -201,11 +203,7 @@ class MachineClassifier:
         )
 
     def _columns(self, known: ResponseClassifier, chances: Array, outside: NDArray[np.bool_]) -> dict[str, Any]:
-        types = np.zeros((len(chances), len(known.classes_)))
-        natures = np.zeros((len(chances), len(known.natures_)))
-        for pair in range(chances.shape[1]):
-            types[:, known.type_of_[pair]] += chances[:, pair]
-            natures[:, known.nature_of_[pair]] += chances[:, pair]
+        types, natures = known.pairs_.types_from(chances), known.pairs_.natures_from(chances)
         confidence = types.max(axis=1)
         unsure = confidence < known.least_confidence_
         abstained = outside | unsure
@@ -247,7 +245,7 @@ class MachineClassifier:
 
 def _state(classifier: ResponseClassifier) -> dict[str, Any]:
     """Fitted attributes."""
-    return {name: value for name, value in vars(classifier).items() if name.endswith("_")}
+    return {name: value for name, value in vars(classifier).items() if name.endswith("_") and name != "teachers_"}
 
 
 def _restored(inputs: Any, state: Mapping[str, Any]) -> ResponseClassifier:

@@ -13,21 +13,27 @@ from typing import Any
 
 import numpy as np
 
+from chaosgym.classifier.beam_swing import SwingTable
+from chaosgym.classifier.expectations import Expectations
 from chaosgym.classifier.linear import Linear
 from chaosgym.classifier.network import Network
 from chaosgym.classifier.novelty import Neighbourhood
+from chaosgym.classifier.pairs import Pairs
 from chaosgym.classifier.parameter_features import ParameterScaling
 from chaosgym.classifier.trees import Forest
 from chaosgym.errors import ModelFileError
 from chaosgym.files import write_atomically
 
-FORMAT = 2
+FORMAT = 3
 """Version of the model file."""
 
 LARGEST = 50_000_000
 """Bytes that a model file may have."""
 
-_KINDS: Mapping[str, Any] = {kind.__name__: kind for kind in (Forest, Linear, Network, Neighbourhood, ParameterScaling)}
+_KINDS: Mapping[str, Any] = {
+    kind.__name__: kind
+    for kind in (Expectations, Forest, Linear, Network, Neighbourhood, Pairs, ParameterScaling, SwingTable)
+}
 """Values that a file may hold beside arrays, numbers, words, tuples and None."""
 
 

@@ -6,20 +6,23 @@ training on a half, a quarter and an eighth of the machines.
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
+from chaosgym.classifier.ceiling import ceilings
 from chaosgym.classifier.compare import SCENES, compare_parameters, compare_scene, outside_parameters, refusals
-from chaosgym.classifier.data import Examples, examples_of
+from chaosgym.classifier.data import Examples, examples_of, thinned
 from chaosgym.classifier.estimator import ResponseClassifier
 from chaosgym.classifier.evaluation import probability_scores
 from chaosgym.classifier.records import training_records
 from chaosgym.classifier.report import card_lines
+from chaosgym.classifier.scorers import Trees, pair_scores, train_scorers
 from chaosgym.classifier.shipped import MachineClassifier
 from chaosgym.classifier.speed import measure_speed
 from chaosgym.files import write_atomically
@@ -27,14 +30,24 @@ from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import LabelledSweep
 from chaosgym.version import __version__
 
-CANDIDATES = ("boosting", "linear", "boosting+linear")
-"""Models for parameters that are tried."""
+PUPIL, PUPIL_SHARE = 60_000, 3
+"""Made-up machines from which the network that answers about parameters learns, and at most for each training row."""
 
-CURVE = (0.125, 0.25, 0.5, 1.0)
-"""Shares of the training machines of the learning curve."""
+CURVE = (0.125, 0.25, 0.5)
+"""Shares of the training machines of the learning curve, before all of them."""
 
-RECORDS, COPIES = 60_000, 6
+LEAST_ROWS = 60
+"""In a leaf of a tree."""
+
+ROUNDS = 100
+"""Of the boosting."""
+
+RECORDS, COPIES = 30_000, 6
 """Noisy training records made of the signals, about, and copies of a run at most."""
+
+
+TIMED = ("training_seconds", "speed")
+"""Parts of the report that differ from run to run; the card, and with it the model file, has none of them."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +76,7 @@ def train_classifier(
     model: str | None = None,
     curve: bool = True,
     transfer: LabelledSweep | None = None,
+    noise: Mapping[str, Any] | None = None,
     progress: bool = False,
 ) -> TrainingResult:
     """Train on a labelled sweep and judge beside baselines.
@@ -74,12 +88,14 @@ def train_classifier(
     seed
         Of split, noise, weights and baselines. Same seed, same weights.
     model
-        As of ``ResponseClassifier``, for parameters; by default the one of ``CANDIDATES`` with the least cross-fitted
-        log loss on the training machines. Records are always judged by boosting.
+        As of ``ResponseClassifier``, for parameters; by default the best on the machines that calibrate. Records are
+        always judged by boosting.
     curve
         Measure the learning curve too.
     transfer
         Sweep of another machine, on whose held-out records the record classifier is tried.
+    noise
+        What ``label_noise`` found for the sweep, for the ceiling of any classifier.
     progress
         Show a progress bar on standard error.
 
@@ -88,21 +104,20 @@ def train_classifier(
     DatasetError
         If there are too few rows or only one response type.
     """
-    examples = examples_of(sweep, seed)
-    candidates = CANDIDATES if model is None else (model,)
-    steps = 1 + 4 * len(candidates) + (4 + len(SCENES) if examples.signals else 0) + (len(CURVE) if curve else 0)
+    examples, sparse = examples_of(sweep, seed), examples_of(thinned(sweep, seed), seed)
+    steps = 4 + (3 + len(SCENES) if examples.signals else 0) + (1 + len(CURVE) if curve else 0)
     with tqdm(total=steps, desc="train classifier", unit="step", disable=not progress, mininterval=0.5) as bar:
         began = time.perf_counter()
-        tried = [fit_parameters(examples, ~examples.test, kind, seed, tick=bar.update) for kind in candidates]
-        parameters = min(tried, key=lambda classifier: classifier.log_loss_)
+        parameters = fit_parameters(sparse, ~sparse.test, model or "best", seed, tick=bar.update)
         records = fit_records(examples, seed, tick=bar.update) if examples.signals else None
         seconds = time.perf_counter() - began
-        losses = {kind: classifier.log_loss_ for kind, classifier in zip(candidates, tried, strict=True)}
-        report = _rows(examples) | {
-            "training_seconds": round(seconds, 1), "model": parameters.model, "cross_fitted_log_loss": losses
+        report = _rows(sparse) | {
+            "training_seconds": round(seconds, 1), "model": parameters.model_,
+            "log_loss": {**parameters.log_losses_, "its pupil": parameters.log_loss_},
         }  # fmt: skip
-        report["parameters"] = compare_parameters(examples, parameters, seed)
-        report["parameters"]["refused"] = outside_parameters(examples, parameters, seed)
+        report["ceiling"] = ceilings(sweep, noise)
+        report["parameters"] = compare_parameters(sparse, parameters, seed)
+        report["parameters"]["refused"] = outside_parameters(sparse, parameters, seed)
         bar.update()
         if records is not None:
             report["records"] = {}
@@ -113,46 +128,34 @@ def train_classifier(
             if transfer is not None:
                 report["transfer"] = _transfer(transfer, records, seed)
         if curve:
-            report["learning_curve"] = [
-                _curve_point(examples, share, parameters.model, seed, bar.update) for share in CURVE
-            ]
-    classifier = MachineClassifier(examples.machine, parameters, records, _card(sweep, examples, report, seed))
+            report["learning_curve"] = _learning_curve(sparse, parameters, seed, bar.update)
+    classifier = MachineClassifier(examples.machine, parameters, records, _card(sweep, examples, sparse, report, seed))
     report["speed"] = measure_speed(classifier, seed)
-    return TrainingResult(classifier, report, examples)
+    return TrainingResult(classifier, report, sparse)
 
 
 def fit_parameters(
-    examples: Examples, rows: Any, model: str, seed: int, *, folds: int = 3, tick: Callable[[], object] = lambda: None
-) -> ResponseClassifier:
-    """Train from parameters on some rows (n,)."""
+    examples: Examples, rows: Any, model: str, seed: int, *,
+    tick: Callable[[], object] = lambda: None,
+) -> ResponseClassifier:  # fmt: skip
+    """Train from parameters on some rows (n,), those that calibrate included."""
     peaks = np.full(len(examples.values), np.nan)
     if examples.signals:
         settled, _, at = examples.signals["settled"]
         peaks[at] = settled[np.arange(len(at)), np.random.default_rng(seed).integers(0, settled.shape[1], len(at))]
+    pupil = min(PUPIL, PUPIL_SHARE * int((rows & examples.training).sum()))
     classifier = ResponseClassifier(
-        "parameters",
-        model,
-        examples.machine,
-        examples.fields,
-        rounds=50,
-        leaves=16,
-        depth=4,
-        learning_rate=0.15,
-        least_rows=60,
-        folds=folds,
-        seed=seed,
+        "parameters", model, pupil, examples.machine, examples.fields, rounds=ROUNDS, least_rows=LEAST_ROWS, seed=seed
     )
     return classifier.fit(
         examples.values[rows], examples.response_type[rows], nature=examples.nature[rows],
         period=examples.period[rows], peak_force=peaks[rows] if np.isfinite(peaks[rows]).any() else None,
-        groups=examples.groups[rows], ranges=examples.ranges, tick=tick,
+        groups=examples.groups[rows], calibration=examples.calibration[rows], ranges=examples.ranges, tick=tick,
     )  # fmt: skip
 
 
-def fit_records(
-    examples: Examples, seed: int, *, folds: int = 3, tick: Callable[[], object] = lambda: None
-) -> ResponseClassifier:
-    """Train on noisy records of the training rows."""
+def fit_records(examples: Examples, seed: int, tick: Callable[[], object] = lambda: None) -> ResponseClassifier:
+    """Train on noisy records of the rows that train and calibrate."""
     signals = examples.signals_where(~examples.test)
     runs = max(1, sum(len(peaks) for peaks, _, _ in signals.values()))
     noisy = training_records(signals, min(COPIES, max(1, round(RECORDS / runs))), seed)
@@ -160,30 +163,49 @@ def fit_records(
     where = np.full(len(examples.values), -1)
     where[later[2]] = np.arange(len(later[2]))
     columns = np.random.default_rng(seed + 1).integers(0, later[0].shape[1], len(noisy.rows))
-    classifier = ResponseClassifier("records", "boosting", folds=folds, seed=seed)
+    classifier = ResponseClassifier("records", "boosting", rounds=ROUNDS, least_rows=LEAST_ROWS, seed=seed)
     return classifier.fit(
         noisy.peaks, examples.response_type[noisy.rows], nature=examples.nature[noisy.rows],
         peak_force=later[0][where[noisy.rows], columns], groups=examples.groups[noisy.rows],
-        section=noisy.section, sensor_error=noisy.sensor_error, tick=tick,
+        calibration=examples.calibration[noisy.rows], section=noisy.section, sensor_error=noisy.sensor_error, tick=tick,
     )  # fmt: skip
 
 
-def _curve_point(examples: Examples, share: float, model: str, seed: int, tick: Callable[[], object]) -> dict[str, Any]:
-    """Scores on the held-out rows after training on a share of the training machines."""
-    machines = np.unique(examples.groups[~examples.test])
-    drawn = np.random.default_rng(seed).permutation(machines)[: max(1, round(share * len(machines)))]
-    rows = np.isin(examples.groups, drawn) & ~examples.test
-    classifier = fit_parameters(examples, rows, model, seed, folds=0)
-    tick()
-    test, groups = examples.test, examples.groups[examples.test]
-    values = examples.values[test]
-    kinds, natures = classifier.predict_proba(values), classifier.predict_nature_proba(values)
-    return {
-        "machines": len(drawn),
-        "rows": int(rows.sum()),
-        "response_type": probability_scores(classifier.classes_, kinds, examples.response_type[test], groups),
-        "nature": probability_scores(classifier.natures_, natures, examples.nature[test], groups),
-    }
+def _learning_curve(
+    examples: Examples, classifier: ResponseClassifier, seed: int, tick: Callable[[], object]
+) -> list[dict[str, Any]]:
+    """Accuracy on the held-out rows by share of the training machines, of the model without its pupil.
+
+    Shares that do not hold every pair of type and nature are left out.
+    """
+    machines = np.random.default_rng(seed).permutation(np.unique(examples.groups[examples.training]))
+    trees = Trees(*(getattr(classifier, name) for name in Trees._fields))
+    features, pair = (
+        classifier.features(examples.values),
+        classifier.pairs_.numbers(examples.response_type, examples.nature),
+    )
+    points = []
+    for share in (*CURVE, 1.0):
+        drawn = machines[: max(1, round(share * len(machines)))]
+        rows = np.isin(examples.groups, drawn)
+        if len(np.unique(pair[rows])) < len(classifier.pairs_.type_of):
+            continue
+        scorers = classifier.teachers_
+        if share < 1.0:
+            (scorers,) = train_scorers(classifier.model_, trees, features[rows], pair[rows], seed).values()
+        chances = classifier.pairs_.chances(pair_scores(scorers, features[examples.test]))
+        points.append({"machines": len(drawn), "rows": int(rows.sum()), **_accuracies(examples, classifier, chances)})
+        tick()
+    return points
+
+
+def _accuracies(examples: Examples, classifier: ResponseClassifier, chances: NDArray[np.float64]) -> dict[str, Any]:
+    """Scores of probabilities of pairs on the held-out rows, for types and natures."""
+    test, pairs = examples.test, classifier.pairs_
+    told = {"response_type": (pairs.types, pairs.types_from(chances), examples.response_type),
+            "nature": (pairs.natures, pairs.natures_from(chances), examples.nature)}  # fmt: skip
+    return {name: probability_scores(kinds, shares, truth[test], examples.groups[test])
+            for name, (kinds, shares, truth) in told.items()}  # fmt: skip
 
 
 def _transfer(sweep: LabelledSweep, records: ResponseClassifier, seed: int) -> dict[str, Any]:
@@ -194,19 +216,18 @@ def _transfer(sweep: LabelledSweep, records: ResponseClassifier, seed: int) -> d
 
 
 def _rows(examples: Examples) -> dict[str, Any]:
-    test = examples.test
+    parts = {"training": examples.training, "calibration": examples.calibration, "held_out": examples.test}
     return {
-        "rows": {"training": int((~test).sum()), "held_out": int(test.sum()), "left_out": examples.left_out},
-        "machines": {
-            "training": len(np.unique(examples.groups[~test])), "held_out": len(np.unique(examples.groups[test]))
-        },
+        "rows": {**{name: int(rows.sum()) for name, rows in parts.items()}, "left_out": examples.left_out},
+        "machines": {name: len(np.unique(examples.groups[rows])) for name, rows in parts.items()},
         "share_of_types": {name: float((examples.response_type == name).mean()) for name in ("I", "II", "III")},
         "share_of_natures": {str(name): float((examples.nature == name).mean()) for name in np.unique(examples.nature)},
     }  # fmt: skip
 
 
-def _card(sweep: LabelledSweep, examples: Examples, report: dict[str, Any], seed: int) -> dict[str, Any]:
-    training = ~examples.test
+def _card(
+    sweep: LabelledSweep, examples: Examples, sparse: Examples, report: dict[str, Any], seed: int
+) -> dict[str, Any]:
     kept = ("sampling", "size", "seed", "budget", "signals", "transient", "cycles", "axes", "patches", "type_reach")
     return {
         "machine": examples.machine.name,
@@ -216,8 +237,8 @@ def _card(sweep: LabelledSweep, examples: Examples, report: dict[str, Any], seed
                    for name, low, high in zip(examples.fields, *examples.ranges, strict=True)},
         "data": {key: sweep.settings[key] for key in kept if key in sweep.settings},
         "rows": {
-            "parameters": int(training.sum()),
-            "records": sum(len(part[0]) for part in examples.signals_where(training).values()),
+            "parameters": int(sparse.training.sum()),
+            "records": sum(len(part[0]) for part in examples.signals_where(examples.training).values()),
         },
         "seed": seed,
         "version": __version__,
@@ -228,5 +249,5 @@ def _card(sweep: LabelledSweep, examples: Examples, report: dict[str, Any], seed
             "state; transient chaos counts as chaotic although a settled record of it is periodic; chaos weaker than "
             "the sensor's noise looks periodic"
         ),
-        "report": report,
+        "report": {name: value for name, value in report.items() if name not in TIMED},
     }  # fmt: skip

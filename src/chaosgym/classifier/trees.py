@@ -8,14 +8,11 @@ sent them. Each tree adds to one score.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from chaosgym.classifier.kernels.trees import walk_blocks, walk_rows
+
 Array = NDArray[np.float64]
-
-BLOCK = 64
-"""Rows that walk a tree side by side."""
-
 
 FEW_ROWS = 8
 """Rows below which each goes its own way, and stops at its leaf."""
@@ -105,7 +102,7 @@ def joined(forests: tuple[Forest, ...]) -> Forest:
 def forest_scores(forest: Forest, features: Array) -> Array:
     """Scores (n_rows, n_scores) of features (n_rows, n_features)."""
     out = np.empty((len(features), len(forest.baseline)))
-    walk = _walk_blocks if len(features) >= FEW_ROWS else _walk_rows
+    walk = walk_blocks if len(features) >= FEW_ROWS else walk_rows
     walk(*forest, features, out)
     return out
 
@@ -114,87 +111,3 @@ def class_scores(forest: Forest, features: Array) -> Array:
     """Scores (n_rows, n_classes); of two classes, for which boosting has one score, the first has zero."""
     found = forest_scores(forest, features)
     return np.concatenate([np.zeros_like(found), found], axis=1) if found.shape[1] == 1 else found
-
-
-@njit(cache=True, nogil=True)
-def _walk(
-    feature: NDArray[np.int32],
-    threshold: Array,
-    missing_right: NDArray[np.bool_],
-    child: NDArray[np.int32],
-    value: Array,
-    roots: NDArray[np.int32],
-    depths: NDArray[np.int32],
-    score: NDArray[np.int32],
-    baseline: Array,
-    features: Array,
-    out: Array,
-) -> None:
-    """Scores of one block of rows."""
-    rows = len(features)
-    known = np.ascontiguousarray(features.T)
-    total = np.zeros((len(baseline), rows))
-    node = np.empty(rows, dtype=np.int32)
-    for tree in range(len(roots)):
-        node[:] = roots[tree]
-        for _ in range(depths[tree]):
-            for row in range(rows):
-                at = node[row]
-                seen = known[feature[at], row]
-                right = (seen > threshold[at]) | ((seen != seen) & missing_right[at])
-                node[row] = child[at] + np.int32(right)
-        sums = total[score[tree]]
-        for row in range(rows):
-            sums[row] += value[node[row]]
-    for row in range(rows):
-        for place in range(len(baseline)):
-            out[row, place] = baseline[place] + total[place, row]
-
-
-@njit(cache=True, nogil=True)
-def _walk_blocks(
-    feature: NDArray[np.int32],
-    threshold: Array,
-    missing_right: NDArray[np.bool_],
-    child: NDArray[np.int32],
-    value: Array,
-    roots: NDArray[np.int32],
-    depths: NDArray[np.int32],
-    score: NDArray[np.int32],
-    baseline: Array,
-    features: Array,
-    out: Array,
-) -> None:
-    """Scores of all rows, block by block."""
-    for block in range((len(features) + BLOCK - 1) // BLOCK):
-        start, stop = block * BLOCK, min(len(features), (block + 1) * BLOCK)
-        _walk(
-            feature, threshold, missing_right, child, value, roots, depths, score, baseline, features[start:stop],
-            out[start:stop],
-        )  # fmt: skip
-
-
-@njit(cache=True, nogil=True)
-def _walk_rows(
-    feature: NDArray[np.int32],
-    threshold: Array,
-    missing_right: NDArray[np.bool_],
-    child: NDArray[np.int32],
-    value: Array,
-    roots: NDArray[np.int32],
-    depths: NDArray[np.int32],
-    score: NDArray[np.int32],
-    baseline: Array,
-    features: Array,
-    out: Array,
-) -> None:
-    """Scores of all rows, row by row."""
-    for row in range(len(features)):
-        out[row] = baseline
-        for tree in range(len(roots)):
-            node = roots[tree]
-            while child[node] != node:
-                seen = features[row, feature[node]]
-                right = seen > threshold[node] or (np.isnan(seen) and missing_right[node])
-                node = child[node] + np.int32(right)
-            out[row, score[tree]] += value[node]

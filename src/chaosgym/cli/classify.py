@@ -1,8 +1,9 @@
 """What does the learned classifier say of a machine, of measured records, of many at once, or live? ``classify``."""
 
 import functools
+import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,20 @@ from chaosgym.cli.machine_options import MACHINE_OPTIONS, machine_command
 from chaosgym.cli.output import emit
 
 
+def _quick_start(command: Callable[..., None]) -> Callable[..., None]:
+    """Let one question be answered by the kernels' Python source: loading their machine code takes much longer."""
+
+    @functools.wraps(command)
+    def wrapped(**options: Any) -> None:
+        if not (options["follow"] or options["batch"] or "numba" in sys.modules):
+            os.environ["NUMBA_DISABLE_JIT"] = "1"
+        command(**options)
+
+    return wrapped
+
+
 @click.command()
+@_quick_start
 @functools.partial(machine_command, required=False)
 @click.option(
     "--peaks", type=click.Path(), help="Judge measured peak forces [N]: CSV, one run a column; - is standard input."

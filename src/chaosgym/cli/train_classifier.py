@@ -30,6 +30,7 @@ def train_classifier(
     from chaosgym.classifier.train import train_classifier as train
     from chaosgym.plotting.classifier import save_pictures
     from chaosgym.sweeps import read_sweep
+    from chaosgym.sweeps.card import read_noise
 
     target = Path(out)
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
@@ -38,7 +39,7 @@ def train_classifier(
         raise click.UsageError(f"--out {out} lies in a folder that does not exist")
     trained = train(
         read_sweep(data), seed, model=model, curve=curve, transfer=read_sweep(transfer) if transfer else None,
-        progress=True,
+        noise=read_noise(data), progress=True,
     )  # fmt: skip
     trained.save(target)
     save_pictures(trained, target)

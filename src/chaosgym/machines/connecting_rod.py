@@ -23,7 +23,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from chaosgym.machines.finite_element import bending_matrices, interpolation
@@ -184,8 +183,10 @@ def connecting_rod(bar: Bar, housing: EndBody, yoke: EndBody, n_modes: int, elem
     basis[3::2, ACROSS_A], basis[3::2, ACROSS_B] = -1.0 / bar.length, 1.0 / bar.length
     frequency = np.zeros(0)
     if n_modes:
+        from scipy.linalg import eigh
+
         at = np.ix_(inner, inner)
-        squares, shapes = scipy.linalg.eigh(stiffness[at], mass[at], subset_by_index=[0, n_modes - 1])
+        squares, shapes = eigh(stiffness[at], mass[at], subset_by_index=[0, n_modes - 1])
         basis[inner, MODES:] = shapes * np.where(shapes[0] < 0.0, -1.0, 1.0)
         frequency = np.sqrt(squares)
 

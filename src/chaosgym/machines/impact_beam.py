@@ -18,7 +18,6 @@ from functools import lru_cache
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from chaosgym.core.impact_beam import ImpactBeamModel
@@ -225,13 +224,15 @@ def modal_analysis(beam: ImpactBeam, elements: int | None = None) -> ModalAnalys
     elements
         Number of finite elements; at least 24 and three a mode by default.
     """
+    from scipy.linalg import eigh
+
     mass, stiffness, at_force, tip = _assembled(beam, elements or max(MIN_ELEMENTS, 3 * beam.n_modes))
     wanted = max(beam.n_modes, 2)
     # the inverse problem, M s = K s / w^2, keeps the slow rocking mode exact on fine meshes
     size = len(mass)
     scale = 1.0 / np.sqrt(np.diag(stiffness))
     try:
-        inverse_squares, shapes = scipy.linalg.eigh(
+        inverse_squares, shapes = eigh(
             mass * np.outer(scale, scale), stiffness * np.outer(scale, scale),
             subset_by_index=[size - wanted, size - 1],
         )  # fmt: skip
@@ -271,15 +272,15 @@ def static_tip_deflection(beam: ImpactBeam) -> float:
 
 def pinned_pinned_frequency(beam: ImpactBeam, length: float) -> float:
     """First natural frequency [Hz] of a beam of the same section, pinned at both ends (thesis table 3.1)."""
+    from scipy.linalg import eigh
+
     section = beam.width * beam.height
     bending_stiffness = beam.youngs_modulus * beam.width * beam.height**3 / 12.0
     mass, stiffness = bending_matrices(
         graded_mesh((0.0, length), MIN_ELEMENTS), bending_stiffness, beam.density * section
     )
     free = [i for i in range(len(mass)) if i not in (0, len(mass) - 2)]
-    lowest = scipy.linalg.eigh(
-        stiffness[np.ix_(free, free)], mass[np.ix_(free, free)], eigvals_only=True, subset_by_index=[0, 0]
-    )
+    lowest = eigh(stiffness[np.ix_(free, free)], mass[np.ix_(free, free)], eigvals_only=True, subset_by_index=[0, 0])
     return float(math.sqrt(lowest[0]) / (2.0 * math.pi))
 
 
@@ -313,8 +314,10 @@ def _modal_blocks(stiffness: Array, damping: Array) -> tuple[Array, Array, Array
 
 def _derivative(rotates: Array, rate: Array) -> Array:
     """Block-diagonal matrix B of u' = B u."""
+    from scipy.linalg import block_diag
+
     blocks = [[[a, -b], [b, a]] if turns else [[a, 0.0], [0.0, b]] for turns, (a, b) in zip(rotates, rate, strict=True)]
-    return np.asarray(scipy.linalg.block_diag(*blocks))
+    return np.asarray(block_diag(*blocks))
 
 
 def _bound(rotates: Array, row: Array) -> Array:

@@ -24,7 +24,6 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from chaosgym.core.crank_stepper import SteppedCrankModel
@@ -347,10 +346,12 @@ SUPERHARMONIC_SLIDER_CRANK = replace(
 
 def frequencies_at(machine: SliderCrank, crank_angle: float) -> Array:
     """Natural frequencies [Hz] of the mechanism at rest at a crank angle [deg], every joint tight."""
+    from scipy.linalg import eigh
+
     bound = replace(machine, slider_joint="clearance", ball_joint="ideal", rod="flexible")
     assemble = spatial_equations if machine.is_spatial else equations
     system = assemble(bound, np.array([math.radians(crank_angle)]))
     free = [i for i, name in enumerate(bound.degrees_of_freedom) if name not in (SLIDER_ACROSS, SLIDER_LATERAL)]
     at = np.ix_(free, free)
-    squares = scipy.linalg.eigh(system.stiffness[0, 0][at], system.mass[0][at], eigvals_only=True)
+    squares = eigh(system.stiffness[0, 0][at], system.mass[0][at], eigvals_only=True)
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi))

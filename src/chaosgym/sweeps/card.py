@@ -150,19 +150,41 @@ def _words(pair: str) -> list[str]:
     return [word for word in pair.split(" against ") if word in TYPES]
 
 
-def _noise(folder: Path) -> str:
-    file = folder / NOISE_FILE
+def read_noise(folder: str | Path) -> dict[str, Any] | None:
+    """What ``chaosgym dataset noise`` found for a folder; None if it did not run.
+
+    Raises
+    ------
+    DatasetError
+        If its file is damaged.
+    """
+    file = Path(folder) / NOISE_FILE
     if not file.is_file():
+        return None
+    try:
+        found: dict[str, Any] = json.loads(file.read_text())
+    except (OSError, ValueError) as error:
+        raise _damaged_noise(folder, error) from error
+    return found
+
+
+def _damaged_noise(folder: str | Path, error: Exception) -> DatasetError:
+    file = Path(folder) / NOISE_FILE
+    return DatasetError(f"{file} is damaged: {error!r}; run `chaosgym dataset noise {folder}` again")
+
+
+def _noise(folder: Path) -> str:
+    noise = read_noise(folder)
+    if noise is None:
         return ""
     try:
-        noise = json.loads(file.read_text())
         rows = [
             f"| {name} | {change['nature']:.1%} ± {change['half_interval']:.1%} | {change['largest_peak']:.1%} |"
             for name, change in noise["changes"].items()
         ]
         options = f"--points {noise['points']} --seed {noise['seed']}"
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise DatasetError(f"{file} is damaged: {error!r}; run `chaosgym dataset noise {folder}` again") from error
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise _damaged_noise(folder, error) from error
     return (
         f"## Label noise\n\n`chaosgym dataset noise {folder} {options}`. No model can agree with the labels better "
         "than they agree with themselves; what another initial state changes are coexisting attractors.\n\n"
