@@ -11,11 +11,11 @@ from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
-import torch
-from stable_baselines3 import PPO
 
 import chaosgym  # noqa: F401  (registers the environments)
 from chaosgym.envs.evaluation import constant_speed, evaluate
+from chaosgym.errors import ModelFileError
+from chaosgym.policies import load_policy
 
 
 def main() -> None:
@@ -27,18 +27,18 @@ def main() -> None:
     parser.add_argument("--speeds", type=int, default=14, help="constant speeds to try over the range")
     arguments = parser.parse_args()
     folder = Path(arguments.policy)
-    if not (folder / "policy.zip").is_file():
-        raise SystemExit(f"--policy {folder} holds no policy.zip; train one first")
-    torch.set_num_threads(1)
+    try:
+        policy = load_policy(folder)
+    except ModelFileError as error:
+        raise SystemExit(f"--policy: {error}; train one first") from None
     config = json.loads((folder / "config.json").read_text())["arguments"]
     env = gym.make(config["env"])
-    model = PPO.load(folder / "policy.zip", device="cpu")
     drive = env.get_wrapper_attr("drive")
     contenders = {
         f"constant {speed:5.1f}": constant_speed(env, speed)
         for speed in np.linspace(drive.lowest_speed, drive.highest_speed, arguments.speeds)
     }
-    contenders["policy"] = lambda observation: model.predict(observation, deterministic=True)[0]
+    contenders["policy"] = policy
     results = {
         name: evaluate(env, policy, arguments.jobs, arguments.seed, progress=name).summary()
         for name, policy in contenders.items()

@@ -7,14 +7,16 @@ Gives what ``DummyVecEnv`` gives of as many single environments, with one compil
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
-from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
+from chaosgym.envs.history import SpeedMemory
 from chaosgym.envs.observation import Observation
 from chaosgym.envs.vector_env import MachineVectorEnv
 from chaosgym.errors import ParameterError
@@ -147,3 +149,31 @@ class SB3VecEnv(VecEnv):
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         """Return no pictures: they come from single environments."""
         return [None] * self.num_envs
+
+
+class SB3RememberSpeeds(VecEnvWrapper):
+    """Adds to the observations what was felt at each speed so far, as ``RememberSpeeds`` does for one environment."""
+
+    def __init__(self, envs: VecEnv) -> None:
+        space = envs.observation_space
+        assert isinstance(space, Box)
+        self._memory = SpeedMemory(space)
+        super().__init__(envs, observation_space=self._memory.space)
+
+    def reset(self) -> Observation:
+        """Start all jobs, with nothing remembered."""
+        return self._memory.start(cast(Observation, self.venv.reset()))
+
+    def step_wait(self) -> tuple[Observation, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """Run the step and remember it; a job that starts anew remembers nothing of the last one."""
+        given, rewards, ended, infos = self.venv.step_wait()
+        observations = cast(Observation, given)
+        last = observations.copy()
+        for i in np.flatnonzero(ended).tolist():
+            last[i] = infos[i]["terminal_observation"]
+        remembered = self._memory.add(last)
+        for i in np.flatnonzero(ended).tolist():
+            infos[i]["terminal_observation"] = remembered[i]
+        if ended.any():
+            remembered[ended] = self._memory.restart(ended, observations[ended])
+        return remembered, rewards, ended, infos
