@@ -25,7 +25,7 @@ from tqdm import tqdm
 
 import chaosgym
 from chaosgym.envs import SB3VecEnv
-from chaosgym.envs.sb3 import SB3RememberSpeeds
+from chaosgym.envs.sb3 import SB3LearnerView
 from chaosgym.files import write_atomically
 from chaosgym.policies import save_policy
 from chaosgym.policies.export import exported
@@ -60,7 +60,7 @@ class Run:
     Parameters
     ----------
     arguments
-        A dataclass with at least env, steps, seed, out, envs, memory, gamma, evaluate_every, jobs and threads.
+        A dataclass with at least env, steps, seed, out, envs, memory, increments, gamma, evaluate_every, jobs, threads.
     wrapped
         Puts one more wrapper around the environments of training.
     """
@@ -87,7 +87,7 @@ class Run:
 
     def _environments(self, count: int) -> VecEnv:
         envs = SB3VecEnv(self.arguments.env, count)
-        return SB3RememberSpeeds(envs) if self.arguments.memory else envs
+        return SB3LearnerView(envs, self.arguments.memory, self.arguments.increments)
 
     def resumed(self, kind: type[BaseAlgorithm]) -> Any:
         """Return the model of the last checkpoint, or None if there is none."""
@@ -105,9 +105,10 @@ class Run:
         self.envs.seed(arguments.seed * SEEDS_PER_RUN + model.num_timesteps)
         model.learn(arguments.steps - model.num_timesteps, Watch(self), reset_num_timesteps=False)
         self.save(model, "policy.zip")
-        plain = self.envs.unwrapped
-        spaces = plain.observation_space, plain.action_space
-        policy = exported(model, arguments.env, spaces, normalise=self.envs, remembers=arguments.memory)
+        policy = exported(
+            model, arguments.env, self.envs.unwrapped, normalise=self.envs, memory=arguments.memory,
+            increments=arguments.increments,
+        )  # fmt: skip
         save_policy(policy, self.folder)
         (self.folder / "checkpoint.zip").unlink(missing_ok=True)
         print(f"policy, config and progress in {self.folder}")

@@ -143,6 +143,7 @@ class Arguments:
     entropy: float = 0.0
     log_std: float = -2.0
     memory: bool = True
+    increments: bool = True
     evaluate_every: int = 25_000
     jobs: int = 16
     threads: int = 1

@@ -29,6 +29,7 @@ class Arguments:
     log_std: float = -2.0
     units: int = 64
     memory: bool = False
+    increments: bool = True
     evaluate_every: int = 25_000
     jobs: int = 16
     threads: int = 1

@@ -27,6 +27,7 @@ class Arguments:
     learning_starts: int = 1_600
     gradient_steps: int = 4
     memory: bool = True
+    increments: bool = True
     evaluate_every: int = 10_000
     jobs: int = 16
     threads: int = 1

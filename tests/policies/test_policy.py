@@ -10,7 +10,7 @@ from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO, SAC
 
 from chaosgym.envs import SB3VecEnv
-from chaosgym.envs.sb3 import SB3RememberSpeeds
+from chaosgym.envs.sb3 import SB3LearnerView
 from chaosgym.errors import ModelFileError
 from chaosgym.policies import TrainedPolicy, load_policy, save_policy, shipped_policy
 from chaosgym.policies.export import exported
@@ -31,7 +31,7 @@ def test_numpy_plays_what_torch_plays(name, tmp_path):
     """Over 30 steps of four jobs, the actions of the files differ from those of torch by less than 1e-5."""
     model, envs = MODELS[name]()
     space = envs.observation_space
-    save_policy(exported(model, ENV, (space, envs.action_space), normalise=envs), tmp_path)
+    save_policy(exported(model, ENV, envs, normalise=envs), tmp_path)
     policy = load_policy(tmp_path)
     observations = np.random.default_rng(0).uniform(space.low, space.high, (30, 4, *space.shape)).astype(np.float32)
     state, start = None, np.ones(4, bool)
@@ -42,25 +42,27 @@ def test_numpy_plays_what_torch_plays(name, tmp_path):
     assert np.ptp(expected) > 0.0
 
 
-def test_a_memory_of_speeds_is_the_same_in_training_and_in_play(tmp_path):
-    """The policy is given single observations; training had them with the memory that the wrapper keeps."""
-    raw = SB3VecEnv(ENV, num_envs=2, job_cycles=50)
-    envs = SB3RememberSpeeds(raw)
+def test_a_policy_sees_and_moves_as_it_did_in_training():
+    """The policy is given plain observations; training had a memory of speeds and increments for actions."""
+    plain = SB3VecEnv(ENV, num_envs=2, job_cycles=50)
+    envs = SB3LearnerView(plain)
     model = PPO("MlpPolicy", envs, seed=0, device="cpu", **SMALL)
-    policy = exported(model, ENV, (raw.observation_space, raw.action_space), remembers=True)
+    policy = exported(model, ENV, plain, memory=True, increments=True)
     envs.seed(5)
-    remembered = envs.reset()
-    plain = raw.observation_space.shape[0]
+    seen = envs.reset()
+    size = plain.observation_space.shape[0]
     for _ in range(9):
-        expected, _ = model.predict(remembered, deterministic=True)
-        np.testing.assert_allclose(policy(remembered[:, :plain]), expected, atol=1e-5)
-        remembered = envs.step(np.linspace(-1.0, 1.0, 2, dtype=np.float32)[:, None])[0]
+        action, _ = model.predict(seen, deterministic=True)
+        speed = seen[:, 0]
+        target = 4.0 + 13.0 * (policy(seen[:, :size])[:, 0] + 1.0)
+        np.testing.assert_allclose(target, np.clip(speed + action[:, 0], 4.0, 30.0), rtol=1e-5)
+        seen = envs.step(np.linspace(-1.0, 1.0, 2, dtype=np.float32)[:, None])[0]
 
 
 def test_a_single_observation_gives_a_single_action_and_a_job_is_forgotten(tmp_path):
     """A policy is a controller: (13,) in, (1,) out; after reset() it starts as new."""
     model, envs = MODELS["recurrent PPO"]()
-    policy = exported(model, ENV, (envs.observation_space, envs.action_space), normalise=envs)
+    policy = exported(model, ENV, envs, normalise=envs)
     observation = envs.observation_space.high
     first, second = policy(observation), policy(observation)
     policy.reset()

@@ -16,7 +16,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
-from chaosgym.envs.history import SpeedMemory
+from chaosgym.envs.learning import SpeedMemory, commanded
 from chaosgym.envs.observation import Observation
 from chaosgym.envs.vector_env import MachineVectorEnv
 from chaosgym.errors import ParameterError
@@ -151,29 +151,46 @@ class SB3VecEnv(VecEnv):
         return [None] * self.num_envs
 
 
-class SB3RememberSpeeds(VecEnvWrapper):
-    """Adds to the observations what was felt at each speed so far, as ``RememberSpeeds`` does for one environment."""
+class SB3LearnerView(VecEnvWrapper):
+    """What ``LearnerView`` is for one environment: a memory of speeds, and increments for actions.
 
-    def __init__(self, envs: VecEnv) -> None:
-        space = envs.observation_space
-        assert isinstance(space, Box)
-        self._memory = SpeedMemory(space)
-        super().__init__(envs, observation_space=self._memory.space)
+    Parameters
+    ----------
+    envs
+        A ``SB3VecEnv``.
+    memory, increments
+        Leave one of them out.
+    """
+
+    def __init__(self, envs: VecEnv, memory: bool = True, increments: bool = True) -> None:
+        self._space = cast(Box, envs.observation_space)
+        self._memory = SpeedMemory(self._space) if memory else None
+        self._largest = envs.get_attr("drive")[0].slew_limit if increments else None
+        super().__init__(envs, observation_space=self._memory.space if self._memory else self._space)
 
     def reset(self) -> Observation:
         """Start all jobs, with nothing remembered."""
-        return self._memory.start(cast(Observation, self.venv.reset()))
+        self._last = cast(Observation, self.venv.reset())
+        return self._memory.start(self._last) if self._memory else self._last
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Take the actions of the next step."""
+        if self._largest is not None:
+            actions = commanded(actions, self._last, self._space, self._largest)
+        self.venv.step_async(actions)
 
     def step_wait(self) -> tuple[Observation, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Run the step and remember it; a job that starts anew remembers nothing of the last one."""
         given, rewards, ended, infos = self.venv.step_wait()
-        observations = cast(Observation, given)
-        last = observations.copy()
-        for i in np.flatnonzero(ended).tolist():
+        self._last = cast(Observation, given)
+        if self._memory is None:
+            return self._last, rewards, ended, infos
+        last, fresh = self._last.copy(), np.flatnonzero(ended).tolist()
+        for i in fresh:
             last[i] = infos[i]["terminal_observation"]
-        remembered = self._memory.add(last)
-        for i in np.flatnonzero(ended).tolist():
-            infos[i]["terminal_observation"] = remembered[i]
-        if ended.any():
-            remembered[ended] = self._memory.restart(ended, observations[ended])
-        return remembered, rewards, ended, infos
+        seen = self._memory.add(last)
+        for i in fresh:
+            infos[i]["terminal_observation"] = seen[i].copy()
+        if fresh:
+            seen[ended] = self._memory.restart(ended, self._last[ended])
+        return seen, rewards, ended, infos

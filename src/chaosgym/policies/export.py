@@ -14,7 +14,7 @@ from chaosgym.policies.policy import Normalisation, TrainedPolicy
 
 
 def exported(
-    model: Any, env: str, spaces: tuple[Any, Any], *, normalise: Any = None, remembers: bool = False
+    model: Any, env: str, envs: Any, *, normalise: Any = None, memory: bool = False, increments: bool = False
 ) -> TrainedPolicy:
     """Return the deterministic policy of a trained model.
 
@@ -24,12 +24,12 @@ def exported(
         PPO, SAC or RecurrentPPO, with continuous actions.
     env
         Id of the environment.
-    spaces
-        Of observations and actions of that environment, without wrappers.
+    envs
+        A ``SB3VecEnv`` of it, whose spaces and drive count.
     normalise
         The ``VecNormalize`` that it was trained in, if any.
-    remembers
-        Whether it was trained with ``SpeedMemory``.
+    memory, increments
+        Of the ``LearnerView`` that it was trained in.
 
     Raises
     ------
@@ -45,7 +45,10 @@ def exported(
     places = sorted(int(name.split(".")[-2]) for name in weights if name.startswith(hidden) and name.endswith("weight"))
     names = [*((f"{hidden}.{place}", activation) for place in places), (last, "none")]
     network = Network(_lstm(weights), tuple(_dense(weights, name, kind) for name, kind in names))
-    return TrainedPolicy(env, *spaces, network, _normalisation(normalise), remembers, bool(model.policy.squash_output))
+    return TrainedPolicy(
+        env, envs.observation_space, envs.action_space, network, _normalisation(normalise), memory,
+        envs.get_attr("drive")[0].slew_limit if increments else None, bool(model.policy.squash_output),
+    )  # fmt: skip
 
 
 def _dense(weights: dict[str, Any], name: str, activation: str) -> Dense:

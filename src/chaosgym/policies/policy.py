@@ -18,7 +18,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from chaosgym.envs.history import SpeedMemory, remembered_space
+from chaosgym.envs.learning import SpeedMemory, commanded, remembered_space
 from chaosgym.errors import ModelFileError
 from chaosgym.files import write_atomically
 from chaosgym.policies.network import Dense, Lstm, Network, State
@@ -63,6 +63,8 @@ class TrainedPolicy:
         Applied to the observations, memory included; None for none.
     remembers
         Whether it is given what ``SpeedMemory`` keeps of the job.
+    largest_step
+        Change of speed for an action of 1, if the network answers with increments; None for target speeds.
     squashed
         Whether the network's answer goes through tanh; otherwise it is clipped.
     """
@@ -73,6 +75,7 @@ class TrainedPolicy:
     network: Network
     normalisation: Normalisation | None = None
     remembers: bool = False
+    largest_step: float | None = None
     squashed: bool = False
     _state: State | None = field(default=None, init=False, repr=False)
     _memory: SpeedMemory | None = field(default=None, init=False, repr=False)
@@ -114,6 +117,8 @@ class TrainedPolicy:
         low, high = self.action_space.low, self.action_space.high
         if self.squashed:
             answer = low + 0.5 * (np.tanh(answer) + 1.0) * (high - low)
+        if self.largest_step is not None:
+            answer = commanded(answer, np.atleast_2d(observations), self.observation_space, self.largest_step)
         return np.clip(answer, low, high).reshape(*observations.shape[:-1], -1).astype(np.float32)
 
     def _remembered(self, observations: Array) -> Array:
@@ -156,6 +161,7 @@ def save_policy(policy: TrainedPolicy, folder: str | Path) -> None:
         "activations": [layer.activation for layer in network.layers],
         "normalisation_limit": policy.normalisation.limit if policy.normalisation else None,
         "remembers": policy.remembers,
+        "largest_step": policy.largest_step,
         "squashed": policy.squashed,
         "sha256": sha256(buffer.getvalue()).hexdigest(),
     }
@@ -207,7 +213,7 @@ def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPol
     return TrainedPolicy(
         description["env"], _space(description["observation"]), _space(description["action"]), Network(lstm, layers),
         None if limit is None else Normalisation(arrays["mean"], arrays["deviation"], float(limit)),
-        bool(description["remembers"]), bool(description["squashed"]),
+        bool(description["remembers"]), description["largest_step"], bool(description["squashed"]),
     )  # fmt: skip
 
 
