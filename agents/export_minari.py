@@ -2,9 +2,8 @@
 
     python agents/export_minari.py --env chaosgym/ImpactBeam-v0 --jobs 100 --out minari
 
-Wandering means speeds drawn from the whole range, each kept for 20 steps on average. Needs the extra [offline]. Load it:
-
-    MINARI_DATASETS_PATH=minari python -c "import minari; print(minari.load_dataset('chaosgym/ImpactBeam/wandering-v0'))"
+Wandering means speeds drawn from the whole range, each kept for 20 steps on average. Needs the extra [offline]. With
+MINARI_DATASETS_PATH=minari, `minari.load_dataset("chaosgym/ImpactBeam/wandering-v0")` loads it.
 """
 
 import os

@@ -1,7 +1,7 @@
 """How does a learner see and move a machine? With a memory of what it felt at each speed, and in steps of the drive.
 
 A machine is hidden from the agent, but it answers the same way when a speed is tried again. The memory adds, for every
-bin of speed, the mean and the standard deviation of the peak forces measured there in this job, and how many there were.
+bin of speed, the mean and the standard deviation of the peak forces measured there in this job, and their number.
 Increments let an action say by how much the speed shall change instead of where it shall end.
 """
 
