@@ -6,9 +6,19 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from chaosgym.policies import load_policy
+
 AGENTS = Path(__file__).parent.parent.parent / "agents"
+SHORT = ("--envs", "2", "--jobs", "2", "--evaluate-every", "400", "--seed", "3")
+SCRIPTS = {
+    "train_ppo.py": ("--steps", "800"),
+    "train_ppo_lstm.py": ("--steps", "800", "--units", "8"),
+    "train_ppo_lagrangian.py": ("--steps", "800"),
+    "train_sac.py": ("--steps", "800", "--learning-starts", "200", "--gradient-steps", "1"),
+}
 
 
 def _run(script, *arguments):
@@ -16,22 +26,53 @@ def _run(script, *arguments):
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
+def _rows(path):
+    return list(csv.DictReader(path.read_text().splitlines()))
+
+
 @pytest.mark.slow
-def test_a_policy_is_trained_and_saved(tmp_path):
-    """train_ppo.py writes policy, config and progress."""
-    out = tmp_path / "ppo"
-    trained = _run("train_ppo.py", "--steps", "3200", "--rollout", "200", "--out", str(out), "--seed", "3")
+@pytest.mark.parametrize("script", list(SCRIPTS))
+def test_a_run_leaves_a_policy_that_numpy_plays(script, tmp_path):
+    """Every script writes its arguments, every job, the evaluations and the policy; a second start is refused."""
+    out = tmp_path / "run"
+    arguments = (*SCRIPTS[script], *SHORT, "--out", str(out))
+    trained = _run(script, *arguments)
     assert trained.returncode == 0, trained.stderr
     config = json.loads((out / "config.json").read_text())
     assert config["arguments"]["seed"] == 3
     assert config["versions"]["stable_baselines3"]
-    episodes = list(csv.DictReader((out / "progress.csv").read_text().splitlines()))
-    assert len(episodes) == 16
-    assert all(float(row["return"]) < 0.0 for row in episodes)
+    assert [row["step"] for row in _rows(out / "evaluations.csv")] == ["400", "800"]
+    assert all(float(row["return"]) < 0.0 for row in _rows(out / "progress.csv"))
+    assert len(_rows(out / "progress.csv")) == 4
+    policy = load_policy(out)
+    assert policy(policy.observation_space.high).shape == (1,)
+    refused = _run(script, *arguments)
+    assert "finished; choose another folder" in refused.stderr
+
+
+@pytest.mark.slow
+def test_an_interrupted_run_goes_on(tmp_path):
+    """What a kill leaves behind is a checkpoint; the same command ends with the rows of one whole run."""
+    out = tmp_path / "run"
+    arguments = ("--steps", "1200", *SHORT, "--out", str(out))
+    script = (AGENTS / "train_ppo.py").read_text()
+    killed = script.replace(
+        "    run.learn(model)", "    run.save(model.learn(400), 'checkpoint.zip')\n    raise SystemExit(9)"
+    )
+    (tmp_path / "killed.py").write_text(f"import sys\nsys.path.insert(0, {str(AGENTS)!r})\n" + killed)
+    assert _run(tmp_path / "killed.py", *arguments).returncode == 9
+    (out / "progress.csv").write_text("step,return,length\n200,-1,100\n600,-9,200\n")
+    resumed = _run("train_ppo.py", *arguments)
+    assert resumed.returncode == 0, resumed.stderr
+    steps = [int(row["step"]) for row in _rows(out / "progress.csv")]
+    assert steps == [200, 800, 800, 1200, 1200]
+    assert not (out / "checkpoint.zip").exists()
+    with np.load(out / "normalisation.npz") as held:
+        assert held["obs_count"] == pytest.approx(1200 + 4, abs=1.0)
 
 
 def test_an_existing_folder_is_left_alone(tmp_path):
-    """Training never writes into a folder that exists."""
+    """Training never writes into a folder that is not its own."""
     refused = _run("train_ppo.py", "--out", str(tmp_path))
     assert refused.returncode != 0
     assert "choose another folder" in refused.stderr

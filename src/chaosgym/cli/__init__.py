@@ -19,6 +19,7 @@ from chaosgym.cli.fidelity import stability, tradeoff
 from chaosgym.cli.figures import figures
 from chaosgym.cli.info import info
 from chaosgym.cli.regimes import regimes
+from chaosgym.cli.run_agent import run_agent
 from chaosgym.cli.scorecard import scorecard
 from chaosgym.cli.simulate import show, simulate
 from chaosgym.cli.sweep import sweep
@@ -35,7 +36,7 @@ def app() -> None:
 
 for command in (
     simulate, show, diagnose, agreement, classify, sweep, dataset, train_classifier, demo, design, figures, calibrate,
-    scorecard, tradeoff, stability, regimes, info, bench,
+    scorecard, tradeoff, stability, regimes, run_agent, info, bench,
 ):  # fmt: skip
     app.add_command(command)
 

@@ -7,14 +7,16 @@ Gives what ``DummyVecEnv`` gives of as many single environments, with one compil
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
-from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
+from chaosgym.envs.learning import SpeedMemory, commanded
 from chaosgym.envs.observation import Observation
 from chaosgym.envs.vector_env import MachineVectorEnv
 from chaosgym.errors import ParameterError
@@ -147,3 +149,48 @@ class SB3VecEnv(VecEnv):
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
         """Return no pictures: they come from single environments."""
         return [None] * self.num_envs
+
+
+class SB3LearnerView(VecEnvWrapper):
+    """What ``LearnerView`` is for one environment: a memory of speeds, and increments for actions.
+
+    Parameters
+    ----------
+    envs
+        A ``SB3VecEnv``.
+    memory, increments
+        Leave one of them out.
+    """
+
+    def __init__(self, envs: VecEnv, memory: bool = True, increments: bool = True) -> None:
+        self._space = cast(Box, envs.observation_space)
+        self._memory = SpeedMemory(self._space) if memory else None
+        self._largest = envs.get_attr("drive")[0].slew_limit if increments else None
+        super().__init__(envs, observation_space=self._memory.space if self._memory else self._space)
+
+    def reset(self) -> Observation:
+        """Start all jobs, with nothing remembered."""
+        self._last = cast(Observation, self.venv.reset())
+        return self._memory.start(self._last) if self._memory else self._last
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Take the actions of the next step."""
+        if self._largest is not None:
+            actions = commanded(actions, self._last, self._space, self._largest)
+        self.venv.step_async(actions)
+
+    def step_wait(self) -> tuple[Observation, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """Run the step and remember it; a job that starts anew remembers nothing of the last one."""
+        given, rewards, ended, infos = self.venv.step_wait()
+        self._last = cast(Observation, given)
+        if self._memory is None:
+            return self._last, rewards, ended, infos
+        last, fresh = self._last.copy(), np.flatnonzero(ended).tolist()
+        for i in fresh:
+            last[i] = infos[i]["terminal_observation"]
+        seen = self._memory.add(last)
+        for i in fresh:
+            infos[i]["terminal_observation"] = seen[i].copy()
+        if fresh:
+            seen[ended] = self._memory.restart(ended, self._last[ended])
+        return seen, rewards, ended, infos

@@ -1,0 +1,213 @@
+"""What do all training scripts share? Arguments, environments, and a folder in which a run is kept and resumed.
+
+A folder holds policy.json and weights.npz (for numpy), policy.zip (stable-baselines3), normalisation.npz, config.json,
+progress.csv (every job) and evaluations.csv. While a run goes on, checkpoint.zip takes the place of the policy.
+"""
+
+import argparse
+import csv
+import json
+import platform
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+import gymnasium as gym
+import numba
+import numpy as np
+import stable_baselines3
+import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
+from tqdm import tqdm
+
+import chaosgym
+from chaosgym.envs import SB3VecEnv
+from chaosgym.envs.sb3 import SB3LearnerView
+from chaosgym.files import write_atomically
+from chaosgym.policies import save_policy
+from chaosgym.policies.export import exported
+
+Arguments = TypeVar("Arguments")
+
+EVALUATION_SEED = 900_000_000
+"""First seed of the jobs of the periodic evaluation, far from those of training."""
+
+SEEDS_PER_RUN = 1_000_000
+"""Seeds of machines and sensors that a run may use."""
+
+STATISTICS = ("mean", "var", "count")
+"""What VecNormalize keeps of observations and returns."""
+
+
+def parse(kind: type[Arguments], description: str | None) -> Arguments:
+    """Read the command line; every field of a dataclass with defaults is an option."""
+    parser = argparse.ArgumentParser(description=(description or "").splitlines()[0])
+    for field in fields(kind):  # type: ignore[arg-type]
+        name, default = f"--{field.name.replace('_', '-')}", field.default
+        if isinstance(default, bool):
+            parser.add_argument(name, action=argparse.BooleanOptionalAction, default=default)
+        else:
+            parser.add_argument(name, type=type(default), default=default, help="default: %(default)s")
+    return kind(**vars(parser.parse_args()))
+
+
+class Run:
+    """A run of training in its folder: new, or one that was interrupted and goes on.
+
+    Parameters
+    ----------
+    arguments
+        A dataclass with at least env, steps, seed, out, envs, memory, increments, gamma, evaluate_every, jobs, threads.
+    wrapped
+        Puts one more wrapper around the environments of training.
+    """
+
+    def __init__(self, arguments: Any, wrapped: Callable[[VecEnv], VecEnv] = lambda envs: envs) -> None:
+        self.arguments, self.folder = arguments, Path(arguments.out)
+        gym.spec(arguments.env)
+        self._open_folder()
+        torch.set_num_threads(arguments.threads)
+        numba.set_num_threads(min(arguments.threads, numba.config.NUMBA_NUM_THREADS))
+        self.envs = VecNormalize(VecMonitor(wrapped(self._environments(arguments.envs))), gamma=arguments.gamma)
+        self._judges = self._environments(arguments.jobs)
+
+    def _open_folder(self) -> None:
+        arguments, config = asdict(self.arguments), self.folder / "config.json"
+        if not self.folder.exists():
+            self.folder.mkdir(parents=True)
+            text = json.dumps({"arguments": arguments, "versions": _versions()}, indent=2) + "\n"
+            write_atomically(config, lambda path: path.write_text(text))
+        elif not config.is_file() or json.loads(config.read_text())["arguments"] != arguments:
+            raise SystemExit(f"--out {self.folder} exists and is not this run; choose another folder")
+        elif (self.folder / "policy.zip").exists():
+            raise SystemExit(f"--out {self.folder} holds this run, finished; choose another folder")
+
+    def _environments(self, count: int) -> VecEnv:
+        envs = SB3VecEnv(self.arguments.env, count)
+        return SB3LearnerView(envs, self.arguments.memory, self.arguments.increments)
+
+    def resumed(self, kind: type[BaseAlgorithm]) -> Any:
+        """Return the model of the last checkpoint, or None if there is none."""
+        if not (self.folder / "checkpoint.zip").exists():
+            return None
+        with np.load(self.folder / "normalisation.npz") as held:
+            for name, statistics in (("obs", self.envs.obs_rms), ("ret", self.envs.ret_rms)):
+                for part in STATISTICS:
+                    setattr(statistics, part, held[f"{name}_{part}"])
+        return kind.load(self.folder / "checkpoint.zip", self.envs, device="cpu")
+
+    def learn(self, model: Any) -> None:
+        """Train up to the asked number of steps, with progress, checkpoints and evaluations; keep the policy."""
+        arguments = self.arguments
+        self.envs.seed(arguments.seed * SEEDS_PER_RUN + model.num_timesteps)
+        model.learn(arguments.steps - model.num_timesteps, Watch(self), reset_num_timesteps=False)
+        self.save(model, "policy.zip")
+        policy = exported(
+            model, arguments.env, self.envs.unwrapped, normalise=self.envs, memory=arguments.memory,
+            increments=arguments.increments,
+        )  # fmt: skip
+        save_policy(policy, self.folder)
+        (self.folder / "checkpoint.zip").unlink(missing_ok=True)
+        print(f"policy, config and progress in {self.folder}")
+
+    def save(self, model: BaseAlgorithm, name: str) -> None:
+        """Write a model, and the normalisation that belongs to it."""
+        held = {
+            f"{kind}_{part}": getattr(statistics, part)
+            for kind, statistics in (("obs", self.envs.obs_rms), ("ret", self.envs.ret_rms))
+            for part in STATISTICS
+        }
+
+        def write_arrays(path: Path) -> None:
+            with path.open("wb") as file:
+                np.savez(file, **held)
+
+        def write_model(path: Path) -> None:
+            with path.open("wb") as file:
+                model.save(file)
+
+        write_atomically(self.folder / "normalisation.npz", write_arrays)
+        write_atomically(self.folder / name, write_model)
+
+    def evaluate(self, model: BaseAlgorithm) -> dict[str, float]:
+        """Means over one job of each evaluation environment, played without exploration."""
+        self._judges.seed(EVALUATION_SEED)
+        observations, state, start = self._judges.reset(), None, np.ones(self._judges.num_envs, bool)
+        runs, sums = start.copy(), np.zeros((3, len(start)))
+        damage, steps = np.zeros(len(start)), np.zeros(len(start))
+        while runs.any():
+            actions, state = model.predict(self.envs.normalize_obs(observations), state, start, deterministic=True)
+            observations, rewards, start, infos = self._judges.step(actions)
+            costs = [[info[name] for info in infos] for name in ("cost_type_iii", "cost")]
+            sums[:, runs] += np.array([rewards, *costs])[:, runs]
+            damage[runs] = np.array([info["damage"] for info in infos])[runs]
+            steps += runs
+            runs &= ~start
+        returns, type_iii, cost = sums
+        return {
+            "return": float(returns.mean()),
+            "type_iii_share": float((type_iii / steps).mean()),
+            "cost_share": float((cost / steps).mean()),
+            "damage": float(damage.mean()),
+        }
+
+
+class Watch(BaseCallback):
+    """Shows progress, writes down every job, and now and then evaluates the model and keeps a checkpoint."""
+
+    def __init__(self, run: Run) -> None:
+        super().__init__()
+        self.run = run
+
+    def _on_training_start(self) -> None:
+        folder, begin = self.run.folder, self.num_timesteps
+        self.jobs = _opened(folder / "progress.csv", ["step", "return", "length"], begin)
+        self.evaluations = _opened(
+            folder / "evaluations.csv", ["step", "return", "type_iii_share", "cost_share", "damage"], begin
+        )
+        self.bar = tqdm(total=self.run.arguments.steps, initial=begin, unit="step", desc=folder.name)
+        self.last = begin
+
+    def _on_rollout_start(self) -> None:
+        if self.num_timesteps - self.last >= self.run.arguments.evaluate_every:
+            self.last = self.num_timesteps
+            self._evaluate()
+            self.run.save(self.model, "checkpoint.zip")
+
+    def _on_step(self) -> bool:
+        self.bar.update(self.num_timesteps - self.bar.n)
+        for info in self.locals["infos"]:
+            if "episode" in info:
+                self._write(self.jobs, [self.num_timesteps, info["episode"]["r"], info["episode"]["l"]])
+        return True
+
+    def _on_training_end(self) -> None:
+        self._evaluate()
+        self.bar.close()
+
+    def _evaluate(self) -> None:
+        figures = self.run.evaluate(self.model)
+        self._write(self.evaluations, [self.num_timesteps, *(f"{value:.6g}" for value in figures.values())])
+        self.bar.set_postfix({name: f"{value:.3f}" for name, value in figures.items()})
+
+    def _write(self, path: Path, row: Iterable[Any]) -> None:
+        with path.open("a", newline="") as file:
+            csv.writer(file).writerow(row)
+
+
+def _opened(path: Path, columns: list[str], begin: int) -> Path:
+    """A table of rows by step, without those that an interrupted run wrote after its last checkpoint."""
+    rows = list(csv.reader(path.read_text().splitlines()))[1:] if path.exists() else []
+    with path.open("w", newline="") as file:
+        csv.writer(file).writerows([columns, *(row for row in rows if int(row[0]) <= begin)])
+    return path
+
+
+def _versions() -> Mapping[str, str]:
+    return {
+        "chaosgym": chaosgym.__version__, "stable_baselines3": stable_baselines3.__version__,
+        "torch": torch.__version__, "numpy": np.__version__, "python": platform.python_version(),
+    }  # fmt: skip

@@ -1,0 +1,82 @@
+"""Write an offline dataset in Minari's format: whole jobs of one environment, by a trained policy or by wandering.
+
+    python agents/export_minari.py --env chaosgym/ImpactBeam-v0 --jobs 100 --out minari
+
+Wandering means speeds drawn from the whole range, each kept for 20 steps on average. Needs the extra [offline]. With
+MINARI_DATASETS_PATH=minari, `minari.load_dataset("chaosgym/ImpactBeam/wandering-v0")` loads it.
+"""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import common
+import gymnasium as gym
+import numpy as np
+from tqdm import trange
+
+from chaosgym.policies import load_policy
+
+MEAN_STAY = 20
+"""Steps for which a speed is kept on average in wandering."""
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Everything that decides a dataset."""
+
+    env: str = "chaosgym/ImpactBeam-v0"
+    policy: str = "wandering"
+    jobs: int = 100
+    seed: int = 0
+    out: str = "minari"
+
+
+def wandering(seed: int) -> Callable[[Any], Any]:
+    """Policy that asks for a new random speed now and then, whatever it observes."""
+    generator = np.random.default_rng(seed)
+    action = generator.uniform(-1.0, 1.0, 1).astype(np.float32)
+
+    def act(observation: Any) -> Any:
+        if generator.random() < 1.0 / MEAN_STAY:
+            action[:] = generator.uniform(-1.0, 1.0)
+        return action.copy()
+
+    return act
+
+
+def main() -> None:
+    """Play the jobs and write the dataset."""
+    arguments = common.parse(Arguments, __doc__)
+    folder = Path(arguments.out)
+    folder.mkdir(parents=True, exist_ok=True)
+    os.environ["MINARI_DATASETS_PATH"] = str(folder.resolve())
+    from minari import DataCollector  # it looks for the folder when it is imported
+
+    behaviour = "wandering" if arguments.policy == "wandering" else Path(arguments.policy).name
+    name = f"{arguments.env.removesuffix('-v0')}/{behaviour}-v0"
+    if (folder / name).exists():
+        raise SystemExit(f"{folder / name} exists; choose another folder with --out")
+    collector = DataCollector(gym.make(arguments.env))
+    trained = None if arguments.policy == "wandering" else load_policy(arguments.policy)
+    for job in trange(arguments.jobs, desc=name, unit="job"):
+        if trained:
+            trained.reset()
+        act = trained or wandering(arguments.seed + job)
+        observation, ended = collector.reset(seed=arguments.seed + job)[0], False
+        while not ended:
+            observation, _, terminated, truncated, _ = collector.step(act(observation))
+            ended = terminated or truncated
+    collector.create_dataset(
+        name, algorithm_name=behaviour, author="The chaosgym developers", requirements=["chaosgym"],
+        code_permalink="agents/export_minari.py",
+        description=f"{arguments.jobs} jobs of {arguments.env} from seed {arguments.seed}, {behaviour}",
+    )  # fmt: skip
+    collector.close()
+    print(f"{name}: {arguments.jobs} jobs in {folder}")
+
+
+if __name__ == "__main__":
+    main()

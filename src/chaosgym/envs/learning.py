@@ -1,0 +1,139 @@
+"""How does a learner see and move a machine? With a memory of what it felt at each speed, and in steps of the drive.
+
+A machine is hidden from the agent, but it answers the same way when a speed is tried again. The memory adds, for every
+bin of speed, the mean and the standard deviation of the peak forces measured there in this job, and their number.
+Increments let an action say by how much the speed shall change instead of where it shall end.
+"""
+
+from typing import Any, cast
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.spaces import Box, Space
+from numpy.typing import NDArray
+
+from chaosgym.envs.observation import Observation
+
+Array = NDArray[np.float64]
+Actions = NDArray[np.float32]
+
+BINS = 53
+"""Bins over the range of the drive: 0.5 Hz of the beam, 5 rpm of the crank, centred on the speeds at both ends."""
+
+FIRST_PEAK = 8
+"""Place of the first measured peak in an observation; the speed is at place 0."""
+
+WELL_KNOWN = 100.0
+"""Peaks after which a bin counts as fully known."""
+
+
+class SpeedMemory:
+    """Peak forces by speed, of n jobs side by side.
+
+    Parameters
+    ----------
+    space
+        Of the observations, d numbers.
+    """
+
+    def __init__(self, space: Box) -> None:
+        self.space = remembered_space(space)
+        self._lowest, self._highest = float(space.low[0]), float(space.high[0])
+        # the peaks are those entries that have the range of the force sensor
+        cycles = int(np.count_nonzero(space.high[FIRST_PEAK:] == space.high[FIRST_PEAK]))
+        self._peaks = slice(FIRST_PEAK, FIRST_PEAK + cycles)
+        self._sums = np.zeros((0, 3, BINS))
+
+    def start(self, observations: Observation) -> Observation:
+        """Forget everything and take in the first observations (n, d) of n jobs; return (n, d + 3 BINS)."""
+        self._sums = np.zeros((len(observations), 3, BINS))
+        return self.add(observations)
+
+    def restart(self, which: NDArray[np.bool_], observations: Observation) -> Observation:
+        """Forget k of the jobs, ``which`` (n,), and take in their first observations (k, d); return (k, d + 3 BINS)."""
+        self._sums[which] = self._news(observations)
+        return self._remembered(observations, self._sums[which])
+
+    def add(self, observations: Observation) -> Observation:
+        """Take in observations (n, d) and return them with what is remembered, (n, d + 3 BINS)."""
+        self._sums += self._news(observations)
+        return self._remembered(observations, self._sums)
+
+    def _news(self, observations: Observation) -> Array:
+        """Number, sum and sum of squares of the peaks of observations (n, d), each at its bin: (n, 3, BINS)."""
+        place = (observations[:, 0] - self._lowest) / (self._highest - self._lowest) * (BINS - 1)
+        bins, jobs = np.rint(place).astype(np.int64), np.arange(len(observations))
+        peaks = observations[:, self._peaks].astype(float)
+        news = np.zeros((len(peaks), 3, BINS))
+        news[jobs, 0, bins] = peaks.shape[1]
+        news[jobs, 1, bins] = peaks.sum(axis=1)
+        news[jobs, 2, bins] = (peaks**2).sum(axis=1)
+        return news
+
+    def _remembered(self, observations: Observation, sums: Array) -> Observation:
+        count, total, squares = sums[:, 0], sums[:, 1], sums[:, 2]
+        mean = total / np.maximum(count, 1.0)
+        deviation = np.sqrt(np.maximum(squares / np.maximum(count, 1.0) - mean**2, 0.0))
+        known = np.minimum(count / WELL_KNOWN, 1.0)
+        return np.concatenate([observations, mean, deviation, known], axis=1, dtype=np.float32)
+
+
+def remembered_space(space: Box) -> Box:
+    """Return the space of observations with memory, of the space of those without."""
+    ranges = np.repeat([space.high[FIRST_PEAK], space.high[FIRST_PEAK], 1.0], BINS)
+    return Box(
+        np.concatenate([space.low, np.zeros(3 * BINS)]).astype(np.float32),
+        np.concatenate([space.high, ranges]).astype(np.float32),
+    )
+
+
+def commanded(increments: Actions, observations: Observation, space: Box, largest: float) -> Actions:
+    """Return the actions (n, 1) that change the observed speeds by increments (n, 1) of -1 to 1 times ``largest``.
+
+    Parameters
+    ----------
+    increments, observations
+        (n, 1), and (n, d) of which the first entry is the speed.
+    space
+        Of the observations.
+    largest
+        Change of speed for an increment of 1, in the machine's unit.
+    """
+    low, high = space.low[0], space.high[0]
+    target = observations[:, :1] + largest * np.clip(increments, -1.0, 1.0)
+    return np.clip(2.0 * (target - low) / (high - low) - 1.0, -1.0, 1.0).astype(np.float32)
+
+
+class LearnerView(gym.Wrapper[Observation, Actions, Observation, Actions]):
+    """One environment with a memory of speeds, moved by increments: for instance as ``env_wrapper`` of rl-zoo.
+
+    Parameters
+    ----------
+    env
+        A chaosgym environment.
+    memory, increments
+        Leave one of them out.
+    """
+
+    def __init__(self, env: gym.Env[Observation, Actions], memory: bool = True, increments: bool = True) -> None:
+        super().__init__(env)
+        self._space = cast(Box, env.observation_space)
+        self._memory = SpeedMemory(self._space) if memory else None
+        self._largest = env.get_wrapper_attr("drive").slew_limit if increments else None
+        if self._memory:
+            self.observation_space = cast(Space[Observation], self._memory.space)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start a job, with nothing remembered."""
+        self._last, info = self.env.reset(seed=seed, options=options)
+        return self._memory.start(self._last[None])[0] if self._memory else self._last, info
+
+    def step(self, action: Actions) -> tuple[Observation, Any, bool, bool, dict[str, Any]]:
+        """Run a step and remember it."""
+        if self._largest is not None:
+            action = commanded(action[None], self._last[None], self._space, self._largest)[0]
+        self._last, reward, terminated, truncated, info = self.env.step(action)
+        seen = self._memory.add(self._last[None])[0] if self._memory else self._last
+        return seen, reward, terminated, truncated, info

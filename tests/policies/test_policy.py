@@ -1,0 +1,143 @@
+"""A trained policy is the same numbers under numpy as under torch, and a file that is not one is refused."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from gymnasium.spaces import Box
+from sb3_contrib import RecurrentPPO
+from stable_baselines3 import PPO, SAC
+
+from chaosgym.envs import SB3VecEnv
+from chaosgym.envs.sb3 import SB3LearnerView
+from chaosgym.errors import ModelFileError
+from chaosgym.policies import TrainedPolicy, load_policy, save_policy, shipped_policy
+from chaosgym.policies.export import exported
+from chaosgym.policies.network import Dense, Network
+from tests.policies.made_up import ENV, trained
+
+SMALL = {"n_steps": 32, "batch_size": 32, "n_epochs": 1}
+MODELS = {
+    "PPO": lambda: trained(PPO, "MlpPolicy", **SMALL),
+    "PPO that explores by state": lambda: trained(PPO, "MlpPolicy", use_sde=True, **SMALL),
+    "recurrent PPO": lambda: trained(RecurrentPPO, "MlpLstmPolicy", policy_kwargs={"lstm_hidden_size": 16}, **SMALL),
+    "SAC": lambda: trained(SAC, "MlpPolicy", learning_starts=16, batch_size=16, buffer_size=100),
+}
+
+
+@pytest.mark.parametrize("name", list(MODELS))
+def test_numpy_plays_what_torch_plays(name, tmp_path):
+    """Over 30 steps of four jobs, the actions of the files differ from those of torch by less than 1e-5."""
+    model, envs = MODELS[name]()
+    space = envs.observation_space
+    save_policy(exported(model, ENV, envs, normalise=envs), tmp_path)
+    policy = load_policy(tmp_path)
+    observations = np.random.default_rng(0).uniform(space.low, space.high, (30, 4, *space.shape)).astype(np.float32)
+    state, start = None, np.ones(4, bool)
+    for observation in observations:
+        expected, state = model.predict(envs.normalize_obs(observation), state, start, deterministic=True)
+        start[:] = False
+        np.testing.assert_allclose(policy(observation), expected, atol=1e-5)
+    assert np.ptp(expected) > 0.0
+
+
+def test_a_policy_sees_and_moves_as_it_did_in_training():
+    """The policy is given plain observations; training had a memory of speeds and increments for actions."""
+    plain = SB3VecEnv(ENV, num_envs=2, job_cycles=50)
+    envs = SB3LearnerView(plain)
+    model = PPO("MlpPolicy", envs, seed=0, device="cpu", **SMALL)
+    policy = exported(model, ENV, plain, memory=True, increments=True)
+    envs.seed(5)
+    seen = envs.reset()
+    size = plain.observation_space.shape[0]
+    for _ in range(9):
+        action, _ = model.predict(seen, deterministic=True)
+        speed = seen[:, 0]
+        target = 4.0 + 13.0 * (policy(seen[:, :size])[:, 0] + 1.0)
+        np.testing.assert_allclose(target, np.clip(speed + action[:, 0], 4.0, 30.0), rtol=1e-5)
+        seen = envs.step(np.linspace(-1.0, 1.0, 2, dtype=np.float32)[:, None])[0]
+
+
+def test_a_single_observation_gives_a_single_action_and_a_job_is_forgotten(tmp_path):
+    """A policy is a controller: (13,) in, (1,) out; after reset() it starts as new."""
+    model, envs = MODELS["recurrent PPO"]()
+    policy = exported(model, ENV, envs, normalise=envs)
+    observation = envs.observation_space.high
+    first, second = policy(observation), policy(observation)
+    policy.reset()
+    assert first.shape == (1,)
+    assert np.array_equal(policy(observation), first)
+    assert not np.array_equal(first, second)
+
+
+def _saved(folder):
+    space = Box(np.zeros(13, np.float32), np.ones(13, np.float32))
+    layer = Dense(np.full((1, 13), 0.1, np.float32), np.zeros(1, np.float32), "none")
+    folder.mkdir(exist_ok=True)
+    save_policy(TrainedPolicy(ENV, space, Box(-1.0, 1.0, (1,), np.float32), Network(None, (layer,))), folder)
+    return folder
+
+
+def test_the_same_policy_gives_the_same_bytes(tmp_path):
+    """Nothing in the files depends on when they were written."""
+    one, other = _saved(tmp_path / "one"), _saved(tmp_path / "other")
+    for name in ("policy.json", "weights.npz"):
+        assert (one / name).read_bytes() == (other / name).read_bytes()
+
+
+def _edit(folder, **changes):
+    path = folder / "policy.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+
+
+DAMAGES = {
+    "no weights.npz": lambda folder: (folder / "weights.npz").unlink(),
+    "does not match the hash": lambda folder: (folder / "weights.npz").write_bytes(b"PK"),
+    "format 2": lambda folder: _edit(folder, format=2),
+    "KeyError: 'layer1.weight'": lambda folder: _edit(folder, activations=["none", "none"]),
+    "activation 'cosine'": lambda folder: _edit(folder, activations=["cosine"]),
+    "expected: float32 (1, 12)": lambda folder: _edit(folder, observation={"low": [0.0] * 12, "high": [1.0] * 12}),
+    "expected: float32 (2, 13)": lambda folder: _edit(folder, action={"low": [-1.0] * 2, "high": [1.0] * 2}),
+}
+
+
+@pytest.mark.parametrize("complaint", list(DAMAGES))
+def test_a_damaged_policy_is_refused_by_name(complaint, tmp_path):
+    """Every damage ends in a ModelFileError that says what is wrong."""
+    folder = _saved(tmp_path / "policy")
+    DAMAGES[complaint](folder)
+    with pytest.raises(ModelFileError) as refusal:
+        load_policy(folder)
+    assert complaint in str(refusal.value)
+
+
+def test_objects_in_the_weights_are_not_unpickled(tmp_path):
+    """A file with an object array is refused, even if its hash is right."""
+    import hashlib
+
+    folder = _saved(tmp_path / "policy")
+    np.savez(folder / "weights.npz", **{"layer0.weight": np.array([print], dtype=object)})
+    _edit(folder, sha256=hashlib.sha256((folder / "weights.npz").read_bytes()).hexdigest())
+    with pytest.raises(ModelFileError, match="pickle"):
+        load_policy(folder)
+
+
+def test_an_observation_of_another_length_is_refused(tmp_path):
+    """The message names both shapes."""
+    policy = load_policy(_saved(tmp_path / "policy"))
+    with pytest.raises(ModelFileError, match=r"\(12,\).*\(13,\)"):
+        policy(np.zeros(12, np.float32))
+
+
+def test_an_environment_without_a_policy_says_so():
+    """And says how to get one."""
+    with pytest.raises(ModelFileError, match="no policy is shipped for chaosgym/Nothing-v0"):
+        shipped_policy("chaosgym/Nothing-v0")
+
+
+def test_a_copied_folder_is_the_same_policy(tmp_path):
+    """Nothing points out of the folder."""
+    copy = shutil.copytree(_saved(tmp_path / "policy"), tmp_path / "copy")
+    shutil.rmtree(tmp_path / "policy")
+    assert load_policy(copy)(np.full(13, 0.5, np.float32)) == pytest.approx(0.65)
