@@ -18,6 +18,7 @@ import numba
 import numpy as np
 import stable_baselines3
 import torch
+from shaping import ClairvoyantShaping
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
@@ -60,7 +61,8 @@ class Run:
     Parameters
     ----------
     arguments
-        A dataclass with at least env, steps, seed, out, envs, memory, increments, gamma, evaluate_every, jobs, threads.
+        A dataclass with at least env, steps, seed, out, envs, memory, increments, shaping, gamma, evaluate_every, jobs
+        and threads.
     wrapped
         Puts one more wrapper around the environments of training.
     """
@@ -71,8 +73,10 @@ class Run:
         self._open_folder()
         torch.set_num_threads(arguments.threads)
         numba.set_num_threads(min(arguments.threads, numba.config.NUMBA_NUM_THREADS))
-        self.envs = VecNormalize(VecMonitor(wrapped(self._environments(arguments.envs))), gamma=arguments.gamma)
-        self._judges = self._environments(arguments.jobs)
+        envs: VecEnv = VecMonitor(SB3VecEnv(arguments.env, arguments.envs))
+        envs = wrapped(ClairvoyantShaping(envs) if arguments.shaping else envs)
+        self.envs = VecNormalize(self._seen(envs), gamma=arguments.gamma)
+        self._judges = self._seen(SB3VecEnv(arguments.env, arguments.jobs))
 
     def _open_folder(self) -> None:
         arguments, config = asdict(self.arguments), self.folder / "config.json"
@@ -85,8 +89,7 @@ class Run:
         elif (self.folder / "policy.zip").exists():
             raise SystemExit(f"--out {self.folder} holds this run, finished; choose another folder")
 
-    def _environments(self, count: int) -> VecEnv:
-        envs = SB3VecEnv(self.arguments.env, count)
+    def _seen(self, envs: VecEnv) -> VecEnv:
         return SB3LearnerView(envs, self.arguments.memory, self.arguments.increments)
 
     def resumed(self, kind: type[BaseAlgorithm]) -> Any:

@@ -9,12 +9,12 @@ A. Y. Ng, D. Harada and S. Russell, Policy invariance under reward transformatio
 
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
+from tqdm import trange
 
-from chaosgym.controllers.forecast import training_forecasts, worth_of_steps
+from chaosgym.controllers.forecast import forecast_of, worth_of_steps
 
 Array = NDArray[np.float64]
 
@@ -25,19 +25,18 @@ class ClairvoyantShaping(VecEnvWrapper):
     Parameters
     ----------
     envs
-        A ``SB3VecEnv`` on machines of the training pool.
-    env
-        Its id.
+        With the observations of chaosgym's environments: the speed first, the remaining share of the job third.
     """
 
-    def __init__(self, envs: VecEnv, env: str) -> None:
+    def __init__(self, envs: VecEnv) -> None:
         super().__init__(envs)
-        forecasts = training_forecasts(gym.make(env).unwrapped)
-        ahead = np.zeros((len(forecasts), forecasts[0].steps + 1, len(forecasts[0].speeds)))
-        for k, forecast in enumerate(forecasts):
+        pool, task = envs.get_attr("pool")[0], envs.get_attr("task")[0]
+        self._speeds = pool.speeds
+        self._ahead = np.zeros((len(pool), task.job_cycles // task.cycles_per_step + 1, len(pool.speeds)))
+        for k in trange(len(pool), desc="best schedules", unit="machine"):
+            forecast = forecast_of(pool, pool.regimes(k), task)
             for step, worth in enumerate(worth_of_steps(forecast)):
-                ahead[k, step] = forecast.best_within_reach(worth[:1])[0]
-        self._ahead, self._speeds = ahead, forecasts[0].speeds
+                self._ahead[k, step] = forecast.best_within_reach(worth[:1])[0]
 
     def reset(self) -> Any:
         """Start all jobs."""

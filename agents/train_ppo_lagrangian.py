@@ -134,16 +134,19 @@ class Arguments:
     out: str = "runs/ppo-lagrangian"
     cost_limit: float = 0.05
     multiplier_rate: float = 1.0
-    envs: int = 8
+    envs: int = 16
     rollout: int = 200
-    batch: int = 200
-    epochs: int = 10
-    learning_rate: float = 1e-3
-    gamma: float = 0.98
+    batch: int = 400
+    epochs: int = 8
+    learning_rate: float = 7e-4
+    gamma: float = 0.95
+    gae_lambda: float = 0.9
     entropy: float = 0.0
-    log_std: float = -2.0
+    log_std: float = -0.7
+    units: int = 128
     memory: bool = True
     increments: bool = True
+    shaping: bool = True
     evaluate_every: int = 25_000
     jobs: int = 16
     threads: int = 1
@@ -156,8 +159,9 @@ def main() -> None:
     model = run.resumed(LagrangianPPO) or LagrangianPPO(
         "MlpPolicy", run.envs, cost_limit=arguments.cost_limit, multiplier_rate=arguments.multiplier_rate,
         n_steps=arguments.rollout, batch_size=arguments.batch, n_epochs=arguments.epochs,
-        learning_rate=arguments.learning_rate, gamma=arguments.gamma, ent_coef=arguments.entropy, seed=arguments.seed,
-        device="cpu", policy_kwargs={"log_std_init": arguments.log_std},
+        learning_rate=arguments.learning_rate, gamma=arguments.gamma, gae_lambda=arguments.gae_lambda,
+        ent_coef=arguments.entropy, seed=arguments.seed, device="cpu",
+        policy_kwargs={"log_std_init": arguments.log_std, "net_arch": [arguments.units, arguments.units]},
     )  # fmt: skip
     run.learn(model)
 

@@ -19,17 +19,19 @@ class Arguments:
     steps: int = 300_000
     seed: int = 0
     out: str = "runs/ppo-lstm"
-    envs: int = 8
+    envs: int = 16
     rollout: int = 200
     batch: int = 400
     epochs: int = 5
-    learning_rate: float = 1e-3
-    gamma: float = 0.98
+    learning_rate: float = 7e-4
+    gamma: float = 0.95
+    gae_lambda: float = 0.9
     entropy: float = 0.0
-    log_std: float = -2.0
+    log_std: float = -0.7
     units: int = 64
     memory: bool = False
     increments: bool = True
+    shaping: bool = True
     evaluate_every: int = 25_000
     jobs: int = 16
     threads: int = 1
@@ -41,8 +43,9 @@ def main() -> None:
     run = common.Run(arguments)
     model = run.resumed(RecurrentPPO) or RecurrentPPO(
         "MlpLstmPolicy", run.envs, n_steps=arguments.rollout, batch_size=arguments.batch, n_epochs=arguments.epochs,
-        learning_rate=arguments.learning_rate, gamma=arguments.gamma, ent_coef=arguments.entropy, seed=arguments.seed,
-        device="cpu", policy_kwargs={"log_std_init": arguments.log_std, "lstm_hidden_size": arguments.units},
+        learning_rate=arguments.learning_rate, gamma=arguments.gamma, gae_lambda=arguments.gae_lambda,
+        ent_coef=arguments.entropy, seed=arguments.seed, device="cpu",
+        policy_kwargs={"log_std_init": arguments.log_std, "lstm_hidden_size": arguments.units},
     )  # fmt: skip
     run.learn(model)
 

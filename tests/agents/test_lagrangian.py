@@ -37,11 +37,11 @@ def _trained(limit, monkeypatch):
 
     torch.set_num_threads(1)
     model = LagrangianPPO(
-        "MlpPolicy", CostRecorder(DummyVecEnv([Push] * 4)), cost_limit=limit, multiplier_rate=0.3, n_steps=50,
+        "MlpPolicy", CostRecorder(DummyVecEnv([Push] * 4)), cost_limit=limit, multiplier_rate=0.05, n_steps=50,
         batch_size=100, n_epochs=5, learning_rate=5e-3, seed=1, device="cpu", policy_kwargs={"log_std_init": -1.5},
-    ).learn(20_000)  # fmt: skip
+    ).learn(30_000)  # fmt: skip
     push = float(model.predict(np.zeros(1, np.float32), deterministic=True)[0][0])
-    return push, float(model.policy.log_std.exp()), float(model.multiplier)
+    return push, float(model.policy.log_std.detach().exp()), float(model.multiplier)
 
 
 def test_the_constraint_holds_and_is_used_up(monkeypatch):
