@@ -43,7 +43,7 @@ def test_tables_are_shipped(name: str) -> None:
     pool = gym.make(name).unwrapped.pool
     file = shipped(pool.nominal.name, pool.task)
     assert file is not None
-    assert pool.speeds is file.speeds
+    assert np.array_equal(pool.speeds, file.speeds)
     assert file.nature.shape[1:] == (len(pool.levels), len(file.speeds))
     assert len(file.nature) == (len(pool.factors) if name in COMPLETE else 1)
 

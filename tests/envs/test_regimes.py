@@ -37,7 +37,7 @@ def test_the_table_is_what_diagnosis_says(tmp_path, monkeypatch: pytest.MonkeyPa
     """Nature and largest force are those of ``diagnose`` from rest; a second call reads the file."""
     monkeypatch.setattr("chaosgym.envs.regimes.KERNEL_CACHE", str(tmp_path))
     drive = SpeedDrive(lowest_speed=19.0, highest_speed=24.0, slew_limit=1.0, regime_spacing=2.5)
-    table = regimes_of(THESIS_IMPACT_BEAM, drive)
+    table = regimes_of(THESIS_IMPACT_BEAM, drive.regime_speeds)
     assert table.speeds.tolist() == [19.0, 21.5, 24.0]
     for speed, periodic, peak in zip(table.speeds.tolist(), table.periodic, table.peak_force, strict=True):
         verdict = diagnose(at_speed(THESIS_IMPACT_BEAM, speed), budget=HORIZON)
@@ -45,5 +45,5 @@ def test_the_table_is_what_diagnosis_says(tmp_path, monkeypatch: pytest.MonkeyPa
         assert peak == pytest.approx(verdict.evidence["largest_peak"], rel=0.02)
     assert np.all(table.equivalent_force <= table.peak_force)
     monkeypatch.setattr("chaosgym.envs.regimes.diagnosed", None)
-    again = regimes_of(THESIS_IMPACT_BEAM, drive)
+    again = regimes_of(THESIS_IMPACT_BEAM, drive.regime_speeds)
     assert np.array_equal(again.equivalent_force, table.equivalent_force)

@@ -37,7 +37,7 @@ def test_an_id_can_name_the_package_to_import() -> None:
 def test_the_spec_survives_json(name: str) -> None:
     """An environment made from the JSON of its spec is the same, keywords included."""
     machine = gym.make(name).unwrapped.nominal
-    env = gym.make(name, **{machine.clearance_field: 0.0635e-3}, lowest_speed=25.0, highest_speed=27.0, job_cycles=50)
+    env = gym.make(name, **{machine.clearance_field: 0.0635e-3}, lowest_speed=25.0, highest_speed=30.0, job_cycles=50)
     assert env.spec is not None
     again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
     first, second = (e.reset(seed=3)[0] for e in (env, again))

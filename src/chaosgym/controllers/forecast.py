@@ -72,7 +72,7 @@ class Forecast(NamedTuple):
 
 
 def forecast_of(pool: Pool, tables: Sequence[RegimeTable], task: Task) -> Forecast:
-    """Return what a task costs by a machine's tables, one for each clearance of its pool; no step wears more than a life."""
+    """Return what a task costs by tables for each clearance of a pool; no step wears more than a life."""
     drive, period_at = pool.drive, pool.nominal.period_at
     damage = np.linspace(0.0, 1.0, DAMAGE_LEVELS)
     at_level = [tables[place] for place in nearest(pool.levels, 1.0 + damage).tolist()]
@@ -84,7 +84,8 @@ def forecast_of(pool: Pool, tables: Sequence[RegimeTable], task: Task) -> Foreca
     return Forecast(
         speeds=pool.speeds, damage=damage,
         time=-task.time_weight * task.cycles_per_step * period_at(pool.speeds) / job_time,
-        type_iii=-task.type_iii_weight * share * type_iii, wear=np.minimum(task.damage(forces), 1.0), damage_weight=task.damage_weight,
+        type_iii=-task.type_iii_weight * share * type_iii, wear=np.minimum(task.damage(forces), 1.0),
+        damage_weight=task.damage_weight,
         moves=max(1, int(drive.slew_limit / spacing * (1.0 + 1e-12))), steps=task.job_cycles // task.cycles_per_step,
         fracture=-task.failure_weight,
     )  # fmt: skip

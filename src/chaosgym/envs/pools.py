@@ -66,11 +66,12 @@ class PoolFile:
     equivalent_force: NDArray[np.float32]
     peak_force: NDArray[np.float32]
 
-    def tables(self, row: int) -> tuple[RegimeTable, ...]:
-        """Tables of one machine, one for each clearance."""
+    def tables(self, row: int, speeds: slice) -> tuple[RegimeTable, ...]:
+        """Tables of one machine over a part of the speeds, one for each clearance."""
         levels = zip(self.nature[row], self.equivalent_force[row], self.peak_force[row], strict=True)
         return tuple(
-            RegimeTable(self.speeds, nature, force.astype(float), peak.astype(float)) for nature, force, peak in levels
+            RegimeTable(self.speeds[speeds], nature[speeds], force[speeds].astype(float), peak[speeds].astype(float))
+            for nature, force, peak in levels
         )
 
 
@@ -153,10 +154,10 @@ class Pool:
         """Tables of the nominal machine, one for each of ``levels``."""
         return self._tables(0)
 
-    @property
+    @cached_property
     def speeds(self) -> Array:
-        """Speeds of the tables, (n,)."""
-        return self.drive.regime_speeds if self._shipped is None else self._shipped.speeds
+        """Speeds of the tables, (n,): those of the shipped ones, as far as the drive needs them, or its own."""
+        return self.drive.regime_speeds if self._shipped is None else self._shipped.speeds[self._needed]
 
     def checked(self, machine: Any) -> NDArray[np.int64]:
         """Return numbers of machines (...).
@@ -183,16 +184,26 @@ class Pool:
         covers = file.speeds[0] <= self.drive.lowest_speed and self.drive.highest_speed <= file.speeds[-1]
         return file if same and covers else None
 
+    @cached_property
+    def _needed(self) -> slice:
+        """Part of the shipped speeds that covers the range of the drive."""
+        assert self._shipped is not None
+        speeds, (lowest, highest) = self._shipped.speeds, (self.drive.lowest_speed, self.drive.highest_speed)
+        return slice(int(np.searchsorted(speeds, lowest, "right")) - 1, int(np.searchsorted(speeds, highest)) + 1)
+
     def _tables(self, row: int) -> tuple[RegimeTable, ...]:
         if row not in self._kept:
             file = self._shipped
-            self._kept[row] = self.computed(row) if file is None or row >= len(file.nature) else file.tables(row)
+            if file is None or row >= len(file.nature):
+                self._kept[row] = self.computed(row, self.speeds)
+            else:
+                self._kept[row] = file.tables(row, self._needed)
         return self._kept[row]
 
-    def computed(self, row: int) -> tuple[RegimeTable, ...]:
-        """Tables of the machine of a row, computed unless they are kept on disk."""
+    def computed(self, row: int, speeds: Array) -> tuple[RegimeTable, ...]:
+        """Tables of the machine of a row at some speeds (n,), computed unless they are kept on disk."""
         machine = self._machine(row)
-        return tuple(regimes_of(worn(machine, ratio), self.drive) for ratio in self.levels.tolist())
+        return tuple(regimes_of(worn(machine, ratio), speeds) for ratio in self.levels.tolist())
 
 
 def make_pools(pool: Pool, folder: Path, command: str, machines: int | None = None) -> tuple[Path, PoolFile]:
@@ -202,7 +213,8 @@ def make_pools(pool: Pool, folder: Path, command: str, machines: int | None = No
     ``machines`` are looked at, the nominal one first; all by default.
     """
     rows = trange(len(pool.factors[:machines]), desc=f"{pool.task} pools of {pool.nominal.name}", unit="machine")
-    tables = [pool.computed(row) for row in rows]
+    speeds = pool.drive.regime_speeds
+    tables = [pool.computed(row, speeds) for row in rows]
     about = {
         "machine": repr(pool.nominal), "tolerances": pool.tolerances, "levels": pool.levels.tolist(),
         "seed": SEEDS[pool.task], "horizon": HORIZON, "chaosgym": __version__, "command": command,
@@ -211,9 +223,7 @@ def make_pools(pool: Pool, folder: Path, command: str, machines: int | None = No
         np.array([[getattr(table, name) for table in row] for row in tables])
         for name in ("nature", "equivalent_force", "peak_force")
     )
-    file = PoolFile(
-        about, pool.factors, pool.drive.regime_speeds, nature, equivalent.astype(np.float32), peak.astype(np.float32)
-    )
+    file = PoolFile(about, pool.factors, speeds, nature, equivalent.astype(np.float32), peak.astype(np.float32))
     path = folder / f"{pool.nominal.name}-{pool.task}.npz"
     write_atomically(path, lambda temporary: _save(temporary, file))
     return path, file

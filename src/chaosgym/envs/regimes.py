@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from chaosgym.core import KERNEL_CACHE
-from chaosgym.envs.drive import SpeedDrive
 from chaosgym.errors import SimulationError
 from chaosgym.files import write_atomically
 from chaosgym.fleet import at_speed
@@ -84,19 +83,18 @@ class RegimeTable:
         return np.asarray(self.type_iii[self.index_of(speed)])
 
 
-def regimes_of(machine: Machine, drive: SpeedDrive, *, workers: int | None = None) -> RegimeTable:
-    """Return the table of a machine over the range of a drive: the one kept on disk, or computed now.
+def regimes_of(machine: Machine, speeds: Array, *, workers: int | None = None) -> RegimeTable:
+    """Return the table of a machine at evenly spaced speeds (n,): the one kept on disk, or computed now.
 
     Parameters
     ----------
     machine
         At any speed.
-    drive
-        Its ``regime_speeds`` are looked at.
+    speeds
+        In the unit of the machine's speed field.
     workers
         Threads; all processors by default.
     """
-    speeds = drive.regime_speeds
     path = _kept_at(machine, speeds)
     if not path.is_file():
         points = diagnosed([at_speed(machine, speed) for speed in speeds.tolist()], workers)
