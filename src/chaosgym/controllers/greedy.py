@@ -31,13 +31,13 @@ class GreedyClassifier(Controller):
         machines = [at_speed(self.env.nominal, float(speed)) for speed in speeds]
         values = np.array([[getattr(machine, name) for name in fields] for machine in machines])
         known = self._classifier.parameters
-        self._before = self._irregular(known, known.features(values))
+        self._before = self._irregular(known, values)
         self._force = known.predict_peak_force(known.features(values), values)[:, 1]
 
     @staticmethod
-    def _irregular(known: Any, features: Array) -> Array:
+    def _irregular(known: Any, values: Array, **record: Any) -> Array:
         """Probability (n,) that a response is not periodic."""
-        chances = known.natures_of(known.chances(features))
+        chances = known.predict_nature_proba(values, **record)
         return np.asarray(1.0 - chances[:, list(known.natures_).index("periodic")])
 
     def reset(self) -> None:
@@ -67,5 +67,5 @@ class GreedyClassifier(Controller):
         self._held = (place, record)
         records = self._classifier.records
         if len(record) >= LEAST_RECORD and records is not None:
-            features = records.features(np.array([record[-64:]]), sensor_error=np.array([self.env.rules.sensor_error]))
-            self._chance[place] = self._irregular(records, features)[0]
+            error = np.array([self.env.rules.sensor_error])
+            self._chance[place] = self._irregular(records, np.array([record[-64:]]), sensor_error=error)[0]
