@@ -30,12 +30,9 @@ def test_chaos_of_the_beam_is_agreed():
 
 
 def test_transient_chaos_is_chaos_with_a_flag():
-    """A beam that is chaotic for 79 cycles before it settles on period 6."""
-    beam = ImpactBeam(
-        excitation_frequency=23.75485448704849, clearance=0.0001330375507648476, damping_ratio=0.01707462128796029
-    )
-    verdict = diagnose(beam)
-    assert (verdict.nature, verdict.status, verdict.transient, verdict.period) == ("chaotic", "transient", True, 6)
+    """A beam that is chaotic for some 76 cycles before it settles on period 3."""
+    verdict = diagnose(ImpactBeam(excitation_frequency=27.2, clearance=0.158e-3, damping_ratio=0.028))
+    assert (verdict.nature, verdict.status, verdict.transient, verdict.period) == ("chaotic", "transient", True, 3)
 
 
 def test_a_long_period_is_proven_where_recurrence_does_not_look():
