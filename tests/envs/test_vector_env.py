@@ -177,7 +177,7 @@ def test_sub_environments_can_be_asked() -> None:
     machines = envs.get_attr("machine")
     assert [machine.excitation_frequency for machine in machines] == [20.0, 20.0]
     assert [machine.clearance for machine in machines] == [envs.get_attr("pool")[0][k].clearance for k in (4, 9)]
-    assert envs.get_attr("regimes")[1].speeds[0] == 4.0
+    assert envs.get_attr("regimes")[1].speeds[0] == 15.0
     assert envs.get_attr("drive")[1].highest_speed == 30.0
     with pytest.raises(AttributeError, match="no attribute 'sped'; known: speed"):
         envs.get_attr("sped")

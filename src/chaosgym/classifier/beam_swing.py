@@ -48,8 +48,10 @@ class SwingTable(NamedTuple):
 
 def swing_table(machine: Machine | None, fields: tuple[str, ...], grid: Array) -> SwingTable:
     """Table for a beam whose ``fields`` vary, over lengths ``grid``; without modes for whatever has no such groups."""
-    known = isinstance(machine, ImpactBeam) and machine.contact_law == "linear" and machine.n_modes >= FREE
-    if not known or not {"excitation_frequency", "clearance"} <= set(fields) <= set(FIELDS):
+    vary = {"excitation_frequency", "clearance"} <= set(fields) <= set(FIELDS)
+    if not (
+        isinstance(machine, ImpactBeam) and machine.contact_law == "linear" and machine.n_modes >= FREE and vary
+    ):  # fmt: skip
         return SwingTable(np.full(len(FIELDS), -1), np.zeros(len(FIELDS)), np.zeros(1), np.empty((0, 1)))
     places = np.array([fields.index(name) if name in fields else -1 for name in FIELDS])
     fixed = np.array([getattr(machine, name) for name in FIELDS], dtype=float)

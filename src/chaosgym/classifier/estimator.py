@@ -263,8 +263,11 @@ class ResponseClassifier:
         values = self._checked(X)
         if len(values) <= CHUNK or record:
             return self.chances(self._features(values, **record))
+        from threadpoolctl import threadpool_limits
+
         chunks = [values[start : start + CHUNK] for start in range(0, len(values), CHUNK)]
-        return np.concatenate(parallel_map(lambda part: self.chances(self._features(part)), chunks))
+        with threadpool_limits(1, "blas"):  # its own threads and ours would wait for each other
+            return np.concatenate(parallel_map(lambda part: self.chances(self._features(part)), chunks))
 
     def chances(self, features: Array) -> Array:
         """Probabilities of the pairs from features that are computed already."""

@@ -26,8 +26,15 @@ def report_table(report: Mapping[str, Any]) -> list[str]:
         lines += ["", *_block(f"nature, {name}{target}", scene["nature"])]
         lines.append(_line("response type by classifier", scene["response_type"]))
     if "transfer" in report:
+        losses = ", ".join(f"{whose} {loss:.3f}" for whose, loss in report["transfer"]["log_loss"].items())
+        lines += ["", f"records: log loss on the calibrating machines when learned from {losses}"]
         for name, scene in report["transfer"]["scenes"].items():
-            lines += ["", *_block(f"nature, {report['transfer']['machine']}, {name}", scene["nature"])]
+            lines += [
+                "",
+                *_block(
+                    f"nature, {report['transfer']['machine']} by this machine's records alone, {name}", scene["nature"]
+                ),
+            ]
     if "refused" in report:
         shares = ", ".join(f"{name} {share:.1%}" for name, share in report["refused"].items())
         lines += ["", f"records refused by fault: {shares}"]
@@ -88,7 +95,8 @@ def card_lines(card: Mapping[str, Any]) -> list[str]:
         f"# Classifier of the {card['machine']}'s response type",
         "",
         "Use: type (I, II, III) and nature of a response from machine parameters, or from 8 to 64 measured peaks.",
-        f"Data: {card['rows']['parameters']} labelled responses, {card['rows']['records']} recorded windows; "
+        f"Data: {card['rows']['parameters']} labelled responses, {card['rows']['records']} recorded windows of "
+        f"{' and '.join(card['records_of'])}; "
         f"{machines['training']} machines (or blocks) train, {machines['calibration']} calibrate, "
         f"{machines['held_out']} judge.",
         f"Range, SI: {ranges}.",

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,6 +33,15 @@ from chaosgym.machines.parameters import parameters_of
 Array = NDArray[np.float64]
 
 QUANTILE_NAMES = tuple(f"{100.0 * quantile:g} %" for quantile in QUANTILES)
+
+
+class PairNames(NamedTuple):
+    """The columns of ``Pairs`` as lists."""
+
+    types: list[str]
+    natures: list[str]
+    type_of: list[int]
+    nature_of: list[int]
 
 
 @dataclass(frozen=True)
@@ -132,6 +141,18 @@ class MachineClassifier:
         return self.records
 
     @cached_property
+    def _names(self) -> dict[str, PairNames]:
+        """Labels as plain lists, by input: a single answer is quicker with them than with arrays."""
+        known = {"parameters": self.parameters} | ({"records": self.records} if self.records else {})
+        return {name: PairNames(*(column.tolist() for column in one.pairs_[:4])) for name, one in known.items()}
+
+    @cached_property
+    def _source(self) -> dict[str, str]:
+        """Where an answer comes from, by input."""
+        of = {"parameters": [self.machine.name], "records": self.card.get("records_of", [self.machine.name])}
+        return {kind: f"learned from {self.card['rows'][kind]} {kind} of {' and '.join(of[kind])}" for kind in of}
+
+    @cached_property
     def _fixed(self) -> tuple[Any, Any]:
         """Fields that training did not vary, as a getter, and their values."""
         getter = operator.attrgetter(*[name for name in parameters_of(self.machine) if name not in self.fields])
@@ -172,34 +193,32 @@ class MachineClassifier:
     def _answer(
         self, known: ResponseClassifier, features: Array, chances: Array, values: Array, outside: str
     ) -> Classification:
-        pairs = known.pairs_
-        types, natures = [0.0] * len(pairs.types), [0.0] * len(pairs.natures)
-        for chance, kind, nature in zip(chances.tolist(), pairs.type_of, pairs.nature_of, strict=True):
+        names = self._names[known.inputs]
+        types, natures = [0.0] * len(names.types), [0.0] * len(names.natures)
+        for chance, kind, nature in zip(chances.tolist(), names.type_of, names.nature_of, strict=True):
             types[kind] += chance
             natures[nature] += chance
         confidence = max(types)
-        best_type = str(known.classes_[types.index(confidence)])
-        best_nature = str(known.natures_[natures.index(max(natures))])
+        best_type, best_nature = names.types[types.index(confidence)], names.natures[natures.index(max(natures))]
         period, reason = None, outside
         if not outside and confidence < known.least_confidence_:
             reason = f"too close to call: the most probable type, {best_type}, has a probability of {confidence:.2f}"
         if not reason and best_nature == "periodic":
             found = repeat_period(values[0]) if known.inputs == "records" else int(known.predict_period(features)[0])
             period = found or None
-        forces = known.predict_peak_force(features, values)[0] if not outside else ()
-        plausible = tuple(str(kind) for kind, chance in zip(known.classes_, types, strict=True)
-                          if chance >= min(known.plausible_, confidence))  # fmt: skip
+        forces = known.predict_peak_force(features, values)[0].tolist() if not outside else ()
+        least = min(known.plausible_, confidence)
         return Classification(
             response_type=None if reason else best_type,
             nature=None if reason else best_nature,
-            probabilities=dict(zip(known.classes_.tolist(), types, strict=True)),
-            nature_probabilities=dict(zip(known.natures_.tolist(), natures, strict=True)),
+            probabilities=dict(zip(names.types, types, strict=True)),
+            nature_probabilities=dict(zip(names.natures, natures, strict=True)),
             confidence=confidence,
             abstained=bool(reason),
-            reason=reason or f"learned from {self.card['rows'][known.inputs]} {known.inputs} of {self.machine.name}s",
+            reason=reason or self._source[known.inputs],
             period=period,
-            plausible_types=plausible,
-            peak_force=dict(zip(QUANTILE_NAMES, map(float, forces), strict=False)),
+            plausible_types=tuple(kind for kind, chance in zip(names.types, types, strict=True) if chance >= least),
+            peak_force=dict(zip(QUANTILE_NAMES, forces, strict=False)),
         )
 
     def _columns(self, known: ResponseClassifier, chances: Array, outside: NDArray[np.bool_]) -> dict[str, Any]:

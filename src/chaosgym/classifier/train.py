@@ -6,7 +6,7 @@ training on a half, a quarter and an eighth of the machines.
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -93,7 +93,8 @@ def train_classifier(
     curve
         Measure the learning curve too.
     transfer
-        Sweep of another machine, on whose held-out records the record classifier is tried.
+        Sweep of another machine. The record classifier is tried on its held-out records; then records of both are
+        learned, and that classifier is kept if it is less surprised by the calibrating machines of ``sweep``.
     noise
         What ``label_noise`` found for the sweep, for the ceiling of any classifier.
     progress
@@ -105,11 +106,14 @@ def train_classifier(
         If there are too few rows or only one response type.
     """
     examples, sparse = examples_of(sweep, seed), examples_of(thinned(sweep, seed), seed)
-    steps = 4 + (3 + len(SCENES) if examples.signals else 0) + (1 + len(CURVE) if curve else 0)
+    other = examples_of(transfer, seed) if transfer and examples.signals else None
+    steps = 4 + (3 + len(SCENES) if examples.signals else 0) + (1 + len(CURVE) if curve else 0) + (2 if other else 0)
     with tqdm(total=steps, desc="train classifier", unit="step", disable=not progress, mininterval=0.5) as bar:
         began = time.perf_counter()
         parameters = fit_parameters(sparse, ~sparse.test, model or "best", seed, tick=bar.update)
-        records = fit_records(examples, seed, tick=bar.update) if examples.signals else None
+        own = fit_records([examples], seed, tick=bar.update) if examples.signals else None
+        both = fit_records([examples, other], seed, tick=bar.update) if other else None
+        records = both if own and both and both.log_loss_ < own.log_loss_ else own
         seconds = time.perf_counter() - began
         report = _rows(sparse) | {
             "training_seconds": round(seconds, 1), "model": parameters.model_,
@@ -125,11 +129,14 @@ def train_classifier(
                 report["records"][scene.name] = compare_scene(scene, examples, records, seed)
                 bar.update()
             report["refused"] = refusals(examples, records, seed)
-            if transfer is not None:
-                report["transfer"] = _transfer(transfer, records, seed)
+        if own and both and other:
+            losses = {"own machine": own.log_loss_, "both machines": both.log_loss_}
+            report["transfer"] = _transfer(other, own, seed) | {"log_loss": losses}
         if curve:
             report["learning_curve"] = _learning_curve(sparse, parameters, seed, bar.update)
-    classifier = MachineClassifier(examples.machine, parameters, records, _card(sweep, examples, sparse, report, seed))
+    teachers = [examples, other] if other and records is both else [examples]
+    card = _card(sweep, teachers, sparse, report, seed)
+    classifier = MachineClassifier(examples.machine, parameters, records, card)
     report["speed"] = measure_speed(classifier, seed)
     return TrainingResult(classifier, report, sparse)
 
@@ -154,21 +161,33 @@ def fit_parameters(
     )  # fmt: skip
 
 
-def fit_records(examples: Examples, seed: int, tick: Callable[[], object] = lambda: None) -> ResponseClassifier:
-    """Train on noisy records of the rows that train and calibrate."""
+def fit_records(
+    machines: Sequence[Examples], seed: int, tick: Callable[[], object] = lambda: None
+) -> ResponseClassifier:
+    """Train on noisy records of the rows that train and calibrate; of machines after the first no row calibrates."""
+    parts = [_record_columns(examples, seed) for examples in machines]
+    columns: dict[str, Any] = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    whose = np.repeat(np.arange(len(parts)), [len(part["y"]) for part in parts])
+    columns["groups"] += (columns["groups"].max() + 1) * whose
+    columns["calibration"] &= whose == 0
+    classifier = ResponseClassifier("records", "boosting", rounds=ROUNDS, least_rows=LEAST_ROWS, seed=seed)
+    return classifier.fit(columns.pop("X"), columns.pop("y"), **columns, tick=tick)
+
+
+def _record_columns(examples: Examples, seed: int) -> dict[str, Any]:
+    """What ``ResponseClassifier.fit`` takes of the noisy records of one machine."""
     signals = examples.signals_where(~examples.test)
     runs = max(1, sum(len(peaks) for peaks, _, _ in signals.values()))
     noisy = training_records(signals, min(COPIES, max(1, round(RECORDS / runs))), seed)
-    later = examples.signals["settled"]
+    settled, _, at = examples.signals["settled"]
     where = np.full(len(examples.values), -1)
-    where[later[2]] = np.arange(len(later[2]))
-    columns = np.random.default_rng(seed + 1).integers(0, later[0].shape[1], len(noisy.rows))
-    classifier = ResponseClassifier("records", "boosting", rounds=ROUNDS, least_rows=LEAST_ROWS, seed=seed)
-    return classifier.fit(
-        noisy.peaks, examples.response_type[noisy.rows], nature=examples.nature[noisy.rows],
-        peak_force=later[0][where[noisy.rows], columns], groups=examples.groups[noisy.rows],
-        calibration=examples.calibration[noisy.rows], section=noisy.section, sensor_error=noisy.sensor_error, tick=tick,
-    )  # fmt: skip
+    where[at] = np.arange(len(at))
+    cycle = np.random.default_rng(seed + 1).integers(0, settled.shape[1], len(noisy.rows))
+    return {
+        "X": noisy.peaks, "y": examples.response_type[noisy.rows], "nature": examples.nature[noisy.rows],
+        "peak_force": settled[where[noisy.rows], cycle], "groups": examples.groups[noisy.rows],
+        "calibration": examples.calibration[noisy.rows], "section": noisy.section, "sensor_error": noisy.sensor_error,
+    }  # fmt: skip
 
 
 def _learning_curve(
@@ -208,9 +227,8 @@ def _accuracies(examples: Examples, classifier: ResponseClassifier, chances: NDA
             for name, (kinds, shares, truth) in told.items()}  # fmt: skip
 
 
-def _transfer(sweep: LabelledSweep, records: ResponseClassifier, seed: int) -> dict[str, Any]:
+def _transfer(other: Examples, records: ResponseClassifier, seed: int) -> dict[str, Any]:
     """Scores of the record classifier on another machine's held-out records."""
-    other = examples_of(sweep, seed)
     found = {scene.name: compare_scene(scene, other, records, seed, baselines=False) for scene in SCENES[:3]}
     return {"machine": other.machine.name, "scenes": found}
 
@@ -226,9 +244,10 @@ def _rows(examples: Examples) -> dict[str, Any]:
 
 
 def _card(
-    sweep: LabelledSweep, examples: Examples, sparse: Examples, report: dict[str, Any], seed: int
+    sweep: LabelledSweep, teachers: Sequence[Examples], sparse: Examples, report: dict[str, Any], seed: int
 ) -> dict[str, Any]:
     kept = ("sampling", "size", "seed", "budget", "signals", "transient", "cycles", "axes", "patches", "type_reach")
+    examples = teachers[0]
     return {
         "machine": examples.machine.name,
         "base": {name: getattr(examples.machine, name) for name in parameters_of(examples.machine)},
@@ -238,8 +257,9 @@ def _card(
         "data": {key: sweep.settings[key] for key in kept if key in sweep.settings},
         "rows": {
             "parameters": int(sparse.training.sum()),
-            "records": sum(len(part[0]) for part in examples.signals_where(examples.training).values()),
+            "records": sum(len(part[0]) for of in teachers for part in of.signals_where(of.training).values()),
         },
+        "records_of": [of.machine.name for of in teachers],
         "seed": seed,
         "version": __version__,
         "command": f"chaosgym train-classifier --data FOLDER --out FOLDER --seed {seed}",

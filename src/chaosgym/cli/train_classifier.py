@@ -19,7 +19,9 @@ from chaosgym.cli.output import emit
 )  # fmt: skip
 @click.option("--curve/--no-curve", default=True, show_default=True, help="Measure the learning curve.")
 @click.option(
-    "--transfer", type=click.Path(exists=True, file_okay=False), help="Sweep of another machine to try records on."
+    "--transfer",
+    type=click.Path(exists=True, file_okay=False),
+    help="Sweep of another machine, to try records on and to learn from.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def train_classifier(

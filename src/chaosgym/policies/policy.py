@@ -151,7 +151,7 @@ def save_policy(policy: TrainedPolicy, folder: str | Path) -> None:
     if policy.normalisation:
         arrays |= {"mean": policy.normalisation.mean, "deviation": policy.normalisation.deviation}
     buffer = BytesIO()
-    np.savez(buffer, **arrays)
+    np.savez(buffer, **arrays)  # type: ignore[arg-type]
     description = {
         "format": FORMAT,
         "env": policy.env,
