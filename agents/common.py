@@ -61,8 +61,8 @@ class Run:
     Parameters
     ----------
     arguments
-        A dataclass with at least env, steps, seed, out, envs, memory, increments, shaping, gamma, evaluate_every, jobs
-        and threads.
+        A dataclass with at least env, steps, seed, out, envs, memory, increments, belief, shaping, gamma,
+        evaluate_every, jobs and threads.
     wrapped
         Puts one more wrapper around the environments of training.
     """
@@ -90,7 +90,7 @@ class Run:
             raise SystemExit(f"--out {self.folder} holds this run, finished; choose another folder")
 
     def _seen(self, envs: VecEnv) -> VecEnv:
-        return SB3LearnerView(envs, self.arguments.memory, self.arguments.increments)
+        return SB3LearnerView(envs, self.arguments.memory, self.arguments.increments, self.arguments.belief)
 
     def resumed(self, kind: type[BaseAlgorithm]) -> Any:
         """Return the model of the last checkpoint, or None if there is none."""
@@ -110,7 +110,7 @@ class Run:
         self.save(model, "policy.zip")
         policy = exported(
             model, arguments.env, self.envs.unwrapped, normalise=self.envs, memory=arguments.memory,
-            increments=arguments.increments,
+            increments=arguments.increments, belief=arguments.belief,
         )  # fmt: skip
         save_policy(policy, self.folder)
         (self.folder / "checkpoint.zip").unlink(missing_ok=True)

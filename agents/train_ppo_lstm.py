@@ -31,6 +31,7 @@ class Arguments:
     units: int = 64
     memory: bool = False
     increments: bool = True
+    belief: bool = False
     shaping: bool = True
     evaluate_every: int = 25_000
     jobs: int = 16

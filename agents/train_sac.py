@@ -28,6 +28,7 @@ class Arguments:
     gradient_steps: int = 8
     memory: bool = True
     increments: bool = True
+    belief: bool = False
     shaping: bool = True
     evaluate_every: int = 10_000
     jobs: int = 16

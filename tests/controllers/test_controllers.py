@@ -14,8 +14,8 @@ from chaosgym.controllers import (
     RecedingHorizon,
     SafeConstant,
 )
-from chaosgym.controllers.forecast import constant_returns, training_forecasts
 from chaosgym.controllers.ladder import LADDER, each_cycle_keywords
+from chaosgym.envs.forecast import constant_returns, training_forecasts
 from chaosgym.errors import ParameterError
 from chaosgym.evaluation.jobs import run_job
 

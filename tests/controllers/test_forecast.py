@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chaosgym.controllers.forecast import Forecast, constant_returns, worth_of_steps
+from chaosgym.envs.forecast import Forecast, constant_returns, worth_of_steps
 
 
 def _forecast(reward, wear, *, moves=1, steps=3, levels=201):

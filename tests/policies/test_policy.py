@@ -94,7 +94,7 @@ def _edit(folder, **changes):
 DAMAGES = {
     "no weights.npz": lambda folder: (folder / "weights.npz").unlink(),
     "does not match the hash": lambda folder: (folder / "weights.npz").write_bytes(b"PK"),
-    "format 2": lambda folder: _edit(folder, format=2),
+    "format 1": lambda folder: _edit(folder, format=1),
     "KeyError: 'layer1.weight'": lambda folder: _edit(folder, activations=["none", "none"]),
     "activation 'cosine'": lambda folder: _edit(folder, activations=["cosine"]),
     "expected: float32 (1, 12)": lambda folder: _edit(folder, observation={"low": [0.0] * 12, "high": [1.0] * 12}),

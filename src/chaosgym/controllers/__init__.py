@@ -5,6 +5,7 @@ controller = SkipBands(env)          # after observation, info = env.reset(): co
 action = controller(observation)
 """
 
+from chaosgym.controllers.belief_programming import BeliefProgramming
 from chaosgym.controllers.constant import ClairvoyantConstant, ConstantSpeed, HighestSpeed, LowestSpeed, SafeConstant
 from chaosgym.controllers.controller import Controller
 from chaosgym.controllers.delayed_feedback import DelayedFeedback
@@ -18,6 +19,7 @@ from chaosgym.controllers.skip_bands import SkipBands
 
 __all__ = [
     "OGY",
+    "BeliefProgramming",
     "ClairvoyantConstant",
     "ClairvoyantHorizon",
     "ConstantSpeed",

@@ -6,8 +6,8 @@ import gymnasium as gym
 import numpy as np
 
 from chaosgym.controllers.controller import Action, Controller, Observation, single
-from chaosgym.controllers.forecast import constant_returns, forecast_for, training_forecasts
 from chaosgym.envs.drive import checked_number
+from chaosgym.envs.forecast import constant_returns, forecast_for, training_forecasts
 
 
 class ConstantSpeed(Controller):

@@ -25,9 +25,6 @@ Knowledge = Literal["nothing", "measurements", "nominal", "tolerance range", "ma
 """What a controller looks at, each item beside the observation: nothing of it, the observation alone, the nominal
 machine, the training pool, or this very machine."""
 
-Model = Literal["nominal", "machine"]
-"""Machine that a planner takes for the true one: the nominal one, or this very machine."""
-
 
 def single(env: gym.Env[Any, Any]) -> MachineEnv:
     """Return the environment without its wrappers.

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from chaosgym.controllers.controller import Action, Controller, Knowledge, Model, Observation
-from chaosgym.controllers.forecast import forecast_for, worth_of_steps
+from chaosgym.controllers.controller import Action, Controller, Knowledge, Observation
+from chaosgym.envs.forecast import Model, forecast_for, worth_of_steps
 
 
 class DynamicProgramming(Controller):

@@ -11,7 +11,7 @@ import numpy as np
 
 from chaosgym.classifier import default_classifier
 from chaosgym.controllers.controller import Action, Array, Controller, Observation
-from chaosgym.controllers.forecast import forecast_for
+from chaosgym.envs.forecast import forecast_for
 from chaosgym.fleet import at_speed
 
 LEAST_RECORD = 8

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import gymnasium as gym
 
+from chaosgym.controllers.belief_programming import BeliefProgramming
 from chaosgym.controllers.constant import ClairvoyantConstant, HighestSpeed, LowestSpeed, SafeConstant
 from chaosgym.controllers.controller import Controller, Knowledge
 from chaosgym.controllers.delayed_feedback import DelayedFeedback
@@ -48,6 +49,7 @@ LADDER: dict[str, Rung] = {
     "nominal programming": Rung(NominalProgramming, NominalProgramming.knows),
     NOMINAL_SEARCH: Rung(RecedingHorizon, RecedingHorizon.knows),
     SAFE_CONSTANT: Rung(SafeConstant, SafeConstant.knows),
+    "belief programming": Rung(BeliefProgramming, BeliefProgramming.knows),
     "OGY": Rung(OGY, OGY.knows, each_cycle=True),
     "clairvoyant constant": Rung(ClairvoyantConstant, ClairvoyantConstant.knows),
     CLAIRVOYANT_SEARCH: Rung(ClairvoyantHorizon, ClairvoyantHorizon.knows),

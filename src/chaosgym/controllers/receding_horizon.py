@@ -11,8 +11,8 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.controllers.controller import Action, Controller, Knowledge, Model, Observation
-from chaosgym.controllers.forecast import forecast_for, worth_of_steps
+from chaosgym.controllers.controller import Action, Controller, Knowledge, Observation
+from chaosgym.envs.forecast import Model, forecast_for, worth_of_steps
 from chaosgym.envs.jobs import RUN_IN_CYCLES
 from chaosgym.envs.pools import worn
 from chaosgym.fleet import at_speed, fleet_of

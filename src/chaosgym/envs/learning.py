@@ -1,10 +1,13 @@
-"""How does a learner see and move a machine? With a memory of what it felt at each speed, and in steps of the drive.
+"""How does a learner see and move a machine? With a memory of what it felt, or a belief, and in steps of the drive.
 
 A machine is hidden from the agent, but it answers the same way when a speed is tried again. The memory adds, for every
-bin of speed, the mean and the standard deviation of the peak forces measured there in this job, and their number.
-Increments let an action say by how much the speed shall change instead of where it shall end.
+bin of speed, the mean and the standard deviation of the peak forces measured there in this job, and their number. The
+belief adds what these say about the machine, among those within the tolerances, and about the speeds in reach.
+Increments let an action say by how much the speed shall change instead of where it shall end; with a belief, by how
+much it shall differ from the belief's own plan (residual learning: T. Silver et al., arXiv:1812.06298).
 """
 
+from collections.abc import Callable
 from typing import Any, cast
 
 import gymnasium as gym
@@ -12,10 +15,14 @@ import numpy as np
 from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
+from chaosgym.envs.belief import Plan, SpeedBelief
 from chaosgym.envs.observation import Observation
+from chaosgym.envs.pools import Pool
+from chaosgym.envs.tasks import Task
 
 Array = NDArray[np.float64]
 Actions = NDArray[np.float32]
+Numbers = NDArray[np.int64]
 
 BINS = 53
 """Bins over the range of the drive: 0.5 Hz of the beam, 5 rpm of the crank, centred on the speeds at both ends."""
@@ -44,12 +51,17 @@ class SpeedMemory:
         self._peaks = slice(FIRST_PEAK, FIRST_PEAK + cycles)
         self._sums = np.zeros((0, 3, BINS))
 
-    def start(self, observations: Observation) -> Observation:
-        """Forget everything and take in the first observations (n, d) of n jobs; return (n, d + 3 BINS)."""
+    def start(self, observations: Observation, excluded: Numbers | None = None) -> Observation:
+        """Forget everything and take in the first observations (n, d) of n jobs; return (n, d + 3 BINS).
+
+        ``excluded`` matters to beliefs alone.
+        """
         self._sums = np.zeros((len(observations), 3, BINS))
         return self.add(observations)
 
-    def restart(self, which: NDArray[np.bool_], observations: Observation) -> Observation:
+    def restart(
+        self, which: NDArray[np.bool_], observations: Observation, excluded: Numbers | None = None
+    ) -> Observation:
         """Forget k of the jobs, ``which`` (n,), and take in their first observations (k, d); return (k, d + 3 BINS)."""
         self._sums[which] = self._news(observations)
         return self._remembered(observations, self._sums[which])
@@ -78,6 +90,55 @@ class SpeedMemory:
         return np.concatenate([observations, mean, deviation, known], axis=1, dtype=np.float32)
 
 
+class BeliefMemory:
+    """A belief over the map of speeds, of n jobs side by side; ``planned`` (n, 1) are the speeds that it goes to next.
+
+    Parameters
+    ----------
+    space
+        Of the observations, d numbers.
+    pool
+        Of the jobs; its sister "training" is what they are believed to come from.
+    task
+        Of the jobs.
+    """
+
+    def __init__(self, space: Box, pool: Pool, task: Task) -> None:
+        self._belief = SpeedBelief(pool.sister("training"), task)
+        low, high = self._belief.feature_bounds
+        self.space = Box(
+            np.concatenate([space.low, low]).astype(np.float32), np.concatenate([space.high, high]).astype(np.float32)
+        )
+        self.planned = np.zeros((0, 1))
+
+    def start(self, observations: Observation, excluded: Numbers | None = None) -> Observation:
+        """Forget everything and take in the first observations (n, d) of n jobs; return (n, d + features).
+
+        ``excluded`` (n,) are the machines of the training pool that they are, if they are: they would be found too
+        easily among their own tables.
+        """
+        self.planned = np.zeros((len(observations), 1))
+        return self._told(self._belief.start(observations, excluded), observations, np.arange(len(observations)))
+
+    def restart(
+        self, which: NDArray[np.bool_], observations: Observation, excluded: Numbers | None = None
+    ) -> Observation:
+        """Forget k of the jobs, ``which`` (n,), and take in their first observations (k, d); return (k, d + features).
+
+        ``excluded`` (k,) as in ``start``.
+        """
+        plan = self._belief.restart(which, observations, excluded)
+        return self._told(plan, observations, np.flatnonzero(which))
+
+    def add(self, observations: Observation) -> Observation:
+        """Take in observations (n, d) and return them with what is believed, (n, d + features)."""
+        return self._told(self._belief.add(observations), observations, np.arange(len(observations)))
+
+    def _told(self, plan: Plan, observations: Observation, jobs: Numbers) -> Observation:
+        self.planned[jobs, 0] = self._belief.speeds[plan.target]
+        return np.concatenate([observations, self._belief.features(plan)], axis=1, dtype=np.float32)
+
+
 def remembered_space(space: Box) -> Box:
     """Return the space of observations with memory, of the space of those without."""
     ranges = np.repeat([space.high[FIRST_PEAK], space.high[FIRST_PEAK], 1.0], BINS)
@@ -87,21 +148,35 @@ def remembered_space(space: Box) -> Box:
     )
 
 
-def commanded(increments: Actions, observations: Observation, space: Box, largest: float) -> Actions:
-    """Return the actions (n, 1) that change the observed speeds by increments (n, 1) of -1 to 1 times ``largest``.
+def commanded(increments: Actions, speeds: Array, space: Box, largest: float) -> Actions:
+    """Return the actions (n, 1) that change speeds by increments (n, 1) of -1 to 1 times ``largest``.
 
     Parameters
     ----------
-    increments, observations
-        (n, 1), and (n, d) of which the first entry is the speed.
+    increments, speeds
+        (n, 1) each; the speeds as observed, or as planned.
     space
         Of the observations.
     largest
         Change of speed for an increment of 1, in the machine's unit.
     """
     low, high = space.low[0], space.high[0]
-    target = observations[:, :1] + largest * np.clip(increments, -1.0, 1.0)
-    return np.clip(2.0 * (target - low) / (high - low) - 1.0, -1.0, 1.0).astype(np.float32)
+    target = speeds + largest * np.clip(increments, -1.0, 1.0)
+    return np.asarray(np.clip(2.0 * (target - low) / (high - low) - 1.0, -1.0, 1.0), np.float32)
+
+
+def memory_of(
+    space: Box, attribute: Callable[[str], Any], memory: bool, belief: bool
+) -> SpeedMemory | BeliefMemory | None:
+    """Return what a view remembers with; ``attribute`` gives those of the environment by name."""
+    if belief:
+        return BeliefMemory(space, attribute("pool"), attribute("task"))
+    return SpeedMemory(space) if memory else None
+
+
+def speeds_before(observations: Observation, memory: SpeedMemory | BeliefMemory | None) -> Array:
+    """Return the speeds (n, 1) that increments change: those planned by a belief, or those observed (n, d)."""
+    return memory.planned if isinstance(memory, BeliefMemory) else observations[:, :1].astype(float)
 
 
 class LearnerView(gym.Wrapper[Observation, Actions, Observation, Actions]):
@@ -113,12 +188,16 @@ class LearnerView(gym.Wrapper[Observation, Actions, Observation, Actions]):
         A chaosgym environment.
     memory, increments
         Leave one of them out.
+    belief
+        Instead of the memory.
     """
 
-    def __init__(self, env: gym.Env[Observation, Actions], memory: bool = True, increments: bool = True) -> None:
+    def __init__(
+        self, env: gym.Env[Observation, Actions], memory: bool = True, increments: bool = True, belief: bool = False
+    ) -> None:
         super().__init__(env)
         self._space = cast(Box, env.observation_space)
-        self._memory = SpeedMemory(self._space) if memory else None
+        self._memory = memory_of(self._space, env.get_wrapper_attr, memory, belief)
         self._largest = env.get_wrapper_attr("drive").slew_limit if increments else None
         if self._memory:
             self.observation_space = cast(Space[Observation], self._memory.space)
@@ -128,12 +207,16 @@ class LearnerView(gym.Wrapper[Observation, Actions, Observation, Actions]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Start a job, with nothing remembered."""
         self._last, info = self.env.reset(seed=seed, options=options)
-        return self._memory.start(self._last[None])[0] if self._memory else self._last, info
+        learns = self.env.get_wrapper_attr("pool").name == "training"
+        excluded = np.array([info["machine"]]) if learns else None
+        return self._memory.start(self._last[None], excluded)[0] if self._memory else self._last, info
 
     def step(self, action: Actions) -> tuple[Observation, Any, bool, bool, dict[str, Any]]:
         """Run a step and remember it."""
         if self._largest is not None:
-            action = commanded(action[None], self._last[None], self._space, self._largest)[0]
+            action = commanded(action[None], speeds_before(self._last[None], self._memory), self._space, self._largest)[
+                0
+            ]
         self._last, reward, terminated, truncated, info = self.env.step(action)
         seen = self._memory.add(self._last[None])[0] if self._memory else self._last
         return seen, reward, terminated, truncated, info

@@ -128,6 +128,10 @@ class Pool:
         self.factors = drawn_factors(list(tolerances.values()), sum(sizes.values()) - 1, SEEDS[self.task])
         self._kept: dict[int, tuple[RegimeTable, ...]] = {}
 
+    def sister(self, name: str) -> "Pool":
+        """Return the pool of another name with the same nominal machine."""
+        return Pool(self.nominal, self.drive, self.tolerances, name, self.wears)
+
     @property
     def wears(self) -> bool:
         """Whether clearances grow."""

@@ -16,7 +16,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
-from chaosgym.envs.learning import SpeedMemory, commanded
+from chaosgym.envs.learning import commanded, memory_of, speeds_before
 from chaosgym.envs.observation import Observation
 from chaosgym.envs.vector_env import MachineVectorEnv
 from chaosgym.errors import ParameterError
@@ -160,23 +160,31 @@ class SB3LearnerView(VecEnvWrapper):
         A ``SB3VecEnv``.
     memory, increments
         Leave one of them out.
+    belief
+        Instead of the memory.
     """
 
-    def __init__(self, envs: VecEnv, memory: bool = True, increments: bool = True) -> None:
+    def __init__(self, envs: VecEnv, memory: bool = True, increments: bool = True, belief: bool = False) -> None:
         self._space = cast(Box, envs.observation_space)
-        self._memory = SpeedMemory(self._space) if memory else None
+        self._memory = memory_of(self._space, lambda name: envs.get_attr(name)[0], memory, belief)
         self._largest = envs.get_attr("drive")[0].slew_limit if increments else None
         super().__init__(envs, observation_space=self._memory.space if self._memory else self._space)
 
     def reset(self) -> Observation:
         """Start all jobs, with nothing remembered."""
         self._last = cast(Observation, self.venv.reset())
-        return self._memory.start(self._last) if self._memory else self._last
+        return self._memory.start(self._last, self._excluded(range(self.num_envs))) if self._memory else self._last
+
+    def _excluded(self, jobs: Iterable[int]) -> NDArray[np.int64] | None:
+        """Numbers in the training pool of the machines of some jobs; None if they are of another pool."""
+        if self.venv.get_attr("pool")[0].name != "training":
+            return None
+        return np.array([self.venv.unwrapped.reset_infos[i]["machine"] for i in jobs])
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Take the actions of the next step."""
         if self._largest is not None:
-            actions = commanded(actions, self._last, self._space, self._largest)
+            actions = commanded(actions, speeds_before(self._last, self._memory), self._space, self._largest)
         self.venv.step_async(actions)
 
     def step_wait(self) -> tuple[Observation, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
@@ -192,5 +200,5 @@ class SB3LearnerView(VecEnvWrapper):
         for i in fresh:
             infos[i]["terminal_observation"] = seen[i].copy()
         if fresh:
-            seen[ended] = self._memory.restart(ended, self._last[ended])
+            seen[ended] = self._memory.restart(ended, self._last[ended], self._excluded(fresh))
         return seen, rewards, ended, infos

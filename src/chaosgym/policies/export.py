@@ -14,7 +14,14 @@ from chaosgym.policies.policy import Normalisation, TrainedPolicy
 
 
 def exported(
-    model: Any, env: str, envs: Any, *, normalise: Any = None, memory: bool = False, increments: bool = False
+    model: Any,
+    env: str,
+    envs: Any,
+    *,
+    normalise: Any = None,
+    memory: bool = False,
+    increments: bool = False,
+    belief: bool = False,
 ) -> TrainedPolicy:
     """Return the deterministic policy of a trained model.
 
@@ -28,7 +35,7 @@ def exported(
         A ``SB3VecEnv`` of it, whose spaces and drive count.
     normalise
         The ``VecNormalize`` that it was trained in, if any.
-    memory, increments
+    memory, increments, belief
         Of the ``LearnerView`` that it was trained in.
 
     Raises
@@ -46,8 +53,9 @@ def exported(
     names = [*((f"{hidden}.{place}", activation) for place in places), (last, "none")]
     network = Network(_lstm(weights), tuple(_dense(weights, name, kind) for name, kind in names))
     return TrainedPolicy(
-        env, envs.observation_space, envs.action_space, network, _normalisation(normalise), memory,
-        envs.get_attr("drive")[0].slew_limit if increments else None, bool(model.policy.squash_output),
+        env, envs.observation_space, envs.action_space, network, _normalisation(normalise),
+        memory and not belief, belief, envs.get_attr("drive")[0].slew_limit if increments else None,
+        bool(model.policy.squash_output),
     )  # fmt: skip
 
 

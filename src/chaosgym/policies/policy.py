@@ -18,14 +18,14 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from chaosgym.envs.learning import SpeedMemory, commanded, remembered_space
+from chaosgym.envs.learning import BeliefMemory, SpeedMemory, commanded, memory_of, speeds_before
 from chaosgym.errors import ModelFileError
 from chaosgym.files import write_atomically
 from chaosgym.policies.network import Dense, Lstm, Network, State
 
 Array = NDArray[Any]
 
-FORMAT = 1
+FORMAT = 2
 """Version of the files."""
 
 LARGEST = 50_000_000
@@ -63,6 +63,8 @@ class TrainedPolicy:
         Applied to the observations, memory included; None for none.
     remembers
         Whether it is given what ``SpeedMemory`` keeps of the job.
+    believes
+        Whether it is given a belief over the map of speeds instead (``BeliefMemory``), on the tables of ``env``.
     largest_step
         Change of speed for an action of 1, if the network answers with increments; None for target speeds.
     squashed
@@ -75,13 +77,16 @@ class TrainedPolicy:
     network: Network
     normalisation: Normalisation | None = None
     remembers: bool = False
+    believes: bool = False
     largest_step: float | None = None
     squashed: bool = False
     _state: State | None = field(default=None, init=False, repr=False)
-    _memory: SpeedMemory | None = field(default=None, init=False, repr=False)
+    _memory: SpeedMemory | BeliefMemory | None = field(default=None, init=False, repr=False)
+    _began: bool = field(default=False, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        space = remembered_space(self.observation_space) if self.remembers else self.observation_space
+        self._memory = memory_of(self.observation_space, self._attribute, self.remembers, self.believes)
+        space = self._memory.space if self._memory else self.observation_space
         self.network.check(space.shape[0], self.action_space.shape[0])
         if self.normalisation:
             for name, values in (("mean", self.normalisation.mean), ("deviation", self.normalisation.deviation)):
@@ -92,7 +97,7 @@ class TrainedPolicy:
 
     def reset(self) -> None:
         """Forget the last job."""
-        self._state = self._memory = None
+        self._state, self._began = None, False
 
     def __call__(self, observation: Array) -> NDArray[np.float32]:
         """Return the action (1,) for an observation (d,), or actions (n, 1) for those of n jobs side by side (n, d).
@@ -109,8 +114,9 @@ class TrainedPolicy:
                 f"{self.observation_space.shape}"
             )
         values: Array = np.atleast_2d(observations)
-        if self.remembers:
-            values = self._remembered(values)
+        if self._memory:
+            values = self._memory.add(values) if self._began else self._memory.start(values)
+            self._began = True
         if self.normalisation:
             values = self.normalisation(values)
         answer, self._state = self.network(values, self._state)
@@ -118,14 +124,13 @@ class TrainedPolicy:
         if self.squashed:
             answer = low + 0.5 * (np.tanh(answer) + 1.0) * (high - low)
         if self.largest_step is not None:
-            answer = commanded(answer, np.atleast_2d(observations), self.observation_space, self.largest_step)
+            speeds = speeds_before(np.atleast_2d(observations), self._memory)
+            answer = commanded(answer, speeds, self.observation_space, self.largest_step)
         return np.clip(answer, low, high).reshape(*observations.shape[:-1], -1).astype(np.float32)
 
-    def _remembered(self, observations: Array) -> Array:
-        if self._memory is None:
-            self._memory = SpeedMemory(self.observation_space)
-            return self._memory.start(observations)
-        return self._memory.add(observations)
+    def _attribute(self, name: str) -> Any:
+        """Attribute of the environment that it was trained on."""
+        return gym.make(self.env).get_wrapper_attr(name)
 
     def fits(self, env: gym.Env[Any, Any]) -> None:
         """Raise a ModelFileError unless the spaces are those of an environment."""
@@ -161,6 +166,7 @@ def save_policy(policy: TrainedPolicy, folder: str | Path) -> None:
         "activations": [layer.activation for layer in network.layers],
         "normalisation_limit": policy.normalisation.limit if policy.normalisation else None,
         "remembers": policy.remembers,
+        "believes": policy.believes,
         "largest_step": policy.largest_step,
         "squashed": policy.squashed,
         "sha256": sha256(buffer.getvalue()).hexdigest(),
@@ -213,7 +219,8 @@ def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPol
     return TrainedPolicy(
         description["env"], _space(description["observation"]), _space(description["action"]), Network(lstm, layers),
         None if limit is None else Normalisation(arrays["mean"], arrays["deviation"], float(limit)),
-        bool(description["remembers"]), description["largest_step"], bool(description["squashed"]),
+        bool(description["remembers"]), bool(description["believes"]), description["largest_step"],
+        bool(description["squashed"]),
     )  # fmt: skip
 
 

@@ -6,19 +6,21 @@ judge, and this is how a planner guesses it.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from chaosgym.controllers.controller import Model
 from chaosgym.envs.pools import Pool
 from chaosgym.envs.regimes import RegimeTable, nearest
 from chaosgym.envs.tasks import Task
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
+
+Model = Literal["nominal", "machine"]
+"""Machine that a planner takes for the true one: the nominal one, or this very machine."""
 
 DAMAGE_LEVELS = 41
 """Grid of the damage, from none to fracture; values in between are interpolated."""
@@ -100,7 +102,7 @@ def forecast_for(env: Any, model: Model) -> Forecast:
 
 def training_forecasts(env: Any) -> list[Forecast]:
     """Return the forecasts of all machines of the training pool."""
-    pool = Pool(env.nominal, env.drive, env.tolerances, "training", env.pool.wears)
+    pool = env.pool.sister("training")
     return [forecast_of(pool, pool.regimes(k), env.task) for k in range(len(pool))]
 
 

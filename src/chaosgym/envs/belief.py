@@ -1,0 +1,168 @@
+"""At which speeds does a hidden machine run calmly? A belief over its map of speeds, from the peaks felt so far.
+
+The machine is one like those of the training pool, whose regime tables are known. Every step makes those machines more
+probable that are calm or irregular where this one is, and that strike as hard; and what was felt at a speed itself
+counts there in any case, since no two machines have the same map. The best schedule of the expected map is a plan.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+from scipy.stats import entropy
+
+from chaosgym.envs.forecast import forecast_of
+from chaosgym.envs.observation import Observation
+from chaosgym.envs.pools import Pool
+from chaosgym.envs.regimes import nearest
+from chaosgym.envs.tasks import Task
+
+Array = NDArray[np.float64]
+Places = NDArray[np.int64]
+
+SPEED, REMAINING, FIRST_PEAK = 0, 2, 8
+"""Places in an observation of the speed, of the remaining share of the job, and of the first measured peak."""
+
+SCATTER = (0.5, 1.5, 2.5, 3.5, 5.0, 7.5, 12.0)
+MOVING = (-1.9, -1.5, -0.5, 0.6, 1.4, 2.0, 2.3)
+STAYING = (-1.6, -1.4, 0.2, 1.7, 2.3, 2.8, 3.5)
+"""Log odds of Type III by the standard deviation [N] of a step's peaks, when the speed has just changed and later;
+calibrated on the training pool of the beam, with its +-3 N sensor."""
+
+TEMPERATURE = 2.0
+"""By which the evidence of a step for a machine is divided: steps at one speed are not independent."""
+
+FORCE_ERROR, FORCE_LIMIT = 6.0, 6.0
+"""Error of a step's mean peak as a measure of the table's force [N], and how surprising it may be at most."""
+
+LOCAL, NEIGHBOUR = 0.5, 0.25
+"""Share of the evidence that counts at the speed itself, and of that at the neighbouring speeds of the table."""
+
+CERTAIN = (-3.0, 5.0)
+"""Limits of the log odds that a speed gathers by itself."""
+
+HORIZON = 60
+"""Steps that a plan looks ahead: more than the drive needs to reach any speed."""
+
+
+class Plan(NamedTuple):
+    """What is believed and what is best, of n jobs.
+
+    ``irregular`` (n, speeds) probability of Type III; ``gathered`` (n, speeds) log odds of it that were felt at the
+    speed itself; ``worth`` (n, speeds) of a step at a speed of the table and of the best ones after it; ``place`` (n,)
+    where each job is, ``target`` (n,) the place in reach that is worth most; ``doubt`` (n,) entropy of the machine's
+    identity, from 0 to 1.
+    """
+
+    irregular: Array
+    gathered: Array
+    worth: Array
+    place: Places
+    target: Places
+    doubt: Array
+
+
+class SpeedBelief:
+    """Beliefs of n jobs side by side.
+
+    Parameters
+    ----------
+    pool
+        Machines that are possible, with their tables.
+    task
+        What their steps are worth.
+    """
+
+    def __init__(self, pool: Pool, task: Task) -> None:
+        forecasts = [forecast_of(pool, pool.regimes(k), task) for k in range(len(pool))]
+        tables = [pool.regimes(k)[0] for k in range(len(pool))]
+        self.speeds, self.moves, self.steps = pool.speeds, forecasts[0].moves, forecasts[0].steps
+        self._type_iii = np.array([table.type_iii for table in tables])
+        self._force = np.array(
+            [np.where(table.equivalent_force < 1e3, table.equivalent_force, 1e3) for table in tables]
+        )
+        self._wear = np.array([forecast.damage_weight * forecast.wear[0] for forecast in forecasts])
+        self._time = forecasts[0].time
+        self._type_iii_cost = task.type_iii_weight * task.cycles_per_step / task.job_cycles
+        self._cycles = task.cycles_per_step
+
+    def start(self, observations: Observation, excluded: Places | None = None) -> Plan:
+        """Begin n jobs with their first observations (n, d); ``excluded`` (n,) are machines that can't be the one."""
+        count = len(observations)
+        self._machine = np.zeros((count, len(self._type_iii)))
+        self._local = np.zeros((count, len(self.speeds)))
+        self._last = np.zeros(count)
+        return self.restart(np.ones(count, np.bool_), observations, excluded)
+
+    def restart(self, which: NDArray[np.bool_], observations: Observation, excluded: Places | None = None) -> Plan:
+        """Begin k of the jobs anew, ``which`` (n,), with observations (k, d) and ``excluded`` (k,); plans of these."""
+        jobs = np.flatnonzero(which)
+        self._machine[jobs], self._local[jobs], self._last[jobs] = 0.0, 0.0, np.nan
+        if excluded is not None:
+            self._machine[jobs, excluded] = -np.inf
+        self._learn(jobs, observations)
+        return self._plan(jobs, observations)
+
+    def features(self, plan: Plan) -> Array:
+        """Return what a learner is told of plans, (n, count): for each place in reach, its probability of Type III,
+        what was felt there, and its worth less the largest in steps of Type III; the target's place; the doubt."""
+        reach = plan.place[:, None] + np.arange(-self.moves, self.moves + 1)
+        near = np.clip(reach, 0, len(self.speeds) - 1)
+        irregular, gathered, worth = (
+            np.take_along_axis(values, near, axis=1) for values in (plan.irregular, plan.gathered, plan.worth)
+        )
+        worth = (worth - worth.max(axis=1, keepdims=True)) / self._type_iii_cost
+        beyond = (reach != near).astype(float)
+        ahead = (plan.target - plan.place) / self.moves
+        columns = [np.maximum(irregular, beyond), gathered / CERTAIN[1], np.maximum(worth, -10.0) - 10.0 * beyond]
+        return np.concatenate([*columns, ahead[:, None], plan.doubt[:, None]], axis=1)
+
+    @property
+    def feature_bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest features, (count,) each."""
+        reach = 2 * self.moves + 1
+        low = np.repeat([0.0, CERTAIN[0] / CERTAIN[1], -20.0], reach)
+        high = np.repeat([1.0, 1.0, 0.0], reach)
+        return np.append(low, [-1.0, 0.0]), np.append(high, [1.0, 1.0])
+
+    def add(self, observations: Observation) -> Plan:
+        """Take in the observations (n, d) of a step."""
+        jobs = np.arange(len(observations))
+        self._learn(jobs, observations)
+        return self._plan(jobs, observations)
+
+    def _learn(self, jobs: Places, observations: Observation) -> None:
+        speed = observations[:, SPEED]
+        peaks = observations[:, FIRST_PEAK : FIRST_PEAK + self._cycles].astype(float)
+        place, moved = nearest(self.speeds, speed), speed != self._last[jobs]
+        self._last[jobs] = speed
+        scatter, mean = peaks.std(axis=1), peaks.mean(axis=1)
+        odds = np.where(moved, np.interp(scatter, SCATTER, MOVING), np.interp(scatter, SCATTER, STAYING))
+        surprise = ((mean[:, None] - self._force[:, place].T) / FORCE_ERROR) ** 2
+        evidence = odds[:, None] * self._type_iii[:, place].T - 0.5 * np.minimum(surprise, FORCE_LIMIT)
+        self._machine[jobs] += evidence / TEMPERATURE
+        for offset, share in ((-1, NEIGHBOUR), (0, 1.0), (1, NEIGHBOUR)):
+            at, inside = place + offset, (place + offset >= 0) & (place + offset < len(self.speeds))
+            self._local[jobs[inside], at[inside]] += LOCAL * share * odds[inside]
+        np.clip(self._local, *CERTAIN, out=self._local)
+
+    def _plan(self, jobs: Places, observations: Observation) -> Plan:
+        """Best schedules of the expected maps, of jobs (k,) with observations (k, d)."""
+        score, gathered = self._machine[jobs], self._local[jobs]
+        weight = np.exp(score - score.max(axis=1, keepdims=True))
+        weight /= weight.sum(axis=1, keepdims=True)
+        chance = np.clip(weight @ self._type_iii, 0.02, 0.98)
+        irregular = 1.0 / (1.0 + (1.0 / chance - 1.0) * np.exp(-gathered))
+        reward = self._time - self._type_iii_cost * irregular - weight @ self._wear
+        left = np.rint(observations[:, REMAINING].astype(float) * self.steps)
+        worth = reward.copy()
+        for step in range(1, min(HORIZON, int(left.max()))):
+            ahead = reward + maximum_filter1d(worth, 2 * self.moves + 1, axis=1, mode="nearest")
+            worth = np.where((step < left)[:, None], ahead, worth)
+        place = nearest(self.speeds, observations[:, SPEED])
+        reach = place[:, None] + np.arange(-self.moves, self.moves + 1)
+        inside = (reach >= 0) & (reach < len(self.speeds))
+        near = np.where(inside, np.take_along_axis(worth, np.clip(reach, 0, len(self.speeds) - 1), axis=1), -np.inf)
+        doubt = entropy(weight, axis=1) / np.log(weight.shape[1])
+        return Plan(irregular, gathered, worth, place, place - self.moves + near.argmax(axis=1), doubt)

@@ -1,0 +1,103 @@
+"""A belief finds the machine that behaves as what was felt, and its plan is the best schedule of what it expects."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from chaosgym.envs.belief import HORIZON, SpeedBelief
+from chaosgym.envs.forecast import forecast_of, worth_of_steps
+from chaosgym.envs.learning import LearnerView
+
+ENV = "chaosgym/ImpactBeamTolerance-v0"
+CALM, WILD = np.array([-1.0, 0.5, 1.0, -0.5, 0.0]), np.array([-9.0, 8.0, 3.0, -7.0, 5.0])
+"""Scatter of five peaks [N]."""
+
+
+@pytest.fixture(scope="module")
+def env():
+    """Training machines."""
+    return gym.make(ENV, pool="training").unwrapped
+
+
+def _felt(table, place, remaining=1.0):
+    """What a machine with a table answers at one of its speeds, as an observation (1, d)."""
+    observation = np.zeros((1, 13), np.float32)
+    observation[0, 0], observation[0, 2] = table.speeds[place], remaining
+    observation[0, 8:] = table.equivalent_force[place] + (WILD if table.type_iii[place] else CALM)
+    return observation
+
+
+def test_the_machine_is_found_by_what_it_does(env):
+    """After a sweep over the range, calm and irregular speeds are believed to be those of the machine."""
+    table = env.pool.regimes(17)[0]
+    belief = SpeedBelief(env.pool, env.task)
+    before = belief.start(_felt(table, 0))
+    for place in range(1, len(table.speeds), 3):
+        after = belief.add(_felt(table, place))
+    right = [np.mean((plan.irregular[0] > 0.5) == table.type_iii) for plan in (before, after)]
+    assert right[0] < 0.9 < 0.97 < right[1]
+    assert before.doubt[0] > 0.5 > after.doubt[0]
+
+
+def test_an_excluded_machine_is_not_believed_in(env):
+    """Without it, what its twin knows is not known, though everything felt is the same."""
+    table = env.pool.regimes(17)[0]
+    sure, unsure = SpeedBelief(env.pool, env.task), SpeedBelief(env.pool, env.task)
+    sure.start(_felt(table, 0))
+    unsure.start(_felt(table, 0), np.array([17]))
+    for place in range(1, len(table.speeds), 6):
+        known, guessed = sure.add(_felt(table, place)), unsure.add(_felt(table, place))
+    wrong = [np.mean((plan.irregular[0] > 0.5) != table.type_iii) for plan in (known, guessed)]
+    assert wrong[0] < 0.5 * wrong[1]
+
+
+def test_jobs_side_by_side_do_not_mix(env):
+    """Two jobs together are believed as each alone; one that starts anew forgets."""
+    tables = [env.pool.regimes(k)[0] for k in (3, 90)]
+    both = SpeedBelief(env.pool, env.task)
+    both.start(np.concatenate([_felt(table, 0) for table in tables]))
+    for place in (40, 60, 61):
+        together = both.add(np.concatenate([_felt(table, place) for table in tables]))
+    for job, table in enumerate(tables):
+        alone = SpeedBelief(env.pool, env.task)
+        alone.start(_felt(table, 0))
+        for place in (40, 60, 61):
+            plan = alone.add(_felt(table, place))
+        np.testing.assert_allclose(together.worth[job], plan.worth[0], rtol=1e-12)
+    fresh = both.restart(np.array([False, True]), _felt(tables[1], 0))
+    np.testing.assert_allclose(fresh.irregular, SpeedBelief(env.pool, env.task).start(_felt(tables[1], 0)).irregular)
+
+
+def test_the_plan_is_dynamic_programming_on_the_expected_map(env):
+    """Where every machine is the same one, the worth of the last steps is that of its own table."""
+
+    class Copies:
+        """A pool of two copies of one machine."""
+
+        drive, nominal, levels, speeds = env.pool.drive, env.pool.nominal, env.pool.levels, env.pool.speeds
+
+        def __len__(self):
+            return 2
+
+        def regimes(self, k):
+            return env.pool.regimes(17)
+
+    forecast = forecast_of(env.pool, env.pool.regimes(17), env.task)
+    left = HORIZON // 2
+    plan = SpeedBelief(Copies(), env.task).start(_felt(env.pool.regimes(17)[0], 50, left / forecast.steps))
+    expected = worth_of_steps(forecast)[forecast.steps - left][0]
+    place = int(plan.target[0])
+    within = forecast.within_reach(50)
+    assert place in within
+    assert expected[place] >= expected[within].max() - 0.02 * left * env.task.cycles_per_step / env.task.job_cycles
+
+
+def test_a_view_with_a_belief_keeps_its_space_and_follows_the_plan():
+    """Observations stay within the announced bounds; an action of zero goes where the belief plans to."""
+    view = LearnerView(gym.make(ENV, pool="held-out", job_cycles=100), belief=True)
+    observation, _ = view.reset(seed=3, options={"machine": 2})
+    for _ in range(20):
+        assert view.observation_space.contains(observation)
+        planned = float(view._memory.planned[0, 0])
+        observation, *_, info = view.step(np.zeros(1, np.float32))
+        assert info["speed"] == pytest.approx(planned, abs=1e-5)
