@@ -32,7 +32,7 @@ from chaosgym.core.impact_beam import CycleArrays, ImpactBeamModel
 from chaosgym.core.restitution import RestitutionModel
 from chaosgym.core.slider_crank import SliderCrankModel
 from chaosgym.errors import SimulationError
-from chaosgym.machines.crank_model import TABLES, KeptModel, models_by_speed
+from chaosgym.machines.crank_model import TABLES, KeptModel, ModelsBySpeed, models_by_speed
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import CycleRecord, ExactEvents, MotionState, batch_arrays, rest_state, simulate
@@ -271,13 +271,17 @@ class CrankFleet(_CompiledFleet):
         changed = self._speeds[which] != speeds
         which, speeds = which[changed], speeds[changed]
         self._speeds[which] = speeds
-        kept = [self._models[i].at(speed) for i, speed in zip(which.tolist(), speeds.tolist(), strict=True)]
-        for name in SPEED_FIELDS:
-            getattr(self._batch, name)[which] = [getattr(each.model, name) for each in kept]
-        for k, name in enumerate(TABLES):
-            getattr(self._batch, name)[which] = [each.addresses[k] for each in kept]
-        for i, each in zip(which.tolist(), kept, strict=True):
-            self._kept[i] = each
+        # machines of one make are often at one speed: each pair is looked up once
+        distinct: dict[tuple[ModelsBySpeed, float], int] = {}
+        pairs = zip(which.tolist(), speeds.tolist(), strict=True)
+        row = [distinct.setdefault((self._models[i], speed), len(distinct)) for i, speed in pairs]
+        kept = [models.at(speed) for models, speed in distinct]
+        for name in SPEED_FIELDS if kept else ():
+            getattr(self._batch, name)[which] = np.array([getattr(each.model, name) for each in kept])[row]
+        for k, name in enumerate(TABLES if kept else ()):
+            getattr(self._batch, name)[which] = np.array([each.addresses[k] for each in kept])[row]
+        for i, place in zip(which.tolist(), row, strict=True):
+            self._kept[i] = kept[place]
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         call(advance_cranks, self._batch, self._bins, which, self._motions, arrays, self._settings, outcome)
