@@ -6,9 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
+from chaosgym.evaluation.jobs import run_job
 from chaosgym.policies import load_policy
 
 AGENTS = Path(__file__).parent.parent.parent / "agents"
@@ -48,6 +50,16 @@ def test_a_run_leaves_a_policy_that_numpy_plays(script, tmp_path):
     assert policy(policy.observation_space.high).shape == (1,)
     refused = _run(script, *arguments)
     assert "finished; choose another folder" in refused.stderr
+
+
+@pytest.mark.slow
+def test_a_run_with_a_belief_leaves_a_policy_that_plays(tmp_path):
+    """The policy carries its belief along: it drives a held-out machine to the end of a job."""
+    env, out = "chaosgym/ImpactBeamTolerance-v0", tmp_path / "run"
+    trained = _run("train_ppo.py", "--env", env, "--belief", "--steps", "800", *SHORT, "--out", str(out))
+    assert trained.returncode == 0, trained.stderr
+    row = run_job(gym.make(env, pool="held-out", job_cycles=100), load_policy(out), 3, 0)
+    assert row.cycles == 100
 
 
 @pytest.mark.slow

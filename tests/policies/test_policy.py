@@ -102,6 +102,24 @@ DAMAGES = {
 }
 
 
+def test_a_policy_believes_what_it_believed_in_training(tmp_path):
+    """With a belief, the same observations give the same features, and actions correct the same plan."""
+    env = "chaosgym/ImpactBeamTolerance-v0"
+    plain = SB3VecEnv(env, num_envs=2, job_cycles=50, pool="held-out")
+    envs = SB3LearnerView(plain, belief=True)
+    model = PPO("MlpPolicy", envs, seed=0, device="cpu", **SMALL)
+    save_policy(exported(model, env, plain, belief=True, increments=True), tmp_path)
+    policy = load_policy(tmp_path)
+    envs.seed(5)
+    seen = envs.reset()
+    size = plain.observation_space.shape[0]
+    for _ in range(9):
+        action, _ = model.predict(seen, deterministic=True)
+        target = 4.0 + 13.0 * (policy(seen[:, :size])[:, 0] + 1.0)
+        np.testing.assert_allclose(target, np.clip(envs._memory.planned[:, 0] + action[:, 0], 4.0, 30.0), rtol=1e-5)
+        seen = envs.step(np.linspace(-1.0, 1.0, 2, dtype=np.float32)[:, None])[0]
+
+
 @pytest.mark.parametrize("complaint", list(DAMAGES))
 def test_a_damaged_policy_is_refused_by_name(complaint, tmp_path):
     """Every damage ends in a ModelFileError that says what is wrong."""

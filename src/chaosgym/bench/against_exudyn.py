@@ -7,6 +7,7 @@ cycles; right is what refined exact events show of a much longer run, so that th
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -126,9 +127,8 @@ def against_exudyn(
         for contest in contests:
             own = [simulate(machine, contest.cycles).peak_force[-contest.judged :, 0] for machine in contest.machines()]
             right = [_right_period(contest, machine) for machine in contest.machines()]
-            rate = float(np.median([_own_rate(contest) for _ in range(repeats)]))
             for setting in contest.settings:
-                theirs, their_rate = _run_setting(contest, setting, bar)
+                theirs, rate, their_rate = _run_setting(contest, setting, repeats, bar)
                 sides = {"chaosgym": _score(contest, own, right), "exudyn": _score(contest, theirs, right)}
                 rows.append({
                     "machine": contest.machine.name,
@@ -147,23 +147,25 @@ def _right_period(contest: Contest, machine: Machine) -> int:
     return period_of(record.peak_force[-contest.judged :, 0], contest.repeatability)
 
 
-def _own_rate(contest: Contest) -> float:
-    """Cycles per second of processor time of this package, from rest, over all speeds."""
-    machines = contest.machines()
-    seconds = processor_seconds(lambda: [simulate(machine, contest.timed) for machine in machines])
-    return contest.timed * len(machines) / seconds
+def _run_setting(contest: Contest, setting: ExudynSetting, repeats: int, bar: Any) -> tuple[list[Array], float, float]:
+    """Judged peak forces at each speed, and cycles per second of processor time from rest over all speeds.
 
-
-def _run_setting(contest: Contest, setting: ExudynSetting, bar: Any) -> tuple[list[Array], float]:
-    """Judged peak forces at each speed, and cycles per second of processor time over all speeds."""
-    seconds, judged = 0.0, []
+    The rates are of this package and of Exudyn. At each speed they take turns, so that both meet the same other work.
+    """
+    own = theirs = 0.0
+    judged = []
     for machine in contest.machines():
-        seconds += run_in_exudyn(machine, contest.timed, setting, forces=False)[0]
+        timed = partial(simulate, machine, contest.timed)
+        times = [processor_seconds(timed) for _ in range(repeats)]
+        theirs += run_in_exudyn(machine, contest.timed, setting, forces=False)[0]
+        times += [processor_seconds(timed) for _ in range(repeats)]
+        own += float(np.median(times))
         _, peaks = run_in_exudyn(machine, contest.cycles, setting, forces=True)
         assert peaks is not None
         judged.append(peaks[-contest.judged :])
         bar.update()
-    return judged, contest.timed * len(judged) / seconds
+    cycles = contest.timed * len(judged)
+    return judged, cycles / own, cycles / theirs
 
 
 def _score(contest: Contest, judged: list[Array], right: list[int]) -> dict[str, Any]:
