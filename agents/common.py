@@ -1,7 +1,8 @@
 """What do all training scripts share? Arguments, environments, and a folder in which a run is kept and resumed.
 
-A folder holds policy.json and weights.npz (for numpy), policy.zip (stable-baselines3), normalisation.npz, config.json,
-progress.csv (every job) and evaluations.csv. While a run goes on, checkpoint.zip takes the place of the policy.
+A folder holds policy.json and weights.npz (for numpy, of the best evaluation), policy.zip (stable-baselines3, the last),
+normalisation.npz, config.json, progress.csv (every job) and evaluations.csv. While a run goes on, checkpoint.zip takes
+the place of policy.zip.
 """
 
 import argparse
@@ -103,16 +104,11 @@ class Run:
         return kind.load(self.folder / "checkpoint.zip", self.envs, device="cpu")
 
     def learn(self, model: Any) -> None:
-        """Train up to the asked number of steps, with progress, checkpoints and evaluations; keep the policy."""
+        """Train up to the asked number of steps, with progress, checkpoints and evaluations; keep the best policy."""
         arguments = self.arguments
         self.envs.seed(arguments.seed * SEEDS_PER_RUN + model.num_timesteps)
         model.learn(arguments.steps - model.num_timesteps, Watch(self), reset_num_timesteps=False)
         self.save(model, "policy.zip")
-        policy = exported(
-            model, arguments.env, self.envs.unwrapped, normalise=self.envs, memory=arguments.memory,
-            increments=arguments.increments, belief=arguments.belief,
-        )  # fmt: skip
-        save_policy(policy, self.folder)
         (self.folder / "checkpoint.zip").unlink(missing_ok=True)
         print(f"policy, config and progress in {self.folder}")
 
@@ -134,6 +130,15 @@ class Run:
 
         write_atomically(self.folder / "normalisation.npz", write_arrays)
         write_atomically(self.folder / name, write_model)
+
+    def export(self, model: BaseAlgorithm) -> None:
+        """Write the policy as numpy plays it."""
+        arguments = self.arguments
+        policy = exported(
+            model, arguments.env, self.envs.unwrapped, normalise=self.envs, memory=arguments.memory,
+            increments=arguments.increments, belief=arguments.belief,
+        )  # fmt: skip
+        save_policy(policy, self.folder)
 
     def evaluate(self, model: BaseAlgorithm) -> dict[str, float]:
         """Means over one job of each evaluation environment, played without exploration."""
@@ -159,7 +164,7 @@ class Run:
 
 
 class Watch(BaseCallback):
-    """Shows progress, writes down every job, and now and then evaluates the model and keeps a checkpoint."""
+    """Shows progress, writes down every job, now and then evaluates the model, and keeps checkpoint and best policy."""
 
     def __init__(self, run: Run) -> None:
         super().__init__()
@@ -171,6 +176,8 @@ class Watch(BaseCallback):
         self.evaluations = _opened(
             folder / "evaluations.csv", ["step", "return", "type_iii_share", "cost_share", "damage"], begin
         )
+        rows = csv.DictReader(self.evaluations.read_text().splitlines())
+        self.best = max((float(row["return"]) for row in rows), default=-np.inf)
         self.bar = tqdm(total=self.run.arguments.steps, initial=begin, unit="step", desc=folder.name)
         self.last = begin
 
@@ -193,6 +200,9 @@ class Watch(BaseCallback):
 
     def _evaluate(self) -> None:
         figures = self.run.evaluate(self.model)
+        if figures["return"] > self.best:
+            self.best = figures["return"]
+            self.run.export(self.model)
         self._write(self.evaluations, [self.num_timesteps, *(f"{value:.6g}" for value in figures.values())])
         self.bar.set_postfix({name: f"{value:.3f}" for name, value in figures.items()})
 
