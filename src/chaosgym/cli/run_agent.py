@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def run_agent(env: str, policy: Path | None, seed: int, out: Path | None, as_json: bool) -> None:
-    """Let a trained agent run one job of ENV, an id such as chaosgym/ImpactBeam-v0."""
+    """Let a trained agent run one job of ENV, such as chaosgym/ImpactBeam-v0, on a held-out machine if it has any."""
     from chaosgym.envs import ENVIRONMENTS
 
     if env not in ENVIRONMENTS:
@@ -39,7 +39,8 @@ def run_agent(env: str, policy: Path | None, seed: int, out: Path | None, as_jso
     from chaosgym.policies.play import play
 
     agent = load_policy(policy) if policy else shipped_policy(env)
-    machine = gym.make(env)
+    # a policy may know the machines that it was trained on
+    machine = gym.make(env, **({"pool": "held-out"} if "pool" in gym.spec(env).kwargs else {}))
     agent.fits(machine)
     agent.reset()
     job = play(machine, agent, seed)
