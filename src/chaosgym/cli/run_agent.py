@@ -1,7 +1,7 @@
 """What does a trained agent do on a machine? ``run-agent``."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -40,7 +40,8 @@ def run_agent(env: str, policy: Path | None, seed: int, out: Path | None, as_jso
 
     agent = load_policy(policy) if policy else shipped_policy(env)
     # a policy may know the machines that it was trained on
-    machine = gym.make(env, **({"pool": "held-out"} if "pool" in gym.spec(env).kwargs else {}))
+    keywords: dict[str, Any] = {"pool": "held-out"} if "pool" in gym.spec(env).kwargs else {}
+    machine = gym.make(env, **keywords)
     agent.fits(machine)
     agent.reset()
     job = play(machine, agent, seed)

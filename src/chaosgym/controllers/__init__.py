@@ -9,7 +9,7 @@ from chaosgym.controllers.belief_programming import BeliefProgramming
 from chaosgym.controllers.constant import ClairvoyantConstant, ConstantSpeed, HighestSpeed, LowestSpeed, SafeConstant
 from chaosgym.controllers.controller import Controller
 from chaosgym.controllers.delayed_feedback import DelayedFeedback
-from chaosgym.controllers.dynamic_programming import DynamicProgramming, NominalProgramming
+from chaosgym.controllers.dynamic_programming import DynamicProgramming, NeighbourProgramming, NominalProgramming
 from chaosgym.controllers.force_feedback import ForceFeedback
 from chaosgym.controllers.greedy import GreedyClassifier
 from chaosgym.controllers.ogy import OGY
@@ -30,6 +30,7 @@ __all__ = [
     "GreedyClassifier",
     "HighestSpeed",
     "LowestSpeed",
+    "NeighbourProgramming",
     "NominalProgramming",
     "RandomSpeed",
     "RecedingHorizon",

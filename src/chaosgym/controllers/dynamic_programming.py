@@ -9,7 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from chaosgym.controllers.controller import Action, Controller, Knowledge, Observation
-from chaosgym.envs.forecast import Model, forecast_for, worth_of_steps
+from chaosgym.envs.forecast import Forecast, Model, forecast_for, forecast_of, worth_of_steps
+from chaosgym.envs.pools import Pool
 
 
 class DynamicProgramming(Controller):
@@ -18,9 +19,13 @@ class DynamicProgramming(Controller):
     knows: ClassVar[Knowledge] = "machine"
     model: ClassVar[Model] = "machine"
 
+    def forecast(self) -> Forecast:
+        """What steps of the present job will bring."""
+        return forecast_for(self.env, self.model)
+
     def reset(self) -> None:
         """Solve the job from its end."""
-        self._forecast = forecast_for(self.env, self.model)
+        self._forecast = self.forecast()
         self._worth = worth_of_steps(self._forecast)
         self._damage = 0.0
 
@@ -39,3 +44,25 @@ class NominalProgramming(DynamicProgramming):
 
     knows = "nominal"
     model = "nominal"
+
+
+class NeighbourProgramming(DynamicProgramming):
+    """Plays the best schedule of the mean table of the training machines that are nearest to this one.
+
+    It is told the machine's parameters exactly, but not its table: what identifying a machine can be worth to one who
+    knows the tables of the training machines alone.
+    """
+
+    neighbours: ClassVar[int] = 5
+
+    def forecast(self) -> Forecast:
+        """Mean of the forecasts of the neighbours, by the distance of their factors in tolerances."""
+        pool: Pool = self.env.pool
+        training = pool.sister("training")
+        widths = np.array(list(pool.tolerances.values()))
+        steps = (training.drawn - pool.drawn[self.env.machine_number]) / np.where(widths > 0.0, widths, 1.0)
+        distance = np.linalg.norm(steps, axis=1)
+        nearest = np.argsort(np.where(distance > 0.0, distance, np.inf))[: self.neighbours].tolist()
+        near = [forecast_of(training, training.regimes(k), self.task) for k in nearest]
+        means = {name: np.mean([getattr(one, name) for one in near], axis=0) for name in ("type_iii", "wear")}
+        return near[0]._replace(**means)

@@ -9,7 +9,7 @@ from chaosgym.controllers.belief_programming import BeliefProgramming
 from chaosgym.controllers.constant import ClairvoyantConstant, HighestSpeed, LowestSpeed, SafeConstant
 from chaosgym.controllers.controller import Controller, Knowledge
 from chaosgym.controllers.delayed_feedback import DelayedFeedback
-from chaosgym.controllers.dynamic_programming import DynamicProgramming, NominalProgramming
+from chaosgym.controllers.dynamic_programming import DynamicProgramming, NeighbourProgramming, NominalProgramming
 from chaosgym.controllers.force_feedback import ForceFeedback
 from chaosgym.controllers.greedy import GreedyClassifier
 from chaosgym.controllers.ogy import OGY
@@ -50,6 +50,7 @@ LADDER: dict[str, Rung] = {
     NOMINAL_SEARCH: Rung(RecedingHorizon, RecedingHorizon.knows),
     SAFE_CONSTANT: Rung(SafeConstant, SafeConstant.knows),
     "belief programming": Rung(BeliefProgramming, BeliefProgramming.knows),
+    "neighbour programming": Rung(NeighbourProgramming, NeighbourProgramming.knows),
     "OGY": Rung(OGY, OGY.knows, each_cycle=True),
     "clairvoyant constant": Rung(ClairvoyantConstant, ClairvoyantConstant.knows),
     CLAIRVOYANT_SEARCH: Rung(ClairvoyantHorizon, ClairvoyantHorizon.knows),

@@ -128,6 +128,11 @@ class Pool:
         self.factors = drawn_factors(list(tolerances.values()), sum(sizes.values()) - 1, SEEDS[self.task])
         self._kept: dict[int, tuple[RegimeTable, ...]] = {}
 
+    @property
+    def drawn(self) -> Array:
+        """Factors of the machines of this pool, (machines, fields)."""
+        return self.factors[self._first : self._first + self._size]
+
     def sister(self, name: str) -> "Pool":
         """Return the pool of another name with the same nominal machine."""
         return Pool(self.nominal, self.drive, self.tolerances, name, self.wears)
