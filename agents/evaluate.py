@@ -62,7 +62,7 @@ def contenders(arguments: argparse.Namespace) -> dict[str, Contender]:
               for name, rung in LADDER.items() if name in asked}  # fmt: skip
     for given in arguments.policy:
         name, _, pattern = given.partition("=")
-        folders = sorted(glob(pattern))
+        folders = sorted(path for path in glob(pattern) if Path(path).is_dir())
         if not folders or not re.fullmatch(r"[\w ,.-]+", name) or name in LADDER:
             raise SystemExit(f"--policy {given}: allowed: NAME=FOLDERS, a new name and a pattern that folders match")
         chosen[name] = Contender("tolerance range", tuple(_player(folder) for folder in folders))

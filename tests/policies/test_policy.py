@@ -3,6 +3,7 @@
 import json
 import shutil
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.spaces import Box
@@ -12,9 +13,11 @@ from stable_baselines3 import PPO, SAC
 from chaosgym.envs import SB3VecEnv
 from chaosgym.envs.sb3 import SB3LearnerView
 from chaosgym.errors import ModelFileError
+from chaosgym.evaluation.jobs import run_job
 from chaosgym.policies import TrainedPolicy, load_policy, save_policy, shipped_policy
 from chaosgym.policies.export import exported
 from chaosgym.policies.network import Dense, Network
+from chaosgym.policies.shipped import shipped_folder
 from tests.policies.made_up import ENV, trained
 
 SMALL = {"n_steps": 32, "batch_size": 32, "n_epochs": 1}
@@ -159,3 +162,14 @@ def test_a_copied_folder_is_the_same_policy(tmp_path):
     copy = shutil.copytree(_saved(tmp_path / "policy"), tmp_path / "copy")
     shutil.rmtree(tmp_path / "policy")
     assert load_policy(copy)(np.full(13, 0.5, np.float32)) == pytest.approx(0.65)
+
+
+def test_the_shipped_policy_does_what_its_evaluation_says():
+    """Two of the held-out jobs of evaluation.json are played again; the card and how it was trained lie beside it."""
+    env = "chaosgym/ImpactBeamTolerance-v0"
+    told = json.loads((shipped_folder(env) / "evaluation.json").read_text())
+    assert all((shipped_folder(env) / name).is_file() for name in ("card.md", "config.json"))
+    for job in told["jobs"][4:6]:
+        again = run_job(gym.make(env, pool="held-out"), shipped_policy(env), job["machine"], job["seed"])
+        assert again.type_iii_share == pytest.approx(job["type_iii_share"], abs=0.05)
+        assert again.job_return == pytest.approx(job["job_return"], abs=0.1)

@@ -36,3 +36,5 @@ def test_the_wheel_alone_plays_a_policy(folder, tmp_path, monkeypatch):  # noqa:
     )  # fmt: skip
     assert json.loads(told)["status"] == "job_done"
     assert out.stat().st_size > 10_000
+    shipped = _run(python.with_name("chaosgym"), "run-agent", "chaosgym/ImpactBeamTolerance-v0", "--json", cwd=tmp_path)
+    assert json.loads(shipped)["status"] == "job_done"
