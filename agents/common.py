@@ -1,6 +1,6 @@
 """What do all training scripts share? Arguments, environments, and a folder in which a run is kept and resumed.
 
-A folder holds policy.json and weights.npz (for numpy, of the best evaluation), policy.zip (stable-baselines3, the last),
+A folder holds policy.json and weights.npz (for numpy, of the best evaluation), policy.zip (stable-baselines3's last),
 normalisation.npz, config.json, progress.csv (every job) and evaluations.csv. While a run goes on, checkpoint.zip takes
 the place of policy.zip.
 """
