@@ -46,7 +46,7 @@ STATISTICS = ("mean", "var", "count")
 
 def parse(kind: type[Arguments], description: str | None) -> Arguments:
     """Read the command line; every field of a dataclass with defaults is an option."""
-    parser = argparse.ArgumentParser(description=(description or "").splitlines()[0])
+    parser = argparse.ArgumentParser(description=(description or "").partition("\n")[0])
     for field in fields(kind):  # type: ignore[arg-type]
         name, default = f"--{field.name.replace('_', '-')}", field.default
         if isinstance(default, bool):
