@@ -15,6 +15,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from tqdm import trange
 
 from chaosgym.envs.forecast import forecast_of, worth_of_steps
+from chaosgym.envs.observation import REMAINING, SPEED
 
 Array = NDArray[np.float64]
 
@@ -25,14 +26,14 @@ class ClairvoyantShaping(VecEnvWrapper):
     Parameters
     ----------
     envs
-        With the observations of chaosgym's environments: the speed first, the remaining share of the job third.
+        With the observations of chaosgym's environments.
     """
 
     def __init__(self, envs: VecEnv) -> None:
         super().__init__(envs)
         pool, task = envs.get_attr("pool")[0], envs.get_attr("task")[0]
         self._speeds = pool.speeds
-        self._ahead = np.zeros((len(pool), task.job_cycles // task.cycles_per_step + 1, len(pool.speeds)))
+        self._ahead = np.zeros((len(pool), task.steps + 1, len(pool.speeds)))
         for k in trange(len(pool), desc="best schedules", unit="machine"):
             forecast = forecast_of(pool, pool.regimes(k), task)
             for step, worth in enumerate(worth_of_steps(forecast)):
@@ -59,6 +60,8 @@ class ClairvoyantShaping(VecEnvWrapper):
 
     def _potential_of(self, observations: Any, machines: NDArray[np.int64]) -> Array:
         """What can still be earned (n,), interpolated between the speeds of the table."""
-        done = np.rint((1.0 - observations[:, 2]) * (self._ahead.shape[1] - 1)).astype(np.int64)
+        done = np.rint((1.0 - observations[:, REMAINING]) * (self._ahead.shape[1] - 1)).astype(np.int64)
         rows = self._ahead[machines, done]
-        return np.array([np.interp(seen[0], self._speeds, row) for seen, row in zip(observations, rows, strict=True)])
+        return np.array(
+            [np.interp(seen[SPEED], self._speeds, row) for seen, row in zip(observations, rows, strict=True)]
+        )

@@ -269,6 +269,8 @@ class CrankFleet(_CompiledFleet):
     def set_speeds(self, which: Indices, speeds: Array) -> None:
         """Change the speeds of the cranks [rpm]."""
         changed = self._speeds[which] != speeds
+        if not changed.any():
+            return
         which, speeds = which[changed], speeds[changed]
         self._speeds[which] = speeds
         # machines of one make are often at one speed: each pair is looked up once
@@ -276,9 +278,9 @@ class CrankFleet(_CompiledFleet):
         pairs = zip(which.tolist(), speeds.tolist(), strict=True)
         row = [distinct.setdefault((self._models[i], speed), len(distinct)) for i, speed in pairs]
         kept = [models.at(speed) for models, speed in distinct]
-        for name in SPEED_FIELDS if kept else ():
+        for name in SPEED_FIELDS:
             getattr(self._batch, name)[which] = np.array([getattr(each.model, name) for each in kept])[row]
-        for k, name in enumerate(TABLES if kept else ()):
+        for k, name in enumerate(TABLES):
             getattr(self._batch, name)[which] = np.array([each.addresses[k] for each in kept])[row]
         for i, place in zip(which.tolist(), row, strict=True):
             self._kept[i] = kept[place]

@@ -89,7 +89,7 @@ def test_the_plan_is_dynamic_programming_on_the_expected_map(env):
     place = int(plan.target[0])
     within = forecast.within_reach(50)
     assert place in within
-    assert expected[place] >= expected[within].max() - 0.02 * left * env.task.cycles_per_step / env.task.job_cycles
+    assert expected[place] >= expected[within].max() - 0.02 * left * env.task.type_iii_step
 
 
 def test_a_view_with_a_belief_keeps_its_space_and_follows_the_plan():

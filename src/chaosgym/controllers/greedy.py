@@ -53,11 +53,10 @@ class GreedyClassifier(Controller):
         self._note(place, self.peaks(observation))
         within = forecast.within_reach(place)
         forces = np.repeat(self._force[within, None, None], task.cycles_per_step, axis=1)
-        share = task.cycles_per_step / task.job_cycles
         promise = (
             forecast.time[within]
             - task.damage_weight * task.damage(forces)[:, 0]
-            - task.type_iii_weight * share * self._chance[within]
+            - task.type_iii_step * self._chance[within]
         )
         return self.command(float(forecast.speeds[within[promise.argmax()]]))
 

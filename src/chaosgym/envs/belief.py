@@ -9,20 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
 from scipy.stats import entropy
 
 from chaosgym.envs.forecast import forecast_of
-from chaosgym.envs.observation import Observation
+from chaosgym.envs.observation import FIRST_PEAK, REMAINING, SPEED, Observation
 from chaosgym.envs.pools import Pool
-from chaosgym.envs.regimes import nearest
 from chaosgym.envs.tasks import Task
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
-
-SPEED, REMAINING, FIRST_PEAK = 0, 2, 8
-"""Places in an observation of the speed, of the remaining share of the job, and of the first measured peak."""
 
 SCATTER = (0.5, 1.5, 2.5, 3.5, 5.0, 7.5, 12.0)
 MOVING = (-1.9, -1.5, -0.5, 0.6, 1.4, 2.0, 2.3)
@@ -41,6 +36,9 @@ LOCAL, NEIGHBOUR = 0.5, 0.25
 
 CERTAIN = (-3.0, 5.0)
 """Limits of the log odds that a speed gathers by itself."""
+
+UNHEARD_OF = 1_000.0
+"""Force [N] in place of that of a motion that could not be followed."""
 
 HORIZON = 60
 """Steps that a plan looks ahead: more than the drive needs to reach any speed."""
@@ -77,15 +75,16 @@ class SpeedBelief:
     def __init__(self, pool: Pool, task: Task) -> None:
         forecasts = [forecast_of(pool, pool.regimes(k), task) for k in range(len(pool))]
         tables = [pool.regimes(k)[0] for k in range(len(pool))]
-        self.speeds, self.moves, self.steps = pool.speeds, forecasts[0].moves, forecasts[0].steps
+        # speeds, moves and times are the same for all
+        self._forecast, self._task = forecasts[0], task
         self._type_iii = np.array([table.type_iii for table in tables])
-        self._force = np.array(
-            [np.where(table.equivalent_force < 1e3, table.equivalent_force, 1e3) for table in tables]
-        )
+        self._force = np.minimum([table.equivalent_force for table in tables], UNHEARD_OF)
         self._wear = np.array([forecast.damage_weight * forecast.wear[0] for forecast in forecasts])
-        self._time = forecasts[0].time
-        self._type_iii_cost = task.type_iii_weight * task.cycles_per_step / task.job_cycles
-        self._cycles = task.cycles_per_step
+
+    @property
+    def speeds(self) -> Array:
+        """Of the map, (n,)."""
+        return self._forecast.speeds
 
     def start(self, observations: Observation, excluded: Places | None = None) -> Plan:
         """Begin n jobs with their first observations (n, d); ``excluded`` (n,) are machines that can't be the one."""
@@ -107,21 +106,20 @@ class SpeedBelief:
     def features(self, plan: Plan) -> Array:
         """Return what a learner is told of plans, (n, count): for each place in reach, its probability of Type III,
         what was felt there, and its worth less the largest in steps of Type III; the target's place; the doubt."""
-        reach = plan.place[:, None] + np.arange(-self.moves, self.moves + 1)
-        near = np.clip(reach, 0, len(self.speeds) - 1)
+        near, inside = self._within_reach(plan.place)
         irregular, gathered, worth = (
             np.take_along_axis(values, near, axis=1) for values in (plan.irregular, plan.gathered, plan.worth)
         )
-        worth = (worth - worth.max(axis=1, keepdims=True)) / self._type_iii_cost
-        beyond = (reach != near).astype(float)
-        ahead = (plan.target - plan.place) / self.moves
+        worth = (worth - worth.max(axis=1, keepdims=True)) / self._task.type_iii_step
+        beyond = (~inside).astype(float)
+        ahead = (plan.target - plan.place) / self._forecast.moves
         columns = [np.maximum(irregular, beyond), gathered / CERTAIN[1], np.maximum(worth, -10.0) - 10.0 * beyond]
         return np.concatenate([*columns, ahead[:, None], plan.doubt[:, None]], axis=1)
 
     @property
     def feature_bounds(self) -> tuple[Array, Array]:
         """Lowest and highest features, (count,) each."""
-        reach = 2 * self.moves + 1
+        reach = 2 * self._forecast.moves + 1
         low = np.repeat([0.0, CERTAIN[0] / CERTAIN[1], -20.0], reach)
         high = np.repeat([1.0, 1.0, 0.0], reach)
         return np.append(low, [-1.0, 0.0]), np.append(high, [1.0, 1.0])
@@ -134,8 +132,8 @@ class SpeedBelief:
 
     def _learn(self, jobs: Places, observations: Observation) -> None:
         speed = observations[:, SPEED]
-        peaks = observations[:, FIRST_PEAK : FIRST_PEAK + self._cycles].astype(float)
-        place, moved = nearest(self.speeds, speed), speed != self._last[jobs]
+        peaks = observations[:, FIRST_PEAK : FIRST_PEAK + self._task.cycles_per_step].astype(float)
+        place, moved = self._forecast.place_of(speed), speed != self._last[jobs]
         self._last[jobs] = speed
         scatter, mean = peaks.std(axis=1), peaks.mean(axis=1)
         odds = np.where(moved, np.interp(scatter, SCATTER, MOVING), np.interp(scatter, SCATTER, STAYING))
@@ -154,15 +152,20 @@ class SpeedBelief:
         weight /= weight.sum(axis=1, keepdims=True)
         chance = np.clip(weight @ self._type_iii, 0.02, 0.98)
         irregular = 1.0 / (1.0 + (1.0 / chance - 1.0) * np.exp(-gathered))
-        reward = self._time - self._type_iii_cost * irregular - weight @ self._wear
-        left = np.rint(observations[:, REMAINING].astype(float) * self.steps)
+        reward = self._forecast.time - self._task.type_iii_step * irregular - weight @ self._wear
+        left = np.rint(observations[:, REMAINING].astype(float) * self._task.steps)
         worth = reward.copy()
         for step in range(1, min(HORIZON, int(left.max()))):
-            ahead = reward + maximum_filter1d(worth, 2 * self.moves + 1, axis=1, mode="nearest")
+            ahead = reward + self._forecast.best_within_reach(worth)
             worth = np.where((step < left)[:, None], ahead, worth)
-        place = nearest(self.speeds, observations[:, SPEED])
-        reach = place[:, None] + np.arange(-self.moves, self.moves + 1)
-        inside = (reach >= 0) & (reach < len(self.speeds))
-        near = np.where(inside, np.take_along_axis(worth, np.clip(reach, 0, len(self.speeds) - 1), axis=1), -np.inf)
+        place = self._forecast.place_of(observations[:, SPEED])
+        near, inside = self._within_reach(place)
+        best = np.where(inside, np.take_along_axis(worth, near, axis=1), -np.inf).argmax(axis=1)
         doubt = entropy(weight, axis=1) / np.log(weight.shape[1])
-        return Plan(irregular, gathered, worth, place, place - self.moves + near.argmax(axis=1), doubt)
+        return Plan(irregular, gathered, worth, place, place - self._forecast.moves + best, doubt)
+
+    def _within_reach(self, place: Places) -> tuple[Places, NDArray[np.bool_]]:
+        """Places that a step reaches from places (n,), (n, reach), and which lie inside; others are the ends."""
+        reach = place[:, None] + np.arange(-self._forecast.moves, self._forecast.moves + 1)
+        near = np.clip(reach, 0, len(self.speeds) - 1)
+        return near, reach == near

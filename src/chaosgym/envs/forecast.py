@@ -79,16 +79,15 @@ def forecast_of(pool: Pool, tables: Sequence[RegimeTable], task: Task) -> Foreca
     damage = np.linspace(0.0, 1.0, DAMAGE_LEVELS)
     at_level = [tables[place] for place in nearest(pool.levels, 1.0 + damage).tolist()]
     job_time = task.job_cycles * period_at(drive.highest_speed)
-    share = task.cycles_per_step / task.job_cycles
     type_iii = np.array([table.type_iii for table in at_level])
     forces = np.array([np.tile(table.equivalent_force, (task.cycles_per_step, 1)) for table in at_level])
     spacing = pool.speeds[1] - pool.speeds[0]
     return Forecast(
         speeds=pool.speeds, damage=damage,
         time=-task.time_weight * task.cycles_per_step * period_at(pool.speeds) / job_time,
-        type_iii=-task.type_iii_weight * share * type_iii, wear=np.minimum(task.damage(forces), 1.0),
+        type_iii=-task.type_iii_step * type_iii, wear=np.minimum(task.damage(forces), 1.0),
         damage_weight=task.damage_weight,
-        moves=max(1, int(drive.slew_limit / spacing * (1.0 + 1e-12))), steps=task.job_cycles // task.cycles_per_step,
+        moves=max(1, int(drive.slew_limit / spacing * (1.0 + 1e-12))), steps=task.steps,
         fracture=-task.failure_weight,
     )  # fmt: skip
 

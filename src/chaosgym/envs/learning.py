@@ -16,7 +16,7 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
 from chaosgym.envs.belief import Plan, SpeedBelief
-from chaosgym.envs.observation import Observation
+from chaosgym.envs.observation import FIRST_PEAK, SPEED, Observation
 from chaosgym.envs.pools import Pool
 from chaosgym.envs.tasks import Task
 
@@ -26,9 +26,6 @@ Numbers = NDArray[np.int64]
 
 BINS = 53
 """Bins over the range of the drive: 0.5 Hz of the beam, 5 rpm of the crank, centred on the speeds at both ends."""
-
-FIRST_PEAK = 8
-"""Place of the first measured peak in an observation; the speed is at place 0."""
 
 WELL_KNOWN = 100.0
 """Peaks after which a bin counts as fully known."""
@@ -73,7 +70,7 @@ class SpeedMemory:
 
     def _news(self, observations: Observation) -> Array:
         """Number, sum and sum of squares of the peaks of observations (n, d), each at its bin: (n, 3, BINS)."""
-        place = (observations[:, 0] - self._lowest) / (self._highest - self._lowest) * (BINS - 1)
+        place = (observations[:, SPEED] - self._lowest) / (self._highest - self._lowest) * (BINS - 1)
         bins, jobs = np.rint(place).astype(np.int64), np.arange(len(observations))
         peaks = observations[:, self._peaks].astype(float)
         news = np.zeros((len(peaks), 3, BINS))
@@ -176,7 +173,7 @@ def memory_of(
 
 def speeds_before(observations: Observation, memory: SpeedMemory | BeliefMemory | None) -> Array:
     """Return the speeds (n, 1) that increments change: those planned by a belief, or those observed (n, d)."""
-    return memory.planned if isinstance(memory, BeliefMemory) else observations[:, :1].astype(float)
+    return memory.planned if isinstance(memory, BeliefMemory) else observations[:, SPEED, None].astype(float)
 
 
 class LearnerView(gym.Wrapper[Observation, Actions, Observation, Actions]):

@@ -12,6 +12,9 @@ Observation = NDArray[np.float32]
 IMPACT_RANGE = 200.0
 """Impacts a cycle at which the counter saturates."""
 
+SPEED, REMAINING, FIRST_PEAK = 0, 2, 8
+"""Places in an observation of the speed, of the remaining share of the job, and of the first measured peak."""
+
 
 def observation_names(cycles_per_step: int, wears: bool) -> tuple[str, ...]:
     """Name every entry of the observation; the last one is the damage if the machine wears."""
@@ -71,7 +74,7 @@ def observe(
         (speed, action, remaining, peaks.max(axis=-1), mean, deviation, impacts, bouncing)
     ):  # fmt: skip
         values[:, column] = entry
-    values[:, 8 : 8 + cycles] = peaks
+    values[:, FIRST_PEAK : FIRST_PEAK + cycles] = peaks
     if damage is not None:
         values[:, -1] = damage
     return np.clip(values, space.low, space.high, out=values)

@@ -109,6 +109,16 @@ class Task:
                 f"{self.cycles_per_step}"
             )
 
+    @property
+    def steps(self) -> int:
+        """Steps of the job."""
+        return int(self.job_cycles // self.cycles_per_step)
+
+    @property
+    def type_iii_step(self) -> float:
+        """Reward lost by a step that counts as Type III."""
+        return self.type_iii_weight * self.cycles_per_step / self.job_cycles
+
     def damage(self, peak_force: Array) -> Array:
         """Share of its life that each surface uses up, (..., sides)."""
         return damage_of(peak_force, self.load_rating, self.damage_acceleration)
@@ -142,7 +152,7 @@ class Task:
         terms = {
             "reward_time": -self.time_weight * step.duration / job_time,
             "reward_damage": 0.0 - self.damage_weight * damage_increase,
-            "reward_type_iii": 0.0 - self.type_iii_weight * type_iii * self.cycles_per_step / self.job_cycles,
+            "reward_type_iii": 0.0 - self.type_iii_step * type_iii,
             "reward_failure": 0.0 - self.failure_weight * (failed | (status == int(Status.FRACTURE))),
         }
         costs = {"cost": type_iii | overload | failed, "cost_type_iii": type_iii, "cost_force": overload}
