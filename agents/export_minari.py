@@ -7,21 +7,15 @@ MINARI_DATASETS_PATH=minari, `minari.load_dataset("chaosgym/ImpactBeam/wandering
 """
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import common
 import gymnasium as gym
-import numpy as np
 from tqdm import trange
+from wandering import wandering
 
 from chaosgym.policies import load_policy
-
-MEAN_STAY = 20
-"""Steps for which a speed is kept on average in wandering."""
-
 
 @dataclass(frozen=True)
 class Arguments:
@@ -32,19 +26,6 @@ class Arguments:
     jobs: int = 100
     seed: int = 0
     out: str = "minari"
-
-
-def wandering(seed: int) -> Callable[[Any], Any]:
-    """Policy that asks for a new random speed now and then, whatever it observes."""
-    generator = np.random.default_rng(seed)
-    action = generator.uniform(-1.0, 1.0, 1).astype(np.float32)
-
-    def act(observation: Any) -> Any:
-        if generator.random() < 1.0 / MEAN_STAY:
-            action[:] = generator.uniform(-1.0, 1.0)
-        return action.copy()
-
-    return act
 
 
 def main() -> None:

@@ -1,0 +1,76 @@
+"""What do five peaks tell of a speed? Counts on the training pool behind the constants of chaosgym.envs.belief.
+
+    python agents/calibrate_belief.py --env chaosgym/SliderCrankTolerance-v0
+
+Jobs wander over the range. Of each step the standard deviation of its measured peaks is known, whether the speed had
+just changed, and whether the table calls it Type III. The log odds of that, less those of all steps, rise with the
+scatter: they are fitted by isotonic regression and printed at the scatters that a belief interpolates between.
+"""
+
+from dataclasses import dataclass
+
+import common
+import gymnasium as gym
+import numpy as np
+from sklearn.isotonic import IsotonicRegression
+from tqdm import trange
+from wandering import wandering
+
+from chaosgym.envs.belief import SCATTER
+from chaosgym.envs.observation import FIRST_PEAK, SPEED
+
+LEAST_SHARE = 0.01
+"""Probabilities closer to none or to one are not told apart by so few jobs."""
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Everything that decides the figures."""
+
+    env: str = "chaosgym/ImpactBeamTolerance-v0"
+    jobs: int = 128
+    seed: int = 0
+
+
+def felt(arguments: Arguments) -> np.ndarray:
+    """Steps of all jobs, (n, 4): changed speed, scatter [N], error of the mean as the table's force [N], Type III."""
+    env = gym.make(arguments.env, pool="training").unwrapped
+    steps = []
+    for job in trange(arguments.jobs, desc="wandering", unit="job"):
+        act, ended = wandering(arguments.seed + job), False
+        observation = env.reset(seed=arguments.seed + job, options={"machine": job % len(env.pool)})[0]
+        while not ended:
+            before = observation[SPEED]
+            observation, _, terminated, truncated, _ = env.step(act(observation))
+            ended = terminated or truncated
+            peaks = observation[FIRST_PEAK : FIRST_PEAK + env.task.cycles_per_step].astype(float)
+            table, speed = env.regimes, observation[SPEED]
+            error = peaks.mean() - table.equivalent_force[table.index_of(speed)]
+            steps.append((speed != before, peaks.std(), error, table.is_type_iii(speed)))
+    return np.array(steps, float)
+
+
+def log_odds(chance: np.ndarray) -> np.ndarray:
+    """Return the log odds of probabilities."""
+    return np.log(chance / (1.0 - chance))
+
+
+def evidence(scatter: np.ndarray, type_iii: np.ndarray) -> np.ndarray:
+    """By how much the log odds of Type III rise with what was felt, at the scatters of ``SCATTER``."""
+    fit = IsotonicRegression(y_min=LEAST_SHARE, y_max=1.0 - LEAST_SHARE, out_of_bounds="clip").fit(scatter, type_iii)
+    return log_odds(fit.predict(SCATTER)) - log_odds(type_iii.mean())
+
+
+def main() -> None:
+    """Play the jobs and print the counts."""
+    moved, scatter, error, type_iii = felt(common.parse(Arguments, __doc__)).T
+    calm, irregular = scatter[type_iii == 0.0], scatter[type_iii == 1.0]
+    print(f"scatter of calm steps {np.median(calm):.2f} N, of Type III {np.median(irregular):.2f} N (medians)")
+    for name, which in (("moving", moved == 1.0), ("staying", moved == 0.0)):
+        values = ", ".join(f"{value:.1f}" for value in evidence(scatter[which], type_iii[which]))
+        print(f"{name}: {values} at {', '.join(map(str, SCATTER))} N, of {np.count_nonzero(which)} steps")
+    print(f"error of the mean: {np.sqrt(np.mean(np.clip(error, -20.0, 20.0) ** 2)):.1f} N")
+
+
+if __name__ == "__main__":
+    main()
