@@ -17,6 +17,7 @@ from wandering import wandering
 
 from chaosgym.policies import load_policy
 
+
 @dataclass(frozen=True)
 class Arguments:
     """Everything that decides a dataset."""

@@ -100,8 +100,8 @@ class SliderCrankEnv(MachineEnv):
 
     *Damage* follows the basic rating life of bearings: a revolution with peak force F uses up (F / C)^(10/3) / 10^6 of
     the life of a bearing surface, times an acceleration of 1000. True peak forces count, of the worse surface. C =
-    141.3 N is the largest equivalent force of the nominal machine at constant speed, that of 300 rpm, so that this worst
-    speed uses up one life in one job.
+    141.3 N is the largest equivalent force of the nominal machine at constant speed, that of 300 rpm, so that this
+    worst speed uses up one life in one job.
 
     A step counts as *Type III* if a table of the machine says so: `diagnose` from rest, within 400 revolutions, at the
     speeds from 50 to 300 rpm by 5 rpm (by 10 rpm in Wear, at six clearances from once to twice that of the new machine;
@@ -171,9 +171,10 @@ class SliderCrankEnv(MachineEnv):
     the thesis (5.2.2), which makes a new speed cheap. The rungs of `fidelity` are `"rigid"`, `"flexible-5deg"`,
     `"flexible-1deg"` and `"reference"`; a field that a rung sets may not be given beside it.
 
-    The clearance is one of the thesis' (figure 4.14b), the contact damping ratio is assumed. More damping makes Type III
-    rare and small, less makes it common: at half of this clearance and a ratio of 0.105, where 37 % of the speeds count,
-    peak forces of a Type III response scatter by 0.2 N in the median, a tenth of the sensor's error, and here by 2.0 N.
+    The clearance is one of the thesis' (figure 4.14b), the contact damping ratio is assumed. More damping makes
+    Type III rare and small, less makes it common: at half of this clearance and a ratio of 0.105, where 37 % of the
+    speeds count, peak forces of a Type III response scatter by 0.2 N in the median, a tenth of the sensor's error,
+    and here by 2.0 N.
 
     Tolerances are +-10 % of the slider's clearance and of the ball's, +-10 % of the contact damping ratio and +-0.2 %
     of the rod length. Their machines are fixed and seeded: 128 to train on and 32 held out, in Wear 32 and 16. The
