@@ -12,7 +12,7 @@ import platform
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import gymnasium as gym
 import numba
@@ -52,7 +52,8 @@ def parse(kind: type[Arguments], description: str | None) -> Arguments:
         if isinstance(default, bool):
             parser.add_argument(name, action=argparse.BooleanOptionalAction, default=default)
         else:
-            parser.add_argument(name, type=type(default), default=default, help="default: %(default)s")
+            choices = get_args(field.type) or None
+            parser.add_argument(name, type=type(default), choices=choices, default=default, help="default: %(default)s")
     return kind(**vars(parser.parse_args()))
 
 
@@ -62,7 +63,7 @@ class Run:
     Parameters
     ----------
     arguments
-        A dataclass with at least env, steps, seed, out, envs, memory, increments, belief, shaping, gamma,
+        A dataclass with at least env, steps, seed, out, envs, memory, increments, shaping, gamma,
         evaluate_every, jobs and threads.
     wrapped
         Puts one more wrapper around the environments of training.
@@ -91,7 +92,7 @@ class Run:
             raise SystemExit(f"--out {self.folder} holds this run, finished; choose another folder")
 
     def _seen(self, envs: VecEnv) -> VecEnv:
-        return SB3LearnerView(envs, self.arguments.memory, self.arguments.increments, self.arguments.belief)
+        return SB3LearnerView(envs, self.arguments.memory, self.arguments.increments)
 
     def resumed(self, kind: type[BaseAlgorithm]) -> Any:
         """Return the model of the last checkpoint, or None if there is none."""
@@ -136,7 +137,7 @@ class Run:
         arguments = self.arguments
         policy = exported(
             model, arguments.env, self.envs.unwrapped, normalise=self.envs, memory=arguments.memory,
-            increments=arguments.increments, belief=arguments.belief,
+            increments=arguments.increments,
         )  # fmt: skip
         save_policy(policy, self.folder)
 

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import common
 from stable_baselines3 import PPO
 
+from chaosgym.envs.learning import Memory
+
 
 @dataclass(frozen=True)
 class Arguments:
@@ -23,15 +25,14 @@ class Arguments:
     rollout: int = 200
     batch: int = 400
     epochs: int = 8
-    learning_rate: float = 7e-4
-    gamma: float = 0.95
+    learning_rate: float = 2e-4
+    gamma: float = 0.97
     gae_lambda: float = 0.9
     entropy: float = 0.0
-    log_std: float = -0.7
+    log_std: float = -1.5
     units: int = 128
-    memory: bool = True
+    memory: Memory = "belief"
     increments: bool = True
-    belief: bool = False
     shaping: bool = True
     evaluate_every: int = 25_000
     jobs: int = 16

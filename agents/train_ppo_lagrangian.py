@@ -20,6 +20,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from torch import nn
 
+from chaosgym.envs.learning import Memory
+
 Array = NDArray[np.float32]
 
 
@@ -138,15 +140,14 @@ class Arguments:
     rollout: int = 200
     batch: int = 400
     epochs: int = 8
-    learning_rate: float = 7e-4
-    gamma: float = 0.95
+    learning_rate: float = 2e-4
+    gamma: float = 0.97
     gae_lambda: float = 0.9
     entropy: float = 0.0
-    log_std: float = -0.7
+    log_std: float = -1.5
     units: int = 128
-    memory: bool = True
+    memory: Memory = "belief"
     increments: bool = True
-    belief: bool = False
     shaping: bool = True
     evaluate_every: int = 25_000
     jobs: int = 16

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import common
 from sb3_contrib import RecurrentPPO
 
+from chaosgym.envs.learning import Memory
+
 
 @dataclass(frozen=True)
 class Arguments:
@@ -29,9 +31,8 @@ class Arguments:
     entropy: float = 0.0
     log_std: float = -0.7
     units: int = 64
-    memory: bool = False
+    memory: Memory = "none"
     increments: bool = True
-    belief: bool = False
     shaping: bool = True
     evaluate_every: int = 25_000
     jobs: int = 16

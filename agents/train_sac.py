@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import common
 from stable_baselines3 import SAC
 
+from chaosgym.envs.learning import Memory
+
 
 @dataclass(frozen=True)
 class Arguments:
@@ -26,9 +28,8 @@ class Arguments:
     gamma: float = 0.95
     learning_starts: int = 3_200
     gradient_steps: int = 8
-    memory: bool = True
+    memory: Memory = "belief"
     increments: bool = True
-    belief: bool = False
     shaping: bool = True
     evaluate_every: int = 10_000
     jobs: int = 16

@@ -53,10 +53,10 @@ def test_a_run_leaves_a_policy_that_numpy_plays(script, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_run_with_a_belief_leaves_a_policy_that_plays(tmp_path):
+def test_a_policy_drives_a_machine_that_it_has_not_met(tmp_path):
     """The policy carries its belief along: it drives a held-out machine to the end of a job."""
     env, out = "chaosgym/ImpactBeamTolerance-v0", tmp_path / "run"
-    trained = _run("train_ppo.py", "--env", env, "--belief", "--steps", "800", *SHORT, "--out", str(out))
+    trained = _run("train_ppo.py", "--env", env, "--steps", "800", *SHORT, "--out", str(out))
     assert trained.returncode == 0, trained.stderr
     row = run_job(gym.make(env, pool="held-out", job_cycles=100), load_policy(out), 3, 0)
     assert row.cycles == 100

@@ -94,7 +94,7 @@ def test_the_plan_is_dynamic_programming_on_the_expected_map(env):
 
 def test_a_view_with_a_belief_keeps_its_space_and_follows_the_plan():
     """Observations stay within the announced bounds; an action of zero goes where the belief plans to."""
-    view = LearnerView(gym.make(ENV, pool="held-out", job_cycles=100), belief=True)
+    view = LearnerView(gym.make(ENV, pool="held-out", job_cycles=100), memory="belief")
     observation, _ = view.reset(seed=3, options={"machine": 2})
     for _ in range(20):
         assert view.observation_space.contains(observation)

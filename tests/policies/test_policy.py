@@ -48,9 +48,9 @@ def test_numpy_plays_what_torch_plays(name, tmp_path):
 def test_a_policy_sees_and_moves_as_it_did_in_training():
     """The policy is given plain observations; training had a memory of speeds and increments for actions."""
     plain = SB3VecEnv(ENV, num_envs=2, job_cycles=50)
-    envs = SB3LearnerView(plain)
+    envs = SB3LearnerView(plain, memory="speeds")
     model = PPO("MlpPolicy", envs, seed=0, device="cpu", **SMALL)
-    policy = exported(model, ENV, plain, memory=True, increments=True)
+    policy = exported(model, ENV, plain, memory="speeds", increments=True)
     envs.seed(5)
     seen = envs.reset()
     size = plain.observation_space.shape[0]
@@ -100,6 +100,7 @@ DAMAGES = {
     "format 1": lambda folder: _edit(folder, format=1),
     "KeyError: 'layer1.weight'": lambda folder: _edit(folder, activations=["none", "none"]),
     "activation 'cosine'": lambda folder: _edit(folder, activations=["cosine"]),
+    "memory = 'elephant' is not one of none, speeds, belief": lambda folder: _edit(folder, memory="elephant"),
     "expected: float32 (1, 12)": lambda folder: _edit(folder, observation={"low": [0.0] * 12, "high": [1.0] * 12}),
     "expected: float32 (2, 13)": lambda folder: _edit(folder, action={"low": [-1.0] * 2, "high": [1.0] * 2}),
 }
@@ -109,9 +110,9 @@ def test_a_policy_believes_what_it_believed_in_training(tmp_path):
     """With a belief, the same observations give the same features, and actions correct the same plan."""
     env = "chaosgym/ImpactBeamTolerance-v0"
     plain = SB3VecEnv(env, num_envs=2, job_cycles=50, pool="held-out")
-    envs = SB3LearnerView(plain, belief=True)
+    envs = SB3LearnerView(plain, memory="belief")
     model = PPO("MlpPolicy", envs, seed=0, device="cpu", **SMALL)
-    save_policy(exported(model, env, plain, belief=True, increments=True), tmp_path)
+    save_policy(exported(model, env, plain, memory="belief", increments=True), tmp_path)
     policy = load_policy(tmp_path)
     envs.seed(5)
     seen = envs.reset()

@@ -8,7 +8,7 @@ much it shall differ from the belief's own plan (residual learning: T. Silver et
 """
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any, Literal, cast, get_args
 
 import gymnasium as gym
 import numpy as np
@@ -19,10 +19,14 @@ from chaosgym.envs.belief import Plan, SpeedBelief
 from chaosgym.envs.observation import FIRST_PEAK, SPEED, Observation
 from chaosgym.envs.pools import Pool
 from chaosgym.envs.tasks import Task
+from chaosgym.errors import ParameterError
 
 Array = NDArray[np.float64]
 Actions = NDArray[np.float32]
 Numbers = NDArray[np.int64]
+
+Memory = Literal["none", "speeds", "belief"]
+"""What a learner is given of the past of a job: nothing, ``SpeedMemory`` or ``BeliefMemory``."""
 
 BINS = 53
 """Bins over the range of the drive: 0.5 Hz of the beam, 5 rpm of the crank, centred on the speeds at both ends."""
@@ -162,13 +166,19 @@ def commanded(increments: Actions, speeds: Array, space: Box, largest: float) ->
     return np.asarray(np.clip(2.0 * (target - low) / (high - low) - 1.0, -1.0, 1.0), np.float32)
 
 
-def memory_of(
-    space: Box, attribute: Callable[[str], Any], memory: bool, belief: bool
-) -> SpeedMemory | BeliefMemory | None:
-    """Return what a view remembers with; ``attribute`` gives those of the environment by name."""
-    if belief:
+def memory_of(space: Box, attribute: Callable[[str], Any], memory: Memory) -> SpeedMemory | BeliefMemory | None:
+    """Return what a view remembers with; ``attribute`` gives those of the environment by name.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such memory.
+    """
+    if memory not in get_args(Memory):
+        raise ParameterError(f"memory = {memory!r} is not one of {', '.join(get_args(Memory))}")
+    if memory == "belief":
         return BeliefMemory(space, attribute("pool"), attribute("task"))
-    return SpeedMemory(space) if memory else None
+    return SpeedMemory(space) if memory == "speeds" else None
 
 
 def speeds_before(observations: Observation, memory: SpeedMemory | BeliefMemory | None) -> Array:
@@ -177,24 +187,27 @@ def speeds_before(observations: Observation, memory: SpeedMemory | BeliefMemory 
 
 
 class LearnerView(gym.Wrapper[Observation, Actions, Observation, Actions]):
-    """One environment with a memory of speeds, moved by increments: for instance as ``env_wrapper`` of rl-zoo.
+    """One environment with a memory, moved by increments: for instance as ``env_wrapper`` of rl-zoo.
 
     Parameters
     ----------
     env
         A chaosgym environment.
-    memory, increments
-        Leave one of them out.
-    belief
-        Instead of the memory.
+    memory
+        Of the job.
+    increments
+        Whether actions are changes of speed; target speeds otherwise.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such memory.
     """
 
-    def __init__(
-        self, env: gym.Env[Observation, Actions], memory: bool = True, increments: bool = True, belief: bool = False
-    ) -> None:
+    def __init__(self, env: gym.Env[Observation, Actions], memory: Memory = "belief", increments: bool = True) -> None:
         super().__init__(env)
         self._space = cast(Box, env.observation_space)
-        self._memory = memory_of(self._space, env.get_wrapper_attr, memory, belief)
+        self._memory = memory_of(self._space, env.get_wrapper_attr, memory)
         self._largest = env.get_wrapper_attr("drive").slew_limit if increments else None
         if self._memory:
             self.observation_space = cast(Space[Observation], self._memory.space)
@@ -211,9 +224,8 @@ class LearnerView(gym.Wrapper[Observation, Actions, Observation, Actions]):
     def step(self, action: Actions) -> tuple[Observation, Any, bool, bool, dict[str, Any]]:
         """Run a step and remember it."""
         if self._largest is not None:
-            action = commanded(action[None], speeds_before(self._last[None], self._memory), self._space, self._largest)[
-                0
-            ]
+            before = speeds_before(self._last[None], self._memory)
+            action = commanded(action[None], before, self._space, self._largest)[0]
         self._last, reward, terminated, truncated, info = self.env.step(action)
         seen = self._memory.add(self._last[None])[0] if self._memory else self._last
         return seen, reward, terminated, truncated, info

@@ -16,7 +16,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
-from chaosgym.envs.learning import commanded, memory_of, speeds_before
+from chaosgym.envs.learning import Memory, commanded, memory_of, speeds_before
 from chaosgym.envs.observation import Observation
 from chaosgym.envs.vector_env import MachineVectorEnv
 from chaosgym.errors import ParameterError
@@ -152,21 +152,24 @@ class SB3VecEnv(VecEnv):
 
 
 class SB3LearnerView(VecEnvWrapper):
-    """What ``LearnerView`` is for one environment: a memory of speeds, and increments for actions.
+    """What ``LearnerView`` is for one environment: a memory, and increments for actions.
 
     Parameters
     ----------
     envs
         A ``SB3VecEnv``.
     memory, increments
-        Leave one of them out.
-    belief
-        Instead of the memory.
+        As there.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such memory.
     """
 
-    def __init__(self, envs: VecEnv, memory: bool = True, increments: bool = True, belief: bool = False) -> None:
+    def __init__(self, envs: VecEnv, memory: Memory = "belief", increments: bool = True) -> None:
         self._space = cast(Box, envs.observation_space)
-        self._memory = memory_of(self._space, lambda name: envs.get_attr(name)[0], memory, belief)
+        self._memory = memory_of(self._space, lambda name: envs.get_attr(name)[0], memory)
         self._largest = envs.get_attr("drive")[0].slew_limit if increments else None
         super().__init__(envs, observation_space=self._memory.space if self._memory else self._space)
 

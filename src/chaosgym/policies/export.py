@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from chaosgym.envs.learning import Memory
 from chaosgym.errors import ModelFileError
 from chaosgym.policies.network import Dense, Lstm, Network
 from chaosgym.policies.policy import Normalisation, TrainedPolicy
@@ -19,9 +20,8 @@ def exported(
     envs: Any,
     *,
     normalise: Any = None,
-    memory: bool = False,
+    memory: Memory = "none",
     increments: bool = False,
-    belief: bool = False,
 ) -> TrainedPolicy:
     """Return the deterministic policy of a trained model.
 
@@ -35,7 +35,7 @@ def exported(
         A ``SB3VecEnv`` of it, whose spaces and drive count.
     normalise
         The ``VecNormalize`` that it was trained in, if any.
-    memory, increments, belief
+    memory, increments
         Of the ``LearnerView`` that it was trained in.
 
     Raises
@@ -54,7 +54,7 @@ def exported(
     network = Network(_lstm(weights), tuple(_dense(weights, name, kind) for name, kind in names))
     return TrainedPolicy(
         env, envs.observation_space, envs.action_space, network, _normalisation(normalise),
-        memory and not belief, belief, envs.get_attr("drive")[0].slew_limit if increments else None,
+        memory, envs.get_attr("drive")[0].slew_limit if increments else None,
         bool(model.policy.squash_output),
     )  # fmt: skip
 

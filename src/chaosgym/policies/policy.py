@@ -18,14 +18,14 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from chaosgym.envs.learning import BeliefMemory, SpeedMemory, commanded, memory_of, speeds_before
+from chaosgym.envs.learning import BeliefMemory, Memory, SpeedMemory, commanded, memory_of, speeds_before
 from chaosgym.errors import ModelFileError
 from chaosgym.files import write_atomically
 from chaosgym.policies.network import Dense, Lstm, Network, State
 
 Array = NDArray[Any]
 
-FORMAT = 2
+FORMAT = 3
 """Version of the files."""
 
 LARGEST = 50_000_000
@@ -61,10 +61,9 @@ class TrainedPolicy:
         From prepared observations to actions.
     normalisation
         Applied to the observations, memory included; None for none.
-    remembers
-        Whether it is given what ``SpeedMemory`` keeps of the job.
-    believes
-        Whether it is given a belief over the map of speeds instead (``BeliefMemory``), on the tables of ``env``.
+    memory
+        What it is given of the past of a job: "none", "speeds" (``SpeedMemory``) or "belief" (``BeliefMemory``), on the
+        tables of ``env``.
     largest_step
         Change of speed for an action of 1, if the network answers with increments; None for target speeds.
     squashed
@@ -76,8 +75,7 @@ class TrainedPolicy:
     action_space: Box
     network: Network
     normalisation: Normalisation | None = None
-    remembers: bool = False
-    believes: bool = False
+    memory: Memory = "none"
     largest_step: float | None = None
     squashed: bool = False
     _state: State | None = field(default=None, init=False, repr=False)
@@ -85,7 +83,7 @@ class TrainedPolicy:
     _began: bool = field(default=False, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        self._memory = memory_of(self.observation_space, self._attribute, self.remembers, self.believes)
+        self._memory = memory_of(self.observation_space, self._attribute, self.memory)
         space = self._memory.space if self._memory else self.observation_space
         self.network.check(space.shape[0], self.action_space.shape[0])
         if self.normalisation:
@@ -165,8 +163,7 @@ def save_policy(policy: TrainedPolicy, folder: str | Path) -> None:
         "lstm": network.lstm is not None,
         "activations": [layer.activation for layer in network.layers],
         "normalisation_limit": policy.normalisation.limit if policy.normalisation else None,
-        "remembers": policy.remembers,
-        "believes": policy.believes,
+        "memory": policy.memory,
         "largest_step": policy.largest_step,
         "squashed": policy.squashed,
         "sha256": sha256(buffer.getvalue()).hexdigest(),
@@ -219,8 +216,7 @@ def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPol
     return TrainedPolicy(
         description["env"], _space(description["observation"]), _space(description["action"]), Network(lstm, layers),
         None if limit is None else Normalisation(arrays["mean"], arrays["deviation"], float(limit)),
-        bool(description["remembers"]), bool(description["believes"]), description["largest_step"],
-        bool(description["squashed"]),
+        description["memory"], description["largest_step"], bool(description["squashed"]),
     )  # fmt: skip
 
 
