@@ -2,7 +2,7 @@
 
     python agents/calibrate_belief.py --env chaosgym/SliderCrankTolerance-v0
 
-Jobs wander over the range. Of each step the standard deviation of its measured peaks is known, whether the speed had
+Jobs wander over the speeds of the table. Of each step the standard deviation of its measured peaks is known, whether the speed had
 just changed, and whether the table calls it Type III. The log odds of that, less those of all steps, rise with the
 scatter: they are fitted by isotonic regression and printed at the scatters that a belief interpolates between.
 """
@@ -40,8 +40,9 @@ def felt(arguments: Arguments) -> np.ndarray:
         act, ended = wandering(arguments.seed + job), False
         observation = env.reset(seed=arguments.seed + job, options={"machine": job % len(env.pool)})[0]
         while not ended:
-            before = observation[SPEED]
-            observation, _, terminated, truncated, _ = env.step(act(observation))
+            before, drive = observation[SPEED], env.drive
+            target = env.regimes.speeds[env.regimes.index_of(drive.target_of(act(observation))[1])]
+            observation, _, terminated, truncated, _ = env.step(np.array([drive.action_for(target)], np.float32))
             ended = terminated or truncated
             peaks = observation[FIRST_PEAK : FIRST_PEAK + env.task.cycles_per_step].astype(float)
             table, speed = env.regimes, observation[SPEED]

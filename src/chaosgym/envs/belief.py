@@ -41,7 +41,7 @@ SENSES = {
         moving=(-1.9, -1.5, -0.5, 0.6, 1.4, 2.0, 2.3), staying=(-1.6, -1.4, 0.2, 1.7, 2.3, 2.8, 3.5), force_error=6.0
     ),
     "slider-crank": Sense(
-        moving=(-0.5, -0.4, 0.6, 0.7, 0.8, 3.9, 3.9), staying=(-0.3, -0.3, 0.6, 0.6, 0.6, 3.9, 3.9), force_error=3.0
+        moving=(-0.8, -0.4, 0.6, 0.7, 1.2, 3.7, 3.7), staying=(-0.8, -0.5, 1.5, 1.5, 1.5, 3.9, 3.9), force_error=3.0
     ),
 }
 """Calibrated on the training pools, rounded from what ``agents/calibrate_belief.py`` counts. The beam's are somewhat
