@@ -13,7 +13,10 @@ from chaosgym.fleet import at_speed
 POOLS = [name for name in ENVIRONMENTS if "Tolerance" in name or "Wear" in name]
 
 
-COMPLETE = ["chaosgym/ImpactBeam-v0", "chaosgym/ImpactBeamTolerance-v0", "chaosgym/ImpactBeamWear-v0"]
+COMPLETE = [
+    "chaosgym/ImpactBeam-v0", "chaosgym/ImpactBeamTolerance-v0", "chaosgym/ImpactBeamWear-v0",
+    "chaosgym/SliderCrank-v0", "chaosgym/SliderCrankTolerance-v0",
+]  # fmt: skip
 """Environments whose tables come with the package for every machine; for others that of the nominal one does."""
 
 
