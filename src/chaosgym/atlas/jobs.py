@@ -100,15 +100,16 @@ def _key(job: Job) -> str:
     return hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()[:32]
 
 
-def _digest() -> str:
+def digest(names: Iterable[str]) -> str:
+    """Hash of the text of some sources of the package, files or folders, at the time of the call."""
     root = Path(chaosgym.__file__).parent
     found = hashlib.sha256()
-    for name in DECISIVE_SOURCES:
+    for name in names:
         path = root / name
         for source in sorted(path.glob("*.py")) if path.is_dir() else [path]:
             found.update(source.read_bytes())
     return found.hexdigest()
 
 
-SOURCES = _digest()
+SOURCES = digest(DECISIVE_SOURCES)
 """Digest of the sources at the time of import: those that run."""

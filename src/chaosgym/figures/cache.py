@@ -1,4 +1,4 @@
-"""How is a result found again? Under a hash of what it depends on: version, kernels and the whole description."""
+"""How is a result found again? Under a hash of what it depends on: version, sources and the whole description."""
 
 import hashlib
 from pathlib import Path
@@ -7,15 +7,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.core import KERNEL_CACHE
+from chaosgym.atlas.jobs import DECISIVE_SOURCES, digest
 from chaosgym.figures.computations import Computation, Data
 from chaosgym.files import write_atomically
 from chaosgym.version import __version__
 
+SOURCES = digest((*DECISIVE_SOURCES, "design/peak_impacts.py", "figures/computations.py"))
+"""Digest of the sources that decide a result."""
+
 
 def result_path(computation: Computation, folder: Path) -> Path:
-    """File of a result; machines, settings, version and kernels are in its name as a hash."""
-    described = "\n".join((__version__, Path(KERNEL_CACHE).name, repr(computation)))
+    """File of a result; machines, settings, version and sources are in its name as a hash."""
+    described = "\n".join((__version__, SOURCES, repr(computation)))
     digest = hashlib.sha256(described.encode()).hexdigest()[:16]
     return folder / f"{type(computation).__name__.lower()}-{digest}.npz"
 
