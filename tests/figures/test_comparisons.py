@@ -18,7 +18,7 @@ def test_a_resonance_stands_above_its_background():
     peak = 20.0 + 60.0 * np.exp(-(((speed - 1134.0) / 6.0) ** 2))
     rise = np.linspace(20.0, 40.0, len(speed))
     for force, ratio in ((peak, 4.0), (rise, 1.0)):
-        data = {"crank_speed": speed, "peaks": np.repeat(force[:, None, None], 2, axis=2)}
+        data = {"crank_speed": speed, "peaks": force[:, None]}
         at, _, found = resonance(data, 4)
         assert found == pytest.approx(ratio, rel=0.01)
     assert abs(at - 1134.0) < 0.05 * 1134.0

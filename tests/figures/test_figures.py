@@ -57,8 +57,8 @@ def test_pictures_are_replaced_only_on_request(tmp_path):
     assert "3.13" in gallery([first], tmp_path)
 
 
-def test_a_result_is_kept_under_all_that_it_depends_on(tmp_path):
-    """Another machine, field or count of cycles is another file; the same description is read, not computed."""
+def test_a_result_is_kept_under_all_that_it_depends_on(tmp_path, monkeypatch):
+    """Another machine, count of cycles or source is another file; the same description is read, not computed."""
     runs = Runs(machines=(THESIS_IMPACT_BEAM,), fields=("clearance",), cycles=20, transient=0)
     others = [
         Runs(machines=(with_settings(THESIS_IMPACT_BEAM, {"width": 0.0176}),), fields=("clearance",), cycles=20,
@@ -67,9 +67,12 @@ def test_a_result_is_kept_under_all_that_it_depends_on(tmp_path):
     ]  # fmt: skip
     assert len({result_path(one, tmp_path) for one in (runs, *others)}) == 3
     first = computed(runs, tmp_path)
-    assert np.array_equal(first["peaks"][0], simulate(THESIS_IMPACT_BEAM, 20).peak_force)
+    assert np.array_equal(first["peaks"][0], simulate(THESIS_IMPACT_BEAM, 20).peak_force[:, 0])
     result_path(runs, tmp_path).touch()
     assert all(np.array_equal(first[name], kept) for name, kept in computed(runs, tmp_path).items())
+    before = result_path(runs, tmp_path)
+    monkeypatch.setattr("chaosgym.figures.cache.SOURCES", "edited")
+    assert result_path(runs, tmp_path) != before
 
 
 def test_the_force_point_follows_the_recorded_forces():

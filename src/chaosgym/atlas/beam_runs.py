@@ -7,7 +7,7 @@ import numpy as np
 import scipy.signal
 from numpy.typing import NDArray
 
-from chaosgym.atlas.observation import READING_ERROR
+from chaosgym.atlas.observation import READING_ERROR, plotted_peaks
 from chaosgym.diagnosis.stroboscopic import find_recurrence, scales
 from chaosgym.machines import ImpactBeam, Machine
 from chaosgym.simulation import CycleRecord, simulate
@@ -24,10 +24,10 @@ def long_run(machine: Machine, cycles: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``irregular_cycles``: cycles before the peak forces repeat within the reading error, all if they never do;
+        ``irregular_cycles``: cycles before the plotted peaks repeat within the reading error, all if they never do;
         ``period`` that they repeat with, None if they don't.
     """
-    peaks = simulate(machine, cycles).peak_force
+    peaks = plotted_peaks(simulate(machine, cycles))[:, None]
     tail = peaks[-100:]
     scale = scales(tail)
     found = find_recurrence(tail / scale, READING_ERROR / scale)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.atlas.observation import plotted_peaks
 from chaosgym.design.peak_impacts import peak_impacts, worn_side
 from chaosgym.design.statistics import cycles_needed
 from chaosgym.diagnosis import matrix_update_test
@@ -67,7 +68,7 @@ def contact_loss(crank: SliderCrank) -> dict[str, float]:
 def update_pair(crank: SliderCrank, first: float, second: float, cycles: int) -> dict[str, list[float]]:
     """Peak forces from rest with two intervals [deg] between matrix updates: ``first`` and ``second``."""
     runs = [simulate(replace(crank, matrix_update_interval=interval), cycles) for interval in (first, second)]
-    peaks = [[float(peak) for peak in run.peak_force.max(axis=1)] for run in runs]
+    peaks = [[float(peak) for peak in plotted_peaks(run)] for run in runs]
     return {"first": peaks[0], "second": peaks[1]}
 
 
@@ -79,7 +80,7 @@ def update_test(crank: SliderCrank, first: float, second: float) -> dict[str, st
 
 def statistics(crank: SliderCrank) -> dict[str, int]:
     """Cycles that the mean and the standard deviation of the peak force need to converge: ``cycles``."""
-    return {"cycles": int(cycles_needed(simulate(crank, 400, transient=60).peak_force[:, 0]))}
+    return {"cycles": int(cycles_needed(plotted_peaks(simulate(crank, 400, transient=60))))}
 
 
 def bearing_spread(crank: SliderCrank) -> dict[str, float]:

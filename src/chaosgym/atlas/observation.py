@@ -1,20 +1,24 @@
 """What does a run look like to a reader of the thesis' figures? Its nature and the peak forces of 100 cycles.
 
-The thesis judges a response by the dots of its figures: one dot is periodic, a few are a subharmonic, a distribution is
-chaos (3.5.1). Two dots closer than the width of a dot are one; ``READING_ERROR`` is that width, for every figure. Dots
-that do not repeat are judged by the whole diagnosis. What the exact test says of the same cycles is kept beside it.
+The thesis judges a response by the dots of its figures, one a cycle (``plotted_peaks``): one dot is periodic, a few are
+a subharmonic, a distribution is chaos (3.5.1). Two dots closer than the width of a dot are one; ``READING_ERROR`` is
+that width, for every figure. Dots that do not repeat are judged by the whole diagnosis. What the exact test says of the
+same cycles, state and both surfaces, is kept beside it.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from chaosgym.diagnosis import diagnose, two_step_test
+from chaosgym.diagnosis import Diagnosis, diagnose, two_step_test
 from chaosgym.errors import SimulationError
-from chaosgym.machines import Machine
-from chaosgym.simulation import simulate
+from chaosgym.machines import ImpactBeam, Machine
+from chaosgym.simulation import CycleRecord, simulate
+
+Array = NDArray[np.float64]
 
 READING_ERROR = 0.5
 """Half the width of a dot [N]: half a per cent of a force axis of 100 N."""
@@ -49,7 +53,7 @@ class Observation:
     exact_nature
         By the Two-Step Test without a reading error; with a budget of 0, ``nature`` again.
     low, mean, high
-        Smallest, mean and largest peak force of a cycle, upper side [N].
+        Smallest, mean and largest of the plotted peak forces [N].
     bounce_share, longest_bounce_share
         Median and largest duration of bouncing, as a share of half the cycle.
     settle_cycle
@@ -76,21 +80,38 @@ class Observation:
         return asdict(self)
 
 
+def plotted_peaks(record: CycleRecord) -> Array:
+    """The peak force of every cycle as the thesis plots it [N], (cycles,).
+
+    Of the beam on one side of the bearing (3.4, figures 3.6 d and 3.7 e); of the crank's joints the resultant (4.6):
+    the larger of both surfaces in a revolution.
+    """
+    forces = record.peak_force
+    return np.asarray(forces[:, 0] if isinstance(record.machine, ImpactBeam) else forces.max(axis=1))
+
+
+def read_dots(machine: Machine, peaks: Array, budget: int) -> Diagnosis:
+    """Judge the plotted peaks (cycles,) [N] of a machine; dots that do not repeat by a diagnosis of ``budget`` cycles.
+
+    With a budget of 0 all of them are chaos (3.5.1).
+    """
+    read = two_step_test(peaks, sensor_error=READING_ERROR)
+    if read.nature == "periodic":
+        return read
+    return diagnose(machine, budget=budget, sensor_error=READING_ERROR) if budget else replace(read, nature="chaotic")
+
+
 def observe(machine: Machine, effort: Effort) -> Observation:
     """Run a machine from rest and read its peak forces as from a figure of the thesis."""
     try:
         record = simulate(machine, effort.transient + effort.cycles)
-        settled = record.after(effort.transient)
-        read = two_step_test(settled, sensor_error=READING_ERROR)
-        exact, settle = read, None
-        if effort.budget:
-            exact = two_step_test(settled)
-            settle = two_step_test(record, sensor_error=READING_ERROR).settle_cycle
-            if read.nature != "periodic":
-                read = diagnose(machine, budget=effort.budget, sensor_error=READING_ERROR)
+        settled, plotted = record.after(effort.transient), plotted_peaks(record)
+        peaks = plotted[effort.transient :]
+        read = read_dots(machine, peaks, effort.budget)
     except SimulationError:
         return Observation("failed")
-    peaks = settled.peak_force[:, 0]
+    exact = two_step_test(settled) if effort.budget else read
+    settle = two_step_test(plotted, sensor_error=READING_ERROR).settle_cycle if effort.budget else None
     shares = settled.bounce_duration[settled.bounce_duration > 0.0] / (0.5 * machine.cycle_period)
     return Observation(
         nature=read.nature, period=read.period, exact_nature=exact.nature,

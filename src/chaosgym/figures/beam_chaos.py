@@ -10,7 +10,7 @@ from chaosgym.design.statistics import histogram
 from chaosgym.figures.beam import BEAM, DAMPING, LARGE, SMALL, TRANSIENT, runs, sweep
 from chaosgym.figures.computations import Computation, Data, History
 from chaosgym.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
-from chaosgym.figures.panels import UPPER, cycles_panel, force_panel, histogram_panel, side_peaks
+from chaosgym.figures.panels import cycles_panel, force_panel, histogram_panel
 from chaosgym.figures.printed import printed
 from chaosgym.plotting import thesis
 from chaosgym.plotting.design import ACCENT, NATURE_COLOURS
@@ -155,7 +155,7 @@ def multiple_peaks(parts: Parts) -> Sequence[Finding]:
     data = parts["long"]
     found = []
     for row, frequency in enumerate(HISTOGRAM_FREQUENCIES):
-        peaks, nature = side_peaks(data, UPPER)[row], str(data["nature"][row])
+        peaks, nature = data["peaks"][row], str(data["nature"][row])
         modes = len(histogram(peaks).modes)
         found.append(
             Finding(

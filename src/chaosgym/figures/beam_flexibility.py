@@ -13,8 +13,6 @@ from chaosgym.figures.computations import Computation
 from chaosgym.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
 from chaosgym.figures.panels import (
     FREQUENCY,
-    UPPER,
-    side_peaks,
 )
 from chaosgym.figures.printed import printed
 from chaosgym.machines.impact_beam import pinned_pinned_frequency
@@ -38,7 +36,7 @@ def flexibility(resolution: float) -> Mapping[str, Computation]:
 def _length_curves(parts: Parts) -> list[tuple[float, Array, Array]]:
     """Length [m], frequency [Hz] and largest peak [N] of each."""
     return [
-        (length, data["excitation_frequency"], side_peaks(data, UPPER).max(axis=1))
+        (length, data["excitation_frequency"], data["peaks"].max(axis=1))
         for length, data in zip(LENGTHS, parts.values(), strict=True)
     ]
 

@@ -13,11 +13,9 @@ from chaosgym.figures.findings import describe_forces
 from chaosgym.figures.flips import flips
 from chaosgym.figures.panels import (
     FREQUENCY,
-    UPPER,
     Mark,
     force_diagram,
     response_at,
-    side_peaks,
 )
 
 Array = NDArray[np.float64]
@@ -35,7 +33,7 @@ def force_against_frequency(resolution: float) -> Mapping[str, Computation]:
 def jumps(parts: Parts) -> Sequence[Finding]:
     """How much the force changes from one hertz to the next: below 8 Hz, and above."""
     data = parts["a"]
-    values, force = data["excitation_frequency"], side_peaks(data, UPPER).max(axis=1)
+    values, force = data["excitation_frequency"], data["peaks"].max(axis=1)
     whole = np.arange(1.0, 31.0)
     at_whole = np.interp(whole, values, force)
     change = np.abs(np.diff(at_whole)) / at_whole[:-1]
@@ -83,7 +81,7 @@ def length_sweep(resolution: float) -> Mapping[str, Computation]:
 def length_flip(parts: Parts) -> Sequence[Finding]:
     """Does 1 % of length change the nature where printed, and where else?"""
     data = parts["lengths"]
-    natures = [str(response_at(data, LENGTH, at, UPPER)[1]) for at in (281.5, 284.0)]
+    natures = [str(response_at(data, LENGTH, at)[1]) for at in (281.5, 284.0)]
     return [
         Finding(
             "+1 % of length, 281.5 to 284 mm, turns periodic into chaotic",
@@ -119,9 +117,9 @@ def damping_sweep(resolution: float) -> Mapping[str, Computation]:
 def damping_calms(parts: Parts) -> Sequence[Finding]:
     """Does the spread fall along the sweep, and is there chaos at its end?"""
     data = parts["dampings"]
-    spread = np.ptp(side_peaks(data, UPPER), axis=1)
+    spread = np.ptp(data["peaks"], axis=1)
     chaotic = data["damping_ratio"][data["nature"] == "chaotic"]
-    end = response_at(data, DAMPING, 8.0, UPPER)
+    end = response_at(data, DAMPING, 8.0)
     last = f"{100.0 * chaotic.max():.3g} %" if len(chaotic) else "nowhere"
     return [
         Finding(

@@ -13,12 +13,10 @@ from chaosgym.figures.computations import Computation, ForcePointHistory, Histor
 from chaosgym.figures.figure import Finding, Panel, Parts, ThesisFigure
 from chaosgym.figures.findings import compare_nature, words
 from chaosgym.figures.panels import (
-    UPPER,
     force_panel,
     motion_panel,
     phase_panel,
     section_panel,
-    side_peaks,
     spectrum_panel,
 )
 from chaosgym.figures.printed import printed, within
@@ -41,7 +39,7 @@ def one_response(frequency: float, resolution: float) -> Mapping[str, Computatio
 def nature_of(where: str, target: str, nature: str, parts: Parts) -> Sequence[Finding]:
     """Compare the nature of the one response."""
     data = parts["response"]
-    return [compare_nature(where, target, (side_peaks(data, UPPER)[0], data["nature"][0], data["period"][0]), nature)]
+    return [compare_nature(where, target, (data["peaks"][0], data["nature"][0], data["period"][0]), nature)]
 
 
 PERIODIC_RESPONSE = ThesisFigure(
@@ -103,7 +101,7 @@ def with_levels(panel: Panel, target: str, *, vertical: bool = False) -> Panel:
 def motion_ranges(parts: Parts) -> Sequence[Finding]:
     """Ranges of displacement, velocity and peak force."""
     motion = parts["motion"]
-    peaks = side_peaks(parts["response"], UPPER)[0]
+    peaks = parts["response"]["peaks"][0]
     displacement, velocity = 1e3 * motion["displacement"], motion["velocity"]
     found = []
     for what, unit, target, values in (

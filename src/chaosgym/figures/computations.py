@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.atlas.beam_runs import follow_modes
-from chaosgym.atlas.observation import READING_ERROR
+from chaosgym.atlas.observation import READING_ERROR, THOROUGH, plotted_peaks, read_dots
 from chaosgym.design.peak_impacts import peak_impacts, worn_side
 from chaosgym.diagnosis import response_map, two_step_test
 from chaosgym.errors import SimulationError
@@ -88,18 +88,16 @@ class ForcePointHistory:
 class Runs:
     """Peak forces of many machines, one run from rest each.
 
-    Gives every field of ``fields`` (machines,), ``peaks`` (machines, cycles, 2) [N], ``nature`` and ``period``
-    (machines,) of the recorded cycles by the Two-Step Test with the reader's error (period 0 where there is none),
-    ``settle`` (machines,): the cycle from which the record repeats, -1 if it does not; ``impacts`` and ``contact``
-    (machines,): impacts a cycle and share of the cycle in contact, both sides together. A run that fails has NaN and
-    the nature "failed".
+    Gives every field of ``fields`` (machines,), ``peaks`` (machines, cycles) [N] as the thesis plots them, ``nature``
+    and ``period`` (machines,) as the scorecard reads them (period 0 where there is none), ``settle`` (machines,): the
+    cycle from which the peaks repeat, -1 if they do not; ``impacts`` and ``contact`` (machines,): impacts a cycle and
+    share of the cycle in contact, both sides together. A run that fails has NaN and the nature "failed".
     """
 
     machines: tuple[Machine, ...]
     fields: tuple[str, ...]
     cycles: int
     transient: int
-    reading_error: float = READING_ERROR
 
     def run(self, workers: int | None = None) -> Data:
         """Simulate and judge each."""
@@ -115,15 +113,17 @@ class Runs:
         try:
             record = simulate(machine, self.cycles, transient=self.transient)
         except SimulationError:
-            return np.full((self.cycles, 2), np.nan), "failed", 0, -1, np.nan, np.nan
+            return np.full(self.cycles, np.nan), "failed", 0, -1, np.nan, np.nan
+        peaks = plotted_peaks(record)
         nature, period, settle = "undetermined", 0, -1
         if self.cycles >= 16:
-            verdict = two_step_test(record, sensor_error=self.reading_error)
-            nature, period = verdict.nature, verdict.period or 0
-            settle = -1 if verdict.settle_cycle is None else verdict.settle_cycle
+            read = read_dots(machine, peaks, THOROUGH[machine.name].budget)
+            nature, period = read.nature, read.period or 0
+            repeats = two_step_test(peaks, sensor_error=READING_ERROR).settle_cycle
+            settle = -1 if repeats is None else repeats
         impacts = float(record.impacts.sum(axis=1).mean())
         contact = float(record.contact_fraction.sum(axis=1).mean())
-        return record.peak_force, nature, period, settle, impacts, contact
+        return peaks, nature, period, settle, impacts, contact
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,7 +25,7 @@ from chaosgym.figures.crank import (
 )
 from chaosgym.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
 from chaosgym.figures.findings import compare_response
-from chaosgym.figures.panels import CRANK_SPEED, UPPER, histogram_panel, impact_panel, side_peaks
+from chaosgym.figures.panels import CRANK_SPEED, histogram_panel, impact_panel
 from chaosgym.figures.printed import printed, within
 from chaosgym.plotting import thesis
 
@@ -45,7 +45,7 @@ def spread_modes(parts: Parts) -> Sequence[Finding]:
     """Modes of each histogram."""
     data = parts["long"]
     found = []
-    for gap, peaks, nature in zip(HISTOGRAM_CLEARANCES, side_peaks(data, UPPER), data["nature"], strict=True):
+    for gap, peaks, nature in zip(HISTOGRAM_CLEARANCES, data["peaks"], data["nature"], strict=True):
         modes = len(histogram(peaks).modes)
         here = f"{nature}, {peaks.min():.3g} to {peaks.max():.3g} N, {modes} mode{'s' * (modes > 1)}"
         found.append(Finding(f"±{1e3 * gap:.3f} mm: measured histogram with several peaks", here, None, ("SSC-120",)))
@@ -77,7 +77,7 @@ def wild_record(cycles: int, resolution: float) -> Mapping[str, Computation]:
 def support(parts: Parts) -> Sequence[Finding]:
     """Range and modes of the histogram."""
     data = parts["long"]
-    peaks = side_peaks(data, UPPER)[0]
+    peaks = data["peaks"][0]
     modes = len(histogram(peaks).modes)
     return [
         compare_response("190 rpm", "SSC-056", (peaks, data["nature"][0], data["period"][0]), "chaotic"),
@@ -161,7 +161,7 @@ def life_sweep(resolution: float) -> Mapping[str, Computation]:
 
 def lives(parts: Parts) -> list[RelativeLife]:
     """Life relative to that at 100 rpm."""
-    peaks = side_peaks(parts["slider"], UPPER)
+    peaks = parts["slider"]["peaks"]
     reference = equivalent_force(peaks[0], CUBIC_EXPONENT)
     return [relative_life(row, reference) for row in peaks]
 
@@ -237,7 +237,7 @@ def running_panel(title: str, which: str, label: str) -> Panel:
     """Running mean or deviation."""
 
     def paint(parts: Parts, ax: Axes) -> None:
-        running = running_statistics(side_peaks(parts["long"], UPPER)[0])
+        running = running_statistics(parts["long"]["peaks"][0])
         thesis.curve(running.cycles, getattr(running, which), ax)
         thesis.printed_span(*printed("SSC-130"), ax, "converged, printed")
         ax.set(xlabel="number of cycles", ylabel=label)
@@ -250,7 +250,7 @@ def running_panel(title: str, which: str, label: str) -> Panel:
 def converged(parts: Parts) -> Sequence[Finding]:
     """After how many cycles do mean and deviation stay in their bands?"""
     wanted = printed("SSC-130").low
-    found = convergence(side_peaks(parts["long"], UPPER)[0])
+    found = convergence(parts["long"]["peaks"][0])
     return [
         Finding(f"mean and STD converge after {wanted:g} cycles",
                 f"within 2 % and 15 % of their final values after {found.cycles} cycles; by their standard errors "

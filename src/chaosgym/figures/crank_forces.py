@@ -9,7 +9,7 @@ from chaosgym.figures.computations import Computation, Data
 from chaosgym.figures.crank import HIGH_DAMPING, LARGE, LOW_DAMPING, ROD_LENGTH, SMALL, slider, sweep
 from chaosgym.figures.figure import Finding, Parts, ThesisFigure, steps
 from chaosgym.figures.flips import flips
-from chaosgym.figures.panels import CRANK_SPEED, UPPER, Mark, force_diagram, response_at, side_peaks
+from chaosgym.figures.panels import CRANK_SPEED, Mark, force_diagram, response_at
 from chaosgym.figures.printed import printed
 from chaosgym.machines import SliderCrank
 
@@ -56,7 +56,7 @@ FORCE_AGAINST_SPEED = ThesisFigure(
 
 def spread_of(data: Data) -> float:
     """Mean over speeds of the range of the peak forces [N]."""
-    return float(np.nanmean(np.ptp(side_peaks(data, UPPER), axis=1)))
+    return float(np.nanmean(np.ptp(data["peaks"], axis=1)))
 
 
 def no_chaos(parts: Parts) -> Sequence[Finding]:
@@ -111,7 +111,7 @@ def rod_lengths(resolution: float) -> Mapping[str, Computation]:
 def rod_flip(parts: Parts) -> Sequence[Finding]:
     """Does 1 % of rod length change the nature where printed, and where else?"""
     data = parts["lengths"]
-    natures = [str(response_at(data, ROD_LENGTH, at, UPPER)[1]) for at in (0.2575, 0.255)]
+    natures = [str(response_at(data, ROD_LENGTH, at)[1]) for at in (0.2575, 0.255)]
     return [
         Finding(
             "-1 % of rod length, 0.2575 to 0.255 m, turns periodic into chaotic",
@@ -146,7 +146,7 @@ def friction_flips(parts: Parts) -> Sequence[Finding]:
         (230.0, ("periodic", "chaotic"), "SSC-064"),
         (260.0, ("chaotic", "periodic"), "SSC-065"),
     ):
-        natures = tuple(str(response_at(parts[name], CRANK_SPEED, speed, UPPER)[1]) for name in ("without", "with"))
+        natures = tuple(str(response_at(parts[name], CRANK_SPEED, speed)[1]) for name in ("without", "with"))
         found.append(
             Finding(
                 f"{speed:g} rpm: friction of 0.1 turns {wanted[0]} into {wanted[1]}",

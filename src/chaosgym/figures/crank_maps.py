@@ -11,7 +11,7 @@ from chaosgym.diagnosis.type_rule import types_on_grid
 from chaosgym.figures.computations import Computation, Data, Runs
 from chaosgym.figures.crank import CYCLES, HIGH_DAMPING, LARGE, MIDDLE, SMALL, TRANSIENT, WIDE, ball, slider, sweep
 from chaosgym.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
-from chaosgym.figures.panels import BOTH, CRANK_SPEED, UPPER, Mark, force_diagram, side_peaks
+from chaosgym.figures.panels import CRANK_SPEED, Mark, force_diagram
 from chaosgym.figures.printed import printed
 from chaosgym.plotting import thesis
 from chaosgym.plotting.design import INK
@@ -73,7 +73,7 @@ BALL_FORCE_AGAINST_SPEED = ThesisFigure(
     shows="Impacts from 110 to 190 rpm and at 280 rpm; chaos at 120, 130 and 140 rpm.",
     parts=ball_speeds,
     panels=(
-        force_diagram("", "ball", CRANK_SPEED, side=BOTH, extra=impact_spans,
+        force_diagram("", "ball", CRANK_SPEED, extra=impact_spans,
                       marks=tuple(Mark(speed, target, "chaotic", "none") for speed, target in
                                   ((120.0, "SSC-030"), (130.0, "SSC-031"), (140.0, "SSC-032")))),
     ),
@@ -161,7 +161,7 @@ def slider_plane(parts: Parts, ax: Axes) -> None:
     speed, clearance, shape = on_grid(data, "slider_clearance")
     nature = data["nature"].reshape(shape)
     reach = round(10.0 / float(speed[1] - speed[0]))
-    types = types_on_grid(nature, side_peaks(data, UPPER).max(axis=1).reshape(shape), axes=(0,), reach=reach)
+    types = types_on_grid(nature, data["peaks"].max(axis=1).reshape(shape), axes=(0,), reach=reach)
     every = slice(None, None, reach)
     thesis.nature_plane(speed[every], clearance / DIMENSIONLESS, nature[every], ax, types=types[every])
     corner = printed("SSC-118").low, printed("SSC-117").low

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chaosgym.figures.computations import Computation, Data
 from chaosgym.figures.crank import WIDE, slider, sweep
 from chaosgym.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
-from chaosgym.figures.panels import CRANK_SPEED, UPPER, side_peaks
+from chaosgym.figures.panels import CRANK_SPEED
 from chaosgym.figures.printed import printed, within
 from chaosgym.machines.slider_crank import SUPERHARMONIC_SLIDER_CRANK
 from chaosgym.plotting import thesis
@@ -57,7 +57,7 @@ def superharmonics(resolution: float) -> Mapping[str, Computation]:
 
 def largest(data: Data) -> tuple[Array, Array]:
     """Speed [rpm] and largest peak force [N]."""
-    return data["crank_speed"], np.asarray(side_peaks(data, UPPER).max(axis=1))
+    return data["crank_speed"], np.asarray(data["peaks"].max(axis=1))
 
 
 def resonance(data: Data, order: int) -> tuple[float, float, float]:
@@ -77,7 +77,7 @@ def paint_resonances(parts: Parts, ax: Axes, *, part: str, tight: str | None = N
     """Largest and all peak forces against the speed."""
     data = parts[part]
     speed, force = largest(data)
-    peaks = side_peaks(data, UPPER)
+    peaks = data["peaks"]
     for kind in ("periodic", "chaotic", "undetermined"):
         of_kind = data["nature"] == kind
         ax.plot(np.repeat(speed[of_kind], peaks.shape[1]), peaks[of_kind].ravel(), ".", ms=2.2, mew=0.0,

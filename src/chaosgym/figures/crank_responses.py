@@ -12,13 +12,11 @@ from chaosgym.figures.crank import LOW_DAMPING, MIDDLE, SMALL, TRANSIENT, WIDE, 
 from chaosgym.figures.figure import Finding, Parts, ThesisFigure
 from chaosgym.figures.findings import compare_nature, words
 from chaosgym.figures.panels import (
-    UPPER,
     angle_panel,
     force_panel,
     motion_panel,
     phase_panel,
     section_panel,
-    side_peaks,
 )
 from chaosgym.figures.printed import printed, within
 from chaosgym.machines import SliderCrank
@@ -144,7 +142,7 @@ def slider_response(resolution: float) -> Mapping[str, Computation]:
 def slider_nature(parts: Parts) -> Sequence[Finding]:
     """Is the response chaotic?"""
     data = parts["response"]
-    response = side_peaks(data, UPPER)[0], data["nature"][0], data["period"][0]
+    response = data["peaks"][0], data["nature"][0], data["period"][0]
     return [compare_nature("230 rpm, contact damping 2.5 %", "SSC-040", response, "chaotic")]
 
 

@@ -11,7 +11,7 @@ from chaosgym.atlas.observation import READING_ERROR
 from chaosgym.figures.computations import Computation, Runs
 from chaosgym.figures.crank import HIGH_DAMPING, LARGE, SMALL, TRANSIENT, slider
 from chaosgym.figures.figure import Finding, Panel, Parts, ThesisFigure
-from chaosgym.figures.panels import BOTH, cycles_panel, side_peaks
+from chaosgym.figures.panels import cycles_panel
 from chaosgym.figures.printed import printed
 from chaosgym.machines import SliderCrank
 from chaosgym.plotting import thesis
@@ -40,7 +40,7 @@ def pair(first: float, second: float) -> list[tuple[str, int, str]]:
 
 def converging(parts: Parts) -> Sequence[Finding]:
     """After how many cycles does each run stay where it ends, and do they end together?"""
-    one, other = side_peaks(parts["runs"], BOTH)
+    one, other = parts["runs"]["peaks"]
     unsteady = [np.flatnonzero(np.abs(peaks - peaks[-1]) > READING_ERROR) for peaks in (one, other)]
     settled = max(int(cycles[-1]) + 1 if len(cycles) else 0 for cycles in unsteady)
     apart = abs(float(one[-1] - other[-1]))
@@ -60,8 +60,8 @@ PERIODIC_TEST = ThesisFigure(
     shows="Peak force of every cycle for updates every 5 and 10 deg: after 6 cycles both agree.",
     parts=partial(updated, CALM, (5.0, 10.0), 35, 0),
     panels=(
-        cycles_panel("(a) 35 cycles", pair(5.0, 10.0), side=BOTH, cycles=(0, 36)),
-        cycles_panel("(b) the first ten", pair(5.0, 10.0), side=BOTH, cycles=(0, 11)),
+        cycles_panel("(a) 35 cycles", pair(5.0, 10.0), cycles=(0, 36)),
+        cycles_panel("(b) the first ten", pair(5.0, 10.0), cycles=(0, 11)),
     ),
     compare=converging,
 )
@@ -75,7 +75,7 @@ def printed_cycle(parts: Parts, ax: Axes) -> None:
 
 def parting(parts: Parts) -> Sequence[Finding]:
     """Do the runs part, and how far are they at cycle 62?"""
-    one, other = side_peaks(parts["runs"], BOTH)
+    one, other = parts["runs"]["peaks"]
     apart = np.abs(one - other)
     first = np.flatnonzero(apart > 3.0)
     when = f"first more than 3 N apart in cycle {first[0] + 1}" if len(first) else "never more than 3 N apart"
@@ -96,8 +96,8 @@ CHAOTIC_TEST = ThesisFigure(
     shows="Peak force of every cycle for updates every 5 and 6 deg: they part; 85 and 105 N in cycle 62.",
     parts=partial(updated, WILD, (5.0, 6.0), 100, 0),
     panels=(
-        cycles_panel("(a) 100 cycles", pair(5.0, 6.0), side=BOTH, cycles=(0, 101)),
-        cycles_panel("(b) ten of them", pair(5.0, 6.0), side=BOTH, cycles=(56, 68), extra=printed_cycle),
+        cycles_panel("(a) 100 cycles", pair(5.0, 6.0), cycles=(0, 101)),
+        cycles_panel("(b) ten of them", pair(5.0, 6.0), cycles=(56, 68), extra=printed_cycle),
     ),
     compare=parting,
 )
@@ -106,14 +106,14 @@ CHAOTIC_TEST = ThesisFigure(
 def paint_statistics(parts: Parts, ax: Axes) -> None:
     """Mean and standard deviation against the interval."""
     data = parts["runs"]
-    peaks = side_peaks(data, BOTH)
+    peaks = data["peaks"]
     thesis.mean_and_deviation(data["matrix_update_interval"], peaks.mean(axis=1), peaks.std(axis=1), ax)
     ax.set(xlabel="matrix update interval [deg]", xlim=(0.0, 11.0), ylim=(0.0, 1.2 * ax.get_ylim()[1]))
 
 
 def steady_statistics(parts: Parts) -> Sequence[Finding]:
     """How much do mean and standard deviation vary with the interval?"""
-    peaks = side_peaks(parts["runs"], BOTH)
+    peaks = parts["runs"]["peaks"]
     mean, deviation = peaks.mean(axis=1), peaks.std(axis=1)
     return [
         Finding(

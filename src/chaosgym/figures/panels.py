@@ -19,9 +19,6 @@ from chaosgym.plotting import thesis
 from chaosgym.plotting.design import ACCENT, BAD, impact_diagram
 
 Array = NDArray[np.float64]
-Side = Literal["upper", "both"]
-
-UPPER, BOTH = "upper", "both"
 
 
 @dataclass(frozen=True)
@@ -63,16 +60,10 @@ class Mark:
     sensitivity: str = ""
 
 
-def side_peaks(data: Data, side: str) -> Array:
-    """Peak forces (machines, cycles) [N] of the upper surface, or the larger of both."""
-    peaks: Array = data["peaks"]
-    return peaks[..., 0] if side == UPPER else peaks.max(axis=-1)
-
-
-def response_at(data: Data, axis: ParameterAxis, at: float, side: str) -> tuple[Array, Any, Any]:
+def response_at(data: Data, axis: ParameterAxis, at: float) -> tuple[Array, Any, Any]:
     """Peaks, nature and period of the run nearest to a value of the axis."""
     k = int(np.argmin(np.abs(axis.factor * data[axis.field] - at)))
-    return side_peaks(data, side)[k], data["nature"][k], data["period"][k]
+    return data["peaks"][k], data["nature"][k], data["period"][k]
 
 
 @dataclass(frozen=True)
@@ -85,7 +76,6 @@ class ForceDiagram:
     marks: tuple[Mark, ...] = ()
     bands: tuple[tuple[str, str], ...] = ()
     """Type and statement of each printed band."""
-    side: str = UPPER
     top: float | None = None
     """Upper end of the force axis [N]."""
     extra: Callable[[Parts, Axes], object] = field(default=lambda parts, ax: None)
@@ -94,7 +84,7 @@ class ForceDiagram:
         """Draw the diagram."""
         data = parts[self.part]
         values = self.axis.factor * data[self.axis.field]
-        thesis.force_points(values, side_peaks(data, self.side), data["nature"], ax)
+        thesis.force_points(values, data["peaks"], data["nature"], ax)
         shown = [mark for mark in self.marks if mark.force != "none"]
         thesis.printed_forces([thesis.PrintedForce(mark.at, *printed(mark.target)) for mark in shown], ax)
         thesis.type_bands([thesis.TypeBand(kind, *printed(target)) for kind, target in self.bands], ax)
@@ -107,7 +97,7 @@ class ForceDiagram:
         """Compare at every mark."""
         found = []
         for mark in self.marks:
-            response = response_at(parts[self.part], self.axis, mark.at, self.side)
+            response = response_at(parts[self.part], self.axis, mark.at)
             where = f"{mark.at:g} {self.axis.unit}".strip()
             if mark.force == "none":
                 found.append(compare_nature(where, mark.target, response, mark.nature or "", mark.sensitivity))
@@ -208,7 +198,6 @@ def cycles_panel(
     title: str,
     series: Sequence[tuple[str, int, str]],
     *,
-    side: str = UPPER,
     cycles: tuple[int, int] | None = None,
     joined: bool = True,
     extra: Any = None,
@@ -217,7 +206,7 @@ def cycles_panel(
 
     def paint(parts: Parts, ax: Axes) -> None:
         for (part, row, label), colour in zip(series, (ACCENT, BAD), strict=False):
-            peaks = side_peaks(parts[part], side)[row]
+            peaks = parts[part]["peaks"][row]
             number = np.arange(1, len(peaks) + 1)
             style = "-o" if joined else "o"
             ax.plot(number, peaks, style, ms=3.0 if joined else 1.8, lw=0.8, mew=0.0, color=colour, label=label,
@@ -233,11 +222,11 @@ def cycles_panel(
     return Panel(title, paint)
 
 
-def histogram_panel(title: str, part: str, row: int, *, side: str = UPPER, support: str | None = None) -> Panel:
+def histogram_panel(title: str, part: str, row: int, *, support: str | None = None) -> Panel:
     """Histogram of the peak forces of one run; ``support`` is a statement with the printed range."""
 
     def paint(parts: Parts, ax: Axes) -> None:
-        peaks = side_peaks(parts[part], side)
+        peaks = parts[part]["peaks"]
         thesis.histogram_bars(histogram(peaks[row], bins=40), ax)
         ax.set_xlim(0.9 * float(np.nanmin(peaks)), 1.06 * float(np.nanmax(peaks)))
         if support is not None:
