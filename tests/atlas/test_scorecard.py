@@ -89,6 +89,25 @@ def test_chaos_begins_at_the_first_response_that_is_not_periodic():
     assert none.value == 31.0
 
 
+@pytest.mark.parametrize("nature", ["undetermined", "failed", "quasiperiodic"])
+def test_what_is_not_known_to_be_chaotic_agrees_with_no_chaos(nature):
+    """A response without a verdict meets neither "chaotic" nor "periodic", ends no range and begins none."""
+    one, curve_of_30 = curve([nature], [40.0]), curve(["periodic"] * 15 + [nature] + ["chaotic"] * 14, [40.0] * 30)
+    found = {
+        name: RESPONSE_QUANTITIES[COMPARED[name].quantity].finding(THESIS_IMPACT_BEAM, COMPARED[name], results)
+        for name, results in {
+            "IBS-013": one, "IBS-014": one, "IBS-028": one, "IBS-043": one, "IBS-074": one, "IBS-075": one,
+            "SSC-056": one, "SSC-065": [*curve(["chaotic"], [40.0]), *one],
+            "IBS-021": curve_of_30, "IBS-023": curve_of_30,
+            "SSC-066": curve(["periodic"] * 10 + [nature], [40.0] * 11),
+            "SSC-067": curve(["periodic"] * 20 + [nature], [40.0] * 21),
+            "SSC-042": curve([nature] * 11, [40.0] * 11),
+            "IBS-031": curve((["periodic"] * 16 + [nature] + ["chaotic"] * 13) * 4, [40.0] * 120),
+        }.items()
+    }  # fmt: skip
+    assert [name for name, finding in found.items() if finding.agrees] == []
+
+
 def test_modes_driven_by_the_recorded_force_follow_the_tip():
     """The motion of the force point is rebuilt from the contact force; the rebuilt tip lies within 1 % of the gap."""
     found = force_point_motion(THESIS_IMPACT_BEAM, 20)

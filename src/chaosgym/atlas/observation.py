@@ -75,6 +75,11 @@ class Observation:
         """True if a reader of the figure sees one dot or a few."""
         return self.nature == "periodic"
 
+    @property
+    def is_chaotic(self) -> bool:
+        """True if the dots are distributed, and the diagnosis calls them chaos."""
+        return self.nature == "chaotic"
+
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         return asdict(self)

@@ -1,4 +1,10 @@
-"""Which quantities follow from the peak forces of responses? Single runs, curves over one axis, maps over two."""
+"""Which quantities follow from the peak forces of responses? Single runs, curves over one axis, maps over two.
+
+A nature agrees if it is the printed word. The thesis knows quasiperiodic responses and saw none (5.5), so its "chaotic"
+is not "quasiperiodic"; a response that is undetermined or failed agrees with nothing and decides no boundary.
+"""
+
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.stats import kendalltau
@@ -9,6 +15,7 @@ from chaosgym.atlas.observation import READING_ERROR, Effort, Observation
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.reference import Comparison
+from chaosgym.reference.comparisons import Axis
 
 # --- single points ----------------------------------------------------------------------------------------------------
 
@@ -19,40 +26,40 @@ def _at_point(machine: Machine, comparison: Comparison, effort: Effort) -> list[
 
 def _nature(machine: Machine, comparison: Comparison, results: Results) -> Finding:
     seen = as_observation(results[0])
-    agrees = seen.is_periodic == (comparison.printed == "periodic")
-    return Finding(seen.nature, agrees, _shown(seen), _nature_deviation(seen, comparison.printed == "periodic"))
+    printed = str(comparison.printed)
+    return Finding(seen.nature, seen.nature == printed, _shown(seen), _nature_deviation(seen, printed))
 
 
 def _periodic_force(machine: Machine, comparison: Comparison, results: Results) -> Finding:
     seen = as_observation(results[0])
-    return Finding(seen.mean, seen.is_periodic, _shown(seen), _nature_deviation(seen, True))
+    return Finding(seen.mean, seen.is_periodic, _shown(seen), _nature_deviation(seen, "periodic"))
 
 
 def _chaotic_range(machine: Machine, comparison: Comparison, results: Results) -> Finding:
     seen = as_observation(results[0])
-    return Finding((seen.low, seen.high), not seen.is_periodic, _shown(seen), _nature_deviation(seen, False))
+    return Finding((seen.low, seen.high), seen.is_chaotic, _shown(seen), _nature_deviation(seen, "chaotic"))
 
 
 def _chaotic_maximum(machine: Machine, comparison: Comparison, results: Results) -> Finding:
     seen = as_observation(results[0])
-    return Finding(seen.high, not seen.is_periodic, _shown(seen), _nature_deviation(seen, False))
+    return Finding(seen.high, seen.is_chaotic, _shown(seen), _nature_deviation(seen, "chaotic"))
 
 
 def _bounce_share(machine: Machine, comparison: Comparison, results: Results) -> Finding:
     seen = as_observation(results[0])
-    return Finding(seen.bounce_share, True, _shown(seen))
+    return Finding(seen.bounce_share, seen.is_periodic, _shown(seen))
 
 
 def _longest_bounce_share(machine: Machine, comparison: Comparison, results: Results) -> Finding:
     seen = as_observation(results[0])
-    return Finding(seen.longest_bounce_share, True, _shown(seen))
+    return Finding(seen.longest_bounce_share, seen.is_chaotic, _shown(seen))
 
 
-def _nature_deviation(seen: Observation, periodic: bool) -> float:
+def _nature_deviation(seen: Observation, printed: str) -> float:
     """0 if the nature is the printed one; otherwise how far from it, growing with the spread of the peaks."""
-    if seen.is_periodic == periodic:
+    if seen.nature == printed:
         return 0.0
-    if not periodic or seen.mean <= 0.0:
+    if printed != "periodic" or seen.mean <= 0.0:
         return 1.0
     return 0.5 + 0.5 * min(1.0, (seen.high - seen.low) / (0.5 * seen.mean))
 
@@ -81,7 +88,9 @@ def _smooth_end(machine: Machine, comparison: Comparison, results: Results) -> F
     values, seen = _curve(comparison, results)
     end, reason = values[0], ""
     for value, before, now in zip(values[1:], seen, seen[1:], strict=False):
-        if not now.is_periodic:
+        if _is_open(now):
+            return Finding(None, False, f"{now.nature} at {value:g}")
+        if now.is_chaotic:
             reason = f"{now.nature} at {value:g}"
             break
         if now.mean < before.mean - READING_ERROR:
@@ -91,52 +100,76 @@ def _smooth_end(machine: Machine, comparison: Comparison, results: Results) -> F
     return Finding(end, True, reason)
 
 
+def _first_chaotic(axis: Axis, rows: Sequence[Sequence[Observation]]) -> float | None:
+    """First value of an axis with a chaotic response, one step beyond the axis if all are periodic.
+
+    None if it is not known: a response before it is neither periodic nor chaotic.
+    """
+    for value, row in zip(axis.values, rows, strict=True):
+        if any(one.is_chaotic for one in row):
+            return value
+        if not all(one.is_periodic for one in row):
+            return None
+    return axis.values[-1] + axis.step
+
+
+def _shares(seen: Sequence[Observation]) -> str:
+    """How many responses are chaotic, and how many neither that nor periodic."""
+    chaotic, other = sum(one.is_chaotic for one in seen), sum(_is_open(one) for one in seen)
+    return f"{chaotic} of {len(seen)} chaotic" + (f", {other} neither chaotic nor periodic" if other else "")
+
+
+def _is_open(one: Observation) -> bool:
+    return not (one.is_periodic or one.is_chaotic)
+
+
+def _restless(seen: Sequence[Observation]) -> float:
+    """Share of responses that are not periodic: it leads a calibration."""
+    return float(np.mean([not one.is_periodic for one in seen]))
+
+
 def _chaos_begin(machine: Machine, comparison: Comparison, results: Results) -> Finding:
-    """First value of the axis at which the response is not periodic; one step beyond the axis if it always is."""
-    values, seen = _curve(comparison, results)
-    restless = [value for value, one in zip(values, seen, strict=True) if not one.is_periodic]
+    """First value of the axis at which the response is chaotic; one step beyond the axis if it is always periodic."""
+    _, seen = _curve(comparison, results)
     assert comparison.along is not None
-    share = f"{len(restless)} of {len(values)} not periodic"
-    return Finding(restless[0] if restless else values[-1] + comparison.along.step, True, share)
+    begin = _first_chaotic(comparison.along, [[one] for one in seen])
+    return Finding(begin, begin is not None, _shares(seen))
 
 
 def _periodic_end(machine: Machine, comparison: Comparison, results: Results) -> Finding:
     """Last value of the axis up to which every response is periodic."""
     begin = _chaos_begin(machine, comparison, results)
-    restless = float(np.mean([not one.is_periodic for one in _curve(comparison, results)[1]]))
     assert comparison.along is not None
-    assert isinstance(begin.value, float)
-    return begin._replace(value=begin.value - comparison.along.step, deviation=restless)
+    end = begin.value - comparison.along.step if isinstance(begin.value, float) else None
+    return begin._replace(value=end, deviation=_restless(_curve(comparison, results)[1]))
 
 
 def _chaos_run(machine: Machine, comparison: Comparison, results: Results) -> Finding:
-    """Both ends of the longest stretch of the axis without a periodic response."""
+    """Both ends of the longest stretch of the axis with chaotic responses alone."""
     values, seen = _curve(comparison, results)
     longest: list[float] = []
     stretch: list[float] = []
     for value, one in zip(values, seen, strict=True):
-        stretch = [] if one.is_periodic else [*stretch, value]
+        stretch = [*stretch, value] if one.is_chaotic else []
         longest = max(longest, stretch, key=len)
-    periodic = float(np.mean([one.is_periodic for one in seen]))
-    share = f"{len(values) - round(periodic * len(values))} of {len(values)} not periodic"
     if not longest:
-        return Finding(None, False, share, periodic)
-    return Finding((longest[0], longest[-1]), True, share)
+        return Finding(None, False, _shares(seen), 1.0 - _restless(seen))
+    return Finding((longest[0], longest[-1]), True, _shares(seen))
 
 
 def _chaos_present(machine: Machine, comparison: Comparison, results: Results) -> Finding:
-    """Whether any response along the axis is not periodic."""
-    restless = float(np.mean([not one.is_periodic for one in _curve(comparison, results)[1]]))
-    word = "chaos" if restless > 0.0 else "none"
-    deviation = max(0.5, restless) if word != comparison.printed else 0.0
-    return Finding(word, word == comparison.printed, f"{restless:.0%} of the curve is not periodic", deviation)
+    """Whether any response along the axis is chaotic; undetermined if none is and not all are periodic."""
+    _, seen = _curve(comparison, results)
+    any_chaotic, all_periodic = any(one.is_chaotic for one in seen), all(one.is_periodic for one in seen)
+    word = "chaos" if any_chaotic else "none" if all_periodic else "undetermined"
+    deviation = max(0.5, _restless(seen)) if word != comparison.printed else 0.0
+    return Finding(word, word == comparison.printed, _shares(seen), deviation)
 
 
 def _change_of_nature(machine: Machine, comparison: Comparison, results: Results) -> Finding:
     """Nature at the first and at the last value of the axis."""
     _, seen = _curve(comparison, results)
-    words = ["periodic" if one.is_periodic else "chaotic" for one in (seen[0], seen[-1])]
-    word = " to ".join(words)
+    word = f"{seen[0].nature} to {seen[-1].nature}"
     return Finding(word, word == comparison.printed, "; ".join(_shown(one) for one in seen))
 
 
@@ -163,8 +196,10 @@ def _curve(comparison: Comparison, results: Results) -> tuple[tuple[float, ...],
 
 
 def _spread_trend(machine: Machine, comparison: Comparison, results: Results) -> Finding:
-    """Rank correlation (Kendall) of the spread of the peak forces with the axis."""
+    """Rank correlation (Kendall) of the spread of the peak forces with the axis; a periodic response has none."""
     values, seen = _curve(comparison, results)
+    if any(one.nature == "failed" for one in seen):
+        return Finding(None, False, "a run could not be finished")
     spread = [one.high - one.low if not one.is_periodic else 0.0 for one in seen]
     tau = float(kendalltau(values, spread).statistic) if np.ptp(spread) > 0.0 else 0.0
     return Finding(tau, True, "spreads " + ", ".join(f"{one:.2g}" for one in spread) + " N")
@@ -188,31 +223,31 @@ def _settling(machine: Machine, comparison: Comparison, results: Results) -> Fin
 # --- maps -------------------------------------------------------------------------------------------------------------
 
 
-def _restless(comparison: Comparison, results: Results) -> np.ndarray:
+def _rows(comparison: Comparison, results: Results) -> list[list[Observation]]:
+    """Responses of a map, one row for each value across."""
     assert comparison.along is not None
-    assert comparison.across is not None
-    shape = len(comparison.across.values), len(comparison.along.values)
-    return np.array([not as_observation(result).is_periodic for result in results]).reshape(shape)
+    seen = [as_observation(result) for result in results]
+    width = len(comparison.along.values)
+    return [seen[begin : begin + width] for begin in range(0, len(seen), width)]
 
 
 def _map_clearance(machine: Machine, comparison: Comparison, results: Results) -> Finding:
     """Largest value across, in the printed unit, up to which nothing along the other axis is chaotic."""
-    restless = _restless(comparison, results)
-    across = comparison.across
-    assert across is not None
-    rows = np.flatnonzero(restless.any(axis=1))
-    first = across.values[rows[0]] if len(rows) else across.high + across.step
-    return Finding((first - across.step) / across.unit, True, f"{restless.mean():.0%} of the map is not periodic")
+    assert comparison.across is not None
+    return _boundary(comparison.across, _rows(comparison, results))
 
 
 def _map_speed(machine: Machine, comparison: Comparison, results: Results) -> Finding:
     """Largest value along up to which nothing on the map is chaotic."""
-    restless = _restless(comparison, results)
-    along = comparison.along
-    assert along is not None
-    columns = np.flatnonzero(restless.any(axis=0))
-    first = along.values[columns[0]] if len(columns) else along.high + along.step
-    return Finding(first - along.step, True, f"{restless.mean():.0%} of the map is not periodic")
+    columns = [list(column) for column in zip(*_rows(comparison, results), strict=True)]
+    assert comparison.along is not None
+    return _boundary(comparison.along, columns)
+
+
+def _boundary(axis: Axis, rows: Sequence[Sequence[Observation]]) -> Finding:
+    first = _first_chaotic(axis, rows)
+    shares = _shares([one for row in rows for one in row])
+    return Finding(None if first is None else (first - axis.step) / axis.unit, first is not None, shares)
 
 
 RESPONSE_QUANTITIES = {
