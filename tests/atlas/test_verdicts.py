@@ -57,6 +57,15 @@ def test_tolerance_is_given_in_the_printed_unit():
     assert shown["SSC-056"] == pytest.approx([12.75, 16.5])
 
 
+def test_a_grid_is_finer_than_what_it_is_compared_with():
+    """A boundary on a clearance is sought on a quarter of it or less, a resonance on its tolerance or less."""
+    for one in COMPARED.values():
+        if one.quantity == "map_clearance":
+            assert one.across.step / one.across.unit <= 0.2501 * one.printed, one.id
+        if one.quantity == "resonance_speed":
+            assert one.along.step / one.along.unit <= one.tolerance.relative * one.printed, one.id
+
+
 def test_totals_count_every_statement_once():
     """Groups add up to "all"; contradictory statements count in the total and not in the rate."""
     judged = [judge(one, [Finding(one.printed)] if one.group != "force" else []) for one in COMPARED.values()]
