@@ -13,7 +13,7 @@ from typing import Any
 from chaosgym.atlas.jobs import Job, run_jobs
 from chaosgym.atlas.observation import THOROUGH, Effort
 from chaosgym.atlas.quantities import QUANTITIES
-from chaosgym.atlas.verdicts import VERDICTS, Judged, judge
+from chaosgym.atlas.verdicts import COUNTED, Judged, judge
 from chaosgym.machines import MACHINES, Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.reference import Comparison, read_comparisons
@@ -27,14 +27,17 @@ class Scorecard:
     judged: tuple[Judged, ...]
 
     def totals(self) -> dict[str, dict[str, dict[str, int]]]:
-        """Return {machine: {group: {hit, near, miss, contradictory, not-computed, total}, "all": ...}}."""
+        """Return {machine: {group: {hit, near, miss, contradictory, total}, "all": ...}}.
+
+        What is not computed counts in the total alone, so it is no hit.
+        """
         found: dict[str, dict[str, Counter[str]]] = {}
         for one in self.judged:
             groups = found.setdefault(one.comparison.machine, {})
             for group in (one.comparison.group, "all"):
                 groups.setdefault(group, Counter())[one.verdict] += 1
         return {
-            machine: {group: {**{name: count[name] for name in VERDICTS}, "total": count.total()}
+            machine: {group: {**{name: count[name] for name in COUNTED}, "total": count.total()}
                       for group, count in sorted(groups.items(), key=lambda item: item[0] == "all")}
             for machine, groups in found.items()
         }  # fmt: skip

@@ -9,7 +9,8 @@ from chaosgym.reference import Comparison
 
 Verdict = Literal["hit", "near", "miss", "contradictory", "not-computed"]
 
-VERDICTS: tuple[Verdict, ...] = ("hit", "near", "miss", "contradictory", "not-computed")
+COUNTED: tuple[Verdict, ...] = ("hit", "near", "miss", "contradictory")
+"""Verdicts with a count of their own; what is not computed is the rest of a total."""
 
 NEAR = 2.0
 """How many tolerances are still near."""

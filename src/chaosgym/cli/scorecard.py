@@ -33,8 +33,8 @@ def _lines(result: dict[str, Any]) -> list[str]:
         for group, count in groups.items():
             counted = count["total"] - count["contradictory"]
             lines.append(
-                f"  {group:12s} {count['hit']:3d} of {counted:3d} hit, {count['near']} near, {count['miss']} missed, "
-                f"{count['not-computed']} not computed; {count['contradictory']} contradictory"
+                f"  {group:12s} {count['hit']:3d} of {counted:3d} hit, {count['near']} near, {count['miss']} missed; "
+                f"{count['contradictory']} contradictory"
             )
     return lines
 
