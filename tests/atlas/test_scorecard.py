@@ -8,11 +8,13 @@ import pytest
 
 from chaosgym.atlas import jobs
 from chaosgym.atlas.beam_runs import force_point_motion, long_run
+from chaosgym.atlas.crank_runs import median_angles
 from chaosgym.atlas.jobs import Job, observation, run_jobs
 from chaosgym.atlas.observation import QUICK, READING_ERROR, THOROUGH, Effort, Observation, observe, plotted_peaks
-from chaosgym.atlas.quantities import clearance_unit
+from chaosgym.atlas.quantities import QUANTITIES, clearance_unit
 from chaosgym.atlas.response_quantities import RESPONSE_QUANTITIES
 from chaosgym.atlas.scorecard import evaluate
+from chaosgym.atlas.verdicts import judge
 from chaosgym.diagnosis import two_step_test
 from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK
 from chaosgym.reference import read_comparisons
@@ -118,10 +120,33 @@ def test_modes_driven_by_the_recorded_force_follow_the_tip():
 def test_a_long_run_tells_how_long_it_was_irregular():
     """At 30 Hz and +-0.127 mm the chaos of the thesis lasts; at 4 Hz the motion repeats after a few cycles."""
     chaotic = long_run(replace(THESIS_IMPACT_BEAM, excitation_frequency=30.0, clearance=0.127e-3), 400)
-    assert chaotic == {"irregular_cycles": 400, "period": None}
+    assert chaotic == {"irregular_cycles": 400, "period": None, "nature": "chaotic"}
     settled = long_run(replace(THESIS_IMPACT_BEAM, excitation_frequency=4.0, clearance=0.03175e-3), 200)
     assert settled["period"] == 1
     assert settled["irregular_cycles"] < 50
+
+
+@pytest.mark.parametrize(
+    ("run", "verdict"),
+    [
+        ({"irregular_cycles": 4000, "period": None, "nature": "chaotic"}, "hit"),
+        ({"irregular_cycles": 3999, "period": 4, "nature": "chaotic"}, "miss"),
+        ({"irregular_cycles": 4000, "period": None, "nature": "undetermined"}, "miss"),
+    ],
+)
+def test_chaos_up_to_the_end_of_the_run_leaves_out_no_cycle(run, verdict):
+    """Chaos "up to 4000 cycles" (5.2.3) is met by all 4000 of them, and by chaos alone."""
+    one = COMPARED["IBS-071"]
+    assert judge(one, [QUANTITIES[one.quantity].finding(THESIS_IMPACT_BEAM, one, [run])]).verdict == verdict
+
+
+def test_angles_are_those_of_the_revolutions_that_lose_contact():
+    """Of three revolutions one keeps contact: the median gap is that of the others; without any there is none."""
+    force = np.ones((3, 360))
+    force[0, 70:90] = force[1, 80:100] = 0.0
+    found = median_angles(force)
+    assert (found["loss"], found["resumption"]) == (75.0, 95.0)
+    assert median_angles(force[2:])["loss"] is None
 
 
 def test_crank_clearance_unit_is_the_thrust_of_the_slider():

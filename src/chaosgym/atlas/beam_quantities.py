@@ -32,6 +32,12 @@ def _irregular_cycles(machine: Machine, comparison: Comparison, results: Results
     return Finding(float(results[0]["irregular_cycles"]), True, ending)
 
 
+def _chaotic_cycles(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """How many cycles of the run are chaotic; the run as a whole must be."""
+    nature = results[0]["nature"]
+    return _irregular_cycles(machine, comparison, results)._replace(agrees=nature == "chaotic", note=nature)
+
+
 def _final_period(machine: Machine, comparison: Comparison, results: Results) -> Finding:
     period = results[0]["period"]
     cycles = results[0]["irregular_cycles"]
@@ -52,6 +58,7 @@ def _motion(which: str, unit: float) -> Callable[[Machine, Comparison, Results],
 
 BEAM_QUANTITIES = {
     "irregular_cycles": Quantity(_long(LONG), _irregular_cycles),
+    "chaotic_cycles": Quantity(_long(LONG), _chaotic_cycles),
     "final_period": Quantity(_long(LONG), _final_period),
     "force_point_displacement": Quantity(_moving, _motion("displacement", 1e-3)),
     "force_point_velocity": Quantity(_moving, _motion("velocity", 1.0)),

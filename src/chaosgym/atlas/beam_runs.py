@@ -8,6 +8,7 @@ import scipy.signal
 from numpy.typing import NDArray
 
 from chaosgym.atlas.observation import READING_ERROR, plotted_peaks
+from chaosgym.diagnosis import two_step_test
 from chaosgym.diagnosis.stroboscopic import find_recurrence, scales
 from chaosgym.machines import ImpactBeam, Machine
 from chaosgym.simulation import CycleRecord, simulate
@@ -25,17 +26,19 @@ def long_run(machine: Machine, cycles: int) -> dict[str, Any]:
     -------
     dict
         ``irregular_cycles``: cycles before the plotted peaks repeat within the reading error, all if they never do;
-        ``period`` that they repeat with, None if they don't.
+        ``period`` that they repeat with, None if they don't; ``nature`` of the whole run by the Two-Step Test.
     """
     peaks = plotted_peaks(simulate(machine, cycles))[:, None]
+    nature = two_step_test(peaks, sensor_error=READING_ERROR).nature
     tail = peaks[-100:]
     scale = scales(tail)
     found = find_recurrence(tail / scale, READING_ERROR / scale)
     if found.period is None:
-        return {"irregular_cycles": cycles, "period": None}
+        return {"irregular_cycles": cycles, "period": None, "nature": nature}
     off = np.max(np.abs(peaks[: -found.period] - peaks[found.period :]), axis=1) > 2.0 * READING_ERROR
     last = np.flatnonzero(off)
-    return {"irregular_cycles": int(last[-1]) + 1 if len(last) else 0, "period": found.period}
+    irregular = int(last[-1]) + 1 if len(last) else 0
+    return {"irregular_cycles": irregular, "period": found.period, "nature": nature}
 
 
 def follow_modes(record: CycleRecord) -> tuple[Array, Array, Array]:

@@ -13,7 +13,7 @@ from chaosgym.diagnosis import matrix_update_test
 from chaosgym.machines import SliderCrank
 from chaosgym.simulation import simulate
 
-ANGLE_SAMPLES, ANGLE_CYCLES = 720, 10
+ANGLE_SAMPLES, ANGLE_CYCLES = 3600, 10
 """Samples of crank angle in a revolution, and revolutions of which the median is taken."""
 
 
@@ -24,16 +24,20 @@ def crank_angles(crank: SliderCrank, transient: int) -> dict[str, float | None]:
     -------
     dict
         ``loss`` and ``resumption``: ends of the longest gap in the contact force; ``settled``: end of the last gap;
-        ``impact``: largest force after the loss; None in a revolution without a gap. ``impulse_down`` and
-        ``impulse_up``: largest force of either half revolution. Medians over the revolutions.
+        ``impact``: largest force after the loss. Medians over the revolutions that have a gap, as the thesis shows one
+        "during which an impact occurs" (4.4.1, 4.4.2); None if none has. ``impulse_down`` and ``impulse_up``: largest
+        force of either half revolution, medians over all.
     """
     record = simulate(crank, ANGLE_CYCLES, transient=transient, samples_per_cycle=ANGLE_SAMPLES)
     assert record.history is not None
-    found = [revolution_angles(np.abs(force)) for force in record.history[:, :, 2]]
-    return {
-        name: None if any(one[name] is None for one in found) else float(np.median([one[name] for one in found]))
-        for name in found[0]
-    }
+    return median_angles(np.abs(record.history[:, :, 2]))
+
+
+def median_angles(force: NDArray[np.float64]) -> dict[str, float | None]:
+    """Crank angles of several revolutions, from the size of their contact force (revolutions, samples) [N]."""
+    found = [revolution_angles(one) for one in force]
+    known = {name: [one[name] for one in found if one[name] is not None] for name in found[0]}
+    return {name: float(np.median(angles)) if angles else None for name, angles in known.items()}
 
 
 def revolution_angles(force: NDArray[np.float64]) -> dict[str, Any]:
