@@ -16,6 +16,9 @@ from chaosgym.reference import Comparison
 LOST = 1e-3
 """Share of a revolution without contact from which on contact counts as lost."""
 
+UPDATED_CYCLES = 35
+"""Revolutions of figure 5.1."""
+
 AGREEMENT = 3.0
 """Difference of two settled runs [N] that a reader of figure 5.1 takes for agreement: a sensor's error (3.6)."""
 
@@ -75,7 +78,7 @@ def _impact_range(machine: Machine, comparison: Comparison, results: Results) ->
 
 
 def _updated(machine: Machine, comparison: Comparison, effort: Effort) -> list[Job]:
-    return [Job(crank_runs.update_pair, machine, (5.0, 10.0, 50))]
+    return [Job(crank_runs.update_pair, machine, (5.0, 10.0, UPDATED_CYCLES))]
 
 
 def _update_transient(machine: Machine, comparison: Comparison, results: Results) -> Finding:

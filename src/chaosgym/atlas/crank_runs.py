@@ -16,6 +16,12 @@ from chaosgym.simulation import simulate
 ANGLE_SAMPLES, ANGLE_CYCLES = 3600, 10
 """Samples of crank angle in a revolution, and revolutions of which the median is taken."""
 
+BALL_TRANSIENT = 20
+"""Revolutions in which a ball joint settles."""
+
+CLOUD_CYCLES, CLOUD_TRANSIENT = 100, 60
+"""Revolutions of a Peak Impact Diagram, and those skipped before."""
+
 
 def crank_angles(crank: SliderCrank, transient: int) -> dict[str, float | None]:
     """At which crank angles [deg] of the first half revolution is contact lost and resumed?
@@ -64,8 +70,8 @@ def revolution_angles(force: NDArray[np.float64]) -> dict[str, Any]:
 
 
 def contact_loss(crank: SliderCrank) -> dict[str, float]:
-    """Mean share of a settled revolution without contact: ``lost``."""
-    record = simulate(crank, 10, transient=20)
+    """Mean share of a revolution without contact, over the 50 that figures 4.8 and 4.9 show: ``lost``."""
+    record = simulate(crank, 50, transient=BALL_TRANSIENT)
     return {"lost": float(1.0 - record.contact_fraction.sum(axis=1).mean())}
 
 
@@ -88,6 +94,6 @@ def statistics(crank: SliderCrank) -> dict[str, int]:
 
 
 def bearing_spread(crank: SliderCrank) -> dict[str, float]:
-    """Length of guide [m] or angle of ball joint [deg] over which the peak impacts of 80 cycles spread: ``spread``."""
-    record = simulate(crank, 80, transient=60)
+    """Length of guide [m] or angle of ball joint [deg] over which the peak impacts spread: ``spread``."""
+    record = simulate(crank, CLOUD_CYCLES, transient=CLOUD_TRANSIENT)
     return {"spread": peak_impacts(record, worn_side(record)).spread}
