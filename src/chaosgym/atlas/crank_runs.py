@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.atlas.observation import plotted_peaks
+from chaosgym.atlas.observation import THOROUGH, plotted_peaks
 from chaosgym.design.peak_impacts import peak_impacts, worn_side
 from chaosgym.design.statistics import cycles_needed
 from chaosgym.diagnosis import matrix_update_test
@@ -16,11 +16,11 @@ from chaosgym.simulation import simulate
 ANGLE_SAMPLES, ANGLE_CYCLES = 3600, 10
 """Samples of crank angle in a revolution, and revolutions of which the median is taken."""
 
-BALL_TRANSIENT = 20
-"""Revolutions in which a ball joint settles."""
+TRANSIENT, SHOWN, _ = THOROUGH["slider-crank"]
+"""Revolutions in which a response settles, and those shown of it (4.4.1)."""
 
-CLOUD_CYCLES, CLOUD_TRANSIENT = 100, 60
-"""Revolutions of a Peak Impact Diagram, and those skipped before."""
+CLOUD_CYCLES = 100
+"""Revolutions of a Peak Impact Diagram."""
 
 
 def crank_angles(crank: SliderCrank, transient: int) -> dict[str, float | None]:
@@ -70,8 +70,8 @@ def revolution_angles(force: NDArray[np.float64]) -> dict[str, Any]:
 
 
 def contact_loss(crank: SliderCrank) -> dict[str, float]:
-    """Mean share of a revolution without contact, over the 50 that figures 4.8 and 4.9 show: ``lost``."""
-    record = simulate(crank, 50, transient=BALL_TRANSIENT)
+    """Mean share of a settled revolution without contact, over those that figures 4.8 and 4.9 show: ``lost``."""
+    record = simulate(crank, SHOWN, transient=TRANSIENT)
     return {"lost": float(1.0 - record.contact_fraction.sum(axis=1).mean())}
 
 
@@ -90,10 +90,10 @@ def update_test(crank: SliderCrank, first: float, second: float) -> dict[str, st
 
 def statistics(crank: SliderCrank) -> dict[str, int]:
     """Cycles that the mean and the standard deviation of the peak force need to converge: ``cycles``."""
-    return {"cycles": int(cycles_needed(plotted_peaks(simulate(crank, 400, transient=60))))}
+    return {"cycles": int(cycles_needed(plotted_peaks(simulate(crank, 400, transient=TRANSIENT))))}
 
 
 def bearing_spread(crank: SliderCrank) -> dict[str, float]:
     """Length of guide [m] or angle of ball joint [deg] over which the peak impacts spread: ``spread``."""
-    record = simulate(crank, CLOUD_CYCLES, transient=CLOUD_TRANSIENT)
+    record = simulate(crank, CLOUD_CYCLES, transient=TRANSIENT)
     return {"spread": peak_impacts(record, worn_side(record)).spread}
