@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from chaosgym.atlas.jobs import default_folder
+from chaosgym.atlas.observation import THOROUGH
+from chaosgym.atlas.scorecard import evaluate
 from chaosgym.cli import app
 from chaosgym.errors import ChaosgymError
 from chaosgym.figures import FIGURES, chosen, draw_figures
@@ -12,7 +15,8 @@ from chaosgym.figures.computations import ForcePointHistory, Runs
 from chaosgym.figures.figure import steps
 from chaosgym.figures.findings import compare_response
 from chaosgym.figures.gallery import gallery
-from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam
+from chaosgym.figures.printed import comparison
+from chaosgym.machines import MACHINES, THESIS_IMPACT_BEAM, ImpactBeam
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
 
@@ -39,9 +43,20 @@ def test_a_periodic_figure_says_what_the_simulation_says(tmp_path):
     """The beam repeats every cycle at 19 Hz and +-0.127 mm; the figure's finding is the nature of that very run."""
     (one,) = draw_figures(chosen(["3.6"]), tmp_path, resolution=0.1, workers=1)
     assert one.path.read_bytes().startswith(b"\x89PNG")
-    peaks = simulate(ImpactBeam(excitation_frequency=19.0), 300, transient=300).peak_force[:, 0]
+    peaks = simulate(ImpactBeam(excitation_frequency=19.0), 100, transient=200).peak_force[:, 0]
     assert one.findings[0].here.startswith(f"{peaks.mean():.3g} N, periodic")
     assert one.findings[0].agrees is True
+
+
+@pytest.mark.parametrize("number", ["5.1", "5.6"])
+def test_a_figure_says_of_a_statement_what_the_scorecard_says(number, tmp_path):
+    """Verdict, value and tolerance of a statement are the same on both pages, whatever else the figure draws."""
+    (one,) = draw_figures(chosen([number]), tmp_path, resolution=0.1)
+    names = [target for finding in one.findings for target in finding.targets]
+    judged = evaluate([comparison(name) for name in names], {name: make() for name, make in MACHINES.items()},
+                      efforts=THOROUGH, folder=default_folder())  # fmt: skip
+    assert [finding.agrees for finding in one.findings] == [found.verdict == "hit" for found in judged]
+    assert [finding.here.split(";")[0] for finding in one.findings] == [found.shown_value for found in judged]
 
 
 def test_pictures_are_replaced_only_on_request(tmp_path):

@@ -1,7 +1,5 @@
 """What does the scorecard look like in the documentation? One table a machine, misses shown like hits."""
 
-from typing import Any
-
 from chaosgym.atlas.scorecard import Scorecard
 from chaosgym.reference import read_comparisons
 
@@ -37,13 +35,10 @@ def _section(card: Scorecard, machine: str) -> str:
         comparison = one.comparison
         if comparison.machine != machine:
             continue
-        plain = one.as_dict()
-        unit = "" if plain["unit"] == "-" else f" {plain['unit']}"
-        notes = "; ".join(dict.fromkeys(finding.note for finding in one.findings if finding.note))
-        found = "; ".join(part for part in (comparison.contradictory, comparison.not_computed, notes) if part)
+        found = "; ".join(part for part in (comparison.contradictory, comparison.not_computed, one.notes) if part)
         lines.append(
-            f"| {one.comparison.id} | {comparison.statement.figure} | {comparison.statement.quantity} "
-            f"| {_shown(plain['printed'])}{unit} | {_shown(plain['value'])}{unit} | {plain['verdict']} "
+            f"| {comparison.id} | {comparison.statement.figure} | {comparison.statement.quantity} "
+            f"| {one.shown_printed} | {one.shown_value} | {one.verdict} "
             f"| {'fit' if comparison.part == 'calibration' else 'held out'} | {found} |"
         )
     return "\n".join(lines) + "\n"
@@ -58,9 +53,3 @@ def _tolerances() -> str:
 def _left_out() -> str:
     rows = "\n".join(f"| {name} | {reason} |" for name, reason in read_comparisons().out.items())
     return f"## Statements that are not compared\n\n| statement | why |\n|---|---|\n{rows}\n"
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, list):
-        return ", ".join(_shown(one) for one in value)
-    return "-" if value is None else value if isinstance(value, str) else f"{value:.4g}"

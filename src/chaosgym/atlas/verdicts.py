@@ -45,10 +45,28 @@ class Judged(NamedTuple):
     @property
     def reason(self) -> str:
         """What is compared, and what was found; for a contradictory statement, what contradicts it."""
-        notes = "; ".join(dict.fromkeys(finding.note for finding in self.findings if finding.note))
         one = self.comparison
-        parts = [one.contradictory, one.not_computed, one.statement.quantity, notes, one.tolerance.reason]
+        parts = [one.contradictory, one.not_computed, one.statement.quantity, self.notes, one.tolerance.reason]
         return " | ".join(part for part in parts if part)
+
+    @property
+    def notes(self) -> str:
+        """What was found besides the value."""
+        return "; ".join(dict.fromkeys(finding.note for finding in self.findings if finding.note))
+
+    @property
+    def shown_value(self) -> str:
+        """What was found, with its unit; "-" for nothing."""
+        return self._shown(self.as_dict()["value"])
+
+    @property
+    def shown_printed(self) -> str:
+        """What is printed, with its unit."""
+        return self._shown(_plain(self.comparison.printed))
+
+    def _shown(self, value: Any) -> str:
+        unit = self.comparison.shown_unit
+        return shown(value) + ("" if unit == "-" or value is None else f" {unit}")
 
 
 def judge(comparison: Comparison, findings: Sequence[Finding]) -> Judged:
@@ -111,6 +129,13 @@ def _error(comparison: Comparison, printed: float, value: float) -> float:
     if limit == 0.0:
         return 0.0 if difference == 0.0 else math.inf
     return difference / limit * (1.0 - 1e-9)
+
+
+def shown(value: Any) -> str:
+    """A number, a word, or several of them, for people."""
+    if isinstance(value, list):
+        return ", ".join(shown(one) for one in value)
+    return "-" if value is None else value if isinstance(value, str) else f"{value:.4g}"
 
 
 def _plain(value: Value) -> Any:

@@ -15,6 +15,7 @@ from chaosgym.figures.panels import (
     FREQUENCY,
 )
 from chaosgym.figures.printed import printed
+from chaosgym.figures.scored import scored, scored_finding
 from chaosgym.machines.impact_beam import pinned_pinned_frequency
 from chaosgym.plotting import thesis
 from chaosgym.plotting.design import ACCENT, MUTED
@@ -25,19 +26,20 @@ Array = NDArray[np.float64]
 def flexibility(resolution: float) -> Mapping[str, Computation]:
     """Three lengths at the tiny clearance."""
     values = steps(1.0, 30.0, 0.15 / resolution)
-    return {
+    curves = {
         f"{1e3 * length:g}": sweep(
             replace(BEAM, clearance=TINY, length=length), "excitation_frequency", values, cycles=50, transient=150
         )
         for length in LENGTHS
     }
+    return {**curves, **scored("IBS-037")}
 
 
 def _length_curves(parts: Parts) -> list[tuple[float, Array, Array]]:
     """Length [m], frequency [Hz] and largest peak [N] of each."""
     return [
         (length, data["excitation_frequency"], data["peaks"].max(axis=1))
-        for length, data in zip(LENGTHS, parts.values(), strict=True)
+        for length, data in ((length, parts[f"{1e3 * length:g}"]) for length in LENGTHS)
     ]
 
 
@@ -56,21 +58,18 @@ def length_curves(parts: Parts, ax: Axes, *, ratio: bool) -> None:
 
 def fluctuation(parts: Parts) -> Sequence[Finding]:
     """Is the force smooth below 15 Hz and rough above?"""
-    found = []
-    for low, high, target, word in ((4.0, 15.0, "IBS-037", "smooth"), (15.0, 30.0, "IBS-036", "fluctuates")):
-        rough = []
-        for _, frequency, force in _length_curves(parts):
-            inside = (frequency >= low) & (frequency <= high)
-            trend = np.polyval(np.polyfit(frequency[inside], force[inside], 2), frequency[inside])
-            rough.append(float(np.std(force[inside] - trend) / np.mean(force[inside])))
-        here = float(np.mean(rough))
-        found.append(
-            Finding(
-                f"{low:g} to {high:g} Hz: {word}", f"{here:.0%} of the force about its trend",
-                here < 0.05 if word == "smooth" else here > 0.05, (target,),
-            )
-        )  # fmt: skip
-    return found
+    low, high = printed("IBS-036")
+    rough = []
+    for _, frequency, force in _length_curves(parts):
+        inside = (frequency >= low) & (frequency <= high)
+        trend = np.polyval(np.polyfit(frequency[inside], force[inside], 2), frequency[inside])
+        rough.append(float(np.std(force[inside] - trend) / np.mean(force[inside])))
+    here = float(np.mean(rough))
+    return [
+        scored_finding(parts, "IBS-037", f"Type I, a smooth rise, to {low:g} Hz at the three lengths"),
+        Finding(f"{low:g} to {high:g} Hz: fluctuates", f"{here:.0%} of the force about its trend", here > 0.05,
+                ("IBS-036",)),
+    ]  # fmt: skip
 
 
 def collapse(parts: Parts) -> Sequence[Finding]:

@@ -17,6 +17,7 @@ from chaosgym.figures.panels import (
     force_diagram,
     response_at,
 )
+from chaosgym.figures.scored import agrees, scored, scored_finding
 
 Array = NDArray[np.float64]
 
@@ -24,14 +25,15 @@ Array = NDArray[np.float64]
 def force_against_frequency(resolution: float) -> Mapping[str, Computation]:
     """Both halves of figure 3.8."""
     values = steps(1.0, 30.0, 0.5 / resolution, 18.0, 19.0, 20.0, 29.0)
-    return {
+    curves = {
         name: sweep(replace(BEAM, clearance=clearance), "excitation_frequency", values)
         for name, clearance in (("a", SMALL), ("b", LARGE))
     }
+    return {**curves, **scored("IBS-020", "IBS-021", "IBS-022", "IBS-023")}
 
 
-def jumps(parts: Parts) -> Sequence[Finding]:
-    """How much the force changes from one hertz to the next: below 8 Hz, and above."""
+def bands_and_jumps(parts: Parts) -> Sequence[Finding]:
+    """Where the types end, and how much the force changes from one hertz to the next: below 8 Hz, and above."""
     data = parts["a"]
     values, force = data["excitation_frequency"], data["peaks"].max(axis=1)
     whole = np.arange(1.0, 31.0)
@@ -39,11 +41,14 @@ def jumps(parts: Parts) -> Sequence[Finding]:
     change = np.abs(np.diff(at_whole)) / at_whole[:-1]
     smooth, rough = float(np.max(change[3:7])), float(np.max(change[7:]))
     return [
+        scored_finding(parts, "IBS-020", "Type I, a smooth rise, to 8 Hz at ±0.032 and ±0.127 mm"),
+        scored_finding(parts, "IBS-021", "±0.032 mm: Type II, periodic, to 30 Hz"),
+        scored_finding(parts, "IBS-022", "±0.127 mm: Type II, periodic, to 17 Hz"),
+        scored_finding(parts, "IBS-023", "±0.127 mm: Type III, chaotic, from 16 Hz on"),
         Finding(
-            "±0.032 mm: smooth rise to 8 Hz, strong fluctuation above (change per hertz, from 4 Hz on)",
-            f"at most {smooth:.0%} per hertz up to 8 Hz, up to {rough:.0%} above",
-            smooth < 0.1 < rough, ("IBS-020", "IBS-021"), "speed",
-        )
+            "±0.032 mm: the force fluctuates above 8 Hz, and not below (change per hertz, from 4 Hz on)",
+            f"at most {smooth:.0%} per hertz up to 8 Hz, up to {rough:.0%} above", smooth < 0.1 < rough, (), "speed",
+        ),
     ]  # fmt: skip
 
 
@@ -68,7 +73,7 @@ FORCE_AGAINST_FREQUENCY = ThesisFigure(
         ),
     ),
     height=3.4,
-    compare=jumps,
+    compare=bands_and_jumps,
 )  # fmt: skip
 
 
@@ -111,7 +116,8 @@ FORCE_AGAINST_LENGTH = ThesisFigure(
 def damping_sweep(resolution: float) -> Mapping[str, Computation]:
     """Structural damping 1 to 8 %."""
     beam = replace(BEAM, excitation_frequency=30.0, clearance=LARGE)
-    return {"dampings": sweep(beam, "damping_ratio", steps(0.01, 0.08, 0.0025 / resolution))}
+    values = steps(0.01, 0.08, 0.0025 / resolution)
+    return {"dampings": sweep(beam, "damping_ratio", values), **scored("IBS-045")}
 
 
 def damping_calms(parts: Parts) -> Sequence[Finding]:
@@ -125,8 +131,8 @@ def damping_calms(parts: Parts) -> Sequence[Finding]:
         Finding(
             "the variation of the peak force falls from 1 % to 8 % structural damping",
             f"{spread[0]:.3g} N at 1 %, {spread[len(spread) // 2]:.3g} N at 4.5 %, {spread[-1]:.3g} N at 8 %; "
-            f"last chaotic at {last}",
-            bool(spread[-1] < 0.5 * spread[0]), ("IBS-045",), "structural damping",
+            f"last chaotic at {last}; rank correlation with damping {parts['IBS-045']['value']}",
+            agrees(parts, "IBS-045"), ("IBS-045",), "structural damping",
         ),
         Finding(
             "no chaos at 8 %", describe_forces(end[0], str(end[1]), int(end[2])), end[1] == "periodic", ("IBS-046",),

@@ -20,6 +20,7 @@ from chaosgym.figures.panels import (
     spectrum_panel,
 )
 from chaosgym.figures.printed import printed, within
+from chaosgym.figures.scored import scored, scored_finding
 from chaosgym.plotting import thesis
 
 Array = NDArray[np.float64]
@@ -32,7 +33,7 @@ def one_response(frequency: float, resolution: float) -> Mapping[str, Computatio
         "history": History(machine=beam, cycles=6, transient=TRANSIENT, samples=2000),
         "long": History(machine=beam, cycles=256, transient=TRANSIENT, samples=128),
         "section": History(machine=beam, cycles=round(2000 * resolution), transient=TRANSIENT, samples=1),
-        "response": runs([beam], cycles=300),
+        "response": runs([beam]),
     }
 
 
@@ -79,7 +80,8 @@ def force_point(resolution: float) -> Mapping[str, Computation]:
     beam = replace(BEAM, excitation_frequency=30.0, clearance=LARGE)
     return {
         "motion": ForcePointHistory(machine=beam, cycles=12, transient=TRANSIENT),
-        "response": runs([beam], cycles=300),
+        "response": runs([beam]),
+        **scored("IBS-060", "IBS-061"),
     }
 
 
@@ -100,18 +102,14 @@ def with_levels(panel: Panel, target: str, *, vertical: bool = False) -> Panel:
 
 def motion_ranges(parts: Parts) -> Sequence[Finding]:
     """Ranges of displacement, velocity and peak force."""
-    motion = parts["motion"]
     peaks = parts["response"]["peaks"][0]
-    displacement, velocity = 1e3 * motion["displacement"], motion["velocity"]
-    found = []
-    for what, unit, target, values in (
-        ("displacement of", "mm", "IBS-060", displacement), ("velocity of", "m/s", "IBS-061", velocity),
-        ("peaks of", "N", "IBS-062", peaks),
-    ):  # fmt: skip
-        low, high = float(values.min()), float(values.max())
-        text = f"{what} {words(printed(target))} {unit}"
-        found.append(Finding(text, f"{low:.3g} to {high:.3g} {unit}", within(target, (low, high)), (target,)))
-    return found
+    low, high = float(peaks.min()), float(peaks.max())
+    return [
+        scored_finding(parts, "IBS-060", f"displacement of {words(printed('IBS-060'))} mm"),
+        scored_finding(parts, "IBS-061", f"velocity of {words(printed('IBS-061'))} m/s"),
+        Finding(f"peaks of {words(printed('IBS-062'))} N", f"{low:.3g} to {high:.3g} N", within("IBS-062", (low, high)),
+                ("IBS-062",)),
+    ]  # fmt: skip
 
 
 FORCE_POINT_MOTION = ThesisFigure(

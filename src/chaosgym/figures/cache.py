@@ -12,7 +12,7 @@ from chaosgym.figures.computations import Computation, Data
 from chaosgym.files import write_atomically
 from chaosgym.version import __version__
 
-SOURCES = digest((*DECISIVE_SOURCES, "design/peak_impacts.py", "figures/computations.py"))
+SOURCES = digest((*DECISIVE_SOURCES, "atlas", "design/peak_impacts.py", "figures/computations.py", "figures/scored.py"))
 """Digest of the sources that decide a result."""
 
 

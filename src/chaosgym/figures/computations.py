@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.atlas.beam_runs import follow_modes
-from chaosgym.atlas.observation import READING_ERROR, THOROUGH, plotted_peaks, read_dots
+from chaosgym.atlas.observation import READING_ERROR, THOROUGH, observe, plotted_peaks, read_dots
 from chaosgym.design.peak_impacts import peak_impacts, worn_side
 from chaosgym.diagnosis import response_map, two_step_test
 from chaosgym.errors import SimulationError
 from chaosgym.machines import ImpactBeam, Machine
+from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import CycleRecord, parallel_map, simulate
 
 Array = NDArray[np.float64]
@@ -37,7 +38,7 @@ class History:
     """Time history of one machine.
 
     Gives ``time`` [s], ``displacement`` [m], ``velocity`` [m/s] and ``force`` [N] (upper side positive), (samples,), of
-    all cycles in a row; ``section`` (cycles, 2) [m, m/s]; ``bounce`` (cycles, 2): ``bounce_duration`` in half cycles.
+    all cycles in a row; ``section`` (cycles, 2) [m, m/s].
     """
 
     machine: Machine
@@ -58,7 +59,6 @@ def _history(record: CycleRecord) -> dict[str, NDArray[Any]]:
         "time": record.time,
         **dict(zip(("displacement", "velocity", "force"), map(np.ascontiguousarray, columns), strict=True)),
         "section": np.column_stack([record.displacement, record.velocity]),
-        "bounce": record.bounce_duration / (0.5 * record.machine.cycle_period),
     }
 
 
@@ -130,7 +130,8 @@ class Runs:
 class Types:
     """Natures and types over speed and clearance.
 
-    Gives ``speed`` (m,) in the machine's unit, ``clearance`` (n,) [m], ``nature`` and ``type`` (m, n).
+    Gives ``speed`` (m,) in the machine's unit, ``clearance`` (n,) [m], ``nature`` and ``type`` (m, n): natures as the
+    scorecard reads them, types by the diagnosis of each point and its neighbourhood.
     """
 
     machine: Machine
@@ -145,7 +146,15 @@ class Types:
             self.machine, self.speeds, self.clearances, budget=self.budget, sensor_error=self.reading_error,
             workers=workers,
         )  # fmt: skip
-        return {"speed": found.speed, "clearance": found.clearance, "nature": found.nature, "type": found.type}
+        speed, clearance = self.machine.speed_field, self.machine.clearance_field
+        machines = [
+            with_settings(self.machine, {speed: float(at), clearance: float(gap)})
+            for at in found.speed for gap in found.clearance
+        ]  # fmt: skip
+        effort = THOROUGH[self.machine.name]
+        seen = parallel_map(lambda machine: observe(machine, effort).nature, machines, workers=workers)
+        nature = np.array(seen).reshape(found.nature.shape)
+        return {"speed": found.speed, "clearance": found.clearance, "nature": nature, "type": found.type}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from chaosgym.atlas.observation import THOROUGH
 from chaosgym.figures.computations import Runs
 from chaosgym.figures.panels import ParameterAxis
 from chaosgym.machines import THESIS_SLIDER_CRANK, SliderCrank
@@ -17,8 +18,8 @@ SMALL, MIDDLE, WIDE, LARGE = 0.03175e-3, 0.0635e-3, 0.127e-3, 0.254e-3
 LOW_DAMPING, HIGH_DAMPING = 0.025, 0.05
 """Contact damping ratios (4.5.4)."""
 
-CYCLES, TRANSIENT = 50, 60
-"""Revolutions shown of each response (4.4.1), after those in which it settles."""
+TRANSIENT, CYCLES, _ = THOROUGH["slider-crank"]
+"""Revolutions in which a response settles, and those shown of it (4.4.1): as for the scorecard."""
 
 ROD_LENGTH = ParameterAxis("rod_length", "connecting rod length [m]", 1.0, "m")
 

@@ -1,7 +1,6 @@
 """How does the slider's peak force depend on the machine? Figures 4.13, 4.14, 4.16 and 4.17."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from chaosgym.figures.figure import Finding, Parts, ThesisFigure, steps
 from chaosgym.figures.flips import flips
 from chaosgym.figures.panels import CRANK_SPEED, Mark, force_diagram, response_at
 from chaosgym.figures.printed import printed
+from chaosgym.figures.scored import agrees, scored, scored_finding
 from chaosgym.machines import SliderCrank
 
 LOOSE = slider(SMALL, contact_damping_ratio=LOW_DAMPING)
@@ -36,14 +36,15 @@ def chaotic_share(data: Data, low: float, high: float) -> tuple[int, int]:
 def chaotic_band(parts: Parts) -> Sequence[Finding]:
     """Is the response chaotic from 110 to 190 rpm?"""
     chaotic, total = chaotic_share(parts["slider"], *printed("SSC-042"))
-    return [Finding("chaotic from 110 to 190 rpm", f"at {chaotic} of {total} speeds", chaotic == total, ("SSC-042",))]
+    more = f"chaotic at {chaotic} of the {total} printed speeds"
+    return [scored_finding(parts, "SSC-042", "chaotic from 110 to 190 rpm", more=more)]
 
 
 FORCE_AGAINST_SPEED = ThesisFigure(
     id="4.13",
     title="Peak impact force in the slider joint against crank speed: ±0.032 mm, contact damping 2.5 %",
     shows="Chaotic from 110 to 190 rpm and at other speeds, periodic at 100 and 200 rpm.",
-    parts=partial(over_speed, slider=LOOSE),
+    parts=lambda resolution: {**over_speed(resolution, slider=LOOSE), **scored("SSC-042")},
     panels=(
         force_diagram("", "slider", CRANK_SPEED,
                       marks=(Mark(100.0, "SSC-043", "periodic", "none", "speed"),
@@ -66,16 +67,18 @@ def no_chaos(parts: Parts) -> Sequence[Finding]:
     after, _ = chaotic_share(stiff, 100.0, 300.0)
     wild, wild_total = chaotic_share(parts["b"], 100.0, 300.0)
     return [
+        scored_finding(parts, "SSC-049", "±0.032 mm: Type I, a smooth rise, to 180 rpm", sensitivity="speed"),
+        scored_finding(parts, "SSC-055", "±0.254 mm: Type III, chaotic, from 100 rpm on", sensitivity="speed"),
         Finding(
             "±0.032 mm: chaos at 2.5 % contact damping, none at 5 %",
             f"chaotic at {before} of {total} speeds at 2.5 %, at {after} at 5 %; mean range {spread_of(loose):.2g} N "
             f"and {spread_of(stiff):.2g} N",
-            before > 0 and after == 0, ("SSC-066", "SSC-067"), "contact damping",
+            agrees(parts, "SSC-066", "SSC-067"), ("SSC-066", "SSC-067"), "contact damping",
         ),
         Finding(
             "5 % contact damping: no chaos at ±0.032 mm, chaos at ±0.254 mm",
             f"chaotic at {after} of {total} speeds at ±0.032 mm, at {wild} of {wild_total} at ±0.254 mm",
-            after == 0 and wild > 0, ("SSC-067", "SSC-055"), "clearance",
+            agrees(parts, "SSC-067", "SSC-055"), ("SSC-067", "SSC-055"), "clearance",
         ),
     ]  # fmt: skip
 
@@ -84,7 +87,10 @@ FORCE_FOR_CLEARANCES = ThesisFigure(
     id="4.14",
     title="Peak impact force in the slider joint for two clearances, contact damping 5 %",
     shows="Type I to 180 rpm and Type II above at the small clearance, Type III at the large one.",
-    parts=partial(over_speed, a=STIFF, b=WIDE_OPEN, loose=LOOSE),
+    parts=lambda resolution: {
+        **over_speed(resolution, a=STIFF, b=WIDE_OPEN, loose=LOOSE),
+        **scored("SSC-049", "SSC-055", "SSC-066", "SSC-067"),
+    },
     panels=(
         force_diagram("(a) ±0.032 mm clearance (dimensionless 0.002)", "a", CRANK_SPEED,
                       marks=(Mark(270.0, "SSC-051", "periodic", sensitivity="speed"),

@@ -1,12 +1,11 @@
 """How does the slider crank's contact force run over a revolution? Figures 4.7, 4.10 to 4.12 and 4.25."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from chaosgym.atlas.crank_runs import revolution_angles
+from chaosgym.atlas.crank_runs import ANGLE_CYCLES, ANGLE_SAMPLES
 from chaosgym.figures.computations import Computation, History
 from chaosgym.figures.crank import LOW_DAMPING, MIDDLE, SMALL, TRANSIENT, WIDE, ball, runs, slider
 from chaosgym.figures.figure import Finding, Parts, ThesisFigure
@@ -18,7 +17,8 @@ from chaosgym.figures.panels import (
     phase_panel,
     section_panel,
 )
-from chaosgym.figures.printed import printed, within
+from chaosgym.figures.printed import printed
+from chaosgym.figures.scored import scored, scored_finding
 from chaosgym.machines import SliderCrank
 from chaosgym.machines.slider_crank import frequencies_at
 from chaosgym.plotting import thesis
@@ -29,30 +29,17 @@ SLIDER = slider(SMALL, crank_speed=230.0, contact_damping_ratio=LOW_DAMPING)
 THIN_ROD = ball(WIDE, "instrumented", crank_speed=200.0, rod_diameter=3.175e-3)
 
 
-def revolution(machine: SliderCrank, resolution: float) -> Mapping[str, Computation]:
-    """One settled revolution."""
-    return {"force": History(machine=machine, cycles=1, transient=TRANSIENT, samples=3600)}
-
-
-def angle_finding(text: str, target: str, *here: float | None) -> Finding:
-    """Compare one or two crank angles [deg] with the print."""
-    known = [angle for angle in here if angle is not None]
-    if len(known) < len(here):
-        return Finding(text, "contact is never lost", False, (target,))
-    value = known[0] if len(known) == 1 else (known[0], known[1])
-    return Finding(text, " to ".join(f"{angle:.0f}" for angle in known) + " deg", within(target, value), (target,))
+def revolutions(machine: SliderCrank, *targets: str) -> Mapping[str, Computation]:
+    """Settled revolutions, and statements about their crank angles."""
+    force = History(machine=machine, cycles=ANGLE_CYCLES, transient=TRANSIENT, samples=ANGLE_SAMPLES)
+    return {"force": force, **scored(*targets)}
 
 
 def ball_angles(parts: Parts) -> Sequence[Finding]:
     """Where is contact lost, resumed, and kept for good?"""
-    found = revolution_angles(np.abs(parts["force"]["force"]))
     return [
-        angle_finding(
-            f"no contact from {words(printed('SSC-025'))} deg", "SSC-025", found["loss"], found["resumption"]
-        ),
-        angle_finding(
-            f"bouncing from {words(printed('SSC-026'))} deg", "SSC-026", found["resumption"], found["settled"]
-        ),
+        scored_finding(parts, "SSC-025", f"no contact from {words(printed('SSC-025'))} deg"),
+        scored_finding(parts, "SSC-026", f"bouncing from {words(printed('SSC-026'))} deg"),
     ]
 
 
@@ -67,7 +54,7 @@ BALL_FORCE = ThesisFigure(
     id="4.7",
     title="Contact force in the ball joint, spherical clearance: ±0.0635 mm, 120 rpm",
     shows="Contact to 70 deg, none to 95 deg, then an impact and bouncing until 130 deg.",
-    parts=partial(revolution, SPHERICAL),
+    parts=lambda resolution: revolutions(SPHERICAL, "SSC-025", "SSC-026"),
     panels=(angle_panel("dotted: bouncing from 95 to 130 deg, printed", "force", "contact force [N]",
                         sign=False, extra=ball_spans),),
     compare=ball_angles,
@@ -77,15 +64,12 @@ BALL_FORCE = ThesisFigure(
 def impulse_angles(parts: Parts) -> Sequence[Finding]:
     """Where do the largest forces of both half revolutions stand, and is contact ever lost?"""
     force = np.abs(parts["force"]["force"])
-    angles = revolution_angles(force)
     first, second = printed("SSC-037")
-    impulses = angles["impulse_down"], angles["impulse_up"]
     lost = float(np.mean(force == 0.0))
     return [
-        angle_finding(f"impulses at {first:g} and {second:g} deg", "SSC-037", *impulses),
-        Finding("no contact loss before the impulses", f"no contact in {lost:.1%} of the revolution", lost < 0.01,
-                ("SSC-037",)),
-    ]  # fmt: skip
+        scored_finding(parts, "SSC-037", f"impulses at {first:g} and {second:g} deg"),
+        Finding("no contact loss before the impulses", f"no contact in {lost:.1%} of the revolution", lost < 0.01),
+    ]
 
 
 def impulse_lines(ax: Axes) -> None:
@@ -98,7 +82,7 @@ INSTRUMENTED_FORCE = ThesisFigure(
     id="4.10",
     title="Contact force in the instrumented ball joint: ±0.127 mm, 100 rpm",
     shows="Two large impulses, at 100 and at 300 deg, without a loss of contact before them.",
-    parts=partial(revolution, INSTRUMENTED),
+    parts=lambda resolution: revolutions(INSTRUMENTED, "SSC-037"),
     panels=(angle_panel("", "force", "contact force [N]", sign=False, extra=impulse_lines),),
     compare=impulse_angles,
 )
@@ -106,11 +90,10 @@ INSTRUMENTED_FORCE = ThesisFigure(
 
 def slider_angles(parts: Parts) -> Sequence[Finding]:
     """Where is contact lost, and where does the large impact stand?"""
-    found = revolution_angles(np.abs(parts["force"]["force"]))
     loss, impact = printed("SSC-038").low, printed("SSC-039").low
     return [
-        angle_finding(f"contact lost at {loss:g} deg", "SSC-038", found["loss"]),
-        angle_finding(f"large impact at {impact:g} deg", "SSC-039", found["impact"]),
+        scored_finding(parts, "SSC-038", f"contact lost at {loss:g} deg"),
+        scored_finding(parts, "SSC-039", f"large impact at {impact:g} deg"),
     ]
 
 
@@ -124,7 +107,7 @@ SLIDER_FORCE = ThesisFigure(
     id="4.11",
     title="Contact force in the slider joint: ±0.032 mm, 230 rpm",
     shows="Contact lost at 55 deg and resumed at 75 deg with a large impact; upper surface positive, lower negative.",
-    parts=partial(revolution, SLIDER),
+    parts=lambda resolution: revolutions(SLIDER, "SSC-038", "SSC-039"),
     panels=(angle_panel("", "force", "contact force [N]", sign=True, extra=slider_lines),),
     compare=slider_angles,
 )
@@ -135,7 +118,7 @@ def slider_response(resolution: float) -> Mapping[str, Computation]:
     return {
         "history": History(machine=SLIDER, cycles=6, transient=TRANSIENT, samples=2000),
         "section": History(machine=SLIDER, cycles=round(1000 * resolution), transient=TRANSIENT, samples=1),
-        "response": runs([SLIDER], cycles=200),
+        "response": runs([SLIDER]),
     }
 
 
@@ -180,7 +163,7 @@ THIN_ROD_FORCE = ThesisFigure(
     id="4.25",
     title="Contact force in the instrumented ball joint, rod of 3.18 mm: ±0.127 mm, 200 rpm",
     shows="Measured and numerical contact force; the numerical ripples are faster than the measured ones.",
-    parts=partial(revolution, THIN_ROD),
+    parts=lambda resolution: revolutions(THIN_ROD),
     panels=(angle_panel("(b) numerical result", "force", "contact force [N]", sign=False),),
     compare=thin_rod,
     remark="the numerical half; the measured record is not in print",

@@ -2,17 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from chaosgym.atlas.observation import READING_ERROR
+from chaosgym.atlas.crank_quantities import AGREEMENT, UPDATED_CYCLES
 from chaosgym.figures.computations import Computation, Runs
 from chaosgym.figures.crank import HIGH_DAMPING, LARGE, SMALL, TRANSIENT, slider
 from chaosgym.figures.figure import Finding, Panel, Parts, ThesisFigure
 from chaosgym.figures.panels import cycles_panel
 from chaosgym.figures.printed import printed
+from chaosgym.figures.scored import scored, scored_finding
 from chaosgym.machines import SliderCrank
 from chaosgym.plotting import thesis
 
@@ -40,25 +40,18 @@ def pair(first: float, second: float) -> list[tuple[str, int, str]]:
 
 def converging(parts: Parts) -> Sequence[Finding]:
     """After how many cycles does each run stay where it ends, and do they end together?"""
-    one, other = parts["runs"]["peaks"]
-    unsteady = [np.flatnonzero(np.abs(peaks - peaks[-1]) > READING_ERROR) for peaks in (one, other)]
-    settled = max(int(cycles[-1]) + 1 if len(cycles) else 0 for cycles in unsteady)
-    apart = abs(float(one[-1] - other[-1]))
     wanted = printed("SSC-111").low
-    return [
-        Finding(
-            f"runs with 5 and 10 deg agree after a transient of about {wanted:g} cycles",
-            f"steady after {settled} cycles, {apart:.2g} N apart at the end",
-            settled <= 2 * wanted and apart <= 3.0, ("SSC-111",),
-        )
-    ]  # fmt: skip
+    return [scored_finding(parts, "SSC-111", f"runs with 5 and 10 deg agree after a transient of {wanted:g} cycles")]
 
 
 PERIODIC_TEST = ThesisFigure(
     id="5.1",
     title="Matrix Update Test of a periodic response: ±0.032 mm, 270 rpm",
     shows="Peak force of every cycle for updates every 5 and 10 deg: after 6 cycles both agree.",
-    parts=partial(updated, CALM, (5.0, 10.0), 35, 0),
+    parts=lambda resolution: {
+        **updated(CALM, (5.0, 10.0), UPDATED_CYCLES, 0, resolution),
+        **scored("SSC-111"),
+    },
     panels=(
         cycles_panel("(a) 35 cycles", pair(5.0, 10.0), cycles=(0, 36)),
         cycles_panel("(b) the first ten", pair(5.0, 10.0), cycles=(0, 11)),
@@ -77,12 +70,12 @@ def parting(parts: Parts) -> Sequence[Finding]:
     """Do the runs part, and how far are they at cycle 62?"""
     one, other = parts["runs"]["peaks"]
     apart = np.abs(one - other)
-    first = np.flatnonzero(apart > 3.0)
+    first = np.flatnonzero(apart > AGREEMENT)
     when = f"first more than 3 N apart in cycle {first[0] + 1}" if len(first) else "never more than 3 N apart"
     wanted = [printed(target).low for target in ("SSC-113", "SSC-114")]
     here = (float(one[61]), float(other[61]))
     return [
-        Finding("runs with 5 and 6 deg part", f"{when}, at most {apart.max():.3g} N", bool(len(first)), ("SSC-112",)),
+        scored_finding(parts, "SSC-112", "runs with 5 and 6 deg part", more=f"{when}, at most {apart.max():.3g} N"),
         Finding(
             f"cycle 62: {wanted[0]:g} N with 5 deg, {wanted[1]:g} N with 6 deg", f"{here[0]:.3g} N and {here[1]:.3g} N",
             None, ("SSC-113", "SSC-114"),
@@ -94,7 +87,7 @@ CHAOTIC_TEST = ThesisFigure(
     id="5.2",
     title="Matrix Update Test of a chaotic response: ±0.254 mm, 190 rpm",
     shows="Peak force of every cycle for updates every 5 and 6 deg: they part; 85 and 105 N in cycle 62.",
-    parts=partial(updated, WILD, (5.0, 6.0), 100, 0),
+    parts=lambda resolution: {**updated(WILD, (5.0, 6.0), 100, 0, resolution), **scored("SSC-112")},
     panels=(
         cycles_panel("(a) 100 cycles", pair(5.0, 6.0), cycles=(0, 101)),
         cycles_panel("(b) ten of them", pair(5.0, 6.0), cycles=(56, 68), extra=printed_cycle),

@@ -28,8 +28,9 @@ compared with the machine here. Written by
 
 which draws every figure (`chaosgym figures --list` names them) and keeps what it computed in `FOLDER/results`. Numbers
 agree within the tolerances of the [scorecard](scorecard.md): a force within 15 % or 3 N, a range if both its ends do, a
-nature if it is the same word. Forces and natures are those of the plotted dots, one a cycle: of the beam on one side of
-the bearing, of the crank the larger of both sides. Dots within 0.5 N are one, as for the scorecard.
+nature if it is the same word. What the scorecard judges is judged by the same runs here, those of the thesis' machine.
+Forces and natures are those of the plotted dots, one a cycle: of the beam on one side of the bearing, of the crank the
+larger of both sides. Dots within 0.5 N are one, as for the scorecard.
 """
 
 

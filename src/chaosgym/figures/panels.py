@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from chaosgym.atlas.crank_runs import ANGLE_CYCLES, revolution_angles
 from chaosgym.design.peak_impacts import PeakImpactDiagram
 from chaosgym.design.statistics import histogram
 from chaosgym.diagnosis import power_spectrum
@@ -179,10 +180,15 @@ def spectrum_panel(title: str, part: str, frequency: float, highest: float) -> P
 
 
 def angle_panel(title: str, part: str, label: str, *, sign: bool, extra: Any = None) -> Panel:
-    """Contact force over one revolution against the crank angle; ``sign`` tells upper from lower surface."""
+    """Contact force over a revolution against the crank angle: the first one with a gap, if there is one.
+
+    ``sign`` tells upper from lower surface.
+    """
 
     def paint(parts: Parts, ax: Axes) -> None:
-        force = parts[part]["force"]
+        several = parts[part]["force"].reshape(ANGLE_CYCLES, -1)
+        gaps = [revolution_angles(np.abs(one))["loss"] is not None for one in several]
+        force = several[int(np.argmax(gaps))]
         thesis.curve(np.arange(len(force)) * (360.0 / len(force)), force if sign else np.abs(force), ax)
         if extra is not None:
             extra(ax)

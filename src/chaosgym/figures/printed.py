@@ -34,9 +34,14 @@ def _comparisons() -> dict[str, Comparison]:
     return {one.id: one for one in read_comparisons().compared}
 
 
+def comparison(target: str) -> Comparison:
+    """How the scorecard compares a statement."""
+    return _comparisons()[target]
+
+
 def within(target: str, here: float | tuple[float, float] | None) -> bool:
     """Whether a value here, or both ends of a range, agrees with the statement: a hit of the scorecard."""
-    return error_of(_comparisons()[target], atlas.Finding(here)) <= 1.0
+    return error_of(comparison(target), atlas.Finding(here)) <= 1.0
 
 
 def contradiction(targets: tuple[str, ...]) -> str:
