@@ -7,7 +7,7 @@ import numpy as np
 import scipy.signal
 from numpy.typing import NDArray
 
-from chaosgym.atlas.observation import READING_ERROR, plotted_peaks
+from chaosgym.atlas.observation import DOT, READING_ERROR, plotted_peaks
 from chaosgym.diagnosis import two_step_test
 from chaosgym.diagnosis.stroboscopic import find_recurrence, scales
 from chaosgym.machines import ImpactBeam, Machine
@@ -35,7 +35,7 @@ def long_run(machine: Machine, cycles: int) -> dict[str, Any]:
     found = find_recurrence(tail / scale, READING_ERROR / scale)
     if found.period is None:
         return {"irregular_cycles": cycles, "period": None, "nature": nature}
-    off = np.max(np.abs(peaks[: -found.period] - peaks[found.period :]), axis=1) > 2.0 * READING_ERROR
+    off = np.max(np.abs(peaks[: -found.period] - peaks[found.period :]), axis=1) > DOT
     last = np.flatnonzero(off)
     irregular = int(last[-1]) + 1 if len(last) else 0
     return {"irregular_cycles": irregular, "period": found.period, "nature": nature}

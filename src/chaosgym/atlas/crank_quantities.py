@@ -7,7 +7,7 @@ import numpy as np
 from chaosgym.atlas import crank_runs
 from chaosgym.atlas.findings import Finding, Quantity, Results, Value, no_jobs
 from chaosgym.atlas.jobs import Job
-from chaosgym.atlas.observation import READING_ERROR, Effort
+from chaosgym.atlas.observation import DOT, Effort
 from chaosgym.machines import Machine, SliderCrank
 from chaosgym.machines.parameters import with_settings
 from chaosgym.machines.slider_crank import frequencies_at
@@ -85,7 +85,7 @@ def _update_transient(machine: Machine, comparison: Comparison, results: Results
     """Cycles until both runs stay within the reading error of where they end; they must end together."""
     runs = [np.array(results[0][name]) for name in ("first", "second")]
     apart = abs(runs[0][-1] - runs[1][-1])
-    unsettled = [np.flatnonzero(np.abs(run - run[-1]) > 2.0 * READING_ERROR) for run in runs]
+    unsettled = [np.flatnonzero(np.abs(run - run[-1]) > DOT) for run in runs]
     cycles = max(int(one[-1]) + 1 if len(one) else 0 for one in unsettled)
     return Finding(float(max(cycles, 1)), bool(apart <= AGREEMENT), f"end {apart:.2g} N apart")
 

@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 READING_ERROR = 0.5
 """Half the width of a dot [N]: half a per cent of a force axis of 100 N."""
 
+DOT = 2.0 * READING_ERROR
+"""Width of a dot [N]."""
+
 
 class Effort(NamedTuple):
     """How long a run is: cycles skipped, cycles recorded, and the budget of the diagnosis (0: Two-Step Test alone)."""
@@ -98,12 +101,17 @@ def plotted_peaks(record: CycleRecord) -> Array:
 def read_dots(machine: Machine, peaks: Array, budget: int) -> Diagnosis:
     """Judge the plotted peaks (cycles,) [N] of a machine; dots that do not repeat by a diagnosis of ``budget`` cycles.
 
-    With a budget of 0 all of them are chaos (3.5.1).
+    With a budget of 0 all of them are chaos (3.5.1). Chaotic dots stay so if the machine turns periodic after the
+    plotted cycles: that is transient chaos, which counts as chaotic (5.2.3).
     """
     read = two_step_test(peaks, sensor_error=READING_ERROR)
     if read.nature == "periodic":
         return read
-    return diagnose(machine, budget=budget, sensor_error=READING_ERROR) if budget else replace(read, nature="chaotic")
+    if not budget:
+        return replace(read, nature="chaotic")
+    found = diagnose(machine, budget=budget, sensor_error=READING_ERROR)
+    later = found.period is not None and np.any(np.abs(peaks[found.period :] - peaks[: -found.period]) > DOT)
+    return read if later and read.nature == "chaotic" else found
 
 
 def observe(machine: Machine, effort: Effort) -> Observation:
