@@ -59,6 +59,40 @@ def test_a_figure_says_of_a_statement_what_the_scorecard_says(number, tmp_path):
     assert [finding.here.split(";")[0] for finding in one.findings] == [found.shown_value for found in judged]
 
 
+@pytest.mark.parametrize(
+    ("number", "label"),
+    [("5.1", "both agree, printed"), ("5.6", "bouncing, printed"), ("5.10", "spread of 30 deg, printed"),
+     ("5.11", "spread of 6 mm, printed"), ("4.17", "periodic, printed"), ("3.13", "no chaos, printed")],
+)  # fmt: skip
+def test_what_the_text_prints_is_drawn_over_the_figure(number, label):
+    """Cycles, durations, spreads and natures stand on the axes beside what is found here."""
+    drawn = FIGURES[number].draw(made_up_parts(number))
+    shown = [word for ax in drawn.axes for artist in ax.get_children() for word in words_of(artist)]
+    assert label in shown
+
+
+def words_of(artist):
+    """What an artist of a figure says: its label and its text."""
+    return [str(artist.get_label()), artist.get_text() if hasattr(artist, "get_text") else ""]
+
+
+def made_up_parts(number):
+    """A few points for each part of a figure, in place of a simulation."""
+    values = np.array([0.01, 0.08])
+    runs = {
+        "damping_ratio": values, "crank_speed": np.array([100.0, 300.0]), "peaks": np.full((2, 20), 40.0),
+        "nature": np.array(["periodic"] * 2), "period": np.ones(2, dtype=int),
+    }  # fmt: skip
+    force = np.tile([1.0, 0.0, -1.0, 0.0], 4)
+    history = {"time": np.linspace(0.0, 0.2, len(force)), "force": force}
+    impacts = {"location": np.array([0.0, 1e-3]), "force": np.ones(2)}
+    cloud = {unit: {**impacts, "unit": np.array(unit)} for unit in ("m", "deg")}
+    return {
+        "5.1": {"runs": runs}, "5.6": {"a": history, "b": history}, "5.10": {"a": cloud["deg"], "b": cloud["deg"]},
+        "5.11": {"cloud": cloud["m"]}, "4.17": {"without": runs, "with": runs}, "3.13": {"dampings": runs},
+    }[number]  # fmt: skip
+
+
 def test_pictures_are_replaced_only_on_request(tmp_path):
     """A picture that exists stops everything before any computing, unless it may be replaced; results are read back."""
     figures = chosen(["3.13"])

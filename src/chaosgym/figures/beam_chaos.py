@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from chaosgym.design.statistics import histogram
 from chaosgym.figures.beam import BEAM, DAMPING, LARGE, SMALL, TRANSIENT, runs, sweep
@@ -15,6 +17,8 @@ from chaosgym.figures.printed import printed
 from chaosgym.figures.scored import agrees, scored, scored_finding
 from chaosgym.plotting import thesis
 from chaosgym.plotting.design import ACCENT, NATURE_COLOURS
+
+Array = NDArray[np.float64]
 
 BRIEF_DAMPING, ENDLESS_DAMPING = 0.011, 0.010
 """Structural damping ratios of figure 5.4 (a) and (b)."""
@@ -114,6 +118,20 @@ def bouncing(resolution: float) -> Mapping[str, Computation]:
     } | dict(scored("IBS-074", "IBS-075"))  # fmt: skip
 
 
+def first_touches(data: Data) -> Array:
+    """Instants [s] at which the upper surface is touched first after the lower one."""
+    struck = np.flatnonzero(data["force"])
+    side = np.sign(data["force"][struck])
+    return np.asarray(data["time"][struck[1:][(side[1:] > 0.0) & (side[:-1] < 0.0)]])
+
+
+def bouncing_spans(data: Data, ax: Axes, *, frequency: float, target: str) -> None:
+    """Printed duration of bouncing from the first touch on, a share of the half cycle."""
+    lasting = printed(target).low * 0.5 / frequency
+    for k, start in enumerate(first_touches(data)):
+        thesis.printed_span(start, start + lasting, ax, None if k else "bouncing, printed")
+
+
 def bouncing_share(parts: Parts) -> Sequence[Finding]:
     """How long does bouncing last, in half cycles?"""
     wanted = printed("IBS-074").low
@@ -130,8 +148,14 @@ BOUNCING = ThesisFigure(
     shows="Bouncing lasts a seventh of each half cycle in a periodic response, up to its end in a chaotic one.",
     parts=bouncing,
     panels=(
-        force_panel("(a) ±0.03 mm clearance, 18 Hz", "a"),
-        force_panel("(b) ±0.127 mm clearance, 30 Hz", "b"),
+        force_panel(
+            "(a) ±0.03 mm clearance, 18 Hz", "a", extra=partial(bouncing_spans, frequency=18.0, target="IBS-074")
+        ),
+        force_panel(
+            "(b) ±0.127 mm clearance, 30 Hz: in some cycles to the end of the half cycle",
+            "b",
+            extra=partial(bouncing_spans, frequency=30.0, target="IBS-075"),
+        ),
     ),
     compare=bouncing_share,
 )

@@ -17,6 +17,7 @@ from chaosgym.figures.panels import (
     force_diagram,
     response_at,
 )
+from chaosgym.figures.printed import printed
 from chaosgym.figures.scored import agrees, scored, scored_finding
 
 Array = NDArray[np.float64]
@@ -146,7 +147,7 @@ FORCE_AGAINST_DAMPING = ThesisFigure(
     title="Peak impact force against structural damping: 30 Hz, ±0.127 mm",
     shows="The variation of the peak force falls as the damping ratio grows from 1 to 8 %.",
     parts=damping_sweep,
-    panels=(force_diagram("", "dampings", DAMPING),),
+    panels=(force_diagram("", "dampings", DAMPING, natures=((printed("IBS-046").low, "no chaos"),)),),
     height=3.6,
     compare=damping_calms,
 )

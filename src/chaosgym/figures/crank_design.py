@@ -94,6 +94,10 @@ SLIDER_HISTOGRAM = ThesisFigure(
 )
 
 
+HALF_BEARING = 180.0
+"""Of the ball joint [deg]."""
+
+
 def ball_clouds(resolution: float) -> Mapping[str, Computation]:
     """Peak impacts in the ball joint."""
     machines = {"a": ball(MIDDLE, crank_speed=120.0), "b": ball(LARGE, crank_speed=110.0)}
@@ -119,8 +123,8 @@ BALL_CLOUDS = ThesisFigure(
     shows="Impacts spread over a sixth of half the bearing at ±0.064 mm, over almost all of it at ±0.245 mm.",
     parts=ball_clouds,
     panels=(
-        impact_panel("(a) ±0.064 mm, 120 rpm", "a"),
-        impact_panel("(b) ±0.254 mm, 110 rpm", "b"),
+        impact_panel("(a) ±0.064 mm, 120 rpm", "a", spread=HALF_BEARING * printed("SSC-122").low),
+        impact_panel("(b) ±0.254 mm, 110 rpm", "b", spread=HALF_BEARING * printed("SSC-123").low),
     ),
     compare=ball_spread,
     remark="(b) at ±0.254 mm: the printed 0.245 mm is not on the grid of the other clearances",
@@ -144,7 +148,7 @@ SLIDER_CLOUD = ThesisFigure(
     title="Peak Impact Diagram of the slider joint: ±0.127 mm, 190 rpm",
     shows="Impacts spread over 6 mm of the guide.",
     parts=slider_cloud,
-    panels=(impact_panel("", "cloud"),),
+    panels=(impact_panel("", "cloud", spread=printed("SSC-124").low),),
     compare=guide_spread,
 )
 

@@ -9,7 +9,7 @@ from chaosgym.figures.crank import HIGH_DAMPING, LARGE, LOW_DAMPING, ROD_LENGTH,
 from chaosgym.figures.figure import Finding, Parts, ThesisFigure, steps
 from chaosgym.figures.flips import flips
 from chaosgym.figures.panels import CRANK_SPEED, Mark, force_diagram, response_at
-from chaosgym.figures.printed import printed
+from chaosgym.figures.printed import comparison, printed
 from chaosgym.figures.scored import agrees, scored, scored_finding
 from chaosgym.machines import SliderCrank
 
@@ -142,16 +142,23 @@ FORCE_AGAINST_ROD = ThesisFigure(
 )  # fmt: skip
 
 
+FRICTION_SPEEDS = {"SSC-064": 230.0, "SSC-065": 260.0}
+"""Speeds [rpm] of the statements about friction."""
+
+
+def friction_natures(end: int) -> tuple[tuple[float, str], ...]:
+    """Printed natures, without friction (0) and with it (1)."""
+    return tuple((speed, str(comparison(name).printed).split(" to ")[end]) for name, speed in FRICTION_SPEEDS.items())
+
+
 def friction_flips(parts: Parts) -> Sequence[Finding]:
     """Does friction change the nature where printed, and where else?"""
     found = []
     pairs = zip(parts["without"]["crank_speed"], parts["without"]["nature"], parts["with"]["nature"], strict=True)
     changed = [f"{speed:g} rpm ({one} to {other})" for speed, one, other in pairs if one != other]
     elsewhere = ", ".join(changed[:8]) + (f" and {len(changed) - 8} more" if len(changed) > 8 else "")
-    for speed, wanted, target in (
-        (230.0, ("periodic", "chaotic"), "SSC-064"),
-        (260.0, ("chaotic", "periodic"), "SSC-065"),
-    ):
+    for target, speed in FRICTION_SPEEDS.items():
+        wanted = tuple(str(comparison(target).printed).split(" to "))
         natures = tuple(str(response_at(parts[name], CRANK_SPEED, speed)[1]) for name in ("without", "with"))
         found.append(
             Finding(
@@ -169,8 +176,8 @@ FORCE_WITH_FRICTION = ThesisFigure(
     shows="Friction of 0.1 turns 230 rpm from periodic to chaotic and 260 rpm from chaotic to periodic.",
     parts=lambda resolution: over_speed(resolution, **{"without": LOOSE, "with": RUBBING}),
     panels=(
-        force_diagram("(a) without friction", "without", CRANK_SPEED),
-        force_diagram("(b) with friction, coefficient 0.1", "with", CRANK_SPEED),
+        force_diagram("(a) without friction", "without", CRANK_SPEED, natures=friction_natures(0)),
+        force_diagram("(b) with friction, coefficient 0.1", "with", CRANK_SPEED, natures=friction_natures(1)),
     ),
     height=3.3,
     compare=friction_flips,

@@ -138,7 +138,7 @@ SLIDER_RESPONSE = ThesisFigure(
         motion_panel("(a) displacement of the slider", "history"),
         phase_panel("(b) phase plane of the slider", "history"),
         section_panel("(c) Poincaré map of the slider", "section"),
-        force_panel("(d) impact force on the upper surface", "history"),
+        force_panel("(d) impact force, either surface", "history", resultant=True),
     ),
     columns=2,
     compare=slider_nature,

@@ -38,6 +38,11 @@ def pair(first: float, second: float) -> list[tuple[str, int, str]]:
     return [("runs", 0, f"updated every {first:g} deg"), ("runs", 1, f"updated every {second:g} deg")]
 
 
+def agreement(parts: Parts, ax: Axes) -> None:
+    """Printed cycle after which both runs agree."""
+    thesis.printed_span(*printed("SSC-111"), ax, "both agree, printed")
+
+
 def converging(parts: Parts) -> Sequence[Finding]:
     """After how many cycles does each run stay where it ends, and do they end together?"""
     wanted = printed("SSC-111").low
@@ -53,8 +58,8 @@ PERIODIC_TEST = ThesisFigure(
         **scored("SSC-111"),
     },
     panels=(
-        cycles_panel("(a) 35 cycles", pair(5.0, 10.0), cycles=(0, 36)),
-        cycles_panel("(b) the first ten", pair(5.0, 10.0), cycles=(0, 11)),
+        cycles_panel("(a) 35 cycles", pair(5.0, 10.0), cycles=(0, 36), extra=agreement),
+        cycles_panel("(b) the first ten", pair(5.0, 10.0), cycles=(0, 11), extra=agreement),
     ),
     compare=converging,
 )

@@ -21,8 +21,8 @@ def verdict(finding: Finding) -> str:
 _OPENING = """# The simulated figures of the thesis, drawn again
 
 P. Gu, *Chaotic Vibration in Machine Systems and Its Implications for Design*, PhD thesis, MIT, 1994. The pixels of its
-figures are not available; axes and ranges follow the text, and everything that the text prints about a figure is
-compared with the machine here. Written by
+figures are not available; axes and ranges follow the text, and everything that the text prints about a figure is drawn
+over it in one colour and compared with the machine here. Written by
 
     chaosgym figures all --out FOLDER --gallery docs/figures.md
 

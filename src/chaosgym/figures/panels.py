@@ -77,6 +77,8 @@ class ForceDiagram:
     marks: tuple[Mark, ...] = ()
     bands: tuple[tuple[str, str], ...] = ()
     """Type and statement of each printed band."""
+    natures: tuple[tuple[float, str], ...] = ()
+    """Printed natures at values of the axis, besides those of the marks."""
     top: float | None = None
     """Upper end of the force axis [N]."""
     extra: Callable[[Parts, Axes], object] = field(default=lambda parts, ax: None)
@@ -88,6 +90,8 @@ class ForceDiagram:
         thesis.force_points(values, data["peaks"], data["nature"], ax)
         shown = [mark for mark in self.marks if mark.force != "none"]
         thesis.printed_forces([thesis.PrintedForce(mark.at, *printed(mark.target)) for mark in shown], ax)
+        told = [(mark.at, mark.nature or "") for mark in self.marks if mark.force == "none"]
+        thesis.printed_natures([*told, *self.natures], ax)
         thesis.type_bands([thesis.TypeBand(kind, *printed(target)) for kind, target in self.bands], ax)
         ax.set_xlabel(self.axis.label)
         self.extra(parts, ax)
@@ -136,11 +140,20 @@ def one_sided_force(data: Data) -> Array:
     return np.maximum(data["force"], 0.0)
 
 
-def force_panel(title: str, part: str, *, levels: str | None = None) -> Panel:
-    """Contact force on one side against time; ``levels`` is a statement with the printed range of its peaks."""
+def force_panel(
+    title: str, part: str, *, levels: str | None = None, resultant: bool = False, extra: Any = None
+) -> Panel:
+    """Contact force on one side, or the ``resultant`` of both, against time.
+
+    ``levels`` is a statement with the printed range of its peaks; ``extra`` draws what else is printed.
+    """
 
     def paint(parts: Parts, ax: Axes) -> None:
-        thesis.curve(parts[part]["time"], one_sided_force(parts[part]), ax)
+        force = np.abs(parts[part]["force"]) if resultant else one_sided_force(parts[part])
+        thesis.curve(parts[part]["time"], force, ax)
+        if extra is not None:
+            extra(parts[part], ax)
+            thesis.legend(ax, "upper right")
         if levels is not None:
             thesis.printed_level(*printed(levels), ax, "range of the peaks, printed")
             ax.set_ylim(0.0, 1.25 * max(printed(levels).high, float(np.max(parts[part]["force"]))))
@@ -208,15 +221,16 @@ def cycles_panel(
     joined: bool = True,
     extra: Any = None,
 ) -> Panel:
-    """Peak force of every cycle from rest; ``series`` holds part, row and label of each run."""
+    """Peak force of every cycle from rest; ``series`` holds part, row and label of each run, the last one thinnest."""
 
     def paint(parts: Parts, ax: Axes) -> None:
-        for (part, row, label), colour in zip(series, (ACCENT, BAD), strict=False):
+        widths = (3.0, 1.0) if len(series) > 1 else (1.0,)
+        for (part, row, label), colour, width in zip(series, (ACCENT, BAD), widths, strict=False):
             peaks = parts[part]["peaks"][row]
             number = np.arange(1, len(peaks) + 1)
             style = "-o" if joined else "o"
-            ax.plot(number, peaks, style, ms=3.0 if joined else 1.8, lw=0.8, mew=0.0, color=colour, label=label,
-                    rasterized=not joined)  # fmt: skip
+            ax.plot(number, peaks, style, ms=2.0 + width if joined else 1.8, lw=0.8 * width, mew=0.0, color=colour,
+                    label=label, rasterized=not joined)  # fmt: skip
         ax.set(xlabel="cycle", ylabel="peak impact force [N]")
         if cycles is not None:
             ax.set_xlim(*cycles)
@@ -242,8 +256,11 @@ def histogram_panel(title: str, part: str, row: int, *, support: str | None = No
     return Panel(title, paint)
 
 
-def impact_panel(title: str, part: str, cycles: int | None = None) -> Panel:
-    """Peak Impact Diagram of the first ``cycles`` impacts; places count from the mean of all."""
+def impact_panel(title: str, part: str, cycles: int | None = None, *, spread: float | None = None) -> Panel:
+    """Peak Impact Diagram of the first ``cycles`` impacts; places count from the mean of all.
+
+    ``spread`` is the printed length of bearing over which they lie, in the shown unit (mm or deg).
+    """
 
     def paint(parts: Parts, ax: Axes) -> None:
         data = parts[part]
@@ -253,7 +270,13 @@ def impact_panel(title: str, part: str, cycles: int | None = None) -> Panel:
         shown = "mm" if unit == "m" else "deg"
         factor = 1e3 if unit == "m" else 1.0
         margin = 0.1 * factor * float(np.ptp(place)) + 0.5
-        ax.set_xlim(factor * float(np.min(place)) - margin, factor * float(np.max(place)) + margin)
+        half = 0.5 * (spread or 0.0)
+        ax.set_xlim(
+            min(factor * float(np.min(place)), -half) - margin, max(factor * float(np.max(place)), half) + margin
+        )
+        if spread is not None:
+            thesis.printed_span(-half, half, ax, f"spread of {spread:.3g} {shown}, printed")
+            thesis.legend(ax, "lower right")
         ax.set(xlabel=f"relative location of the peak impact [{shown}]", ylabel="peak impact force [N]")
         ax.set_ylim(0.0, 1.1 * float(np.max(data["force"])))
 

@@ -106,6 +106,17 @@ def printed_forces(marks: Sequence[PrintedForce], ax: Axes) -> Axes:
     return ax
 
 
+def printed_natures(marks: Sequence[tuple[float, str]], ax: Axes) -> Axes:
+    """Natures that the text prints: a word beside a dotted line at each value of the axis."""
+    for at, word in marks:
+        ax.axvline(at, ls=":", lw=1.1, **PRINTED)
+        ax.text(
+            at, 0.02, f"{word}, printed", rotation=90, ha="right", va="bottom", fontsize=7.0,
+            transform=ax.get_xaxis_transform(), **PRINTED,
+        )  # fmt: skip
+    return ax
+
+
 def type_bands(bands: Sequence[TypeBand], ax: Axes) -> Axes:
     """Printed ranges of the response types, as strips above the axes' frame."""
     for k, band in enumerate(bands):
