@@ -5,6 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from chaosgym.atlas.observation import THOROUGH
+from chaosgym.atlas.page import row
+from chaosgym.atlas.scorecard import evaluate
 from chaosgym.machines import MACHINES
 from chaosgym.machines.parameters import markdown_table
 from chaosgym.reference import read_comparisons
@@ -31,3 +34,25 @@ def test_scorecard_page_lists_every_statement():
         assert f"| {'fit' if one.part == 'calibration' else 'held out'} |" in row[0]
     for name, reason in out.items():
         assert f"| {name} | {reason} |" in page
+
+
+def test_scorecard_page_shows_what_the_machines_do():
+    """Rows of periodic responses and of the machines' own numbers, computed again, are those of the page."""
+    page = (DOCS / "scorecard.md").read_text().splitlines()
+    cheap = ("IBS-013", "IBS-016", "IBS-020", "IBS-025", "IBS-028", "IBS-034", "IBS-046",
+             "SSC-045", "SSC-051", "SSC-052", "SSC-053", "SSC-075", "SSC-111")  # fmt: skip
+    chosen = [one for one in read_comparisons().compared if one.id in cheap]
+    judged = evaluate(chosen, {name: make() for name, make in MACHINES.items()}, efforts=THOROUGH)
+    assert [row(one) for one in judged if row(one) not in page] == []
+
+
+def test_hits_are_those_of_the_rows():
+    """Totals of the page count its rows, and the README repeats them."""
+    page, readme = (DOCS / "scorecard.md").read_text(), (DOCS.parent / "README.md").read_text()
+    told = []
+    for name, letters in (("impact-beam", "IBS"), ("slider-crank", "SSC")):
+        verdicts = re.findall(rf"^\| {letters}-\d+ \|(?:[^|]*\|){{4}} (\S+) \| (?:fit|held out) \|", page, re.MULTILINE)
+        hits, counted = verdicts.count("hit"), len(verdicts) - verdicts.count("contradictory")
+        assert f"## {name}\n\nHits: {hits} of {counted} (" in page
+        told.append(f"{hits} of {counted}")
+    assert f"the beam hits {told[0]}, the crank {told[1]} (" in " ".join(readme.split())

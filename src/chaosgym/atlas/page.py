@@ -1,6 +1,7 @@
 """What does the scorecard look like in the documentation? One table a machine, misses shown like hits."""
 
 from chaosgym.atlas.scorecard import Scorecard
+from chaosgym.atlas.verdicts import Judged
 from chaosgym.reference import read_comparisons
 
 HEAD = """# Scorecard: the thesis and the machines here
@@ -31,17 +32,19 @@ def _section(card: Scorecard, machine: str) -> str:
         "| statement | figure | what | printed | here | verdict | part | found |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for one in card.judged:
-        comparison = one.comparison
-        if comparison.machine != machine:
-            continue
-        found = "; ".join(part for part in (comparison.contradictory, comparison.not_computed, one.notes) if part)
-        lines.append(
-            f"| {comparison.id} | {comparison.statement.figure} | {comparison.statement.quantity} "
-            f"| {one.shown_printed} | {one.shown_value} | {one.verdict} "
-            f"| {'fit' if comparison.part == 'calibration' else 'held out'} | {found} |"
-        )
+    lines += [row(one) for one in card.judged if one.comparison.machine == machine]
     return "\n".join(lines) + "\n"
+
+
+def row(one: Judged) -> str:
+    """Return one statement as a row of the table."""
+    comparison = one.comparison
+    found = "; ".join(part for part in (comparison.contradictory, comparison.not_computed, one.notes) if part)
+    return (
+        f"| {comparison.id} | {comparison.statement.figure} | {comparison.statement.quantity} "
+        f"| {one.shown_printed} | {one.shown_value} | {one.verdict} "
+        f"| {'fit' if comparison.part == 'calibration' else 'held out'} | {found} |"
+    )
 
 
 def _tolerances() -> str:
