@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from chaosgym.atlas.observation import THOROUGH
 from chaosgym.errors import SimulationError
 from chaosgym.figures import FIGURES, draw_figures
 from chaosgym.figures.beam import DAMPING
@@ -9,6 +10,7 @@ from chaosgym.figures.crank_maps import SLIDER_MAP
 from chaosgym.figures.crank_resonances import resonance
 from chaosgym.figures.flips import flips
 from chaosgym.figures.gallery import gallery, sensitivities
+from chaosgym.figures.printed import comparison
 from chaosgym.machines import THESIS_IMPACT_BEAM
 
 
@@ -68,6 +70,20 @@ def test_the_map_of_the_slider_is_calm_at_small_clearance():
     nature = dict(zip(zip(data["crank_speed"], data["slider_clearance"], strict=True), data["nature"], strict=True))
     assert {nature[speed, 0.03175e-3] for speed in (100.0, 150.0, 200.0)} == {"periodic"}
     assert "chaotic" in {nature[speed, 0.254e-3] for speed in (100.0, 150.0, 200.0)}
+
+
+@pytest.mark.parametrize(
+    ("number", "part", "target"),
+    [("3.8", "a", "IBS-021"), ("3.13", "dampings", "IBS-045"), ("4.8", "ball", "SSC-028"), ("4.9", "map", "SSC-033"),
+     ("4.13", "slider", "SSC-042"), ("4.14", "b", "SSC-055")],
+)  # fmt: skip
+def test_a_figure_draws_the_runs_that_its_statements_are_judged_by(number, part, target):
+    """Every point of the scorecard's grid is drawn, and its run is as long."""
+    drawn, judged = FIGURES[number].parts(1.0)[part], comparison(target)
+    assert (drawn.transient, drawn.cycles) == THOROUGH[judged.machine][:2]
+    for axis in (judged.along, judged.across):
+        values = [] if axis is None else [getattr(machine, axis.field) for machine in drawn.machines]
+        assert axis is None or all(np.isclose(values, wanted, rtol=1e-6).any() for wanted in axis.values)
 
 
 @pytest.mark.slow
