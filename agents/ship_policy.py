@@ -1,0 +1,105 @@
+"""Put the best policy of some runs into the package, with how it was trained, how it was judged, and a card.
+
+    python agents/ship_policy.py --evaluation runs/evaluation-beam --contender "PPO, belief" --runs "runs/ppo-belief-*"
+
+The best is the one whose periodic evaluation, on machines of the training pool, was best. No held-out machine has a
+say.
+"""
+
+import csv
+import json
+import shutil
+from dataclasses import dataclass
+from glob import glob
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import common
+from train_ppo import Arguments as Training
+
+from chaosgym.controllers.ladder import REFERENCE, SAFE_CONSTANT
+from chaosgym.policies.shipped import shipped_folder
+
+BESIDE = (SAFE_CONSTANT, "belief programming", REFERENCE)
+"""Contenders whose figures stand beside those of the policy."""
+
+CARD = Path(__file__).parent / "policy_card.md"
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Where the runs and their comparison are."""
+
+    evaluation: str = "runs/evaluation"
+    contender: str = "PPO"
+    runs: str = "runs/ppo-*"
+
+
+class Best(NamedTuple):
+    """The best run: its place among the runs, its folder, return of the evaluation, and steps before it."""
+
+    place: int
+    folder: Path
+    earned: float
+    steps: int
+
+
+def best_run(pattern: str) -> Best:
+    """Return the run with the best evaluation, of folders in the order of evaluate.py."""
+    folders = [Path(folder) for folder in sorted(glob(pattern)) if Path(folder).is_dir()]
+    if not folders:
+        raise SystemExit(f"--runs {pattern}: no folder matches")
+    found = [
+        Best(place, folder, float(row["return"]), int(row["step"]))
+        for place, folder in enumerate(folders)
+        for row in csv.DictReader((folder / "evaluations.csv").read_text().splitlines())
+    ]
+    return max(found, key=lambda one: one.earned)
+
+
+def described(config: dict[str, Any]) -> dict[str, Any]:
+    """Return the record of a run, with the command that repeats it and a folder that means something elsewhere."""
+    arguments = config["arguments"]
+    arguments["out"] = f"runs/{Path(arguments['out']).name}"
+    changed = {name: value for name, value in arguments.items() if value != getattr(Training(), name)}
+    options = " ".join(f"--{name.replace('_', '-')} {value}" for name, value in changed.items())
+    return config | {"command": f"python agents/train_ppo.py {options}"}
+
+
+def main() -> None:
+    """Choose, copy, describe."""
+    asked = common.parse(Arguments, __doc__)
+    best, evaluation = best_run(asked.runs), Path(asked.evaluation)
+    summaries = json.loads((evaluation / "report.json").read_text())["contenders"]
+    judged = json.loads((evaluation / "jobs" / f"{asked.contender}-{best.place}.json").read_text())
+    figures = {
+        name: {key: value for key, value in summaries[name].items() if key not in ("better_than", "profile")}
+        for name in (asked.contender, *BESIDE)
+    }
+    config = described(json.loads((best.folder / "config.json").read_text()))
+    own, jobs, arguments = figures.pop(asked.contender), judged["jobs"], config["arguments"]
+    score = own["score_by_seed"][best.place]
+    report = {
+        "setting": judged["setting"], "score": score, "mean_return": sum(job["job_return"] for job in jobs) / len(jobs),
+        "jobs": jobs, "all_seeds": own, **figures,
+    }  # fmt: skip
+    folder = shipped_folder(arguments["env"])
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in ("policy.json", "weights.npz"):
+        shutil.copyfile(best.folder / name, folder / name)
+    for name, content in (("config.json", config), ("evaluation.json", report)):
+        (folder / name).write_text(json.dumps(content, indent=1) + "\n")
+    card = CARD.read_text().format(
+        env=arguments["env"], steps=arguments["steps"], seeds=own["seeds"], jobs=arguments["jobs"], at=best.steps,
+        machines=len(jobs), pool=judged["setting"]["pool"], score=score,
+        type_iii=sum(job["type_iii_share"] for job in jobs) / len(jobs),
+        safe_iii=figures[SAFE_CONSTANT]["type_iii_share"], reference_iii=figures[REFERENCE]["type_iii_share"],
+        belief=figures["belief programming"]["score"],
+        all_seeds=", ".join(f"{value:.2f}" for value in own["score_by_seed"]),
+    )  # fmt: skip
+    (folder / "card.md").write_text(card)
+    print(f"{best.folder} is the policy of {arguments['env']}, in {folder}")
+
+
+if __name__ == "__main__":
+    main()
