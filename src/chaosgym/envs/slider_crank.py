@@ -110,6 +110,10 @@ class SliderCrankEnv(MachineEnv):
     chaos. `env.unwrapped.regimes` is the table of the machine at work, `nominal_regimes` that of the nominal one. On
     the nominal machine 39 % of the speeds are not periodic and 43 % count.
 
+    How far the table is right where agents go (`chaosgym regimes check chaosgym/SliderCrankTolerance-v0`): of 200 steps
+    of random jobs on held-out machines, diagnosed from rest at their own speeds within 3200 revolutions, 79 % agree; 38
+    counted though periodic, and 4 did not though chaotic. Half of these speeds lie between those of the table.
+
     `info["cost"]` is 1 in a step that counts as Type III (`cost_type_iii`), has a peak force above the force limit on
     either surface (`cost_force`, on the nominal machine from 250 rpm on) or fails, and 0 otherwise. `info` also holds
     `speed` [rpm], `damage`, `machine` (its number in the pool), `status` (0 running, 1 job done, 2 fracture,
