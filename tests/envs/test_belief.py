@@ -39,6 +39,15 @@ def test_the_machine_is_found_by_what_it_does(env):
     assert before.doubt[0] > 0.5 > after.doubt[0]
 
 
+def test_a_machine_that_is_known_leaves_no_doubt():
+    """On the nominal machine the belief holds that machine alone, whatever is felt."""
+    env = gym.make("chaosgym/ImpactBeam-v0").unwrapped
+    table = env.pool.regimes(0)[0]
+    plan = SpeedBelief(env.pool.possible, env.task).start(_felt(env.pool.sister("training").regimes(17)[0], 40))
+    assert plan.doubt[0] == 0.0
+    assert np.array_equal(plan.irregular[0, 60:] > 0.5, table.type_iii[60:])
+
+
 def test_an_excluded_machine_is_not_believed_in(env):
     """Without it, what its twin knows is not known, though everything felt is the same."""
     table = env.pool.regimes(17)[0]

@@ -20,7 +20,7 @@ class BeliefProgramming(Controller):
 
     def __init__(self, env: gym.Env[Any, Any]) -> None:
         super().__init__(env)
-        self._belief = SpeedBelief(self.env.pool.sister("training"), self.task)
+        self._belief = SpeedBelief(self.env.pool.possible, self.task)
         self._itself = self.env.pool.name == "training"
 
     def reset(self) -> None:

@@ -192,7 +192,7 @@ class SpeedBelief:
         place = self._forecast.place_of(observations[:, SPEED])
         near, inside = self._within_reach(place)
         best = np.where(inside, np.take_along_axis(worth, near, axis=1), -np.inf).argmax(axis=1)
-        doubt = entropy(weight, axis=1) / np.log(weight.shape[1])
+        doubt = entropy(weight, axis=1) / np.log(max(weight.shape[1], 2))
         return Plan(irregular, gathered, worth, place, place - self._forecast.moves + best, doubt)
 
     def _within_reach(self, place: Places) -> tuple[Places, NDArray[np.bool_]]:

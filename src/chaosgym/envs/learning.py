@@ -99,13 +99,13 @@ class BeliefMemory:
     space
         Of the observations, d numbers.
     pool
-        Of the jobs; its sister "training" is what they are believed to come from.
+        Of the jobs.
     task
         Of the jobs.
     """
 
     def __init__(self, space: Box, pool: Pool, task: Task) -> None:
-        self._belief = SpeedBelief(pool.sister("training"), task)
+        self._belief = SpeedBelief(pool.possible, task)
         low, high = self._belief.feature_bounds
         self.space = Box(
             np.concatenate([space.low, low]).astype(np.float32), np.concatenate([space.high, high]).astype(np.float32)

@@ -138,6 +138,11 @@ class Pool:
         return Pool(self.nominal, self.drive, self.tolerances, name, self.wears)
 
     @property
+    def possible(self) -> "Pool":
+        """Machines that an agent has to reckon with: those of the training pool, or the nominal one that it knows."""
+        return self if self.name == "nominal" else self.sister("training")
+
+    @property
     def wears(self) -> bool:
         """Whether clearances grow."""
         return len(self.levels) > 1
