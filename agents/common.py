@@ -181,6 +181,8 @@ class Watch(BaseCallback):
         self.best = max((float(row["return"]) for row in rows), default=-np.inf)
         self.bar = tqdm(total=self.run.arguments.steps, initial=begin, unit="step", desc=folder.name)
         self.last = begin
+        if begin == 0:
+            self._evaluate()
 
     def _on_rollout_start(self) -> None:
         if self.num_timesteps - self.last >= self.run.arguments.evaluate_every:

@@ -43,7 +43,7 @@ def test_a_run_leaves_a_policy_that_numpy_plays(script, tmp_path):
     config = json.loads((out / "config.json").read_text())
     assert config["arguments"]["seed"] == 3
     assert config["versions"]["stable_baselines3"]
-    assert [row["step"] for row in _rows(out / "evaluations.csv")] == ["400", "800"]
+    assert [row["step"] for row in _rows(out / "evaluations.csv")] == ["0", "400", "800"]
     assert all(float(row["return"]) < 0.0 for row in _rows(out / "progress.csv"))
     assert len(_rows(out / "progress.csv")) == 4
     policy = load_policy(out)
