@@ -2,9 +2,9 @@
 
     python agents/calibrate_belief.py --env chaosgym/SliderCrankTolerance-v0
 
-Jobs wander over the speeds of the table. Of each step the standard deviation of its measured peaks is known, whether the speed had
-just changed, and whether the table calls it Type III. The log odds of that, less those of all steps, rise with the
-scatter: they are fitted by isotonic regression and printed at the scatters that a belief interpolates between.
+Jobs wander over the speeds of the table. Of each step the standard deviation of its measured peaks is known, whether
+the speed had just changed, and whether the table calls it Type III. The log odds of that, less those of all steps, rise
+with the scatter: they are fitted by isotonic regression and printed at the scatters that a belief interpolates between.
 """
 
 from dataclasses import dataclass

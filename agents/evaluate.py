@@ -3,9 +3,9 @@
     python agents/evaluate.py --env chaosgym/ImpactBeamTolerance-v0 --out runs/evaluation-beam
     python agents/evaluate.py --env chaosgym/ImpactBeamTolerance-v0 --out runs/evaluation-beam --policy "PPO=runs/ppo-*"
 
-Every contender runs one job on each machine; a training seed of a policy counts as a run of its own. The folder keeps
-the jobs of each contender (a run that was stopped goes on, and a later one adds contenders), report.json, table.md
-and comparison.png.
+Every contender runs one job on each machine, or several on the only one; a training seed of a policy counts as a run of
+its own. The folder keeps the jobs of each contender (a run that was stopped goes on, and a later one adds contenders),
+report.json, table.md and comparison.png.
 """
 
 import argparse
@@ -27,6 +27,9 @@ from chaosgym.files import write_atomically
 FIRST_SEED = 10_000
 """Of the sensor errors; job i has this seed + i."""
 
+REPEATS = 16
+"""Jobs on a machine that is the only one; they differ by their sensor errors."""
+
 
 class Contender(NamedTuple):
     """Who runs: ``makes`` has an entry for each training seed."""
@@ -42,6 +45,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--env", default="chaosgym/ImpactBeamTolerance-v0", help="id of an environment")
     parser.add_argument("--pool", default="held-out", help="pool of machines; the nominal tasks have one machine")
     parser.add_argument("--machines", type=int, help="only the first ones of the pool")
+    parser.add_argument("--repeats", type=int, help="jobs on each machine; 16 if there is one machine, else 1")
     parser.add_argument("--controllers", nargs="*", default=list(LADDER), help=f"some of: {', '.join(LADDER)}")
     parser.add_argument(
         "--policy", action="append", default=[], metavar="NAME=FOLDERS",
@@ -82,11 +86,13 @@ def rows_of(arguments: argparse.Namespace, name: str, contender: Contender) -> l
     if contender.each_cycle:
         env = gym.make(arguments.env, **task, **each_cycle_keywords(env))
     pool: Any = env.get_wrapper_attr("pool")
-    machines = range(min(len(pool), arguments.machines or len(pool)))
+    count = min(len(pool), arguments.machines or len(pool))
+    machines = list(range(count)) * (arguments.repeats or (REPEATS if count == 1 else 1))
     rows = []
     for seed, make in enumerate(contender.makes):
         path = arguments.out / "jobs" / f"{name}-{seed}.json"
-        setting = {"env": arguments.env, "pool": pool.name, "machines": len(machines), "first_seed": FIRST_SEED}
+        setting = {"env": arguments.env, "pool": pool.name, "machines": count, "jobs": len(machines),
+                   "first_seed": FIRST_SEED}  # fmt: skip
         if path.is_file():
             kept = json.loads(path.read_text())
             if kept["setting"] != setting:
@@ -116,7 +122,7 @@ def main() -> None:
     report = {
         "env": arguments.env, "chaosgym": chaosgym.__version__, "gap": model_gap(summaries), "contenders": summaries,
     }  # fmt: skip
-    lines = [f"{arguments.env}, {len(next(iter(results.values())).rows[0])} machines of the pool", "",
+    lines = [f"{arguments.env}, {len(next(iter(results.values())).rows[0])} jobs", "",
              *table_lines(summaries)]  # fmt: skip
     if report["gap"]:
         lines += ["", f"Searching with the nominal model costs {report['gap']['gap']:.3f}, "

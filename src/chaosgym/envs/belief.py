@@ -1,9 +1,9 @@
 """At which speeds does a hidden machine run calmly? A belief over its map of speeds, from the peaks felt so far.
 
-The machine is one like those of the training pool, whose regime tables are known (those of the new machines, where it
-wears). Every step makes those machines more probable that are calm or irregular where this one is, and that strike as
-hard; and what was felt at a speed itself counts there in any case, since no two machines have the same map. The best
-schedule of the expected map is a plan.
+The machine is one like those of the training pool, whose regime tables are known; where it wears, at the clearance that
+it has by now. Every step makes those machines more probable that are calm or irregular where this one is, and that
+strike as hard; and what was felt at a speed itself counts there in any case, since no two machines have the same map.
+The best schedule of the expected map is a plan.
 """
 
 from typing import NamedTuple
@@ -15,6 +15,7 @@ from scipy.stats import entropy
 from chaosgym.envs.forecast import forecast_of
 from chaosgym.envs.observation import FIRST_PEAK, REMAINING, SPEED, Observation
 from chaosgym.envs.pools import Pool
+from chaosgym.envs.regimes import nearest
 from chaosgym.envs.tasks import Task
 
 Array = NDArray[np.float64]
@@ -104,12 +105,14 @@ class SpeedBelief:
 
     def __init__(self, pool: Pool, task: Task) -> None:
         forecasts = [forecast_of(pool, pool.regimes(k), task) for k in range(len(pool))]
-        tables = [pool.regimes(k)[0] for k in range(len(pool))]
+        tables = [pool.regimes(k) for k in range(len(pool))]
         # speeds, moves and times are the same for all
         self._forecast, self._task, self._sense = forecasts[0], task, SENSES[pool.nominal.name]
-        self._type_iii = np.array([table.type_iii for table in tables])
-        self._force = np.minimum([table.equivalent_force for table in tables], UNHEARD_OF)
-        self._wear = np.array([forecast.damage_weight * forecast.wear[0] for forecast in forecasts])
+        # by machine, clearance and speed
+        self._levels, new = pool.levels, forecasts[0].level_of(pool.levels - 1.0)
+        self._type_iii = np.array([[table.type_iii for table in levels] for levels in tables])
+        self._force = np.minimum([[table.equivalent_force for table in levels] for levels in tables], UNHEARD_OF)
+        self._wear = np.array([forecast.damage_weight * forecast.wear[new] for forecast in forecasts])
 
     @property
     def speeds(self) -> Array:
@@ -168,8 +171,9 @@ class SpeedBelief:
         scatter, mean = peaks.std(axis=1), peaks.mean(axis=1)
         sense = self._sense
         odds = np.where(moved, np.interp(scatter, SCATTER, sense.moving), np.interp(scatter, SCATTER, sense.staying))
-        surprise = ((mean[:, None] - self._force[:, place].T) / sense.force_error) ** 2
-        evidence = odds[:, None] * self._type_iii[:, place].T - 0.5 * np.minimum(surprise, FORCE_LIMIT)
+        level = self._level_of(observations)
+        surprise = ((mean[:, None] - self._force[:, level, place].T) / sense.force_error) ** 2
+        evidence = odds[:, None] * self._type_iii[:, level, place].T - 0.5 * np.minimum(surprise, FORCE_LIMIT)
         self._machine[jobs] += evidence / TEMPERATURE
         for offset, share in ((-1, NEIGHBOUR), (0, 1.0), (1, NEIGHBOUR)):
             at, inside = place + offset, (place + offset >= 0) & (place + offset < len(self.speeds))
@@ -181,9 +185,11 @@ class SpeedBelief:
         score, gathered = self._machine[jobs], self._local[jobs]
         weight = np.exp(score - score.max(axis=1, keepdims=True))
         weight /= weight.sum(axis=1, keepdims=True)
-        chance = np.clip(weight @ self._type_iii, *DOUBTS)
+        level = self._level_of(observations)
+        chance = np.clip(_expected(weight, self._type_iii, level), *DOUBTS)
         irregular = 1.0 / (1.0 + (1.0 / chance - 1.0) * np.exp(-gathered))
-        reward = self._forecast.time - self._task.type_iii_step * irregular - weight @ self._wear
+        wear = _expected(weight, self._wear, level)
+        reward = self._forecast.time - self._task.type_iii_step * irregular - wear
         left = np.rint(observations[:, REMAINING].astype(float) * self._task.steps)
         worth = reward.copy()
         for step in range(1, min(HORIZON, int(left.max()))):
@@ -195,8 +201,22 @@ class SpeedBelief:
         doubt = entropy(weight, axis=1) / np.log(max(weight.shape[1], 2))
         return Plan(irregular, gathered, worth, place, place - self._forecast.moves + best, doubt)
 
+    def _level_of(self, observations: Observation) -> Places:
+        """Place of each clearance among those of the tables, by the damage that is observed where it grows."""
+        if len(self._levels) == 1:
+            return np.zeros(len(observations), np.int64)
+        return nearest(self._levels, 1.0 + observations[:, -1])
+
     def _within_reach(self, place: Places) -> tuple[Places, NDArray[np.bool_]]:
         """Places that a step reaches from places (n,), (n, reach), and which lie inside; others are the ends."""
         reach = place[:, None] + np.arange(-self._forecast.moves, self._forecast.moves + 1)
         near = np.clip(reach, 0, len(self.speeds) - 1)
         return near, reach == near
+
+
+def _expected(weight: Array, values: Array, level: Places) -> Array:
+    """Mean of values (machines, levels, speeds) by weights (k, machines), at a level for each of the k."""
+    mean = np.empty((len(weight), values.shape[2]))
+    for each in np.unique(level):
+        mean[level == each] = weight[level == each] @ values[:, each]
+    return mean
