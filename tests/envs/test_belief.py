@@ -48,6 +48,18 @@ def test_a_machine_that_is_known_leaves_no_doubt():
     assert np.array_equal(plan.irregular[0, 60:] > 0.5, table.type_iii[60:])
 
 
+def test_a_worn_machine_is_believed_by_the_tables_of_its_clearance():
+    """The same peaks at the same speed, with other damage: what is expected are the tables of that clearance."""
+    env = gym.make("chaosgym/ImpactBeamWear-v0", pool="training").unwrapped
+    tables = env.pool.regimes(5)
+    for damage, table in ((0.0, tables[0]), (0.62, tables[3]), (1.0, tables[5])):
+        belief = SpeedBelief(env.pool, env.task)
+        plan = belief.start(np.append(_felt(table, 0), [[np.float32(damage)]], axis=1))
+        for place in range(1, len(table.speeds), 3):
+            plan = belief.add(np.append(_felt(table, place), [[np.float32(damage)]], axis=1))
+        assert np.mean((plan.irregular[0] > 0.5) == table.type_iii) > 0.95
+
+
 def test_an_excluded_machine_is_not_believed_in(env):
     """Without it, what its twin knows is not known, though everything felt is the same."""
     table = env.pool.regimes(17)[0]
