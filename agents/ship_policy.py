@@ -28,11 +28,12 @@ CARD = Path(__file__).parent / "policy_card.md"
 
 @dataclass(frozen=True)
 class Arguments:
-    """Where the runs and their comparison are."""
+    """Where the runs and their comparison are, and where the policies go: into the package."""
 
     evaluation: str = "runs/evaluation"
     contender: str = "PPO"
     runs: str = "runs/ppo-*"
+    out: str = str(shipped_folder(""))
 
 
 class Best(NamedTuple):
@@ -83,7 +84,7 @@ def main() -> None:
         "setting": judged["setting"], "score": score, "mean_return": sum(job["job_return"] for job in jobs) / len(jobs),
         "jobs": jobs, "all_seeds": own, **figures,
     }  # fmt: skip
-    folder = shipped_folder(arguments["env"])
+    folder = Path(asked.out) / arguments["env"].rpartition("/")[2]
     folder.mkdir(parents=True, exist_ok=True)
     for name in ("policy.json", "weights.npz"):
         shutil.copyfile(best.folder / name, folder / name)

@@ -28,8 +28,8 @@ SCATTER = (0.5, 1.5, 2.5, 3.5, 5.0, 7.5, 12.0)
 class Sense(NamedTuple):
     """What the peaks of a step tell, under the sensor error of the environments.
 
-    ``moving`` and ``staying`` are the log odds of Type III by the scatter of the peaks, at ``SCATTER``, when the speed
-    has just changed and later; ``force_error`` [N] is that of their mean as a measure of the table's force.
+    ``moving`` and ``staying`` say by how much the log odds of Type III change with the scatter of the peaks, at
+    ``SCATTER``, when the speed has just changed and later; ``force_error`` [N] is that of their mean as a measure of the table's force.
     """
 
     moving: tuple[float, ...]

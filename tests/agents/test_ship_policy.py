@@ -1,0 +1,64 @@
+"""The best of some runs becomes a folder of the package that says where it comes from."""
+
+import json
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from chaosgym.policies import load_policy
+from chaosgym.policies.shipped import shipped_folder
+from tests.agents.test_scripts import AGENTS
+
+ENV = "chaosgym/ImpactBeamTolerance-v0"
+CONTENDER = "PPO, belief"
+
+
+@pytest.fixture
+def runs(tmp_path):
+    """Two runs of one policy, of which the second had the better evaluation, and their comparison."""
+    source = shipped_folder(ENV)
+    told = json.loads((source / "evaluation.json").read_text())
+    (tmp_path / "comparison" / "jobs").mkdir(parents=True)
+    for place, earned in enumerate((-2.5, -2.0)):
+        folder = tmp_path / f"run-{place}"
+        folder.mkdir()
+        for name in ("policy.json", "weights.npz", "config.json"):
+            shutil.copyfile(source / name, folder / name)
+        (folder / "evaluations.csv").write_text(f"step,return\n0,-3.0\n400,{earned}\n800,-2.9\n")
+        jobs = {"setting": told["setting"], "jobs": told["jobs"][place : place + 2]}
+        (tmp_path / "comparison" / "jobs" / f"{CONTENDER}-{place}.json").write_text(json.dumps(jobs))
+    beside = {name: told[name] for name in ("belief programming", "safe constant", "dynamic programming")}
+    report = {"contenders": {CONTENDER: told["all_seeds"] | {"score_by_seed": [0.1, 0.2], "seeds": 2}, **beside}}
+    (tmp_path / "comparison" / "report.json").write_text(json.dumps(report))
+    return tmp_path
+
+
+def _ship(folder, pattern):
+    command = [sys.executable, str(AGENTS / "ship_policy.py"), "--evaluation", str(folder / "comparison"),
+               "--contender", CONTENDER, "--runs", str(folder / pattern), "--out", str(folder / "shipped")]  # fmt: skip
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_the_best_run_is_shipped_with_its_figures(runs):
+    """The policy plays, the figures are those of its seed, the command has what differs from the defaults."""
+    done = _ship(runs, "run-*")
+    assert done.returncode == 0, done.stderr
+    folder = runs / "shipped" / "ImpactBeamTolerance-v0"
+    policy = load_policy(folder)
+    assert np.isfinite(policy(policy.observation_space.low)).all()
+    assert json.loads((folder / "evaluation.json").read_text())["score"] == 0.2
+    command = json.loads((folder / "config.json").read_text())["command"]
+    assert command.startswith(f"python agents/train_ppo.py --env {ENV} --seed 1 --out runs/")
+    card = (folder / "card.md").read_text()
+    assert "after 400 steps" in card
+    assert "Score 0.20" in card
+
+
+def test_a_pattern_without_runs_is_named(runs):
+    """Nothing is written."""
+    done = _ship(runs, "none-*")
+    assert "no folder matches" in done.stderr
+    assert not (runs / "shipped").exists()
