@@ -20,7 +20,7 @@ import gymnasium as gym
 
 import chaosgym
 from chaosgym.controllers.ladder import LADDER, REFERENCE, SAFE_CONSTANT, each_cycle_keywords
-from chaosgym.evaluation.comparison import Results, compare, model_gap, table_lines
+from chaosgym.evaluation.comparison import Results, compare, model_gap, reference_of, table_lines
 from chaosgym.evaluation.jobs import JobRow, run_jobs
 from chaosgym.files import write_atomically
 
@@ -120,7 +120,8 @@ def main() -> None:
     }
     summaries = compare(results)
     report = {
-        "env": arguments.env, "chaosgym": chaosgym.__version__, "gap": model_gap(summaries), "contenders": summaries,
+        "env": arguments.env, "chaosgym": chaosgym.__version__, "reference": reference_of(results),
+        "gap": model_gap(summaries), "contenders": summaries,
     }  # fmt: skip
     lines = [f"{arguments.env}, {len(next(iter(results.values())).rows[0])} jobs", "",
              *table_lines(summaries)]  # fmt: skip

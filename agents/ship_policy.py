@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 import common
 from train_ppo import Arguments as Training
 
-from chaosgym.controllers.ladder import REFERENCE, SAFE_CONSTANT
+from chaosgym.controllers.ladder import SAFE_CONSTANT
 from chaosgym.policies.shipped import shipped_folder
 
-BESIDE = (SAFE_CONSTANT, "belief programming", REFERENCE)
-"""Contenders whose figures stand beside those of the policy."""
+BESIDE = (SAFE_CONSTANT, "belief programming")
+"""Contenders whose figures stand beside those of the policy and of the reference."""
 
 CARD = Path(__file__).parent / "policy_card.md"
 
@@ -71,11 +71,12 @@ def main() -> None:
     """Choose, copy, describe."""
     asked = common.parse(Arguments, __doc__)
     best, evaluation = best_run(asked.runs), Path(asked.evaluation)
-    summaries = json.loads((evaluation / "report.json").read_text())["contenders"]
+    compared = json.loads((evaluation / "report.json").read_text())
+    summaries, reference = compared["contenders"], compared["reference"]
     judged = json.loads((evaluation / "jobs" / f"{asked.contender}-{best.place}.json").read_text())
     figures = {
         name: {key: value for key, value in summaries[name].items() if key not in ("better_than", "profile")}
-        for name in (asked.contender, *BESIDE)
+        for name in (asked.contender, *BESIDE, reference)
     }
     config = described(json.loads((best.folder / "config.json").read_text()))
     own, jobs, arguments = figures.pop(asked.contender), judged["jobs"], config["arguments"]
@@ -94,7 +95,7 @@ def main() -> None:
         env=arguments["env"], steps=arguments["steps"], seeds=own["seeds"], jobs=arguments["jobs"], at=best.steps,
         machines=len(jobs), pool=judged["setting"]["pool"], score=score,
         type_iii=sum(job["type_iii_share"] for job in jobs) / len(jobs),
-        safe_iii=figures[SAFE_CONSTANT]["type_iii_share"], reference_iii=figures[REFERENCE]["type_iii_share"],
+        safe_iii=figures[SAFE_CONSTANT]["type_iii_share"], reference_iii=figures[reference]["type_iii_share"],
         belief=figures["belief programming"]["score"],
         all_seeds=", ".join(f"{value:.2f}" for value in own["score_by_seed"]),
     )  # fmt: skip

@@ -31,7 +31,10 @@ def runs(tmp_path):
         jobs = {"setting": told["setting"], "jobs": told["jobs"][place : place + 2]}
         (tmp_path / "comparison" / "jobs" / f"{CONTENDER}-{place}.json").write_text(json.dumps(jobs))
     beside = {name: told[name] for name in ("belief programming", "safe constant", "dynamic programming")}
-    report = {"contenders": {CONTENDER: told["all_seeds"] | {"score_by_seed": [0.1, 0.2], "seeds": 2}, **beside}}
+    report = {
+        "reference": "dynamic programming",
+        "contenders": {CONTENDER: told["all_seeds"] | {"score_by_seed": [0.1, 0.2], "seeds": 2}, **beside},
+    }
     (tmp_path / "comparison" / "report.json").write_text(json.dumps(report))
     return tmp_path
 

@@ -39,6 +39,15 @@ def test_the_scale_ends_are_the_safe_constant_and_the_reference():
     assert summaries["dynamic programming"]["better_than"]["safe constant"] == pytest.approx(2.5 / 3.0)
 
 
+def test_the_reference_is_the_better_plan_of_those_who_know_the_machine():
+    """Where the table misleads, the search with a copy of the machine is worth 1, and a constant may be worth more."""
+    search = _results([[-0.5, -1.0, -0.5]])
+    summaries = compare({**LADDER, "clairvoyant search": search, "clairvoyant constant": _results([[0.0] * 3])})
+    assert summaries["clairvoyant search"]["score"] == pytest.approx(1.0)
+    assert 0.0 < summaries["dynamic programming"]["score"] < 1.0 < summaries["clairvoyant constant"]["score"]
+    assert summaries["safe constant"]["type_iii_above_reference"] == 0.0
+
+
 def test_means_over_machines_come_before_the_ratio():
     """A machine on which the reference gains nothing would divide by zero; the means do not."""
     summary = compare({**LADDER, "agent": _results([[-2.0, -2.0, -1.0]])})["agent"]
@@ -81,6 +90,8 @@ def test_what_is_missing_is_named():
     same = {name: LADDER["safe constant"] for name in LADDER}
     with pytest.raises(ParameterError, match="no scale"):
         compare(same)
+    with pytest.raises(ParameterError, match=r"returns -1\.333, as much as the reference"):
+        compare(dict(zip(LADDER, reversed(LADDER.values()), strict=True)))
 
 
 def test_the_table_lists_the_best_last():

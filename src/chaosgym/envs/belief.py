@@ -29,7 +29,8 @@ class Sense(NamedTuple):
     """What the peaks of a step tell, under the sensor error of the environments.
 
     ``moving`` and ``staying`` say by how much the log odds of Type III change with the scatter of the peaks, at
-    ``SCATTER``, when the speed has just changed and later; ``force_error`` [N] is that of their mean as a measure of the table's force.
+    ``SCATTER``, when the speed has just changed and later; ``force_error`` [N] is the error of their mean as a measure
+    of the table's force.
     """
 
     moving: tuple[float, ...]

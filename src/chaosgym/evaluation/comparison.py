@@ -4,7 +4,8 @@
 
 Means over all machines come first, then the ratio, one for each training seed; the interquartile mean is over seeds.
 Intervals over machines keep the scale and draw other machines, so that of the reference has a width too.
-Scores may exceed 1: the reference is the best schedule by the table of regimes, not a bound on what a job returns.
+The reference is the best schedule by the machine's table of regimes, or the search with a copy of the machine where
+that returns more, as on machines that wear. It is no bound on what a job returns: scores may exceed 1.
 """
 
 from collections.abc import Mapping, Sequence
@@ -61,18 +62,28 @@ def compare(results: Mapping[str, Results]) -> dict[str, dict[str, Any]]:
     Raises
     ------
     ParameterError
-        If the safe constant or the reference is missing, or they are worth the same.
+        If the safe constant or the reference is missing, or the reference is not worth more.
     """
     for name in (SAFE_CONSTANT, REFERENCE):
         if name not in results:
             raise ParameterError(f"there are no jobs of {name!r}, which the scores need; known: {', '.join(results)}")
-    scale = Scale(*(results[name].column("job_return")[0] for name in (SAFE_CONSTANT, REFERENCE)))
-    if np.isclose(scale.safe.mean(), scale.reference.mean()):
-        raise ParameterError("the safe constant returns as much as the reference, so there is no scale for scores")
-    return {name: _summary(result, results, scale) for name, result in results.items()}
+    reference = reference_of(results)
+    scale = Scale(*(results[name].column("job_return")[0] for name in (SAFE_CONSTANT, reference)))
+    if scale.safe.mean() > scale.reference.mean() or np.isclose(scale.safe.mean(), scale.reference.mean()):
+        raise ParameterError(
+            f"the safe constant returns {scale.safe.mean():.4g}, as much as the reference ({reference}) or more, so "
+            "there is no scale for scores"
+        )
+    return {name: _summary(result, results, scale, reference) for name, result in results.items()}
 
 
-def _summary(result: Results, others: Mapping[str, Results], scale: Scale) -> dict[str, Any]:
+def reference_of(results: Mapping[str, Results]) -> str:
+    """Return who is worth 1: of those who know the machine and plan, the one that returns most."""
+    known = [name for name in (REFERENCE, CLAIRVOYANT_SEARCH) if name in results]
+    return max(known, key=lambda name: float(results[name].column("job_return").mean()))
+
+
+def _summary(result: Results, others: Mapping[str, Results], scale: Scale, reference: str) -> dict[str, Any]:
     returns, shares = result.column("job_return"), result.column("type_iii_share")
     cycles, duration = result.column("cycles"), result.column("duration")
     seeds, machines = returns.shape
@@ -96,7 +107,7 @@ def _summary(result: Results, others: Mapping[str, Results], scale: Scale) -> di
         "score_interval_seeds": bootstrap_interval(seeds, over_seeds).tolist(),
         "score_interval_machines": bootstrap_interval(machines, over_machines).tolist(),
         "type_iii_share": float(shares.mean()),
-        "type_iii_above_reference": float(shares.mean() - others[REFERENCE].column("type_iii_share").mean()),
+        "type_iii_above_reference": float(shares.mean() - others[reference].column("type_iii_share").mean()),
         "cycles_per_hour": float(3600.0 * cycles.sum() / duration.sum()),
         "damage": float(result.column("damage").mean()),
         "damage_cvar": worst_mean(result.column("damage")),
