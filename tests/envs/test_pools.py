@@ -13,13 +13,6 @@ from chaosgym.fleet import at_speed
 POOLS = [name for name in ENVIRONMENTS if "Tolerance" in name or "Wear" in name]
 
 
-COMPLETE = [
-    "chaosgym/ImpactBeam-v0", "chaosgym/ImpactBeamTolerance-v0", "chaosgym/ImpactBeamWear-v0",
-    "chaosgym/SliderCrank-v0", "chaosgym/SliderCrankTolerance-v0",
-]  # fmt: skip
-"""Environments whose tables come with the package for every machine; for others that of the nominal one does."""
-
-
 def _pool(name: str, pool: str) -> Pool:
     return gym.make(name, pool=pool).unwrapped.pool
 
@@ -48,10 +41,10 @@ def test_tables_are_shipped(name: str) -> None:
     assert file is not None
     assert np.array_equal(pool.speeds, file.speeds)
     assert file.nature.shape[1:] == (len(pool.levels), len(file.speeds))
-    assert len(file.nature) == (len(pool.factors) if name in COMPLETE else 1)
+    assert len(file.nature) == len(pool.factors)
 
 
-@pytest.mark.parametrize("name", COMPLETE[1:])
+@pytest.mark.parametrize("name", POOLS)
 def test_the_shipped_tables_are_those_of_the_machines(name: str) -> None:
     """A few entries computed again agree in nature, and in force where the response is periodic."""
     pool = _pool(name, "held-out")

@@ -182,8 +182,8 @@ class SliderCrankEnv(MachineEnv):
 
     Tolerances are +-10 % of the slider's clearance and of the ball's, +-10 % of the contact damping ratio and +-0.2 %
     of the rod length. Their machines are fixed and seeded: 128 to train on and 32 held out, in Wear 32 and 16. The
-    agent is not told which machine it got. Tables are shipped; a machine that has none gets its own when it is first
-    used, which takes minutes and is kept on disk.
+    agent is not told which machine it got. Tables of all of them are shipped; a machine with other fields gets its own
+    when it is first used, which takes minutes and is kept on disk.
 
     ## Vectorized environment
 
