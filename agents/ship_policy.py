@@ -8,7 +8,6 @@ say.
 
 import csv
 import json
-import shutil
 from dataclasses import dataclass
 from glob import glob
 from pathlib import Path
@@ -18,6 +17,8 @@ import common
 from train_ppo import Arguments as Training
 
 from chaosgym.controllers.ladder import SAFE_CONSTANT
+from chaosgym.files import write_atomically
+from chaosgym.policies import load_policy, save_policy
 from chaosgym.policies.shipped import shipped_folder
 
 BESIDE = (SAFE_CONSTANT, "belief programming")
@@ -87,10 +88,7 @@ def main() -> None:
     }  # fmt: skip
     folder = Path(asked.out) / arguments["env"].rpartition("/")[2]
     folder.mkdir(parents=True, exist_ok=True)
-    for name in ("policy.json", "weights.npz"):
-        shutil.copyfile(best.folder / name, folder / name)
-    for name, content in (("config.json", config), ("evaluation.json", report)):
-        (folder / name).write_text(json.dumps(content, indent=1) + "\n")
+    save_policy(load_policy(best.folder), folder)
     card = CARD.read_text().format(
         env=arguments["env"], steps=arguments["steps"], seeds=own["seeds"], jobs=arguments["jobs"], at=best.steps,
         machines=len(jobs), pool=judged["setting"]["pool"], score=score,
@@ -99,7 +97,9 @@ def main() -> None:
         belief=figures["belief programming"]["score"],
         all_seeds=", ".join(f"{value:.2f}" for value in own["score_by_seed"]),
     )  # fmt: skip
-    (folder / "card.md").write_text(card)
+    written = {"config.json": json.dumps(config, indent=1), "evaluation.json": json.dumps(report, indent=1)}
+    for name, text in (written | {"card.md": card.rstrip()}).items():
+        write_atomically(folder / name, lambda path, text=text: path.write_text(text + "\n"))
     print(f"{best.folder} is the policy of {arguments['env']}, in {folder}")
 
 

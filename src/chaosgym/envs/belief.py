@@ -47,7 +47,8 @@ SENSES = {
     ),
 }
 """Calibrated on the training pools, rounded from what ``agents/calibrate_belief.py`` counts. The beam's are somewhat
-more careful: the score of the plan on the training pool does not tell 4 from 9 N of error."""
+more careful, and so are both errors of the force: the score of the plan on the training pool does not tell 4 from 9 N
+on the beam, or 1.5 from 3 N on the crank."""
 
 TEMPERATURE = 2.0
 """By which the evidence of a step for a machine is divided: steps at one speed are not independent. Calibrated: from 1
@@ -67,7 +68,7 @@ DOUBTS = (0.02, 0.98)
 """Limits of the probability that the tables alone give: no table is that of the machine at hand; assumed."""
 
 WORST = -10.0
-"""Least worth that a learner is told of, in steps of Type III."""
+"""Least worth that a learner is told of, in steps of Type III; assumed."""
 
 UNHEARD_OF = 1_000.0
 """Force [N] in place of that of a motion that could not be followed."""
@@ -110,10 +111,10 @@ class SpeedBelief:
         # speeds, moves and times are the same for all
         self._forecast, self._task, self._sense = forecasts[0], task, SENSES[pool.nominal.name]
         # by machine, clearance and speed
-        self._levels, new = pool.levels, forecasts[0].level_of(pool.levels - 1.0)
+        self._levels, damage = pool.levels, forecasts[0].level_of(pool.levels - 1.0)
         self._type_iii = np.array([[table.type_iii for table in levels] for levels in tables])
         self._force = np.minimum([[table.equivalent_force for table in levels] for levels in tables], UNHEARD_OF)
-        self._wear = np.array([forecast.damage_weight * forecast.wear[new] for forecast in forecasts])
+        self._wear = np.array([forecast.damage_weight * forecast.wear[damage] for forecast in forecasts])
 
     @property
     def speeds(self) -> Array:
