@@ -12,8 +12,8 @@ SLIDER_CLEARANCE = 0.254e-3
 """Half clearance [m] of the slider joint; printed (thesis figure 4.14b)."""
 
 CONTACT_DAMPING_RATIO = 0.13
-"""Assumed: 43 % of the speeds count as Type III, and a sensor with +-3 N of error can feel it. At half the clearance and
-0.105, where 37 % count, the chaotic peaks of 190 rpm lie within 1.2 N of each other, here within 11 N."""
+"""Assumed: 43 % of the speeds count as Type III, and a sensor with +-3 N of error can feel it. At half the clearance
+and 0.105, where 37 % count, the chaotic peaks of 190 rpm lie within 1.2 N of each other, here within 11 N."""
 
 MATRIX_UPDATE_INTERVAL = 5.0
 """Crank angle [deg] over which matrices are held; printed (thesis 5.2.2)."""
