@@ -12,6 +12,7 @@ from chaosgym.controllers.delayed_feedback import DelayedFeedback
 from chaosgym.controllers.dynamic_programming import DynamicProgramming, NeighbourProgramming, NominalProgramming
 from chaosgym.controllers.force_feedback import ForceFeedback
 from chaosgym.controllers.greedy import GreedyClassifier
+from chaosgym.controllers.identified_programming import IdentifiedProgramming
 from chaosgym.controllers.ogy import OGY
 from chaosgym.controllers.random_speed import RandomSpeed
 from chaosgym.controllers.receding_horizon import ClairvoyantHorizon, RecedingHorizon
@@ -29,6 +30,7 @@ __all__ = [
     "ForceFeedback",
     "GreedyClassifier",
     "HighestSpeed",
+    "IdentifiedProgramming",
     "LowestSpeed",
     "NeighbourProgramming",
     "NominalProgramming",

@@ -12,6 +12,7 @@ from chaosgym.controllers.delayed_feedback import DelayedFeedback
 from chaosgym.controllers.dynamic_programming import DynamicProgramming, NeighbourProgramming, NominalProgramming
 from chaosgym.controllers.force_feedback import ForceFeedback
 from chaosgym.controllers.greedy import GreedyClassifier
+from chaosgym.controllers.identified_programming import IdentifiedProgramming
 from chaosgym.controllers.ogy import OGY
 from chaosgym.controllers.random_speed import RandomSpeed
 from chaosgym.controllers.receding_horizon import ClairvoyantHorizon, RecedingHorizon
@@ -50,6 +51,7 @@ LADDER: dict[str, Rung] = {
     NOMINAL_SEARCH: Rung(RecedingHorizon, RecedingHorizon.knows),
     SAFE_CONSTANT: Rung(SafeConstant, SafeConstant.knows),
     "belief programming": Rung(BeliefProgramming, BeliefProgramming.knows),
+    "identified programming": Rung(IdentifiedProgramming, IdentifiedProgramming.knows),
     "neighbour programming": Rung(NeighbourProgramming, NeighbourProgramming.knows),
     "OGY": Rung(OGY, OGY.knows, each_cycle=True),
     "clairvoyant constant": Rung(ClairvoyantConstant, ClairvoyantConstant.knows),

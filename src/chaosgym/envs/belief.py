@@ -6,6 +6,7 @@ strike as hard; and what was felt at a speed itself counts there in any case, si
 The best schedule of the expected map is a plan.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from scipy.stats import entropy
 from chaosgym.envs.forecast import forecast_of
 from chaosgym.envs.observation import FIRST_PEAK, REMAINING, SPEED, Observation
 from chaosgym.envs.pools import Pool
-from chaosgym.envs.regimes import nearest
+from chaosgym.envs.regimes import RegimeTable, nearest
 from chaosgym.envs.tasks import Task
 
 Array = NDArray[np.float64]
@@ -106,25 +107,48 @@ class SpeedBelief:
     """
 
     def __init__(self, pool: Pool, task: Task) -> None:
-        forecasts = [forecast_of(pool, pool.regimes(k), task) for k in range(len(pool))]
-        tables = [pool.regimes(k) for k in range(len(pool))]
+        self._pool, self._task, self._sense = pool, task, SENSES[pool.nominal.name]
         # speeds, moves and times are the same for all
-        self._forecast, self._task, self._sense = forecasts[0], task, SENSES[pool.nominal.name]
+        self._forecast, self._levels = forecast_of(pool, pool.regimes(0), task), pool.levels
         # by machine, clearance and speed
-        self._levels, damage = pool.levels, forecasts[0].level_of(pool.levels - 1.0)
-        self._type_iii = np.array([[table.type_iii for table in levels] for levels in tables])
-        self._force = np.minimum([[table.equivalent_force for table in levels] for levels in tables], UNHEARD_OF)
-        self._wear = np.array([forecast.damage_weight * forecast.wear[damage] for forecast in forecasts])
+        self._tables = [self._of_tables(pool.regimes(k)) for k in range(len(pool))]
+        self._stack()
+        self._machine, self._local = np.zeros((0, len(pool))), np.zeros((0, len(self.speeds)))
+        self._last = np.zeros(0)
+
+    def _of_tables(self, tables: Sequence[RegimeTable]) -> Array:
+        """Type III, force [N] and loss by wear of a machine by clearance and speed, (3, levels, speeds)."""
+        forecast = forecast_of(self._pool, tables, self._task)
+        wear = forecast.damage_weight * forecast.wear[forecast.level_of(self._levels - 1.0)]
+        force = np.minimum([table.equivalent_force for table in tables], UNHEARD_OF)
+        return np.array([np.array([table.type_iii for table in tables]), force, wear])
+
+    def _stack(self) -> None:
+        self._type_iii, self._force, self._wear = np.array(self._tables).swapaxes(0, 1)
 
     @property
     def speeds(self) -> Array:
         """Of the map, (n,)."""
         return self._forecast.speeds
 
+    def know(self, job: int, machine: int) -> None:
+        """Be certain from now on that a job runs a machine of the pool."""
+        self._machine[job] = -np.inf
+        self._machine[job, machine] = 0.0
+
+    def know_tables(self, job: int, tables: Sequence[RegimeTable]) -> None:
+        """Be certain from now on that a job runs a machine with these tables, one for each clearance."""
+        self._tables.append(self._of_tables(tables))
+        self._stack()
+        self._machine = np.pad(self._machine, ((0, 0), (0, 1)), constant_values=-np.inf)
+        self.know(job, len(self._tables) - 1)
+
     def start(self, observations: Observation, excluded: Places | None = None) -> Plan:
         """Begin n jobs with their first observations (n, d); ``excluded`` (n,) are machines that can't be the one."""
         count = len(observations)
-        self._machine = np.zeros((count, len(self._type_iii)))
+        del self._tables[len(self._pool) :]
+        self._stack()
+        self._machine = np.zeros((count, len(self._tables)))
         self._local = np.zeros((count, len(self.speeds)))
         self._last = np.zeros(count)
         return self.restart(np.ones(count, np.bool_), observations, excluded)
@@ -133,6 +157,7 @@ class SpeedBelief:
         """Begin k of the jobs anew, ``which`` (n,), with observations (k, d) and ``excluded`` (k,); plans of these."""
         jobs = np.flatnonzero(which)
         self._machine[jobs], self._local[jobs], self._last[jobs] = 0.0, 0.0, np.nan
+        self._machine[jobs, len(self._pool) :] = -np.inf
         if excluded is not None:
             self._machine[jobs, excluded] = -np.inf
         self._learn(jobs, observations)
@@ -200,7 +225,7 @@ class SpeedBelief:
         place = self._forecast.place_of(observations[:, SPEED])
         near, inside = self._within_reach(place)
         best = np.where(inside, np.take_along_axis(worth, near, axis=1), -np.inf).argmax(axis=1)
-        doubt = entropy(weight, axis=1) / np.log(max(weight.shape[1], 2))
+        doubt = entropy(weight, axis=1) / np.log(max(len(self._pool), 2))
         return Plan(irregular, gathered, worth, place, place - self._forecast.moves + best, doubt)
 
     def _level_of(self, observations: Observation) -> Places:

@@ -48,6 +48,12 @@ class Outcome(NamedTuple):
     info: dict[str, NDArray[Any]]
 
 
+def bouncing_share(cycles: Cycles, last: int, period: Any) -> Array:
+    """Share of the half cycle that k machines spent bouncing on one side in their ``last`` cycles of a period [s]."""
+    duration = cycles.bounce_duration[:, -last:]
+    return np.asarray(2.0 * duration.reshape(len(duration), -1).mean(axis=1) / period)
+
+
 class Jobs:
     """Jobs on the machines of a fleet.
 
@@ -187,10 +193,8 @@ class Jobs:
         monitored = cycles.peak_force[..., 0]
         n = self._peaks.shape[1]
         self._peaks[which] = monitored[:, -n:]
-        sides = (len(which), n * self.damage.shape[1])
-        self._impacts[which] = cycles.impacts[:, -n:].reshape(sides).sum(axis=1) / n
-        period = self.rules.machine.period_at(speed)
-        self._bouncing[which] = 2.0 * cycles.bounce_duration[:, -n:].reshape(sides).mean(axis=1) / period
+        self._impacts[which] = cycles.impacts[:, -n:].reshape(len(which), -1).sum(axis=1) / n
+        self._bouncing[which] = bouncing_share(cycles, n, self.rules.machine.period_at(speed))
 
     def _observe(self, which: Indices, generators: Generators) -> Observation:
         rules = self.rules

@@ -16,8 +16,10 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
 from chaosgym.envs.belief import Plan, SpeedBelief
+from chaosgym.envs.identification import ATTEMPTS, Identification
 from chaosgym.envs.observation import FIRST_PEAK, SPEED, Observation
 from chaosgym.envs.pools import Pool
+from chaosgym.envs.robust_regimes import robust_regimes
 from chaosgym.envs.tasks import Task
 from chaosgym.errors import ParameterError
 
@@ -25,8 +27,8 @@ Array = NDArray[np.float64]
 Actions = NDArray[np.float32]
 Numbers = NDArray[np.int64]
 
-Memory = Literal["none", "speeds", "belief"]
-"""What a learner is given of the past of a job: nothing, ``SpeedMemory`` or ``BeliefMemory``."""
+Memory = Literal["none", "speeds", "belief", "identified"]
+"""What a learner is given of the past of a job: nothing, ``SpeedMemory``, ``BeliefMemory`` or ``IdentifiedMemory``."""
 
 BINS = 53
 """Bins over the range of the drive: 0.5 Hz of the beam, 5 rpm of the crank, centred on the speeds at both ends."""
@@ -105,7 +107,7 @@ class BeliefMemory:
     """
 
     def __init__(self, space: Box, pool: Pool, task: Task) -> None:
-        self._belief = SpeedBelief(pool.possible, task)
+        self._pool, self._belief = pool, SpeedBelief(pool.possible, task)
         low, high = self._belief.feature_bounds
         self.space = Box(
             np.concatenate([space.low, low]).astype(np.float32), np.concatenate([space.high, high]).astype(np.float32)
@@ -138,6 +140,62 @@ class BeliefMemory:
     def _told(self, plan: Plan, observations: Observation, jobs: Numbers) -> Observation:
         self.planned[jobs, 0] = self._belief.speeds[plan.target]
         return np.concatenate([observations, self._belief.features(plan)], axis=1, dtype=np.float32)
+
+
+class IdentifiedMemory(BeliefMemory):
+    """A belief that becomes certain as soon as the machine is identified, of n jobs side by side.
+
+    Its tables are computed then, which takes seconds to minutes. A machine of the training pool is known after as many
+    observations as an identification takes, without one.
+
+    Parameters
+    ----------
+    space, pool, task
+        As in ``BeliefMemory``.
+    """
+
+    def __init__(self, space: Box, pool: Pool, task: Task) -> None:
+        super().__init__(space, pool, task)
+        self._task = task
+
+    def start(self, observations: Observation, excluded: Numbers | None = None) -> Observation:
+        """Forget everything and take in the first observations (n, d) of n jobs; return (n, d + features)."""
+        count = len(observations)
+        self._number = np.full(count, -1) if excluded is None else excluded.copy()
+        self._seen = np.ones(count, np.int64)
+        self._looking = [Identification(self._pool, self._task) for _ in range(count)]
+        for identification, observation in zip(self._looking, observations, strict=True):
+            identification.add(observation)
+        return super().start(observations, excluded)
+
+    def restart(
+        self, which: NDArray[np.bool_], observations: Observation, excluded: Numbers | None = None
+    ) -> Observation:
+        """Forget k of the jobs, ``which`` (n,), and take in their first observations (k, d), as in ``start``."""
+        self._number[which] = -1 if excluded is None else excluded
+        self._seen[which] = 1
+        for job, observation in zip(np.flatnonzero(which).tolist(), observations, strict=True):
+            self._looking[job].start()
+            self._looking[job].add(observation)
+        return super().restart(which, observations, excluded)
+
+    def add(self, observations: Observation) -> Observation:
+        """Take in observations (n, d) and return them with what is believed, (n, d + features)."""
+        self._seen += 1
+        for job in np.flatnonzero((self._number >= 0) & (self._seen == ATTEMPTS[0])).tolist():
+            self._belief.know(job, int(self._number[job]))
+        for job in np.flatnonzero(self._number < 0).tolist():
+            self._look(job, observations[job])
+        return super().add(observations)
+
+    def _look(self, job: int, observation: Observation) -> None:
+        """Look for the machine of a job, unless it is known by now."""
+        identification = self._looking[job]
+        if identification.machines:
+            return
+        identification.add(observation)
+        if machines := identification.machines:
+            self._belief.know_tables(job, robust_regimes(self._pool, self._task, machines))
 
 
 def remembered_space(space: Box) -> Box:
@@ -176,8 +234,9 @@ def memory_of(space: Box, attribute: Callable[[str], Any], memory: Memory) -> Sp
     """
     if memory not in get_args(Memory):
         raise ParameterError(f"memory = {memory!r} is not one of {', '.join(get_args(Memory))}")
-    if memory == "belief":
-        return BeliefMemory(space, attribute("pool"), attribute("task"))
+    if memory in ("belief", "identified"):
+        kind = BeliefMemory if memory == "belief" else IdentifiedMemory
+        return kind(space, attribute("pool"), attribute("task"))
     return SpeedMemory(space) if memory == "speeds" else None
 
 

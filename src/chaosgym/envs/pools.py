@@ -152,12 +152,16 @@ class Pool:
 
     def __getitem__(self, k: int) -> Machine:
         """Machine k, new and at the lowest speed."""
-        return self._machine(self._first + k)
+        return self.machine_with(self.factors[self._first + k])
 
-    def _machine(self, row: int) -> Machine:
-        """Machine of a row of the file: the nominal one times its factors."""
-        pairs = zip(self.tolerances, self.factors[row].tolist(), strict=True)
+    def machine_with(self, factors: Array) -> Machine:
+        """Return the nominal machine times factors (fields,), at the lowest speed."""
+        pairs = zip(self.tolerances, factors.tolist(), strict=True)
         return with_settings(self.nominal, {name: getattr(self.nominal, name) * factor for name, factor in pairs})
+
+    def regimes_of(self, machine: Machine) -> tuple[RegimeTable, ...]:
+        """Return tables of any machine, one for each of ``levels``, computed unless they are kept on disk."""
+        return self._computed(machine, self.speeds)
 
     def regimes(self, k: int) -> tuple[RegimeTable, ...]:
         """Tables of machine k, one for each of ``levels``."""
@@ -216,7 +220,9 @@ class Pool:
 
     def computed(self, row: int, speeds: Array) -> tuple[RegimeTable, ...]:
         """Tables of the machine of a row at some speeds (n,), computed unless they are kept on disk."""
-        machine = self._machine(row)
+        return self._computed(self.machine_with(self.factors[row]), speeds)
+
+    def _computed(self, machine: Machine, speeds: Array) -> tuple[RegimeTable, ...]:
         return tuple(regimes_of(worn(machine, ratio), speeds) for ratio in self.levels.tolist())
 
 

@@ -62,8 +62,8 @@ class TrainedPolicy:
     normalisation
         Applied to the observations, memory included; None for none.
     memory
-        What it is given of the past of a job: "none", "speeds" (``SpeedMemory``) or "belief" (``BeliefMemory``), on the
-        tables of ``env``.
+        What it is given of the past of a job: "none", "speeds" (``SpeedMemory``), "belief" (``BeliefMemory``) or
+        "identified" (``IdentifiedMemory``), on the tables of ``env``.
     largest_step
         Change of speed for an action of 1, if the network answers with increments; None for target speeds.
     squashed
