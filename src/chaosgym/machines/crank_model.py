@@ -43,7 +43,7 @@ STEP_PHASE = 1.0
 MAX_SETS = 32
 """Contact sets for which propagators are made; a machine with more is left to the stepper."""
 
-KEPT = 32
+KEPT = 128
 """Machines whose assembled equations are kept, whatever their speed and clearance."""
 
 KEPT_STRUCTURES = 1024
