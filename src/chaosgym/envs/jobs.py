@@ -1,5 +1,6 @@
 """How do jobs go on? The bookkeeping of machines at work, whether one runs or a thousand side by side."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -51,7 +52,7 @@ class Outcome(NamedTuple):
 def bouncing_share(cycles: Cycles, last: int, period: Any) -> Array:
     """Share of the half cycle that k machines spent bouncing on one side in their ``last`` cycles of a period [s]."""
     duration = cycles.bounce_duration[:, -last:]
-    return np.asarray(2.0 * duration.reshape(len(duration), -1).mean(axis=1) / period)
+    return np.asarray(2.0 * duration.reshape(len(duration), math.prod(duration.shape[1:])).mean(axis=1) / period)
 
 
 class Jobs:
@@ -193,7 +194,7 @@ class Jobs:
         monitored = cycles.peak_force[..., 0]
         n = self._peaks.shape[1]
         self._peaks[which] = monitored[:, -n:]
-        self._impacts[which] = cycles.impacts[:, -n:].reshape(len(which), -1).sum(axis=1) / n
+        self._impacts[which] = cycles.impacts[:, -n:].sum(axis=(1, 2)) / n
         self._bouncing[which] = bouncing_share(cycles, n, self.rules.machine.period_at(speed))
 
     def _observe(self, which: Indices, generators: Generators) -> Observation:
