@@ -29,7 +29,7 @@ def _deviation(env, machine):
     return (env.pool.drawn[machine] - 1.0) / np.array(list(env.pool.tolerances.values()))
 
 
-def test_a_beam_is_found_to_a_millionth_of_its_tolerances(env):
+def test_a_beam_is_found_to_millionths_of_its_tolerances(env):
     """Nine observations are enough to know clearance, damping and length."""
     for machine in (0, 1):
         identification = Identification(env.pool, env.task)

@@ -35,8 +35,6 @@ class IdentifiedProgramming(BeliefProgramming):
 
     def __call__(self, observation: Observation) -> Action:
         """Look whether the machine is known by now, and take the step with the largest expected worth."""
-        if not self._identification.machines:
-            self._identification.add(observation)
-            if machines := self._identification.machines:
-                self._belief.know_tables(0, robust_regimes(self.env.pool, self.task, machines))
+        if machines := self._identification.add(observation):
+            self._belief.know_tables(0, robust_regimes(self.env.pool, self.task, machines))
         return super().__call__(observation)

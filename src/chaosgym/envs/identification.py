@@ -24,39 +24,40 @@ from chaosgym.machines.machine import Machine
 Array = NDArray[np.float64]
 
 SCREENED, STARTS, ITERATIONS = 256, 16, 20
-"""Machines that are tried first, how many of them are followed up, and for how many steps; enough for most training
-beams at the first attempt (``pytest -m slow tests/envs/test_identification.py``)."""
+"""Machines that are tried first, how many of them are followed up, and for how many steps; calibrated: enough for
+most training beams at the first attempt (``pytest -m slow tests/envs/test_identification.py``)."""
 
 EQUAL = 1e-6
-"""Difference of shares that counts as none: some units in the last place of an observation."""
+"""Difference of shares that counts as none: some units in the last place of an observation; derived."""
 
 LAST_PLACE = 3e-8
-"""Rounding error of an observed share."""
+"""Rounding error of an observed share; derived from its 24 bits."""
 
 JUMP = 2e-3
-"""Difference of shares that the screening takes for a jump."""
+"""Difference of shares that the screening takes for a jump; assumed."""
 
 SEARCHED = 5
 """Observations that a machine is searched by, before the whole record is looked at: irregular motion that goes on for
-longer leaves no valley to descend in."""
+longer leaves no valley to descend in. Calibrated on training beams."""
 
 STRANGERS = 2
-"""Observations of a longer record that need not be repeated: those where a bounce more or less counts."""
+"""Observations of a longer record that need not be repeated: those where a bounce more or less counts; assumed."""
 
 ATTEMPTS = (9, 17)
-"""Observations after which the machine is looked for."""
+"""Observations after which the machine is looked for; assumed."""
 
 PRECISION, ALIKE = 1e-6, 8
-"""Error of estimates, in tolerances, and how many machines stand for what is possible within it."""
+"""Usual error of estimates, in tolerances, calibrated on training beams, and how many machines stand for what is
+possible within it, assumed."""
 
 PROBE = 1e-5
-"""Change of a factor, in tolerances, that derivatives are taken with."""
+"""Change of a factor, in tolerances, that derivatives are taken with; assumed."""
 
 STEEP = 50.0
-"""Derivative of a share by a factor in tolerances that is none: a jump lies in between."""
+"""Derivative of a share by a factor in tolerances that is none: a jump lies in between; assumed."""
 
 FARTHEST = 0.3
-"""Largest step of an iteration, in tolerances."""
+"""Largest step of an iteration, in tolerances; assumed."""
 
 
 class Identification:
@@ -98,8 +99,8 @@ class Identification:
         points = [self.estimate, *(self.estimate + PRECISION * shares)]
         return [self._pool.machine_with(self._factors(point)) for point in points]
 
-    def add(self, observation: Observation) -> None:
-        """Take in an observation (d,), and look for the machine if it is time to."""
+    def add(self, observation: Observation) -> list[Machine]:
+        """Take in an observation (d,) and look for the machine if it is time to; return ``machines`` if found now."""
         drive = self._pool.drive
         if self._speeds:
             target = drive.target_of(observation[[LAST_ACTION]])[1]
@@ -107,8 +108,10 @@ class Identification:
         else:
             self._speeds.append(float(drive.rounded(float(observation[SPEED]))))
         self._shares.append(float(observation[BOUNCING]))
-        if self.estimate is None and len(self._speeds) in ATTEMPTS:
-            self.estimate = self._found()
+        if self.estimate is not None or len(self._speeds) not in ATTEMPTS:
+            return []
+        self.estimate = self._found()
+        return self.machines
 
     def _found(self) -> Array | None:
         """Search the whole range by the first observations; None if nothing repeats the record."""

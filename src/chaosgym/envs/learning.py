@@ -185,17 +185,9 @@ class IdentifiedMemory(BeliefMemory):
         for job in np.flatnonzero((self._number >= 0) & (self._seen == ATTEMPTS[0])).tolist():
             self._belief.know(job, int(self._number[job]))
         for job in np.flatnonzero(self._number < 0).tolist():
-            self._look(job, observations[job])
+            if machines := self._looking[job].add(observations[job]):
+                self._belief.know_tables(job, robust_regimes(self._pool, self._task, machines))
         return super().add(observations)
-
-    def _look(self, job: int, observation: Observation) -> None:
-        """Look for the machine of a job, unless it is known by now."""
-        identification = self._looking[job]
-        if identification.machines:
-            return
-        identification.add(observation)
-        if machines := identification.machines:
-            self._belief.know_tables(job, robust_regimes(self._pool, self._task, machines))
 
 
 def remembered_space(space: Box) -> Box:

@@ -18,7 +18,8 @@ from chaosgym.fleet import at_speed
 from chaosgym.machines.machine import Machine
 
 CALM_ENOUGH = 4
-"""Speeds that have to be found calm on all machines, the best ones; worse ones need not be looked at."""
+"""Speeds that have to be found calm on all machines, the best ones; worse ones need not be looked at;
+assumed."""
 
 
 def robust_regimes(pool: Pool, task: Task, machines: Sequence[Machine]) -> tuple[RegimeTable, ...]:
@@ -38,7 +39,9 @@ def _robust(table: RegimeTable, earned: NDArray[np.float64], others: Sequence[Ma
     """Return the table of a machine, as irregular as any of the others at its best speeds."""
     calm = 0
     for place in np.argsort(-earned, kind="stable").tolist():
-        if table.type_iii[place] or calm == CALM_ENOUGH:
+        if calm == CALM_ENOUGH:
+            break
+        if table.type_iii[place]:
             continue
         natures = diagnosed([at_speed(machine, float(table.speeds[place])) for machine in others])[:, 0]
         calm += int((natures == PERIODIC).all())
