@@ -37,4 +37,6 @@ class IdentifiedProgramming(BeliefProgramming):
         """Look whether the machine is known by now, and take the step with the largest expected worth."""
         if machines := self._identification.add(observation):
             self._belief.know_tables(0, robust_regimes(self.env.pool, self.task, machines))
-        return super().__call__(observation)
+        planned = super().__call__(observation)
+        target = self._identification.target
+        return planned if target is None else self.command(target)

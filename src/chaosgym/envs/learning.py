@@ -16,7 +16,7 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
 from chaosgym.envs.belief import Plan, SpeedBelief
-from chaosgym.envs.identification import ATTEMPTS, Identification
+from chaosgym.envs.identification import FROM_REST, Identification
 from chaosgym.envs.observation import FIRST_PEAK, SPEED, Observation
 from chaosgym.envs.pools import Pool
 from chaosgym.envs.robust_regimes import robust_regimes
@@ -182,7 +182,7 @@ class IdentifiedMemory(BeliefMemory):
     def add(self, observations: Observation) -> Observation:
         """Take in observations (n, d) and return them with what is believed, (n, d + features)."""
         self._seen += 1
-        for job in np.flatnonzero((self._number >= 0) & (self._seen == ATTEMPTS[0])).tolist():
+        for job in np.flatnonzero((self._number >= 0) & (self._seen == FROM_REST[0])).tolist():
             self._belief.know(job, int(self._number[job]))
         for job in np.flatnonzero(self._number < 0).tolist():
             if machines := self._looking[job].add(observations[job]):

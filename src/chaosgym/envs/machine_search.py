@@ -1,0 +1,204 @@
+"""Which machine repeats a record? The one whose simulation gives the same shares of bouncing: output error.
+
+The share of the half cycle spent bouncing has no sensor error and changes smoothly with the parameters, but for jumps
+where a bounce more or less belongs to it. Levenberg-Marquardt steps under Cauchy weights go down from many starting
+points side by side, and then from points along the valleys that they end in, until one repeats the record.
+
+References
+----------
+L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall, 1999, chapters 7 (output error) and 15
+(robust norms).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from chaosgym.envs.jobs import bouncing_share
+from chaosgym.envs.pools import Pool, worn
+from chaosgym.envs.tasks import Task
+from chaosgym.fleet import at_speed, fleet_of
+from chaosgym.machines.machine import Machine
+
+Array = NDArray[np.float64]
+
+SCREENED, STARTS, ITERATIONS = 256, 8, 14
+"""Machines that are tried first, how many of them are followed up side by side, and for how many steps; calibrated on
+training machines (``pytest -m slow tests/envs/test_identification.py``)."""
+
+GENERATIONS = 5
+"""How often starting points are followed up, the first time those of the screening, then those along valleys;
+calibrated."""
+
+VALLEYS, EACH, FRESH, ALONG = 2, 3, 2, 0.8
+"""Starting points of a later generation: in how many valleys, how many in each, how many more of the screening; and how
+far along a valley at most, in tolerances; assumed."""
+
+ROUGH, FINE = (2e-3, 1e-4), (3e-4, 3e-5)
+"""Errors of a share, at the first and the last step, that weigh a half: after the screening and along valleys;
+assumed."""
+
+EQUAL = 1e-6
+"""Difference of shares that counts as none: some units in the last place of an observation; derived."""
+
+REPEATED = 7
+"""Observations of a record that a machine has to repeat: more than there are parameters, and fewer than there are,
+since a bounce more or less may count; assumed."""
+
+PROBE = 1e-6
+"""Change of a factor, in tolerances, that derivatives are taken with; assumed."""
+
+STEEP = 5.0
+"""Derivative of a share by a factor in tolerances that is none: a jump lies in between; assumed."""
+
+SMOOTH = 0.5
+"""Share of the observations that has to change smoothly with the parameters for a search to make sense; assumed."""
+
+FARTHEST = 0.3
+"""Largest step of an iteration, in tolerances; assumed."""
+
+
+class Record(NamedTuple):
+    """Observations (n,) that a simulation from rest can repeat.
+
+    ``cycles`` from rest to the end of the first of them, at its speed; ``speeds`` of the steps; ``ratios`` of the
+    clearance to that of the new machine during them; ``shares`` of the half cycle spent bouncing.
+    """
+
+    cycles: int
+    speeds: Array
+    ratios: Array
+    shares: Array
+
+
+class MachineSearch:
+    """The machines within the tolerances of a pool, as points (fields,) from -1 to 1: which of them repeats a record?
+
+    Parameters
+    ----------
+    pool
+        Whose nominal machine and tolerances are known.
+    task
+        That the record is of.
+    """
+
+    def __init__(self, pool: Pool, task: Task) -> None:
+        self._pool, self._task, self._fields = pool, task, len(pool.tolerances)
+        self._felt: NDArray[np.bool_] = np.ones(self._fields, np.bool_)
+        """Fields (fields,) that the record changes with at all: not those of a joint that the machine lacks."""
+
+    def machine(self, point: Array) -> Machine:
+        """Machine at a point (fields,), new and at the lowest speed."""
+        return self._pool.machine_with(1.0 + point * np.array(list(self._pool.tolerances.values())))
+
+    def found(self, record: Record) -> Array | None:
+        """Return the point (fields,) that repeats a record; None if none is found."""
+        grid = self._spread(SCREENED, record)
+        promising = grid[np.argsort(_cost(self._errors(record, grid), ROUGH[0]), kind="stable")]
+        points, scales, ends = promising[:STARTS], ROUGH, list[_End]()
+        self._felt = np.ones(self._fields, np.bool_)
+        self._felt = np.asarray(self._linearised(record, points)[1].any(axis=(0, 1)))
+        generator = np.random.default_rng(0)
+        for generation in range(GENERATIONS):
+            ends += self._descend(record, points, np.geomspace(*scales, ITERATIONS))
+            ends.sort(key=lambda end: end.cost)
+            if hits := [end.point for end in ends if end.repeated >= REPEATED]:
+                return self._descend(record, np.array(hits[:1]), np.full(ITERATIONS, EQUAL))[0].point
+            lengths = generator.uniform(-ALONG, ALONG, (VALLEYS, EACH, 1))
+            along = [end.point + length * end.valley for end, length in zip(ends, lengths, strict=False)]
+            fresh = STARTS + generation * FRESH
+            points = np.clip(np.vstack([*along, promising[fresh : fresh + FRESH]]), -1.0, 1.0)
+            scales = FINE
+        return None
+
+    def is_smooth(self, record: Record) -> bool:
+        """Whether most shares of a record change smoothly with the parameters of most machines."""
+        self._felt = np.ones(self._fields, np.bool_)
+        slopes = self._linearised(record, self._spread(STARTS, record))[1]
+        return bool(np.median(slopes.any(axis=2).mean(axis=1)) >= SMOOTH)
+
+    def _spread(self, count: int, record: Record) -> Array:
+        """Points (count, fields) that cover the tolerances."""
+        return np.asarray(2.0 * qmc.Sobol(self._fields, seed=len(record.speeds)).random(count) - 1.0)
+
+    def _descend(self, record: Record, points: Array, scales: Array) -> "list[_End]":
+        """Go down from points (k, fields) side by side, with errors of ``scales`` in turn that weigh a half."""
+        errors, slopes = self._linearised(record, points)
+        damping = np.full(len(points), 1e-5)
+        for scale in scales:
+            trial = np.clip(points + _steps(errors, slopes, scale, damping), -1.0, 1.0)
+            found, there = self._linearised(record, trial)
+            better = _cost(found, scale) < _cost(errors, scale)
+            points = np.where(better[:, None], trial, points)
+            errors = np.where(better[:, None], found, errors)
+            slopes = np.where(better[:, None, None], there, slopes)
+            damping = np.where(better, 0.2 * damping, 6.0 * damping)
+            if scale > EQUAL and (_repeated(errors) >= REPEATED).any():
+                break
+        costs = _cost(errors, FINE[1])
+        return [_End(*each) for each in zip(costs.tolist(), _repeated(errors).tolist(), points, slopes, strict=True)]
+
+    def _linearised(self, record: Record, points: Array) -> tuple[Array, Array]:
+        """Errors of points (k, fields), (k, n), and their derivatives (k, n, fields), zero across jumps."""
+        changes = np.vstack([np.zeros(self._fields), np.eye(self._fields)[self._felt]])
+        probes = points[:, None] + PROBE * changes
+        errors = self._errors(record, probes.reshape(-1, self._fields)).reshape(len(points), len(changes), -1)
+        slopes = np.zeros((len(points), len(record.shares), self._fields))
+        slopes[:, :, self._felt] = (errors[:, 1:] - errors[:, :1]).transpose(0, 2, 1) / PROBE
+        smooth = np.abs(slopes).max(axis=2, keepdims=True) < STEEP
+        return errors[:, 0], np.where(smooth, slopes, 0.0)
+
+    def _errors(self, record: Record, points: Array) -> Array:
+        """Simulated less observed shares of machines (k, fields), (k, n)."""
+        machines = [self.machine(point) for point in points]
+        fleet, which = fleet_of(machines[0], len(machines)), np.arange(len(machines))
+        shares = np.empty((len(machines), len(record.shares)))
+        for step, (speed, ratio) in enumerate(zip(record.speeds.tolist(), record.ratios.tolist(), strict=True)):
+            if step == 0 or ratio != record.ratios[step - 1]:
+                put = fleet.change if step else fleet.start
+                for place, machine in enumerate(machines):
+                    put(place, at_speed(worn(machine, ratio) if self._pool.wears else machine, speed))
+            fleet.set_speeds(which, np.full(len(which), speed))
+            cycles = fleet.run(which, self._task.cycles_per_step if step else record.cycles)
+            shares[:, step] = bouncing_share(cycles, self._task.cycles_per_step, self._pool.nominal.period_at(speed))
+        return shares - record.shares
+
+
+class _End(NamedTuple):
+    """Where a descent ended: its cost, how many observations are repeated, the point (fields,), and slopes there."""
+
+    cost: float
+    repeated: int
+    point: Array
+    slopes: Array
+
+    @property
+    def valley(self) -> Array:
+        """Direction (fields,) in which the record changes least, among parameters that it changes with at all."""
+        felt = np.asarray(self.slopes.any(axis=0))
+        direction = np.zeros(len(felt))
+        if felt.any():
+            direction[felt] = np.linalg.svd(self.slopes[:, felt])[2][-1]
+        return direction
+
+
+def _repeated(errors: Array) -> NDArray[np.int64]:
+    """How many of the observations are repeated, (k,) of errors (k, n)."""
+    return np.asarray(np.count_nonzero(np.abs(errors) < EQUAL, axis=1))
+
+
+def _cost(errors: Array, scale: float) -> Array:
+    """Cauchy's robust cost (k,) of errors (k, n)."""
+    return np.asarray(np.log1p((errors / scale) ** 2).sum(axis=1))
+
+
+def _steps(errors: Array, slopes: Array, scale: float, damping: Array) -> Array:
+    """Levenberg-Marquardt steps (k, fields) under Cauchy weights, with a damping (k,) as share of mean curvatures."""
+    weighted = (slopes / (1.0 + (errors / scale) ** 2)[:, :, None]).transpose(0, 2, 1)
+    curvature = weighted @ slopes
+    held = damping * np.trace(curvature, axis1=1, axis2=2) / slopes.shape[2] + 1e-17
+    curvature += held[:, None, None] * np.eye(slopes.shape[2])
+    steps = -np.linalg.solve(curvature, weighted @ errors[:, :, None])[:, :, 0]
+    return np.asarray(steps * np.minimum(1.0, FARTHEST / np.maximum(np.abs(steps).max(axis=1), 1e-30))[:, None])
