@@ -2,10 +2,11 @@
 
     python agents/evaluate.py --env chaosgym/ImpactBeamTolerance-v0 --out runs/evaluation-beam
     python agents/evaluate.py --env chaosgym/ImpactBeamTolerance-v0 --out runs/evaluation-beam --policy "PPO=runs/ppo-*"
+    python agents/evaluate.py --env chaosgym/ImpactBeamTolerance-v0 --out runs/evaluation-beam --controllers
 
 Every contender runs one job on each machine, or several on the only one; a training seed of a policy counts as a run of
-its own. The folder keeps the jobs of each contender (a run that was stopped goes on, and a later one adds contenders),
-report.json, table.md and comparison.png.
+its own. The folder keeps the jobs of each contender, report.json, table.md and comparison.png. A run that was stopped
+goes on, and a later one adds contenders to those that the folder has.
 """
 
 import argparse
@@ -79,32 +80,52 @@ def _player(folder: str) -> Callable[[gym.Env[Any, Any]], Any]:
     return lambda env: load_policy(folder)
 
 
-def rows_of(arguments: argparse.Namespace, name: str, contender: Contender) -> list[list[JobRow]]:
-    """Return the jobs of a contender, one list for each training seed: those kept in the folder, or run now."""
-    task = {} if _is_nominal(arguments.env) else {"pool": arguments.pool}
-    env = gym.make(arguments.env, **task)
-    if contender.each_cycle:
-        env = gym.make(arguments.env, **task, **each_cycle_keywords(env))
-    pool: Any = env.get_wrapper_attr("pool")
-    count = min(len(pool), arguments.machines or len(pool))
-    machines = list(range(count)) * (arguments.repeats or (REPEATS if count == 1 else 1))
-    rows = []
-    for seed, make in enumerate(contender.makes):
-        path = arguments.out / "jobs" / f"{name}-{seed}.json"
-        setting = {"env": arguments.env, "pool": pool.name, "machines": count, "jobs": len(machines),
-                   "first_seed": FIRST_SEED}  # fmt: skip
+class Comparison:
+    """What has to be the same for everybody, and a folder that keeps who ran what."""
+
+    def __init__(self, arguments: argparse.Namespace) -> None:
+        self._env_id, self._folder = arguments.env, arguments.out / "jobs"
+        self._task = {} if _is_nominal(arguments.env) else {"pool": arguments.pool}
+        pool: Any = gym.make(arguments.env, **self._task).get_wrapper_attr("pool")
+        count = min(len(pool), arguments.machines or len(pool))
+        self._machines = list(range(count)) * (arguments.repeats or (REPEATS if count == 1 else 1))
+        self._setting = {"env": arguments.env, "pool": pool.name, "machines": count, "jobs": len(self._machines),
+                         "first_seed": FIRST_SEED}  # fmt: skip
+
+    def results(self, name: str, contender: Contender) -> Results:
+        """Return the jobs of a contender, those kept in the folder, or run now."""
+        return Results(contender.knows, [self._jobs(name, contender, seed) for seed in range(len(contender.makes))])
+
+    def kept(self) -> dict[str, Results]:
+        """Return what the folder keeps, by contender."""
+        paths = sorted(self._folder.glob("*.json"), key=lambda path: (len(path.name), path.name))
+        found: dict[str, Results] = {}
+        for path in paths:
+            name = path.stem.rpartition("-")[0]
+            content = self._read(path)
+            rows = found[name].rows if name in found else []
+            found[name] = Results(content["knows"], [*rows, [JobRow(**row) for row in content["jobs"]]])
+        return found
+
+    def _jobs(self, name: str, contender: Contender, seed: int) -> list[JobRow]:
+        path = self._folder / f"{name}-{seed}.json"
         if path.is_file():
-            kept = json.loads(path.read_text())
-            if kept["setting"] != setting:
-                raise SystemExit(f"--out {arguments.out} holds another comparison, {kept['setting']}; choose another")
-            rows.append([JobRow(**row) for row in kept["jobs"]])
-            continue
-        jobs = run_jobs(env, make, machines, FIRST_SEED, progress=f"{name} {seed}")
+            return [JobRow(**row) for row in self._read(path)["jobs"]]
+        env = gym.make(self._env_id, **self._task)
+        if contender.each_cycle:
+            env = gym.make(self._env_id, **self._task, **each_cycle_keywords(env))
+        jobs = run_jobs(env, contender.makes[seed], self._machines, FIRST_SEED, progress=f"{name} {seed}")
+        content = {"setting": self._setting, "knows": contender.knows, "jobs": [job.as_dict() for job in jobs]}
         path.parent.mkdir(parents=True, exist_ok=True)
-        text = json.dumps({"setting": setting, "jobs": [job.as_dict() for job in jobs]}, indent=1) + "\n"
-        write_atomically(path, lambda file, text=text: file.write_text(text))
-        rows.append(jobs)
-    return rows
+        write_atomically(path, lambda file: file.write_text(json.dumps(content) + "\n"))
+        return jobs
+
+    def _read(self, path: Path) -> dict[str, Any]:
+        content: dict[str, Any] = json.loads(path.read_text())
+        if content["setting"] != self._setting:
+            raise SystemExit(f"--out {self._folder.parent} holds another comparison, {content['setting']}; "
+                             "choose another")  # fmt: skip
+        return content
 
 
 def _is_nominal(env: str) -> bool:
@@ -114,10 +135,8 @@ def _is_nominal(env: str) -> bool:
 def main() -> None:
     """Run, compare, print, save."""
     arguments = parse()
-    results = {
-        name: Results(contender.knows, rows_of(arguments, name, contender))
-        for name, contender in contenders(arguments).items()
-    }
+    asked, comparison = contenders(arguments), Comparison(arguments)
+    results = comparison.kept() | {name: comparison.results(name, each) for name, each in asked.items()}
     summaries = compare(results)
     report = {
         "env": arguments.env, "chaosgym": chaosgym.__version__, "reference": reference_of(results),
