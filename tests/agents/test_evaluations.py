@@ -1,0 +1,35 @@
+"""The published comparisons are what the published jobs give."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent.parent
+FOLDERS = sorted((ROOT / "agents" / "evaluations").iterdir())
+
+
+def _published(env):
+    """Rows of the table of an environment in docs/controllers.md, by contender."""
+    text = (ROOT / "docs" / "controllers.md").read_text().split(f"### What came out: `chaosgym/{env}`")[1]
+    lines = text.split("| contender |")[1].split("\n\n")[0].splitlines()[2:]
+    rows = ([cell.strip() for cell in line.strip("|").split("|")] for line in lines)
+    return {row[0]: row for row in rows}
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_the_table_of_the_documentation_is_that_of_the_jobs(folder, tmp_path):
+    """Seeds, return, score and Type III of every contender whose jobs are published; nobody is run again."""
+    copy = shutil.copytree(folder, tmp_path / folder.name)
+    command = [sys.executable, ROOT / "agents" / "evaluate.py", "--env", f"chaosgym/{folder.name}", "--out", copy]
+    done = subprocess.run([*map(str, command), "--controllers", "--json"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    published = _published(folder.name)
+    for name, found in json.loads(done.stdout)["contenders"].items():
+        row = published[name]
+        assert row[1] == found["knows"]
+        assert [int(row[2]), row[3], row[4]] == [found["seeds"], f"{found['return']:.3f}", f"{found['score']:.2f}"]
+        assert row[7] == f"{found['type_iii_share']:.1%}"
