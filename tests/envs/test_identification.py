@@ -7,6 +7,7 @@ import pytest
 from chaosgym.controllers.identified_programming import IdentifiedProgramming
 from chaosgym.envs.belief import SpeedBelief
 from chaosgym.envs.identification import EXPERIMENT, EXPERIMENTS, FROM_REST, HELD, PATIENCE, Identification
+from chaosgym.envs.jobs import RUN_IN_CYCLES
 from chaosgym.envs.learning import IdentifiedMemory
 from chaosgym.envs.machine_search import EQUAL, MachineSearch
 from chaosgym.envs.observation import BOUNCING, LAST_ACTION, REMAINING, SPEED
@@ -44,19 +45,14 @@ def test_a_beam_is_found_to_millionths_of_its_tolerances(env):
         assert len(set(identification.machines)) == len(identification.machines) > 1
 
 
-def _record(env, identification):
-    """Record of the motion from rest that an identification has taken down."""
-    return identification._record(0, 20)
-
-
 def test_only_the_machine_itself_repeats_the_record(env):
     """The true parameters repeat every share to the last places of an observation; others within the tolerances not."""
     identification = Identification(env.pool, env.task)
     for observation in _started(env, 5, 5):
         identification.add(observation)
     others = np.random.default_rng(0).uniform(-1.0, 1.0, (16, 3))
-    search = MachineSearch(env.pool, env.task)
-    errors = np.abs(search._errors(_record(env, identification), np.vstack([_deviation(env, 5), others])))
+    search = identification._search(0, RUN_IN_CYCLES)
+    errors = np.abs(search.errors(np.vstack([_deviation(env, 5), others])))
     assert errors[0].max() < EQUAL < errors[1:].max(axis=1).min()
 
 
@@ -79,8 +75,8 @@ def crank():
 def test_a_crank_repeats_an_experiment_in_simulation(crank, monkeypatch):
     """What a settled crank does when its speed is changed a little depends on its parameters alone, not on the past."""
     records = []
-    monkeypatch.setattr(MachineSearch, "found", lambda self, record: records.append(record))
-    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self, record: False)
+    monkeypatch.setattr(MachineSearch, "found", lambda self: records.append(self.record))
+    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self: False)
     controller = IdentifiedProgramming(gym.make("chaosgym/SliderCrankTolerance-v0", pool="training"))
     observation, _ = controller.env.reset(seed=0, options={"machine": 5})
     controller.reset()
@@ -90,7 +86,7 @@ def test_a_crank_repeats_an_experiment_in_simulation(crank, monkeypatch):
     changes = (records[0].speeds[1:] - records[0].speeds[0]) / (crank.drive.slew_limit / 4.0)
     assert changes == pytest.approx(EXPERIMENT)
     points = _deviation(crank, 5) + np.array([np.zeros(4), [0.01, 0.0, 0.0, 0.0]])
-    true, other = np.abs(MachineSearch(crank.pool, crank.task)._errors(records[0], points))
+    true, other = np.abs(MachineSearch(crank.pool, crank.task, records[0]).errors(points))
     assert true.max() < EQUAL < np.median(other)
 
 
@@ -105,7 +101,7 @@ def _told(crank, identification, speed, share, left=1.0):
 
 def test_where_the_motion_does_not_settle_other_speeds_are_tried(crank, monkeypatch):
     """Up to the highest speed and back down between the speeds of the way up, as long as a job has steps left."""
-    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self, record: False)
+    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self: False)
     identification = Identification(crank.pool, crank.task)
     shares = iter(np.random.default_rng(0).uniform(0.2, 0.4, 1000))
     speed, visited = 50.0, []
@@ -126,8 +122,8 @@ def test_where_the_motion_does_not_settle_other_speeds_are_tried(crank, monkeypa
 def test_a_motion_that_has_settled_is_experimented_with_where_no_experiment_has_failed(crank, monkeypatch):
     """A share that repeats itself begins an experiment, once at each speed."""
     searched = []
-    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self, record: False)
-    monkeypatch.setattr(MachineSearch, "found", lambda self, record: searched.append(record.speeds[0]))
+    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self: False)
+    monkeypatch.setattr(MachineSearch, "found", lambda self: searched.append(self.record.speeds[0]))
     identification = Identification(crank.pool, crank.task)
     for speed in np.arange(50.0, 200.0, 10.0):
         assert _told(crank, identification, speed, 0.3) is None
@@ -140,8 +136,8 @@ def test_a_motion_that_has_settled_is_experimented_with_where_no_experiment_has_
 
 def test_who_goes_elsewhere_ends_an_experiment(crank, monkeypatch):
     """An identification that only looks on is not led to take a detour for an experiment."""
-    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self, record: False)
-    monkeypatch.setattr(MachineSearch, "found", lambda self, record: pytest.fail("there was no experiment"))
+    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self: False)
+    monkeypatch.setattr(MachineSearch, "found", lambda self: pytest.fail("there was no experiment"))
     identification = Identification(crank.pool, crank.task)
     for speed in (*np.arange(50.0, 200.0, 10.0), *[200.0] * 20):
         _told(crank, identification, speed, 0.3)

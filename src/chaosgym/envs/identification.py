@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.envs.jobs import RUN_IN_CYCLES
-from chaosgym.envs.machine_search import EQUAL, MachineSearch, Record
+from chaosgym.envs.machine_search import EQUAL, MachineSearch, Record, machine_at
 from chaosgym.envs.observation import BOUNCING, LAST_ACTION, REMAINING, SPEED, Observation
 from chaosgym.envs.pools import Pool
 from chaosgym.envs.tasks import Task
@@ -66,7 +66,7 @@ class Identification:
     """
 
     def __init__(self, pool: Pool, task: Task) -> None:
-        self._pool, self._task, self._search = pool, task, MachineSearch(pool, task)
+        self._pool, self._task = pool, task
         self.start()
 
     def start(self) -> None:
@@ -89,7 +89,7 @@ class Identification:
         if self.estimate is None:
             return []
         shares = np.random.default_rng(0).uniform(-1.0, 1.0, (ALIKE - 1, len(self.estimate)))
-        return [self._search.machine(point) for point in [self.estimate, *(self.estimate + PRECISION * shares)]]
+        return [machine_at(self._pool, point) for point in [self.estimate, *(self.estimate + PRECISION * shares)]]
 
     def add(self, observation: Observation) -> list[Machine]:
         """Take in an observation (d,) and look for the machine if it is time to; return ``machines`` if found now."""
@@ -98,8 +98,8 @@ class Identification:
             return []
         if self.target is not None and not np.isclose(self._speeds[-1], self.target, rtol=1e-6):
             self._experiment, self._sweep = None, 0.0
-        if record := self._record_from_rest() or self._record_of_experiment():
-            self.estimate = self._search.found(record)
+        if search := self._search_from_rest() or self._search_by_experiment():
+            self.estimate = search.found()
         left = float(observation[REMAINING]) * self._task.steps
         self.target = self._wanted() if self.estimate is None and left > WORTHWHILE else None
         return self.machines
@@ -114,20 +114,19 @@ class Identification:
         self._ratios.append(1.0 + float(observation[-1]) if self._pool.wears else 1.0)
         self._shares.append(float(observation[BOUNCING]))
 
-    def _record_from_rest(self) -> Record | None:
-        """Return the record of the whole job if it is time to look at it."""
+    def _search_from_rest(self) -> MachineSearch | None:
+        """Return a search by the record of the whole job, if it is time and machines move regularly from rest."""
         if len(self._speeds) not in FROM_REST:
             return None
-        record = self._record(0, max(RUN_IN_CYCLES, self._task.cycles_per_step))
-        return record if self._search.is_smooth(record) else None
+        search = self._search(0, max(RUN_IN_CYCLES, self._task.cycles_per_step))
+        return search if search.is_smooth() else None
 
-    def _record_of_experiment(self) -> Record | None:
-        """Return the record of an experiment if one is done."""
+    def _search_by_experiment(self) -> MachineSearch | None:
+        """Return a search by the record of an experiment, if one is done."""
         if self._experiment is None or len(self._speeds) <= self._experiment + len(EXPERIMENT):
             return None
-        record = self._record(self._experiment, SETTLING_CYCLES)
-        self._experiment = None
-        return record
+        first, self._experiment = self._experiment, None
+        return self._search(first, SETTLING_CYCLES)
 
     def _wanted(self) -> float | None:
         """Speed to go to next: that of the experiment, or where an experiment may become possible."""
@@ -177,6 +176,8 @@ class Identification:
         before = np.array(self._shares[-self._held :][:-1][-LONGEST:])
         return bool((np.abs(before - self._shares[-1]) < EQUAL).any())
 
-    def _record(self, first: int, cycles: int) -> Record:
+    def _search(self, first: int, cycles: int) -> MachineSearch:
+        """Search by the record from an observation on, at whose end the machine has run for some cycles from rest."""
         before = [self._ratios[max(first - 1, 0)], *self._ratios[first:-1]]
-        return Record(cycles, *(np.array(values) for values in (self._speeds[first:], before, self._shares[first:])))
+        speeds, shares = np.array(self._speeds[first:]), np.array(self._shares[first:])
+        return MachineSearch(self._pool, self._task, Record(cycles, speeds, np.array(before), shares))

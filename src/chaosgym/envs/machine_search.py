@@ -73,8 +73,13 @@ class Record(NamedTuple):
     shares: Array
 
 
+def machine_at(pool: Pool, point: Array) -> Machine:
+    """Return the machine at a point (fields,) within the tolerances of a pool, new and at the lowest speed."""
+    return pool.machine_with(1.0 + point * np.array(list(pool.tolerances.values())))
+
+
 class MachineSearch:
-    """The machines within the tolerances of a pool, as points (fields,) from -1 to 1: which of them repeats a record?
+    """A search among the machines within the tolerances, points (fields,) from -1 to 1, for one that repeats a record.
 
     Parameters
     ----------
@@ -82,30 +87,28 @@ class MachineSearch:
         Whose nominal machine and tolerances are known.
     task
         That the record is of.
+    record
+        To be repeated.
     """
 
-    def __init__(self, pool: Pool, task: Task) -> None:
-        self._pool, self._task, self._fields = pool, task, len(pool.tolerances)
+    def __init__(self, pool: Pool, task: Task, record: Record) -> None:
+        self._pool, self._task, self.record = pool, task, record
+        self._fields = len(pool.tolerances)
         self._felt: NDArray[np.bool_] = np.ones(self._fields, np.bool_)
         """Fields (fields,) that the record changes with at all: not those of a joint that the machine lacks."""
 
-    def machine(self, point: Array) -> Machine:
-        """Machine at a point (fields,), new and at the lowest speed."""
-        return self._pool.machine_with(1.0 + point * np.array(list(self._pool.tolerances.values())))
-
-    def found(self, record: Record) -> Array | None:
-        """Return the point (fields,) that repeats a record; None if none is found."""
-        grid = self._spread(SCREENED, record)
-        promising = grid[np.argsort(_cost(self._errors(record, grid), ROUGH[0]), kind="stable")]
+    def found(self) -> Array | None:
+        """Return the point (fields,) that repeats the record; None if none is found."""
+        grid = self._spread(SCREENED)
+        promising = grid[np.argsort(_cost(self.errors(grid), ROUGH[0]), kind="stable")]
         points, scales, ends = promising[:STARTS], ROUGH, list[_End]()
-        self._felt = np.ones(self._fields, np.bool_)
-        self._felt = np.asarray(self._linearised(record, points)[1].any(axis=(0, 1)))
+        self._felt = np.asarray(self._linearised(points)[1].any(axis=(0, 1)))
         generator = np.random.default_rng(0)
         for generation in range(GENERATIONS):
-            ends += self._descend(record, points, np.geomspace(*scales, ITERATIONS))
+            ends += self._descend(points, np.geomspace(*scales, ITERATIONS))
             ends.sort(key=lambda end: end.cost)
             if hits := [end.point for end in ends if end.repeated >= REPEATED]:
-                return self._descend(record, np.array(hits[:1]), np.full(ITERATIONS, EQUAL))[0].point
+                return self._descend(np.array(hits[:1]), np.full(ITERATIONS, EQUAL))[0].point
             lengths = generator.uniform(-ALONG, ALONG, (VALLEYS, EACH, 1))
             along = [end.point + length * end.valley for end, length in zip(ends, lengths, strict=False)]
             fresh = STARTS + generation * FRESH
@@ -113,46 +116,14 @@ class MachineSearch:
             scales = FINE
         return None
 
-    def is_smooth(self, record: Record) -> bool:
-        """Whether most shares of a record change smoothly with the parameters of most machines."""
-        self._felt = np.ones(self._fields, np.bool_)
-        slopes = self._linearised(record, self._spread(STARTS, record))[1]
+    def is_smooth(self) -> bool:
+        """Whether most shares of the record change smoothly with the parameters of most machines."""
+        slopes = self._linearised(self._spread(STARTS))[1]
         return bool(np.median(slopes.any(axis=2).mean(axis=1)) >= SMOOTH)
 
-    def _spread(self, count: int, record: Record) -> Array:
-        """Points (count, fields) that cover the tolerances."""
-        return np.asarray(2.0 * qmc.Sobol(self._fields, seed=len(record.speeds)).random(count) - 1.0)
-
-    def _descend(self, record: Record, points: Array, scales: Array) -> "list[_End]":
-        """Go down from points (k, fields) side by side, with errors of ``scales`` in turn that weigh a half."""
-        errors, slopes = self._linearised(record, points)
-        damping = np.full(len(points), 1e-5)
-        for scale in scales:
-            trial = np.clip(points + _steps(errors, slopes, scale, damping), -1.0, 1.0)
-            found, there = self._linearised(record, trial)
-            better = _cost(found, scale) < _cost(errors, scale)
-            points = np.where(better[:, None], trial, points)
-            errors = np.where(better[:, None], found, errors)
-            slopes = np.where(better[:, None, None], there, slopes)
-            damping = np.where(better, 0.2 * damping, 6.0 * damping)
-            if scale > EQUAL and (_repeated(errors) >= REPEATED).any():
-                break
-        costs = _cost(errors, FINE[1])
-        return [_End(*each) for each in zip(costs.tolist(), _repeated(errors).tolist(), points, slopes, strict=True)]
-
-    def _linearised(self, record: Record, points: Array) -> tuple[Array, Array]:
-        """Errors of points (k, fields), (k, n), and their derivatives (k, n, fields), zero across jumps."""
-        changes = np.vstack([np.zeros(self._fields), np.eye(self._fields)[self._felt]])
-        probes = points[:, None] + PROBE * changes
-        errors = self._errors(record, probes.reshape(-1, self._fields)).reshape(len(points), len(changes), -1)
-        slopes = np.zeros((len(points), len(record.shares), self._fields))
-        slopes[:, :, self._felt] = (errors[:, 1:] - errors[:, :1]).transpose(0, 2, 1) / PROBE
-        smooth = np.abs(slopes).max(axis=2, keepdims=True) < STEEP
-        return errors[:, 0], np.where(smooth, slopes, 0.0)
-
-    def _errors(self, record: Record, points: Array) -> Array:
-        """Simulated less observed shares of machines (k, fields), (k, n)."""
-        machines = [self.machine(point) for point in points]
+    def errors(self, points: Array) -> Array:
+        """Simulated less observed shares of machines at points (k, fields), (k, n)."""
+        record, machines = self.record, [machine_at(self._pool, point) for point in points]
         fleet, which = fleet_of(machines[0], len(machines)), np.arange(len(machines))
         shares = np.empty((len(machines), len(record.shares)))
         for step, (speed, ratio) in enumerate(zip(record.speeds.tolist(), record.ratios.tolist(), strict=True)):
@@ -164,6 +135,37 @@ class MachineSearch:
             cycles = fleet.run(which, self._task.cycles_per_step if step else record.cycles)
             shares[:, step] = bouncing_share(cycles, self._task.cycles_per_step, self._pool.nominal.period_at(speed))
         return shares - record.shares
+
+    def _spread(self, count: int) -> Array:
+        """Points (count, fields) that cover the tolerances."""
+        return np.asarray(2.0 * qmc.Sobol(self._fields, seed=len(self.record.speeds)).random(count) - 1.0)
+
+    def _descend(self, points: Array, scales: Array) -> "list[_End]":
+        """Go down from points (k, fields) side by side, with errors of ``scales`` in turn that weigh a half."""
+        errors, slopes = self._linearised(points)
+        damping = np.full(len(points), 1e-5)
+        for scale in scales:
+            trial = np.clip(points + _steps(errors, slopes, scale, damping), -1.0, 1.0)
+            found, there = self._linearised(trial)
+            better = _cost(found, scale) < _cost(errors, scale)
+            points = np.where(better[:, None], trial, points)
+            errors = np.where(better[:, None], found, errors)
+            slopes = np.where(better[:, None, None], there, slopes)
+            damping = np.where(better, 0.2 * damping, 6.0 * damping)
+            if scale > EQUAL and (_repeated(errors) >= REPEATED).any():
+                break
+        costs = _cost(errors, FINE[1])
+        return [_End(*each) for each in zip(costs.tolist(), _repeated(errors).tolist(), points, slopes, strict=True)]
+
+    def _linearised(self, points: Array) -> tuple[Array, Array]:
+        """Errors of points (k, fields), (k, n), and their derivatives (k, n, fields), zero across jumps."""
+        changes = np.vstack([np.zeros(self._fields), np.eye(self._fields)[self._felt]])
+        probes = points[:, None] + PROBE * changes
+        errors = self.errors(probes.reshape(-1, self._fields)).reshape(len(points), len(changes), -1)
+        slopes = np.zeros((len(points), len(self.record.shares), self._fields))
+        slopes[:, :, self._felt] = (errors[:, 1:] - errors[:, :1]).transpose(0, 2, 1) / PROBE
+        smooth = np.abs(slopes).max(axis=2, keepdims=True) < STEEP
+        return errors[:, 0], np.where(smooth, slopes, 0.0)
 
 
 class _End(NamedTuple):
