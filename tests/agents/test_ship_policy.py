@@ -25,8 +25,11 @@ def runs(tmp_path):
     for place, earned in enumerate((-2.5, -2.0)):
         folder = tmp_path / f"run-{place}"
         folder.mkdir()
-        for name in ("policy.json", "weights.npz", "config.json"):
+        for name in ("policy.json", "weights.npz"):
             shutil.copyfile(source / name, folder / name)
+        config = json.loads((source / "config.json").read_text())
+        config["arguments"]["seed"] = place
+        (folder / "config.json").write_text(json.dumps(config))
         (folder / "evaluations.csv").write_text(f"step,return\n0,-3.0\n400,{earned}\n800,-2.9\n")
         jobs = {"setting": told["setting"], "jobs": told["jobs"][place : place + 2]}
         (tmp_path / "comparison" / "jobs" / f"{CONTENDER}-{place}.json").write_text(json.dumps(jobs))
