@@ -27,7 +27,8 @@ at constant speed, that of 300 rpm."""
 
 TOLERANCES = {"slider_clearance": 0.1, "ball_clearance": 0.1, "contact_damping_ratio": 0.1, "rod_length": 0.002}
 """Half widths as shares of the nominal value. Clearances: +-0.0254 mm at +-0.254 mm, the repeatability of the thesis'
-feeler gauges (3.4, printed); damping and length (+-0.47 mm at 235 mm): assumed."""
+feeler gauges (3.4, printed); damping and length (+-0.47 mm at 235 mm): assumed. That of the ball joint matters where
+it has a clearance, which it has not by default."""
 
 
 class SliderCrankEnv(MachineEnv):
