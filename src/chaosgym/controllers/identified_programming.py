@@ -1,8 +1,8 @@
 """What is a model worth to one who does not know which machine it is? Identify the machine, then plan with its tables.
 
-Until the record tells which machine within the tolerances it is, the best schedule of the expected map is played. Then
-the tables of the machine that was found are computed, some seconds for each, and take the place of the others; what is
-felt at a speed goes on to count.
+Until the record tells which machine within the tolerances it is, the best schedule of the expected map is played, but
+for the detours that an experiment asks for. Then the tables of the machine that was found are computed, some seconds
+for each, and take the place of the others; what is felt at a speed goes on to count.
 """
 
 from typing import Any
@@ -34,7 +34,7 @@ class IdentifiedProgramming(BeliefProgramming):
         self._identification.start()
 
     def __call__(self, observation: Observation) -> Action:
-        """Look whether the machine is known by now, and take the step with the largest expected worth."""
+        """Look whether the machine is known by now; take the step of an experiment, or that of the largest worth."""
         if machines := self._identification.add(observation):
             self._belief.know_tables(0, robust_regimes(self.env.pool, self.task, machines))
         planned = super().__call__(observation)
