@@ -1,10 +1,11 @@
-"""What do five peaks tell of a speed? Counts on the training pool behind the constants of chaosgym.envs.belief.
+"""What does a step tell of its speed? Counts on the training pool behind the constants of chaosgym.envs.belief.
 
     python agents/calibrate_belief.py --env chaosgym/SliderCrankTolerance-v0
 
-Jobs wander over the speeds of the table. Of each step the standard deviation of its measured peaks is known, whether
-the speed had just changed, and whether the table calls it Type III. The log odds of that, less those of all steps, rise
-with the scatter: they are fitted by isotonic regression and printed at the scatters that a belief interpolates between.
+Jobs wander over the speeds of the table. Of each step the standard deviation of its measured peaks is known, by how
+much its share of bouncing differs from that of an earlier step of the stay at that speed, and whether the table calls
+it Type III. The log odds of that, less those of all steps, rise with scatter and difference: they are fitted by
+isotonic regression and printed at the values that a belief interpolates between.
 """
 
 from dataclasses import dataclass
@@ -16,8 +17,8 @@ from sklearn.isotonic import IsotonicRegression
 from tqdm import trange
 from wandering import wandering
 
-from chaosgym.envs.belief import SCATTER
-from chaosgym.envs.observation import FIRST_PEAK, SPEED
+from chaosgym.envs.belief import COMPARED, DIFFERENCE, SCATTER
+from chaosgym.envs.observation import BOUNCING, FIRST_PEAK, SPEED
 
 LEAST_SHARE = 0.01
 """Probabilities closer to none or to one are not told apart by so few jobs."""
@@ -33,12 +34,14 @@ class Arguments:
 
 
 def felt(arguments: Arguments) -> np.ndarray:
-    """Steps of all jobs, (n, 4): changed speed, scatter [N], error of the mean as the table's force [N], Type III."""
+    """Steps of all jobs, (n, 5): earlier steps at this speed, scatter [N], least difference of the share from theirs,
+    error of the mean as the table's force [N], Type III."""
     env = gym.make(arguments.env, pool="training").unwrapped
     steps = []
     for job in trange(arguments.jobs, desc="wandering", unit="job"):
         act, ended = wandering(arguments.seed + job), False
         observation = env.reset(seed=arguments.seed + job, options={"machine": job % len(env.pool)})[0]
+        stay = [observation[BOUNCING]]
         while not ended:
             before, drive = observation[SPEED], env.drive
             target = env.regimes.speeds[env.regimes.index_of(drive.target_of(act(observation))[1])]
@@ -46,8 +49,11 @@ def felt(arguments: Arguments) -> np.ndarray:
             ended = terminated or truncated
             peaks = observation[FIRST_PEAK : FIRST_PEAK + env.task.cycles_per_step].astype(float)
             table, speed = env.regimes, observation[SPEED]
+            stay = stay if speed == before else []
+            difference = min(np.abs(np.array(stay[-COMPARED:], float) - observation[BOUNCING]), default=np.nan)
             error = peaks.mean() - table.equivalent_force[table.index_of(speed)]
-            steps.append((speed != before, peaks.std(), error, table.is_type_iii(speed)))
+            steps.append((len(stay), peaks.std(), difference, error, table.is_type_iii(speed)))
+            stay.append(observation[BOUNCING])
     return np.array(steps, float)
 
 
@@ -56,20 +62,24 @@ def log_odds(chance: np.ndarray) -> np.ndarray:
     return np.log(chance / (1.0 - chance))
 
 
-def evidence(scatter: np.ndarray, type_iii: np.ndarray) -> np.ndarray:
-    """By how much the log odds of Type III rise with what was felt, at the scatters of ``SCATTER``."""
-    fit = IsotonicRegression(y_min=LEAST_SHARE, y_max=1.0 - LEAST_SHARE, out_of_bounds="clip").fit(scatter, type_iii)
-    return log_odds(fit.predict(SCATTER)) - log_odds(type_iii.mean())
+def evidence(sign: np.ndarray, type_iii: np.ndarray, at: np.ndarray, usual: float) -> str:
+    """By how much the log odds of Type III rise above the usual ones with a sign (n,), at some of its values."""
+    fit = IsotonicRegression(y_min=LEAST_SHARE, y_max=1.0 - LEAST_SHARE, out_of_bounds="clip").fit(sign, type_iii)
+    return ", ".join(f"{value:.1f}" for value in log_odds(fit.predict(at)) - usual)
 
 
 def main() -> None:
     """Play the jobs and print the counts."""
-    moved, scatter, error, type_iii = felt(common.parse(Arguments, __doc__)).T
+    earlier, scatter, difference, error, type_iii = felt(common.parse(Arguments, __doc__)).T
     calm, irregular = scatter[type_iii == 0.0], scatter[type_iii == 1.0]
     print(f"scatter of calm steps {np.median(calm):.2f} N, of Type III {np.median(irregular):.2f} N (medians)")
-    for name, which in (("moving", moved == 1.0), ("staying", moved == 0.0)):
-        values = ", ".join(f"{value:.1f}" for value in evidence(scatter[which], type_iii[which]))
+    for name, which in (("moving", earlier == 0), ("staying", earlier > 0)):
+        values = evidence(scatter[which], type_iii[which], np.array(SCATTER), log_odds(type_iii[which].mean()))
         print(f"{name}: {values} at {', '.join(map(str, SCATTER))} N, of {np.count_nonzero(which)} steps")
+    for name, which in (("first", earlier == 1), ("second", earlier == 2), ("later", earlier > 2)):
+        closeness = np.log10(np.maximum(difference[which], DIFFERENCE[0]))
+        values = evidence(closeness, type_iii[which], np.log10(DIFFERENCE), log_odds(type_iii.mean()))
+        print(f"{name} comparison: {values} at {', '.join(map(str, DIFFERENCE))}, of {np.count_nonzero(which)} steps")
     print(f"error of the mean: {np.sqrt(np.mean(np.clip(error, -20.0, 20.0) ** 2)):.1f} N")
 
 

@@ -4,9 +4,10 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from chaosgym.envs.belief import HORIZON, SpeedBelief
+from chaosgym.envs.belief import HORIZON, LOCAL, SCATTER, SENSES, SpeedBelief
 from chaosgym.envs.forecast import forecast_of, worth_of_steps
 from chaosgym.envs.learning import LearnerView
+from chaosgym.envs.observation import BOUNCING
 
 ENV = "chaosgym/ImpactBeamTolerance-v0"
 CALM, WILD = np.array([-1.0, 0.5, 1.0, -0.5, 0.0]), np.array([-9.0, 8.0, 3.0, -7.0, 5.0])
@@ -58,6 +59,32 @@ def test_a_worn_machine_is_believed_by_the_tables_of_its_clearance():
         for place in range(1, len(table.speeds), 3):
             plan = belief.add(np.append(_felt(table, place), [[np.float32(damage)]], axis=1))
         assert np.mean((plan.irregular[0] > 0.5) == table.type_iii) > 0.95
+
+
+def test_a_motion_that_repeats_itself_is_calm(env):
+    """Stays at one speed with the same peaks: a share of bouncing that comes back every third step is believed to be
+    calm, one that never does to be irregular."""
+    calm, irregular = SpeedBelief(env.pool, env.task), SpeedBelief(env.pool, env.task)
+    table, place = env.pool.regimes(17)[0], 60
+    for step in range(8):
+        felt = _felt(table, place)
+        add = "add" if step else "start"
+        felt[0, BOUNCING] = 0.3 + 0.02 * (step % 3)
+        repeated = getattr(calm, add)(felt)
+        felt[0, BOUNCING] = 0.3 + 0.02 * step
+        changed = getattr(irregular, add)(felt)
+    assert repeated.gathered[0, place] < -2.0
+    assert changed.gathered[0, place] > 2.0
+
+
+def test_a_share_is_compared_within_a_stay_alone(env):
+    """Back at a speed after one step elsewhere, the share of the last stay says nothing about this one."""
+    table, belief = env.pool.regimes(17)[0], SpeedBelief(env.pool, env.task)
+    belief.start(_felt(table, 60))
+    before = belief.add(_felt(table, 80)).gathered[0, 60]
+    after = belief.add(_felt(table, 60)).gathered[0, 60]
+    arriving = np.interp(_felt(table, 60)[0, 8:].std(), SCATTER, SENSES["impact-beam"].moving)
+    assert after - before == pytest.approx(LOCAL * arriving, abs=1e-6)
 
 
 def test_an_excluded_machine_is_not_believed_in(env):

@@ -1,9 +1,10 @@
-"""At which speeds does a hidden machine run calmly? A belief over its map of speeds, from the peaks felt so far.
+"""At which speeds does a hidden machine run calmly? A belief over its map of speeds, from what was felt so far.
 
 The machine is one like those of the training pool, whose regime tables are known; where it wears, at the clearance that
 it has by now. Every step makes those machines more probable that are calm or irregular where this one is, and that
 strike as hard; and what was felt at a speed itself counts there in any case, since no two machines have the same map.
-The best schedule of the expected map is a plan.
+A motion that settles repeats the share of bouncing, which has no sensor error; on the way, and where the clearance
+grows, the scatter of the peaks has to tell. The best schedule of the expected map is a plan.
 """
 
 from collections.abc import Sequence
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.stats import entropy
 
 from chaosgym.envs.forecast import forecast_of
-from chaosgym.envs.observation import FIRST_PEAK, REMAINING, SPEED, Observation
+from chaosgym.envs.observation import BOUNCING, FIRST_PEAK, REMAINING, SPEED, Observation
 from chaosgym.envs.pools import Pool
 from chaosgym.envs.regimes import RegimeTable, nearest
 from chaosgym.envs.tasks import Task
@@ -26,25 +27,50 @@ SCATTER = (0.5, 1.5, 2.5, 3.5, 5.0, 7.5, 12.0)
 """Standard deviations [N] of a step's peaks at which a ``Sense`` is known; in between it is interpolated."""
 
 
-class Sense(NamedTuple):
-    """What the peaks of a step tell, under the sensor error of the environments.
+DIFFERENCE = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+"""Differences of the share spent bouncing from that of an earlier step at which a ``Sense`` is known; in between it is
+interpolated by their logarithm."""
 
-    ``moving`` and ``staying`` say by how much the log odds of Type III change with the scatter of the peaks, at
-    ``SCATTER``, when the speed has just changed and later; ``force_error`` [N] is the error of their mean as a measure
-    of the table's force.
+COMPARED = 5
+"""Steps back with which a share is compared: a motion that repeats itself after so many is periodic; assumed."""
+
+
+class Sense(NamedTuple):
+    """What a step tells, under the sensor error of the environments.
+
+    By how much do the log odds of Type III change? ``moving`` and ``staying`` say it by the scatter of the peaks, at
+    ``SCATTER``, when the speed has just changed and later. Where the clearance does not grow, ``repeating`` says it
+    instead of ``staying``, by how closely the share spent bouncing repeats, at ``DIFFERENCE``: a row for the first
+    step that can be compared, one for the second, and one for all later ones. ``force_error`` [N] is the error of the
+    mean peak as a measure of the table's force.
     """
 
     moving: tuple[float, ...]
     staying: tuple[float, ...]
+    repeating: tuple[tuple[float, ...], ...]
     force_error: float
 
 
 SENSES = {
     "impact-beam": Sense(
-        moving=(-1.9, -1.5, -0.5, 0.6, 1.4, 2.0, 2.3), staying=(-1.6, -1.4, 0.2, 1.7, 2.3, 2.8, 3.5), force_error=6.0
+        moving=(-1.9, -1.5, -0.5, 0.6, 1.4, 2.0, 2.3),
+        staying=(-1.6, -1.4, 0.2, 1.7, 2.3, 2.8, 3.5),
+        repeating=(
+            (-3.9, -3.7, -2.6, -2.1, -2.1, -1.4, 0.3),
+            (-3.9, -3.9, -3.9, -2.1, -0.7, 1.2, 2.8),
+            (-2.2, -1.1, -0.6, 0.9, 2.5, 3.5, 3.9),
+        ),
+        force_error=6.0,
     ),
     "slider-crank": Sense(
-        moving=(-0.8, -0.4, 0.6, 0.7, 1.2, 3.7, 3.7), staying=(-0.8, -0.5, 1.5, 1.5, 1.5, 3.9, 3.9), force_error=3.0
+        moving=(-0.8, -0.4, 0.6, 0.7, 1.2, 3.7, 3.7),
+        staying=(-0.8, -0.5, 1.5, 1.5, 1.5, 3.9, 3.9),
+        repeating=(
+            (-3.0, -3.0, -3.0, -2.6, -1.9, -1.0, 0.6),
+            (-2.3, -2.3, -2.1, -1.9, -0.8, 0.0, 1.6),
+            (-2.0, -1.2, -0.6, 0.1, 1.1, 2.9, 3.5),
+        ),
+        force_error=3.0,
     ),
 }
 """Calibrated on the training pools, rounded from what ``agents/calibrate_belief.py`` counts. The beam's are somewhat
@@ -114,7 +140,7 @@ class SpeedBelief:
         self._tables = [self._of_tables(pool.regimes(k)) for k in range(len(pool))]
         self._stack()
         self._machine, self._local = np.zeros((0, len(pool))), np.zeros((0, len(self.speeds)))
-        self._last = np.zeros(0)
+        self._last, self._shares = np.zeros(0), np.zeros((0, COMPARED))
 
     def _of_tables(self, tables: Sequence[RegimeTable]) -> Array:
         """Type III, force [N] and loss by wear of a machine by clearance and speed, (3, levels, speeds)."""
@@ -150,7 +176,7 @@ class SpeedBelief:
         self._stack()
         self._machine = np.zeros((count, len(self._tables)))
         self._local = np.zeros((count, len(self.speeds)))
-        self._last = np.zeros(count)
+        self._last, self._shares = np.zeros(count), np.zeros((count, COMPARED))
         return self.restart(np.ones(count, np.bool_), observations, excluded)
 
     def restart(self, which: NDArray[np.bool_], observations: Observation, excluded: Places | None = None) -> Plan:
@@ -195,17 +221,30 @@ class SpeedBelief:
         peaks = observations[:, FIRST_PEAK : FIRST_PEAK + self._task.cycles_per_step].astype(float)
         place, moved = self._forecast.place_of(speed), speed != self._last[jobs]
         self._last[jobs] = speed
-        scatter, mean = peaks.std(axis=1), peaks.mean(axis=1)
-        sense = self._sense
-        odds = np.where(moved, np.interp(scatter, SCATTER, sense.moving), np.interp(scatter, SCATTER, sense.staying))
+        odds = self._odds(jobs, moved, peaks.std(axis=1), observations[:, BOUNCING].astype(float))
         level = self._level_of(observations)
-        surprise = ((mean[:, None] - self._force[:, level, place].T) / sense.force_error) ** 2
+        surprise = ((peaks.mean(axis=1)[:, None] - self._force[:, level, place].T) / self._sense.force_error) ** 2
         evidence = odds[:, None] * self._type_iii[:, level, place].T - 0.5 * np.minimum(surprise, FORCE_LIMIT)
         self._machine[jobs] += evidence / TEMPERATURE
         for offset, share in ((-1, NEIGHBOUR), (0, 1.0), (1, NEIGHBOUR)):
             at, inside = place + offset, (place + offset >= 0) & (place + offset < len(self.speeds))
             self._local[jobs[inside], at[inside]] += LOCAL * share * odds[inside]
         np.clip(self._local, *CERTAIN, out=self._local)
+
+    def _odds(self, jobs: Places, moved: NDArray[np.bool_], scatter: Array, share: Array) -> Array:
+        """By how much the log odds of Type III change (k,), with the scatter of peaks and the shares of bouncing."""
+        sense, before = self._sense, self._shares[jobs]
+        before[moved] = np.nan
+        self._shares[jobs] = np.column_stack([share, before[:, :-1]])
+        arriving = np.interp(scatter, SCATTER, sense.moving)
+        if len(self._levels) > 1:
+            return np.where(moved, arriving, np.interp(scatter, SCATTER, sense.staying))
+        difference = np.fmin.reduce(np.abs(before - share[:, None]), axis=1)
+        closeness = np.log10(np.maximum(difference, DIFFERENCE[0]))
+        staying = np.array([np.interp(closeness, np.log10(DIFFERENCE), row) for row in sense.repeating])
+        compared = np.count_nonzero(np.isfinite(before), axis=1)
+        row = np.clip(compared - 1, 0, len(staying) - 1)
+        return np.where(compared == 0, arriving, staying[row, np.arange(len(jobs))])
 
     def _plan(self, jobs: Places, observations: Observation) -> Plan:
         """Best schedules of the expected maps, of jobs (k,) with observations (k, d)."""

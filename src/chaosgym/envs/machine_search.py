@@ -59,6 +59,10 @@ SMOOTH = 0.5
 FARTHEST = 0.3
 """Largest step of an iteration, in tolerances; assumed."""
 
+DAMPING, EASED, HELD_BACK = 1e-5, 0.2, 6.0
+"""Damping of the first step, as share of the mean curvature, and its factors after a step that gains and after one that
+does not; assumed."""
+
 
 class Record(NamedTuple):
     """Observations (n,) that a simulation from rest can repeat.
@@ -143,7 +147,7 @@ class MachineSearch:
     def _descend(self, points: Array, scales: Array) -> "list[_End]":
         """Go down from points (k, fields) side by side, with errors of ``scales`` in turn that weigh a half."""
         errors, slopes = self._linearised(points)
-        damping = np.full(len(points), 1e-5)
+        damping = np.full(len(points), DAMPING)
         for scale in scales:
             trial = np.clip(points + _steps(errors, slopes, scale, damping), -1.0, 1.0)
             found, there = self._linearised(trial)
@@ -151,7 +155,7 @@ class MachineSearch:
             points = np.where(better[:, None], trial, points)
             errors = np.where(better[:, None], found, errors)
             slopes = np.where(better[:, None, None], there, slopes)
-            damping = np.where(better, 0.2 * damping, 6.0 * damping)
+            damping *= np.where(better, EASED, HELD_BACK)
             if scale > EQUAL and (_repeated(errors) >= REPEATED).any():
                 break
         costs = _cost(errors, FINE[1])
