@@ -6,7 +6,7 @@ import pytest
 
 from chaosgym.controllers.identified_programming import IdentifiedProgramming
 from chaosgym.envs.belief import SpeedBelief
-from chaosgym.envs.identification import EXPERIMENT, EXPERIMENTS, FROM_REST, HELD, PATIENCE, Identification
+from chaosgym.envs.identification import EXPERIMENT, EXPERIMENTS, FROM_REST, SETTLING_CYCLES, Identification
 from chaosgym.envs.jobs import RUN_IN_CYCLES
 from chaosgym.envs.learning import IdentifiedMemory
 from chaosgym.envs.machine_search import EQUAL, MachineSearch
@@ -99,24 +99,32 @@ def _told(crank, identification, speed, share, left=1.0):
     return identification.target
 
 
-def test_where_the_motion_does_not_settle_other_speeds_are_tried(crank, monkeypatch):
-    """Up to the highest speed and back down between the speeds of the way up, as long as a job has steps left."""
+def _experimented(crank, monkeypatch, shares, left=1.0):
+    """Records that are looked for after a long stay at 200 rpm whose steps have these shares in turn."""
+    records = []
     monkeypatch.setattr(MachineSearch, "is_smooth", lambda self: False)
-    identification = Identification(crank.pool, crank.task)
-    shares = iter(np.random.default_rng(0).uniform(0.2, 0.4, 1000))
-    speed, visited = 50.0, []
-    while speed < 280.0:
-        _told(crank, identification, speed, next(shares))
-        speed += 10.0
-    asked = [_told(crank, identification, 280.0, next(shares)) for _ in range(PATIENCE)]
-    assert asked[:-1] == [None] * (PATIENCE - 1)
-    speed = asked[-1]
-    for _ in range(6 * HELD):
-        visited.append(speed)
-        speed = _told(crank, identification, speed, next(shares))
-    assert visited[::HELD] == [290.0, 300.0, 295.0, 285.0, 275.0, 265.0]
-    assert visited == sorted(visited[: HELD * 2]) + sorted(visited[HELD * 2 :], reverse=True)
-    assert _told(crank, identification, speed, next(shares), left=0.1) is None
+    monkeypatch.setattr(MachineSearch, "found", lambda self: records.append(self.record))
+    identification, shares = Identification(crank.pool, crank.task), iter(shares)
+    for speed in np.arange(50.0, 200.0, 10.0):
+        assert _told(crank, identification, speed, next(shares)) is None
+    speed = 200.0
+    for _ in range(3 * len(EXPERIMENT)):
+        speed = _told(crank, identification, speed, next(shares), left) or 200.0
+    return records
+
+
+def test_no_experiment_where_the_motion_does_not_settle_or_the_job_is_nearly_done(crank, monkeypatch):
+    """There is nothing to start from, or nothing to gain."""
+    assert _experimented(crank, monkeypatch, np.random.default_rng(0).uniform(0.2, 0.4, 100)) == []
+    assert _experimented(crank, monkeypatch, [0.3] * 100, left=0.1) == []
+
+
+@pytest.mark.parametrize("period", [1, 2, 3, 4])
+def test_a_longer_orbit_may_be_at_any_of_its_phases(crank, monkeypatch, period):
+    """A motion that repeats itself after some steps is simulated for as many numbers of cycles before the record."""
+    records = _experimented(crank, monkeypatch, np.resize(0.3 + 0.01 * np.arange(period), 100))
+    assert [record.cycles for record in records] == [SETTLING_CYCLES + phase for phase in range(period)]
+    assert len({tuple(record.speeds) for record in records}) == 1
 
 
 def test_a_motion_that_has_settled_is_experimented_with_where_no_experiment_has_failed(crank, monkeypatch):

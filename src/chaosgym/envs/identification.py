@@ -1,8 +1,7 @@
 """Which machine is it? A job goes on, with experiments on the way, until a machine is found that repeats them.
 
 A record can be repeated in simulation where the motion before it is known: from rest, if machines move regularly there,
-or from an orbit that the motion has settled on. Small changes of speed from such an orbit are an experiment. Where the
-motion does not settle, other speeds are tried.
+or from an orbit that the motion has settled on. Small changes of speed from such an orbit are an experiment.
 
 References
 ----------
@@ -36,11 +35,11 @@ EXPERIMENTS = 3
 """Experiments of a job at most, each at another speed; assumed."""
 
 WORTHWHILE = 50
-"""Steps that a job must still have for an experiment, or a search for a place for it; assumed."""
+"""Steps that a job must still have for an experiment; assumed."""
 
-PATIENCE, HELD, LONGEST = 6, 4, 5
-"""Steps at one speed without a sign of settling after which other speeds are tried, how many steps each of them is
-held, and the longest pattern, in steps, that is a sign; assumed."""
+LONGEST = 4
+"""Longest period of an orbit in steps, and so in cycles where five are a step, for which its phase is guessed;
+assumed."""
 
 PRECISION, ALIKE = 1e-6, 8
 """Usual error of estimates, in tolerances, calibrated on training beams, and how many machines stand for what is
@@ -62,7 +61,7 @@ class Identification:
     estimate : (fields,) or None
         Deviation of each field from its nominal value, in tolerances; None as long as none repeats a record.
     target : float or None
-        Speed that an experiment, or the way to one, asks for next, if any; who goes elsewhere ends it.
+        Speed that an experiment asks for next, if there is one; who goes elsewhere ends it.
     """
 
     def __init__(self, pool: Pool, task: Task) -> None:
@@ -77,7 +76,7 @@ class Identification:
         self._ratios: list[float] = []
         self._shares: list[float] = []
         self._experiment: int | None = None
-        self._sweep = 0.0
+        self._period = 1
         self._tried: set[float] = set()
 
     @property
@@ -97,9 +96,11 @@ class Identification:
         if self.estimate is not None:
             return []
         if self.target is not None and not np.isclose(self._speeds[-1], self.target, rtol=1e-6):
-            self._experiment, self._sweep = None, 0.0
-        if search := self._search_from_rest() or self._search_by_experiment():
+            self._experiment = None
+        for search in self._searches():
             self.estimate = search.found()
+            if self.estimate is not None:
+                break
         left = float(observation[REMAINING]) * self._task.steps
         self.target = self._wanted() if self.estimate is None and left > WORTHWHILE else None
         return self.machines
@@ -114,67 +115,41 @@ class Identification:
         self._ratios.append(1.0 + float(observation[-1]) if self._pool.wears else 1.0)
         self._shares.append(float(observation[BOUNCING]))
 
-    def _search_from_rest(self) -> MachineSearch | None:
-        """Return a search by the record of the whole job, if it is time and machines move regularly from rest."""
-        if len(self._speeds) not in FROM_REST:
-            return None
-        search = self._search(0, max(RUN_IN_CYCLES, self._task.cycles_per_step))
-        return search if search.is_smooth() else None
-
-    def _search_by_experiment(self) -> MachineSearch | None:
-        """Return a search by the record of an experiment, if one is done."""
+    def _searches(self) -> list[MachineSearch]:
+        """Return searches by the record of the whole job, if it is time and machines move regularly from rest, or by
+        that of an experiment that is done, for each phase that the orbit may have had at its beginning."""
+        if len(self._speeds) in FROM_REST:
+            search = self._search(0, max(RUN_IN_CYCLES, self._task.cycles_per_step))
+            if search.is_smooth():
+                return [search]
         if self._experiment is None or len(self._speeds) <= self._experiment + len(EXPERIMENT):
-            return None
+            return []
         first, self._experiment = self._experiment, None
-        return self._search(first, SETTLING_CYCLES)
+        return [self._search(first, SETTLING_CYCLES + phase) for phase in range(self._period)]
 
     def _wanted(self) -> float | None:
-        """Speed to go to next: that of the experiment, or where an experiment may become possible."""
-        if self._experiment is None and self._is_settled and len(self._tried) < EXPERIMENTS:
-            self._experiment = len(self._speeds) - 1
+        """Speed to go to next: that of an experiment, which begins as soon as the motion has settled."""
+        if self._experiment is None:
+            period = self._period_of_steps
+            if period is None or self._speeds[-1] in self._tried or len(self._tried) == EXPERIMENTS:
+                return None
+            self._experiment, self._period = len(self._speeds) - 1, period
             self._tried.add(self._speeds[-1])
-        if self._experiment is not None:
-            self._sweep = 0.0
-            change = EXPERIMENT[len(self._speeds) - 1 - self._experiment] * self._pool.drive.slew_limit / 4.0
-            return self._commanded(self._speeds[self._experiment] + change)
-        if self._has_pattern:
-            return None
-        if self._held >= (HELD if self._sweep else PATIENCE):
-            return self._commanded(self._next_of_sweep())
-        return self._speeds[-1] if self._sweep else None
-
-    def _next_of_sweep(self) -> float:
-        """Speed after the present one: up to the highest, and back down between the speeds of the way up."""
-        drive = self._pool.drive
-        self._sweep = self._sweep or drive.slew_limit
-        if self._speeds[-1] >= drive.highest_speed and self._sweep > 0.0:
-            self._sweep = -drive.slew_limit
-            return self._speeds[-1] - 0.5 * drive.slew_limit
-        return self._speeds[-1] + self._sweep
+        change = EXPERIMENT[len(self._speeds) - 1 - self._experiment] * self._pool.drive.slew_limit / 4.0
+        return self._commanded(self._speeds[self._experiment] + change)
 
     def _commanded(self, speed: float) -> float:
         drive = self._pool.drive
         return float(drive.rounded(np.clip(speed, drive.lowest_speed, drive.highest_speed)))
 
     @property
-    def _held(self) -> int:
-        """Steps at the present speed without a break."""
-        held = 0
-        while held < len(self._speeds) and self._speeds[-1 - held] == self._speeds[-1]:
-            held += 1
-        return held
-
-    @property
-    def _is_settled(self) -> bool:
-        """Whether the motion repeats itself step by step, at a speed where no experiment has been made."""
-        steady = self._held > 1 and abs(self._shares[-1] - self._shares[-2]) < EQUAL
-        return steady and self._speeds[-1] not in self._tried
-
-    @property
-    def _has_pattern(self) -> bool:
-        """Whether the motion repeats itself after some steps at the present speed."""
-        before = np.array(self._shares[-self._held :][:-1][-LONGEST:])
-        return bool((np.abs(before - self._shares[-1]) < EQUAL).any())
+    def _period_of_steps(self) -> int | None:
+        """After how many steps at the present speed the motion repeats itself; None if it does not."""
+        for period in range(1, min(LONGEST, len(self._speeds) - 1) + 1):
+            stays = len(set(self._speeds[-1 - period :])) == 1
+            if stays and abs(self._shares[-1] - self._shares[-1 - period]) < EQUAL:
+                return period
+        return None
 
     def _search(self, first: int, cycles: int) -> MachineSearch:
         """Search by the record from an observation on, at whose end the machine has run for some cycles from rest."""
