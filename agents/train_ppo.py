@@ -29,7 +29,7 @@ class Arguments:
     gamma: float = 0.97
     gae_lambda: float = 0.9
     entropy: float = 0.0
-    log_std: float = -1.5
+    log_std: float = -2.0
     units: int = 128
     memory: Memory = "belief"
     increments: bool = True

@@ -140,6 +140,16 @@ def test_the_plan_is_dynamic_programming_on_the_expected_map(env):
     assert expected[place] >= expected[within].max() - 0.02 * left * env.task.type_iii_step
 
 
+def test_small_corrections_of_a_plan_leave_it_as_it_is():
+    """The target is the nearest speed of the map, so that a learner can keep a speed and the motion can settle."""
+    view = LearnerView(gym.make(ENV, pool="held-out", job_cycles=100), memory="belief")
+    view.reset(seed=3, options={"machine": 2})
+    for correction in (0.1, -0.1, 0.12, -0.12, -0.3, 0.0):
+        plan = float(view._memory.planned[0, 0])
+        *_, info = view.step(np.array([correction], np.float32))
+        assert info["speed"] == pytest.approx(plan - (0.25 if correction == -0.3 else 0.0), abs=1e-5)
+
+
 def test_a_view_with_a_belief_keeps_its_space_and_follows_the_plan():
     """Observations stay within the announced bounds; an action of zero goes where the belief plans to."""
     view = LearnerView(gym.make(ENV, pool="held-out", job_cycles=100), memory="belief")

@@ -112,6 +112,7 @@ def test_a_policy_believes_what_it_believed_in_training(tmp_path):
     plain = SB3VecEnv(env, num_envs=2, job_cycles=50, pool="held-out")
     envs = SB3LearnerView(plain, memory="belief")
     model = PPO("MlpPolicy", envs, seed=0, device="cpu", **SMALL)
+    model.policy.action_net.bias.data.fill_(0.5)
     save_policy(exported(model, env, plain, memory="belief", increments=True), tmp_path)
     policy = load_policy(tmp_path)
     envs.seed(5)
@@ -120,7 +121,9 @@ def test_a_policy_believes_what_it_believed_in_training(tmp_path):
     for _ in range(9):
         action, _ = model.predict(seen, deterministic=True)
         target = 4.0 + 13.0 * (policy(seen[:, :size])[:, 0] + 1.0)
-        np.testing.assert_allclose(target, np.clip(envs._memory.planned[:, 0] + action[:, 0], 4.0, 30.0), atol=1e-3)
+        wanted = np.round(4.0 * (envs._memory.planned[:, 0] + action[:, 0])) / 4.0
+        np.testing.assert_allclose(target, np.clip(wanted, 4.0, 30.0), atol=1e-3)
+        assert (wanted != envs._memory.planned[:, 0]).all()
         seen = envs.step(np.linspace(-1.0, 1.0, 2, dtype=np.float32)[:, None])[0]
 
 

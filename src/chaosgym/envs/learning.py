@@ -4,7 +4,8 @@ A machine is hidden from the agent, but it answers the same way when a speed is 
 bin of speed, the mean and the standard deviation of the peak forces measured there in this job, and their number. The
 belief adds what these say about the machine, among those within the tolerances, and about the speeds in reach.
 Increments let an action say by how much the speed shall change instead of where it shall end; with a belief, by how
-much it shall differ from the belief's own plan (residual learning: T. Silver et al., arXiv:1812.06298).
+much it shall differ from the belief's own plan (residual learning: T. Silver et al., arXiv:1812.06298), in steps of the
+map of speeds.
 """
 
 from collections.abc import Callable
@@ -19,6 +20,7 @@ from chaosgym.envs.belief import Plan, SpeedBelief
 from chaosgym.envs.identification import FROM_REST, Identification
 from chaosgym.envs.observation import FIRST_PEAK, SPEED, Observation
 from chaosgym.envs.pools import Pool
+from chaosgym.envs.regimes import nearest
 from chaosgym.envs.robust_regimes import robust_regimes
 from chaosgym.envs.tasks import Task
 from chaosgym.errors import ParameterError
@@ -137,6 +139,10 @@ class BeliefMemory:
         """Take in observations (n, d) and return them with what is believed, (n, d + features)."""
         return self._told(self._belief.add(observations), observations, np.arange(len(observations)))
 
+    def nearest(self, speeds: Array) -> Array:
+        """Return the nearest speeds of the map (...)."""
+        return np.asarray(self._belief.speeds[nearest(self._belief.speeds, speeds)])
+
     def _told(self, plan: Plan, observations: Observation, jobs: Numbers) -> Observation:
         self.planned[jobs, 0] = self._belief.speeds[plan.target]
         return np.concatenate([observations, self._belief.features(plan)], axis=1, dtype=np.float32)
@@ -199,20 +205,34 @@ def remembered_space(space: Box) -> Box:
     )
 
 
-def commanded(increments: Actions, speeds: Array, space: Box, largest: float) -> Actions:
+def commanded(
+    increments: Actions, observations: Observation, memory: SpeedMemory | BeliefMemory | None, space: Box,
+    largest: float,
+) -> Actions:  # fmt: skip
     """Return the actions (n, 1) that change speeds by increments (n, 1) of -1 to 1 times ``largest``.
+
+    Without a belief it is the observed speed that changes. With one it is the planned speed, and the target is the
+    nearest speed of the map: only a motion whose speed stays exactly the same can settle.
 
     Parameters
     ----------
-    increments, speeds
-        (n, 1) each; the speeds as observed, or as planned.
+    increments
+        (n, 1).
+    observations
+        The last ones, (n, d), without memory.
+    memory
+        That has taken them in.
     space
         Of the observations.
     largest
         Change of speed for an increment of 1, in the machine's unit.
     """
+    change = largest * np.clip(increments, -1.0, 1.0)
+    if isinstance(memory, BeliefMemory):
+        target = memory.nearest(memory.planned + change)
+    else:
+        target = observations[:, SPEED, None].astype(float) + change
     low, high = space.low[0], space.high[0]
-    target = speeds + largest * np.clip(increments, -1.0, 1.0)
     return np.asarray(np.clip(2.0 * (target - low) / (high - low) - 1.0, -1.0, 1.0), np.float32)
 
 
@@ -230,11 +250,6 @@ def memory_of(space: Box, attribute: Callable[[str], Any], memory: Memory) -> Sp
         kind = BeliefMemory if memory == "belief" else IdentifiedMemory
         return kind(space, attribute("pool"), attribute("task"))
     return SpeedMemory(space) if memory == "speeds" else None
-
-
-def speeds_before(observations: Observation, memory: SpeedMemory | BeliefMemory | None) -> Array:
-    """Return the speeds (n, 1) that increments change: those planned by a belief, or those observed (n, d)."""
-    return memory.planned if isinstance(memory, BeliefMemory) else observations[:, SPEED, None].astype(float)
 
 
 class LearnerView(gym.Wrapper[Observation, Actions, Observation, Actions]):
@@ -275,8 +290,7 @@ class LearnerView(gym.Wrapper[Observation, Actions, Observation, Actions]):
     def step(self, action: Actions) -> tuple[Observation, Any, bool, bool, dict[str, Any]]:
         """Run a step and remember it."""
         if self._largest is not None:
-            before = speeds_before(self._last[None], self._memory)
-            action = commanded(action[None], before, self._space, self._largest)[0]
+            action = commanded(action[None], self._last[None], self._memory, self._space, self._largest)[0]
         self._last, reward, terminated, truncated, info = self.env.step(action)
         seen = self._memory.add(self._last[None])[0] if self._memory else self._last
         return seen, reward, terminated, truncated, info

@@ -16,7 +16,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
-from chaosgym.envs.learning import Memory, commanded, memory_of, speeds_before
+from chaosgym.envs.learning import Memory, commanded, memory_of
 from chaosgym.envs.observation import Observation
 from chaosgym.envs.vector_env import MachineVectorEnv
 from chaosgym.errors import ParameterError
@@ -187,7 +187,7 @@ class SB3LearnerView(VecEnvWrapper):
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Take the actions of the next step."""
         if self._largest is not None:
-            actions = commanded(actions, speeds_before(self._last, self._memory), self._space, self._largest)
+            actions = commanded(actions, self._last, self._memory, self._space, self._largest)
         self.venv.step_async(actions)
 
     def step_wait(self) -> tuple[Observation, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:

@@ -18,7 +18,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from chaosgym.envs.learning import BeliefMemory, Memory, SpeedMemory, commanded, memory_of, speeds_before
+from chaosgym.envs.learning import BeliefMemory, Memory, SpeedMemory, commanded, memory_of
 from chaosgym.errors import ModelFileError
 from chaosgym.files import write_atomically
 from chaosgym.policies.network import Dense, Lstm, Network, State
@@ -122,8 +122,8 @@ class TrainedPolicy:
         if self.squashed:
             answer = low + 0.5 * (np.tanh(answer) + 1.0) * (high - low)
         if self.largest_step is not None:
-            speeds = speeds_before(np.atleast_2d(observations), self._memory)
-            answer = commanded(answer, speeds, self.observation_space, self.largest_step)
+            last = np.atleast_2d(observations)
+            answer = commanded(answer, last, self._memory, self.observation_space, self.largest_step)
         return np.clip(answer, low, high).reshape(*observations.shape[:-1], -1).astype(np.float32)
 
     def _attribute(self, name: str) -> Any:
