@@ -106,7 +106,7 @@ class MachineSearch:
         grid = self._spread(SCREENED)
         promising = grid[np.argsort(_cost(self.errors(grid), ROUGH[0]), kind="stable")]
         points, scales, ends = promising[:STARTS], ROUGH, list[_End]()
-        self._felt = np.asarray(self._linearised(points)[1].any(axis=(0, 1)))
+        self._felt = np.asarray(self._slopes(points, self.errors(points)).any(axis=(0, 1)))
         generator = np.random.default_rng(0)
         for generation in range(GENERATIONS):
             ends += self._descend(points, np.geomspace(*scales, ITERATIONS))
@@ -122,7 +122,8 @@ class MachineSearch:
 
     def is_smooth(self) -> bool:
         """Whether most shares of the record change smoothly with the parameters of most machines."""
-        slopes = self._linearised(self._spread(STARTS))[1]
+        points = self._spread(STARTS)
+        slopes = self._slopes(points, self.errors(points))
         return bool(np.median(slopes.any(axis=2).mean(axis=1)) >= SMOOTH)
 
     def errors(self, points: Array) -> Array:
@@ -146,30 +147,29 @@ class MachineSearch:
 
     def _descend(self, points: Array, scales: Array) -> "list[_End]":
         """Go down from points (k, fields) side by side, with errors of ``scales`` in turn that weigh a half."""
-        errors, slopes = self._linearised(points)
+        errors = self.errors(points)
+        slopes = self._slopes(points, errors)
         damping = np.full(len(points), DAMPING)
         for scale in scales:
             trial = np.clip(points + _steps(errors, slopes, scale, damping), -1.0, 1.0)
-            found, there = self._linearised(trial)
+            found = self.errors(trial)
             better = _cost(found, scale) < _cost(errors, scale)
-            points = np.where(better[:, None], trial, points)
-            errors = np.where(better[:, None], found, errors)
-            slopes = np.where(better[:, None, None], there, slopes)
+            points, errors = np.where(better[:, None], trial, points), np.where(better[:, None], found, errors)
+            slopes[better] = self._slopes(points[better], errors[better])
             damping *= np.where(better, EASED, HELD_BACK)
             if scale > EQUAL and (_repeated(errors) >= REPEATED).any():
                 break
         costs = _cost(errors, FINE[1])
         return [_End(*each) for each in zip(costs.tolist(), _repeated(errors).tolist(), points, slopes, strict=True)]
 
-    def _linearised(self, points: Array) -> tuple[Array, Array]:
-        """Errors of points (k, fields), (k, n), and their derivatives (k, n, fields), zero across jumps."""
-        changes = np.vstack([np.zeros(self._fields), np.eye(self._fields)[self._felt]])
-        probes = points[:, None] + PROBE * changes
-        errors = self.errors(probes.reshape(-1, self._fields)).reshape(len(points), len(changes), -1)
-        slopes = np.zeros((len(points), len(self.record.shares), self._fields))
-        slopes[:, :, self._felt] = (errors[:, 1:] - errors[:, :1]).transpose(0, 2, 1) / PROBE
-        smooth = np.abs(slopes).max(axis=2, keepdims=True) < STEEP
-        return errors[:, 0], np.where(smooth, slopes, 0.0)
+    def _slopes(self, points: Array, errors: Array) -> Array:
+        """Derivatives (k, n, fields) of the errors (k, n) at points (k, fields), zero across jumps."""
+        slopes = np.zeros((*errors.shape, self._fields))
+        if len(points):
+            probes = points[:, None] + PROBE * np.eye(self._fields)[self._felt]
+            beside = self.errors(probes.reshape(-1, self._fields)).reshape(*probes.shape[:2], -1)
+            slopes[:, :, self._felt] = (beside - errors[:, None]).transpose(0, 2, 1) / PROBE
+        return np.where(np.abs(slopes).max(axis=2, keepdims=True) < STEEP, slopes, 0.0)
 
 
 class _End(NamedTuple):
