@@ -26,6 +26,11 @@ BESIDE = (SAFE_CONSTANT, "belief programming")
 
 CARD = Path(__file__).parent / "policy_card.md"
 
+NOTHING_LEARNED = """
+
+**Nothing learned.** Training never improved on the plan of the belief that it begins with; this policy is that plan."""
+"""What the card of a policy says whose best evaluation was the one before training."""
+
 
 @dataclass(frozen=True)
 class Arguments:
@@ -94,7 +99,7 @@ def main() -> None:
         machines=len(jobs), pool=judged["setting"]["pool"], score=score,
         type_iii=sum(job["type_iii_share"] for job in jobs) / len(jobs),
         safe_iii=figures[SAFE_CONSTANT]["type_iii_share"], reference_iii=figures[reference]["type_iii_share"],
-        belief=figures["belief programming"]["score"],
+        belief=figures["belief programming"]["score"], nothing_learned="" if best.steps else NOTHING_LEARNED,
         all_seeds=", ".join(f"{value:.2f}" for value in own["score_by_seed"]),
     )  # fmt: skip
     written = {"config.json": json.dumps(config, indent=1), "evaluation.json": json.dumps(report, indent=1)}

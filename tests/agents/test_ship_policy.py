@@ -61,6 +61,17 @@ def test_the_best_run_is_shipped_with_its_figures(runs):
     card = (folder / "card.md").read_text()
     assert "after 400 steps" in card
     assert "Score 0.20" in card
+    assert "Nothing learned" not in card
+
+
+def test_the_card_says_when_training_gained_nothing(runs):
+    """The best evaluation is the one before the first step."""
+    for place in range(2):
+        (runs / f"run-{place}" / "evaluations.csv").write_text(f"step,return\n0,{-1.0 - place}\n400,-2.0\n")
+    assert _ship(runs, "run-*").returncode == 0
+    card = (runs / "shipped" / "ImpactBeamTolerance-v0" / "card.md").read_text()
+    assert "after 0 steps" in card
+    assert "Nothing learned" in card
 
 
 def test_a_pattern_without_runs_is_named(runs):

@@ -4,8 +4,7 @@ A machine is hidden from the agent, but it answers the same way when a speed is 
 bin of speed, the mean and the standard deviation of the peak forces measured there in this job, and their number. The
 belief adds what these say about the machine, among those within the tolerances, and about the speeds in reach.
 Increments let an action say by how much the speed shall change instead of where it shall end; with a belief, by how
-much it shall differ from the belief's own plan (residual learning: T. Silver et al., arXiv:1812.06298), in steps of the
-map of speeds.
+much it shall differ from the belief's own plan (residual learning: T. Silver et al., arXiv:1812.06298).
 """
 
 from collections.abc import Callable
@@ -139,9 +138,13 @@ class BeliefMemory:
         """Take in observations (n, d) and return them with what is believed, (n, d + features)."""
         return self._told(self._belief.add(observations), observations, np.arange(len(observations)))
 
-    def nearest(self, speeds: Array) -> Array:
-        """Return the nearest speeds of the map (...)."""
-        return np.asarray(self._belief.speeds[nearest(self._belief.speeds, speeds)])
+    def settling(self, speeds: Array) -> Array:
+        """Return speeds (...) that a learner can keep exactly, so that the motion can settle: the nearest of the map.
+
+        Where the clearance grows no motion settles, and the speeds stay as they are.
+        """
+        known = self._belief.speeds
+        return speeds if self._pool.wears else np.asarray(known[nearest(known, speeds)])
 
     def _told(self, plan: Plan, observations: Observation, jobs: Numbers) -> Observation:
         self.planned[jobs, 0] = self._belief.speeds[plan.target]
@@ -211,8 +214,8 @@ def commanded(
 ) -> Actions:  # fmt: skip
     """Return the actions (n, 1) that change speeds by increments (n, 1) of -1 to 1 times ``largest``.
 
-    Without a belief it is the observed speed that changes. With one it is the planned speed, and the target is the
-    nearest speed of the map: only a motion whose speed stays exactly the same can settle.
+    Without a belief it is the observed speed that changes; with one it is the planned speed, to one at which the motion
+    can settle.
 
     Parameters
     ----------
@@ -229,7 +232,7 @@ def commanded(
     """
     change = largest * np.clip(increments, -1.0, 1.0)
     if isinstance(memory, BeliefMemory):
-        target = memory.nearest(memory.planned + change)
+        target = memory.settling(memory.planned + change)
     else:
         target = observations[:, SPEED, None].astype(float) + change
     low, high = space.low[0], space.high[0]
