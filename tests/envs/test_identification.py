@@ -170,6 +170,8 @@ def test_what_is_known_of_a_machine_replaces_what_is_believed(env):
     far = np.abs(table[0].speeds - env.drive.lowest_speed) > 1.0
     assert np.array_equal((after.irregular[0] > 0.5)[far], table[0].type_iii[far])
     assert after.doubt[0] == 0.0 < before.doubt[1]
+    assert not after.gathered[0].any()
+    assert after.gathered[1].any()
     assert np.mean((after.irregular[1] > 0.5)[far] == table[0].type_iii[far]) < 0.95
 
 

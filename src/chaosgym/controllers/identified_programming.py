@@ -2,7 +2,7 @@
 
 Until the record tells which machine within the tolerances it is, the best schedule of the expected map is played, but
 for the detours that an experiment asks for. Then the tables of the machine that was found are computed, some seconds
-for each, and take the place of the others; what is felt at a speed goes on to count.
+for each, and take the place of the others and of what was felt.
 """
 
 from typing import Any

@@ -140,7 +140,7 @@ class SpeedBelief:
         self._tables = [self._of_tables(pool.regimes(k)) for k in range(len(pool))]
         self._stack()
         self._machine, self._local = np.zeros((0, len(pool))), np.zeros((0, len(self.speeds)))
-        self._last, self._shares = np.zeros(0), np.zeros((0, COMPARED))
+        self._last, self._shares, self._known = np.zeros(0), np.zeros((0, COMPARED)), np.zeros(0, np.bool_)
 
     def _of_tables(self, tables: Sequence[RegimeTable]) -> Array:
         """Type III, force [N] and loss by wear of a machine by clearance and speed, (3, levels, speeds)."""
@@ -158,8 +158,8 @@ class SpeedBelief:
         return self._forecast.speeds
 
     def know(self, job: int, machine: int) -> None:
-        """Be certain from now on that a job runs a machine of the pool."""
-        self._machine[job] = -np.inf
+        """Be certain from now on that a job runs a machine of the pool, whatever is felt."""
+        self._known[job], self._machine[job] = True, -np.inf
         self._machine[job, machine] = 0.0
 
     def know_tables(self, job: int, tables: Sequence[RegimeTable]) -> None:
@@ -176,13 +176,13 @@ class SpeedBelief:
         self._stack()
         self._machine = np.zeros((count, len(self._tables)))
         self._local = np.zeros((count, len(self.speeds)))
-        self._last, self._shares = np.zeros(count), np.zeros((count, COMPARED))
+        self._last, self._shares, self._known = np.zeros(count), np.zeros((count, COMPARED)), np.zeros(count, np.bool_)
         return self.restart(np.ones(count, np.bool_), observations, excluded)
 
     def restart(self, which: NDArray[np.bool_], observations: Observation, excluded: Places | None = None) -> Plan:
         """Begin k of the jobs anew, ``which`` (n,), with observations (k, d) and ``excluded`` (k,); plans of these."""
         jobs = np.flatnonzero(which)
-        self._machine[jobs], self._local[jobs], self._last[jobs] = 0.0, 0.0, np.nan
+        self._machine[jobs], self._local[jobs], self._last[jobs], self._known[jobs] = 0.0, 0.0, np.nan, False
         self._machine[jobs, len(self._pool) :] = -np.inf
         if excluded is not None:
             self._machine[jobs, excluded] = -np.inf
@@ -248,7 +248,7 @@ class SpeedBelief:
 
     def _plan(self, jobs: Places, observations: Observation) -> Plan:
         """Best schedules of the expected maps, of jobs (k,) with observations (k, d)."""
-        score, gathered = self._machine[jobs], self._local[jobs]
+        score, gathered = self._machine[jobs], np.where(self._known[jobs, None], 0.0, self._local[jobs])
         weight = np.exp(score - score.max(axis=1, keepdims=True))
         weight /= weight.sum(axis=1, keepdims=True)
         level = self._level_of(observations)
