@@ -73,9 +73,10 @@ SENSES = {
         force_error=3.0,
     ),
 }
-"""Calibrated on the training pools, rounded from what ``agents/calibrate_belief.py`` counts. The beam's are somewhat
-more careful, and so are both errors of the force: the score of the plan on the training pool does not tell 4 from 9 N
-on the beam, or 1.5 from 3 N on the crank."""
+"""Calibrated on the training pools, rounded from what ``agents/calibrate_belief.py`` counts. Those of the scatter on
+the beam are somewhat more careful, those of the first comparison on the crank end at -3, and both errors of the force
+are larger: the score of the plan on the training pool does not tell 4 from 9 N on the beam, or 1.5 from 3 N on the
+crank."""
 
 TEMPERATURE = 2.0
 """By which the evidence of a step for a machine is divided: steps at one speed are not independent. Calibrated: from 1
