@@ -3,8 +3,8 @@
 The machine is one like those of the training pool, whose regime tables are known; where it wears, at the clearance that
 it has by now. Every step makes those machines more probable that are calm or irregular where this one is, and that
 strike as hard; and what was felt at a speed itself counts there in any case, since no two machines have the same map.
-A motion that settles repeats the share of bouncing, which has no sensor error; on the way, and where the clearance
-grows, the scatter of the peaks has to tell. The best schedule of the expected map is a plan.
+A motion that settles repeats the share of bouncing, which has no sensor error; in the first step at a speed, and where
+the clearance grows, the scatter of the peaks has to tell. The best schedule of the expected map is a plan.
 """
 
 from collections.abc import Sequence
