@@ -6,12 +6,13 @@
 
 Every contender runs one job on each machine, or several on the only one; a training seed of a policy counts as a run of
 its own. The folder keeps the jobs of each contender, report.json, table.md and comparison.png. A run that was stopped
-goes on, and a later one adds contenders to those that the folder has.
+goes on with the next job, and a later one adds contenders to those that the folder has.
 """
 
 import argparse
 import json
 import re
+import sys
 from collections.abc import Callable
 from glob import glob
 from pathlib import Path
@@ -101,31 +102,40 @@ class Comparison:
         paths = sorted(self._folder.glob("*.json"), key=lambda path: (len(path.name), path.name))
         found: dict[str, Results] = {}
         for path in paths:
-            name = path.stem.rpartition("-")[0]
-            content = self._read(path)
+            name, knows, jobs = path.stem.rpartition("-")[0], *self._read(path)
+            if len(jobs) < len(self._machines):
+                print(f"{path}: {len(jobs)} of {len(self._machines)} jobs; ask for {name} to go on", file=sys.stderr)
+                continue
             rows = found[name].rows if name in found else []
-            found[name] = Results(content["knows"], [*rows, [JobRow(**row) for row in content["jobs"]]])
+            found[name] = Results(knows, [*rows, jobs])
         return found
 
     def _jobs(self, name: str, contender: Contender, seed: int) -> list[JobRow]:
         path = self._folder / f"{name}-{seed}.json"
-        if path.is_file():
-            return [JobRow(**row) for row in self._read(path)["jobs"]]
+        jobs = self._read(path)[1] if path.is_file() else []
+        if len(jobs) == len(self._machines):
+            return jobs
+        path.parent.mkdir(parents=True, exist_ok=True)
         env = gym.make(self._env_id, **self._task)
         if contender.each_cycle:
             env = gym.make(self._env_id, **self._task, **each_cycle_keywords(env))
-        jobs = run_jobs(env, contender.makes[seed], self._machines, FIRST_SEED, progress=f"{name} {seed}")
-        content = {"setting": self._setting, "knows": contender.knows, "jobs": [job.as_dict() for job in jobs]}
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, lambda file: file.write_text(json.dumps(content) + "\n"))
+        runs = run_jobs(
+            env, contender.makes[seed], self._machines, FIRST_SEED, done=len(jobs), progress=f"{name} {seed}"
+        )
+        for job in runs:
+            jobs.append(job)
+            content = {"setting": self._setting, "knows": contender.knows, "jobs": [each.as_dict() for each in jobs]}
+            text = json.dumps(content) + "\n"
+            write_atomically(path, lambda file, text=text: file.write_text(text))
         return jobs
 
-    def _read(self, path: Path) -> dict[str, Any]:
+    def _read(self, path: Path) -> tuple[str, list[JobRow]]:
+        """What a contender knows, and the jobs that it has done."""
         content: dict[str, Any] = json.loads(path.read_text())
         if content["setting"] != self._setting:
             raise SystemExit(f"--out {self._folder.parent} holds another comparison, {content['setting']}; "
                              "choose another")  # fmt: skip
-        return content
+        return content["knows"], [JobRow(**row) for row in content["jobs"]]
 
 
 def _is_nominal(env: str) -> bool:

@@ -36,6 +36,21 @@ def test_controllers_are_compared_and_the_comparison_goes_on(tmp_path):
     assert "holds another comparison" in other.stderr
 
 
+def test_a_contender_that_was_stopped_goes_on_with_its_next_job(tmp_path):
+    """The rest of the jobs is as if nothing had happened, even by chance; who is not asked for waits and is named."""
+    out = ["--out", str(tmp_path), "--machines", "3"]
+    assert _run(*out, "--controllers", "random").returncode == 0
+    path = tmp_path / "jobs" / "random-0.json"
+    whole = path.read_text()
+    content = json.loads(whole)
+    path.write_text(json.dumps(content | {"jobs": content["jobs"][:1]}))
+    waiting = _run(*out, "--controllers")
+    assert "1 of 3 jobs; ask for random to go on" in waiting.stderr
+    assert "| random |" not in waiting.stdout
+    assert "| random |" in _run(*out, "--controllers", "random").stdout
+    assert path.read_text() == whole
+
+
 def test_unknown_contenders_are_refused(tmp_path):
     """The message lists the controllers; a pattern that no folder matches is named."""
     refused = _run("--out", str(tmp_path / "a"), "--controllers", "best")

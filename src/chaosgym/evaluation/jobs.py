@@ -1,6 +1,6 @@
 """What happened in each job? One row a job, the same machines and sensor errors for everybody."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
@@ -76,13 +76,17 @@ def run_jobs(
     machines: Sequence[int],
     first_seed: int,
     *,
+    done: int = 0,
     progress: str | None = None,
-) -> list[JobRow]:
-    """Run a job on each of some machines of the environment's pool.
+) -> Iterator[JobRow]:
+    """Run a job on each of some machines of the environment's pool, but for the first ones that are ``done``.
 
     Job i is reset with ``first_seed`` + i, so that everybody meets the same sensor errors. ``progress`` names a
     progress bar on standard error.
     """
     policy = make_policy(env)
-    bar = tqdm(machines, desc=progress, unit="job", disable=progress is None)
-    return [run_job(env, policy, machine, first_seed + i) for i, machine in enumerate(bar)]
+    bar = tqdm(total=len(machines), initial=done, desc=progress, unit="job", disable=progress is None)
+    with bar:
+        for i in range(done, len(machines)):
+            yield run_job(env, policy, machines[i], first_seed + i)
+            bar.update()
