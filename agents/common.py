@@ -1,8 +1,8 @@
 """What do all training scripts share? Arguments, environments, and a folder in which a run is kept and resumed.
 
-A folder holds policy.json and weights.npz (for numpy, of the best evaluation), policy.zip (stable-baselines3's last),
-normalisation.npz, config.json, progress.csv (every job) and evaluations.csv. While a run goes on, checkpoint.zip takes
-the place of policy.zip.
+A folder holds the policy of the best evaluation, as policy.json and weights.npz for numpy and as policy.zip and
+policy_normalisation.npz for stable-baselines3, and config.json, progress.csv (every job) and evaluations.csv. While a
+run goes on, checkpoint.zip and checkpoint_normalisation.npz are the last model.
 """
 
 import argparse
@@ -12,7 +12,7 @@ import platform
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, Literal, TypeVar, get_args
 
 import gymnasium as gym
 import numba
@@ -88,8 +88,13 @@ class Run:
             write_atomically(config, lambda path: path.write_text(text))
         elif not config.is_file() or json.loads(config.read_text())["arguments"] != arguments:
             raise SystemExit(f"--out {self.folder} exists and is not this run; choose another folder")
-        elif (self.folder / "policy.zip").exists():
+        elif self._is_finished():
             raise SystemExit(f"--out {self.folder} holds this run, finished; choose another folder")
+
+    def _is_finished(self) -> bool:
+        evaluations = self.folder / "evaluations.csv"
+        rows = list(csv.DictReader(evaluations.read_text().splitlines())) if evaluations.exists() else []
+        return bool(rows) and int(rows[-1]["step"]) >= self.arguments.steps
 
     def _seen(self, envs: VecEnv) -> VecEnv:
         return SB3LearnerView(envs, self.arguments.memory, self.arguments.increments)
@@ -98,7 +103,7 @@ class Run:
         """Return the model of the last checkpoint, or None if there is none."""
         if not (self.folder / "checkpoint.zip").exists():
             return None
-        with np.load(self.folder / "normalisation.npz") as held:
+        with np.load(self.folder / "checkpoint_normalisation.npz") as held:
             for name, statistics in (("obs", self.envs.obs_rms), ("ret", self.envs.ret_rms)):
                 for part in STATISTICS:
                     setattr(statistics, part, held[f"{name}_{part}"])
@@ -109,12 +114,12 @@ class Run:
         arguments = self.arguments
         self.envs.seed(arguments.seed * SEEDS_PER_RUN + model.num_timesteps)
         model.learn(arguments.steps - model.num_timesteps, Watch(self), reset_num_timesteps=False)
-        self.save(model, "policy.zip")
-        (self.folder / "checkpoint.zip").unlink(missing_ok=True)
+        for path in self.folder.glob("checkpoint*"):
+            path.unlink()
         print(f"policy, config and progress in {self.folder}")
 
-    def save(self, model: BaseAlgorithm, name: str) -> None:
-        """Write a model, and the normalisation that belongs to it."""
+    def save(self, model: BaseAlgorithm, name: Literal["policy", "checkpoint"]) -> None:
+        """Write a model as stable-baselines3 loads it, and the normalisation that belongs to it."""
         held = {
             f"{kind}_{part}": getattr(statistics, part)
             for kind, statistics in (("obs", self.envs.obs_rms), ("ret", self.envs.ret_rms))
@@ -129,8 +134,8 @@ class Run:
             with path.open("wb") as file:
                 model.save(file)
 
-        write_atomically(self.folder / "normalisation.npz", write_arrays)
-        write_atomically(self.folder / name, write_model)
+        write_atomically(self.folder / f"{name}_normalisation.npz", write_arrays)
+        write_atomically(self.folder / f"{name}.zip", write_model)
 
     def export(self, model: BaseAlgorithm) -> None:
         """Write the policy as numpy plays it."""
@@ -188,7 +193,7 @@ class Watch(BaseCallback):
         if self.num_timesteps - self.last >= self.run.arguments.evaluate_every:
             self.last = self.num_timesteps
             self._evaluate()
-            self.run.save(self.model, "checkpoint.zip")
+            self.run.save(self.model, "checkpoint")
 
     def _on_step(self) -> bool:
         self.bar.update(self.num_timesteps - self.bar.n)
@@ -206,6 +211,7 @@ class Watch(BaseCallback):
         if figures["return"] > self.best:
             self.best = figures["return"]
             self.run.export(self.model)
+            self.run.save(self.model, "policy")
         self._write(self.evaluations, [self.num_timesteps, *(f"{value:.6g}" for value in figures.values())])
         self.bar.set_postfix({name: f"{value:.3f}" for name, value in figures.items()})
 
