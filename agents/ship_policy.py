@@ -3,11 +3,12 @@
     python agents/ship_policy.py --evaluation runs/evaluation-beam --contender "PPO, belief" --runs "runs/ppo-belief-*"
 
 The best is the one whose periodic evaluation, on machines of the training pool, was best. No held-out machine has a
-say.
+say. What stable-baselines3 loads to train on goes to agents/policies/, since it contains pickled objects.
 """
 
 import csv
 import json
+import shutil
 from dataclasses import dataclass
 from glob import glob
 from pathlib import Path
@@ -24,6 +25,9 @@ from chaosgym.policies.shipped import shipped_folder
 BESIDE = (SAFE_CONSTANT, "belief programming")
 """Contenders whose figures stand beside those of the policy and of the reference."""
 
+MODEL = ("policy.zip", "policy_normalisation.npz")
+"""Files of a run that stable-baselines3 loads."""
+
 CARD = Path(__file__).parent / "policy_card.md"
 
 NOTHING_LEARNED = """
@@ -34,12 +38,13 @@ NOTHING_LEARNED = """
 
 @dataclass(frozen=True)
 class Arguments:
-    """Where the runs and their comparison are, and where the policies go: into the package."""
+    """Where the runs and their comparison are, and where policies (into the package) and their models go."""
 
     evaluation: str = "runs/evaluation"
     contender: str = "PPO"
     runs: str = "runs/ppo-*"
     out: str = str(shipped_folder(""))
+    models: str = str(Path(__file__).parent / "policies")
 
 
 class Best(NamedTuple):
@@ -105,7 +110,11 @@ def main() -> None:
     written = {"config.json": json.dumps(config, indent=1), "evaluation.json": json.dumps(report, indent=1)}
     for name, text in (written | {"card.md": card.rstrip()}).items():
         write_atomically(folder / name, lambda path, text=text: path.write_text(text + "\n"))
-    print(f"{best.folder} is the policy of {arguments['env']}, in {folder}")
+    models = Path(asked.models) / folder.name
+    models.mkdir(parents=True, exist_ok=True)
+    for name in MODEL:
+        write_atomically(models / name, lambda path, name=name: shutil.copyfile(best.folder / name, path))
+    print(f"{best.folder} is the policy of {arguments['env']}, in {folder} and {models}")
 
 
 if __name__ == "__main__":

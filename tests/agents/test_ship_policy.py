@@ -27,6 +27,8 @@ def runs(tmp_path):
         folder.mkdir()
         for name in ("policy.json", "weights.npz"):
             shutil.copyfile(source / name, folder / name)
+        for name in ("policy.zip", "policy_normalisation.npz"):
+            (folder / name).write_text(f"{name} of run {place}")
         config = json.loads((source / "config.json").read_text())
         config["arguments"]["seed"] = place
         (folder / "config.json").write_text(json.dumps(config))
@@ -44,7 +46,8 @@ def runs(tmp_path):
 
 def _ship(folder, pattern):
     command = [sys.executable, str(AGENTS / "ship_policy.py"), "--evaluation", str(folder / "comparison"),
-               "--contender", CONTENDER, "--runs", str(folder / pattern), "--out", str(folder / "shipped")]  # fmt: skip
+               "--contender", CONTENDER, "--runs", str(folder / pattern), "--out", str(folder / "shipped"),
+               "--models", str(folder / "models")]  # fmt: skip
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
@@ -62,6 +65,9 @@ def test_the_best_run_is_shipped_with_its_figures(runs):
     assert "after 400 steps" in card
     assert "Score 0.20" in card
     assert "Nothing learned" not in card
+    model = runs / "models" / "ImpactBeamTolerance-v0"
+    assert (model / "policy.zip").read_text() == "policy.zip of run 1"
+    assert (model / "policy_normalisation.npz").is_file()
 
 
 def test_the_card_says_when_training_gained_nothing(runs):
