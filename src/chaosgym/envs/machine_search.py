@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
+from tqdm import tqdm
 
 from chaosgym.envs.jobs import bouncing_share
 from chaosgym.envs.pools import Pool, worn
@@ -102,13 +103,13 @@ class MachineSearch:
         """Fields (fields,) that the record changes with at all: not those of a joint that the machine lacks."""
 
     def found(self) -> Array | None:
-        """Return the point (fields,) that repeats the record; None if none is found."""
+        """Return the point (fields,) that repeats the record; None if none is found. Shows progress after 2 s."""
         grid = self._spread(SCREENED)
         promising = grid[np.argsort(_cost(self.errors(grid), ROUGH[0]), kind="stable")]
         points, scales, ends = promising[:STARTS], ROUGH, list[_End]()
         self._felt = np.asarray(self._slopes(points, self.errors(points)).any(axis=(0, 1)))
         generator = np.random.default_rng(0)
-        for generation in range(GENERATIONS):
+        for generation in tqdm(range(GENERATIONS), desc="identification", unit="round", leave=False, delay=2.0):
             ends += self._descend(points, np.geomspace(*scales, ITERATIONS))
             ends.sort(key=lambda end: end.cost)
             if hits := [end.point for end in ends if end.repeated >= REPEATED]:
