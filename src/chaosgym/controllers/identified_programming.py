@@ -37,8 +37,6 @@ class IdentifiedProgramming(BeliefProgramming):
         """Look whether the machine is known by now; take the step of an experiment, or that of the largest worth."""
         if machines := self._identification.add(observation):
             self._belief.know_tables(0, robust_regimes(self.env.pool, self.task, machines))
-        for speed in self._identification.failed:
-            self._belief.distrust(0, speed)
         planned = super().__call__(observation)
         target = self._identification.target
         return planned if target is None else self.command(target)

@@ -62,9 +62,6 @@ class Identification:
         Deviation of each field from its nominal value, in tolerances; None as long as none repeats a record.
     target : float or None
         Speed that an experiment asks for next, if there is one; who goes elsewhere ends it.
-    failed : list of float
-        Speeds of experiments that no machine repeats: what the machine does there is perhaps not what it does from
-        rest, and so not what its table says.
     """
 
     def __init__(self, pool: Pool, task: Task) -> None:
@@ -75,7 +72,6 @@ class Identification:
         """Forget the last job."""
         self.estimate: Array | None = None
         self.target: float | None = None
-        self.failed: list[float] = []
         self._speeds: list[float] = []
         self._ratios: list[float] = []
         self._shares: list[float] = []
@@ -101,7 +97,10 @@ class Identification:
             return []
         if self.target is not None and not np.isclose(self._speeds[-1], self.target, rtol=1e-6):
             self._experiment = None
-        self._look()
+        for search in self._searches():
+            self.estimate = search.found()
+            if self.estimate is not None:
+                break
         left = float(observation[REMAINING]) * self._task.steps
         self.target = self._wanted() if self.estimate is None and left > WORTHWHILE else None
         return self.machines
@@ -115,16 +114,6 @@ class Identification:
             self._speeds.append(float(drive.rounded(float(observation[SPEED]))))
         self._ratios.append(1.0 + float(observation[-1]) if self._pool.wears else 1.0)
         self._shares.append(float(observation[BOUNCING]))
-
-    def _look(self) -> None:
-        """Look for the machine if it is time to."""
-        experiment = self._experiment
-        for search in self._searches():
-            self.estimate = search.found()
-            if self.estimate is not None:
-                return
-        if experiment is not None and self._experiment is None:
-            self.failed.append(self._speeds[experiment])
 
     def _searches(self) -> list[MachineSearch]:
         """Return searches by the record of the whole job, if it is time and machines move regularly from rest, or by
