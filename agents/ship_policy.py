@@ -36,6 +36,17 @@ NOTHING_LEARNED = """
 """What the card of a policy says whose best evaluation was the one before training."""
 
 
+GIVEN = {
+    "none": "the observation alone",
+    "speeds": "the observation, and the peak forces felt at each speed",
+    "belief": "the observation, and a belief over the map of speeds by what was felt",
+    "identified": "the observation, a belief over the map of speeds by what was felt, and the machine's own map "
+    "once a simulation repeats what was observed. The search for it takes some seconds to a minute of a job, and needs "
+    "the share of bouncing without error, as the task gives it",
+}
+"""What the card says of each memory."""
+
+
 @dataclass(frozen=True)
 class Arguments:
     """Where the runs and their comparison are, and where policies (into the package) and their models go."""
@@ -100,7 +111,8 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     save_policy(load_policy(best.folder), folder)
     card = CARD.read_text().format(
-        env=arguments["env"], steps=arguments["steps"], seeds=own["seeds"], jobs=arguments["jobs"], at=best.steps,
+        env=arguments["env"], given=GIVEN[arguments["memory"]], steps=arguments["steps"], seeds=own["seeds"],
+        jobs=arguments["jobs"], at=best.steps,
         machines=len(jobs), pool=judged["setting"]["pool"], score=score,
         type_iii=sum(job["type_iii_share"] for job in jobs) / len(jobs),
         safe_iii=figures[SAFE_CONSTANT]["type_iii_share"], reference_iii=figures[reference]["type_iii_share"],
