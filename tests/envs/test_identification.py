@@ -4,6 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from chaosgym.controllers.belief_programming import BeliefProgramming
 from chaosgym.controllers.identified_programming import IdentifiedProgramming
 from chaosgym.envs.belief import SpeedBelief
 from chaosgym.envs.identification import EXPERIMENT, EXPERIMENTS, FROM_REST, SETTLING_CYCLES, Identification
@@ -151,6 +152,20 @@ def test_who_goes_elsewhere_ends_an_experiment(crank, monkeypatch):
         _told(crank, identification, speed, 0.3)
 
 
+def test_who_knows_the_machine_does_not_look_for_it(monkeypatch):
+    """On the nominal machine the plan is that of the belief, which is certain."""
+    monkeypatch.setattr(MachineSearch, "found", lambda self: pytest.fail("the machine is known"))
+    env = gym.make("chaosgym/SliderCrank-v0")
+    observation, _ = env.reset(seed=0)
+    controller, plan = IdentifiedProgramming(env), BeliefProgramming(env)
+    for each in (controller, plan):
+        each.reset()
+    for _ in range(30):
+        action = controller(observation)
+        assert action == plan(observation)
+        observation = env.step(action)[0]
+
+
 def test_a_wearing_machine_is_found():
     """Clearances that grow with the damage are simulated as the environment lets them grow."""
     env = gym.make("chaosgym/ImpactBeamWear-v0", pool="training").unwrapped
@@ -221,7 +236,6 @@ def test_cranks_are_found_by_experiments(crank):
 @pytest.mark.slow
 def test_who_identifies_the_machine_beats_who_does_not():
     """The plan with the found machine's own tables earns nearly what the true tables earn."""
-    from chaosgym.controllers.belief_programming import BeliefProgramming
     from chaosgym.controllers.dynamic_programming import DynamicProgramming
     from chaosgym.evaluation.jobs import run_jobs
 
