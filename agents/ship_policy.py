@@ -41,8 +41,8 @@ GIVEN = {
     "speeds": "the observation, and the peak forces felt at each speed",
     "belief": "the observation, and a belief over the map of speeds by what was felt",
     "identified": "the observation, a belief over the map of speeds by what was felt, and the machine's own map "
-    "once a simulation repeats what was observed. The search for it takes some seconds to a minute of a job, and needs "
-    "the share of bouncing without error, as the task gives it",
+    "once a simulation repeats what was observed. The search for it takes some ten seconds of a job, a minute or more "
+    "where it fails, and needs the share of bouncing without error, as the task gives it",
 }
 """What the card says of each memory."""
 

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import gymnasium as gym
+import numpy as np
 import pytest
 
 from chaosgym.evaluation.jobs import run_job
@@ -75,11 +76,14 @@ def test_an_interrupted_run_goes_on(tmp_path):
     (tmp_path / "killed.py").write_text(f"import sys\nsys.path.insert(0, {str(AGENTS)!r})\n" + killed)
     assert _run(tmp_path / "killed.py", *arguments).returncode == 9
     (out / "progress.csv").write_text("step,return,length\n200,-1,100\n600,-9,200\n")
-    resumed = _run("train_ppo.py", *arguments)
+    resuming = script.replace("    run.learn(model)", "    run.learn(model)\n    run.save(model, 'checkpoint')")
+    (tmp_path / "resuming.py").write_text(f"import sys\nsys.path.insert(0, {str(AGENTS)!r})\n" + resuming)
+    resumed = _run(tmp_path / "resuming.py", *arguments)
     assert resumed.returncode == 0, resumed.stderr
     steps = [int(row["step"]) for row in _rows(out / "progress.csv")]
     assert steps == [200, 800, 800, 1200, 1200]
-    assert not list(out.glob("checkpoint*"))
+    with np.load(out / "checkpoint_normalisation.npz") as held:
+        assert held["obs_count"] == pytest.approx(1200 + 4, abs=1.0)
     assert "finished; choose another folder" in _run("train_ppo.py", *arguments).stderr
 
 
