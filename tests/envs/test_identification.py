@@ -7,7 +7,7 @@ import pytest
 from chaosgym.controllers.belief_programming import BeliefProgramming
 from chaosgym.controllers.identified_programming import IdentifiedProgramming
 from chaosgym.envs.belief import SpeedBelief
-from chaosgym.envs.identification import EXPERIMENT, EXPERIMENTS, FROM_REST, SETTLING_CYCLES, Identification
+from chaosgym.envs.identification import EXPERIMENT, EXPERIMENTS, FROM_REST, SETTLING_CYCLES, SIDES, STAY, Identification
 from chaosgym.envs.jobs import RUN_IN_CYCLES
 from chaosgym.envs.learning import IdentifiedMemory
 from chaosgym.envs.machine_search import EQUAL, MachineSearch
@@ -85,7 +85,7 @@ def test_a_crank_repeats_an_experiment_in_simulation(crank, monkeypatch):
         observation = controller.env.step(controller(observation))[0]
     assert len(records[0].shares) == len(EXPERIMENT) + 1
     changes = (records[0].speeds[1:] - records[0].speeds[0]) / (crank.drive.slew_limit / 4.0)
-    assert changes == pytest.approx(EXPERIMENT)
+    assert changes == pytest.approx(SIDES[0] * np.array(EXPERIMENT))
     points = _deviation(crank, 5) + np.array([np.zeros(4), [0.01, 0.0, 0.0, 0.0]])
     true, other = np.abs(MachineSearch(crank.pool, crank.task, records[0]).errors(points))
     assert true.max() < EQUAL < np.median(other)
@@ -109,7 +109,7 @@ def _experimented(crank, monkeypatch, shares, left=1.0):
     for speed in np.arange(50.0, 200.0, 10.0):
         assert _told(crank, identification, speed, next(shares)) is None
     speed = 200.0
-    for _ in range(3 * len(EXPERIMENT)):
+    for _ in range(4 * len(EXPERIMENT)):
         speed = _told(crank, identification, speed, next(shares), left) or 200.0
     return records
 
@@ -124,12 +124,34 @@ def test_no_experiment_where_the_motion_does_not_settle_or_the_job_is_nearly_don
 def test_a_longer_orbit_may_be_at_any_of_its_phases(crank, monkeypatch, period):
     """A motion that repeats itself after some steps is simulated for as many numbers of cycles before the record."""
     records = _experimented(crank, monkeypatch, np.resize(0.3 + 0.01 * np.arange(period), 100))
-    assert [record.cycles for record in records] == [SETTLING_CYCLES + phase for phase in range(period)]
-    assert len({tuple(record.speeds) for record in records}) == 1
+    assert [record.cycles for record in records] == [SETTLING_CYCLES + phase for phase in range(period)] * len(SIDES)
+    assert len({tuple(record.speeds) for record in records}) == len(SIDES)
+
+
+def test_the_other_side_is_tried_where_the_motion_does_not_settle_beside(crank, monkeypatch):
+    """A share that still changes at the end of the stay makes no sense to search with: no machine is near enough."""
+    settled, shares = 16, np.full(100, 0.3)
+    shares[settled + 1 : settled + 1 + STAY] += [0.01, 0.02, 0.03]
+    searched = [record.speeds.tolist() for record in _experimented(crank, monkeypatch, shares)]
+    assert searched == [(200.0 + SIDES[1] * crank.drive.slew_limit / 4.0 * np.array([0, *EXPERIMENT])).tolist()]
+
+
+def test_an_experiment_stays_within_the_range_of_the_drive(crank, monkeypatch):
+    """At the highest speed there is one side only."""
+    searched = []
+    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self: False)
+    monkeypatch.setattr(MachineSearch, "found", lambda self: searched.append(self.record.speeds.tolist()))
+    identification = Identification(crank.pool, crank.task)
+    for speed in np.arange(50.0, 300.0, 10.0):
+        assert _told(crank, identification, speed, 0.3) is None
+    speed = 300.0
+    for _ in range(4 * len(EXPERIMENT)):
+        speed = _told(crank, identification, speed, 0.3) or 300.0
+    assert [set(speeds) for speeds in searched] == [{300.0, 297.5}]
 
 
 def test_a_motion_that_has_settled_is_experimented_with_where_no_experiment_has_failed(crank, monkeypatch):
-    """A share that repeats itself begins an experiment, once at each speed."""
+    """A share that repeats itself begins an experiment, once on each side of a speed."""
     searched = []
     monkeypatch.setattr(MachineSearch, "is_smooth", lambda self: False)
     monkeypatch.setattr(MachineSearch, "found", lambda self: searched.append(self.record.speeds[0]))
@@ -140,7 +162,7 @@ def test_a_motion_that_has_settled_is_experimented_with_where_no_experiment_has_
         speed = place
         for _ in range(3 * len(EXPERIMENT)):
             speed = _told(crank, identification, speed, 0.3) or place
-    assert searched == [200.0, 210.0, 220.0][:EXPERIMENTS]
+    assert searched == np.repeat([200.0, 210.0, 220.0, 230.0], len(SIDES)).tolist()[:EXPERIMENTS]
 
 
 def test_who_goes_elsewhere_ends_an_experiment(crank, monkeypatch):

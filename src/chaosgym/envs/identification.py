@@ -1,7 +1,8 @@
 """Which machine is it? A job goes on, with experiments on the way, until a machine is found that repeats them.
 
 A record can be repeated in simulation where the motion before it is known: from rest, if machines move regularly there,
-or from an orbit that the motion has settled on. Small changes of speed from such an orbit are an experiment.
+or from an orbit that the motion has settled on. A stay a little beside the speed of such an orbit is an experiment: where
+the motion settles there too, its shares change smoothly with the parameters; where it does not, it is no use to search.
 
 References
 ----------
@@ -27,12 +28,23 @@ SETTLING_CYCLES = 60
 """Cycles from rest after which a machine is taken to have settled where the one observed has; calibrated: enough for
 most training cranks to repeat what they did."""
 
-EXPERIMENT = (-1, 0, 0, 1, 0, 0, -2, 0, 0, 2, 0)
-"""Speeds of the steps after the motion has settled, as changes from there in quarters of the slew limit; calibrated on
-training cranks: after longer stays elsewhere fewer of them come back to what can be repeated."""
+STAY = 3
+"""Steps of an experiment beside the speed of the orbit, and then as many back at it; calibrated on training cranks: most
+settle within two."""
 
-EXPERIMENTS = 3
-"""Experiments of a job at most, each at another speed; assumed."""
+EXPERIMENT = (1,) * STAY + (0,) * STAY
+"""Speeds of the steps after the motion has settled, as changes from there in quarters of the slew limit."""
+
+SIDES = (-1, 1)
+"""Factors of an experiment, the first one first: a speed is left downwards, and upwards if no machine is found;
+assumed."""
+
+SETTLED = 1e-4
+"""Difference of the last two shares beside from which on the motion counts as not settled there, and the machine is not
+looked for; calibrated: of training cranks beyond it few are found."""
+
+EXPERIMENTS = 6
+"""Experiments of a job at most; assumed."""
 
 WORTHWHILE = 50
 """Steps that a job must still have for an experiment; assumed."""
@@ -76,8 +88,8 @@ class Identification:
         self._ratios: list[float] = []
         self._shares: list[float] = []
         self._experiment: int | None = None
-        self._period = 1
-        self._tried: set[float] = set()
+        self._period = self._side = 1
+        self._tried: set[tuple[float, int]] = set()
 
     @property
     def machines(self) -> list[Machine]:
@@ -117,7 +129,7 @@ class Identification:
 
     def _searches(self) -> list[MachineSearch]:
         """Return searches by the record of the whole job, if it is time and machines move regularly from rest, or by
-        that of an experiment that is done, for each phase that the orbit may have had at its beginning."""
+        that of an experiment that is done and made sense, for each phase that the orbit may have had at its beginning."""
         if len(self._speeds) in FROM_REST:
             search = self._search(0, max(RUN_IN_CYCLES, self._task.cycles_per_step))
             if search.is_smooth():
@@ -125,22 +137,27 @@ class Identification:
         if self._experiment is None or len(self._speeds) <= self._experiment + len(EXPERIMENT):
             return []
         first, self._experiment = self._experiment, None
+        if self._period == 1 and abs(self._shares[first + STAY] - self._shares[first + STAY - 1]) > SETTLED:
+            return []
         return [self._search(first, SETTLING_CYCLES + phase) for phase in range(self._period)]
 
     def _wanted(self) -> float | None:
         """Speed to go to next: that of an experiment, which begins as soon as the motion has settled."""
         if self._experiment is None:
-            period = self._period_of_steps
-            if period is None or self._speeds[-1] in self._tried or len(self._tried) == EXPERIMENTS:
+            period, speed = self._period_of_steps, self._speeds[-1]
+            sides = [side for side in SIDES if (speed, side) not in self._tried and self._beside(speed, side) != speed]
+            if period is None or not sides or len(self._tried) == EXPERIMENTS:
                 return None
-            self._experiment, self._period = len(self._speeds) - 1, period
-            self._tried.add(self._speeds[-1])
-        change = EXPERIMENT[len(self._speeds) - 1 - self._experiment] * self._pool.drive.slew_limit / 4.0
-        return self._commanded(self._speeds[self._experiment] + change)
+            self._experiment, self._period, self._side = len(self._speeds) - 1, period, sides[0]
+            self._tried.add((speed, sides[0]))
+        change = EXPERIMENT[len(self._speeds) - 1 - self._experiment] * self._side
+        return self._beside(self._speeds[self._experiment], change)
 
-    def _commanded(self, speed: float) -> float:
+    def _beside(self, speed: float, change: int) -> float:
+        """Speed that is some quarters of the slew limit beside another, as far as the drive goes."""
         drive = self._pool.drive
-        return float(drive.rounded(np.clip(speed, drive.lowest_speed, drive.highest_speed)))
+        beside = speed + change * drive.slew_limit / 4.0
+        return float(drive.rounded(np.clip(beside, drive.lowest_speed, drive.highest_speed)))
 
     @property
     def _period_of_steps(self) -> int | None:

@@ -33,7 +33,7 @@ GENERATIONS = 5
 """How often starting points are followed up, the first time those of the screening, then those along valleys;
 calibrated."""
 
-VALLEYS, EACH, FRESH, ALONG = 2, 3, 2, 0.8
+VALLEYS, EACH, FRESH, ALONG = 2, 3, 6, 0.8
 """Starting points of a later generation: in how many valleys, how many in each, how many more of the screening; and how
 far along a valley at most, in tolerances; assumed."""
 
