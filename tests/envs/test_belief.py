@@ -77,6 +77,25 @@ def test_a_motion_that_repeats_itself_is_calm(env):
     assert changed.gathered[0, place] > 2.0
 
 
+def test_a_distrusted_speed_is_avoided_until_the_machine_is_known(env):
+    """Whatever is felt there, of one job and of the speed alone, and as long as asked; its own table is trusted."""
+    table = env.pool.regimes(17)[0]
+    place = int(np.flatnonzero(~table.type_iii)[-1])
+    belief = SpeedBelief(env.pool, env.task)
+    belief.start(np.repeat(_felt(table, place), 2, axis=0))
+    belief.distrust(0, [float(table.speeds[place])])
+    for _ in range(5):
+        plan = belief.add(np.repeat(_felt(table, place), 2, axis=0))
+    assert plan.irregular[0, place] > 0.5 > plan.irregular[1, place]
+    assert plan.irregular[0, place + 1] == plan.irregular[1, place + 1]
+    belief.distrust(0, [])
+    plan = belief.add(np.repeat(_felt(table, place), 2, axis=0))
+    assert plan.irregular[0, place] == plan.irregular[1, place]
+    belief.distrust(0, [float(table.speeds[place])])
+    belief.know(0, 17)
+    assert belief.add(np.repeat(_felt(table, place), 2, axis=0)).irregular[0, place] < 0.1
+
+
 def test_a_share_is_compared_within_a_stay_alone(env):
     """Back at a speed after one step elsewhere, the share of the last stay says nothing about this one."""
     table, belief = env.pool.regimes(17)[0], SpeedBelief(env.pool, env.task)

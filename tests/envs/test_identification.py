@@ -7,7 +7,15 @@ import pytest
 from chaosgym.controllers.belief_programming import BeliefProgramming
 from chaosgym.controllers.identified_programming import IdentifiedProgramming
 from chaosgym.envs.belief import SpeedBelief
-from chaosgym.envs.identification import EXPERIMENT, EXPERIMENTS, FROM_REST, SETTLING_CYCLES, SIDES, STAY, Identification
+from chaosgym.envs.identification import (
+    EXPERIMENT,
+    EXPERIMENTS,
+    FROM_REST,
+    SETTLING_CYCLES,
+    SIDES,
+    STAY,
+    Identification,
+)
 from chaosgym.envs.jobs import RUN_IN_CYCLES
 from chaosgym.envs.learning import IdentifiedMemory
 from chaosgym.envs.machine_search import EQUAL, MachineSearch
@@ -163,6 +171,22 @@ def test_a_motion_that_has_settled_is_experimented_with_where_no_experiment_has_
         for _ in range(3 * len(EXPERIMENT)):
             speed = _told(crank, identification, speed, 0.3) or place
     assert searched == np.repeat([200.0, 210.0, 220.0, 230.0], len(SIDES)).tolist()[:EXPERIMENTS]
+
+
+def test_a_speed_whose_experiments_failed_is_kept_away_from_while_others_are_left(crank, monkeypatch):
+    """Both sides have to fail; with the last experiment of the job what was felt counts again."""
+    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self: False)
+    monkeypatch.setattr(MachineSearch, "found", lambda self: None)
+    identification, failed = Identification(crank.pool, crank.task), []
+    for speed in np.arange(50.0, 200.0, 10.0):
+        _told(crank, identification, speed, 0.3)
+    for place in 200.0 + 10.0 * np.arange(EXPERIMENTS // len(SIDES)):
+        speed = place
+        for _ in range(3 * len(EXPERIMENT)):
+            speed = _told(crank, identification, speed, 0.3) or place
+            if not failed or failed[-1] != identification.failed:
+                failed.append(set(identification.failed))
+    assert failed == [set(), {200.0}, {200.0, 210.0}, set()]
 
 
 def test_who_goes_elsewhere_ends_an_experiment(crank, monkeypatch):

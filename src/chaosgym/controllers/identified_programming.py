@@ -1,8 +1,9 @@
 """What is a model worth to one who does not know which machine it is? Identify the machine, then plan with its tables.
 
 Until the record tells which machine within the tolerances it is, the best schedule of the expected map is played, but
-for the detours that an experiment asks for. Then the tables of the machine that was found are computed, some seconds
-for each, and take the place of the others and of what was felt.
+for the detours that an experiment asks for. It keeps away from speeds whose experiments have failed, while there are
+others to be made. Then the tables of the machine that was found are computed, some seconds for each, and take the place
+of the others and of what was felt.
 """
 
 from typing import Any
@@ -39,6 +40,8 @@ class IdentifiedProgramming(BeliefProgramming):
             return super().__call__(observation)
         if machines := self._identification.add(observation):
             self._belief.know_tables(0, robust_regimes(self.env.pool, self.task, machines))
+        if self._began:
+            self._belief.distrust(0, self._identification.failed)
         planned = super().__call__(observation)
         target = self._identification.target
         return planned if target is None else self.command(target)

@@ -7,7 +7,7 @@ A motion that settles repeats the share of bouncing, which has no sensor error; 
 the clearance grows, the scatter of the peaks has to tell. The best schedule of the expected map is a plan.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -142,6 +142,7 @@ class SpeedBelief:
         self._stack()
         self._machine, self._local = np.zeros((0, len(pool))), np.zeros((0, len(self.speeds)))
         self._last, self._shares, self._known = np.zeros(0), np.zeros((0, COMPARED)), np.zeros(0, np.bool_)
+        self._distrusted = np.zeros((0, len(self.speeds)), np.bool_)
 
     def _of_tables(self, tables: Sequence[RegimeTable]) -> Array:
         """Type III, force [N] and loss by wear of a machine by clearance and speed, (3, levels, speeds)."""
@@ -170,6 +171,12 @@ class SpeedBelief:
         self._machine = np.pad(self._machine, ((0, 0), (0, 1)), constant_values=-np.inf)
         self.know(job, len(self._tables) - 1)
 
+    def distrust(self, job: int, speeds: Iterable[float]) -> None:
+        """Reckon with Type III at these speeds and no others, whatever is felt there, until the machine is known."""
+        self._distrusted[job] = False
+        for speed in speeds:
+            self._distrusted[job, self._forecast.place_of(np.array([speed]))] = True
+
     def start(self, observations: Observation, excluded: Places | None = None) -> Plan:
         """Begin n jobs with their first observations (n, d); ``excluded`` (n,) are machines that can't be the one."""
         count = len(observations)
@@ -178,12 +185,14 @@ class SpeedBelief:
         self._machine = np.zeros((count, len(self._tables)))
         self._local = np.zeros((count, len(self.speeds)))
         self._last, self._shares, self._known = np.zeros(count), np.zeros((count, COMPARED)), np.zeros(count, np.bool_)
+        self._distrusted = np.zeros((count, len(self.speeds)), np.bool_)
         return self.restart(np.ones(count, np.bool_), observations, excluded)
 
     def restart(self, which: NDArray[np.bool_], observations: Observation, excluded: Places | None = None) -> Plan:
         """Begin k of the jobs anew, ``which`` (n,), with observations (k, d) and ``excluded`` (k,); plans of these."""
         jobs = np.flatnonzero(which)
         self._machine[jobs], self._local[jobs], self._last[jobs], self._known[jobs] = 0.0, 0.0, np.nan, False
+        self._distrusted[jobs] = False
         self._machine[jobs, len(self._pool) :] = -np.inf
         if excluded is not None:
             self._machine[jobs, excluded] = -np.inf
@@ -249,7 +258,8 @@ class SpeedBelief:
 
     def _plan(self, jobs: Places, observations: Observation) -> Plan:
         """Best schedules of the expected maps, of jobs (k,) with observations (k, d)."""
-        score, gathered = self._machine[jobs], np.where(self._known[jobs, None], 0.0, self._local[jobs])
+        score, gathered = self._machine[jobs], np.where(self._distrusted[jobs], CERTAIN[1], self._local[jobs])
+        gathered[self._known[jobs]] = 0.0
         weight = np.exp(score - score.max(axis=1, keepdims=True))
         weight /= weight.sum(axis=1, keepdims=True)
         level = self._level_of(observations)

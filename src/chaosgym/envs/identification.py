@@ -1,8 +1,9 @@
 """Which machine is it? A job goes on, with experiments on the way, until a machine is found that repeats them.
 
 A record can be repeated in simulation where the motion before it is known: from rest, if machines move regularly there,
-or from an orbit that the motion has settled on. A stay a little beside the speed of such an orbit is an experiment: where
-the motion settles there too, its shares change smoothly with the parameters; where it does not, it is no use to search.
+or from an orbit that the motion has settled on. A stay a little beside the speed of such an orbit is an experiment:
+where the motion settles there too, its shares change smoothly with the parameters; where it does not, it is no use to
+search.
 
 References
 ----------
@@ -29,8 +30,8 @@ SETTLING_CYCLES = 60
 most training cranks to repeat what they did."""
 
 STAY = 3
-"""Steps of an experiment beside the speed of the orbit, and then as many back at it; calibrated on training cranks: most
-settle within two."""
+"""Steps of an experiment beside the speed of the orbit, and then as many back at it; calibrated on training cranks:
+most settle within two."""
 
 EXPERIMENT = (1,) * STAY + (0,) * STAY
 """Speeds of the steps after the motion has settled, as changes from there in quarters of the slew limit."""
@@ -74,6 +75,8 @@ class Identification:
         Deviation of each field from its nominal value, in tolerances; None as long as none repeats a record.
     target : float or None
         Speed that an experiment asks for next, if there is one; who goes elsewhere ends it.
+    failed : set of float
+        Speeds on both sides of which experiments have failed, as long as more can be made elsewhere.
     """
 
     def __init__(self, pool: Pool, task: Task) -> None:
@@ -84,6 +87,7 @@ class Identification:
         """Forget the last job."""
         self.estimate: Array | None = None
         self.target: float | None = None
+        self.failed: set[float] = set()
         self._speeds: list[float] = []
         self._ratios: list[float] = []
         self._shares: list[float] = []
@@ -109,11 +113,16 @@ class Identification:
             return []
         if self.target is not None and not np.isclose(self._speeds[-1], self.target, rtol=1e-6):
             self._experiment = None
+        experiment = self._experiment
         for search in self._searches():
             self.estimate = search.found()
             if self.estimate is not None:
                 break
+        if experiment is not None and self._experiment is None and not self._untried(self._speeds[experiment]):
+            self.failed.add(self._speeds[experiment])
         left = float(observation[REMAINING]) * self._task.steps
+        if self.estimate is not None or left <= WORTHWHILE or self._is_used_up:
+            self.failed.clear()
         self.target = self._wanted() if self.estimate is None and left > WORTHWHILE else None
         return self.machines
 
@@ -129,7 +138,7 @@ class Identification:
 
     def _searches(self) -> list[MachineSearch]:
         """Return searches by the record of the whole job, if it is time and machines move regularly from rest, or by
-        that of an experiment that is done and made sense, for each phase that the orbit may have had at its beginning."""
+        that of an experiment that is done and settled, for each phase that the orbit may have had at its beginning."""
         if len(self._speeds) in FROM_REST:
             search = self._search(0, max(RUN_IN_CYCLES, self._task.cycles_per_step))
             if search.is_smooth():
@@ -145,13 +154,22 @@ class Identification:
         """Speed to go to next: that of an experiment, which begins as soon as the motion has settled."""
         if self._experiment is None:
             period, speed = self._period_of_steps, self._speeds[-1]
-            sides = [side for side in SIDES if (speed, side) not in self._tried and self._beside(speed, side) != speed]
-            if period is None or not sides or len(self._tried) == EXPERIMENTS:
+            sides = self._untried(speed)
+            if period is None or not sides or self._is_used_up:
                 return None
             self._experiment, self._period, self._side = len(self._speeds) - 1, period, sides[0]
             self._tried.add((speed, sides[0]))
         change = EXPERIMENT[len(self._speeds) - 1 - self._experiment] * self._side
         return self._beside(self._speeds[self._experiment], change)
+
+    @property
+    def _is_used_up(self) -> bool:
+        """Whether as many experiments have been made as a job may have, and none is going on."""
+        return self._experiment is None and len(self._tried) == EXPERIMENTS
+
+    def _untried(self, speed: float) -> list[int]:
+        """Sides of a speed, as far as the drive goes, that no experiment has been made on."""
+        return [side for side in SIDES if (speed, side) not in self._tried and self._beside(speed, side) != speed]
 
     def _beside(self, speed: float, change: int) -> float:
         """Speed that is some quarters of the slew limit beside another, as far as the drive goes."""
