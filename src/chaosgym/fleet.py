@@ -60,6 +60,10 @@ class Cycles(NamedTuple):
         """Return those of some of the machines."""
         return Cycles(self.failed[chosen], self.peak_force[chosen], self.impacts[chosen], self.bounce_duration[chosen])
 
+    def until(self, end: int) -> "Cycles":
+        """Return the first ``end`` cycles."""
+        return Cycles(self.failed, self.peak_force[:, :end], self.impacts[:, :end], self.bounce_duration[:, :end])
+
 
 @lru_cache(maxsize=KEPT_MACHINES)
 def at_speed(machine: Machine, speed: float) -> Machine:

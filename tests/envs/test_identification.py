@@ -13,13 +13,13 @@ from chaosgym.envs.identification import (
     FROM_REST,
     SETTLING_CYCLES,
     SIDES,
-    STAY,
     Identification,
 )
-from chaosgym.envs.jobs import RUN_IN_CYCLES
+from chaosgym.envs.jobs import RUN_IN_CYCLES, bouncing_share, impacts_per_cycle
 from chaosgym.envs.learning import IdentifiedMemory
-from chaosgym.envs.machine_search import EQUAL, MachineSearch
+from chaosgym.envs.machine_search import EQUAL, MachineSearch, Record
 from chaosgym.envs.observation import BOUNCING, LAST_ACTION, REMAINING, SPEED
+from chaosgym.fleet import at_speed, fleet_of
 
 UP = np.array([1.0], np.float32)
 
@@ -129,19 +129,56 @@ def test_no_experiment_where_the_motion_does_not_settle_or_the_job_is_nearly_don
 
 
 @pytest.mark.parametrize("period", [1, 2, 3, 4])
-def test_a_longer_orbit_may_be_at_any_of_its_phases(crank, monkeypatch, period):
-    """A motion that repeats itself after some steps is simulated for as many numbers of cycles before the record."""
-    records = _experimented(crank, monkeypatch, np.resize(0.3 + 0.01 * np.arange(period), 100))
-    assert [record.cycles for record in records] == [SETTLING_CYCLES + phase for phase in range(period)] * len(SIDES)
-    assert len({tuple(record.speeds) for record in records}) == len(SIDES)
+def test_a_record_knows_the_orbit_that_it_begins_on(crank, monkeypatch, period):
+    """It holds the shares of the steps after which the motion repeats itself, up to its first observation."""
+    shares = 0.3 + 0.01 * np.arange(period)
+    for record in _experimented(crank, monkeypatch, np.resize(shares, 100)):
+        assert sorted(record.orbit) == pytest.approx(shares)
+        assert record.orbit[-1] == record.shares[0]
+        assert record.cycles == SETTLING_CYCLES
 
 
-def test_the_other_side_is_tried_where_the_motion_does_not_settle_beside(crank, monkeypatch):
-    """A share that still changes at the end of the stay makes no sense to search with: no machine is near enough."""
-    settled, shares = 16, np.full(100, 0.3)
-    shares[settled + 1 : settled + 1 + STAY] += [0.01, 0.02, 0.03]
-    searched = [record.speeds.tolist() for record in _experimented(crank, monkeypatch, shares)]
-    assert searched == [(200.0 + SIDES[1] * crank.drive.slew_limit / 4.0 * np.array([0, *EXPERIMENT])).tolist()]
+def _record_of(crank, machine, speed, period, cycles):
+    """Record of an experiment below a speed, after some cycles there from rest, on an orbit of ``period`` steps."""
+    speeds = speed - crank.drive.slew_limit / 4.0 * np.array([0, *EXPERIMENT])
+    fleet, which = fleet_of(crank.pool[machine], 1), np.array([0])
+    fleet.start(0, at_speed(crank.pool[machine], speed))
+    seen = fleet.run(which, cycles)
+    orbit = [bouncing_share(seen.until(cycles - 5 * k), 5, crank.machine.period_at(speed))[0] for k in range(period)]
+    shares, impacts = [orbit[0]], [impacts_per_cycle(seen, 5)[0]]
+    for each in speeds[1:]:
+        fleet.set_speeds(which, np.array([each]))
+        seen = fleet.run(which, 5)
+        shares.append(bouncing_share(seen, 5, crank.machine.period_at(each))[0])
+        impacts.append(impacts_per_cycle(seen, 5)[0])
+    return Record(SETTLING_CYCLES, *map(np.array, (orbit[::-1], speeds, np.ones(len(speeds)), shares, impacts)))
+
+
+@pytest.mark.parametrize(("machine", "speed", "period"), [(13, 120.0, 2), (17, 160.0, 3), (110, 160.0, 4)])
+def test_a_longer_orbit_is_left_at_the_phase_that_was_observed(crank, machine, speed, period):
+    """However long the machine has run before, the shares before the experiment tell where on the orbit it is."""
+    for cycles in range(100, 100 + period):
+        record = _record_of(crank, machine, speed, period, cycles)
+        for phases, repeats in ((0, True), (1, False)):
+            turned = record._replace(orbit=np.roll(record.orbit, phases))
+            errors = MachineSearch(crank.pool, crank.task, turned).errors(_deviation(crank, machine)[None])
+            assert (np.abs(errors).max() < EQUAL) == repeats
+
+
+def test_a_share_with_another_number_of_impacts_is_far_off(crank):
+    """A motion of another kind may bounce as long by chance, and leads nowhere."""
+    record = _record_of(crank, 13, 120.0, 2, 100)
+    other = record._replace(impacts=record.impacts + np.eye(len(record.impacts))[3] / 5)
+    errors = np.abs(MachineSearch(crank.pool, crank.task, other).errors(_deviation(crank, 13)[None])[0])
+    assert np.flatnonzero(errors > EQUAL).tolist() == [3]
+    assert errors[3] > 1e4 * EQUAL
+
+
+def test_the_other_side_is_tried_where_no_machine_repeats_the_first(crank, monkeypatch):
+    """A stay a quarter of the slew limit below and one back, and then as much above."""
+    searched = [record.speeds.tolist() for record in _experimented(crank, monkeypatch, np.full(100, 0.3))]
+    quarter = crank.drive.slew_limit / 4.0 * np.array([0, *EXPERIMENT])
+    assert searched == [(200.0 + side * quarter).tolist() for side in SIDES]
 
 
 def test_an_experiment_stays_within_the_range_of_the_drive(crank, monkeypatch):

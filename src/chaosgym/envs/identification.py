@@ -2,8 +2,7 @@
 
 A record can be repeated in simulation where the motion before it is known: from rest, if machines move regularly there,
 or from an orbit that the motion has settled on. A stay a little beside the speed of such an orbit is an experiment:
-where the motion settles there too, its shares change smoothly with the parameters; where it does not, it is no use to
-search.
+where the motion settles there too, its shares change smoothly with the parameters and the search is short.
 
 References
 ----------
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from chaosgym.envs.jobs import RUN_IN_CYCLES
 from chaosgym.envs.machine_search import EQUAL, MachineSearch, Record, machine_at
-from chaosgym.envs.observation import BOUNCING, LAST_ACTION, REMAINING, SPEED, Observation
+from chaosgym.envs.observation import BOUNCING, IMPACTS, LAST_ACTION, REMAINING, SPEED, Observation
 from chaosgym.envs.pools import Pool
 from chaosgym.envs.tasks import Task
 from chaosgym.machines.machine import Machine
@@ -40,10 +39,6 @@ SIDES = (-1, 1)
 """Factors of an experiment, the first one first: a speed is left downwards, and upwards if no machine is found;
 assumed."""
 
-SETTLED = 1e-4
-"""Difference of the last two shares beside from which on the motion counts as not settled there, and the machine is not
-looked for; calibrated: of training cranks beyond it few are found."""
-
 EXPERIMENTS = 6
 """Experiments of a job at most; assumed."""
 
@@ -51,8 +46,7 @@ WORTHWHILE = 50
 """Steps that a job must still have for an experiment; assumed."""
 
 LONGEST = 4
-"""Longest period of an orbit in steps, and so in cycles where five are a step, for which its phase is guessed;
-assumed."""
+"""Longest period in steps of an orbit that an experiment begins on; assumed."""
 
 PRECISION, ALIKE = 1e-6, 8
 """Usual error of estimates, in tolerances, calibrated on training beams, and how many machines stand for what is
@@ -91,6 +85,7 @@ class Identification:
         self._speeds: list[float] = []
         self._ratios: list[float] = []
         self._shares: list[float] = []
+        self._impacts: list[float] = []
         self._experiment: int | None = None
         self._period = self._side = 1
         self._tried: set[tuple[float, int]] = set()
@@ -135,10 +130,11 @@ class Identification:
             self._speeds.append(float(drive.rounded(float(observation[SPEED]))))
         self._ratios.append(1.0 + float(observation[-1]) if self._pool.wears else 1.0)
         self._shares.append(float(observation[BOUNCING]))
+        self._impacts.append(float(observation[IMPACTS]))
 
     def _searches(self) -> list[MachineSearch]:
         """Return searches by the record of the whole job, if it is time and machines move regularly from rest, or by
-        that of an experiment that is done and settled, for each phase that the orbit may have had at its beginning."""
+        that of an experiment that is done and settled."""
         if len(self._speeds) in FROM_REST:
             search = self._search(0, max(RUN_IN_CYCLES, self._task.cycles_per_step))
             if search.is_smooth():
@@ -146,9 +142,7 @@ class Identification:
         if self._experiment is None or len(self._speeds) <= self._experiment + len(EXPERIMENT):
             return []
         first, self._experiment = self._experiment, None
-        if self._period == 1 and abs(self._shares[first + STAY] - self._shares[first + STAY - 1]) > SETTLED:
-            return []
-        return [self._search(first, SETTLING_CYCLES + phase) for phase in range(self._period)]
+        return [self._search(first, SETTLING_CYCLES, self._period)]
 
     def _wanted(self) -> float | None:
         """Speed to go to next: that of an experiment, which begins as soon as the motion has settled."""
@@ -186,8 +180,10 @@ class Identification:
                 return period
         return None
 
-    def _search(self, first: int, cycles: int) -> MachineSearch:
-        """Search by the record from an observation on, at whose end the machine has run for some cycles from rest."""
+    def _search(self, first: int, cycles: int, period: int = 1) -> MachineSearch:
+        """Search by the record from an observation on, at whose end the machine has run for some cycles from rest, or
+        where it has settled by then on an orbit of some steps."""
         before = [self._ratios[max(first - 1, 0)], *self._ratios[first:-1]]
-        speeds, shares = np.array(self._speeds[first:]), np.array(self._shares[first:])
-        return MachineSearch(self._pool, self._task, Record(cycles, speeds, np.array(before), shares))
+        orbit = np.array(self._shares[first + 1 - period : first + 1])
+        seen = (self._speeds[first:], before, self._shares[first:], self._impacts[first:])
+        return MachineSearch(self._pool, self._task, Record(cycles, orbit, *map(np.array, seen)))

@@ -55,6 +55,11 @@ def bouncing_share(cycles: Cycles, last: int, period: Any) -> Array:
     return np.asarray(2.0 * duration.reshape(len(duration), math.prod(duration.shape[1:])).mean(axis=1) / period)
 
 
+def impacts_per_cycle(cycles: Cycles, last: int) -> Array:
+    """Contacts begun in a cycle by k machines, mean of their ``last`` cycles."""
+    return np.asarray(cycles.impacts[:, -last:].sum(axis=(1, 2)) / last)
+
+
 class Jobs:
     """Jobs on the machines of a fleet.
 
@@ -194,7 +199,7 @@ class Jobs:
         monitored = cycles.peak_force[..., 0]
         n = self._peaks.shape[1]
         self._peaks[which] = monitored[:, -n:]
-        self._impacts[which] = cycles.impacts[:, -n:].sum(axis=(1, 2)) / n
+        self._impacts[which] = impacts_per_cycle(cycles, n)
         self._bouncing[which] = bouncing_share(cycles, n, self.rules.machine.period_at(speed))
 
     def _observe(self, which: Indices, generators: Generators) -> Observation:

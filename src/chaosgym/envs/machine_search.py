@@ -1,7 +1,8 @@
 """Which machine repeats a record? The one whose simulation gives the same shares of bouncing: output error.
 
 The share of the half cycle spent bouncing has no sensor error and changes smoothly with the parameters, but for jumps
-where a bounce more or less belongs to it. Levenberg-Marquardt steps under Cauchy weights go down from many starting
+where a bounce more or less belongs to it. How many impacts there were is observed too, and where a simulation has
+another number its share is no guide. Levenberg-Marquardt steps under Cauchy weights go down from many starting
 points side by side, and then from points along the valleys that they end in, until one repeats the record.
 
 References
@@ -17,10 +18,10 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 from tqdm import tqdm
 
-from chaosgym.envs.jobs import bouncing_share
+from chaosgym.envs.jobs import bouncing_share, impacts_per_cycle
 from chaosgym.envs.pools import Pool, worn
 from chaosgym.envs.tasks import Task
-from chaosgym.fleet import at_speed, fleet_of
+from chaosgym.fleet import Cycles, Fleet, at_speed, fleet_of
 from chaosgym.machines.machine import Machine
 
 Array = NDArray[np.float64]
@@ -54,6 +55,10 @@ PROBE = 1e-6
 STEEP = 5.0
 """Derivative of a share by a factor in tolerances that is none: a jump lies in between; assumed."""
 
+OTHER_BRANCH = 0.1
+"""Error of a share that belongs to another number of impacts than was counted: near shares mean nothing there;
+assumed."""
+
 SMOOTH = 0.5
 """Share of the observations that has to change smoothly with the parameters for a search to make sense; assumed."""
 
@@ -68,14 +73,19 @@ does not; assumed."""
 class Record(NamedTuple):
     """Observations (n,) that a simulation from rest can repeat.
 
-    ``cycles`` from rest to the end of the first of them, at its speed; ``speeds`` of the steps; ``ratios`` of the
-    clearance to that of the new machine during them; ``shares`` of the half cycle spent bouncing.
+    ``cycles`` from rest to the end of the first of them, at its speed, if ``orbit`` is that observation's share alone;
+    where it is those of several steps, the last ones up to it, a motion that repeats itself after so many steps, it has
+    settled after ``cycles`` and goes on to the same phase. ``speeds`` of the steps; ``ratios`` of the clearance to that
+    of the new machine during them; ``shares`` of the half cycle spent bouncing; ``impacts`` a cycle, nan where any
+    number of them will do.
     """
 
     cycles: int
+    orbit: Array
     speeds: Array
     ratios: Array
     shares: Array
+    impacts: Array
 
 
 def machine_at(pool: Pool, point: Array) -> Machine:
@@ -123,24 +133,59 @@ class MachineSearch:
 
     def is_smooth(self) -> bool:
         """Whether most shares of the record change smoothly with the parameters of most machines."""
-        points = self._spread(STARTS)
-        slopes = self._slopes(points, self.errors(points))
+        points, any_branch = (
+            self._spread(STARTS),
+            self.record._replace(impacts=np.full(len(self.record.shares), np.nan)),
+        )
+        search = MachineSearch(self._pool, self._task, any_branch)
+        slopes = search._slopes(points, search.errors(points))
         return bool(np.median(slopes.any(axis=2).mean(axis=1)) >= SMOOTH)
 
     def errors(self, points: Array) -> Array:
-        """Simulated less observed shares of machines at points (k, fields), (k, n)."""
+        """Simulated less observed shares of machines at points (k, fields), (k, n); those of another number of impacts
+        than was counted are ``OTHER_BRANCH``."""
+        shares, impacts = self._simulated(points)
+        differ = np.abs(impacts - self.record.impacts) > 0.5 / self._task.cycles_per_step
+        return np.where(differ, OTHER_BRANCH, shares - self.record.shares)
+
+    def _simulated(self, points: Array) -> tuple[Array, Array]:
+        """Shares and impacts a cycle of machines at points (k, fields) in the steps of the record, (k, n) each."""
         record, machines = self.record, [machine_at(self._pool, point) for point in points]
         fleet, which = fleet_of(machines[0], len(machines)), np.arange(len(machines))
         shares = np.empty((len(machines), len(record.shares)))
+        impacts = np.empty_like(shares)
         for step, (speed, ratio) in enumerate(zip(record.speeds.tolist(), record.ratios.tolist(), strict=True)):
             if step == 0 or ratio != record.ratios[step - 1]:
                 put = fleet.change if step else fleet.start
                 for place, machine in enumerate(machines):
                     put(place, at_speed(worn(machine, ratio) if self._pool.wears else machine, speed))
             fleet.set_speeds(which, np.full(len(which), speed))
-            cycles = fleet.run(which, self._task.cycles_per_step if step else record.cycles)
-            shares[:, step] = bouncing_share(cycles, self._task.cycles_per_step, self._pool.nominal.period_at(speed))
-        return shares - record.shares
+            if step == 0:
+                self._begin(fleet)
+            cycles = fleet.run(which, self._task.cycles_per_step)
+            shares[:, step], impacts[:, step] = self._observed(cycles, speed)
+        return shares, impacts
+
+    def _begin(self, fleet: Fleet) -> None:
+        """Run machines from rest to the beginning of the first observation, at the phase that fits the orbit best."""
+        orbit, each, all_of_them = self.record.orbit, self._task.cycles_per_step, np.arange(len(fleet))
+        if len(orbit) == 1:
+            fleet.run(all_of_them, self.record.cycles - each)
+            return
+        period = each * len(orbit)
+        cycles = fleet.run(all_of_them, self.record.cycles + 2 * period - 1)
+        ends = self.record.cycles + np.arange(period)[:, None] + each * (1 + np.arange(len(orbit)))
+        shares = [[self._observed(cycles.until(end), self.record.speeds[0])[0] for end in row] for row in ends.tolist()]
+        fitting = np.abs(np.array(shares) - orbit[:, None]).max(axis=1).argmin(axis=0)
+        for phase in range(period):
+            # from the end of the last phase to the same point of a later period, but for the step to be observed
+            fleet.run(np.flatnonzero(fitting == phase), (phase + 1 - each) % period)
+
+    def _observed(self, cycles: Cycles, speed: float) -> tuple[Array, Array]:
+        """Shares and impacts a cycle (k,) of the last step of k machines."""
+        each = self._task.cycles_per_step
+        period = self._pool.nominal.period_at(speed)
+        return bouncing_share(cycles, each, period), impacts_per_cycle(cycles, each)
 
     def _spread(self, count: int) -> Array:
         """Points (count, fields) that cover the tolerances."""

@@ -12,9 +12,9 @@ Observation = NDArray[np.float32]
 IMPACT_RANGE = 200.0
 """Impacts a cycle at which the counter saturates."""
 
-SPEED, LAST_ACTION, REMAINING, BOUNCING, FIRST_PEAK = 0, 1, 2, 7, 8
-"""Places in an observation of the speed, of the action behind it, of the remaining share of the job, of the share spent
-bouncing, and of the first measured peak."""
+SPEED, LAST_ACTION, REMAINING, IMPACTS, BOUNCING, FIRST_PEAK = 0, 1, 2, 6, 7, 8
+"""Places in an observation of the speed, of the action behind it, of the remaining share of the job, of the impacts a
+cycle, of the share spent bouncing, and of the first measured peak."""
 
 
 def observation_names(cycles_per_step: int, wears: bool) -> tuple[str, ...]:
