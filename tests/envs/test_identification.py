@@ -16,7 +16,7 @@ from chaosgym.envs.identification import (
     Identification,
 )
 from chaosgym.envs.jobs import RUN_IN_CYCLES, bouncing_share, impacts_per_cycle
-from chaosgym.envs.learning import IdentifiedMemory
+from chaosgym.envs.learning import IdentifiedMemory, LearnerView
 from chaosgym.envs.machine_search import EQUAL, MachineSearch, Record
 from chaosgym.envs.observation import BOUNCING, LAST_ACTION, REMAINING, SPEED
 from chaosgym.fleet import at_speed, fleet_of
@@ -85,7 +85,6 @@ def test_a_crank_repeats_an_experiment_in_simulation(crank, monkeypatch):
     """What a settled crank does when its speed is changed a little depends on its parameters alone, not on the past."""
     records = []
     monkeypatch.setattr(MachineSearch, "found", lambda self: records.append(self.record))
-    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self: False)
     controller = IdentifiedProgramming(gym.make("chaosgym/SliderCrankTolerance-v0", pool="training"))
     observation, _ = controller.env.reset(seed=0, options={"machine": 5})
     controller.reset()
@@ -111,7 +110,6 @@ def _told(crank, identification, speed, share, left=1.0):
 def _experimented(crank, monkeypatch, shares, left=1.0):
     """Records that are looked for after a long stay at 200 rpm whose steps have these shares in turn."""
     records = []
-    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self: False)
     monkeypatch.setattr(MachineSearch, "found", lambda self: records.append(self.record))
     identification, shares = Identification(crank.pool, crank.task), iter(shares)
     for speed in np.arange(50.0, 200.0, 10.0):
@@ -184,7 +182,6 @@ def test_the_other_side_is_tried_where_no_machine_repeats_the_first(crank, monke
 def test_an_experiment_stays_within_the_range_of_the_drive(crank, monkeypatch):
     """At the highest speed there is one side only."""
     searched = []
-    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self: False)
     monkeypatch.setattr(MachineSearch, "found", lambda self: searched.append(self.record.speeds.tolist()))
     identification = Identification(crank.pool, crank.task)
     for speed in np.arange(50.0, 300.0, 10.0):
@@ -198,7 +195,6 @@ def test_an_experiment_stays_within_the_range_of_the_drive(crank, monkeypatch):
 def test_a_motion_that_has_settled_is_experimented_with_where_no_experiment_has_failed(crank, monkeypatch):
     """A share that repeats itself begins an experiment, once on each side of a speed."""
     searched = []
-    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self: False)
     monkeypatch.setattr(MachineSearch, "found", lambda self: searched.append(self.record.speeds[0]))
     identification = Identification(crank.pool, crank.task)
     for speed in np.arange(50.0, 200.0, 10.0):
@@ -212,7 +208,6 @@ def test_a_motion_that_has_settled_is_experimented_with_where_no_experiment_has_
 
 def test_a_speed_whose_experiments_failed_is_kept_away_from_while_others_are_left(crank, monkeypatch):
     """Both sides have to fail; with the last experiment of the job what was felt counts again."""
-    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self: False)
     monkeypatch.setattr(MachineSearch, "found", lambda self: None)
     identification, failed = Identification(crank.pool, crank.task), []
     for speed in np.arange(50.0, 200.0, 10.0):
@@ -228,7 +223,6 @@ def test_a_speed_whose_experiments_failed_is_kept_away_from_while_others_are_lef
 
 def test_who_goes_elsewhere_ends_an_experiment(crank, monkeypatch):
     """An identification that only looks on is not led to take a detour for an experiment."""
-    monkeypatch.setattr(MachineSearch, "is_smooth", lambda self: False)
     monkeypatch.setattr(MachineSearch, "found", lambda self: pytest.fail("there was no experiment"))
     identification = Identification(crank.pool, crank.task)
     for speed in (*np.arange(50.0, 200.0, 10.0), *[200.0] * 20):
@@ -284,6 +278,19 @@ def test_in_training_the_machine_is_known_after_as_many_observations(env):
     assert doubt[FROM_REST[0] - 1 :] == [0.0, 0.0]
     again = memory.restart(np.array([True]), observations[:1], np.array([4]))
     assert again[0, -1] > 0.0
+
+
+def test_a_learner_makes_the_experiments_too(crank):
+    """What it does in between is its own; an experiment is made whatever it says, and tells the machine."""
+    view = LearnerView(gym.make("chaosgym/SliderCrankTolerance-v0", pool="training"), memory="identified")
+    seen, _ = view.reset(seed=0, options={"machine": 5})
+    held = 0
+    while seen[-1] > 0.0:
+        planned, is_held = float(view._memory.planned[0, 0]), bool(view._memory.held[0, 0])
+        seen, *_, info = view.step(np.array([1.0 if is_held else 0.0], np.float32))
+        held += is_held
+        assert info["speed"] == pytest.approx(planned)
+    assert held == len(EXPERIMENT)
 
 
 @pytest.mark.slow

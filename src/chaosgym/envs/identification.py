@@ -9,6 +9,8 @@ References
 L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall, 1999, chapter 13 (experiment design).
 """
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,6 +55,20 @@ PRECISION, ALIKE = 1e-6, 8
 possible within it, assumed."""
 
 
+@lru_cache(maxsize=16)
+def is_regular_from_rest(pool: Pool, task: Task) -> bool:
+    """Whether what most machines of a pool do in the first steps of full acceleration changes smoothly with them."""
+    drive = pool.drive
+    speeds = np.minimum(drive.lowest_speed + drive.slew_limit * np.arange(FROM_REST[0]), drive.highest_speed)
+    none, new = np.zeros(len(speeds)), np.ones(len(speeds))
+    return MachineSearch(pool, task, Record(_run_in(task), none[:1], speeds, new, none, none)).is_smooth()
+
+
+def _run_in(task: Task) -> int:
+    """Cycles from rest to the end of the first observation of a job."""
+    return max(RUN_IN_CYCLES, task.cycles_per_step)
+
+
 class Identification:
     """The machine of one job, as a point within the tolerances.
 
@@ -62,6 +78,8 @@ class Identification:
         Whose nominal machine and tolerances are known.
     task
         Of the job.
+    truth : (fields,), optional
+        What a search comes to; searched by default.
 
     Attributes
     ----------
@@ -73,8 +91,8 @@ class Identification:
         Speeds on both sides of which experiments have failed, as long as more can be made elsewhere.
     """
 
-    def __init__(self, pool: Pool, task: Task) -> None:
-        self._pool, self._task = pool, task
+    def __init__(self, pool: Pool, task: Task, truth: Array | None = None) -> None:
+        self._pool, self._task, self._truth = pool, task, truth
         self.start()
 
     def start(self) -> None:
@@ -106,13 +124,11 @@ class Identification:
         self._note(observation)
         if self.estimate is not None:
             return []
-        if self.target is not None and not np.isclose(self._speeds[-1], self.target, rtol=1e-6):
+        if self.target is not None and abs(self._speeds[-1] - self.target) > 1e-6 * self.target:
             self._experiment = None
         experiment = self._experiment
-        for search in self._searches():
-            self.estimate = search.found()
-            if self.estimate is not None:
-                break
+        if search := self._due():
+            self.estimate = search.found() if self._truth is None else self._truth
         if experiment is not None and self._experiment is None and not self._untried(self._speeds[experiment]):
             self.failed.add(self._speeds[experiment])
         left = float(observation[REMAINING]) * self._task.steps
@@ -132,17 +148,15 @@ class Identification:
         self._shares.append(float(observation[BOUNCING]))
         self._impacts.append(float(observation[IMPACTS]))
 
-    def _searches(self) -> list[MachineSearch]:
-        """Return searches by the record of the whole job, if it is time and machines move regularly from rest, or by
-        that of an experiment that is done and settled."""
-        if len(self._speeds) in FROM_REST:
-            search = self._search(0, max(RUN_IN_CYCLES, self._task.cycles_per_step))
-            if search.is_smooth():
-                return [search]
+    def _due(self) -> MachineSearch | None:
+        """Return a search by the record of the whole job, if it is time and machines move regularly from rest, or by
+        that of an experiment that is done."""
+        if len(self._speeds) in FROM_REST and is_regular_from_rest(self._pool, self._task):
+            return self._search(0, _run_in(self._task))
         if self._experiment is None or len(self._speeds) <= self._experiment + len(EXPERIMENT):
-            return []
+            return None
         first, self._experiment = self._experiment, None
-        return [self._search(first, SETTLING_CYCLES, self._period)]
+        return self._search(first, SETTLING_CYCLES, self._period)
 
     def _wanted(self) -> float | None:
         """Speed to go to next: that of an experiment, which begins as soon as the motion has settled."""

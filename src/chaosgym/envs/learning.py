@@ -16,13 +16,15 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 
 from chaosgym.envs.belief import Plan, SpeedBelief
-from chaosgym.envs.identification import FROM_REST, Identification
+from chaosgym.envs.identification import Identification
+from chaosgym.envs.machine_search import point_of
 from chaosgym.envs.observation import FIRST_PEAK, SPEED, Observation
 from chaosgym.envs.pools import Pool
 from chaosgym.envs.regimes import nearest
 from chaosgym.envs.robust_regimes import robust_regimes
 from chaosgym.envs.tasks import Task
 from chaosgym.errors import ParameterError
+from chaosgym.machines.machine import Machine
 
 Array = NDArray[np.float64]
 Actions = NDArray[np.float32]
@@ -95,7 +97,14 @@ class SpeedMemory:
 
 
 class BeliefMemory:
-    """A belief over the map of speeds, of n jobs side by side; ``planned`` (n, 1) are the speeds that it goes to next.
+    """A belief over the map of speeds, of n jobs side by side.
+
+    Attributes
+    ----------
+    planned : (n, 1)
+        Speeds that it goes to next.
+    held : (n, 1)
+        Whether it goes there whatever the learner says, for an experiment.
 
     Parameters
     ----------
@@ -113,7 +122,7 @@ class BeliefMemory:
         self.space = Box(
             np.concatenate([space.low, low]).astype(np.float32), np.concatenate([space.high, high]).astype(np.float32)
         )
-        self.planned = np.zeros((0, 1))
+        self.planned, self.held = np.zeros((0, 1)), np.zeros((0, 1), np.bool_)
 
     def start(self, observations: Observation, excluded: Numbers | None = None) -> Observation:
         """Forget everything and take in the first observations (n, d) of n jobs; return (n, d + features).
@@ -121,7 +130,7 @@ class BeliefMemory:
         ``excluded`` (n,) are the machines of the training pool that they are, if they are: they would be found too
         easily among their own tables.
         """
-        self.planned = np.zeros((len(observations), 1))
+        self.planned, self.held = np.zeros((len(observations), 1)), np.zeros((len(observations), 1), np.bool_)
         return self._told(self._belief.start(observations, excluded), observations, np.arange(len(observations)))
 
     def restart(
@@ -147,15 +156,15 @@ class BeliefMemory:
         return speeds if self._pool.wears else np.asarray(known[nearest(known, speeds)])
 
     def _told(self, plan: Plan, observations: Observation, jobs: Numbers) -> Observation:
-        self.planned[jobs, 0] = self._belief.speeds[plan.target]
+        self.planned[jobs, 0], self.held[jobs] = self._belief.speeds[plan.target], False
         return np.concatenate([observations, self._belief.features(plan)], axis=1, dtype=np.float32)
 
 
 class IdentifiedMemory(BeliefMemory):
     """A belief that becomes certain as soon as the machine is identified, of n jobs side by side.
 
-    Its tables are computed then, which takes seconds to minutes. A machine of the training pool is known after as many
-    observations as an identification takes, without one.
+    Its tables are computed then, which takes seconds to minutes. A machine of the training pool is known as soon as
+    there is a record to look for it by, without a search.
 
     Parameters
     ----------
@@ -169,12 +178,9 @@ class IdentifiedMemory(BeliefMemory):
 
     def start(self, observations: Observation, excluded: Numbers | None = None) -> Observation:
         """Forget everything and take in the first observations (n, d) of n jobs; return (n, d + features)."""
-        count = len(observations)
-        self._number = np.full(count, -1) if excluded is None else excluded.copy()
-        self._seen = np.ones(count, np.int64)
-        self._looking = [Identification(self._pool, self._task) for _ in range(count)]
-        for identification, observation in zip(self._looking, observations, strict=True):
-            identification.add(observation)
+        self._number = np.full(len(observations), -1) if excluded is None else excluded.copy()
+        self._looking = [self._identification(number, first)
+                         for number, first in zip(self._number.tolist(), observations, strict=True)]  # fmt: skip
         return super().start(observations, excluded)
 
     def restart(
@@ -182,21 +188,36 @@ class IdentifiedMemory(BeliefMemory):
     ) -> Observation:
         """Forget k of the jobs, ``which`` (n,), and take in their first observations (k, d), as in ``start``."""
         self._number[which] = -1 if excluded is None else excluded
-        self._seen[which] = 1
         for job, observation in zip(np.flatnonzero(which).tolist(), observations, strict=True):
-            self._looking[job].start()
-            self._looking[job].add(observation)
+            self._looking[job] = self._identification(int(self._number[job]), observation)
         return super().restart(which, observations, excluded)
 
     def add(self, observations: Observation) -> Observation:
         """Take in observations (n, d) and return them with what is believed, (n, d + features)."""
-        self._seen += 1
-        for job in np.flatnonzero((self._number >= 0) & (self._seen == FROM_REST[0])).tolist():
+        for job, (identification, observation) in enumerate(zip(self._looking, observations, strict=True)):
+            if machines := identification.add(observation):
+                self._know(job, machines)
+            self._belief.distrust(job, identification.failed)
+        told = super().add(observations)
+        targets = [identification.target for identification in self._looking]
+        for job, target in enumerate(targets):
+            if target is not None:
+                self.planned[job], self.held[job] = target, True
+        return told
+
+    def _identification(self, number: int, observation: Observation) -> Identification:
+        """Begin to look for a machine, which is found by its first record if its number in the pool is not -1."""
+        truth = None if number < 0 else point_of(self._pool, number)
+        identification = Identification(self._pool, self._task, truth)
+        identification.add(observation)
+        return identification
+
+    def _know(self, job: int, machines: list[Machine]) -> None:
+        """Trust the tables of a machine of the pool, or of the one that was found."""
+        if self._number[job] >= 0:
             self._belief.know(job, int(self._number[job]))
-        for job in np.flatnonzero(self._number < 0).tolist():
-            if machines := self._looking[job].add(observations[job]):
-                self._belief.know_tables(job, robust_regimes(self._pool, self._task, machines))
-        return super().add(observations)
+        else:
+            self._belief.know_tables(job, robust_regimes(self._pool, self._task, machines))
 
 
 def remembered_space(space: Box) -> Box:
@@ -215,7 +236,7 @@ def commanded(
     """Return the actions (n, 1) that change speeds by increments (n, 1) of -1 to 1 times ``largest``.
 
     Without a belief it is the observed speed that changes; with one it is the planned speed, to one at which the motion
-    can settle.
+    can settle, but for an experiment, which goes to the planned speed.
 
     Parameters
     ----------
@@ -232,7 +253,7 @@ def commanded(
     """
     change = largest * np.clip(increments, -1.0, 1.0)
     if isinstance(memory, BeliefMemory):
-        target = memory.settling(memory.planned + change)
+        target = np.where(memory.held, memory.planned, memory.settling(memory.planned + change))
     else:
         target = observations[:, SPEED, None].astype(float) + change
     low, high = space.low[0], space.high[0]

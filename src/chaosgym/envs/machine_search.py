@@ -93,6 +93,11 @@ def machine_at(pool: Pool, point: Array) -> Machine:
     return pool.machine_with(1.0 + point * np.array(list(pool.tolerances.values())))
 
 
+def point_of(pool: Pool, number: int) -> Array:
+    """Return the point (fields,) within the tolerances of a pool that one of its machines is at."""
+    return np.asarray((pool.drawn[number] - 1.0) / np.array(list(pool.tolerances.values())))
+
+
 class MachineSearch:
     """A search among the machines within the tolerances, points (fields,) from -1 to 1, for one that repeats a record.
 
