@@ -60,7 +60,7 @@ def test_only_the_machine_itself_repeats_the_record(env):
     for observation in _started(env, 5, 5):
         identification.add(observation)
     others = np.random.default_rng(0).uniform(-1.0, 1.0, (16, 3))
-    search = identification._search(0, RUN_IN_CYCLES)
+    search = MachineSearch(env.pool, env.task, identification._record(0, RUN_IN_CYCLES))
     errors = np.abs(search.errors(np.vstack([_deviation(env, 5), others])))
     assert errors[0].max() < EQUAL < errors[1:].max(axis=1).min()
 

@@ -152,11 +152,12 @@ class Identification:
         """Return a search by the record of the whole job, if it is time and machines move regularly from rest, or by
         that of an experiment that is done."""
         if len(self._speeds) in FROM_REST and is_regular_from_rest(self._pool, self._task):
-            return self._search(0, _run_in(self._task))
+            # impacts are not compared from rest: the published comparisons of the beams were made without
+            return self._search(self._record(0, _run_in(self._task)).of_any_number())
         if self._experiment is None or len(self._speeds) <= self._experiment + len(EXPERIMENT):
             return None
         first, self._experiment = self._experiment, None
-        return self._search(first, SETTLING_CYCLES, self._period)
+        return self._search(self._record(first, SETTLING_CYCLES, self._period))
 
     def _wanted(self) -> float | None:
         """Speed to go to next: that of an experiment, which begins as soon as the motion has settled."""
@@ -194,10 +195,13 @@ class Identification:
                 return period
         return None
 
-    def _search(self, first: int, cycles: int, period: int = 1) -> MachineSearch:
-        """Search by the record from an observation on, at whose end the machine has run for some cycles from rest, or
+    def _record(self, first: int, cycles: int, period: int = 1) -> Record:
+        """Return the record from an observation on, at whose end the machine has run for some cycles from rest, or
         where it has settled by then on an orbit of some steps."""
         before = [self._ratios[max(first - 1, 0)], *self._ratios[first:-1]]
         orbit = np.array(self._shares[first + 1 - period : first + 1])
         seen = (self._speeds[first:], before, self._shares[first:], self._impacts[first:])
-        return MachineSearch(self._pool, self._task, Record(cycles, orbit, *map(np.array, seen)))
+        return Record(cycles, orbit, *map(np.array, seen))
+
+    def _search(self, record: Record) -> MachineSearch:
+        return MachineSearch(self._pool, self._task, record)

@@ -1,9 +1,9 @@
 """Which machine repeats a record? The one whose simulation gives the same shares of bouncing: output error.
 
 The share of the half cycle spent bouncing has no sensor error and changes smoothly with the parameters, but for jumps
-where a bounce more or less belongs to it. How many impacts there were is observed too, and where a simulation has
-another number its share is no guide. Levenberg-Marquardt steps under Cauchy weights go down from many starting
-points side by side, and then from points along the valleys that they end in, until one repeats the record.
+where a bounce more or less belongs to it. How many impacts there were is observed too; where a record has them and a
+simulation gives another number, its share is no guide. Levenberg-Marquardt steps under Cauchy weights go down from many
+starting points side by side, and then from points along the valleys that they end in, until one repeats the record.
 
 References
 ----------
@@ -86,6 +86,10 @@ class Record(NamedTuple):
     ratios: Array
     shares: Array
     impacts: Array
+
+    def of_any_number(self) -> "Record":
+        """Return the record without its number of impacts."""
+        return self._replace(impacts=np.full(len(self.shares), np.nan))
 
 
 def machine_at(pool: Pool, point: Array) -> Machine:
