@@ -142,11 +142,7 @@ class MachineSearch:
 
     def is_smooth(self) -> bool:
         """Whether most shares of the record change smoothly with the parameters of most machines."""
-        points, any_branch = (
-            self._spread(STARTS),
-            self.record._replace(impacts=np.full(len(self.record.shares), np.nan)),
-        )
-        search = MachineSearch(self._pool, self._task, any_branch)
+        points, search = self._spread(STARTS), MachineSearch(self._pool, self._task, self.record.of_any_number())
         slopes = search._slopes(points, search.errors(points))
         return bool(np.median(slopes.any(axis=2).mean(axis=1)) >= SMOOTH)
 
