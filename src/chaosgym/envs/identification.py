@@ -61,7 +61,8 @@ def is_regular_from_rest(pool: Pool, task: Task) -> bool:
     drive = pool.drive
     speeds = np.minimum(drive.lowest_speed + drive.slew_limit * np.arange(FROM_REST[0]), drive.highest_speed)
     none, new = np.zeros(len(speeds)), np.ones(len(speeds))
-    return MachineSearch(pool, task, Record(_run_in(task), none[:1], speeds, new, none, none)).is_smooth()
+    record = Record(_run_in(task), none[:1], speeds, new, none, none).of_any_number()
+    return MachineSearch(pool, task, record).is_smooth()
 
 
 def _run_in(task: Task) -> int:
@@ -127,7 +128,8 @@ class Identification:
         if self.target is not None and abs(self._speeds[-1] - self.target) > 1e-6 * self.target:
             self._experiment = None
         experiment = self._experiment
-        if search := self._due():
+        if record := self._due():
+            search = MachineSearch(self._pool, self._task, record)
             self.estimate = search.found() if self._truth is None else self._truth
         if experiment is not None and self._experiment is None and not self._untried(self._speeds[experiment]):
             self.failed.add(self._speeds[experiment])
@@ -148,16 +150,16 @@ class Identification:
         self._shares.append(float(observation[BOUNCING]))
         self._impacts.append(float(observation[IMPACTS]))
 
-    def _due(self) -> MachineSearch | None:
-        """Return a search by the record of the whole job, if it is time and machines move regularly from rest, or by
-        that of an experiment that is done."""
+    def _due(self) -> Record | None:
+        """Return what to search by now: the record of the whole job, if it is time and machines move regularly from
+        rest, or that of an experiment that is done."""
         if len(self._speeds) in FROM_REST and is_regular_from_rest(self._pool, self._task):
             # impacts are not compared from rest: the published comparisons of the beams were made without
-            return self._search(self._record(0, _run_in(self._task)).of_any_number())
+            return self._record(0, _run_in(self._task)).of_any_number()
         if self._experiment is None or len(self._speeds) <= self._experiment + len(EXPERIMENT):
             return None
         first, self._experiment = self._experiment, None
-        return self._search(self._record(first, SETTLING_CYCLES, self._period))
+        return self._record(first, SETTLING_CYCLES, self._period)
 
     def _wanted(self) -> float | None:
         """Speed to go to next: that of an experiment, which begins as soon as the motion has settled."""
@@ -202,6 +204,3 @@ class Identification:
         orbit = np.array(self._shares[first + 1 - period : first + 1])
         seen = (self._speeds[first:], before, self._shares[first:], self._impacts[first:])
         return Record(cycles, orbit, *map(np.array, seen))
-
-    def _search(self, record: Record) -> MachineSearch:
-        return MachineSearch(self._pool, self._task, record)

@@ -142,8 +142,8 @@ class MachineSearch:
 
     def is_smooth(self) -> bool:
         """Whether most shares of the record change smoothly with the parameters of most machines."""
-        points, search = self._spread(STARTS), MachineSearch(self._pool, self._task, self.record.of_any_number())
-        slopes = search._slopes(points, search.errors(points))
+        points = self._spread(STARTS)
+        slopes = self._slopes(points, self.errors(points))
         return bool(np.median(slopes.any(axis=2).mean(axis=1)) >= SMOOTH)
 
     def errors(self, points: Array) -> Array:
