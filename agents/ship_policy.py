@@ -32,7 +32,7 @@ CARD = Path(__file__).parent / "policy_card.md"
 
 NOTHING_LEARNED = """
 
-**Nothing learned.** Training never improved on the plan of the belief that it begins with; this policy is that plan."""
+**Nothing learned.** Training never improved on the plan that it begins with; this policy is that plan."""
 """What the card of a policy says whose best evaluation was the one before training."""
 
 
@@ -41,8 +41,8 @@ GIVEN = {
     "speeds": "the observation, and the peak forces felt at each speed",
     "belief": "the observation, and a belief over the map of speeds by what was felt",
     "identified": "the observation, a belief over the map of speeds by what was felt, and the machine's own map "
-    "once a simulation repeats what was observed. The search for it takes some ten seconds of a job, a minute or more "
-    "where it fails, and needs the share of bouncing without error, as the task gives it",
+    "once a simulation repeats what was observed. The search for it takes some ten seconds for a beam and up to "
+    "minutes for a crank, or where it fails, and needs the share of bouncing without error, as the task gives it",
 }
 """What the card says of each memory."""
 
