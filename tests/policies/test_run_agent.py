@@ -3,6 +3,7 @@
 import json
 import shutil
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.spaces import Box
@@ -10,6 +11,7 @@ from PIL import Image
 
 from chaosgym.policies import TrainedPolicy, save_policy
 from chaosgym.policies.network import Dense, Network
+from chaosgym.policies.play import play
 from tests.cli.test_cli import run, run_json
 from tests.policies.made_up import ENV
 
@@ -17,8 +19,6 @@ from tests.policies.made_up import ENV
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A policy that always asks for 19 Hz."""
-    import gymnasium as gym
-
     env = gym.make(ENV)
     space = Box(env.observation_space.low, env.observation_space.high)
     action = env.get_wrapper_attr("drive").action_for(19.0)
@@ -38,6 +38,14 @@ def test_a_job_is_played_and_animated(folder, tmp_path):
     assert len(told["type_iii"]) == 200
     with Image.open(out) as animation:
         assert animation.n_frames == 50
+
+
+def test_peak_forces_are_all_that_is_shown_as_such():
+    """Where the clearance grows the observation ends in the damage, which is no force."""
+    env = gym.make("chaosgym/ImpactBeamWear-v0", job_cycles=50)
+    job = play(env, lambda observation: env.action_space.high, seed=0)
+    assert job.peak_force.shape == (10, env.get_wrapper_attr("task").cycles_per_step)
+    assert job.peak_force.min() > 5.0
 
 
 def test_a_figure_is_drawn_beside_a_table(folder, tmp_path):

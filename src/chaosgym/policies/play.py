@@ -70,12 +70,13 @@ class PlayedJob:
 def play(env: gym.Env[Any, Any], policy: Callable[[Any], Any], seed: int) -> PlayedJob:
     """Run one job of an environment by a policy from observations to actions."""
     observation, _ = env.reset(seed=seed)
-    first_peak = env.get_wrapper_attr("observation_names").index("peak_force_1")
+    first = env.get_wrapper_attr("observation_names").index("peak_force_1")
+    measured = slice(first, first + env.get_wrapper_attr("task").cycles_per_step)
     rows, peaks, status, ended = [], [], Status.RUNNING, False
     while not ended:
         observation, reward, terminated, truncated, info = env.step(policy(observation))
         rows.append((info["speed"], info["cost_type_iii"], info["cost"], info["damage"], float(reward)))
-        peaks.append(observation[first_peak:])
+        peaks.append(observation[measured])
         status, ended = Status(info["status"]), terminated or truncated
     speed, type_iii, cost, damage, rewards = np.array(rows, dtype=float).T
     machine: Any = env.get_wrapper_attr("nominal")
