@@ -83,7 +83,7 @@ class RegimeTable:
         return np.asarray(self.type_iii[self.index_of(speed)])
 
 
-def regimes_of(machine: Machine, speeds: Array, *, workers: int | None = None) -> RegimeTable:
+def regimes_of(machine: Machine, speeds: Array) -> RegimeTable:
     """Return the table of a machine at evenly spaced speeds (n,): the one kept on disk, or computed now.
 
     Parameters
@@ -92,21 +92,19 @@ def regimes_of(machine: Machine, speeds: Array, *, workers: int | None = None) -
         At any speed.
     speeds
         In the unit of the machine's speed field.
-    workers
-        Threads; all processors by default.
     """
     path = _kept_at(machine, speeds)
     if not path.is_file():
-        points = diagnosed([at_speed(machine, speed) for speed in speeds.tolist()], workers)
+        points = diagnosed([at_speed(machine, speed) for speed in speeds.tolist()])
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, lambda temporary: _save(temporary, points))
     nature, equivalent, peak = np.load(path, allow_pickle=False).T
     return RegimeTable(speeds, nature.astype(np.int8), equivalent, peak)
 
 
-def diagnosed(machines: Sequence[Machine], workers: int | None = None) -> Array:
+def diagnosed(machines: Sequence[Machine]) -> Array:
     """Diagnose machines side by side, with a progress bar: nature and forces as in a table, (n, 3)."""
-    with ThreadPoolExecutor(workers or cpu_count()) as threads:
+    with ThreadPoolExecutor(cpu_count()) as threads:
         points = threads.map(_diagnose, machines)
         bar = tqdm(
             points, total=len(machines), desc=f"regimes of {machines[0].name}", unit="speed", delay=1.0, leave=False
