@@ -66,13 +66,21 @@ def test_only_the_machine_itself_repeats_the_record(env):
 
 
 def test_no_machine_is_named_that_does_not_repeat_the_record(env, monkeypatch):
-    """Shares that a sensor with errors would give fit none."""
+    """Shares that a sensor with errors of a hundredth would give fit none."""
     monkeypatch.setattr("chaosgym.envs.machine_search.GENERATIONS", 2)
-    identification = Identification(env.pool, env.task)
+    identification, errors = Identification(env.pool, env.task), np.random.default_rng(0)
     for observation in _started(env, 7, FROM_REST[0] - 1):
-        observation[BOUNCING] += np.random.default_rng(0).normal(0.0, 0.01)
+        observation[BOUNCING] += errors.normal(0.0, 0.01)
         identification.add(observation)
     assert identification.estimate is None
+
+
+def test_no_machine_is_named_where_all_do_the_same():
+    """A beam that never touches its stops bounces for no part of the cycle, whatever its parameters."""
+    env = gym.make("chaosgym/ImpactBeamTolerance-v0", pool="training", clearance=5e-3).unwrapped
+    speeds, none = np.linspace(4.0, 8.0, FROM_REST[0]), np.zeros(FROM_REST[0])
+    record = Record(RUN_IN_CYCLES, none[:1], speeds, np.ones(len(speeds)), none, none)
+    assert MachineSearch(env.pool, env.task, record).found() is None
 
 
 @pytest.fixture(scope="module")
@@ -243,6 +251,15 @@ def test_who_knows_the_machine_does_not_look_for_it(monkeypatch):
         observation = env.step(action)[0]
 
 
+def test_a_learner_does_not_look_for_the_nominal_machine(monkeypatch):
+    """There is nothing to find out, nor to wait for."""
+    monkeypatch.setattr(MachineSearch, "found", lambda self: pytest.fail("the machine is known"))
+    view = LearnerView(gym.make("chaosgym/ImpactBeam-v0"), memory="identified")
+    view.reset(seed=0)
+    for _ in range(FROM_REST[1]):
+        view.step(UP)
+
+
 def test_a_wearing_machine_is_found():
     """Clearances that grow with the damage are simulated as the environment lets them grow."""
     env = gym.make("chaosgym/ImpactBeamWear-v0", pool="training").unwrapped
@@ -280,14 +297,16 @@ def test_in_training_the_machine_is_known_after_as_many_observations(env):
     assert again[0, -1] > 0.0
 
 
-def test_a_learner_makes_the_experiments_too(crank):
+@pytest.mark.parametrize("increments", [True, False])
+def test_a_learner_makes_the_experiments_too(crank, increments):
     """What it does in between is its own; an experiment is made whatever it says, and tells the machine."""
-    view = LearnerView(gym.make("chaosgym/SliderCrankTolerance-v0", pool="training"), memory="identified")
+    view = LearnerView(gym.make("chaosgym/SliderCrankTolerance-v0", pool="training"), "identified", increments)
     seen, _ = view.reset(seed=0, options={"machine": 5})
     held = 0
     while seen[-1] > 0.0:
         planned, is_held = float(view._memory.planned[0, 0]), bool(view._memory.held[0, 0])
-        seen, *_, info = view.step(np.array([1.0 if is_held else 0.0], np.float32))
+        follows = 0.0 if increments else crank.drive.action_for(planned)
+        seen, *_, info = view.step(np.array([1.0 if is_held else follows], np.float32))
         held += is_held
         assert info["speed"] == pytest.approx(planned)
     assert held == len(EXPERIMENT)

@@ -36,8 +36,6 @@ class IdentifiedProgramming(BeliefProgramming):
 
     def __call__(self, observation: Observation) -> Action:
         """Look whether the machine is known by now; take the step of an experiment, or that of the largest worth."""
-        if len(self.env.pool.possible) == 1:
-            return super().__call__(observation)
         if machines := self._identification.add(observation):
             self._belief.know_tables(0, robust_regimes(self.env.pool, self.task, machines))
         if self._began:

@@ -76,7 +76,7 @@ class Identification:
     Parameters
     ----------
     pool
-        Whose nominal machine and tolerances are known.
+        Whose nominal machine and tolerances are known; nothing is looked for where it has one machine alone.
     task
         Of the job.
     truth : (fields,), optional
@@ -94,6 +94,7 @@ class Identification:
 
     def __init__(self, pool: Pool, task: Task, truth: Array | None = None) -> None:
         self._pool, self._task, self._truth = pool, task, truth
+        self._is_needless = len(pool.possible) == 1
         self.start()
 
     def start(self) -> None:
@@ -122,9 +123,9 @@ class Identification:
 
     def add(self, observation: Observation) -> list[Machine]:
         """Take in an observation (d,) and look for the machine if it is time to; return ``machines`` if found now."""
-        self._note(observation)
-        if self.estimate is not None:
+        if self._is_needless or self.estimate is not None:
             return []
+        self._note(observation)
         if self.target is not None and abs(self._speeds[-1] - self.target) > 1e-6 * self.target:
             self._experiment = None
         experiment = self._experiment

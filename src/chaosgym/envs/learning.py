@@ -34,7 +34,7 @@ Memory = Literal["none", "speeds", "belief", "identified"]
 """What a learner is given of the past of a job: nothing, ``SpeedMemory``, ``BeliefMemory`` or ``IdentifiedMemory``."""
 
 BINS = 53
-"""Bins over the range of the drive: 0.5 Hz of the beam, 5 rpm of the crank, centred on the speeds at both ends."""
+"""Bins over the range of the drive: 0.5 Hz of the beam, 4.8 rpm of the crank, centred on the speeds at both ends."""
 
 WELL_KNOWN = 100.0
 """Peaks after which a bin counts as fully known."""
@@ -230,18 +230,18 @@ def remembered_space(space: Box) -> Box:
 
 
 def commanded(
-    increments: Actions, observations: Observation, memory: SpeedMemory | BeliefMemory | None, space: Box,
-    largest: float,
+    answers: Actions, observations: Observation, memory: SpeedMemory | BeliefMemory | None, space: Box,
+    largest: float | None,
 ) -> Actions:  # fmt: skip
-    """Return the actions (n, 1) that change speeds by increments (n, 1) of -1 to 1 times ``largest``.
+    """Return the actions (n, 1) of an environment that a learner's answers (n, 1) stand for.
 
-    Without a belief it is the observed speed that changes; with one it is the planned speed, to one at which the motion
-    can settle, but for an experiment, which goes to the planned speed.
+    An increment changes the observed speed, or with a belief the planned one, to a speed at which the motion can
+    settle. An experiment goes to the planned speed, whatever the answer is.
 
     Parameters
     ----------
-    increments
-        (n, 1).
+    answers
+        Target speeds or increments, each from -1 to 1.
     observations
         The last ones, (n, d), without memory.
     memory
@@ -249,15 +249,18 @@ def commanded(
     space
         Of the observations.
     largest
-        Change of speed for an increment of 1, in the machine's unit.
+        Change of speed for an increment of 1, in the machine's unit; None for target speeds.
     """
-    change = largest * np.clip(increments, -1.0, 1.0)
+
+    def action_for(target: Array) -> Actions:
+        low, high = space.low[0], space.high[0]
+        return np.asarray(np.clip(2.0 * (target - low) / (high - low) - 1.0, -1.0, 1.0), np.float32)
+
+    change = None if largest is None else largest * np.clip(answers, -1.0, 1.0)
     if isinstance(memory, BeliefMemory):
-        target = np.where(memory.held, memory.planned, memory.settling(memory.planned + change))
-    else:
-        target = observations[:, SPEED, None].astype(float) + change
-    low, high = space.low[0], space.high[0]
-    return np.asarray(np.clip(2.0 * (target - low) / (high - low) - 1.0, -1.0, 1.0), np.float32)
+        asked = answers if change is None else action_for(memory.settling(memory.planned + change))
+        return np.where(memory.held, action_for(memory.planned), asked)
+    return answers if change is None else action_for(observations[:, SPEED, None].astype(float) + change)
 
 
 def memory_of(space: Box, attribute: Callable[[str], Any], memory: Memory) -> SpeedMemory | BeliefMemory | None:
@@ -313,8 +316,7 @@ class LearnerView(gym.Wrapper[Observation, Actions, Observation, Actions]):
 
     def step(self, action: Actions) -> tuple[Observation, Any, bool, bool, dict[str, Any]]:
         """Run a step and remember it."""
-        if self._largest is not None:
-            action = commanded(action[None], self._last[None], self._memory, self._space, self._largest)[0]
+        action = commanded(action[None], self._last[None], self._memory, self._space, self._largest)[0]
         self._last, reward, terminated, truncated, info = self.env.step(action)
         seen = self._memory.add(self._last[None])[0] if self._memory else self._last
         return seen, reward, terminated, truncated, info

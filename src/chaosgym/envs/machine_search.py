@@ -46,8 +46,8 @@ EQUAL = 1e-6
 """Difference of shares that counts as none: some units in the last place of an observation; derived."""
 
 REPEATED = 7
-"""Observations of a record that a machine has to repeat: more than there are parameters, and fewer than there are,
-since a bounce more or less may count; assumed."""
+"""Observations of a record that a machine has to repeat: more than there are parameters; of a record from rest not all,
+since a bounce more or less may count, of one of an experiment all; assumed."""
 
 PROBE = 1e-6
 """Change of a factor, in tolerances, that derivatives are taken with; assumed."""
@@ -127,6 +127,8 @@ class MachineSearch:
         promising = grid[np.argsort(_cost(self.errors(grid), ROUGH[0]), kind="stable")]
         points, scales, ends = promising[:STARTS], ROUGH, list[_End]()
         self._felt = np.asarray(self._slopes(points, self.errors(points)).any(axis=(0, 1)))
+        if not self._felt.any():
+            return None
         generator = np.random.default_rng(0)
         for generation in tqdm(range(GENERATIONS), desc="identification", unit="round", leave=False, delay=2.0):
             ends += self._descend(points, np.geomspace(*scales, ITERATIONS))

@@ -186,8 +186,7 @@ class SB3LearnerView(VecEnvWrapper):
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Take the actions of the next step."""
-        if self._largest is not None:
-            actions = commanded(actions, self._last, self._memory, self._space, self._largest)
+        actions = commanded(actions, self._last, self._memory, self._space, self._largest)
         self.venv.step_async(actions)
 
     def step_wait(self) -> tuple[Observation, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
