@@ -11,12 +11,14 @@ from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO, SAC
 
 from chaosgym.envs import SB3VecEnv
+from chaosgym.envs.learning import BINS
 from chaosgym.envs.sb3 import SB3LearnerView
-from chaosgym.errors import ModelFileError
+from chaosgym.errors import ModelFileError, ParameterError
 from chaosgym.evaluation.jobs import run_job
 from chaosgym.policies import TrainedPolicy, load_policy, save_policy, shipped_policy
 from chaosgym.policies.export import exported
 from chaosgym.policies.network import Dense, Network
+from chaosgym.policies.policy import Normalisation
 from chaosgym.policies.shipped import shipped_folder
 from tests.policies.made_up import ENV, trained
 
@@ -78,7 +80,8 @@ def _saved(folder):
     space = Box(np.zeros(13, np.float32), np.ones(13, np.float32))
     layer = Dense(np.full((1, 13), 0.1, np.float32), np.zeros(1, np.float32), "none")
     folder.mkdir(exist_ok=True)
-    save_policy(TrainedPolicy(ENV, space, Box(-1.0, 1.0, (1,), np.float32), Network(None, (layer,))), folder)
+    plain = Normalisation(np.zeros(13), np.ones(13), 10.0)
+    save_policy(TrainedPolicy(ENV, space, Box(-1.0, 1.0, (1,), np.float32), Network(None, (layer,)), plain), folder)
     return folder
 
 
@@ -99,6 +102,11 @@ DAMAGES = {
     "does not match the hash": lambda folder: (folder / "weights.npz").write_bytes(b"PK"),
     "format 1": lambda folder: _edit(folder, format=1),
     "KeyError: 'layer1.weight'": lambda folder: _edit(folder, activations=["none", "none"]),
+    "the network has no layers": lambda folder: _edit(folder, activations=[]),
+    "'somebody:Else-v0', is none of chaosgym/": lambda folder: _edit(folder, env="somebody:Else-v0"),
+    "the largest step is nan": lambda folder: _edit(folder, largest_step=float("nan")),
+    "could not convert string to float: 'x'": lambda folder: _edit(folder, largest_step="x"),
+    "the limit of the normalisation is nan": lambda folder: _edit(folder, normalisation_limit=float("nan")),
     "activation 'cosine'": lambda folder: _edit(folder, activations=["cosine"]),
     "memory = 'elephant' is not one of none, speeds, belief": lambda folder: _edit(folder, memory="elephant"),
     "expected: float32 (1, 12)": lambda folder: _edit(folder, observation={"low": [0.0] * 12, "high": [1.0] * 12}),
@@ -153,6 +161,26 @@ def test_an_observation_of_another_length_is_refused(tmp_path):
     policy = load_policy(_saved(tmp_path / "policy"))
     with pytest.raises(ModelFileError, match=r"\(12,\).*\(13,\)"):
         policy(np.zeros(12, np.float32))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_an_observation_that_is_not_finite_is_refused(value, tmp_path):
+    """An action that is not a number would stop a machine without a word."""
+    policy = load_policy(_saved(tmp_path / "policy"))
+    with pytest.raises(ParameterError, match="not finite"):
+        policy(np.full(13, value, np.float32))
+
+
+def test_jobs_do_not_come_and_go_without_a_reset():
+    """What is remembered belongs to as many jobs as there were."""
+    space = gym.make(ENV).observation_space
+    layer = Dense(np.zeros((1, space.shape[0] + 3 * BINS), np.float32), np.zeros(1, np.float32), "none")
+    policy = TrainedPolicy(ENV, space, Box(-1.0, 1.0, (1,), np.float32), Network(None, (layer,)), memory="speeds")
+    assert policy(space.high[None]).shape == (1, 1)
+    with pytest.raises(ParameterError, match="2 jobs after 1: call reset"):
+        policy(np.tile(space.high, (2, 1)))
+    policy.reset()
+    assert policy(np.tile(space.high, (2, 1))).shape == (2, 1)
 
 
 def test_an_environment_without_a_policy_says_so():

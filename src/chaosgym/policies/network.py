@@ -66,11 +66,6 @@ class Network(NamedTuple):
     lstm: Lstm | None
     layers: tuple[Dense, ...]
 
-    @property
-    def inputs(self) -> int:
-        """Length of an input."""
-        return int((self.lstm.from_input if self.lstm else self.layers[0].weight).shape[1])
-
     def __call__(self, inputs: Array, state: State | None) -> tuple[Array, State | None]:
         """Return the answer (..., outputs) and the next state, for inputs (..., inputs) and the state before."""
         values = inputs
@@ -83,6 +78,8 @@ class Network(NamedTuple):
 
     def check(self, inputs: int, outputs: int) -> None:
         """Raise a ModelFileError unless the shapes fit each other, ``inputs`` and ``outputs``, and all is finite."""
+        if not self.layers:
+            raise ModelFileError("the network has no layers")
         width = inputs
         if self.lstm:
             units = self.lstm.units

@@ -18,8 +18,9 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from chaosgym.envs import ENVIRONMENTS
 from chaosgym.envs.learning import BeliefMemory, Memory, SpeedMemory, commanded, memory_of
-from chaosgym.errors import ModelFileError
+from chaosgym.errors import ModelFileError, ParameterError
 from chaosgym.files import write_atomically
 from chaosgym.policies.network import Dense, Lstm, Network, State
 
@@ -80,7 +81,7 @@ class TrainedPolicy:
     squashed: bool = False
     _state: State | None = field(default=None, init=False, repr=False)
     _memory: SpeedMemory | BeliefMemory | None = field(default=None, init=False, repr=False)
-    _began: bool = field(default=False, init=False, repr=False)
+    _jobs: int = field(default=0, init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._memory = memory_of(self.observation_space, self._attribute, self.memory)
@@ -92,10 +93,13 @@ class TrainedPolicy:
                     raise ModelFileError(f"the {name} of the normalisation is not {space.shape[0]} finite numbers")
             if not (self.normalisation.deviation > 0.0).all():
                 raise ModelFileError("a deviation of the normalisation is not positive")
+            _expect_scale("limit of the normalisation", self.normalisation.limit)
+        if self.largest_step is not None:
+            _expect_scale("largest step", self.largest_step)
 
     def reset(self) -> None:
         """Forget the last job."""
-        self._state, self._began = None, False
+        self._state, self._jobs = None, 0
 
     def __call__(self, observation: Array) -> NDArray[np.float32]:
         """Return the action (1,) for an observation (d,), or actions (n, 1) for those of n jobs side by side (n, d).
@@ -104,6 +108,8 @@ class TrainedPolicy:
         ------
         ModelFileError
             If observations of another length were expected.
+        ParameterError
+            If an observation is not finite, or there are more or fewer jobs than before and no ``reset`` in between.
         """
         observations = np.asarray(observation, np.float32)
         if observations.shape[-1:] != self.observation_space.shape:
@@ -111,19 +117,21 @@ class TrainedPolicy:
                 f"the observation has shape {observations.shape}; this policy of {self.env} expects "
                 f"{self.observation_space.shape}"
             )
-        values: Array = np.atleast_2d(observations)
+        if not np.isfinite(observations).all():
+            raise ParameterError(f"the observation {observations.tolist()} is not finite")
+        last = values = np.atleast_2d(observations)
+        if (self._memory or self.network.lstm) and self._jobs not in (0, len(values)):
+            raise ParameterError(f"observations of {len(values)} jobs after {self._jobs}: call reset() between jobs")
         if self._memory:
-            values = self._memory.add(values) if self._began else self._memory.start(values)
-            self._began = True
+            values = self._memory.add(values) if self._jobs else self._memory.start(values)
+        self._jobs = len(values)
         if self.normalisation:
             values = self.normalisation(values)
         answer, self._state = self.network(values, self._state)
         low, high = self.action_space.low, self.action_space.high
         if self.squashed:
             answer = low + 0.5 * (np.tanh(answer) + 1.0) * (high - low)
-        if self.largest_step is not None:
-            last = np.atleast_2d(observations)
-            answer = commanded(answer, last, self._memory, self.observation_space, self.largest_step)
+        answer = commanded(answer, last, self._memory, self.observation_space, self.largest_step)
         return np.clip(answer, low, high).reshape(*observations.shape[:-1], -1).astype(np.float32)
 
     def _attribute(self, name: str) -> Any:
@@ -174,7 +182,7 @@ def save_policy(policy: TrainedPolicy, folder: str | Path) -> None:
 
 
 def load_policy(folder: str | Path) -> TrainedPolicy:
-    """Read what ``save_policy`` wrote; nothing in it is executed.
+    """Read what ``save_policy`` wrote; nothing in it is executed or imported.
 
     Raises
     ------
@@ -207,16 +215,19 @@ def load_policy(folder: str | Path) -> TrainedPolicy:
 
 
 def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPolicy:
+    env, limit, step = (description[name] for name in ("env", "normalisation_limit", "largest_step"))
+    if env not in ENVIRONMENTS:
+        # Gymnasium would import the module of an id like "module:name"
+        raise ModelFileError(f"its environment, {env!r}, is none of {', '.join(ENVIRONMENTS)}")
     lstm = Lstm(*(arrays[f"lstm.{name}"] for name in Lstm._fields)) if description["lstm"] else None
     layers = tuple(
         Dense(arrays[f"layer{place}.weight"], arrays[f"layer{place}.bias"], activation)
         for place, activation in enumerate(description["activations"])
     )
-    limit = description["normalisation_limit"]
     return TrainedPolicy(
-        description["env"], _space(description["observation"]), _space(description["action"]), Network(lstm, layers),
+        env, _space(description["observation"]), _space(description["action"]), Network(lstm, layers),
         None if limit is None else Normalisation(arrays["mean"], arrays["deviation"], float(limit)),
-        description["memory"], description["largest_step"], bool(description["squashed"]),
+        description["memory"], None if step is None else float(step), bool(description["squashed"]),
     )  # fmt: skip
 
 
@@ -229,6 +240,11 @@ def _arrays(path: Path, digest: str) -> dict[str, Array]:
         raise ModelFileError(f"{WEIGHTS} is damaged: its content does not match the hash in {DESCRIPTION}")
     with np.load(BytesIO(content), allow_pickle=False) as held:
         return {name: held[name] for name in held.files}
+
+
+def _expect_scale(name: str, value: float) -> None:
+    if not 0.0 < value < np.inf:
+        raise ModelFileError(f"the {name} is {value}; expected: a positive number")
 
 
 def _bounds(space: Box) -> dict[str, list[float]]:
