@@ -9,12 +9,12 @@ import argparse
 import csv
 import json
 import platform
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args
 
-import gymnasium as gym
 import numba
 import numpy as np
 import stable_baselines3
@@ -26,8 +26,9 @@ from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 from tqdm import tqdm
 
 import chaosgym
-from chaosgym.envs import SB3VecEnv
+from chaosgym.envs import ENVIRONMENTS, SB3VecEnv
 from chaosgym.envs.sb3 import SB3LearnerView
+from chaosgym.errors import ParameterError
 from chaosgym.files import write_atomically
 from chaosgym.policies import save_policy
 from chaosgym.policies.export import exported
@@ -71,20 +72,25 @@ class Run:
 
     def __init__(self, arguments: Any, wrapped: Callable[[VecEnv], VecEnv] = lambda envs: envs) -> None:
         self.arguments, self.folder = arguments, Path(arguments.out)
-        gym.spec(arguments.env)
-        self._open_folder()
+        if arguments.env not in ENVIRONMENTS:
+            raise SystemExit(f"--env {arguments.env}: unknown; allowed: {', '.join(ENVIRONMENTS)}")
         torch.set_num_threads(arguments.threads)
         numba.set_num_threads(min(arguments.threads, numba.config.NUMBA_NUM_THREADS))
-        envs: VecEnv = VecMonitor(SB3VecEnv(arguments.env, arguments.envs))
+        try:
+            envs: VecEnv = VecMonitor(SB3VecEnv(arguments.env, arguments.envs))
+            self._judges = self._seen(SB3VecEnv(arguments.env, arguments.jobs))
+        except ParameterError as error:
+            raise SystemExit(str(error)) from error
         envs = wrapped(ClairvoyantShaping(envs) if arguments.shaping else envs)
         self.envs = VecNormalize(self._seen(envs), gamma=arguments.gamma)
-        self._judges = self._seen(SB3VecEnv(arguments.env, arguments.jobs))
+        self._open_folder()
 
     def _open_folder(self) -> None:
         arguments, config = asdict(self.arguments), self.folder / "config.json"
         if not self.folder.exists():
             self.folder.mkdir(parents=True)
-            text = json.dumps({"arguments": arguments, "versions": _versions()}, indent=2) + "\n"
+            content = {"script": Path(sys.argv[0]).name, "arguments": arguments, "versions": _versions()}
+            text = json.dumps(content, indent=2) + "\n"
             write_atomically(config, lambda path: path.write_text(text))
         elif not config.is_file() or json.loads(config.read_text())["arguments"] != arguments:
             raise SystemExit(f"--out {self.folder} exists and is not this run; choose another folder")
@@ -221,8 +227,8 @@ class Watch(BaseCallback):
 
 
 def _opened(path: Path, columns: list[str], begin: int) -> Path:
-    """A table of rows by step, without those that an interrupted run wrote after its last checkpoint."""
-    rows = list(csv.reader(path.read_text().splitlines()))[1:] if path.exists() else []
+    """A table of rows by step, without those that an interrupted run wrote after its last checkpoint, if it has one."""
+    rows = list(csv.reader(path.read_text().splitlines()))[1:] if path.exists() and begin else []
     with path.open("w", newline="") as file:
         csv.writer(file).writerows([columns, *(row for row in rows if int(row[0]) <= begin)])
     return path

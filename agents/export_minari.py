@@ -41,8 +41,10 @@ def main() -> None:
     name = f"{arguments.env.removesuffix('-v0')}/{behaviour}-v0"
     if (folder / name).exists():
         raise SystemExit(f"{folder / name} exists; choose another folder with --out")
-    collector = DataCollector(gym.make(arguments.env))
-    trained = None if arguments.policy == "wandering" else load_policy(arguments.policy)
+    trained, env = None if arguments.policy == "wandering" else load_policy(arguments.policy), gym.make(arguments.env)
+    if trained:
+        trained.fits(env)
+    collector = DataCollector(env)
     for job in trange(arguments.jobs, desc=name, unit="job"):
         if trained:
             trained.reset()

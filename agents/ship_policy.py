@@ -10,11 +10,11 @@ import csv
 import json
 import shutil
 from dataclasses import dataclass
-from glob import glob
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import common
+from evaluate import policy_hash, run_folders
 from train_ppo import Arguments as Training
 
 from chaosgym.controllers.ladder import SAFE_CONSTANT
@@ -27,6 +27,9 @@ BESIDE = (SAFE_CONSTANT, "belief programming")
 
 MODEL = ("policy.zip", "policy_normalisation.npz")
 """Files of a run that stable-baselines3 loads."""
+
+SCRIPT = "train_ppo.py"
+"""Script whose runs are shipped."""
 
 CARD = Path(__file__).parent / "policy_card.md"
 
@@ -69,7 +72,7 @@ class Best(NamedTuple):
 
 def best_run(pattern: str) -> Best:
     """Return the run with the best evaluation, of folders in the order of evaluate.py."""
-    folders = [Path(folder) for folder in sorted(glob(pattern)) if Path(folder).is_dir()]
+    folders = run_folders(pattern)
     if not folders:
         raise SystemExit(f"--runs {pattern}: no folder matches")
     found = [
@@ -82,11 +85,20 @@ def best_run(pattern: str) -> Best:
 
 def described(config: dict[str, Any]) -> dict[str, Any]:
     """Return the record of a run, with the command that repeats it and a folder that means something elsewhere."""
+    script = config.get("script", SCRIPT)
+    if script != SCRIPT:
+        raise SystemExit(f"--runs: a run of {script}; the card tells of {SCRIPT} alone")
     arguments = config["arguments"]
     arguments["out"] = f"runs/{Path(arguments['out']).name}"
     changed = {name: value for name, value in arguments.items() if value != getattr(Training(), name)}
-    options = " ".join(f"--{name.replace('_', '-')} {value}" for name, value in changed.items())
-    return config | {"command": f"python agents/train_ppo.py {options}"}
+    options = " ".join(_option(name.replace("_", "-"), value) for name, value in changed.items())
+    return config | {"command": f"python agents/{SCRIPT} {options}"}
+
+
+def _option(name: str, value: Any) -> str:
+    if isinstance(value, bool):
+        return f"--{name}" if value else f"--no-{name}"
+    return f"--{name} {value}"
 
 
 def main() -> None:
@@ -96,6 +108,8 @@ def main() -> None:
     compared = json.loads((evaluation / "report.json").read_text())
     summaries, reference = compared["contenders"], compared["reference"]
     judged = json.loads((evaluation / "jobs" / f"{asked.contender}-{best.place}.json").read_text())
+    if judged.get("policy") not in (None, policy_hash(best.folder)):
+        raise SystemExit(f"--evaluation {evaluation} judged another policy than {best.folder}: compare them again")
     figures = {
         name: {key: value for key, value in summaries[name].items() if key not in ("better_than", "profile")}
         for name in (asked.contender, *BESIDE, reference)

@@ -87,6 +87,25 @@ def test_an_interrupted_run_goes_on(tmp_path):
     assert "finished; choose another folder" in _run("train_ppo.py", *arguments).stderr
 
 
+@pytest.mark.parametrize(("option", "value"), [("--env", "CartPole-v1"), ("--envs", "0")])
+def test_wrong_arguments_leave_no_folder(option, value, tmp_path):
+    """The corrected command finds nothing in its way."""
+    refused = _run("train_ppo.py", option, value, "--out", str(tmp_path / "run"))
+    assert refused.returncode != 0
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_run_that_left_no_checkpoint_begins_anew(tmp_path, monkeypatch):
+    """What it wrote down before is not part of the new run."""
+    monkeypatch.syspath_prepend(AGENTS)
+    from common import _opened
+
+    path = tmp_path / "evaluations.csv"
+    path.write_text("step,return\n0,-2.0\n400,-1.9\n800,-1.8\n")
+    assert [row["step"] for row in _rows(_opened(path, ["step", "return"], 400))] == ["0", "400"]
+    assert _rows(_opened(path, ["step", "return"], 0)) == []
+
+
 def test_an_existing_folder_is_left_alone(tmp_path):
     """Training never writes into a folder that is not its own."""
     refused = _run("train_ppo.py", "--out", str(tmp_path))

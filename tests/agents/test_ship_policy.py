@@ -80,6 +80,26 @@ def test_the_card_says_when_training_gained_nothing(runs):
     assert "Nothing learned" in card
 
 
+def test_the_figures_of_another_policy_are_not_shipped(runs):
+    """Jobs say which policy ran them: a run that was trained again has none yet."""
+    path = runs / "comparison" / "jobs" / f"{CONTENDER}-1.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"policy": "0" * 64}))
+    assert "judged another policy" in _ship(runs, "run-*").stderr
+    assert not (runs / "shipped").exists()
+
+
+def test_a_switch_that_was_off_is_off_in_the_command(runs):
+    """And a run of another script is refused, whose arguments mean something else."""
+    path = runs / "run-1" / "config.json"
+    config = json.loads(path.read_text())
+    path.write_text(json.dumps(config | {"arguments": config["arguments"] | {"shaping": False}}))
+    assert _ship(runs, "run-*").returncode == 0
+    shipped = runs / "shipped" / "ImpactBeamTolerance-v0" / "config.json"
+    assert " --no-shaping " in json.loads(shipped.read_text())["command"]
+    path.write_text(json.dumps(config | {"script": "train_sac.py"}))
+    assert "a run of train_sac.py" in _ship(runs, "run-*").stderr
+
+
 def test_a_pattern_without_runs_is_named(runs):
     """Nothing is written."""
     done = _ship(runs, "none-*")
