@@ -21,3 +21,12 @@ def test_every_page_makes_its_own_environment() -> None:
     for name, page in zip(ENVIRONMENTS, dict(pages()).values(), strict=False):
         assert f'gym.make("{name}")' in page
         assert page.startswith(f"# {name}\n")
+
+
+def test_defaults_are_those_of_the_id() -> None:
+    """Machines are drawn from the training pool, and wear, where the id says so."""
+    written = dict(pages())
+    for name, pool, wear in (("", "nominal", False), ("Tolerance", "training", False), ("Wear", "training", True)):
+        page = written[f"environments/SliderCrank{name}-v0.md"]
+        assert f"| `{pool}` " in next(line for line in page.splitlines() if line.startswith("| `pool`"))
+        assert f"| `{wear}` " in next(line for line in page.splitlines() if line.startswith("| `wear`"))

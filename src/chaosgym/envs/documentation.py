@@ -4,6 +4,7 @@ python -m chaosgym.envs.documentation docs
 """
 
 import inspect
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -34,6 +35,9 @@ def pages() -> Iterator[tuple[str, str]]:
         nominal = name.replace(f"{task}-v", "-v")
         text = inspect.getdoc(type(gym.make(name).unwrapped)) or ""
         text = text.replace(f'("{nominal}"', f'("{name}"')
+        for parameter, default in gym.spec(name).kwargs.items():
+            row = re.compile(rf"(\| `{parameter}` +\| [^|]+ \| )`\w+`")
+            text = row.sub(rf"\g<1>`{default}`", text)
         yield file, f"# {name}\n\n{TASKS[task]}\n\n{text}\n"
         rows.append(f"| [{name}]({file}) | {TASKS[task]} |")
     table = "\n".join(["| id | task |", "|---|---|", *rows])
