@@ -18,6 +18,7 @@ from tqdm import trange
 from wandering import wandering
 
 from chaosgym.envs.belief import COMPARED, DIFFERENCE, SCATTER
+from chaosgym.envs.machine_search import EQUAL
 from chaosgym.envs.observation import BOUNCING, FIRST_PEAK, SPEED
 
 LEAST_SHARE = 0.01
@@ -70,7 +71,15 @@ def evidence(sign: np.ndarray, type_iii: np.ndarray, at: np.ndarray, usual: floa
 
 def main() -> None:
     """Play the jobs and print the counts."""
-    earlier, scatter, difference, error, type_iii = felt(common.parse(Arguments, __doc__)).T
+    arguments = common.parse(Arguments, __doc__)
+    pool = gym.make(arguments.env, pool="training").unwrapped.pool
+    tables = [table.type_iii for machine in range(len(pool)) for table in pool.regimes(machine)]
+    earlier, scatter, difference, error, type_iii = felt(arguments).T
+    print(f"Type III: {np.mean(tables):.1%} of the speeds of all tables, {type_iii.mean():.1%} of the steps")
+    for name, which in (("whose peaks scatter by less than 2 N", (earlier > 0) & (scatter < 2.0)),
+                        ("whose share of bouncing repeats one before", difference < EQUAL)):  # fmt: skip
+        told = f"{type_iii[which].mean():.1%} of {np.count_nonzero(which)}" if which.any() else "there are none"
+        print(f"Type III among steps at a speed that was kept, {name}: {told}")
     calm, irregular = scatter[type_iii == 0.0], scatter[type_iii == 1.0]
     print(f"scatter of calm steps {np.median(calm):.2f} N, of Type III {np.median(irregular):.2f} N (medians)")
     for name, which in (("moving", earlier == 0), ("staying", earlier > 0)):
