@@ -4,9 +4,12 @@ import json
 import shutil
 import subprocess
 import sys
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
+
+from chaosgym.policies.shipped import shipped_folder
 
 ROOT = Path(__file__).parent.parent.parent
 FOLDERS = sorted((ROOT / "agents" / "evaluations").iterdir())
@@ -33,3 +36,11 @@ def test_the_table_of_the_documentation_is_that_of_the_jobs(folder, tmp_path):
         assert row[1] == found["knows"]
         assert [int(row[2]), row[3], row[4]] == [found["seeds"], f"{found['return']:.3f}", f"{found['score']:.2f}"]
         assert row[7] == f"{found['type_iii_share']:.1%}"
+
+
+@pytest.mark.parametrize("name", ["ImpactBeamTolerance-v0", "SliderCrankTolerance-v0"])
+def test_the_shipped_policy_is_one_of_those_compared(name):
+    """The jobs of a comparison name the policy that ran them, by the hash of its description."""
+    shipped = sha256((shipped_folder(f"chaosgym/{name}") / "policy.json").read_bytes()).hexdigest()
+    jobs = (ROOT / "agents" / "evaluations" / name / "jobs").glob("PPO, identified-*.json")
+    assert shipped in [json.loads(path.read_text()).get("policy") for path in jobs]
