@@ -1,10 +1,28 @@
 """The demo passes through every floor; here with a smaller sweep and a shorter training."""
 
+import re
+from pathlib import Path
+
+import gymnasium as gym
 import pytest
 
 from chaosgym import demo
+from chaosgym.envs.evaluation import constant_speed, evaluate
 from chaosgym.errors import DatasetError
 from chaosgym.sweeps import Axis
+
+README = (Path(__file__).parent.parent / "README.md").read_text()
+
+
+def test_readme_shows_what_constant_speeds_of_the_demo_earn():
+    """Return, share of Type III, damage and time of the constant speeds are those of the table."""
+    rows = re.findall(r"^\| constant (\d+) Hz[^|]*\| (\S+) \| (\S+) % \| (\S+) \| (\S+) \|$", README, re.MULTILINE)
+    assert len(rows) == 3
+    env = gym.make(demo.ENVIRONMENT)
+    for speed, *written in rows:
+        earned = evaluate(env, constant_speed(env, float(speed)), demo.JOBS, demo.TEST_SEED).summary()
+        found = [earned["return"], 100.0 * earned["type_iii_share"], earned["damage"], earned["time_cost"]]
+        assert [float(value) for value in written] == pytest.approx(found, abs=0.02)
 
 
 @pytest.mark.slow
