@@ -1,4 +1,4 @@
-"""What does a step tell of its speed? Counts on the training pool behind the constants of chaosgym.envs.belief.
+"""What does a step tell of its speed? Counts on the training pool behind the constants of chaosgym.control.belief.
 
     python agents/calibrate_belief.py --env chaosgym/SliderCrankTolerance-v0
 
@@ -17,8 +17,8 @@ from sklearn.isotonic import IsotonicRegression
 from tqdm import trange
 from wandering import wandering
 
-from chaosgym.envs.belief import COMPARED, DIFFERENCE, SCATTER
-from chaosgym.envs.machine_search import EQUAL
+from chaosgym.control.belief import COMPARED, DIFFERENCE, SCATTER
+from chaosgym.control.machine_search import EQUAL
 from chaosgym.envs.observation import BOUNCING, FIRST_PEAK, SPEED
 
 LEAST_SHARE = 0.01

@@ -26,12 +26,12 @@ from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 from tqdm import tqdm
 
 import chaosgym
+from chaosgym.control.policies import save_policy
+from chaosgym.control.policies.export import exported
 from chaosgym.envs import ENVIRONMENTS, SB3VecEnv
 from chaosgym.envs.sb3 import SB3LearnerView
 from chaosgym.errors import ParameterError
 from chaosgym.files import write_atomically
-from chaosgym.policies import save_policy
-from chaosgym.policies.export import exported
 
 Arguments = TypeVar("Arguments")
 

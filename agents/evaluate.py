@@ -22,10 +22,10 @@ from typing import Any, NamedTuple
 import gymnasium as gym
 
 import chaosgym
-from chaosgym.controllers.ladder import LADDER, REFERENCE, SAFE_CONSTANT, each_cycle_keywords
+from chaosgym.control.comparison import Results, compare, model_gap, reference_of, table_lines
+from chaosgym.control.controllers.ladder import LADDER, REFERENCE, SAFE_CONSTANT, each_cycle_keywords
+from chaosgym.control.jobs import JobRow, run_jobs
 from chaosgym.envs import ENVIRONMENTS
-from chaosgym.evaluation.comparison import Results, compare, model_gap, reference_of, table_lines
-from chaosgym.evaluation.jobs import JobRow, run_jobs
 from chaosgym.files import write_atomically
 
 FIRST_SEED = 10_000
@@ -108,7 +108,7 @@ def policy_hash(folder: Path) -> str:
 
 
 def _player(folder: Path) -> Player:
-    from chaosgym.policies import load_policy
+    from chaosgym.control.policies import load_policy
 
     def make(env: gym.Env[Any, Any]) -> Any:
         policy = load_policy(folder)
@@ -199,7 +199,7 @@ def main() -> None:
     text = json.dumps(report, indent=1) + "\n"
     write_atomically(arguments.out / "report.json", lambda file: file.write_text(text))
     write_atomically(arguments.out / "table.md", lambda file: file.write_text("\n".join(lines) + "\n"))
-    from chaosgym.plotting.evaluation import comparison_figure
+    from chaosgym.plotting.comparison import comparison_figure
 
     figure = comparison_figure(summaries, arguments.env)
     write_atomically(arguments.out / "comparison.png", lambda file: figure.savefig(file, dpi=130, format="png"))

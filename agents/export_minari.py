@@ -15,7 +15,7 @@ import gymnasium as gym
 from tqdm import trange
 from wandering import wandering
 
-from chaosgym.policies import load_policy
+from chaosgym.control.policies import load_policy
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from tqdm import trange
 
-from chaosgym.envs.forecast import forecast_of, worth_of_steps
+from chaosgym.control.forecast import forecast_of, worth_of_steps
 from chaosgym.envs.observation import REMAINING, SPEED
 
 Array = NDArray[np.float64]

@@ -17,10 +17,10 @@ import common
 from evaluate import policy_hash, run_folders
 from train_ppo import Arguments as Training
 
-from chaosgym.controllers.ladder import SAFE_CONSTANT
+from chaosgym.control.controllers.ladder import SAFE_CONSTANT
+from chaosgym.control.policies import load_policy, save_policy
+from chaosgym.control.policies.shipped import shipped_folder
 from chaosgym.files import write_atomically
-from chaosgym.policies import load_policy, save_policy
-from chaosgym.policies.shipped import shipped_folder
 
 BESIDE = (SAFE_CONSTANT, "belief programming")
 """Contenders whose figures stand beside those of the policy and of the reference."""

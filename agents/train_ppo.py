@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import common
 from stable_baselines3 import PPO
 
-from chaosgym.envs.learning import Memory
+from chaosgym.control.learner_view import Memory
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from torch import nn
 
-from chaosgym.envs.learning import Memory
+from chaosgym.control.learner_view import Memory
 
 Array = NDArray[np.float32]
 

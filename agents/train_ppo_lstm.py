@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import common
 from sb3_contrib import RecurrentPPO
 
-from chaosgym.envs.learning import Memory
+from chaosgym.control.learner_view import Memory
 
 
 @dataclass(frozen=True)

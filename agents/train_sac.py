@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import common
 from stable_baselines3 import SAC
 
-from chaosgym.envs.learning import Memory
+from chaosgym.control.learner_view import Memory
 
 
 @dataclass(frozen=True)

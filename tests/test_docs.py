@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from chaosgym.atlas.observation import THOROUGH
-from chaosgym.atlas.page import row
-from chaosgym.atlas.scorecard import evaluate
 from chaosgym.machines import MACHINES
 from chaosgym.machines.parameters import markdown_table
-from chaosgym.reference import read_comparisons
+from thesis.scorecard.observation import THOROUGH
+from thesis.scorecard.page import row
+from thesis.scorecard.scorecard import evaluate
+from thesis.statements import read_comparisons
 
 DOCS = Path(__file__).parent.parent / "docs"
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from chaosgym.policies.shipped import shipped_folder
+from chaosgym.control.policies.shipped import shipped_folder
 
 NOMINAL = "chaosgym/ImpactBeam-v0"
 SCRIPT = Path(__file__).parent.parent.parent / "agents" / "evaluate.py"

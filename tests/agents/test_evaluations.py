@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from chaosgym.policies.shipped import shipped_folder
+from chaosgym.control.policies.shipped import shipped_folder
 
 ROOT = Path(__file__).parent.parent.parent
 FOLDERS = sorted((ROOT / "agents" / "evaluations").iterdir())

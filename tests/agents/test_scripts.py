@@ -10,8 +10,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from chaosgym.evaluation.jobs import run_job
-from chaosgym.policies import load_policy
+from chaosgym.control.jobs import run_job
+from chaosgym.control.policies import load_policy
 
 AGENTS = Path(__file__).parent.parent.parent / "agents"
 SHORT = ("--envs", "2", "--jobs", "2", "--evaluate-every", "400", "--seed", "3")

@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from chaosgym.policies import load_policy
-from chaosgym.policies.shipped import shipped_folder
+from chaosgym.control.policies import load_policy
+from chaosgym.control.policies.shipped import shipped_folder
 from tests.agents.test_scripts import AGENTS
 
 ENV = "chaosgym/ImpactBeamTolerance-v0"

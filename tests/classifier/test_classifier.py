@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
+from benchmarks.classifier.plotting import save_pictures
 from chaosgym.classifier import MachineClassifier, data, default_classifier
 from chaosgym.classifier.data import examples_of
 from chaosgym.classifier.train import train_classifier
 from chaosgym.errors import DatasetError, ModelFileError, ParameterError
 from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, ImpactBeam
-from chaosgym.plotting.classifier import save_pictures
 from chaosgym.sweeps import LabelledSweep
 from tests.classifier.made_up import made_up_sweep, settled
 

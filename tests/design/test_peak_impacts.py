@@ -9,8 +9,8 @@ from chaosgym.design.statistics import convergence
 from chaosgym.design.trends import clearance_trade_off, life_against
 from chaosgym.errors import DesignError, SimulationError
 from chaosgym.machines import MACHINES, ImpactBeam
-from chaosgym.machines.kinematics import slider_position
 from chaosgym.machines.parameters import with_settings
+from chaosgym.machines.slider_crank.kinematics import slider_position
 from chaosgym.plotting.design import impact_diagram
 from chaosgym.simulation import simulate
 

@@ -12,11 +12,11 @@ import pytest
 from gymnasium.envs.registration import load_env_creator
 from gymnasium.utils.env_checker import check_env
 
-from chaosgym import fleet
 from chaosgym.envs import ENVIRONMENTS, machine_env
 from chaosgym.envs.machine_env import MachineEnv
 from chaosgym.envs.tasks import Status
 from chaosgym.errors import ParameterError, SimulationError
+from chaosgym.simulation import batch as fleet
 from chaosgym.simulation import simulate
 
 pytestmark = pytest.mark.parametrize("name", ENVIRONMENTS)

@@ -8,7 +8,7 @@ from chaosgym.diagnosis.diagnose import diagnosed_run
 from chaosgym.envs import ENVIRONMENTS
 from chaosgym.envs.pools import Pool, shipped, worn
 from chaosgym.envs.regimes import HORIZON
-from chaosgym.fleet import at_speed
+from chaosgym.simulation.batch import at_speed
 
 POOLS = [name for name in ENVIRONMENTS if "Tolerance" in name or "Wear" in name]
 

@@ -6,8 +6,8 @@ import pytest
 from chaosgym.diagnosis import diagnose
 from chaosgym.envs.drive import SpeedDrive
 from chaosgym.envs.regimes import HORIZON, RegimeTable, nearest, regimes_of
-from chaosgym.fleet import at_speed
 from chaosgym.machines import THESIS_IMPACT_BEAM
+from chaosgym.simulation.batch import at_speed
 
 
 def _table(pattern: str) -> RegimeTable:

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from chaosgym import fleet
-from chaosgym.compilation import call
 from chaosgym.core import status
+from chaosgym.core.compilation import call
 from chaosgym.envs import ENVIRONMENTS
 from chaosgym.envs.tasks import Status
 from chaosgym.errors import ParameterError
+from chaosgym.simulation import batch as fleet
 
 BEAM, CRANK = "chaosgym/ImpactBeam-v0", "chaosgym/SliderCrank-v0"
 BEAMS = "chaosgym/ImpactBeamTolerance-v0"

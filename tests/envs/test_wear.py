@@ -7,8 +7,8 @@ import pytest
 from chaosgym.envs import ENVIRONMENTS
 from chaosgym.envs.machine_env import MachineEnv
 from chaosgym.envs.pools import worn
-from chaosgym.fleet import at_speed, fleet_of
 from chaosgym.simulation import simulate
+from chaosgym.simulation.batch import at_speed, fleet_of
 
 RANGES = {"chaosgym/ImpactBeamWear-v0": (29.5, 30.0), "chaosgym/SliderCrankWear-v0": (290.0, 300.0)}
 """Range of the drive in which the tables of the nominal machine are soon known."""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.impact_beam import (
+from chaosgym.machines.impact_beam.parameters import (
     THESIS_IMPACT_BEAM,
     ImpactBeam,
     modal_analysis,

@@ -7,12 +7,17 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.connecting_rod import Bar, EndBody, connecting_rod
-from chaosgym.machines.crank_equations import ELEMENTS, equations
-from chaosgym.machines.kinematics import planar_motion, slider_position, stroke
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
-from chaosgym.machines.slider_crank import SUPERHARMONIC_SLIDER_CRANK, THESIS_SLIDER_CRANK, SliderCrank, frequencies_at
+from chaosgym.machines.slider_crank.connecting_rod import Bar, EndBody, connecting_rod
+from chaosgym.machines.slider_crank.equations import ELEMENTS, equations
+from chaosgym.machines.slider_crank.kinematics import planar_motion, slider_position, stroke
+from chaosgym.machines.slider_crank.parameters import (
+    SUPERHARMONIC_SLIDER_CRANK,
+    THESIS_SLIDER_CRANK,
+    SliderCrank,
+    frequencies_at,
+)
 
 CRANK = THESIS_SLIDER_CRANK
 RIGID = replace(

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from chaosgym.core.crank_stepper import SteppedCrankModel
-from chaosgym.core.slider_crank import SliderCrankModel
-from chaosgym.machines.crank_equations import degrees_of_freedom, equations
-from chaosgym.machines.crank_joints import InstrumentedSlider
-from chaosgym.machines.kinematics import crank_pin, slider_position, slider_rate
-from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
-from chaosgym.machines.spatial_equations import spatial_equations, spatial_loads
+from chaosgym.machines.slider_crank.equations import degrees_of_freedom, equations
+from chaosgym.machines.slider_crank.joints import InstrumentedSlider
+from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
+from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
+from chaosgym.machines.slider_crank.kinematics import crank_pin, slider_position, slider_rate
+from chaosgym.machines.slider_crank.parameters import THESIS_SLIDER_CRANK
+from chaosgym.machines.slider_crank.spatial_equations import spatial_equations, spatial_loads
 from chaosgym.simulation import simulate
 from tests.machines.spatial_twin import RigidMechanism
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chaosgym.machines.slider_crank import SUPERHARMONIC_SLIDER_CRANK, THESIS_SLIDER_CRANK
+from chaosgym.machines.slider_crank.parameters import SUPERHARMONIC_SLIDER_CRANK, THESIS_SLIDER_CRANK
 from chaosgym.simulation import simulate
 
 CRANK = THESIS_SLIDER_CRANK

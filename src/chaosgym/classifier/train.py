@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from chaosgym.classifier.ceiling import ceilings
-from chaosgym.classifier.compare import SCENES, compare_parameters, compare_scene, outside_parameters, refusals
+from benchmarks.classifier.ceiling import ceilings
+from benchmarks.classifier.compare import SCENES, compare_parameters, compare_scene, outside_parameters, refusals
+from benchmarks.classifier.latency import measure_speed
 from chaosgym.classifier.data import Examples, examples_of, thinned
 from chaosgym.classifier.estimator import ResponseClassifier
 from chaosgym.classifier.evaluation import probability_scores
@@ -24,7 +25,6 @@ from chaosgym.classifier.records import training_records
 from chaosgym.classifier.report import card_lines
 from chaosgym.classifier.scorers import Trees, pair_scores, train_scorers
 from chaosgym.classifier.shipped import MachineClassifier
-from chaosgym.classifier.speed import measure_speed
 from chaosgym.files import write_atomically
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import LabelledSweep

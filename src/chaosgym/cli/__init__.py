@@ -8,19 +8,15 @@ import sys
 
 import click
 
-from chaosgym.cli.bench import bench
-from chaosgym.cli.calibrate import calibrate
 from chaosgym.cli.classify import classify
 from chaosgym.cli.dataset import dataset
 from chaosgym.cli.demo import demo
 from chaosgym.cli.design import design
-from chaosgym.cli.diagnose import agreement, diagnose
+from chaosgym.cli.diagnose import diagnose
 from chaosgym.cli.fidelity import stability, tradeoff
-from chaosgym.cli.figures import figures
 from chaosgym.cli.info import info
 from chaosgym.cli.regimes import regimes
 from chaosgym.cli.run_agent import run_agent
-from chaosgym.cli.scorecard import scorecard
 from chaosgym.cli.simulate import show, simulate
 from chaosgym.cli.sweep import sweep
 from chaosgym.cli.train_classifier import train_classifier
@@ -35,16 +31,21 @@ def app() -> None:
 
 
 for command in (
-    simulate, show, diagnose, agreement, classify, sweep, dataset, train_classifier, demo, design, figures, calibrate,
-    scorecard, tradeoff, stability, regimes, run_agent, info, bench,
+    simulate, show, diagnose, classify, sweep, dataset, train_classifier, demo, design,
+    tradeoff, stability, regimes, run_agent, info,
 ):  # fmt: skip
     app.add_command(command)
 
 
 def main() -> None:
-    """Entry point: one clear line instead of a traceback for every error that chaosgym raises on purpose."""
+    """Entry point of ``chaosgym``."""
+    run_command(app)
+
+
+def run_command(command: click.Command) -> None:
+    """Run a command line: one clear line instead of a traceback for every error that chaosgym raises on purpose."""
     try:
-        app(standalone_mode=False)
+        command(standalone_mode=False)
     except click.exceptions.Abort:
         click.echo("Aborted.", err=True)
         sys.exit(130)

@@ -62,25 +62,6 @@ def card(folder: str) -> None:
     click.echo(f"wrote {write_card(folder)}")
 
 
-@dataset.command("check")
-@FOLDER
-@click.option("--points", type=click.IntRange(1, 10**6), default=50, show_default=True, help="Rows to label again.")
-@click.option("--seed", type=click.IntRange(0), default=None, help="Of the rows; default: other ones every time.")
-@AS_JSON
-def check(folder: str, points: int, seed: int | None, as_json: bool) -> None:
-    """Label some rows again and compare them; exit code 1 if they differ by more than another platform explains."""
-    from chaosgym.sweeps import read_sweep
-    from chaosgym.sweeps.check import check_rows
-
-    found = check_rows(read_sweep(folder), points, seed=seed, progress=True)
-    platform = "the same packages and processor" if found.same_platform else "other packages or another processor"
-    emit(found.as_dict(), as_json, lambda: [
-        f"{folder}: {found.identical} of {points} rows identical, {found.same_nature} of the same nature ({platform})"
-    ])  # fmt: skip
-    if not found.sound:
-        raise SystemExit(1)
-
-
 @dataset.command("noise")
 @FOLDER
 @click.option("--points", type=click.IntRange(1, 10**6), default=300, show_default=True, help="Rows to diagnose again.")
@@ -101,27 +82,6 @@ def noise(folder: str, points: int, seed: int, workers: int | None, as_json: boo
         f"{folder}: {found['points']} rows diagnosed again; nature differs / still periodic, peak moved by 10 %",
         *(f"  {name:36s}{change['nature']:6.1%} +- {change['half_interval']:.1%}  {change['largest_peak']:6.1%}"
           for name, change in found["changes"].items()),
-    ])  # fmt: skip
-
-
-@dataset.command("cost")
-@FOLDER
-@click.option("--points", type=click.IntRange(3, 10**6), default=300, show_default=True, help="Rows to label again.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
-@AS_JSON
-def cost(folder: str, points: int, seed: int, as_json: bool) -> None:
-    """Measure the processor time of a point against every axis, and extrapolate it."""
-    from chaosgym.sweeps import read_sweep
-    from chaosgym.sweeps.cost import labelling_cost
-
-    found = labelling_cost(read_sweep(folder), points, seed=seed, progress=True)
-    emit(found, as_json, lambda: [
-        f"{found['machine']}: {1e3 * found['seconds']:.1f} +- {1e3 * found['standard_error']:.1f} ms of processor time "
-        f"a point, {found['points_per_second']:.1f} points a second and core ({points} rows)",
-        *(f"  {name:22s}" + ", ".join(f"{part}: {1e3 * mean:.1f} ms" for part, mean in parts.items())
-          for name, parts in found["by"].items()),
-        *(f"  {size} points: " + ", ".join(f"{hours:.3g} h on {cores} cores" for cores, hours in row.items())
-          for size, row in found["hours"].items()),
     ])  # fmt: skip
 
 

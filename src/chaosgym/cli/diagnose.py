@@ -130,19 +130,3 @@ def _diagnose_machine(
         result["step_check"] = compared.as_dict()
         lines.append(f"  {compared.summary}")
     return result, lines
-
-
-@click.command()
-@machine_command
-@click.option("--points", type=click.IntRange(1, 10**6), default=500, show_default=True, help="Random machines.")
-@click.option("--cycles", type=click.IntRange(1000, 10**7), default=10_000, show_default=True, help="Of the reference.")
-@click.option("--budget", type=click.IntRange(100, 10**7), default=3200, show_default=True, help="Of the diagnosis.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
-def agreement(machine: Any, points: int, cycles: int, budget: int, seed: int, as_json: bool) -> None:
-    """Compare all tests of chaos with a long reference on random machines (takes long)."""
-    from chaosgym.diagnosis.agreement import agreement as compare
-    from chaosgym.diagnosis.agreement import random_machines
-
-    machines = random_machines(machine, points, seed)
-    table = compare(machines, reference_cycles=cycles, budget=budget, progress=True)
-    emit(table.as_dict(), as_json, lambda: table.markdown().splitlines())

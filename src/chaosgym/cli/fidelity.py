@@ -10,8 +10,8 @@ from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import emit
 
 if TYPE_CHECKING:
-    from chaosgym.stability import StabilityMap
-    from chaosgym.tradeoff import Tradeoff, TradeoffRow
+    from chaosgym.fidelity.stability import StabilityMap
+    from chaosgym.fidelity.tradeoff import Tradeoff, TradeoffRow
 
 _FOLDER = click.Path(file_okay=False, path_type=Path)
 
@@ -32,7 +32,7 @@ def tradeoff(
     as_json: bool,
 ) -> None:  # fmt: skip
     """Measure every rung, integrator and step of a machine against its reference: cost, errors, Pareto front."""
-    from chaosgym.tradeoff import tradeoff as measure
+    from chaosgym.fidelity.tradeoff import tradeoff as measure
 
     result = measure(
         machine, points=points, cycles=cycles, transient=transient, budget=budget, workers=workers, progress=True
@@ -76,7 +76,7 @@ def _tradeoff_line(row: "TradeoffRow") -> str:
 @click.option("--out", type=_FOLDER, default=None, help="Write stability.json and stability.png there.")
 def stability(machine: Any, workers: int | None, out: Path | None, as_json: bool) -> None:
     """Run a machine at every extreme on every rung: an answer within physical bounds, or an error with a name."""
-    from chaosgym.stability import stability_map
+    from chaosgym.fidelity.stability import stability_map
 
     result = stability_map(machine, workers=workers, progress=True)
     if out is not None:

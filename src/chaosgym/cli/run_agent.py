@@ -8,7 +8,7 @@ import click
 from chaosgym.cli.output import emit
 
 if TYPE_CHECKING:
-    from chaosgym.policies.play import PlayedJob
+    from chaosgym.control.policies.play import PlayedJob
 
 
 @click.command("run-agent")
@@ -35,8 +35,8 @@ def run_agent(env: str, policy: Path | None, seed: int, out: Path | None, as_jso
         check_format(out)
     import gymnasium as gym
 
-    from chaosgym.policies import load_policy, shipped_policy
-    from chaosgym.policies.play import play
+    from chaosgym.control.policies import load_policy, shipped_policy
+    from chaosgym.control.policies.play import play
 
     agent = load_policy(policy) if policy else shipped_policy(env)
     # a policy may know the machines that it was trained on

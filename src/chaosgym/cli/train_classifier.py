@@ -28,9 +28,9 @@ def train_classifier(
     data: str, out: str, seed: int, model: str | None, curve: bool, transfer: str | None, as_json: bool
 ) -> None:
     """Train the classifier on a sweep and judge it beside its baselines (needs the extra [learn])."""
+    from benchmarks.classifier.plotting import save_pictures
     from chaosgym.classifier.report import report_table
     from chaosgym.classifier.train import train_classifier as train
-    from chaosgym.plotting.classifier import save_pictures
     from chaosgym.sweeps import read_sweep
     from chaosgym.sweeps.card import read_noise
 

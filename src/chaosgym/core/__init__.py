@@ -1,4 +1,4 @@
-"""Ground floor: the compiled kernels, which know numpy and numba only.
+"""Compiled kernels that serve every machine; they know numpy and numba only.
 
 Compiled code is cached on disk in a folder named after the content of these sources. Numba itself looks only at the
 file of the function that is called, and would keep serving old machine code after an edit in a helper.
@@ -11,9 +11,9 @@ from pathlib import Path
 from numba import config
 
 
-def source_digest(folder: Path) -> str:
-    """Hash of all Python sources in a folder."""
-    sources = sorted(folder.glob("*.py"))
+def source_digest(*folders: Path) -> str:
+    """Hash of all Python sources in some folders."""
+    sources = [path for folder in folders for path in sorted(folder.glob("*.py"))]
     return hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
 
 
@@ -29,14 +29,12 @@ try:
     from chaosgym.core import (  # noqa: F401
         batch,
         contact,
-        crank_fixed_step,
-        crank_propagator,
-        crank_stepper,
+        cubic,
+        cycle,
         fixed_step,
-        impact_beam,
+        modal_impact,
         propagator,
         restitution,
-        slider_crank,
         status,
         tangent,
     )

@@ -1,25 +1,18 @@
-"""How do many machines move at once? Each by its own ``advance``, side by side on all threads.
+"""Many machines with modal impacts at once: each by its own ``advance``, side by side on all threads.
 
-A batch of models is a model whose fields have one more axis, the machines, in front. The large tables of a slider crank
-stay where they are, and its batch holds their addresses: machines at equal speeds share them.
+A batch of models is a model whose fields have one more axis, the machines, in front.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from numba import carray, njit, prange, types
-from numba.core import cgutils
-from numba.extending import intrinsic
+from numba import njit, prange
 
-from chaosgym.core.crank_propagator import FORCING_TERMS
-from chaosgym.core.crank_stepper import SteppedCrankModel
-from chaosgym.core.crank_stepper import advance as advance_stepped_crank
-from chaosgym.core.impact_beam import CycleArrays, Episode, ImpactBeamModel
-from chaosgym.core.impact_beam import advance as advance_beam
+from chaosgym.core.cycle import CycleArrays, Episode
+from chaosgym.core.modal_impact import ModalImpactModel
+from chaosgym.core.modal_impact import advance as advance_beam
 from chaosgym.core.propagator import Regimes
 from chaosgym.core.restitution import RestitutionModel, advance_restitution
-from chaosgym.core.slider_crank import SliderCrankModel
-from chaosgym.core.slider_crank import advance as advance_crank
 
 
 class Motions(NamedTuple):
@@ -65,7 +58,7 @@ def regimes_of(regimes, i):
 @njit(cache=True, inline="always")
 def beam_of(batch, regimes, i):
     """Model of machine i."""
-    return ImpactBeamModel(
+    return ModalImpactModel(
         batch.excitation_frequency[i], batch.force_amplitude[i], batch.clearance[i], batch.contact_stiffness[i],
         batch.contact_damping[i], batch.stiffness[i], batch.damping[i], batch.tip_shape[i], batch.force_shape[i],
         regimes_of(regimes, i), batch.rest[i], batch.rest_penetration[i],
@@ -105,62 +98,4 @@ def advance_rigid_beams(batch, regimes, which, motions, arrays, settings, outcom
         outcome[k] = advance_restitution(
             rigid_beam_of(batch, regimes, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
             settings.step_phase, settings.event_budget,
-        )[0]  # fmt: skip
-
-
-@intrinsic
-def pointer(typing_context, address):
-    """Turn an integer into a pointer."""
-
-    def build(context, builder, signature, arguments):
-        return builder.inttoptr(arguments[0], cgutils.voidptr_t)
-
-    return types.voidptr(types.intp), build
-
-
-@njit(cache=True, inline="always")
-def crank_of(batch, bins, i):
-    """Model of machine i of a batch that holds the addresses of the tables."""
-    m, n = batch.row.shape[1:]
-    size = 2 * n + FORCING_TERMS + m
-    sets = batch.radix[i] ** m
-    return SliderCrankModel(
-        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.order[i], batch.spectrum[i], batch.row[i],
-        batch.gap[i], batch.stiffness[i], batch.damping[i], batch.two_sided[i], batch.radix[i], batch.reading[i],
-        batch.reach[i], batch.display[i],
-        carray(pointer(batch.acceleration[i]), (sets, bins, n, size), np.float64),
-        carray(pointer(batch.curvature[i]), (sets, bins, m, size), np.float64),
-        carray(pointer(batch.propagator[i]), (sets, bins, size, 2 * n), np.float64),
-    )  # fmt: skip
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def advance_cranks(batch, bins, which, motions, arrays, settings, outcome):
-    """As ``advance_beams``, for slider cranks with ``bins`` bins of crank angle."""
-    for k in prange(which.shape[0]):
-        i = which[k]
-        outcome[k] = advance_crank(
-            crank_of(batch, bins, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
-            settings.event_tolerance / batch.contact_rate[i], settings.event_budget,
-        )[0]  # fmt: skip
-
-
-@njit(cache=True, inline="always")
-def stepped_crank_of(batch, i):
-    """Model of machine i."""
-    return SteppedCrankModel(
-        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.acceleration[i], batch.first[i],
-        batch.row[i], batch.answer[i], batch.friction[i], batch.gap[i], batch.stiffness[i], batch.damping[i],
-        batch.law[i], batch.two_sided[i], batch.reading[i], batch.monitored[i], batch.display[i],
-    )  # fmt: skip
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def advance_stepped_cranks(batch, which, motions, arrays, settings, outcome):
-    """As ``advance_beams``, for slider cranks that need the stepper."""
-    for k in prange(which.shape[0]):
-        i = which[k]
-        outcome[k] = advance_stepped_crank(
-            stepped_crank_of(batch, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
-            settings.event_tolerance / batch.contact_rate[i], settings.event_budget,
         )[0]  # fmt: skip

@@ -12,7 +12,8 @@ from numba import njit
 
 from chaosgym.core import status
 from chaosgym.core.contact import contact_force
-from chaosgym.core.impact_beam import LOWER, UPPER, note_touch, tip_of_state
+from chaosgym.core.cycle import LOWER, UPPER, note_touch
+from chaosgym.core.modal_impact import tip_of_state
 
 STABILITY_LIMIT = 2.7
 """Largest step times fastest angular frequency; the method grows undamped oscillations from 2.83 on."""

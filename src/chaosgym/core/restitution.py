@@ -26,7 +26,8 @@ import numpy as np
 from numba import njit
 
 from chaosgym.core import status
-from chaosgym.core.impact_beam import LOWER, UPPER, note_touch, suspect
+from chaosgym.core.cycle import LOWER, UPPER, note_touch
+from chaosgym.core.modal_impact import suspect
 from chaosgym.core.propagator import Regimes, move, safe_time, with_force
 from chaosgym.core.tangent import carry, orthonormalise
 
@@ -51,7 +52,7 @@ MAX_POLISH = 60
 class RestitutionModel(NamedTuple):
     """All that the kernel knows of a rigid beam whose impacts take no time.
 
-    As ``ImpactBeamModel`` with one mode and the free regime alone; ``restitution``, ``contact_duration`` [s] and
+    As ``ModalImpactModel`` with one mode and the free regime alone; ``restitution``, ``contact_duration`` [s] and
     ``force_per_speed`` [N s/m] are those of the compliant contact.
     """
 

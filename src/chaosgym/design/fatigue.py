@@ -25,9 +25,9 @@ import numpy as np
 import rainflow
 from numpy.typing import ArrayLike, NDArray
 
+from chaosgym.design.rating_life import LIFE_EXPONENT, damage_in_a_million
 from chaosgym.design.statistics import as_forces
 from chaosgym.errors import DesignError
-from chaosgym.life_law import LIFE_EXPONENT, damage_in_a_million
 
 Array = NDArray[np.float64]
 

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.design.fatigue import rating_life
+from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.design.statistics import as_forces
 from chaosgym.errors import DesignError
-from chaosgym.life_law import LIFE_EXPONENT
 from chaosgym.simulation import CycleRecord
 
 Array = NDArray[np.float64]

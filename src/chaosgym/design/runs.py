@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from chaosgym.design.fatigue import equivalent_force
+from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.design.statistics import convergence
 from chaosgym.diagnosis import Nature, Tolerance, diagnose
-from chaosgym.life_law import LIFE_EXPONENT
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import MotionState, parallel_map, rest_state, simulate

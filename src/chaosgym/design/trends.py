@@ -16,10 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.design.fatigue import CUBIC_EXPONENT, equivalent_force, relative_life
 from chaosgym.design.peak_impacts import peak_impacts, spot_life, worn_side
+from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.design.runs import SettledRun, settled_run
 from chaosgym.diagnosis import Nature
 from chaosgym.errors import DesignError
-from chaosgym.life_law import LIFE_EXPONENT
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import parallel_map, simulate

@@ -1,6 +1,5 @@
 """What kind of response is this? Tests take a ``CycleRecord`` or a plain array of one sample a cycle."""
 
-from chaosgym.diagnosis.agreement import AgreementTable, agreement, random_machines
 from chaosgym.diagnosis.criteria import CriterionRate, PredictiveCriterion, criterion_rate, predictive_criteria
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.lyapunov import (
@@ -35,7 +34,6 @@ __all__ = [
     "NATURES",
     "STATUSES",
     "TYPES",
-    "AgreementTable",
     "CriterionRate",
     "Diagnosis",
     "Intermittency",
@@ -53,7 +51,6 @@ __all__ = [
     "Tolerance",
     "Type",
     "WarningRate",
-    "agreement",
     "bounce_fraction",
     "compare_attractors",
     "compare_outcomes",
@@ -73,7 +70,6 @@ __all__ = [
     "power_spectrum",
     "precursors",
     "predictive_criteria",
-    "random_machines",
     "response_map",
     "response_type",
     "two_step_test",

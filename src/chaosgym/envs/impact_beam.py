@@ -6,7 +6,7 @@ from chaosgym.envs.drive import SpeedDrive
 from chaosgym.envs.machine_env import SENSOR_ERROR, MachineEnv, nominal_machine
 from chaosgym.envs.tasks import Task
 from chaosgym.envs.vector_env import MachineVectorEnv
-from chaosgym.machines.impact_beam import THESIS_IMPACT_BEAM, ImpactBeam
+from chaosgym.machines.impact_beam.parameters import THESIS_IMPACT_BEAM, ImpactBeam
 
 TOLERANCES = {"clearance": 0.2, "damping_ratio": 0.2, "length": 0.002}
 """Half widths as shares of the nominal value. Clearance: +-0.0254 mm at +-0.127 mm, the repeatability of the thesis'
@@ -149,7 +149,7 @@ class ImpactBeamEnv(MachineEnv):
     | `sensor_error`    | **float** | `3.0`     | half width of the uniform error of a measured peak force [N] |
     | `render_mode`     | **str**   | `None`    | `"rgb_array"` or `"human"`                                   |
     | `fidelity`        | **str**   | `None`    | rung of the ladder of models; none is "modes-5"              |
-    | any field         | **float** |           | of `chaosgym.machines.impact_beam.ImpactBeam`, in SI units   |
+    | any field         | **float** |           | of `chaosgym.machines.impact_beam.parameters.ImpactBeam`, in SI units   |
 
     The rungs of `fidelity` are `"restitution"`, `"rigid"`, `"modes-3"`, `"modes-5"`, `"modes-8"` and `"reference"`; a
     field that a rung sets may not be given beside it.

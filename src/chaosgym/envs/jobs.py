@@ -14,8 +14,8 @@ from chaosgym.envs.pools import Pool, worn
 from chaosgym.envs.regimes import RegimeTable, nearest
 from chaosgym.envs.tasks import Status, Step, Task
 from chaosgym.errors import SimulationError
-from chaosgym.fleet import Cycles, Fleet, at_speed
 from chaosgym.machines.machine import Machine
+from chaosgym.simulation.batch import Cycles, Fleet, at_speed
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -20,10 +20,10 @@ from chaosgym.envs.pools import Pool
 from chaosgym.envs.regimes import RegimeTable
 from chaosgym.envs.tasks import Status, Task
 from chaosgym.errors import ParameterError
-from chaosgym.fleet import SerialFleet, at_speed
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import CycleRecord, simulate
+from chaosgym.simulation.batch import SerialFleet, at_speed
 
 if TYPE_CHECKING:
     from chaosgym.envs.rendering import Dashboard

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.machines.kinematics import crank_pin, slider_position
+from chaosgym.machines.slider_crank.kinematics import crank_pin, slider_position
 from chaosgym.simulation import CycleRecord
 
 Array = NDArray[np.float64]

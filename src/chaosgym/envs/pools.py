@@ -21,9 +21,9 @@ from chaosgym.envs.drive import SpeedDrive
 from chaosgym.envs.regimes import HORIZON, RegimeTable, regimes_of
 from chaosgym.errors import ParameterError
 from chaosgym.files import write_atomically
-from chaosgym.fleet import at_speed
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import with_settings
+from chaosgym.simulation.batch import at_speed
 from chaosgym.version import __version__
 
 Array = NDArray[np.float64]

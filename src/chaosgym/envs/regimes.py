@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from chaosgym.core import KERNEL_CACHE
+from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.errors import SimulationError
 from chaosgym.files import write_atomically
-from chaosgym.fleet import at_speed
-from chaosgym.life_law import LIFE_EXPONENT
 from chaosgym.machines.machine import Machine
+from chaosgym.simulation.batch import at_speed
 from chaosgym.version import __version__
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ from chaosgym.envs.drive import SpeedDrive
 from chaosgym.envs.machine_env import SENSOR_ERROR, MachineEnv, nominal_machine
 from chaosgym.envs.tasks import Task
 from chaosgym.envs.vector_env import MachineVectorEnv
-from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK, SliderCrank
+from chaosgym.machines.slider_crank.parameters import THESIS_SLIDER_CRANK, SliderCrank
 
 SLIDER_CLEARANCE = 0.254e-3
 """Half clearance [m] of the slider joint; printed (thesis figure 4.14b)."""
@@ -167,7 +167,7 @@ class SliderCrankEnv(MachineEnv):
     | `contact_damping_ratio` | **float**      | `0.13`     | damping ratio of a joint in contact                   |
     | `fidelity`              | **str**        | `None`     | rung of the ladder of models; none is "flexible-5deg" |
     | `render_mode`           | **str**        | `None`     | `"rgb_array"` or `"human"`                            |
-    | any field               | **float, str** |            | of `chaosgym.machines.slider_crank.SliderCrank`       |
+    | any field               | **float, str** |            | of `chaosgym.machines.slider_crank.parameters.SliderCrank`       |
 
     Fields are in SI units, angles in degrees. They include the motor angle, the joints (`slider_joint`, `ball_joint`),
     their clearances, the rod (`rod`, `rod_diameter`, `rod_length`), friction and gravity. The ball joint has no

@@ -23,8 +23,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.design.rating_life import damage_in_a_million
 from chaosgym.errors import ParameterError
-from chaosgym.life_law import damage_in_a_million
 from chaosgym.machines.parameters import parameter, validate
 
 Array = NDArray[np.float64]

@@ -19,7 +19,7 @@ from chaosgym.envs.jobs import Indices, Jobs
 from chaosgym.envs.machine_env import METADATA, MachineEnv, Start, start_of
 from chaosgym.envs.observation import Observation
 from chaosgym.errors import ParameterError
-from chaosgym.fleet import fleet_of
+from chaosgym.simulation.batch import fleet_of
 
 Actions = NDArray[np.float32]
 Flags = NDArray[np.bool_]

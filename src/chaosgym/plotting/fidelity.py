@@ -8,8 +8,8 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from chaosgym.stability import Outcome, StabilityMap
-from chaosgym.tradeoff import Tradeoff, TradeoffRow
+from chaosgym.fidelity.stability import Outcome, StabilityMap
+from chaosgym.fidelity.tradeoff import Tradeoff, TradeoffRow
 
 MARKERS = {"exact": "o", "Runge-Kutta 4": "^"}
 OUTCOME_COLOURS: dict[Outcome, str] = {"answer": "#3b7dd8", "named error": "#f2a93b", "failure": "#d1495b"}

@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from PIL import Image
 from tqdm import tqdm
 
+from chaosgym.control.policies.play import PlayedJob
 from chaosgym.envs.pictures import CALM, INK, LIMIT, WILD
 from chaosgym.errors import ChaosgymError
 from chaosgym.files import write_atomically
-from chaosgym.policies.play import PlayedJob
 
 FRAMES = 50
 """Pictures of an animation."""

@@ -1,0 +1,1 @@
+"""Numbers about chaosgym itself, which a reader can rerun."""

@@ -1,0 +1,1 @@
+"""The contest of classifiers on held-out machines."""

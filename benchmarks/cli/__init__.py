@@ -1,0 +1,131 @@
+"""Command line of ``python -m benchmarks``."""
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from benchmarks.cli.bench import bench
+from chaosgym.cli import run_command
+from chaosgym.cli.dataset import AS_JSON, FOLDER
+from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.output import emit
+from chaosgym.envs import ENVIRONMENTS
+
+if TYPE_CHECKING:
+    from benchmarks.envs.audit import Score
+
+
+@click.command()
+@machine_command
+@click.option("--points", type=click.IntRange(1, 10**6), default=500, show_default=True, help="Random machines.")
+@click.option("--cycles", type=click.IntRange(1000, 10**7), default=10_000, show_default=True, help="Of the reference.")
+@click.option("--budget", type=click.IntRange(100, 10**7), default=3200, show_default=True, help="Of the diagnosis.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+def agreement(machine: Any, points: int, cycles: int, budget: int, seed: int, as_json: bool) -> None:
+    """Compare all tests of chaos with a long reference on random machines (takes long)."""
+    from benchmarks.agreement import agreement as compare
+    from benchmarks.agreement import random_machines
+
+    machines = random_machines(machine, points, seed)
+    table = compare(machines, reference_cycles=cycles, budget=budget, progress=True)
+    emit(table.as_dict(), as_json, lambda: table.markdown().splitlines())
+
+
+@click.command("check-sweep")
+@FOLDER
+@click.option("--points", type=click.IntRange(1, 10**6), default=50, show_default=True, help="Rows to label again.")
+@click.option("--seed", type=click.IntRange(0), default=None, help="Of the rows; default: other ones every time.")
+@AS_JSON
+def check(folder: str, points: int, seed: int | None, as_json: bool) -> None:
+    """Label some rows again and compare them; exit code 1 if they differ by more than another platform explains."""
+    from benchmarks.sweeps.check import check_rows
+    from chaosgym.sweeps import read_sweep
+
+    found = check_rows(read_sweep(folder), points, seed=seed, progress=True)
+    platform = "the same packages and processor" if found.same_platform else "other packages or another processor"
+    emit(found.as_dict(), as_json, lambda: [
+        f"{folder}: {found.identical} of {points} rows identical, {found.same_nature} of the same nature ({platform})"
+    ])  # fmt: skip
+    if not found.sound:
+        raise SystemExit(1)
+
+
+@click.command("sweep-cost")
+@FOLDER
+@click.option("--points", type=click.IntRange(3, 10**6), default=300, show_default=True, help="Rows to label again.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@AS_JSON
+def cost(folder: str, points: int, seed: int, as_json: bool) -> None:
+    """Measure the processor time of a point against every axis, and extrapolate it."""
+    from benchmarks.sweeps.cost import labelling_cost
+    from chaosgym.sweeps import read_sweep
+
+    found = labelling_cost(read_sweep(folder), points, seed=seed, progress=True)
+    emit(found, as_json, lambda: [
+        f"{found['machine']}: {1e3 * found['seconds']:.1f} +- {1e3 * found['standard_error']:.1f} ms of processor time "
+        f"a point, {found['points_per_second']:.1f} points a second and core ({points} rows)",
+        *(f"  {name:22s}" + ", ".join(f"{part}: {1e3 * mean:.1f} ms" for part, mean in parts.items())
+          for name, parts in found["by"].items()),
+        *(f"  {size} points: " + ", ".join(f"{hours:.3g} h on {cores} cores" for cores, hours in row.items())
+          for size, row in found["hours"].items()),
+    ])  # fmt: skip
+
+
+@click.command()
+@click.argument("env", type=click.Choice(ENVIRONMENTS))
+@click.option("--samples", type=click.IntRange(1), default=200, show_default=True, help="Steps that are looked at.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def check_regimes(env: str, samples: int, seed: int, as_json: bool) -> None:
+    """Compare the table with a full diagnosis in steps that random jobs on held-out machines went through."""
+    from benchmarks.envs.regime_check import check_regimes as compare
+
+    found = compare(env, samples, seed, progress=True)
+    emit(
+        found.as_dict(),
+        as_json,
+        lambda: [
+            f"{env}: {found.as_dict()['agreement']:.1%} of {found.samples} steps agree",
+            f"  counted as Type III and not periodic {found.irregular}, though periodic {found.blamed}",
+            f"  not counted and periodic {found.periodic}, though not periodic {found.missed}",
+        ],
+    )
+
+
+@click.command()
+@click.argument("env", type=click.Choice(ENVIRONMENTS))
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def audit(env: str, as_json: bool) -> None:
+    """Play every loophole that one could think of for a job on the nominal machine."""
+    from benchmarks.envs.audit import audit as play
+
+    scores = play(env)
+    emit({"env": env, "schedules": [score.as_dict() for score in scores]}, as_json, lambda: _audit_lines(scores))
+
+
+def _audit_lines(scores: list["Score"]) -> list[str]:
+    """The best and the worst schedule of each kind."""
+    lines = [f"{'schedule':16s} {'speeds':>15s} {'return':>8s} {'Type III':>8s} {'force':>6s} {'damage':>6s}  end"]
+    for kind in dict.fromkeys(score.plan.kind for score in scores):
+        ranked = sorted((score for score in scores if score.plan.kind == kind), key=lambda score: -score.total)
+        for score in ranked[:3] + ranked[3:][-1:]:
+            speeds = " to ".join(f"{speed:g}" for speed in score.plan.speeds)
+            lines.append(
+                f"{kind:16s} {speeds:>15s} {score.total:8.3f} {score.type_iii:8.1%} {score.force:6.1%} "
+                f"{score.damage:6.2f}  {score.status}"
+            )
+    return [*lines, f"largest reward of a step: {max(score.best_step for score in scores):.2g}"]
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+def app() -> None:
+    """Numbers about chaosgym itself."""
+
+
+for command in (bench, agreement, check, cost, check_regimes, audit):
+    app.add_command(command)
+
+
+def main() -> None:
+    """Entry point."""
+    run_command(app)

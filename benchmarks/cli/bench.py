@@ -1,0 +1,98 @@
+"""How fast is this computer? ``bench``."""
+
+from dataclasses import asdict
+from typing import Any
+
+import click
+
+from chaosgym.cli.output import emit
+
+
+@click.command()
+@click.option("--repeats", type=click.IntRange(1, 100), default=5, show_default=True, help="Timed runs per figure.")
+@click.option("--against", type=click.Choice(["exudyn"]), help="Run the same machines there; needs chaosgym[peers].")
+@click.option("--scenes", is_flag=True, help="The scenes of the slider crank instead: degrees of freedom and cost.")
+@click.option("--set-up", "set_up", is_flag=True, help="The times to make a slider crank ready instead.")
+@click.option("--scaling", is_flag=True, help="What threads and wrapping make of the vector environments instead.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def bench(
+    repeats: int, against: str | None, scenes: bool, set_up: bool, scaling: bool, as_json: bool
+) -> None:  # fmt: skip
+    """Rates on this computer: cycles, environment steps, sweep points, classifier rows; or against a peer."""
+    if (against is not None) + scenes + set_up + scaling > 1:
+        raise click.UsageError("--against, --scenes, --set-up and --scaling exclude each other")
+    if against is not None:
+        from benchmarks.performance.against_exudyn import against_exudyn
+
+        rows = against_exudyn(repeats=repeats, progress=True)
+        return emit({"against": against, "settings": rows}, as_json, lambda: _comparison(rows))
+    from benchmarks.performance import benchmark, scene_costs, set_up_times, vector_scaling
+
+    if scenes:
+        costs = scene_costs()
+        return emit({"scenes": [asdict(cost) for cost in costs]}, as_json, lambda: _scene_table(costs))
+    if set_up:
+        times = set_up_times(repeats)
+        return emit({"set_up_microseconds": times}, as_json, lambda: [
+            f"{name:40s} {value:10.1f} us" for name, value in times.items()
+        ])  # fmt: skip
+    if scaling:
+        measured = vector_scaling(repeats)
+        return emit({"scaling": [asdict(each) for each in measured]}, as_json, lambda: _scaling_table(measured))
+    result = benchmark(repeats, progress=True)
+    return emit(result, as_json, lambda: _rates(result))
+
+
+def _rates(result: dict[str, Any]) -> list[str]:
+    load = result["load_average"]
+    lines = [f"{'':64s}{'per second':>12s}{'per CPU second':>16s}"]
+    for quantity, figures in result.items():
+        if quantity == "load_average":
+            continue
+        lines.append(quantity.replace("_", " "))
+        for name, rates in figures.items():
+            lines.append(f"  {name:62s}{_shown(rates['per_second']):>12s}{_shown(rates['per_processor_second']):>16s}")
+    return [*lines, f"load average of this computer: {load['before']:.1f} before, {load['after']:.1f} after"]
+
+
+def _shown(figure: float) -> str:
+    return f"{figure:.1f}" if figure < 100.0 else f"{figure:,.0f}"
+
+
+def _comparison(rows: list[dict[str, Any]]) -> list[str]:
+    lines = [f"{'':78s}{'cycles per CPU second':>22s}{'ratio':>7s}{'goal':>6s}  right verdicts (periods)"]
+    shown = ""
+    for row in rows:
+        rates, own = row["cycles_per_processor_second"], f"{row['machine']}: chaosgym, exact events"
+        if row["machine"] != shown:
+            shown = row["machine"]
+            lines.append(f"{own:78s}{rates['chaosgym']:22,.1f}{'':13s}{_verdicts(row, 'chaosgym')}")
+        figures = f"{rates['exudyn']:22,.1f}{row['ratio']:7.0f}{row['goal']:6.0f}"
+        lines.append(f"  {row['setting']:76s}{figures}{_verdicts(row, 'exudyn')}")
+    return lines
+
+
+def _verdicts(row: dict[str, Any], side: str) -> str:
+    wrong = ", ".join(f"{speed:g}" for speed in row["wrong_at"][side])
+    share = f"  {row['right_class'][side]} ({row['right_period'][side]}) of {row['speeds']}"
+    return share + (f", wrong at {wrong}" if wrong else "")
+
+
+def _scene_table(costs: list[Any]) -> list[str]:
+    head = f"{'slider crank, 200 rpm, 5 deg bins':41s} {'DOF':>3s}  {'method':11s} {'set-up':>9s} {'revolution':>12s}"
+    rows = [
+        f"{cost.scene:41s} {len(cost.degrees_of_freedom):3d}  {cost.method:11s} {1e3 * cost.setup:6.1f} ms "
+        f"{1e3 * cost.revolution:9.2f} ms"
+        for cost in costs
+    ]
+    return [head, *rows, "the degrees of freedom of a scene by name: chaosgym show slider-crank, and --json"]
+
+
+def _scaling_table(measured: list[Any]) -> list[str]:
+    title = f"{'us a step of a machine':42s}{'one thread':>12s}{'all':>8s}{'of ideal':>11s}{'wrapper':>9s}"
+    rows = [
+        f"{f'{each.environment}, {each.machines} on {each.threads} threads':42s}{1e6 * each.one_thread:12.1f}"
+        f"{1e6 * each.all_threads:8.1f}{100.0 * each.efficiency:9.1f} %{1e6 * each.wrapper:9.2f}"
+        for each in measured
+    ]
+    return [title, *rows]

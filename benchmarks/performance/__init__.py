@@ -1,0 +1,9 @@
+"""How fast is it here? Numbers that a reader can rerun with ``chaosgym bench``."""
+
+from benchmarks.performance.rates import benchmark
+from benchmarks.performance.scaling import vector_scaling
+from benchmarks.performance.scenes import scene_costs
+from benchmarks.performance.set_up import set_up_times
+from benchmarks.performance.timing import timed_run
+
+__all__ = ["benchmark", "scene_costs", "set_up_times", "timed_run", "vector_scaling"]

@@ -1,0 +1,256 @@
+"""How does Exudyn simulate the same machines? The best general simulator for them, driven as its manual advises.
+
+The impact beam is a body with mass, stiffness and damping matrices (``ObjectGenericODE2``): those of our modes, turned
+into coordinates of which the first is the tip and the second the point of the force. So both simulators integrate
+the same equations. The slider crank is what an Exudyn user would build of the same parts: geometrically exact
+beam elements whose end nodes carry housing and yoke, a flywheel so heavy that it turns at constant speed, a slider.
+
+Sources: exudyn.readthedocs.io, reference manual of the items used; Exudyn is written by J. Gerstmayr.
+"""
+
+import contextlib
+import io
+import math
+import sys
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from benchmarks.performance.timing import processor_seconds
+from chaosgym.core.modal_impact import ModalImpactModel
+from chaosgym.errors import ChaosgymError
+from chaosgym.machines.impact_beam.parameters import ImpactBeam
+from chaosgym.machines.machine import Machine
+from chaosgym.machines.slider_crank.parameters import SliderCrank
+
+Array = NDArray[np.float64]
+
+NEWTON_TOLERANCE = 1e-6
+"""Below this the Newton iteration of an elastic body that starts from rest stalls in rounding."""
+
+ELEMENTS = 8
+"""Beam elements of the connecting rod."""
+
+FLYWHEEL_INERTIA = 1e4
+"""Moment of inertia [kg m^2] of a crank whose speed the mechanism does not change."""
+
+
+@dataclass(frozen=True)
+class ExudynSetting:
+    """How Exudyn runs a machine.
+
+    Attributes
+    ----------
+    solver
+        Name of its ``DynamicSolverType``.
+    contact
+        "stop": the built-in limit stop. "law": our contact law as a user function, compiled by ``exudyn.symbolic``.
+    step
+        Time step [s], shortened to a whole number in a cycle.
+    switch_tolerance
+        Force [N] by which a limit stop may switch late; None for Exudyn's default of 1 N.
+    """
+
+    solver: str
+    contact: str
+    step: float
+    switch_tolerance: float | None = None
+
+    def __str__(self) -> str:
+        switched = "" if self.switch_tolerance is None else f", switched within {self.switch_tolerance:g} N"
+        contact = "limit stop" if self.contact == "stop" else "contact law as symbolic function"
+        return f"{self.solver}, {contact}{switched}, step {self.step:g} s"
+
+
+def load_exudyn() -> Any:
+    """Import Exudyn, the build without range checks where there is one.
+
+    Raises
+    ------
+    ChaosgymError
+        If it is not installed.
+    """
+    vars(sys).setdefault("exudynFast", True)
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            import exudyn
+            import exudyn.itemInterface
+            import exudyn.utilities
+    except ImportError as error:
+        raise ChaosgymError("exudyn is not installed; install it with: pip install 'chaosgym[peers]'") from error
+    return exudyn
+
+
+def run_in_exudyn(machine: Machine, cycles: int, setting: ExudynSetting, *, forces: bool) -> tuple[float, Array | None]:
+    """Run a machine from rest in Exudyn.
+
+    Parameters
+    ----------
+    machine
+        An impact beam, or a slider crank with clearance at the slider.
+    cycles
+        Operating cycles.
+    setting
+        How.
+    forces
+        Whether to record the contact force, which takes time.
+
+    Returns
+    -------
+    (seconds, peak_force)
+        Processor time of the run; peak force of each cycle on the first surface, (cycles,), or None.
+    """
+    exudyn = load_exudyn()
+    container = exudyn.SystemContainer()
+    system = container.AddSystem()
+    if isinstance(machine, ImpactBeam):
+        node, coordinate, first = *_add_beam(exudyn, system, machine, setting), 1.0
+        gap, stiffness, damping = machine.clearance, machine.contact_stiffness, machine.contact_damping
+    else:
+        assert isinstance(machine, SliderCrank)
+        # the first surface of the guide pushes upward, so it lies below the slider
+        node, coordinate, first = *_add_crank(exudyn, system, machine, setting), -1.0
+        gap, stiffness, damping = machine.slider_clearance, machine.contact_stiffness, machine.contact_damping
+    sensors = []
+    if forces:
+        kinds = exudyn.OutputVariableType
+        for kind in (kinds.Coordinates, kinds.Coordinates_t):
+            sensor = exudyn.itemInterface.SensorNode(nodeNumber=node, storeInternal=True, outputVariableType=kind)
+            sensors.append(system.AddSensor(sensor))
+    system.Assemble()
+    steps = math.ceil(machine.cycle_period / setting.step)
+    settings = _settings(exudyn, machine.cycle_period, cycles, steps, setting)
+    solver = getattr(exudyn.DynamicSolverType, setting.solver)
+    seconds = processor_seconds(lambda: system.SolveDynamic(settings, solverType=solver))
+    if not forces:
+        return seconds, None
+    x, v = (first * system.GetSensorStoredData(sensor)[-cycles * steps :, 1 + coordinate] for sensor in sensors)
+    force = np.where(x > gap, np.maximum(stiffness * (x - gap) + damping * v, 0.0), 0.0)
+    return seconds, force.reshape(cycles, steps).max(axis=1)
+
+
+def _settings(exudyn: Any, period: float, cycles: int, steps: int, setting: ExudynSetting) -> Any:
+    settings = exudyn.SimulationSettings()
+    integration = settings.timeIntegration
+    integration.endTime = period * cycles
+    integration.numberOfSteps = steps * cycles
+    integration.verboseMode = 0
+    integration.generalizedAlpha.spectralRadius = 1.0
+    integration.newton.useModifiedNewton = True
+    integration.newton.absoluteTolerance = NEWTON_TOLERANCE
+    if setting.switch_tolerance is not None:
+        integration.discontinuous.iterationTolerance = setting.switch_tolerance
+    settings.solution.file.write = False
+    settings.solution.sensors.writePeriod = period / steps
+    settings.linearSolver.solverType = exudyn.LinearSolverType.EXUdense
+    settings.parallel.numberOfThreads = 1
+    return settings
+
+
+def _add_contact(
+    exudyn: Any, system: Any, marker: int, setting: ExudynSetting, gap: float, stiffness: float, damping: float
+) -> None:
+    """Put two surfaces around the coordinate of a marker."""
+    items = exudyn.itemInterface
+    fixed = system.AddNode(items.NodePointGround())
+    ground = system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))
+    if setting.contact == "stop":
+        data = system.AddNode(items.NodeGenericData(initialCoordinates=[0, 0, 0], numberOfDataCoordinates=3))
+        system.AddObject(items.ObjectConnectorCoordinateSpringDamperExt(
+            markerNumbers=[ground, marker], nodeNumber=data, useLimitStops=True, limitStopsUpper=gap,
+            limitStopsLower=-gap, limitStopsStiffness=stiffness, limitStopsDamping=damping,
+        ))  # fmt: skip
+        return
+    symbolic = exudyn.symbolic
+
+    def force(mbs: Any, t: Any, item: Any, x: Any, v: Any, k: Any, d: Any, c: Any) -> Any:
+        upper = symbolic.max(0.0, k * (x - c) + d * v) * (0.5 * symbolic.sign(x - c) + 0.5)
+        lower = symbolic.max(0.0, k * (-x - c) - d * v) * (0.5 * symbolic.sign(-x - c) + 0.5)
+        return upper - lower
+
+    spring = system.AddObject(items.ObjectConnectorCoordinateSpringDamper(
+        markerNumbers=[ground, marker], stiffness=stiffness, damping=damping, offset=gap
+    ))  # fmt: skip
+    name = "springForceUserFunction"
+    compiled = exudyn.utilities.CreateSymbolicUserFunction(system, force, name, spring)
+    system.SetObjectParameter(spring, name, compiled)
+
+
+def _add_beam(exudyn: Any, system: Any, beam: ImpactBeam, setting: ExudynSetting) -> tuple[int, int]:
+    """Add an impact beam; its node and the number of the tip's coordinate."""
+    items, model = exudyn.itemInterface, beam.reduce()
+    assert isinstance(model, ModalImpactModel)
+    shapes = np.vstack([model.tip_shape, model.force_shape])
+    modal = np.linalg.inv(np.vstack([shapes, scipy.linalg.null_space(shapes).T]))
+    n = len(modal)
+    node = system.AddNode(items.NodeGenericODE2(
+        referenceCoordinates=[0.0] * n, initialCoordinates=[0.0] * n, initialCoordinates_t=[0.0] * n,
+        numberOfODE2Coordinates=n,
+    ))  # fmt: skip
+    system.AddObject(items.ObjectGenericODE2(
+        nodeNumbers=[node], massMatrix=modal.T @ modal, stiffnessMatrix=modal.T @ (model.stiffness[:, None] * modal),
+        dampingMatrix=modal.T @ model.damping @ modal,
+    ))  # fmt: skip
+    tip, shaker = (system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=i)) for i in (0, 1))
+    load = system.AddLoad(items.LoadCoordinate(markerNumber=shaker, load=model.force_amplitude))
+    omega = 2.0 * math.pi * model.excitation_frequency
+    drive = exudyn.utilities.CreateSymbolicUserFunction(
+        system, lambda mbs, t, amplitude: amplitude * exudyn.symbolic.sin(omega * t), "loadUserFunction", load
+    )
+    system.SetLoadParameter(load, "loadUserFunction", drive)
+    _add_contact(exudyn, system, tip, setting, model.clearance, model.contact_stiffness, model.contact_damping)
+    return node, 0
+
+
+def _add_crank(exudyn: Any, system: Any, crank: SliderCrank, setting: ExudynSetting) -> tuple[int, int]:
+    """Add a planar slider crank at crank angle zero on its nominal motion; the slider's node and its y coordinate."""
+    items = exudyn.itemInterface
+    radius, length, speed = crank.crank_radius, crank.rod_length, crank.crank_rate
+    flywheel = system.AddNode(items.NodeRigidBody2D(initialVelocities=[0.0, 0.0, speed]))
+    wheel = system.AddObject(items.ObjectRigidBody2D(nodeNumber=flywheel, mass=1.0, inertia=FLYWHEEL_INERTIA))
+    hub = system.AddMarker(items.MarkerBodyPosition(bodyNumber=system.AddObject(items.ObjectGround())))
+    pin = system.AddMarker(items.MarkerBodyPosition(bodyNumber=wheel, localPosition=[radius, 0.0, 0.0]))
+    system.AddObject(items.ObjectJointRevolute2D(
+        markerNumbers=[hub, system.AddMarker(items.MarkerBodyPosition(bodyNumber=wheel))]
+    ))  # fmt: skip
+
+    nodes = [
+        system.AddNode(items.NodeRigidBody2D(
+            referenceCoordinates=[radius + share * length, 0.0, 0.0],
+            initialVelocities=[0.0, radius * speed * (1.0 - share), -radius * speed / length],
+        ))
+        for share in np.linspace(0.0, 1.0, ELEMENTS + 1).tolist()
+    ]  # fmt: skip
+    area, inertia = math.pi * crank.rod_diameter**2 / 4.0, math.pi * crank.rod_diameter**4 / 64.0
+    bending, axial = crank.youngs_modulus * inertia, crank.youngs_modulus * area
+    delay = 2.0 * crank.damping_ratio / (2.0 * math.pi * float(crank.natural_frequencies[0]))
+    for first, last in pairwise(nodes):
+        system.AddObject(items.ObjectBeamGeometricallyExact2D(
+            nodeNumbers=[first, last], length=length / ELEMENTS, massPerLength=crank.density * area,
+            crossSectionInertia=crank.density * inertia, bendingStiffness=bending, axialStiffness=axial,
+            shearStiffness=0.35 * axial, bendingDamping=delay * bending, axialDamping=delay * axial,
+            shearDamping=delay * 0.35 * axial,
+        ))  # fmt: skip
+    ends = []
+    for node, mass, moment, offset in (
+        (nodes[0], crank.housing_mass, crank.housing_inertia, crank.housing_offset_along),
+        (nodes[-1], crank.yoke_mass, crank.yoke_inertia, crank.yoke_offset_along),
+    ):
+        body = system.AddObject(items.ObjectRigidBody2D(
+            nodeNumber=node, mass=mass, inertia=moment - mass * offset**2, centerOfMass=[offset, 0.0]
+        ))  # fmt: skip
+        ends.append(system.AddMarker(items.MarkerBodyPosition(bodyNumber=body)))
+    slider = system.AddNode(items.NodePoint2D(referenceCoordinates=[radius + length, 0.0]))
+    block = system.AddObject(items.ObjectMassPoint2D(nodeNumber=slider, mass=crank.slider_mass))
+    system.AddObject(items.ObjectJointRevolute2D(markerNumbers=[pin, ends[0]]))
+    system.AddObject(items.ObjectJointRevolute2D(
+        markerNumbers=[ends[1], system.AddMarker(items.MarkerBodyPosition(bodyNumber=block))]
+    ))  # fmt: skip
+    across = system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=slider, coordinate=1))
+    gap, stiffness, damping = crank.slider_clearance, crank.contact_stiffness, crank.contact_damping
+    _add_contact(exudyn, system, across, setting, gap, stiffness, damping)
+    return slider, 1

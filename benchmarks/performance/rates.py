@@ -1,0 +1,169 @@
+"""How many cycles, environment steps, sweep points and classifier rows per second?
+
+Rates per second of the wall clock, and per second of processor time, which suffer less where a computer is busy with
+something else. Environments take random actions. CartPole, and HalfCheetah where mujoco is installed, stand beside
+ours.
+"""
+
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from tqdm import tqdm
+
+from benchmarks.performance.timing import Rate, rate
+from chaosgym.classifier import default_classifier
+from chaosgym.envs import MACHINES
+from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, Machine
+from chaosgym.simulation import ExactEvents, Integrator, RungeKutta4, simulate
+from chaosgym.sweeps import SweepPlan, run_sweep
+from chaosgym.sweeps.plan import default_axes
+
+SUB_ENVIRONMENTS = 256
+"""Sub-environments of a vector environment."""
+
+SETTLING_CYCLES = 50
+"""Cycles from rest before a response is timed."""
+
+SWEEP_POINTS = 16
+"""Random points of a timed sweep over the machine's usual ranges."""
+
+CLASSIFIER_ROWS = 10_000
+"""Machines classified at once."""
+
+STEPS = {"chaosgym": (200, 5), "CartPole-v1": (5000, 500), "HalfCheetah-v5": (1000, 8)}
+"""Steps of a timed run of a single environment and of a vector environment, by the first part of the id."""
+
+OTHER_ENVIRONMENTS = ("CartPole-v1", "HalfCheetah-v5")
+
+
+Measure = Callable[[Any, int], Rate]
+
+
+def benchmark(repeats: int = 5, *, progress: bool = False) -> dict[str, Any]:
+    """Measure every rate; each figure is the median of ``repeats`` runs.
+
+    Returns
+    -------
+    dict
+        ``cycles``, ``env_steps``, ``vector_env_steps``, ``sweep_points``, ``classifier_rows``: by name, how many
+        ``per_second`` and ``per_processor_second``. ``load_average``: how busy the computer was before and after.
+    """
+    beam, crank = THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK
+    environments = {name: name for name in _environments()}
+    work: dict[str, tuple[Measure, dict[str, Any]]] = {
+        "cycles": (cycle_rate, _points()),
+        "env_steps": (env_rate, environments),
+        "vector_env_steps": (vector_env_rate, environments),
+        "sweep_points": (sweep_rate, {beam.name: beam, crank.name: crank}),
+        "classifier_rows": (classifier_rate, {beam.name: beam.name}),
+    }
+    results: dict[str, Any] = {"load_average": {"before": os.getloadavg()[0]}}
+    with tqdm(total=sum(len(subjects) for _, subjects in work.values()), desc="bench", disable=not progress) as bar:
+        for quantity, (measure, subjects) in work.items():
+            results[quantity] = {}
+            for name, subject in subjects.items():
+                results[quantity][name] = measure(subject, repeats)._asdict()
+                bar.update()
+    results["load_average"]["after"] = os.getloadavg()[0]
+    return results
+
+
+def _points() -> dict[str, tuple[Machine, Integrator, int]]:
+    """Operating points that the documentation quotes, the integrator, and cycles of a timed run."""
+    exact, fixed = ExactEvents(), RungeKutta4(4000)
+    beam, crank = THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK
+    points: dict[str, tuple[Machine, Integrator, int]] = {}
+    for frequency, clearance in ((30.0, 0.127e-3), (30.0, 0.032e-3), (19.0, 0.127e-3), (10.0, 0.127e-3)):
+        name = f"impact beam, {frequency:g} Hz, {1e3 * clearance:g} mm"
+        points[name] = (replace(beam, excitation_frequency=frequency, clearance=clearance), exact, 300)
+    points["impact beam, 30 Hz, 0.127 mm, Runge-Kutta 4, 4000 steps"] = (
+        replace(beam, excitation_frequency=30.0, clearance=0.127e-3), fixed, 100,
+    )  # fmt: skip
+    for clearance in (0.032e-3, 0.254e-3):
+        for degrees in (1.0, 5.0):
+            name = f"slider crank, 200 rpm, {1e3 * clearance:g} mm, matrices held over {degrees:g} deg"
+            held = replace(crank, crank_speed=200.0, slider_clearance=clearance, matrix_update_interval=degrees)
+            points[name] = (held, exact, 100)
+    return points
+
+
+def cycle_rate(point: tuple[Machine, Integrator, int], repeats: int) -> Rate:
+    """Operating cycles of a settled response, one thread."""
+    machine, integrator, cycles = point
+    settled = simulate(machine, SETTLING_CYCLES, integrator=integrator).final_state
+    return rate(lambda: len(simulate(machine, cycles, settled, integrator=integrator)), repeats)
+
+
+def _environments() -> list[str]:
+    names = [f"chaosgym/{machine}-v0" for machine in MACHINES]
+    for name in OTHER_ENVIRONMENTS:
+        try:
+            gym.make(name).close()
+        except (gym.error.Error, ImportError):
+            continue
+        names.append(name)
+    return names
+
+
+def env_rate(name: str, repeats: int) -> Rate:
+    """Steps of a single environment."""
+    env = gym.make(name)
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    steps, _ = STEPS[name.partition("/")[0]]
+
+    def run() -> int:
+        for _ in range(steps):
+            _, _, terminated, truncated, _ = env.step(env.action_space.sample())
+            if terminated or truncated:
+                env.reset()
+        return steps
+
+    return rate(run, repeats)
+
+
+def vector_env_rate(name: str, repeats: int) -> Rate:
+    """Steps, of all sub-environments together, of the vector environment that ``make_vec`` gives."""
+    envs = gym.make_vec(name, num_envs=SUB_ENVIRONMENTS)
+    envs.reset(seed=0)
+    envs.action_space.seed(0)
+    _, steps = STEPS[name.partition("/")[0]]
+
+    def run() -> int:
+        for _ in range(steps):
+            envs.step(envs.action_space.sample())
+        return steps * SUB_ENVIRONMENTS
+
+    result = rate(run, repeats)
+    envs.close()
+    return result
+
+
+def sweep_rate(machine: Machine, repeats: int) -> Rate:
+    """Labelled points of a random sweep over speed and clearance, on all processors."""
+    plan = SweepPlan(machine, default_axes(machine, "random"), "random", SWEEP_POINTS)
+
+    def run() -> int:
+        with tempfile.TemporaryDirectory() as folder:
+            return len(run_sweep(plan, Path(folder) / "sweep").table)
+
+    return rate(run, repeats)
+
+
+def classifier_rate(machine_name: str, repeats: int) -> Rate:
+    """Machines that the shipped classifier types, many at once."""
+    classifier = default_classifier(machine_name)
+    low, high = classifier.parameters.low_, classifier.parameters.high_
+    values = np.random.default_rng(0).uniform(low, high, (CLASSIFIER_ROWS, len(low)))
+
+    def classify() -> int:
+        classifier.classify_table(values)
+        return len(values)
+
+    return rate(classify, repeats)

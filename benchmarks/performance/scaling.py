@@ -1,0 +1,116 @@
+"""How well do many machines share the processors, and what does an environment cost beside its physics?
+
+A vector environment takes the same random actions from the same seeds on one thread and on all, so that both compute
+the same bytes. Wall time tells how well the threads share the work, which only an idle computer shows; processor time
+on one thread tells what a step of one machine costs outside the kernels, physics left out.
+"""
+
+import statistics
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+import numba
+import numpy as np
+
+from benchmarks.performance.rates import SUB_ENVIRONMENTS
+from chaosgym.envs import MACHINES
+from chaosgym.envs.jobs import Indices
+from chaosgym.simulation.batch import Cycles, Fleet
+
+WARM_UP_STEPS = 12
+"""Steps from the middle of the speed range that are not timed; the speeds have spread after them."""
+
+TIMED_STEPS = 8
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """How a vector environment uses the processors.
+
+    ``environment``; ``machines`` side by side; ``threads``; ``one_thread``, ``all_threads`` wall time [s] of a step of
+    one machine; ``efficiency`` share of the ideal speed-up; ``physics``, ``wrapper`` processor time [s] of a step of
+    one machine inside and outside the kernels, on one thread.
+    """
+
+    environment: str
+    machines: int
+    threads: int
+    one_thread: float
+    all_threads: float
+    efficiency: float
+    physics: float
+    wrapper: float
+
+
+class _TimedFleet:
+    """A fleet whose runs are timed: ``seconds`` of processor time of this thread."""
+
+    def __init__(self, fleet: Fleet) -> None:
+        self._fleet = fleet
+        self.seconds = 0.0
+
+    def __len__(self) -> int:
+        return len(self._fleet)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._fleet, name)
+
+    def run(self, which: Indices, cycles: int) -> Cycles:
+        """As the fleet's."""
+        start = time.thread_time()
+        done = self._fleet.run(which, cycles)
+        self.seconds += time.thread_time() - start
+        return done
+
+
+def vector_scaling(repeats: int = 5) -> list[Scaling]:
+    """Measure the environment of every machine; medians of ``repeats`` runs.
+
+    A first run, in which kernels are loaded and the crank meets its speeds, is not counted.
+    """
+    return [_scaling_of(f"chaosgym/{machine}-v0", repeats) for machine in MACHINES]
+
+
+def _scaling_of(name: str, repeats: int) -> Scaling:
+    threads = numba.config.NUMBA_NUM_THREADS
+    try:
+        _timed_steps(name, threads)
+        runs = [(_timed_steps(name, 1), _timed_steps(name, threads)) for _ in range(repeats)]
+    finally:
+        numba.set_num_threads(threads)
+    one, many = (statistics.median(run[k][0] for run in runs) for k in (0, 1))
+    return Scaling(
+        environment=name,
+        machines=SUB_ENVIRONMENTS,
+        threads=threads,
+        one_thread=one,
+        all_threads=many,
+        efficiency=one / (threads * many),
+        physics=statistics.median(run[0][1] for run in runs),
+        wrapper=statistics.median(run[0][2] for run in runs),
+    )
+
+
+def _timed_steps(name: str, threads: int) -> tuple[float, float, float]:
+    """Wall time of a step of one machine, and this thread's processor time inside and outside the kernels [s]."""
+    numba.set_num_threads(threads)
+    envs: Any = gym.make_vec(name, num_envs=SUB_ENVIRONMENTS)
+    jobs = envs.unwrapped._jobs
+    drive = jobs.rules.drive
+    jobs.fleet = fleet = _TimedFleet(jobs.fleet)
+    actions = np.random.default_rng(0).uniform(
+        -1.0, 1.0, (WARM_UP_STEPS + TIMED_STEPS, SUB_ENVIRONMENTS, 1)
+    ).astype(np.float32)  # fmt: skip
+    envs.reset(seed=0, options={"speed": drive.rounded(0.5 * (drive.lowest_speed + drive.highest_speed))})
+    for action in actions[:WARM_UP_STEPS]:
+        envs.step(action)
+    fleet.seconds = 0.0
+    wall, processor = time.perf_counter(), time.thread_time()
+    for action in actions[WARM_UP_STEPS:]:
+        envs.step(action)
+    wall, processor = time.perf_counter() - wall, time.thread_time() - processor
+    envs.close()
+    each = 1.0 / (TIMED_STEPS * SUB_ENVIRONMENTS)
+    return wall * each, fleet.seconds * each, (processor - fleet.seconds) * each

@@ -1,0 +1,82 @@
+"""How does a policy trained with stable-baselines3 become one that numpy plays? Its weights are read out as arrays.
+
+Knows the multilayer policies of PPO and SAC and the one-layer LSTM policy of sb3-contrib's RecurrentPPO, without
+importing any of them.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from chaosgym.control.learner_view import Memory
+from chaosgym.control.policies.network import Dense, Lstm, Network
+from chaosgym.control.policies.policy import Normalisation, TrainedPolicy
+from chaosgym.errors import ModelFileError
+
+
+def exported(
+    model: Any,
+    env: str,
+    envs: Any,
+    *,
+    normalise: Any = None,
+    memory: Memory = "none",
+    increments: bool = False,
+) -> TrainedPolicy:
+    """Return the deterministic policy of a trained model.
+
+    Parameters
+    ----------
+    model
+        PPO, SAC or RecurrentPPO, with continuous actions.
+    env
+        Id of the environment.
+    envs
+        A ``SB3VecEnv`` of it, whose spaces and drive count.
+    normalise
+        The ``VecNormalize`` that it was trained in, if any.
+    memory, increments
+        Of the ``LearnerView`` that it was trained in.
+
+    Raises
+    ------
+    ModelFileError
+        If the policy has parts that can't be exported; names them.
+    """
+    weights = {name: values.detach().cpu().numpy() for name, values in model.policy.state_dict().items()}
+    if hasattr(model.policy, "actor") and hasattr(model.policy.actor, "latent_pi"):
+        hidden, last = "actor.latent_pi", "actor.mu"
+    else:
+        hidden, last = "mlp_extractor.policy_net", "action_net"
+    activation = model.policy.activation_fn.__name__.lower()
+    places = sorted(int(name.split(".")[-2]) for name in weights if name.startswith(hidden) and name.endswith("weight"))
+    names = [*((f"{hidden}.{place}", activation) for place in places), (last, "none")]
+    network = Network(_lstm(weights), tuple(_dense(weights, name, kind) for name, kind in names))
+    return TrainedPolicy(
+        env, envs.observation_space, envs.action_space, network, _normalisation(normalise),
+        memory, envs.get_attr("drive")[0].slew_limit if increments else None,
+        bool(model.policy.squash_output),
+    )  # fmt: skip
+
+
+def _dense(weights: dict[str, Any], name: str, activation: str) -> Dense:
+    try:
+        return Dense(weights[f"{name}.weight"], weights[f"{name}.bias"], activation)
+    except KeyError as error:
+        raise ModelFileError(f"the policy has no {error}; known: dense policies of PPO, SAC and RecurrentPPO") from None
+
+
+def _lstm(weights: dict[str, Any]) -> Lstm | None:
+    if "lstm_actor.weight_ih_l0" not in weights:
+        return None
+    if "lstm_actor.weight_ih_l1" in weights:
+        raise ModelFileError("the policy has more than one layer of LSTM units; allowed: one")
+    bias = weights["lstm_actor.bias_ih_l0"] + weights["lstm_actor.bias_hh_l0"]
+    return Lstm(weights["lstm_actor.weight_ih_l0"], weights["lstm_actor.weight_hh_l0"], bias)
+
+
+def _normalisation(normalise: Any) -> Normalisation | None:
+    if normalise is None:
+        return None
+    statistics = normalise.obs_rms
+    return Normalisation(statistics.mean, np.sqrt(statistics.var + normalise.epsilon), float(normalise.clip_obs))

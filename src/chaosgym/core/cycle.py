@@ -1,0 +1,77 @@
+"""Arrays of one operating cycle: what every kernel writes, and the bouncing that goes on from cycle to cycle."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from chaosgym.core.kernel import leaf
+
+UPPER, LOWER = 0, 1
+
+
+class Episode(NamedTuple):
+    """Bouncing on one surface, from the first touch until the other surface is touched.
+
+    ``side`` (1,): +1, -1, or 0 before the first touch; ``touch`` (2,): instants of the first and the last touch [s],
+    counted from the start of the coming cycle.
+    """
+
+    side: np.ndarray
+    touch: np.ndarray
+
+
+class CycleArrays(NamedTuple):
+    """What the kernels write, one row a cycle; two columns are UPPER and LOWER.
+
+    ``section`` (cycles, 2n) state at the start of each cycle; ``tip`` (cycles, 2) its tip displacement [m] and
+    velocity [m/s]; ``peak_force`` [N], ``impacts``, ``contact_time`` [s], ``bounce_time`` [s] (cycles, 2); ``events``
+    (cycles,); ``history`` (cycles, samples, 3) tip displacement, velocity and contact force at equal intervals.
+
+    Of machines whose contact travels: ``peak_instant`` (cycles, 2) [s] and ``peak_vector`` (cycles, 2, 3) [N] of each
+    peak force; of machines with sensors: ``channel_peak`` (cycles, channels, 2) [N], largest force of either side of
+    each contact channel. Without rows or channels these are not written.
+    """
+
+    section: np.ndarray
+    tip: np.ndarray
+    peak_force: np.ndarray
+    impacts: np.ndarray
+    contact_time: np.ndarray
+    bounce_time: np.ndarray
+    events: np.ndarray
+    history: np.ndarray
+    peak_instant: np.ndarray
+    peak_vector: np.ndarray
+    channel_peak: np.ndarray
+
+
+def cycle_arrays(
+    cycles: int, states: int, samples: int = 0, *, travels: bool = False, channels: int = 0
+) -> CycleArrays:
+    """Make ``CycleArrays`` for a number of cycles, states and samples a cycle."""
+    rows = cycles if travels else 0
+    return CycleArrays(
+        section=np.empty((cycles, states)),
+        tip=np.empty((cycles, 2)),
+        peak_force=np.empty((cycles, 2)),
+        impacts=np.empty((cycles, 2), dtype=np.int64),
+        contact_time=np.empty((cycles, 2)),
+        bounce_time=np.empty((cycles, 2)),
+        events=np.empty(cycles, dtype=np.int64),
+        history=np.empty((cycles, samples, 3)),
+        peak_instant=np.empty((rows, 2)),
+        peak_vector=np.empty((rows, 2, 3)),
+        channel_peak=np.empty((cycles, channels, 2)),
+    )
+
+
+@leaf
+def note_touch(episode, side, time, bounce_time):
+    """Extend the episode of bouncing, or close it and start the next one when the other surface is touched."""
+    if episode.side[0] != side:
+        if episode.side[0] != 0.0:
+            column = UPPER if episode.side[0] > 0.0 else LOWER
+            bounce_time[column] = max(bounce_time[column], episode.touch[1] - episode.touch[0])
+        episode.side[0] = side
+        episode.touch[0] = time
+    episode.touch[1] = time

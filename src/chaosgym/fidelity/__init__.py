@@ -1,0 +1,1 @@
+"""The fidelity ladder: what accuracy costs, and where a model stops answering."""

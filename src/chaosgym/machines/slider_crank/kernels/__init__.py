@@ -1,0 +1,16 @@
+"""Compiled kernels of the slider crank, cached on disk by the content of their sources and of those of ``core``."""
+
+from pathlib import Path
+
+from chaosgym.core.compilation import cached_by_content
+
+with cached_by_content(Path(__file__).parent):
+    from chaosgym.machines.slider_crank.kernels import (  # noqa: F401
+        batch,
+        contact,
+        exact,
+        fixed_step,
+        propagator,
+        record,
+        stepped,
+    )

@@ -1,0 +1,75 @@
+"""Many slider cranks at once: each by its own ``advance``, side by side on all threads.
+
+The large tables of a slider crank stay where they are, and its batch holds their addresses: machines at equal speeds
+share them.
+"""
+
+import numpy as np
+from numba import carray, njit, prange, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from chaosgym.core.batch import episode_of, rows_of
+from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
+from chaosgym.machines.slider_crank.kernels.exact import advance as advance_crank
+from chaosgym.machines.slider_crank.kernels.propagator import FORCING_TERMS
+from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
+from chaosgym.machines.slider_crank.kernels.stepped import advance as advance_stepped_crank
+
+
+@intrinsic
+def pointer(typing_context, address):
+    """Turn an integer into a pointer."""
+
+    def build(context, builder, signature, arguments):
+        return builder.inttoptr(arguments[0], cgutils.voidptr_t)
+
+    return types.voidptr(types.intp), build
+
+
+@njit(cache=True, inline="always")
+def crank_of(batch, bins, i):
+    """Model of machine i of a batch that holds the addresses of the tables."""
+    m, n = batch.row.shape[1:]
+    size = 2 * n + FORCING_TERMS + m
+    sets = batch.radix[i] ** m
+    return SliderCrankModel(
+        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.order[i], batch.spectrum[i], batch.row[i],
+        batch.gap[i], batch.stiffness[i], batch.damping[i], batch.two_sided[i], batch.radix[i], batch.reading[i],
+        batch.reach[i], batch.display[i],
+        carray(pointer(batch.acceleration[i]), (sets, bins, n, size), np.float64),
+        carray(pointer(batch.curvature[i]), (sets, bins, m, size), np.float64),
+        carray(pointer(batch.propagator[i]), (sets, bins, size, 2 * n), np.float64),
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def advance_cranks(batch, bins, which, motions, arrays, settings, outcome):
+    """As ``advance_beams``, for slider cranks with ``bins`` bins of crank angle."""
+    for k in prange(which.shape[0]):
+        i = which[k]
+        outcome[k] = advance_crank(
+            crank_of(batch, bins, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
+            settings.event_tolerance / batch.contact_rate[i], settings.event_budget,
+        )[0]  # fmt: skip
+
+
+@njit(cache=True, inline="always")
+def stepped_crank_of(batch, i):
+    """Model of machine i."""
+    return SteppedCrankModel(
+        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.acceleration[i], batch.first[i],
+        batch.row[i], batch.answer[i], batch.friction[i], batch.gap[i], batch.stiffness[i], batch.damping[i],
+        batch.law[i], batch.two_sided[i], batch.reading[i], batch.monitored[i], batch.display[i],
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def advance_stepped_cranks(batch, which, motions, arrays, settings, outcome):
+    """As ``advance_beams``, for slider cranks that need the stepper."""
+    for k in prange(which.shape[0]):
+        i = which[k]
+        outcome[k] = advance_stepped_crank(
+            stepped_crank_of(batch, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
+            settings.event_tolerance / batch.contact_rate[i], settings.event_budget,
+        )[0]  # fmt: skip

@@ -1,0 +1,112 @@
+r"""How does a fixed-step integrator move the same slider crank? The comparison for exact propagation.
+
+The classical Runge-Kutta method of order four on the equations of ``crank_stepper``, any joint and contact law, without
+event location: which joints push is judged at every stage, so touch and release are placed to O(h). Matrices are those
+of the bin of crank angle in which a stage falls.
+"""
+
+import numpy as np
+from numba import njit
+
+from chaosgym.core import status
+from chaosgym.core.cycle import LOWER, UPPER, note_touch
+from chaosgym.core.fixed_step import STABILITY_LIMIT
+from chaosgym.machines.slider_crank.kernels.exact import RUNAWAY
+from chaosgym.machines.slider_crank.kernels.record import begin_cycle, note_peak, note_share, write_peaks, write_sample
+from chaosgym.machines.slider_crank.kernels.stepped import joint_force, margin, measure, push_of, slope
+
+
+@njit(cache=True)
+def judge(model, z, closed, direction):
+    """Write which joints push in the state z."""
+    for j in range(closed.shape[0]):
+        depth, rate = measure(model, j, z, direction)
+        closed[j] = margin(model, j, False, depth, rate) < 0.0
+
+
+@njit(cache=True)
+def slope_at(model, instant, z, closed, direction, dz):
+    """dz = (p', p'') at an instant of the revolution; judges the contacts."""
+    bins = model.acceleration.shape[0]
+    b = min(int(instant / model.bin_duration), bins - 1)
+    judge(model, z, closed, direction)
+    slope(model, b, instant - b * model.bin_duration, z, closed, direction, dz)
+
+
+@njit(cache=True)
+def note_touches(model, z, before, closed, direction, episode, instant, impacts, bounce_time):
+    """Record the monitored joints that push now and did not ``before``."""
+    for j in range(closed.shape[0]):
+        if closed[j] and not before[j] and model.monitored[j]:
+            measure(model, j, z, direction)
+            up = 0.0
+            for r in range(model.first[j], model.first[j + 1]):
+                up += model.reading[r, 1] * direction[r]
+            impacts[UPPER if up > 0.0 else LOWER] += 1
+            note_touch(episode, 1.0 if up > 0.0 else -1.0, instant, bounce_time)
+        before[j] = closed[j]
+
+
+@njit(cache=True)
+def note_joint_peaks(model, z, dz, closed, direction, channel_peak):
+    """Raise the peaks (J, 2) of the joints to their forces in the state z."""
+    for j in range(channel_peak.shape[0]):
+        if closed[j]:
+            force, _ = push_of(model, j, z, dz, direction)
+            positive = not model.two_sided[j] or direction[model.first[j]] > 0.0
+            column = UPPER if positive else LOWER
+            channel_peak[j, column] = max(channel_peak[j, column], force)
+
+
+@njit(cache=True, nogil=True)
+def advance_crank_fixed_step(model, state, episode, arrays, steps, fastest):
+    """Advance ``state`` and ``episode`` by whole revolutions of ``steps`` equal steps; see ``slider_crank.advance``.
+
+    ``fastest`` is the largest angular frequency with all contacts closed. Peaks and samples are taken at the ends of
+    steps.
+    """
+    n2, joints = state.shape[0], model.gap.shape[0]
+    period = model.acceleration.shape[0] * model.bin_duration
+    h = period / steps
+    if h * fastest > STABILITY_LIMIT:
+        return status.STEP_TOO_COARSE, 0
+    samples = arrays.history.shape[1]
+    k, inner = np.empty((4, n2)), np.empty(n2)
+    closed, before = np.zeros(joints, dtype=np.bool_), np.zeros(joints, dtype=np.bool_)
+    direction, peak = np.empty(model.row.shape[0]), np.zeros((2, 5))
+    for cycle in range(arrays.section.shape[0]):
+        begin_cycle(model, state, arrays, cycle)
+        peak[:] = 0.0
+        slope_at(model, 0.0, state, closed, direction, k[0])
+        before[:] = closed
+        force = joint_force(model, state, k[0], closed, direction)
+        sample = 0
+        for step in range(steps):
+            now = step * h
+            while sample < samples and sample * steps <= step * samples:
+                write_sample(model.display, state, force, arrays.history[cycle, sample])
+                sample += 1
+            for stage in range(1, 4):
+                share = h if stage == 3 else 0.5 * h
+                for i in range(n2):
+                    inner[i] = state[i] + share * k[stage - 1, i]
+                slope_at(model, now + share, inner, closed, direction, k[stage])
+            for i in range(n2):
+                state[i] += h / 6.0 * (k[0, i] + 2.0 * (k[1, i] + k[2, i]) + k[3, i])
+            now = (step + 1) * h
+            slope_at(model, min(now, period), state, closed, direction, k[0])
+            earlier, force = force, joint_force(model, state, k[0], closed, direction)
+            note_share(earlier, force, h, arrays.contact_time[cycle])
+            note_peak(peak, now, force)
+            note_joint_peaks(model, state, k[0], closed, direction, arrays.channel_peak[cycle])
+            note_touches(
+                model, state, before, closed, direction, episode, now, arrays.impacts[cycle], arrays.bounce_time[cycle]
+            )
+        write_peaks(peak, arrays, cycle)
+        arrays.events[cycle] = 0
+        for i in range(n2):
+            if not abs(state[i]) < RUNAWAY:
+                return status.DIVERGED, cycle
+        episode.touch[0] -= period
+        episode.touch[1] -= period
+    return status.OK, arrays.section.shape[0]

@@ -1,0 +1,344 @@
+r"""How do the equations of a slider crank become the model that the kernels integrate?
+
+Matrices are held at the middle of each bin of crank angle, loads follow as cubics in the time of a bin, and every set
+of closed contacts adds its stiffness and damping. Mass matrices, loads and contacts of all bins depend neither on the
+speed nor on the clearance; at a given speed they are summed and turned into propagators. Both results are kept for
+machines that differ only in speed or clearance.
+"""
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from dataclasses import fields
+from functools import cache, lru_cache
+from operator import attrgetter
+from threading import Lock
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.machines.slider_crank.equations import Equations, equations, rod_of
+from chaosgym.machines.slider_crank.joints import Channels, channels_of, display_of, gaps_of, hertz_constants, joints_of
+from chaosgym.machines.slider_crank.kernels.exact import PIECES, SliderCrankModel
+from chaosgym.machines.slider_crank.kernels.propagator import FORCING_TERMS, SQUARINGS, propagator_table, series_order
+from chaosgym.machines.slider_crank.kernels.stepped import HERTZ, LINEAR, SteppedCrankModel
+from chaosgym.machines.slider_crank.kinematics import slider_rate
+from chaosgym.machines.slider_crank.spatial_equations import spatial_equations, spatial_loads
+
+if TYPE_CHECKING:
+    from chaosgym.machines.slider_crank.parameters import SliderCrank
+
+Array = NDArray[np.float64]
+
+MAX_PHASE = 8.0
+"""Longest step times largest eigenvalue that a Taylor series sums without loss of digits."""
+
+STABLE_PHASE = 2.0
+"""Longest Runge-Kutta step times largest eigenvalue; the method is stable up to 2.7."""
+
+STEP_PHASE = 1.0
+"""Angle [rad] by which a closed contact turns in a piece of a step, by default."""
+
+MAX_SETS = 32
+"""Contact sets for which propagators are made; a machine with more is left to the stepper."""
+
+KEPT = 128
+"""Machines whose assembled equations are kept, whatever their speed and clearance."""
+
+KEPT_STRUCTURES = 1024
+"""Machines whose models are looked up by speed alone."""
+
+TABLES = ("acceleration", "curvature", "propagator")
+"""Large arrays of a model."""
+
+KEPT_BYTES = 256_000_000
+"""Memory for the propagators of machines at one speed; those used longest ago go first."""
+
+_NOT_IN_THE_MATRICES = ("crank_speed", "slider_clearance", "ball_clearance")
+
+
+class KeptModel(NamedTuple):
+    """A model without its clearances, and the addresses of its large ``TABLES``, which live as long as it does."""
+
+    model: SliderCrankModel
+    addresses: tuple[int, ...]
+
+
+class _RecentModels:
+    """Models by key within ``KEPT_BYTES``; several threads may ask at once."""
+
+    def __init__(self) -> None:
+        self._models: OrderedDict[Hashable, KeptModel] = OrderedDict()
+        self._bytes = 0
+        self._lock = Lock()
+
+    def get(self, key: Hashable, make: Callable[[], SliderCrankModel]) -> KeptModel:
+        with self._lock:
+            if key in self._models:
+                self._models.move_to_end(key)
+                return self._models[key]
+        model = make()
+        kept = KeptModel(model, tuple(getattr(model, name).ctypes.data for name in TABLES))
+        with self._lock:
+            if key not in self._models:
+                self._models[key] = kept
+                self._bytes += _size(model)
+            while self._bytes > KEPT_BYTES and len(self._models) > 1:
+                self._bytes -= _size(self._models.popitem(last=False)[1].model)
+        return kept
+
+
+def _size(model: SliderCrankModel) -> int:
+    return sum(int(getattr(model, name).nbytes) for name in TABLES)
+
+
+_recent = _RecentModels()
+
+
+def has_propagators(machine: "SliderCrank") -> bool:
+    """True if contact is linear, no contact force turns with the ball, and the contact sets are few."""
+    if machine.contact_law != "linear" or machine.ball_joint == "spherical":
+        return False
+    return int(_radix(machine) ** len(gaps_of(machine))) <= MAX_SETS
+
+
+class ModelsBySpeed:
+    """Models, at any speed, of machines that differ in speed and clearance alone; from ``models_by_speed``."""
+
+    def __init__(self, step_phase: float, structure: tuple[Any, ...]) -> None:
+        self._step_phase, self._structure = step_phase, structure
+
+    def at(self, crank_speed: float) -> KeptModel:
+        """Return the model at a speed [rpm]; its gaps are zero."""
+        return _recent.get(
+            (crank_speed, self), lambda: _at_speed(crank_speed, self._step_phase, _structure(*self._structure))
+        )
+
+
+@lru_cache(maxsize=KEPT_STRUCTURES)
+def _models_by_speed(step_phase: float, *structure: Any) -> ModelsBySpeed:
+    return ModelsBySpeed(step_phase, structure)
+
+
+def models_by_speed(machine: "SliderCrank", step_phase: float = STEP_PHASE) -> ModelsBySpeed:
+    """Models of a machine that ``has_propagators``; a contact turns by ``step_phase`` [rad] in a piece of a step."""
+    return _models_by_speed(step_phase, *_key(machine))
+
+
+def exact_model(machine: "SliderCrank", step_phase: float) -> SliderCrankModel:
+    """Model of a machine that ``has_propagators``; a contact turns by ``step_phase`` [rad] in a piece of a step."""
+    return models_by_speed(machine, step_phase).at(machine.crank_speed).model._replace(gap=gaps_of(machine))
+
+
+def _radix(machine: "SliderCrank") -> int:
+    """Contact states of a channel that differ in their matrices: friction tells one side from the other."""
+    return 3 if machine.friction_coefficient > 0.0 else 2
+
+
+def _key(machine: "SliderCrank") -> tuple[Any, ...]:
+    """Class and all fields that shape the matrices."""
+    kind: Any = type(machine)
+    return (kind, *_structure_values(kind)(machine))
+
+
+@cache
+def _structure_values(kind: Any) -> Callable[[Any], tuple[Any, ...]]:
+    return attrgetter(*_structure_fields(kind))
+
+
+@cache
+def _structure_fields(kind: Any) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind) if field.name not in _NOT_IN_THE_MATRICES)
+
+
+def _assembled(machine: "SliderCrank", middles: Array, nodes: Array) -> tuple[Equations, Array]:
+    """Equations at the middles of the bins and loads at the nodes of the forcing, in the plane or in space."""
+    if machine.is_spatial:
+        return spatial_equations(machine, middles), spatial_loads(machine, nodes)
+    rod = rod_of(machine)
+    return equations(machine, middles, rod), equations(machine, nodes, rod).load
+
+
+@lru_cache(maxsize=KEPT)
+def _held(kind: type, *structure: Any) -> tuple[Array, Array, Array, Array]:
+    """Inverse mass, free accelerations and forcing of all bins as in ``_Structure``, and friction per newton."""
+    machine = kind(**dict(zip(_structure_fields(kind), structure, strict=True)))
+    bins = round(360.0 / machine.matrix_update_interval)
+    width = 2.0 * math.pi / bins
+    middles = np.array([(b + 0.5) * width for b in range(bins)])
+    nodes = FORCING_TERMS - 1
+    held, loads = _assembled(machine, middles, np.array([k * width / nodes for k in range(bins * nodes)]))
+    n = held.mass.shape[-1]
+    inverse_mass = np.asarray(np.linalg.inv(held.mass), dtype=np.float64)
+    free = np.zeros((3, bins, 2 * n, n))
+    free[:, :, :n] = -np.swapaxes(inverse_mass @ held.stiffness, -1, -2)
+    free[:2, :, n:] = -np.swapaxes(inverse_mass @ held.damping, -1, -2)
+    friction = _friction(machine, middles)[:, None] * held.slider_along
+    return inverse_mass, free, _forcing(inverse_mass, loads), friction
+
+
+def _free_motion(free: Array, forcing: Array, rate: float) -> Array:
+    """Accelerations without contact at a crank rate, (bins, 2n + 4, n)."""
+    return np.concatenate([free[0] + rate * free[1] + rate**2 * free[2], forcing[0] + rate**2 * forcing[1]], axis=1)
+
+
+def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankModel:
+    """Model of any machine for the Runge-Kutta stepper, a closed contact turning by ``step_phase`` / 4 in a step."""
+    inverse_mass, free, forcing, friction = _held(*_key(machine))
+    joints = joints_of(machine)
+    row = np.concatenate([joint.row for joint in joints])
+    acceleration = _free_motion(free, forcing, machine.crank_rate)
+    scale = np.array([joint.scale for joint in joints])
+    first = np.cumsum([0] + [len(joint.row) for joint in joints])
+    linear = machine.contact_law == "linear"
+    stiffness, damping = (machine.contact_stiffness, machine.contact_damping) if linear else hertz_constants(machine)
+    answer = np.ascontiguousarray(np.swapaxes(inverse_mass @ row.T, -1, -2))
+    slide = -np.einsum("bij,bj->bi", inverse_mass, friction)
+    contact = math.sqrt(machine.contact_stiffness * np.max(np.einsum("brn,rn->br", answer, row)))
+    bins = len(inverse_mass)
+    duration = 2.0 * math.pi / (bins * machine.crank_rate)
+    n = len(row[0])
+    system = np.zeros((bins, 2 * n, 2 * n))
+    system[:, n:, :n] = np.eye(n)
+    system[:, :, n:] = acceleration[:, : 2 * n]
+    spectrum = float(np.max(np.abs(np.linalg.eigvals(system[[0, bins // 4]]))))
+    return SteppedCrankModel(
+        bin_duration=duration,
+        steps=max(1, math.ceil(duration * max(4.0 * contact / step_phase, spectrum / STABLE_PHASE))),
+        contact_rate=contact,
+        acceleration=np.ascontiguousarray(np.swapaxes(acceleration, -1, -2)),
+        first=first,
+        row=row,
+        answer=answer,
+        friction=np.stack([slide * joint.slides for joint in joints], axis=1),
+        gap=np.array([joint.gap for joint in joints]),
+        stiffness=stiffness * scale,
+        damping=damping * scale if linear else np.full(len(joints), damping),
+        law=LINEAR if linear else HERTZ,
+        two_sided=np.array([joint.two_sided for joint in joints]),
+        reading=np.concatenate([joint.reading for joint in joints]),
+        monitored=np.array([bool(np.any(joint.reading)) for joint in joints]),
+        display=display_of(machine),
+    )
+
+
+def fastest_rate(machine: "SliderCrank", model: SteppedCrankModel) -> float:
+    """Largest modulus [1/s] of an eigenvalue with every contact closed."""
+    some = [0, len(model.answer) // 4]
+    n = model.row.shape[1]
+    system = np.zeros((len(some), 2 * n, 2 * n))
+    system[:, :n, n:] = np.eye(n)
+    system[:, n:] = model.acceleration[some][:, :, : 2 * n]
+    system[:, n:, :n] -= machine.contact_stiffness * np.swapaxes(model.answer[some], -1, -2) @ model.row
+    return float(np.max(np.abs(np.linalg.eigvals(system))))
+
+
+class _Structure(NamedTuple):
+    """Accelerations of all bins by powers of the crank rate, whatever the speed and the clearance.
+
+    ``free`` (3, bins, 2n, n) per unit p and p'; ``forcing`` (2, bins, 4, n) of gravity and of squared crank rate;
+    ``push`` (sets, bins, 2n + m, n) what closed contacts add per unit p, p' and clearance; ``contact`` [rad/s] angular
+    frequency of the masses next to the closed contacts; ``spectrum`` [1/s] largest modulus of an eigenvalue.
+    """
+
+    channels: Channels
+    radix: int
+    display: Array
+    free: Array
+    forcing: Array
+    push: Array
+    contact: float
+    spectrum: float
+
+
+def _forcing(inverse_mass: Array, loads: Array) -> Array:
+    """Cubics in the time of each bin through the loads at its nodes, as accelerations: (2, bins, 4, n)."""
+    bins, nodes = len(inverse_mass), FORCING_TERMS - 1
+    at = (np.arange(bins)[:, None] * nodes + np.arange(FORCING_TERMS)) % (bins * nodes)
+    coefficients = np.linalg.inv(np.vander(np.arange(FORCING_TERMS) / nodes, increasing=True))
+    return np.asarray(-np.einsum("bij,kbcj->kbci", inverse_mass, coefficients @ loads[:, at]))
+
+
+def _push(inverse_mass: Array, channels: Channels, radix: int, friction: Array) -> Array:
+    """Accelerations that the closed contacts of every set add: (sets, bins, 2n + m, n).
+
+    ``friction`` (bins, n) is what one newton of contact force drives along the guide.
+    """
+    bins, n, m = len(inverse_mass), inverse_mass.shape[-1], len(channels.row)
+    push = np.zeros((radix**m, bins, 2 * n + m, n))
+    for chosen in range(radix**m):
+        for j in range(m):
+            digit = chosen // radix**j % radix
+            if digit:
+                row, sign = channels.row[j], 1.0 if digit == 1 else -1.0
+                force = row + sign * channels.slides[j] * friction
+                answer = np.einsum("bij,bj->bi", inverse_mass, force)[:, None, :]
+                push[chosen, :, :n] -= channels.stiffness[j] * row[:, None] * answer
+                push[chosen, :, n : 2 * n] -= channels.damping[j] * row[:, None] * answer
+                push[chosen, :, 2 * n + j] += channels.stiffness[j] * answer[:, 0]
+    return push
+
+
+def _rates(free: Array, pushed: Array, row: Array) -> tuple[float, float]:
+    """(contact, spectrum) of ``_Structure`` from the accelerations (b, 2n, n) of some bins with all contacts closed."""
+    n = free.shape[-1]
+    local = -row @ pushed[:, :n] @ np.linalg.pinv(row)
+    contact = math.sqrt(float(np.max(np.abs(np.linalg.eigvals(local)))))
+    system = np.zeros((len(free), 2 * n, 2 * n))
+    system[:, n:, :n] = np.eye(n)
+    system[:, :, n:] = free + pushed
+    return contact, float(np.max(np.abs(np.linalg.eigvals(system))))
+
+
+@lru_cache(maxsize=KEPT)
+def _structure(kind: type, *structure: Any) -> _Structure:
+    machine = kind(**dict(zip(_structure_fields(kind), structure, strict=True)))
+    inverse_mass, free, forcing, friction = _held(kind, *structure)
+    n = inverse_mass.shape[-1]
+    channels = channels_of(machine)
+    radix = _radix(machine)
+    push = _push(inverse_mass, channels, radix, friction)
+    some = [0, len(inverse_mass) // 4]
+    contact, spectrum = _rates(free[0, some], push[-1, some, : 2 * n], channels.row)
+    return _Structure(channels, radix, display_of(machine), free, forcing, push, contact, spectrum)
+
+
+def _friction(machine: "SliderCrank", crank_angle: Array) -> Array:
+    """Friction coefficient with the sign of the nominal slider velocity, ramped through zero."""
+    rate = slider_rate(crank_angle, machine.crank_radius, machine.rod_length, math.radians(machine.motor_angle))
+    speed = rate / (machine.friction_ramp * machine.crank_radius)
+    return np.asarray(machine.friction_coefficient * np.clip(speed, -1.0, 1.0))
+
+
+def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> SliderCrankModel:
+    m = len(parts.channels.row)
+    sets, bins, _, n = parts.push.shape
+    rate = crank_speed * math.pi / 30.0
+    duration = 2.0 * math.pi / (bins * rate)
+    columns = np.zeros((sets, bins, 2 * n + FORCING_TERMS + m, n))
+    columns[:, :, : 2 * n + FORCING_TERMS] = _free_motion(parts.free, parts.forcing, rate)
+    columns[:, :, : 2 * n] += parts.push[:, :, : 2 * n]
+    columns[:, :, 2 * n + FORCING_TERMS :] = parts.push[:, :, 2 * n :]
+    acceleration = np.ascontiguousarray(np.swapaxes(columns, -1, -2))
+    steps = max(1, math.ceil(duration * max(parts.contact / (PIECES * step_phase), parts.spectrum / MAX_PHASE)))
+    step = duration / steps
+    return SliderCrankModel(
+        bin_duration=duration,
+        steps=steps,
+        contact_rate=parts.contact,
+        order=series_order(parts.spectrum * step),
+        spectrum=parts.spectrum,
+        row=parts.channels.row,
+        gap=np.zeros(m),
+        stiffness=parts.channels.stiffness,
+        damping=parts.channels.damping,
+        two_sided=parts.channels.two_sided,
+        radix=parts.radix,
+        reading=parts.channels.reading,
+        reach=np.linalg.norm(parts.channels.reading, axis=1),
+        display=parts.display,
+        acceleration=acceleration,
+        curvature=np.ascontiguousarray(parts.channels.row @ acceleration),
+        propagator=propagator_table(acceleration, duration, step, series_order(parts.spectrum * step / 2**SQUARINGS)),
+    )

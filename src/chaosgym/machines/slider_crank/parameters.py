@@ -1,0 +1,357 @@
+r"""What is the Spatial Slider Crank? A flywheel, a connecting rod and a slider whose joints rattle in their clearance.
+
+A motor turns the crank at constant speed. A ball joint drives a slender steel rod; at its other end a yoke pivots on a
+slider that runs along a straight guide (thesis 4.2). Clearance in the slider joint lets the slider rattle across the
+guide, clearance in the ball joint lets the ball rattle in its housing.
+
+Nominal kinematics and rod (``kinematics``, ``connecting_rod``) -> equations of small motions (``crank_equations``),
+held over bins of crank angle -> exact propagators (``core.crank_propagator``) -> SliderCrankModel.
+
+Gravity is off by default. With the mechanism's plane upright, the slider's weight keeps it on the guide below about
+360 rpm, so no impact could happen in the slider joint; yet the thesis shows impacts of 35 to 130 N at 190 to 290 rpm
+(4.4.2), which follow the law of a slider without weight. Its ball joint results need gravity (4.4.1). Each scene
+therefore says which gravity it has. What makes impacts of the printed size under gravity is pitch: an instrumented
+slider joint whose slider has its centre of gravity about 30 mm off the guide.
+
+References
+----------
+P. Gu, Chaotic Vibration in Machine Systems and Its Implications for Design, PhD thesis, MIT, 1994, chapter 4.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.fidelity import FidelityLadder
+from chaosgym.machines.parameters import parameter, validate
+from chaosgym.machines.slider_crank.equations import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom, equations
+from chaosgym.machines.slider_crank.joints import sensors_of
+from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
+from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
+from chaosgym.machines.slider_crank.kinematics import slider_position
+from chaosgym.machines.slider_crank.model import STEP_PHASE, exact_model, has_propagators, stepped_model
+from chaosgym.machines.slider_crank.spatial_equations import spatial_equations
+
+Array = NDArray[np.float64]
+
+_FIT = "set S: search over the printed natures and forces of figures 4.13 to 4.16"
+_STEEL = "steel"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SliderCrank(FidelityLadder):
+    """The Spatial Slider Crank; the defaults are the planar mechanism of the thesis with clearance at the slider.
+
+    Raises
+    ------
+    ParameterError
+        On construction, if a field is outside its range; names the field, the value and the range.
+    """
+
+    fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "rigid": {"rod": "rigid", "matrix_update_interval": 5.0},
+        "flexible-5deg": {"rod": "flexible", "matrix_update_interval": 5.0},
+        "flexible-1deg": {"rod": "flexible", "matrix_update_interval": 1.0},
+        "reference": {"rod": "flexible", "matrix_update_interval": 0.25},
+    }
+
+    name: ClassVar[str] = "slider-crank"
+    speed_field: ClassVar[str] = "crank_speed"
+    usual_ranges: ClassVar[Mapping[str, tuple[float, float]]] = {
+        "crank_speed": (50.0, 300.0),
+        "slider_clearance": (0.02e-3, 0.3e-3),
+        "ball_clearance": (0.02e-3, 0.3e-3),
+    }
+    sides: ClassVar[tuple[str, ...]] = ("upper", "lower")
+    """Surfaces whose force points up and down: on the slider, or on the housing if the ball joint is monitored."""
+
+    crank_speed: float = parameter(
+        190.0, unit="rpm", low=1.0, high=5000.0, provenance="printed", source="thesis figure 4.14"
+    )
+    """Constant speed of the crank [rpm]."""
+    crank_radius: float = parameter(
+        0.050, unit="m", low=1e-3, high=1.0, provenance="derived", source="stroke 100 mm, thesis 4.2"
+    )
+    """From the motor axis to the ball centre [m]."""
+    rod_length: float = parameter(
+        0.235, unit="m", low=1e-2, high=5.0, provenance="printed", source="thesis figure 4.24a"
+    )
+    """From the ball centre to the slider pivot, above the crank radius [m]."""
+    rod_diameter: float = parameter(6.35e-3, unit="m", low=1e-3, high=0.1, provenance="printed", source="thesis 4.6")
+    """Diameter of the round rod [m]."""
+    motor_angle: float = parameter(
+        0.0, unit="deg", low=0.0, high=25.0, provenance="printed", source="thesis 4.2: 0 to 25 deg"
+    )
+    """Angle between the motor axis and the normal of the guide [deg]; planar motion at 0."""
+    rod: str = parameter("flexible", choices=("flexible", "rigid"), provenance="printed", source="thesis 4.3.1")
+    """Whether the rod bends and stretches."""
+    n_modes: int = parameter(3, low=1, high=40, provenance="calibrated", source=_FIT)
+    """Bending modes of the flexible rod."""
+    damping_ratio: float = parameter(0.027, low=0.0, high=100.0, provenance="calibrated", source=_FIT)
+    """Structural damping ratio of the rod's first mode."""
+    damping_family: str = parameter("stiffness", choices=("uniform", "stiffness"), provenance="calibrated", source=_FIT)
+    """"uniform": the same ratio in every mode; "stiffness": proportional to the mode's frequency."""
+    geometric_stiffness: str = parameter(
+        "off", choices=("off", "on"), provenance="calibrated", source="figure 4.18: 2500 N only without it"
+    )
+    """Whether tension in the rod stiffens it."""
+    youngs_modulus: float = parameter(2.068e11, unit="Pa", low=1e8, high=1e13, provenance="assumed", source=_STEEL)
+    """Young's modulus of the rod [Pa]."""
+    density: float = parameter(7833.0, unit="kg/m^3", low=10.0, high=1e5, provenance="assumed", source=_STEEL)
+    """Mass density of the rod [kg/m^3]."""
+    housing_mass: float = parameter(0.36, unit="kg", low=0.0, high=100.0, provenance="calibrated", source=_FIT)
+    """Ball joint housing at the rod's end [kg]."""
+    housing_inertia: float = parameter(
+        3.922e-4, unit="kg m^2", low=0.0, high=10.0, provenance="calibrated",
+        source="first natural frequency 75.6 Hz, thesis 4.5.5",
+    )  # fmt: skip
+    """Moment of inertia of the housing about the ball centre [kg m^2]."""
+    housing_offset_along: float = parameter(3e-3, unit="m", low=-0.1, high=0.1, provenance="calibrated", source=_FIT)
+    """Centre of gravity of the housing from the ball centre towards the slider [m]."""
+    housing_offset_across: float = parameter(0.0, unit="m", low=-0.1, high=0.1, provenance="assumed", source="symmetry")
+    """Centre of gravity of the housing across the rod [m]."""
+    yoke_mass: float = parameter(0.16, unit="kg", low=0.0, high=100.0, provenance="calibrated", source=_FIT)
+    """Yoke at the rod's other end [kg]."""
+    yoke_inertia: float = parameter(
+        7.059e-4, unit="kg m^2", low=0.0, high=10.0, provenance="calibrated",
+        source="first natural frequency 75.6 Hz, thesis 4.5.5",
+    )  # fmt: skip
+    """Moment of inertia of the yoke about the slider pivot [kg m^2]."""
+    yoke_offset_along: float = parameter(-8e-3, unit="m", low=-0.1, high=0.1, provenance="calibrated", source=_FIT)
+    """Centre of gravity of the yoke from the slider pivot, positive away from the crank [m]."""
+    yoke_offset_across: float = parameter(0.0, unit="m", low=-0.1, high=0.1, provenance="assumed", source="symmetry")
+    """Centre of gravity of the yoke across the rod [m]."""
+    slider_mass: float = parameter(0.22, unit="kg", low=1e-3, high=100.0, provenance="calibrated", source=_FIT)
+    """Slider [kg]."""
+    slider_pitch_inertia: float = parameter(
+        2e-4, unit="kg m^2", low=1e-9, high=10.0, provenance="assumed", source="a block 100 mm long"
+    )
+    """Moment of inertia of the slider about its pivot, in the plane of the mechanism [kg m^2]."""
+    slider_roll_inertia: float = parameter(
+        6e-5, unit="kg m^2", low=1e-9, high=10.0, provenance="assumed", source="a block 40 mm wide and high"
+    )
+    """Moment of inertia of the slider about the guide [kg m^2], which matters at a motor angle alone.
+
+    About the vertical it has the pitch inertia: it is as wide as it is high.
+    """
+    slider_offset_along: float = parameter(0.0, unit="m", low=-0.1, high=0.1, provenance="assumed", source="symmetry")
+    """Centre of gravity of the slider from its pivot along the guide [m]."""
+    slider_offset_across: float = parameter(0.0, unit="m", low=-0.1, high=0.1, provenance="assumed", source="symmetry")
+    """Centre of gravity of the slider from its pivot, upward [m]."""
+    slider_joint: str = parameter(
+        "clearance", choices=("ideal", "clearance", "instrumented"), provenance="printed", source="thesis 4.3.2"
+    )
+    """"ideal": tight; "clearance": one gap around the pivot; "instrumented": eight sensors at two stations."""
+    ball_joint: str = parameter(
+        "ideal", choices=("ideal", "spherical", "instrumented"), provenance="printed", source="thesis 4.3.2"
+    )
+    """"ideal": tight; "spherical": ball in a shell; "instrumented": ball between four tetrahedral sensors."""
+    slider_clearance: float = parameter(
+        0.254e-3,
+        unit="m",
+        low=0.0,
+        high=0.02,
+        provenance="printed",
+        source="thesis figure 4.14; adjustable to 1 mm, 4.2",
+    )
+    """Half the gap of the slider joint [m]; in one of 20 mm the slider of the thesis touches nothing."""
+    ball_clearance: float = parameter(
+        0.127e-3,
+        unit="m",
+        low=0.0,
+        high=0.02,
+        provenance="printed",
+        source="thesis figure 4.8; adjustable to 1 mm, 4.2",
+    )
+    """Half the gap of the ball joint [m]."""
+    sensor_distance: float = parameter(
+        0.040, unit="m", low=1e-3, high=0.5, provenance="assumed", source="bearing length of about 100 mm"
+    )
+    """From the slider pivot to either station of an instrumented slider joint, along the guide [m]."""
+    sensor_offset: float = parameter(
+        0.006, unit="m", low=0.0, high=0.1, provenance="assumed", source="thesis 4.2: off-center, no size in print"
+    )
+    """From the middle of the guide's face to a sensor, across the guide [m]; matters at a motor angle alone."""
+    ball_sensor_angle: float = parameter(
+        -90.0, unit="deg", low=-180.0, high=180.0, provenance="calibrated",
+        source="impacts from 100 and from 300 deg on, figure 4.10",
+    )  # fmt: skip
+    """Direction halfway between the two in-plane sensors of an instrumented ball joint, from the rod's axis [deg]."""
+    contact_law: str = parameter("linear", choices=("linear", "hertz"), provenance="printed", source="thesis 3.3")
+    """"linear": spring and damper; "hertz": penetration to the power of 1.5 with dissipation."""
+    hertz_reference_force: float = parameter(
+        50.0, unit="N", low=1e-3, high=1e6, provenance="assumed", source="middle of the printed forces"
+    )
+    """Force [N] at which the Hertzian law has the linear law's secant stiffness and restitution."""
+    contact_stiffness: float = parameter(
+        1.5e7, unit="N/m", low=1e3, high=1e12, provenance="printed", source="thesis 3.3"
+    )
+    """Linearised Hertzian stiffness of a joint [N/m]; the stations of an instrumented slider joint share it."""
+    contact_damping_ratio: float = parameter(
+        0.05, low=0.0, high=100.0, provenance="printed", source="thesis 4.5.4: 2.5 % and 5 %"
+    )
+    """Damping ratio of a joint in contact, related to the mass of slider and yoke."""
+    friction_coefficient: float = parameter(
+        0.0, low=0.0, high=0.5, provenance="printed", source="thesis 4.5.3: 0 and 0.1"
+    )
+    """Coulomb friction between slider and guide."""
+    friction_ramp: float = parameter(0.02, low=1e-4, high=1.0, provenance="assumed", source="not in print")
+    """Slider speed below which friction fades, as a share of the crank pin's speed."""
+    gravity: float = parameter(
+        0.0, unit="m/s^2", low=0.0, high=100.0, provenance="derived", source="contact loss below 360 rpm, thesis 4.4.2"
+    )
+    """Acceleration of gravity in the plane of the mechanism [m/s^2]."""
+    gravity_angle: float = parameter(
+        0.0, unit="deg", low=-180.0, high=180.0, provenance="printed", source="thesis 4.4.1"
+    )
+    """Direction of gravity [deg]: 0 presses the slider down on the guide, 90 pulls it away from the crank."""
+    matrix_update_interval: float = parameter(
+        1.0, unit="deg", low=0.1, high=30.0, provenance="assumed", source="5, 6 and 10 deg in thesis 5.2.2"
+    )
+    """Crank angle over which mass, damping and stiffness matrices are held [deg]; divides 360."""
+
+    def __post_init__(self, fidelity: str | None) -> None:
+        super().__post_init__(fidelity)
+        validate(self)
+        if self.rod_length <= self.crank_radius:
+            raise ParameterError(
+                f"rod_length = {self.rod_length:g} m is out of range; "
+                f"allowed: above the crank radius of {self.crank_radius:g} m"
+            )
+        if abs(360.0 / self.matrix_update_interval - round(360.0 / self.matrix_update_interval)) > 1e-9:
+            raise ParameterError(
+                f"matrix_update_interval = {self.matrix_update_interval:g} deg is out of range; "
+                "allowed: 0.1 to 30 deg that divide 360 deg"
+            )
+        if self.slider_joint == "ideal" and self.ball_joint == "ideal":
+            raise ParameterError(
+                "slider_joint = 'ideal' and ball_joint = 'ideal' leave nothing that rattles; "
+                "allowed: at least one joint with clearance"
+            )
+        for body in ("housing", "yoke", "slider"):
+            field = "slider_pitch_inertia" if body == "slider" else f"{body}_inertia"
+            offset = math.hypot(getattr(self, f"{body}_offset_along"), getattr(self, f"{body}_offset_across"))
+            self._check_inertia(field, getattr(self, f"{body}_mass") * offset**2)
+        if self.is_spatial:
+            self._check_inertia("slider_roll_inertia", self.slider_mass * self.slider_offset_across**2)
+
+    def _check_inertia(self, field: str, least: float) -> None:
+        if getattr(self, field) < least:
+            raise ParameterError(
+                f"{field} = {getattr(self, field):g} kg m^2 is out of range; "
+                f"allowed: from mass times squared offset, {least:g} kg m^2, on"
+            )
+
+    @property
+    def cycle_period(self) -> float:
+        """Duration of one revolution [s]."""
+        return float(self.period_at(self.crank_speed))
+
+    @staticmethod
+    def period_at(speed: Any) -> Any:
+        """Duration of one operating cycle [s] at a speed [rpm], or at many."""
+        return 60.0 / speed
+
+    @property
+    def crank_rate(self) -> float:
+        """Angular velocity of the crank [rad/s]."""
+        return self.crank_speed * math.pi / 30.0
+
+    @property
+    def contact_damping(self) -> float:
+        """Damping constant [N s/m] of a joint in contact: 2 zeta sqrt(k m), m the mass of slider and yoke."""
+        mass = self.slider_mass + self.yoke_mass
+        return 2.0 * self.contact_damping_ratio * math.sqrt(self.contact_stiffness * mass)
+
+    @property
+    def monitored_joint(self) -> str:
+        """Joint whose force is recorded: the slider joint if it has clearance, otherwise the ball joint."""
+        return "slider" if self.slider_joint != "ideal" else "ball"
+
+    def bearing_place(self, phase: Array, force: Array) -> tuple[Array, str]:
+        """Where on its bearing the monitored joint carries a force, and the unit of that place.
+
+        Parameters
+        ----------
+        phase : (n,)
+            Phases [rad] of the cycle.
+        force : (n, 3)
+            Components of the force, as in ``CycleRecord.peak_vector``.
+
+        Returns
+        -------
+        (place, unit)
+            The slider's pivot on its guide, counted from the crank's axis, and "m"; or the polar angle on the ball
+            joint's housing, counted in the rod's plane of swing from the rod's axis, and "deg".
+        """
+        if self.monitored_joint == "slider":
+            tilt = math.radians(self.motor_angle)
+            return slider_position(phase, self.crank_radius, self.rod_length, tilt), "m"
+        return np.degrees(np.arctan2(force[:, 1], force[:, 0])), "deg"
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the force sensors of the instrumented joints; ``CycleRecord.sensor_peak`` has their columns."""
+        return sensors_of(self)
+
+    @property
+    def clearance_field(self) -> str:
+        """Field that holds the clearance of the monitored joint."""
+        return f"{self.monitored_joint}_clearance"
+
+    @property
+    def natural_frequencies(self) -> Array:
+        """Natural frequencies [Hz] at rest at crank angle zero, every joint tight, (n_modes + 1,).
+
+        At a motor angle (2 n_modes + 1,): those of bending sideways too.
+        """
+        return frequencies_at(self, 0.0)
+
+    @property
+    def degrees_of_freedom(self) -> tuple[str, ...]:
+        """Names of the coordinates that are integrated: only those that the scene requires."""
+        return degrees_of_freedom(self)
+
+    @property
+    def is_spatial(self) -> bool:
+        """True if the motor stands at an angle, so that the rod swings in two planes."""
+        return self.motor_angle > 0.0
+
+    def reduce(self, step_phase: float = STEP_PHASE) -> SliderCrankModel | SteppedCrankModel:
+        """Return the model in whose steps changes of contact are searched for every ``step_phase`` [rad] of a contact.
+
+        With exact propagators if contact is linear and does not turn with the ball, for the Runge-Kutta stepper
+        otherwise. Machines that differ in clearance alone share all of it; those that differ in speed
+        share the assembly.
+        """
+        return exact_model(self, step_phase) if has_propagators(self) else stepped_model(self, step_phase)
+
+
+THESIS_SLIDER_CRANK = SliderCrank()
+"""The planar mechanism of the thesis; ``parameters_of(SliderCrank)`` says where each number comes from."""
+
+SUPERHARMONIC_SLIDER_CRANK = replace(
+    THESIS_SLIDER_CRANK,
+    crank_speed=1508.0, slider_clearance=0.127e-3, n_modes=4, damping_ratio=0.0007, damping_family="uniform",
+    housing_mass=0.4, housing_inertia=5.68e-4, housing_offset_along=0.035,
+    yoke_mass=0.25, yoke_inertia=5.68e-4, yoke_offset_along=-0.040, slider_mass=0.1,
+)  # fmt: skip
+"""The mechanism of figure 4.18: end bodies whose centres of gravity lie along the rod excite its first mode."""
+
+
+def frequencies_at(machine: SliderCrank, crank_angle: float) -> Array:
+    """Natural frequencies [Hz] of the mechanism at rest at a crank angle [deg], every joint tight."""
+    from scipy.linalg import eigh
+
+    bound = replace(machine, slider_joint="clearance", ball_joint="ideal", rod="flexible")
+    assemble = spatial_equations if machine.is_spatial else equations
+    system = assemble(bound, np.array([math.radians(crank_angle)]))
+    free = [i for i, name in enumerate(bound.degrees_of_freedom) if name not in (SLIDER_ACROSS, SLIDER_LATERAL)]
+    at = np.ix_(free, free)
+    squares = eigh(system.stiffness[0, 0][at], system.mass[0][at], eigvals_only=True)
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi))

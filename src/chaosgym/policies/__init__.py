@@ -1,9 +1,0 @@
-"""Trained policies: loaded without pickle, played by numpy alone.
-
-policy = shipped_policy("chaosgym/ImpactBeamTolerance-v0")
-"""
-
-from chaosgym.policies.policy import TrainedPolicy, load_policy, save_policy
-from chaosgym.policies.shipped import shipped_policy
-
-__all__ = ["TrainedPolicy", "load_policy", "save_policy", "shipped_policy"]

@@ -1,0 +1,136 @@
+"""The benchmark measures what it says, and peers run the same machines."""
+
+import json
+import math
+import sys
+import time
+from dataclasses import replace
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from benchmarks.performance import rates, scaling
+from benchmarks.performance.against_exudyn import Contest, against_exudyn, period_of
+from benchmarks.performance.exudyn_machines import ExudynSetting, load_exudyn, run_in_exudyn
+from benchmarks.performance.timing import processor_seconds, rate
+from chaosgym.cli import app
+from chaosgym.errors import ChaosgymError
+from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK
+from chaosgym.simulation import simulate
+
+BEAM_30 = replace(THESIS_IMPACT_BEAM, excitation_frequency=30.0, clearance=0.127e-3)
+
+
+def test_a_rate_counts_units_of_work() -> None:
+    """Twice the units in the same time is twice the rate; processor time does not run while nothing is computed."""
+
+    def doze() -> int:
+        time.sleep(0.02)
+        return 10
+
+    measured = rate(doze, 3)
+    assert 50.0 < measured.per_second <= 500.0
+    assert measured.per_processor_second > 2.0 * measured.per_second
+    assert processor_seconds(lambda: time.sleep(0.05)) < 0.04
+
+
+def test_every_rate_comes_out_positive(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command prints one JSON object with finite rates by name, ours beside CartPole."""
+    monkeypatch.setattr(rates, "SUB_ENVIRONMENTS", 2)
+    monkeypatch.setattr(rates, "SWEEP_POINTS", 1)
+    monkeypatch.setattr(rates, "STEPS", dict.fromkeys(rates.STEPS, (2, 1)))
+    monkeypatch.setattr(rates, "_points", lambda: {name: (m, i, 2) for name, (m, i, _) in list(_points().items())[:1]})
+    monkeypatch.setattr(rates, "sweep_rate", lambda machine, repeats: rate(lambda: 1, repeats))
+    run = CliRunner().invoke(app, ["bench", "--repeats", "1", "--json"])
+    assert run.exit_code == 0, run.output
+    result = json.loads(run.stdout)
+    assert set(result["env_steps"]) >= {"chaosgym/ImpactBeam-v0", "chaosgym/SliderCrank-v0", "CartPole-v1"}
+    assert set(result["vector_env_steps"]) == set(result["env_steps"])
+    figures = [
+        figure
+        for quantity, named in result.items()
+        if quantity != "load_average"
+        for both in named.values()
+        for figure in both.values()
+    ]
+    assert len(figures) >= 16
+    assert all(math.isfinite(figure) and figure > 0.0 for figure in figures)
+
+
+def test_threads_and_wrapping_of_vector_environments(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time inside and outside the kernels makes up a step on one thread, and the ideal is one thread's over theirs."""
+    monkeypatch.setattr(scaling, "SUB_ENVIRONMENTS", 3)
+    monkeypatch.setattr(scaling, "WARM_UP_STEPS", 1)
+    monkeypatch.setattr(scaling, "TIMED_STEPS", 2)
+    threads = numba.get_num_threads()
+    run = CliRunner().invoke(app, ["bench", "--scaling", "--repeats", "1", "--json"])
+    assert run.exit_code == 0, run.output
+    assert numba.get_num_threads() == threads
+    measured = json.loads(run.stdout)["scaling"]
+    assert [each["environment"] for each in measured] == ["chaosgym/ImpactBeam-v0", "chaosgym/SliderCrank-v0"]
+    for each in measured:
+        assert each["wrapper"] > 0.0
+        assert each["physics"] + each["wrapper"] <= 1.01 * each["one_thread"]
+        assert each["efficiency"] == pytest.approx(each["one_thread"] / each["all_threads"] / each["threads"])
+
+
+_points = rates._points
+
+
+@pytest.mark.slow
+def test_a_sweep_is_timed() -> None:
+    """Points per second of a whole sweep, labels and files included."""
+    assert rates.sweep_rate(THESIS_IMPACT_BEAM, 1).per_second > 0.5
+
+
+def test_periods_of_peaks() -> None:
+    """A response that cycles among p peaks within the tolerance has period p; noise beyond it has none."""
+    for period in range(1, 9):
+        peaks = np.resize(10.0 * np.arange(1, period + 1), 50)
+        assert period_of(peaks + 0.2 * np.sin(np.arange(50)), 0.5) == period
+    assert period_of(np.random.default_rng(0).uniform(0.0, 10.0, 50), 0.5) == 0
+
+
+def test_without_exudyn_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The peers are an extra."""
+    monkeypatch.setitem(sys.modules, "exudyn", None)
+    with pytest.raises(ChaosgymError, match=r"pip install 'chaosgym\[peers\]'"):
+        load_exudyn()
+
+
+@pytest.mark.parametrize(
+    "setting", [ExudynSetting("RK44", "law", 1e-5), ExudynSetting("GeneralizedAlpha", "stop", 2e-6, 1e-4)], ids=str
+)
+def test_exudyn_integrates_the_same_beam(setting: ExudynSetting) -> None:
+    """The first peak forces, before small differences have grown, agree within 1 %."""
+    pytest.importorskip("exudyn")
+    seconds, peaks = run_in_exudyn(BEAM_30, 2, setting, forces=True)
+    assert seconds > 0.0
+    assert peaks == pytest.approx(simulate(BEAM_30, 2).peak_force[:, 0], rel=0.01)
+
+
+def test_exudyn_builds_the_same_crank() -> None:
+    """Tight in the guide, the slider's side force over a revolution is that of our mechanism within 3 %."""
+    pytest.importorskip("exudyn")
+    crank = replace(THESIS_SLIDER_CRANK, crank_speed=300.0, slider_clearance=0.0, contact_damping_ratio=1.0)
+    _, peaks = run_in_exudyn(crank, 2, ExudynSetting("TrapezoidalIndex2", "stop", 2e-5, 1e-4), forces=True)
+    assert peaks is not None
+    assert peaks[1] == pytest.approx(simulate(crank, 2).peak_force[1, 0], rel=0.03)
+
+
+def test_a_contest_reports_speed_beside_verdict() -> None:
+    """At 10 Hz both find period 1; the ratio is that of the two rates."""
+    pytest.importorskip("exudyn")
+    contest = Contest(
+        machine=BEAM_30, speeds=(10.0,), settings=(ExudynSetting("RK44", "law", 1e-5),), cycles=60, judged=20, timed=5,
+        reference_cycles=80, repeatability=0.5, goal=80.0,
+    )  # fmt: skip
+    row: dict[str, Any] = against_exudyn([contest], repeats=1)[0]
+    rates_of = row["cycles_per_processor_second"]
+    assert row["ratio"] == pytest.approx(rates_of["chaosgym"] / rates_of["exudyn"])
+    for side in ("chaosgym", "exudyn"):
+        assert (row["right_class"][side], row["right_period"][side], row["wrong_at"][side]) == (1, 1, [])
+    assert row["mean_peak_force"]["exudyn"] == pytest.approx(row["mean_peak_force"]["chaosgym"], rel=0.02)

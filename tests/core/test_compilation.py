@@ -1,0 +1,76 @@
+"""Kernels are compiled once, and a user is told what takes so long."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import chaosgym
+from chaosgym.core.compilation import is_cached
+from chaosgym.core.fixed_step import advance_fixed_step
+from chaosgym.core.modal_impact import advance
+from chaosgym.machines import ImpactBeam
+from chaosgym.simulation import RungeKutta4, simulate, simulate_with_deviations
+
+COUNT = "; print(sum(kernel.stats.cache_misses.values()), sum(kernel.stats.cache_hits.values()))"
+ONE_MACHINE = (
+    "from chaosgym import *; simulate(ImpactBeam(fidelity='rigid'), 1, integrator=RungeKutta4(4000));"
+    "from chaosgym.core.fixed_step import advance_fixed_step as kernel" + COUNT
+)
+MANY_MACHINES = (
+    "import gymnasium as gym, chaosgym; gym.make_vec('chaosgym/ImpactBeam-v0', num_envs=2).reset(seed=0);"
+    "from chaosgym.core.batch import advance_beams as kernel" + COUNT
+)
+PEAK_FORCE = (
+    "from chaosgym import *; run = simulate(ImpactBeam(fidelity='rigid'), 1, integrator=RungeKutta4(4000));"
+    "print(run.peak_force.max())"
+)
+
+
+def test_a_call_adds_no_version_of_a_kernel():
+    """Preparing a kernel compiles just what the call needs: one version without and one with deviations."""
+    simulate(ImpactBeam(), 1)
+    simulate_with_deviations(ImpactBeam(), 1, deviations=[[1.0] * 10])
+    simulate(ImpactBeam(), 1, integrator=RungeKutta4(4000))
+    assert len(advance.signatures) == 2
+    assert len(advance_fixed_step.signatures) == 1
+    assert is_cached(advance)
+
+
+def _in_a_process(code, **environment):
+    return subprocess.Popen(
+        [sys.executable, "-c", code], env={**os.environ, **environment}, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("code", "kernel"), [(ONE_MACHINE, "fixed_step.advance_fixed_step"), (MANY_MACHINES, "batch.advance_beams")]
+)
+def test_processes_that_start_together_compile_once(tmp_path, code, kernel):
+    """Of two processes on an empty cache one compiles, saying so, and the other loads what it left."""
+    started = [_in_a_process(code, NUMBA_CACHE_DIR=str(tmp_path)) for _ in range(2)]
+    ended = [process.communicate() for process in started]
+    counts = sorted(out.decode().split() for out, _ in ended)
+    assert counts == [["0", "1"], ["1", "0"]]
+    assert sorted(err.decode().count(f"compiling {kernel}") for _, err in ended) == [0, 1]
+
+
+@pytest.mark.slow
+def test_an_edit_in_a_helper_reaches_the_kernels_of_other_files(tmp_path):
+    """Machine code on the disk is not served once a surface's force is doubled in a file that the kernel imports."""
+    package, cache = tmp_path / "chaosgym", str(tmp_path / "cache")
+    shutil.copytree(Path(chaosgym.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__", "weights"))
+
+    def peak():
+        out, _ = _in_a_process(PEAK_FORCE, NUMBA_CACHE_DIR=cache, PYTHONPATH=str(tmp_path)).communicate()
+        return float(out)
+
+    before = peak()
+    assert peak() == before
+    helper = package / "core" / "contact.py"
+    helper.write_text(helper.read_text().replace("return stiffness *", "return 2.0 * stiffness *"))
+    assert peak() > 1.1 * before

@@ -1,0 +1,108 @@
+"""The measured fidelity ladder: what it compares, and that its figures mean what they say."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from chaosgym.cli import app
+from chaosgym.errors import ParameterError
+from chaosgym.fidelity.stability import StabilityCell, StabilityMap
+from chaosgym.fidelity.tradeoff import operating_points, settings_of, tradeoff
+from chaosgym.machines import ImpactBeam, SliderCrank
+from chaosgym.plotting.fidelity import stability_figure, tradeoff_figure
+
+
+@pytest.fixture(scope="module")
+def beam_ladder():
+    """A small sample; fixed steps beyond the budget are left out of it."""
+    return tradeoff(ImpactBeam(), points=2, cycles=24, transient=10, budget=0.1, workers=1)
+
+
+def _row(result, rung, method="exact", step=0.5):
+    return next(row for row in result.rows if (row.rung, row.method, row.step) == (rung, method, step))
+
+
+def test_every_rung_method_and_step_has_its_row(beam_ladder):
+    """Six rungs by two exact steps, five by three steps of Runge-Kutta's method; none was refused."""
+    assert len(beam_ladder.rows) == len(settings_of(ImpactBeam())) == 6 * 2 + 5 * 3
+    assert not beam_ladder.refused
+    assert all(row.microseconds_per_cycle * row.cycles_per_second == pytest.approx(1e6) for row in beam_ladder.rows)
+
+
+def test_the_reference_agrees_with_itself(beam_ladder):
+    """Its own row has no error, full agreement and all points, whatever it costs."""
+    row = _row(beam_ladder, "reference")
+    assert (row.trajectory_error, row.wasserstein, row.nature_agreement, row.type_agreement) == (0.0, 0.0, 1.0, 1.0)
+    assert row.points == 2
+    assert row.on_front
+
+
+def test_finer_rungs_are_nearer(beam_ladder):
+    """From the rigid beam to eight modes both the path and the distribution of peak forces come nearer."""
+    rows = [_row(beam_ladder, rung) for rung in ("rigid", "modes-3", "modes-5", "modes-8", "reference")]
+    for name in ("trajectory_error", "wasserstein", "mean_error"):
+        values = [getattr(row, name) for row in rows]
+        assert values == sorted(values, reverse=True)
+
+
+def test_the_front_is_not_beaten(beam_ladder):
+    """Nothing measured at all points is both cheaper and nearer than a setting on the front."""
+    full = [row for row in beam_ladder.rows if row.points == 2]
+    for row in (row for row in full if row.on_front):
+        assert not any(
+            other.microseconds_per_cycle < row.microseconds_per_cycle and other.wasserstein < row.wasserstein
+            for other in full
+        )
+
+
+def test_a_setting_beyond_its_budget_is_compared_where_it_got(beam_ladder):
+    """The finest steps of the reference are too slow for the budget; they keep their cost and their path."""
+    row = _row(beam_ladder, "reference", "Runge-Kutta 4", 0.1)
+    assert row.points < 2
+    assert row.microseconds_per_cycle > 1000.0
+    assert 0.0 < row.trajectory_error < 0.01
+    assert not row.on_front
+
+
+def test_results_are_plain_values_and_draw(beam_ladder):
+    """JSON without NaN; two panels with one mark a row and the front."""
+    json.dumps(beam_ladder.as_dict(), allow_nan=False)
+    left, right = tradeoff_figure(beam_ladder).axes
+    assert len(left.lines) == sum(row.wasserstein is not None for row in beam_ladder.rows) + 1
+    assert right.get_xlabel() == "processor time [µs per cycle]"
+
+
+def test_stability_figure_shows_rows_columns_and_forces():
+    """Extremes are rows, models are columns, and an answer shows its largest force."""
+    about = {"detail": "", "share_of_bound": 0.1, "seconds": 0.0}
+    cells = (
+        StabilityCell(extreme="force 0", model="rigid", outcome="answer", largest_peak=12.5, **about),
+        StabilityCell(extreme="force 0", model="modes-5", outcome="named error", largest_peak=None, **about),
+    )
+    axes = stability_figure(StabilityMap("impact-beam", cells)).axes[0]
+    assert [text.get_text() for text in axes.texts] == ["12.5 N"]
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["rigid", "modes-5"]
+
+
+def test_the_sample_covers_the_usual_range():
+    """Operating points lie inside it, spread over both halves of either axis, and are the same every time."""
+    points = operating_points(SliderCrank(), 16)
+    low, high = np.array([SliderCrank.usual_ranges[name] for name in ("crank_speed", "slider_clearance")]).T
+    assert np.all((points >= low) & (points <= high))
+    middle = np.sqrt(low * high)
+    assert np.all(np.abs((points > middle).mean(axis=0) - 0.5) <= 0.1)
+    np.testing.assert_array_equal(points, operating_points(SliderCrank(), 16))
+    with pytest.raises(ParameterError, match="points = 0"):
+        operating_points(SliderCrank(), 0)
+
+
+def test_command_writes_its_files(tmp_path):
+    """``tradeoff --out`` prints the table and leaves JSON and a figure."""
+    options = ["--points", "1", "--cycles", "20", "--transient", "0", "--budget", "0.05", "--out", str(tmp_path)]
+    done = CliRunner().invoke(app, ["tradeoff", "impact-beam", *options])
+    assert done.exit_code == 0, done.output
+    assert "reference" in done.output
+    assert (tmp_path / "tradeoff.png").stat().st_size > 10_000
+    assert json.loads((tmp_path / "tradeoff.json").read_text())["machine"] == "impact-beam"

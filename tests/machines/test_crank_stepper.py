@@ -1,0 +1,103 @@
+"""The stepper of the slider crank against the exact kernel, the exact rigid mechanism and smaller steps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chaosgym.core.cycle import Episode, cycle_arrays
+from chaosgym.machines.slider_crank.kernels.stepped import advance
+from chaosgym.machines.slider_crank.model import stepped_model
+from chaosgym.machines.slider_crank.parameters import THESIS_SLIDER_CRANK
+from chaosgym.simulation import ExactEvents, simulate
+from tests.machines.crank_twin import rigid_ball_twin
+
+SMALL_GAP = replace(THESIS_SLIDER_CRANK, crank_speed=250.0, slider_clearance=0.032e-3)
+BALL = replace(
+    THESIS_SLIDER_CRANK, slider_joint="ideal", ball_joint="spherical", gravity=9.81, crank_speed=120.0, rod="rigid",
+    housing_offset_along=0.0, yoke_offset_along=0.0,
+)  # fmt: skip
+
+
+def stepped(machine, cycles, step_phase):
+    """Run a piecewise linear machine by the stepper."""
+    states = 2 * len(machine.degrees_of_freedom)
+    arrays = cycle_arrays(cycles, states, travels=True)
+    model = stepped_model(machine, step_phase)
+    outcome, _ = advance(model, np.zeros(states), Episode(np.zeros(1), np.zeros(2)), arrays, 1e-13, 10_000)
+    assert outcome == 0
+    return arrays
+
+
+@pytest.mark.parametrize(
+    "machine",
+    [
+        SMALL_GAP,
+        replace(SMALL_GAP, friction_coefficient=0.1),
+        replace(SMALL_GAP, slider_joint="ideal", ball_joint="instrumented", gravity=9.81, ball_clearance=0.02e-3),
+    ],
+    ids=["slider", "friction", "instrumented ball"],
+)
+def test_stepper_and_exact_propagation_agree(machine):
+    """Two kernels that share no step give the same two revolutions, impact by impact."""
+    exact = simulate(machine, 2)
+    other = stepped(machine, 2, 0.5)
+    assert exact.impacts.sum() > 3
+    np.testing.assert_allclose(other.peak_force.max(axis=1), exact.peak_force.max(axis=1), rtol=2e-3)
+    np.testing.assert_allclose(other.section[1], exact.section[1], atol=2e-3 * np.abs(exact.section[1]).max())
+    np.testing.assert_allclose(
+        other.contact_time.sum(axis=1), exact.contact_fraction.sum(axis=1) * machine.cycle_period, rtol=0.02
+    )
+
+
+def test_the_stepper_is_of_fourth_order():
+    """Half the step leaves less than an eighth of the error of the state after a revolution with fifty impacts."""
+    exact = simulate(SMALL_GAP, 2, integrator=ExactEvents(step_phase=0.25)).section[1]
+    errors = [np.abs(stepped(SMALL_GAP, 2, phase).section[1] - exact).max() for phase in (0.5, 0.25)]
+    assert errors[1] < errors[0] / 8
+
+
+def test_a_ball_in_its_shell_moves_like_the_exact_rigid_mechanism():
+    """The nonlinear motion of rod and slider gives the same eccentricity to 2 % of the clearance."""
+    machine = replace(BALL, geometric_stiffness="on", matrix_update_interval=0.5)
+    samples = 720
+    instants = np.arange(1, samples // 2) * (machine.cycle_period / samples)
+    history = simulate(machine, 1, samples_per_cycle=samples).history[0, 1 : samples // 2, 0]
+    # the rod's end moves by minus the ball's eccentricity in the housing
+    twin = -rigid_ball_twin(machine, instants)[:, 1]
+    np.testing.assert_allclose(history, twin, atol=0.02 * machine.ball_clearance)
+
+
+def test_hertzian_contact_gives_forces_of_the_same_size():
+    """With the linear law's stiffness and restitution at 50 N, mean peaks near 36 N differ by less than 15 %."""
+    linear = simulate(SMALL_GAP, 20, transient=20).peak_force.max(axis=1).mean()
+    hertz = simulate(replace(SMALL_GAP, contact_law="hertz"), 20, transient=20).peak_force.max(axis=1).mean()
+    assert hertz == pytest.approx(linear, rel=0.15)
+    assert hertz != pytest.approx(linear, rel=1e-3)
+
+
+def test_a_hertzian_drop_keeps_its_restitution():
+    """A rigid slider that strikes at the reference force leaves with the linear law's speed, within 2 %."""
+    machine = replace(
+        THESIS_SLIDER_CRANK, crank_speed=1.0, rod="rigid", matrix_update_interval=30.0, contact_law="hertz",
+        contact_damping_ratio=0.025, slider_clearance=0.1e-3, hertz_reference_force=50.0,
+    )  # fmt: skip
+    model = stepped_model(machine, 0.25)
+    total = machine.slider_mass + machine.yoke_mass
+    # the speed at which the reference force is reached with the law's mass, as the effective mass has it
+    strike = np.sqrt(0.8 * model.stiffness[0] * (50.0 / 1.5e7) ** 2.5 / total)
+    start = np.array([0.0, strike])
+    samples = 200_000
+    history = simulate(machine, 1, start, samples_per_cycle=samples).history[0]
+    inside = np.abs(history[:, 0]) < 0.9 * machine.slider_clearance
+    back = history[inside & (history[:, 1] < -1e-3), 1]
+    zeta = machine.contact_damping_ratio
+    assert -back[0] / strike == pytest.approx(np.exp(-np.pi * zeta / np.sqrt(1 - zeta**2)), rel=0.02)
+
+
+def test_a_stepped_run_can_be_continued_to_the_bit():
+    """Two runs of 3 revolutions equal one run of 6."""
+    whole = simulate(BALL, 6)
+    second = simulate(BALL, 3, simulate(BALL, 3).final_state)
+    assert np.array_equal(whole.section[3:], second.section)
+    assert np.array_equal(whole.peak_force[3:], second.peak_force)

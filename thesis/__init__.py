@@ -1,0 +1,1 @@
+"""The thesis' statements and figures, computed on the machines of chaosgym."""

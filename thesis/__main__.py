@@ -1,0 +1,5 @@
+"""``python -m thesis scorecard|figures|calibrate``."""
+
+from thesis.cli import main
+
+main()

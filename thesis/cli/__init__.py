@@ -1,0 +1,22 @@
+"""Command line of ``python -m thesis``."""
+
+import click
+
+from chaosgym.cli import run_command
+from thesis.cli.calibrate import calibrate
+from thesis.cli.figures import figures
+from thesis.cli.scorecard import scorecard
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+def app() -> None:
+    """The statements and figures of the thesis, computed on the machines of chaosgym."""
+
+
+for command in (scorecard, figures, calibrate):
+    app.add_command(command)
+
+
+def main() -> None:
+    """Entry point."""
+    run_command(app)

@@ -1,0 +1,105 @@
+"""What do the figures say, all together? A page with what agrees with the print and what does not."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from chaosgym.files import write_atomically
+from thesis.figures.figure import Finding
+from thesis.figures.printed import contradiction
+from thesis.figures.produce import Drawn, picture_path
+from thesis.figures.registry import FIGURES
+
+_WORDS = {True: "agrees", False: "**differs**", None: "nothing to decide it by"}
+
+
+def verdict(finding: Finding) -> str:
+    """Whether a statement is met, in words; one that the text contradicts is not judged."""
+    against = contradiction(finding.targets)
+    return f"not judged, the text contradicts itself: {against}" if against else _WORDS[finding.agrees]
+
+
+_OPENING = """# The simulated figures of the thesis, drawn again
+
+P. Gu, *Chaotic Vibration in Machine Systems and Its Implications for Design*, PhD thesis, MIT, 1994. The pixels of its
+figures are not available; axes and ranges follow the text, and everything that the text prints about a figure is drawn
+over it in one colour and compared with the machine here. Written by
+
+    chaosgym figures all --out FOLDER --gallery docs/figures.md
+
+which draws every figure (`chaosgym figures --list` names them) and keeps what it computed in `FOLDER/results`. Numbers
+agree within the tolerances of the [scorecard](scorecard.md): a force within 15 % or 3 N, a range if both its ends do, a
+nature if it is the same word. What the scorecard judges is judged by the same runs here, those of the thesis' machine.
+Forces and natures are those of the plotted dots, one a cycle: of the beam on one side of the bearing, of the crank the
+larger of both sides. Dots within 0.5 N are one, as for the scorecard.
+"""
+
+
+def totals(drawn: Sequence[Drawn]) -> dict[str, int]:
+    """How many statements agree, and how many do not; what the text contradicts, or does not decide, is not judged."""
+    found = [finding for one in drawn for finding in one.findings]
+    judged = [finding.agrees for finding in found if not contradiction(finding.targets)]
+    return {
+        "agree": judged.count(True),
+        "differ": judged.count(False),
+        "contradictory": len(found) - len(judged),
+        "undecided": judged.count(None),
+    }
+
+
+def sensitivities(drawn: Sequence[Drawn]) -> dict[str, list[tuple[str, Finding]]]:
+    """Statements about sensitivity by parameter, each with its figure; one that two figures share stands once."""
+    found: dict[str, list[tuple[str, Finding]]] = {}
+    for one in drawn:
+        for finding in one.findings:
+            known = [other for _, other in found.get(finding.sensitivity, [])]
+            if finding.sensitivity and finding not in known:
+                found.setdefault(finding.sensitivity, []).append((one.figure.id, finding))
+    return found
+
+
+def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
+    """The page; pictures that lie in the folder ``pictures`` beside it are shown."""
+    count = totals(drawn)
+    lines = [
+        _OPENING,
+        f"Of {count['agree'] + count['differ']} printed statements about these figures {count['agree']} agree and "
+        f"{count['differ']} differ.",
+    ]
+    shown = {one.figure.id for one in drawn}
+    missing = [number for number in FIGURES if number not in shown]
+    if missing:
+        lines.append(f"Not drawn for this page: {', '.join(missing)}.")
+    answered = sensitivities(drawn)
+    if answered:
+        lines += [
+            "",
+            "## Sensitivities as printed",
+            "",
+            "| parameter | printed | here | figure | |",
+            "|---|---|---|---|---|",
+        ]
+    for parameter, entries in answered.items():
+        for number, finding in entries:
+            lines.append(f"| {parameter} | {finding.printed} | {finding.here} | {number} | {verdict(finding)} |")
+    for one in drawn:
+        figure = one.figure
+        lines += ["", f"## {figure.label}. {figure.title}", "", figure.shows]
+        if figure.remark:
+            lines += ["", f"Not as in the thesis: {figure.remark}."]
+        if one.error:
+            lines += ["", f"Not computed: {one.error}"]
+        if one.findings:
+            lines.append("")
+        for finding in one.findings:
+            lines.append(f"- {finding.printed}. Here {finding.here}: {verdict(finding)}.")
+        picture = picture_path(figure, pictures)
+        if picture.exists():
+            lines += ["", f"![{figure.label}: {figure.title}]({pictures.name}/{picture.name})"]
+    return "\n".join(lines) + "\n"
+
+
+def write_gallery(drawn: Sequence[Drawn], path: Path) -> None:
+    """Write the page; pictures in ``figures`` beside it are shown."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    page = gallery(drawn, path.parent / "figures")
+    write_atomically(path, lambda temporary: temporary.write_text(page, encoding="utf-8"))

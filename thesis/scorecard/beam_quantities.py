@@ -1,0 +1,67 @@
+"""Which quantities are the Impact Beam System's own? Its scales, the motion of the force point, long transients."""
+
+from collections.abc import Callable
+
+from chaosgym.machines import ImpactBeam, Machine
+from chaosgym.machines.impact_beam.parameters import pinned_pinned_frequency
+from thesis.scorecard import beam_runs
+from thesis.scorecard.findings import Finding, Quantity, Results, no_jobs
+from thesis.scorecard.jobs import Job
+from thesis.scorecard.observation import Effort
+from thesis.statements import Comparison
+
+LONG = 4000
+"""Cycles of the longest run of the thesis (5.2.3)."""
+
+
+def _of_beam(number: Callable[[ImpactBeam], float]) -> Quantity:
+    def finding(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+        assert isinstance(machine, ImpactBeam)
+        return Finding(number(machine))
+
+    return Quantity(no_jobs, finding)
+
+
+def _long(cycles: int) -> Callable[[Machine, Comparison, Effort], list[Job]]:
+    return lambda machine, comparison, effort: [Job(beam_runs.long_run, machine, (cycles,))]
+
+
+def _irregular_cycles(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    period = results[0]["period"]
+    ending = f"then period {period}" if period else "irregular to the end"
+    return Finding(float(results[0]["irregular_cycles"]), True, ending)
+
+
+def _chaotic_cycles(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """How many cycles of the run are chaotic; the run as a whole must be."""
+    nature = results[0]["nature"]
+    return _irregular_cycles(machine, comparison, results)._replace(agrees=nature == "chaotic", note=nature)
+
+
+def _final_period(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    period = results[0]["period"]
+    cycles = results[0]["irregular_cycles"]
+    return Finding(None if period is None else float(period), period is not None, f"irregular for {cycles} cycles")
+
+
+def _moving(machine: Machine, comparison: Comparison, effort: Effort) -> list[Job]:
+    return [Job(beam_runs.force_point_motion, machine, (200,))]
+
+
+def _motion(which: str, unit: float) -> Callable[[Machine, Comparison, Results], Finding]:
+    def finding(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+        low, high = results[0][which]
+        return Finding((low / unit, high / unit))
+
+    return finding
+
+
+BEAM_QUANTITIES = {
+    "irregular_cycles": Quantity(_long(LONG), _irregular_cycles),
+    "chaotic_cycles": Quantity(_long(LONG), _chaotic_cycles),
+    "final_period": Quantity(_long(LONG), _final_period),
+    "force_point_displacement": Quantity(_moving, _motion("displacement", 1e-3)),
+    "force_point_velocity": Quantity(_moving, _motion("velocity", 1.0)),
+    "pinned_pinned_frequency": _of_beam(lambda beam: pinned_pinned_frequency(beam, beam.length)),
+}
+"""By name, as in ``reference/comparisons.toml``."""

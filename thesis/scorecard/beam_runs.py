@@ -1,0 +1,80 @@
+"""Which runs do statements about the beam need, beyond the peak forces of a settled response?"""
+
+import math
+from typing import Any
+
+import numpy as np
+import scipy.signal
+from numpy.typing import NDArray
+
+from chaosgym.diagnosis import two_step_test
+from chaosgym.diagnosis.stroboscopic import find_recurrence, scales
+from chaosgym.machines import ImpactBeam, Machine
+from chaosgym.simulation import CycleRecord, simulate
+from thesis.scorecard.observation import DOT, READING_ERROR, plotted_peaks
+
+Array = NDArray[np.float64]
+
+MOTION_CYCLES, MOTION_SAMPLES = 50, 4000
+"""Cycles of the motion of the force point, and samples in each."""
+
+
+def long_run(machine: Machine, cycles: int) -> dict[str, Any]:
+    """How long is a run from rest irregular, and with which period does it end?
+
+    Returns
+    -------
+    dict
+        ``irregular_cycles``: cycles before the plotted peaks repeat within the reading error, all if they never do;
+        ``period`` that they repeat with, None if they don't; ``nature`` of the whole run by the Two-Step Test.
+    """
+    peaks = plotted_peaks(simulate(machine, cycles))[:, None]
+    nature = two_step_test(peaks, sensor_error=READING_ERROR).nature
+    tail = peaks[-100:]
+    scale = scales(tail)
+    found = find_recurrence(tail / scale, READING_ERROR / scale)
+    if found.period is None:
+        return {"irregular_cycles": cycles, "period": None, "nature": nature}
+    off = np.max(np.abs(peaks[: -found.period] - peaks[found.period :]), axis=1) > DOT
+    last = np.flatnonzero(off)
+    irregular = int(last[-1]) + 1 if len(last) else 0
+    return {"irregular_cycles": irregular, "period": found.period, "nature": nature}
+
+
+def follow_modes(record: CycleRecord) -> tuple[Array, Array, Array]:
+    """Motion of the point where the shaker pushes a beam, from a record with a time history.
+
+    The modes are driven once more by the shaker force and the contact force of the run, held linear between samples.
+
+    Returns
+    -------
+    (displacement, velocity, tip)
+        Of the force point [m, m/s], and displacement of the tip [m] by the same route; all (cycles * samples,).
+    """
+    beam = record.machine
+    assert isinstance(beam, ImpactBeam)
+    assert record.history is not None
+    model, n, time = beam.reduce(), beam.n_modes, record.time
+    shaker = beam.force_amplitude * np.sin(2.0 * math.pi * beam.excitation_frequency * time)
+    system = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(model.stiffness), -model.damping]])
+    load = np.zeros((2 * n, 2))
+    load[n:] = np.column_stack([model.force_shape, -model.tip_shape])
+    output = np.zeros((3, 2 * n))
+    output[0, :n] = output[1, n:] = model.force_shape
+    output[2, :n] = model.tip_shape
+    forces = np.column_stack([shaker, record.history[:, :, 2].ravel()])
+    _, motion, _ = scipy.signal.lsim((system, load, output, np.zeros((3, 2))), forces, time, record.section[0])
+    displacement, velocity, tip = np.ascontiguousarray(motion.T)
+    return displacement, velocity, tip
+
+
+def force_point_motion(beam: ImpactBeam, transient: int) -> dict[str, Any]:
+    """Range of displacement [m] and velocity [m/s] of the point where the shaker pushes a beam."""
+    record = simulate(beam, MOTION_CYCLES, transient=transient, samples_per_cycle=MOTION_SAMPLES)
+    displacement, velocity, tip = follow_modes(record)
+    assert record.history is not None
+    return {
+        "displacement": [float(displacement.min()), float(displacement.max())],
+        "velocity": [float(velocity.min()), float(velocity.max())],
+        "tip_error": float(np.max(np.abs(tip - record.history[:, :, 0].ravel()))),
+    }

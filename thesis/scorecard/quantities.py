@@ -1,0 +1,38 @@
+"""How is each quantity of the thesis computed? One entry for each kind; ``reference`` has the statements."""
+
+from collections.abc import Mapping
+
+from chaosgym.machines import ImpactBeam, Machine, SliderCrank
+from chaosgym.machines.impact_beam.parameters import static_tip_deflection
+from thesis.scorecard.beam_quantities import BEAM_QUANTITIES
+from thesis.scorecard.crank_quantities import CRANK_QUANTITIES
+from thesis.scorecard.findings import Finding, Quantity, Results, no_jobs
+from thesis.scorecard.response_quantities import RESPONSE_QUANTITIES
+from thesis.statements import Comparison
+
+
+def clearance_unit(machine: Machine) -> float:
+    """Displacement [m] by which the thesis makes a clearance dimensionless.
+
+    The beam's is its static tip deflection under the force amplitude (3.5.1). The crank's is "the slider vibration due
+    to a force equal to the slider inertia force" (4.5.1), one number at all speeds: a force m r w^2 of the slider's
+    mass m moves slider and yoke, of mass M, by r m / M.
+    """
+    if isinstance(machine, ImpactBeam):
+        return static_tip_deflection(machine)
+    assert isinstance(machine, SliderCrank)
+    return machine.crank_radius * machine.slider_mass / (machine.slider_mass + machine.yoke_mass)
+
+
+def _dimensionless_clearance(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    clearance: float = getattr(machine, machine.clearance_field)
+    return Finding(clearance / clearance_unit(machine))
+
+
+QUANTITIES: Mapping[str, Quantity] = {
+    **RESPONSE_QUANTITIES,
+    **BEAM_QUANTITIES,
+    **CRANK_QUANTITIES,
+    "dimensionless_clearance": Quantity(no_jobs, _dimensionless_clearance),
+}
+"""By name, as in ``reference/comparisons.toml``."""

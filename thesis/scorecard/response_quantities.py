@@ -1,0 +1,274 @@
+"""Which quantities follow from the peak forces of responses? Single runs, curves over one axis, maps over two.
+
+A nature agrees if it is the printed word. The thesis knows quasiperiodic responses and saw none (5.5), so its "chaotic"
+is not "quasiperiodic"; a response that is undetermined or failed agrees with nothing and decides no boundary.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import kendalltau
+
+from chaosgym.machines import Machine
+from chaosgym.machines.parameters import with_settings
+from thesis.scorecard.findings import Finding, Quantity, Results
+from thesis.scorecard.jobs import Job, as_observation, observation
+from thesis.scorecard.observation import READING_ERROR, Effort, Observation
+from thesis.statements import Comparison
+from thesis.statements.comparisons import Axis
+
+# --- single points ----------------------------------------------------------------------------------------------------
+
+
+def _at_point(machine: Machine, comparison: Comparison, effort: Effort) -> list[Job]:
+    return [Job(observation, machine, effort)]
+
+
+def _nature(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    seen = as_observation(results[0])
+    printed = str(comparison.printed)
+    return Finding(seen.nature, seen.nature == printed, _shown(seen), _nature_deviation(seen, printed))
+
+
+def _periodic_force(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    seen = as_observation(results[0])
+    return Finding(seen.mean, seen.is_periodic, _shown(seen), _nature_deviation(seen, "periodic"))
+
+
+def _chaotic_range(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    seen = as_observation(results[0])
+    return Finding((seen.low, seen.high), seen.is_chaotic, _shown(seen), _nature_deviation(seen, "chaotic"))
+
+
+def _chaotic_maximum(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    seen = as_observation(results[0])
+    return Finding(seen.high, seen.is_chaotic, _shown(seen), _nature_deviation(seen, "chaotic"))
+
+
+def _bounce_share(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    seen = as_observation(results[0])
+    return Finding(seen.bounce_share, seen.is_periodic, _shown(seen))
+
+
+def _longest_bounce_share(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    seen = as_observation(results[0])
+    return Finding(seen.longest_bounce_share, seen.is_chaotic, _shown(seen))
+
+
+def _nature_deviation(seen: Observation, printed: str) -> float:
+    """0 if the nature is the printed one; otherwise how far from it, growing with the spread of the peaks."""
+    if seen.nature == printed:
+        return 0.0
+    if printed != "periodic" or seen.mean <= 0.0:
+        return 1.0
+    return 0.5 + 0.5 * min(1.0, (seen.high - seen.low) / (0.5 * seen.mean))
+
+
+def _shown(seen: Observation) -> str:
+    if seen.nature == "failed":
+        return "the run could not be finished"
+    period = f" {seen.period}" if seen.period else ""
+    return f"{seen.nature}{period}, {seen.low:.3g} to {seen.high:.3g} N"
+
+
+# --- curves -----------------------------------------------------------------------------------------------------------
+
+
+def _over_axes(machine: Machine, comparison: Comparison, effort: Effort) -> list[Job]:
+    """Every combination of the axes; the one along varies fastest."""
+    machines = [machine]
+    for axis in (comparison.across, comparison.along):
+        if axis is not None:
+            machines = [with_settings(one, {axis.field: value}) for one in machines for value in axis.values]
+    return [Job(observation, one, effort) for one in machines]
+
+
+def _smooth_end(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """Last value of the axis up to which the peak force is periodic and never falls: the end of Type I (3.5.1)."""
+    values, seen = _curve(comparison, results)
+    end, reason = values[0], ""
+    for value, before, now in zip(values[1:], seen, seen[1:], strict=False):
+        if _is_open(now):
+            return Finding(None, False, f"{now.nature} at {value:g}")
+        if now.is_chaotic:
+            reason = f"{now.nature} at {value:g}"
+            break
+        if now.mean < before.mean - READING_ERROR:
+            reason = f"falls from {before.mean:.3g} to {now.mean:.3g} N at {value:g}"
+            break
+        end = value
+    return Finding(end, True, reason)
+
+
+def _first_chaotic(axis: Axis, rows: Sequence[Sequence[Observation]]) -> float | None:
+    """First value of an axis with a chaotic response, one step beyond the axis if all are periodic.
+
+    None if it is not known: a response before it is neither periodic nor chaotic.
+    """
+    for value, row in zip(axis.values, rows, strict=True):
+        if any(one.is_chaotic for one in row):
+            return value
+        if not all(one.is_periodic for one in row):
+            return None
+    return axis.values[-1] + axis.step
+
+
+def _shares(seen: Sequence[Observation]) -> str:
+    """How many responses are chaotic, and how many neither that nor periodic."""
+    chaotic, other = sum(one.is_chaotic for one in seen), sum(_is_open(one) for one in seen)
+    return f"{chaotic} of {len(seen)} chaotic" + (f", {other} neither chaotic nor periodic" if other else "")
+
+
+def _is_open(one: Observation) -> bool:
+    return not (one.is_periodic or one.is_chaotic)
+
+
+def _restless(seen: Sequence[Observation]) -> float:
+    """Share of responses that are not periodic: it leads a calibration."""
+    return float(np.mean([not one.is_periodic for one in seen]))
+
+
+def _chaos_begin(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """First value of the axis at which the response is chaotic; one step beyond the axis if it is always periodic."""
+    _, seen = _curve(comparison, results)
+    assert comparison.along is not None
+    begin = _first_chaotic(comparison.along, [[one] for one in seen])
+    return Finding(begin, begin is not None, _shares(seen))
+
+
+def _periodic_end(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """Last value of the axis up to which every response is periodic."""
+    begin = _chaos_begin(machine, comparison, results)
+    assert comparison.along is not None
+    end = begin.value - comparison.along.step if isinstance(begin.value, float) else None
+    return begin._replace(value=end, deviation=_restless(_curve(comparison, results)[1]))
+
+
+def _chaos_run(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """Both ends of the longest stretch of the axis with chaotic responses alone."""
+    values, seen = _curve(comparison, results)
+    longest: list[float] = []
+    stretch: list[float] = []
+    for value, one in zip(values, seen, strict=True):
+        stretch = [*stretch, value] if one.is_chaotic else []
+        longest = max(longest, stretch, key=len)
+    if not longest:
+        return Finding(None, False, _shares(seen), 1.0 - _restless(seen))
+    return Finding((longest[0], longest[-1]), True, _shares(seen))
+
+
+def _chaos_present(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """Whether any response along the axis is chaotic; undetermined if none is and not all are periodic."""
+    _, seen = _curve(comparison, results)
+    any_chaotic, all_periodic = any(one.is_chaotic for one in seen), all(one.is_periodic for one in seen)
+    word = "chaos" if any_chaotic else "none" if all_periodic else "undetermined"
+    deviation = max(0.5, _restless(seen)) if word != comparison.printed else 0.0
+    return Finding(word, word == comparison.printed, _shares(seen), deviation)
+
+
+def _change_of_nature(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """Nature at the first and at the last value of the axis."""
+    _, seen = _curve(comparison, results)
+    word = f"{seen[0].nature} to {seen[-1].nature}"
+    return Finding(word, word == comparison.printed, "; ".join(_shown(one) for one in seen))
+
+
+def _resonance_speed(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """Where the largest peak force has a maximum inside the axis; none if it lies at an end."""
+    values, seen = _curve(comparison, results)
+    assert comparison.along is not None
+    force = [one.high for one in seen]
+    top = int(np.argmax(force))
+    shown = f"{force[0]:.3g}, at most {force[top]:.3g}, {force[-1]:.3g} N"
+    if top in (0, len(force) - 1):
+        return Finding(None, False, f"no maximum: {shown}")
+    return Finding(values[top] / comparison.along.unit, True, shown)
+
+
+def _largest_force(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """Largest peak force along the axis."""
+    return Finding(max(one.high for one in _curve(comparison, results)[1]))
+
+
+def _curve(comparison: Comparison, results: Results) -> tuple[tuple[float, ...], list[Observation]]:
+    assert comparison.along is not None
+    return comparison.along.values, [as_observation(result) for result in results]
+
+
+def _spread_trend(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """Rank correlation (Kendall) of the spread of the peak forces with the axis; a periodic response has none."""
+    values, seen = _curve(comparison, results)
+    if any(one.nature == "failed" for one in seen):
+        return Finding(None, False, "a run could not be finished")
+    spread = [one.high - one.low if not one.is_periodic else 0.0 for one in seen]
+    tau = float(kendalltau(values, spread).statistic) if np.ptp(spread) > 0.0 else 0.0
+    return Finding(tau, True, "spreads " + ", ".join(f"{one:.2g}" for one in spread) + " N")
+
+
+def _rise_of_maximum(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """By how many per cent the largest peak force grows from the first to the last value of the axis."""
+    _, seen = _curve(comparison, results)
+    return Finding(100.0 * (seen[-1].high / seen[0].high - 1.0), True, f"{_shown(seen[0])}; {_shown(seen[-1])}")
+
+
+def _settling(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """Cycles after which all responses that become periodic repeat within the reading error."""
+    seen = [as_observation(result) for result in results]
+    cycles = [one.settle_cycle for one in seen if one.settle_cycle is not None]
+    if not cycles:
+        return Finding(None, False, "none becomes periodic")
+    return Finding(float(max(cycles)), True, f"{len(cycles)} periodic responses")
+
+
+# --- maps -------------------------------------------------------------------------------------------------------------
+
+
+def _rows(comparison: Comparison, results: Results) -> list[list[Observation]]:
+    """Responses of a map, one row for each value across."""
+    assert comparison.along is not None
+    seen = [as_observation(result) for result in results]
+    width = len(comparison.along.values)
+    return [seen[begin : begin + width] for begin in range(0, len(seen), width)]
+
+
+def _map_clearance(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """Largest value across, in the printed unit, up to which nothing along the other axis is chaotic."""
+    assert comparison.across is not None
+    return _boundary(comparison.across, _rows(comparison, results))
+
+
+def _map_speed(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """Largest value along up to which nothing on the map is chaotic."""
+    columns = [list(column) for column in zip(*_rows(comparison, results), strict=True)]
+    assert comparison.along is not None
+    return _boundary(comparison.along, columns)
+
+
+def _boundary(axis: Axis, rows: Sequence[Sequence[Observation]]) -> Finding:
+    first = _first_chaotic(axis, rows)
+    shares = _shares([one for row in rows for one in row])
+    return Finding(None if first is None else (first - axis.step) / axis.unit, first is not None, shares)
+
+
+RESPONSE_QUANTITIES = {
+    "nature": Quantity(_at_point, _nature),
+    "periodic_force": Quantity(_at_point, _periodic_force),
+    "chaotic_range": Quantity(_at_point, _chaotic_range),
+    "chaotic_maximum": Quantity(_at_point, _chaotic_maximum),
+    "bounce_share": Quantity(_at_point, _bounce_share),
+    "longest_bounce_share": Quantity(_at_point, _longest_bounce_share),
+    "smooth_end": Quantity(_over_axes, _smooth_end),
+    "chaos_begin": Quantity(_over_axes, _chaos_begin),
+    "periodic_end": Quantity(_over_axes, _periodic_end),
+    "chaos_run": Quantity(_over_axes, _chaos_run),
+    "chaos_present": Quantity(_over_axes, _chaos_present),
+    "change_of_nature": Quantity(_over_axes, _change_of_nature),
+    "resonance_speed": Quantity(_over_axes, _resonance_speed),
+    "largest_force": Quantity(_over_axes, _largest_force),
+    "spread_trend": Quantity(_over_axes, _spread_trend),
+    "rise_of_maximum": Quantity(_over_axes, _rise_of_maximum),
+    "settling": Quantity(_over_axes, _settling),
+    "map_clearance": Quantity(_over_axes, _map_clearance),
+    "map_speed": Quantity(_over_axes, _map_speed),
+}
+"""By name, as in ``reference/comparisons.toml``."""
