@@ -76,8 +76,10 @@ def main() -> None:
     tables = [table.type_iii for machine in range(len(pool)) for table in pool.regimes(machine)]
     earlier, scatter, difference, error, type_iii = felt(arguments).T
     print(f"Type III: {np.mean(tables):.1%} of the speeds of all tables, {type_iii.mean():.1%} of the steps")
-    for name, which in (("whose peaks scatter by less than 2 N", (earlier > 0) & (scatter < 2.0)),
-                        ("whose share of bouncing repeats one before", difference < EQUAL)):  # fmt: skip
+    for name, which in (
+        ("whose peaks scatter by less than 2 N", (earlier > 0) & (scatter < 2.0)),
+        ("whose share of bouncing repeats one before", difference < EQUAL),
+    ):
         told = f"{type_iii[which].mean():.1%} of {np.count_nonzero(which)}" if which.any() else "there are none"
         print(f"Type III among steps at a speed that was kept, {name}: {told}")
     calm, irregular = scatter[type_iii == 0.0], scatter[type_iii == 1.0]

@@ -147,9 +147,13 @@ class Run:
         """Write the policy as numpy plays it."""
         arguments = self.arguments
         policy = exported(
-            model, arguments.env, self.envs.unwrapped, normalise=self.envs, memory=arguments.memory,
+            model,
+            arguments.env,
+            self.envs.unwrapped,
+            normalise=self.envs,
+            memory=arguments.memory,
             increments=arguments.increments,
-        )  # fmt: skip
+        )
         save_policy(policy, self.folder)
 
     def evaluate(self, model: BaseAlgorithm) -> dict[str, float]:
@@ -236,6 +240,9 @@ def _opened(path: Path, columns: list[str], begin: int) -> Path:
 
 def _versions() -> Mapping[str, str]:
     return {
-        "chaosgym": chaosgym.__version__, "stable_baselines3": stable_baselines3.__version__,
-        "torch": torch.__version__, "numpy": np.__version__, "python": platform.python_version(),
-    }  # fmt: skip
+        "chaosgym": chaosgym.__version__,
+        "stable_baselines3": stable_baselines3.__version__,
+        "torch": torch.__version__,
+        "numpy": np.__version__,
+        "python": platform.python_version(),
+    }

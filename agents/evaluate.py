@@ -55,16 +55,21 @@ def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--env", default="chaosgym/ImpactBeamTolerance-v0", choices=ENVIRONMENTS)
     parser.add_argument(
-        "--pool", default="held-out", choices=("training", "held-out"),
+        "--pool",
+        default="held-out",
+        choices=("training", "held-out"),
         help="pool of machines; the nominal tasks have one machine",
-    )  # fmt: skip
+    )
     parser.add_argument("--machines", type=_number, help="only the first ones of the pool")
     parser.add_argument("--repeats", type=_number, help="jobs on each machine; 16 if there is one machine, else 1")
     parser.add_argument("--controllers", nargs="*", default=list(LADDER), help=f"some of: {', '.join(LADDER)}")
     parser.add_argument(
-        "--policy", action="append", default=[], metavar="NAME=FOLDERS",
+        "--policy",
+        action="append",
+        default=[],
+        metavar="NAME=FOLDERS",
         help="trained policies: a pattern of folders, one for each training seed; may be given again",
-    )  # fmt: skip
+    )
     parser.add_argument("--out", type=Path, required=True, help="folder of the comparison")
     parser.add_argument("--json", action="store_true", help="print report.json instead of the table")
     return parser.parse_args()
@@ -82,8 +87,11 @@ def contenders(arguments: argparse.Namespace) -> dict[str, Contender]:
     if unknown:
         raise SystemExit(f"--controllers {', '.join(sorted(unknown))}: unknown; allowed: {', '.join(LADDER)}")
     asked = {*arguments.controllers, SAFE_CONSTANT, REFERENCE}
-    chosen = {name: Contender(rung.knows, (Player(rung.make),), rung.each_cycle)
-              for name, rung in LADDER.items() if name in asked}  # fmt: skip
+    chosen = {
+        name: Contender(rung.knows, (Player(rung.make),), rung.each_cycle)
+        for name, rung in LADDER.items()
+        if name in asked
+    }
     for given in arguments.policy:
         name, _, pattern = given.partition("=")
         folders = run_folders(pattern)
@@ -127,8 +135,13 @@ class Comparison:
         pool: Any = gym.make(arguments.env, **self._task).get_wrapper_attr("pool")
         count = min(len(pool), arguments.machines or len(pool))
         self._machines = list(range(count)) * (arguments.repeats or (REPEATS if count == 1 else 1))
-        self._setting = {"env": arguments.env, "pool": pool.name, "machines": count, "jobs": len(self._machines),
-                         "first_seed": FIRST_SEED}  # fmt: skip
+        self._setting = {
+            "env": arguments.env,
+            "pool": pool.name,
+            "machines": count,
+            "jobs": len(self._machines),
+            "first_seed": FIRST_SEED,
+        }
 
     def results(self, name: str, contender: Contender) -> Results:
         """Return the jobs of a contender, those kept in the folder, or run now."""
@@ -172,8 +185,9 @@ class Comparison:
         """What a contender knows, the hash of its policy if it is known, and the jobs that it has done."""
         content: dict[str, Any] = json.loads(path.read_text())
         if content["setting"] != self._setting:
-            raise SystemExit(f"--out {self._folder.parent} holds another comparison, {content['setting']}; "
-                             "choose another")  # fmt: skip
+            raise SystemExit(
+                f"--out {self._folder.parent} holds another comparison, {content['setting']}; choose another"
+            )
         return content | {"jobs": [JobRow(**row) for row in content["jobs"]]}
 
 
@@ -188,14 +202,19 @@ def main() -> None:
     results = comparison.kept() | {name: comparison.results(name, each) for name, each in asked.items()}
     summaries = compare(results)
     report = {
-        "env": arguments.env, "chaosgym": chaosgym.__version__, "reference": reference_of(results),
-        "gap": model_gap(summaries), "contenders": summaries,
-    }  # fmt: skip
-    lines = [f"{arguments.env}, {len(next(iter(results.values())).rows[0])} jobs", "",
-             *table_lines(summaries)]  # fmt: skip
+        "env": arguments.env,
+        "chaosgym": chaosgym.__version__,
+        "reference": reference_of(results),
+        "gap": model_gap(summaries),
+        "contenders": summaries,
+    }
+    lines = [f"{arguments.env}, {len(next(iter(results.values())).rows[0])} jobs", "", *table_lines(summaries)]
     if report["gap"]:
-        lines += ["", f"Searching with the nominal model costs {report['gap']['gap']:.3f}, "
-                      f"{report['gap']['share']:.0%} of the safe constant's return."]  # fmt: skip
+        lines += [
+            "",
+            f"Searching with the nominal model costs {report['gap']['gap']:.3f}, "
+            f"{report['gap']['share']:.0%} of the safe constant's return.",
+        ]
     text = json.dumps(report, indent=1) + "\n"
     write_atomically(arguments.out / "report.json", lambda file: file.write_text(text))
     write_atomically(arguments.out / "table.md", lambda file: file.write_text("\n".join(lines) + "\n"))

@@ -54,10 +54,13 @@ def main() -> None:
             observation, _, terminated, truncated, _ = collector.step(act(observation))
             ended = terminated or truncated
     collector.create_dataset(
-        name, algorithm_name=behaviour, author="The chaosgym developers", requirements=["chaosgym"],
+        name,
+        algorithm_name=behaviour,
+        author="The chaosgym developers",
+        requirements=["chaosgym"],
         code_permalink="agents/export_minari.py",
         description=f"{arguments.jobs} jobs of {arguments.env} from seed {arguments.seed}, {behaviour}",
-    )  # fmt: skip
+    )
     collector.close()
     print(f"{name}: {arguments.jobs} jobs in {folder}")
 

@@ -118,21 +118,33 @@ def main() -> None:
     own, jobs, arguments = figures.pop(asked.contender), judged["jobs"], config["arguments"]
     score = own["score_by_seed"][best.place]
     report = {
-        "setting": judged["setting"], "score": score, "mean_return": sum(job["job_return"] for job in jobs) / len(jobs),
-        "jobs": jobs, "all_seeds": own, **figures,
-    }  # fmt: skip
+        "setting": judged["setting"],
+        "score": score,
+        "mean_return": sum(job["job_return"] for job in jobs) / len(jobs),
+        "jobs": jobs,
+        "all_seeds": own,
+        **figures,
+    }
     folder = Path(asked.out) / arguments["env"].rpartition("/")[2]
     folder.mkdir(parents=True, exist_ok=True)
     save_policy(load_policy(best.folder), folder)
     card = CARD.read_text().format(
-        env=arguments["env"], given=GIVEN[arguments["memory"]], steps=arguments["steps"], seeds=own["seeds"],
-        jobs=arguments["jobs"], at=best.steps,
-        machines=len(jobs), pool=judged["setting"]["pool"], score=score,
+        env=arguments["env"],
+        given=GIVEN[arguments["memory"]],
+        steps=arguments["steps"],
+        seeds=own["seeds"],
+        jobs=arguments["jobs"],
+        at=best.steps,
+        machines=len(jobs),
+        pool=judged["setting"]["pool"],
+        score=score,
         type_iii=sum(job["type_iii_share"] for job in jobs) / len(jobs),
-        safe_iii=figures[SAFE_CONSTANT]["type_iii_share"], reference_iii=figures[reference]["type_iii_share"],
-        belief=figures["belief programming"]["score"], nothing_learned="" if best.steps else NOTHING_LEARNED,
+        safe_iii=figures[SAFE_CONSTANT]["type_iii_share"],
+        reference_iii=figures[reference]["type_iii_share"],
+        belief=figures["belief programming"]["score"],
+        nothing_learned="" if best.steps else NOTHING_LEARNED,
         all_seeds=", ".join(f"{value:.2f}" for value in own["score_by_seed"]),
-    )  # fmt: skip
+    )
     written = {"config.json": json.dumps(config, indent=1), "evaluation.json": json.dumps(report, indent=1)}
     for name, text in (written | {"card.md": card.rstrip()}).items():
         write_atomically(folder / name, lambda path, text=text: path.write_text(text + "\n"))

@@ -159,12 +159,21 @@ def main() -> None:
     arguments = common.parse(Arguments, __doc__)
     run = common.Run(arguments, CostRecorder)
     model = run.resumed(LagrangianPPO) or LagrangianPPO(
-        "MlpPolicy", run.envs, cost_limit=arguments.cost_limit, multiplier_rate=arguments.multiplier_rate,
-        n_steps=arguments.rollout, batch_size=arguments.batch, n_epochs=arguments.epochs,
-        learning_rate=arguments.learning_rate, gamma=arguments.gamma, gae_lambda=arguments.gae_lambda,
-        ent_coef=arguments.entropy, seed=arguments.seed, device="cpu",
+        "MlpPolicy",
+        run.envs,
+        cost_limit=arguments.cost_limit,
+        multiplier_rate=arguments.multiplier_rate,
+        n_steps=arguments.rollout,
+        batch_size=arguments.batch,
+        n_epochs=arguments.epochs,
+        learning_rate=arguments.learning_rate,
+        gamma=arguments.gamma,
+        gae_lambda=arguments.gae_lambda,
+        ent_coef=arguments.entropy,
+        seed=arguments.seed,
+        device="cpu",
         policy_kwargs={"log_std_init": arguments.log_std, "net_arch": [arguments.units, arguments.units]},
-    )  # fmt: skip
+    )
     run.learn(model)
 
 

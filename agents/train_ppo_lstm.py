@@ -44,11 +44,19 @@ def main() -> None:
     arguments = common.parse(Arguments, __doc__)
     run = common.Run(arguments)
     model = run.resumed(RecurrentPPO) or RecurrentPPO(
-        "MlpLstmPolicy", run.envs, n_steps=arguments.rollout, batch_size=arguments.batch, n_epochs=arguments.epochs,
-        learning_rate=arguments.learning_rate, gamma=arguments.gamma, gae_lambda=arguments.gae_lambda,
-        ent_coef=arguments.entropy, seed=arguments.seed, device="cpu",
+        "MlpLstmPolicy",
+        run.envs,
+        n_steps=arguments.rollout,
+        batch_size=arguments.batch,
+        n_epochs=arguments.epochs,
+        learning_rate=arguments.learning_rate,
+        gamma=arguments.gamma,
+        gae_lambda=arguments.gae_lambda,
+        ent_coef=arguments.entropy,
+        seed=arguments.seed,
+        device="cpu",
         policy_kwargs={"log_std_init": arguments.log_std, "lstm_hidden_size": arguments.units},
-    )  # fmt: skip
+    )
     run.learn(model)
 
 

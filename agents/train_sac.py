@@ -41,10 +41,18 @@ def main() -> None:
     arguments = common.parse(Arguments, __doc__)
     run = common.Run(arguments)
     model = run.resumed(SAC) or SAC(
-        "MlpPolicy", run.envs, batch_size=arguments.batch, learning_rate=arguments.learning_rate, gamma=arguments.gamma,
-        learning_starts=arguments.learning_starts, train_freq=1, gradient_steps=arguments.gradient_steps,
-        buffer_size=arguments.steps, seed=arguments.seed, device="cpu",
-    )  # fmt: skip
+        "MlpPolicy",
+        run.envs,
+        batch_size=arguments.batch,
+        learning_rate=arguments.learning_rate,
+        gamma=arguments.gamma,
+        learning_starts=arguments.learning_starts,
+        train_freq=1,
+        gradient_steps=arguments.gradient_steps,
+        buffer_size=arguments.steps,
+        seed=arguments.seed,
+        device="cpu",
+    )
     run.learn(model)
 
 

@@ -33,8 +33,11 @@ REFERENCE_CYCLES = 10_000
 """Cycles of the reference run."""
 
 UPDATES: tuple[tuple[Form, tuple[float, float]], ...] = (
-    ("literal", (5.0, 6.0)), ("literal", (1.0, 1.2)), ("attractors", (5.0, 6.0)), ("attractors", (1.0, 1.2)),
-)  # fmt: skip
+    ("literal", (5.0, 6.0)),
+    ("literal", (1.0, 1.2)),
+    ("attractors", (5.0, 6.0)),
+    ("attractors", (1.0, 1.2)),
+)
 """Forms and intervals [deg] of the Matrix Update Test, for machines whose matrices depend on their configuration."""
 
 
@@ -266,9 +269,13 @@ def agreement(
     pairwise = np.mean(votes[:, :, None] == votes[:, None, :], axis=0)
     natures = [point.reference for point in points]
     return AgreementTable(
-        machine=machines[0].name, points=len(points), reference_cycles=reference_cycles,
-        reference={nature: natures.count(nature) for nature in dict.fromkeys(natures)}, rows=rows, pairwise=pairwise,
-    )  # fmt: skip
+        machine=machines[0].name,
+        points=len(points),
+        reference_cycles=reference_cycles,
+        reference={nature: natures.count(nature) for nature in dict.fromkeys(natures)},
+        rows=rows,
+        pairwise=pairwise,
+    )
 
 
 def _judge(machine: Machine, tests: Sequence[RecordTest], reference_cycles: int, budget: int) -> _Point:

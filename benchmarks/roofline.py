@@ -26,9 +26,19 @@ from chaosgym.machines import ImpactBeam
 from chaosgym.simulation import ExactEvents, simulate
 
 COUNTED = (
-    "tip_motion", "curvature_bounds", "event_functions", "safe_time", "cubic", "cubic_extremum", "move", "nudge",
-    "enter_regime", "leave_regime", "locate", "crest",
-)  # fmt: skip
+    "tip_motion",
+    "curvature_bounds",
+    "event_functions",
+    "safe_time",
+    "cubic",
+    "cubic_extremum",
+    "move",
+    "nudge",
+    "enter_regime",
+    "leave_regime",
+    "locate",
+    "crest",
+)
 """Functions of the kernel whose calls are counted; a call of ``curvature_bounds`` is a step."""
 
 OPERATIONS_PER_CLOCK = 16
@@ -73,9 +83,14 @@ def counted_cycle(beam: ImpactBeam, cycles: int, state: Any) -> dict[str, float]
     arrays = cycle_arrays(cycles, 2 * beam.n_modes)
     episode = Episode(np.zeros(1), np.zeros(2))
     modal_impact.advance(
-        beam.reduce(), np.array(state), episode, arrays, settings.step_phase, settings.event_tolerance,
+        beam.reduce(),
+        np.array(state),
+        episode,
+        arrays,
+        settings.step_phase,
+        settings.event_tolerance,
         settings.event_budget,
-    )  # fmt: skip
+    )
     # every step that neither ends at an event nor at the end of the cycle is a step of the table
     counts["step"] = counts["curvature_bounds"]
     counts["event"] = int(arrays.events.sum())
@@ -92,9 +107,13 @@ def _count_uncompiled(beam: ImpactBeam, cycles: int) -> dict[str, float]:
     )
     given = json.dumps([beam.excitation_frequency, beam.clearance, cycles, state])
     done = subprocess.run(
-        [sys.executable, "-c", code], input=given, capture_output=True, text=True, check=True,
+        [sys.executable, "-c", code],
+        input=given,
+        capture_output=True,
+        text=True,
+        check=True,
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-    )  # fmt: skip
+    )
     counts: dict[str, float] = json.loads(done.stdout)
     return counts
 

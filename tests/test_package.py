@@ -85,6 +85,9 @@ def test_wheel_alone_classifies_and_simulates(tmp_path):
     for command, key in (("classify", "response_type"), ("simulate", "peak_force_N")):
         done = subprocess.run(
             [tools / "chaosgym", command, "impact-beam", "--frequency-hz", "30", "--clearance-mm", "0.127", "--json"],
-            capture_output=True, text=True, check=True, cwd=tmp_path,
-        )  # fmt: skip
+            capture_output=True,
+            text=True,
+            check=True,
+            cwd=tmp_path,
+        )
         assert json.loads(done.stdout)[key]

@@ -111,9 +111,16 @@ def printed_natures(marks: Sequence[tuple[float, str]], ax: Axes) -> Axes:
     for at, word in marks:
         ax.axvline(at, ls=":", lw=1.1, **PRINTED)
         ax.text(
-            at, 0.02, f"{word}, printed", rotation=90, ha="right", va="bottom", fontsize=7.0,
-            transform=ax.get_xaxis_transform(), **PRINTED,
-        )  # fmt: skip
+            at,
+            0.02,
+            f"{word}, printed",
+            rotation=90,
+            ha="right",
+            va="bottom",
+            fontsize=7.0,
+            transform=ax.get_xaxis_transform(),
+            **PRINTED,
+        )
     return ax
 
 
@@ -124,9 +131,15 @@ def type_bands(bands: Sequence[TypeBand], ax: Axes) -> Axes:
         colour = TYPE_COLOURS[band.type]
         ax.axvspan(band.low, band.high, height, height + 0.045, color=colour, alpha=0.55, lw=0, clip_on=False)
         ax.text(
-            0.5 * (band.low + band.high), height + 0.02, f"Type {band.type} (printed)", ha="center", va="center",
-            fontsize=7.0, transform=ax.get_xaxis_transform(), color=INK,
-        )  # fmt: skip
+            0.5 * (band.low + band.high),
+            height + 0.02,
+            f"Type {band.type} (printed)",
+            ha="center",
+            va="center",
+            fontsize=7.0,
+            transform=ax.get_xaxis_transform(),
+            color=INK,
+        )
     return ax
 
 
@@ -166,8 +179,9 @@ def nature_plane(
     if types is not None:
         handles += [
             Patch(color=_rgba(colour), label=f"Type {kind}" if len(kind) <= 3 else f"type {kind}")
-            for kind, colour in TYPE_COLOURS.items() if np.any(types == kind)
-        ]  # fmt: skip
+            for kind, colour in TYPE_COLOURS.items()
+            if np.any(types == kind)
+        ]
     ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8.0)
     ax.grid(visible=False)
     return ax

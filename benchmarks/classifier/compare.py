@@ -47,12 +47,13 @@ class Scene:
 SCENES = (
     Scene("50 settled cycles, 1 % noise", "settled", 50, share=0.01, target=0.95),
     Scene("first 50 cycles, 1 % noise", "start", 50, share=0.01, target=0.92),
-    Scene("16 settled cycles, 3 N sensor, away from boundaries", "settled", 16, error=3.0, clear_only=True,
-          target=0.95),
+    Scene(
+        "16 settled cycles, 3 N sensor, away from boundaries", "settled", 16, error=3.0, clear_only=True, target=0.95
+    ),
     Scene("16 settled cycles, 3 N sensor", "settled", 16, error=3.0),
     Scene("8 settled cycles, 1 % noise", "settled", 8, share=0.01),
     Scene("64 settled cycles, no noise", "settled", 64),
-)  # fmt: skip
+)
 """Scenes of the table; the first three have targets."""
 
 
@@ -79,8 +80,11 @@ def compare_parameters(examples: Examples, classifier: ResponseClassifier, seed:
         guesses: dict[str, Any] = model_guesses(features[train], labels[train], features[test], seed)
         if name == "nature":
             guesses["criteria of 5.3.1"] = criteria_guess(examples, np.flatnonzero(test))
-        scored[name] |= {method: bootstrap_scores(labels[test], guess, groups)
-                         for method, guess in guesses.items() if guess is not None}  # fmt: skip
+        scored[name] |= {
+            method: bootstrap_scores(labels[test], guess, groups)
+            for method, guess in guesses.items()
+            if guess is not None
+        }
     guess = classifier.classes_[chances.argmax(axis=1)]
     scored["confusion"] = confusion_matrix(types[test], guess, classifier.classes_)
     scored["abstained"] = float(np.mean(chances.max(axis=1) < classifier.least_confidence_))
@@ -110,8 +114,11 @@ def compare_scene(
         guesses: dict[str, Any] = rule_guesses(forces[known], natures[known], forces[asked])
         guesses |= model_guesses(features[known], natures[known], features[asked], seed)
         guesses["catch22 + boosting"] = catch22_guess(forces[known], natures[known], forces[asked], seed)
-        found |= {name: bootstrap_scores(natures[asked], guess, groups[asked])
-                  for name, guess in guesses.items() if guess is not None}  # fmt: skip
+        found |= {
+            name: bootstrap_scores(natures[asked], guess, groups[asked])
+            for name, guess in guesses.items()
+            if guess is not None
+        }
     return {
         "records": int(asked.sum()),
         "target": scene.target,
@@ -131,8 +138,9 @@ def refusals(examples: Examples, classifier: ResponseClassifier, seed: int) -> d
     forces = forces[forces.mean(axis=1) > 0.0]
     generator = np.random.default_rng(seed)
     faulty = {"none": forces, **{name: fault(forces, generator) for name, fault in FAULTS.items()}}
-    return {name: float(classifier.unlike_training(record_features(records)).mean())
-            for name, records in faulty.items()}  # fmt: skip
+    return {
+        name: float(classifier.unlike_training(record_features(records)).mean()) for name, records in faulty.items()
+    }
 
 
 def outside_parameters(examples: Examples, classifier: ResponseClassifier, seed: int) -> dict[str, float]:

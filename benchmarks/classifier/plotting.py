@@ -33,10 +33,24 @@ def confusion(matrix: list[list[int]], classes: list[str], ax: Axes) -> Axes:
     shares = counts / counts.sum(axis=1, keepdims=True).clip(1.0)
     ax.imshow(shares, cmap="Blues", vmin=0.0, vmax=1.0)
     for (row, column), share in np.ndenumerate(shares):
-        ax.text(column, row, f"{share:.2f}\n{int(counts[row, column])}", ha="center", va="center", fontsize=9,
-                color="white" if share > 0.6 else "black")  # fmt: skip
-    ax.set(xticks=range(len(classes)), yticks=range(len(classes)), xticklabels=classes, yticklabels=classes,
-           xlabel="classifier", ylabel="simulation", title="Response types from parameters")  # fmt: skip
+        ax.text(
+            column,
+            row,
+            f"{share:.2f}\n{int(counts[row, column])}",
+            ha="center",
+            va="center",
+            fontsize=9,
+            color="white" if share > 0.6 else "black",
+        )
+    ax.set(
+        xticks=range(len(classes)),
+        yticks=range(len(classes)),
+        xticklabels=classes,
+        yticklabels=classes,
+        xlabel="classifier",
+        ylabel="simulation",
+        title="Response types from parameters",
+    )
     return ax
 
 
@@ -51,8 +65,9 @@ def plane_of_types(trained: TrainingResult, kinds: NDArray[Any], ax: Axes, title
         if rows.any():
             ax.plot(x[rows], 1e3 * y[rows], ".", ms=2.5, color=colour, label=f"Type {kind}" if len(kind) < 4 else kind)
     unit = parameters_of(machine)[machine.speed_field].unit
-    ax.set(yscale="log", xlabel=f"{machine.speed_field.replace('_', ' ')} [{unit}]", ylabel="clearance [mm]",
-           title=title)  # fmt: skip
+    ax.set(
+        yscale="log", xlabel=f"{machine.speed_field.replace('_', ' ')} [{unit}]", ylabel="clearance [mm]", title=title
+    )
     ax.legend(fontsize=7, markerscale=4, loc="upper left")
     return plain_ticks(ax)
 
@@ -62,8 +77,15 @@ def learning_curve(points: list[dict[str, Any]], ax: Axes) -> Axes:
     rows = [point["rows"] for point in points]
     for name in ("response_type", "nature"):
         values = np.array([point[name]["accuracy"] for point in points])
-        ax.errorbar(rows, values[:, 0], yerr=np.abs(values[:, 1:].T - values[:, 0]), fmt="o-", ms=4, capsize=3,
-                    label=name.replace("_", " "))  # fmt: skip
+        ax.errorbar(
+            rows,
+            values[:, 0],
+            yerr=np.abs(values[:, 1:].T - values[:, 0]),
+            fmt="o-",
+            ms=4,
+            capsize=3,
+            label=name.replace("_", " "),
+        )
     ax.set(xlim=(0, None), xlabel="training points", ylabel="held-out accuracy", title="Learning curve, parameters")
     ax.legend(fontsize=8)
     return ax

@@ -43,9 +43,13 @@ def check(folder: str, points: int, seed: int | None, as_json: bool) -> None:
 
     found = check_rows(read_sweep(folder), points, seed=seed, progress=True)
     platform = "the same packages and processor" if found.same_platform else "other packages or another processor"
-    emit(found.as_dict(), as_json, lambda: [
-        f"{folder}: {found.identical} of {points} rows identical, {found.same_nature} of the same nature ({platform})"
-    ])  # fmt: skip
+    emit(
+        found.as_dict(),
+        as_json,
+        lambda: [
+            f"{folder}: {found.identical} of {points} rows identical, {found.same_nature} of the same nature ({platform})"
+        ],
+    )
     if not found.sound:
         raise SystemExit(1)
 
@@ -61,14 +65,22 @@ def cost(folder: str, points: int, seed: int, as_json: bool) -> None:
     from chaosgym.sweeps import read_sweep
 
     found = labelling_cost(read_sweep(folder), points, seed=seed, progress=True)
-    emit(found, as_json, lambda: [
-        f"{found['machine']}: {1e3 * found['seconds']:.1f} +- {1e3 * found['standard_error']:.1f} ms of processor time "
-        f"a point, {found['points_per_second']:.1f} points a second and core ({points} rows)",
-        *(f"  {name:22s}" + ", ".join(f"{part}: {1e3 * mean:.1f} ms" for part, mean in parts.items())
-          for name, parts in found["by"].items()),
-        *(f"  {size} points: " + ", ".join(f"{hours:.3g} h on {cores} cores" for cores, hours in row.items())
-          for size, row in found["hours"].items()),
-    ])  # fmt: skip
+    emit(
+        found,
+        as_json,
+        lambda: [
+            f"{found['machine']}: {1e3 * found['seconds']:.1f} +- {1e3 * found['standard_error']:.1f} ms of processor time "
+            f"a point, {found['points_per_second']:.1f} points a second and core ({points} rows)",
+            *(
+                f"  {name:22s}" + ", ".join(f"{part}: {1e3 * mean:.1f} ms" for part, mean in parts.items())
+                for name, parts in found["by"].items()
+            ),
+            *(
+                f"  {size} points: " + ", ".join(f"{hours:.3g} h on {cores} cores" for cores, hours in row.items())
+                for size, row in found["hours"].items()
+            ),
+        ],
+    )
 
 
 @click.command()

@@ -15,9 +15,7 @@ from chaosgym.cli.output import emit
 @click.option("--set-up", "set_up", is_flag=True, help="The times to make a slider crank ready instead.")
 @click.option("--scaling", is_flag=True, help="What threads and wrapping make of the vector environments instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def bench(
-    repeats: int, against: str | None, scenes: bool, set_up: bool, scaling: bool, as_json: bool
-) -> None:  # fmt: skip
+def bench(repeats: int, against: str | None, scenes: bool, set_up: bool, scaling: bool, as_json: bool) -> None:
     """Rates on this computer: cycles, environment steps, sweep points, classifier rows; or against a peer."""
     if (against is not None) + scenes + set_up + scaling > 1:
         raise click.UsageError("--against, --scenes, --set-up and --scaling exclude each other")
@@ -33,9 +31,11 @@ def bench(
         return emit({"scenes": [asdict(cost) for cost in costs]}, as_json, lambda: _scene_table(costs))
     if set_up:
         times = set_up_times(repeats)
-        return emit({"set_up_microseconds": times}, as_json, lambda: [
-            f"{name:40s} {value:10.1f} us" for name, value in times.items()
-        ])  # fmt: skip
+        return emit(
+            {"set_up_microseconds": times},
+            as_json,
+            lambda: [f"{name:40s} {value:10.1f} us" for name, value in times.items()],
+        )
     if scaling:
         measured = vector_scaling(repeats)
         return emit({"scaling": [asdict(each) for each in measured]}, as_json, lambda: _scaling_table(measured))

@@ -130,15 +130,17 @@ def against_exudyn(
             for setting in contest.settings:
                 theirs, rate, their_rate = _run_setting(contest, setting, repeats, bar)
                 sides = {"chaosgym": _score(contest, own, right), "exudyn": _score(contest, theirs, right)}
-                rows.append({
-                    "machine": contest.machine.name,
-                    "setting": str(setting),
-                    "cycles_per_processor_second": {"chaosgym": rate, "exudyn": their_rate},
-                    "ratio": rate / their_rate,
-                    "goal": contest.goal,
-                    "speeds": len(contest.speeds),
-                    **{name: {side: sides[side][name] for side in sides} for name in sides["exudyn"]},
-                })  # fmt: skip
+                rows.append(
+                    {
+                        "machine": contest.machine.name,
+                        "setting": str(setting),
+                        "cycles_per_processor_second": {"chaosgym": rate, "exudyn": their_rate},
+                        "ratio": rate / their_rate,
+                        "goal": contest.goal,
+                        "speeds": len(contest.speeds),
+                        **{name: {side: sides[side][name] for side in sides} for name in sides["exudyn"]},
+                    }
+                )
     return rows
 
 

@@ -160,10 +160,17 @@ def _add_contact(
     ground = system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))
     if setting.contact == "stop":
         data = system.AddNode(items.NodeGenericData(initialCoordinates=[0, 0, 0], numberOfDataCoordinates=3))
-        system.AddObject(items.ObjectConnectorCoordinateSpringDamperExt(
-            markerNumbers=[ground, marker], nodeNumber=data, useLimitStops=True, limitStopsUpper=gap,
-            limitStopsLower=-gap, limitStopsStiffness=stiffness, limitStopsDamping=damping,
-        ))  # fmt: skip
+        system.AddObject(
+            items.ObjectConnectorCoordinateSpringDamperExt(
+                markerNumbers=[ground, marker],
+                nodeNumber=data,
+                useLimitStops=True,
+                limitStopsUpper=gap,
+                limitStopsLower=-gap,
+                limitStopsStiffness=stiffness,
+                limitStopsDamping=damping,
+            )
+        )
         return
     symbolic = exudyn.symbolic
 
@@ -172,9 +179,11 @@ def _add_contact(
         lower = symbolic.max(0.0, k * (-x - c) - d * v) * (0.5 * symbolic.sign(-x - c) + 0.5)
         return upper - lower
 
-    spring = system.AddObject(items.ObjectConnectorCoordinateSpringDamper(
-        markerNumbers=[ground, marker], stiffness=stiffness, damping=damping, offset=gap
-    ))  # fmt: skip
+    spring = system.AddObject(
+        items.ObjectConnectorCoordinateSpringDamper(
+            markerNumbers=[ground, marker], stiffness=stiffness, damping=damping, offset=gap
+        )
+    )
     name = "springForceUserFunction"
     compiled = exudyn.utilities.CreateSymbolicUserFunction(system, force, name, spring)
     system.SetObjectParameter(spring, name, compiled)
@@ -187,14 +196,22 @@ def _add_beam(exudyn: Any, system: Any, beam: ImpactBeam, setting: ExudynSetting
     shapes = np.vstack([model.tip_shape, model.force_shape])
     modal = np.linalg.inv(np.vstack([shapes, scipy.linalg.null_space(shapes).T]))
     n = len(modal)
-    node = system.AddNode(items.NodeGenericODE2(
-        referenceCoordinates=[0.0] * n, initialCoordinates=[0.0] * n, initialCoordinates_t=[0.0] * n,
-        numberOfODE2Coordinates=n,
-    ))  # fmt: skip
-    system.AddObject(items.ObjectGenericODE2(
-        nodeNumbers=[node], massMatrix=modal.T @ modal, stiffnessMatrix=modal.T @ (model.stiffness[:, None] * modal),
-        dampingMatrix=modal.T @ model.damping @ modal,
-    ))  # fmt: skip
+    node = system.AddNode(
+        items.NodeGenericODE2(
+            referenceCoordinates=[0.0] * n,
+            initialCoordinates=[0.0] * n,
+            initialCoordinates_t=[0.0] * n,
+            numberOfODE2Coordinates=n,
+        )
+    )
+    system.AddObject(
+        items.ObjectGenericODE2(
+            nodeNumbers=[node],
+            massMatrix=modal.T @ modal,
+            stiffnessMatrix=modal.T @ (model.stiffness[:, None] * modal),
+            dampingMatrix=modal.T @ model.damping @ modal,
+        )
+    )
     tip, shaker = (system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=i)) for i in (0, 1))
     load = system.AddLoad(items.LoadCoordinate(markerNumber=shaker, load=model.force_amplitude))
     omega = 2.0 * math.pi * model.excitation_frequency
@@ -214,42 +231,56 @@ def _add_crank(exudyn: Any, system: Any, crank: SliderCrank, setting: ExudynSett
     wheel = system.AddObject(items.ObjectRigidBody2D(nodeNumber=flywheel, mass=1.0, inertia=FLYWHEEL_INERTIA))
     hub = system.AddMarker(items.MarkerBodyPosition(bodyNumber=system.AddObject(items.ObjectGround())))
     pin = system.AddMarker(items.MarkerBodyPosition(bodyNumber=wheel, localPosition=[radius, 0.0, 0.0]))
-    system.AddObject(items.ObjectJointRevolute2D(
-        markerNumbers=[hub, system.AddMarker(items.MarkerBodyPosition(bodyNumber=wheel))]
-    ))  # fmt: skip
+    system.AddObject(
+        items.ObjectJointRevolute2D(markerNumbers=[hub, system.AddMarker(items.MarkerBodyPosition(bodyNumber=wheel))])
+    )
 
     nodes = [
-        system.AddNode(items.NodeRigidBody2D(
-            referenceCoordinates=[radius + share * length, 0.0, 0.0],
-            initialVelocities=[0.0, radius * speed * (1.0 - share), -radius * speed / length],
-        ))
+        system.AddNode(
+            items.NodeRigidBody2D(
+                referenceCoordinates=[radius + share * length, 0.0, 0.0],
+                initialVelocities=[0.0, radius * speed * (1.0 - share), -radius * speed / length],
+            )
+        )
         for share in np.linspace(0.0, 1.0, ELEMENTS + 1).tolist()
-    ]  # fmt: skip
+    ]
     area, inertia = math.pi * crank.rod_diameter**2 / 4.0, math.pi * crank.rod_diameter**4 / 64.0
     bending, axial = crank.youngs_modulus * inertia, crank.youngs_modulus * area
     delay = 2.0 * crank.damping_ratio / (2.0 * math.pi * float(crank.natural_frequencies[0]))
     for first, last in pairwise(nodes):
-        system.AddObject(items.ObjectBeamGeometricallyExact2D(
-            nodeNumbers=[first, last], length=length / ELEMENTS, massPerLength=crank.density * area,
-            crossSectionInertia=crank.density * inertia, bendingStiffness=bending, axialStiffness=axial,
-            shearStiffness=0.35 * axial, bendingDamping=delay * bending, axialDamping=delay * axial,
-            shearDamping=delay * 0.35 * axial,
-        ))  # fmt: skip
+        system.AddObject(
+            items.ObjectBeamGeometricallyExact2D(
+                nodeNumbers=[first, last],
+                length=length / ELEMENTS,
+                massPerLength=crank.density * area,
+                crossSectionInertia=crank.density * inertia,
+                bendingStiffness=bending,
+                axialStiffness=axial,
+                shearStiffness=0.35 * axial,
+                bendingDamping=delay * bending,
+                axialDamping=delay * axial,
+                shearDamping=delay * 0.35 * axial,
+            )
+        )
     ends = []
     for node, mass, moment, offset in (
         (nodes[0], crank.housing_mass, crank.housing_inertia, crank.housing_offset_along),
         (nodes[-1], crank.yoke_mass, crank.yoke_inertia, crank.yoke_offset_along),
     ):
-        body = system.AddObject(items.ObjectRigidBody2D(
-            nodeNumber=node, mass=mass, inertia=moment - mass * offset**2, centerOfMass=[offset, 0.0]
-        ))  # fmt: skip
+        body = system.AddObject(
+            items.ObjectRigidBody2D(
+                nodeNumber=node, mass=mass, inertia=moment - mass * offset**2, centerOfMass=[offset, 0.0]
+            )
+        )
         ends.append(system.AddMarker(items.MarkerBodyPosition(bodyNumber=body)))
     slider = system.AddNode(items.NodePoint2D(referenceCoordinates=[radius + length, 0.0]))
     block = system.AddObject(items.ObjectMassPoint2D(nodeNumber=slider, mass=crank.slider_mass))
     system.AddObject(items.ObjectJointRevolute2D(markerNumbers=[pin, ends[0]]))
-    system.AddObject(items.ObjectJointRevolute2D(
-        markerNumbers=[ends[1], system.AddMarker(items.MarkerBodyPosition(bodyNumber=block))]
-    ))  # fmt: skip
+    system.AddObject(
+        items.ObjectJointRevolute2D(
+            markerNumbers=[ends[1], system.AddMarker(items.MarkerBodyPosition(bodyNumber=block))]
+        )
+    )
     across = system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=slider, coordinate=1))
     gap, stiffness, damping = crank.slider_clearance, crank.contact_stiffness, crank.contact_damping
     _add_contact(exudyn, system, across, setting, gap, stiffness, damping)

@@ -83,8 +83,10 @@ def _points() -> dict[str, tuple[Machine, Integrator, int]]:
         name = f"impact beam, {frequency:g} Hz, {1e3 * clearance:g} mm"
         points[name] = (replace(beam, excitation_frequency=frequency, clearance=clearance), exact, 300)
     points["impact beam, 30 Hz, 0.127 mm, Runge-Kutta 4, 4000 steps"] = (
-        replace(beam, excitation_frequency=30.0, clearance=0.127e-3), fixed, 100,
-    )  # fmt: skip
+        replace(beam, excitation_frequency=30.0, clearance=0.127e-3),
+        fixed,
+        100,
+    )
     for clearance in (0.032e-3, 0.254e-3):
         for degrees in (1.0, 5.0):
             name = f"slider crank, 200 rpm, {1e3 * clearance:g} mm, matrices held over {degrees:g} deg"

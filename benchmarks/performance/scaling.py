@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.performance.rates import SUB_ENVIRONMENTS
 from chaosgym.envs import MACHINES
 from chaosgym.envs.jobs import Indices
-from chaosgym.simulation.batch import Cycles, Fleet
+from chaosgym.simulation.batch import Batch, Cycles
 
 WARM_UP_STEPS = 12
 """Steps from the middle of the speed range that are not timed; the speeds have spread after them."""
@@ -44,23 +44,23 @@ class Scaling:
     wrapper: float
 
 
-class _TimedFleet:
-    """A fleet whose runs are timed: ``seconds`` of processor time of this thread."""
+class _TimedBatch:
+    """A batch whose runs are timed: ``seconds`` of processor time of this thread."""
 
-    def __init__(self, fleet: Fleet) -> None:
-        self._fleet = fleet
+    def __init__(self, batch: Batch) -> None:
+        self._batch = batch
         self.seconds = 0.0
 
     def __len__(self) -> int:
-        return len(self._fleet)
+        return len(self._batch)
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._fleet, name)
+        return getattr(self._batch, name)
 
     def run(self, which: Indices, cycles: int) -> Cycles:
-        """As the fleet's."""
+        """As the batch's."""
         start = time.thread_time()
-        done = self._fleet.run(which, cycles)
+        done = self._batch.run(which, cycles)
         self.seconds += time.thread_time() - start
         return done
 
@@ -99,18 +99,20 @@ def _timed_steps(name: str, threads: int) -> tuple[float, float, float]:
     envs: Any = gym.make_vec(name, num_envs=SUB_ENVIRONMENTS)
     jobs = envs.unwrapped._jobs
     drive = jobs.rules.drive
-    jobs.fleet = fleet = _TimedFleet(jobs.fleet)
-    actions = np.random.default_rng(0).uniform(
-        -1.0, 1.0, (WARM_UP_STEPS + TIMED_STEPS, SUB_ENVIRONMENTS, 1)
-    ).astype(np.float32)  # fmt: skip
+    jobs.batch = batch = _TimedBatch(jobs.batch)
+    actions = (
+        np.random.default_rng(0)
+        .uniform(-1.0, 1.0, (WARM_UP_STEPS + TIMED_STEPS, SUB_ENVIRONMENTS, 1))
+        .astype(np.float32)
+    )
     envs.reset(seed=0, options={"speed": drive.rounded(0.5 * (drive.lowest_speed + drive.highest_speed))})
     for action in actions[:WARM_UP_STEPS]:
         envs.step(action)
-    fleet.seconds = 0.0
+    batch.seconds = 0.0
     wall, processor = time.perf_counter(), time.thread_time()
     for action in actions[WARM_UP_STEPS:]:
         envs.step(action)
     wall, processor = time.perf_counter() - wall, time.thread_time() - processor
     envs.close()
     each = 1.0 / (TIMED_STEPS * SUB_ENVIRONMENTS)
-    return wall * each, fleet.seconds * each, (processor - fleet.seconds) * each
+    return wall * each, batch.seconds * each, (processor - batch.seconds) * each

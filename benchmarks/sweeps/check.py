@@ -55,9 +55,12 @@ class Check:
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         return {
-            "points": len(self.rows), "identical": self.identical, "same_nature": self.same_nature,
-            "same_platform": self.same_platform, "sound": self.sound,
-        }  # fmt: skip
+            "points": len(self.rows),
+            "identical": self.identical,
+            "same_nature": self.same_nature,
+            "same_platform": self.same_platform,
+            "sound": self.sound,
+        }
 
 
 def check_rows(sweep: LabelledSweep, points: int, *, seed: int | None = None, progress: bool = False) -> Check:
@@ -102,4 +105,4 @@ def _same_platform(sweep: LabelledSweep) -> bool:
     here = provenance()
     return all(
         made.get(name) == value for made in sweep.provenance for name, value in here.items() if name not in SOURCES
-    )  # fmt: skip
+    )

@@ -60,10 +60,8 @@ def labelling_cost(sweep: LabelledSweep, points: int, *, seed: int = 0, progress
         "standard_error": float(seconds.std(ddof=1) / np.sqrt(points)),
         "points_per_second": 1.0 / mean,
         "by": by,
-        "hours": {
-            f"{size:.0e}": {str(cores): size * mean / cores / 3600.0 for cores in CORES} for size in SIZES
-        },
-    }  # fmt: skip
+        "hours": {f"{size:.0e}": {str(cores): size * mean / cores / 3600.0 for cores in CORES} for size in SIZES},
+    }
 
 
 def _by_name(names: Sequence[str], seconds: NDArray[np.float64]) -> dict[str, float]:

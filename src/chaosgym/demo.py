@@ -143,9 +143,16 @@ def _train_agent(seed: int) -> Any:
     torch.set_num_threads(1)
     envs = VecNormalize(make_vec_env(_environment, n_envs=8, seed=seed), norm_obs=False, gamma=DISCOUNT)
     model = PPO(
-        "MlpPolicy", envs, learning_rate=1e-3, n_steps=200, batch_size=200, gamma=DISCOUNT, seed=seed, device="cpu",
+        "MlpPolicy",
+        envs,
+        learning_rate=1e-3,
+        n_steps=200,
+        batch_size=200,
+        gamma=DISCOUNT,
+        seed=seed,
+        device="cpu",
         policy_kwargs={"log_std_init": INITIAL_LOG_STD},
-    )  # fmt: skip
+    )
     with tqdm(total=TRAINING_STEPS, desc="train agent", unit="step") as bar:
 
         def advance(values: dict[str, Any], _: Any) -> bool:

@@ -74,8 +74,17 @@ def test_jobs_belong_to_a_policy_and_not_to_its_place(tmp_path):
 
 def test_a_policy_of_another_machine_is_not_judged(tmp_path):
     """Observations of both machines have the same length, and mean something else."""
-    refused = _run("--out", str(tmp_path / "a"), "--machines", "1", "--env", "chaosgym/SliderCrankTolerance-v0",
-                   "--controllers", "--policy", f"PPO={shipped_folder(NOMINAL)}")  # fmt: skip
+    refused = _run(
+        "--out",
+        str(tmp_path / "a"),
+        "--machines",
+        "1",
+        "--env",
+        "chaosgym/SliderCrankTolerance-v0",
+        "--controllers",
+        "--policy",
+        f"PPO={shipped_folder(NOMINAL)}",
+    )
     assert "it was trained on chaosgym/ImpactBeam-v0" in refused.stderr
     assert not list((tmp_path / "a").glob("jobs/PPO*"))
 

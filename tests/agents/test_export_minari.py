@@ -23,9 +23,17 @@ pytest.importorskip("minari", reason="needs the extra [offline]")
 def test_a_dataset_is_loaded_back_and_replays(tmp_path, name):
     """Two jobs of 200 steps; the environment that the dataset names gives the first job again, bit for bit."""
     command = [
-        sys.executable, str(AGENTS / "export_minari.py"), "--env", f"chaosgym/{name}-v0",
-        "--jobs", "2", "--seed", "5", "--out", str(tmp_path),
-    ]  # fmt: skip
+        sys.executable,
+        str(AGENTS / "export_minari.py"),
+        "--env",
+        f"chaosgym/{name}-v0",
+        "--jobs",
+        "2",
+        "--seed",
+        "5",
+        "--out",
+        str(tmp_path),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     from minari.dataset.minari_dataset import MinariDataset

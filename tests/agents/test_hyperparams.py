@@ -8,10 +8,19 @@ import yaml
 from tests.agents.test_scripts import AGENTS
 
 NAMES = {
-    "n_envs": "envs", "n_timesteps": "steps", "n_steps": "rollout", "batch_size": "batch", "n_epochs": "epochs",
-    "learning_rate": "learning_rate", "gamma": "gamma", "gae_lambda": "gae_lambda", "ent_coef": "entropy",
-    "learning_starts": "learning_starts", "gradient_steps": "gradient_steps", "buffer_size": "steps",
-}  # fmt: skip
+    "n_envs": "envs",
+    "n_timesteps": "steps",
+    "n_steps": "rollout",
+    "batch_size": "batch",
+    "n_epochs": "epochs",
+    "learning_rate": "learning_rate",
+    "gamma": "gamma",
+    "gae_lambda": "gae_lambda",
+    "ent_coef": "entropy",
+    "learning_starts": "learning_starts",
+    "gradient_steps": "gradient_steps",
+    "buffer_size": "steps",
+}
 
 
 @pytest.mark.parametrize("algorithm", ["ppo", "ppo_lstm", "sac"])

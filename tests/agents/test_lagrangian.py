@@ -56,9 +56,18 @@ def _trained(limit, steps, monkeypatch):
     torch.set_num_threads(1)
     iterates = Iterates()
     LagrangianPPO(
-        "MlpPolicy", CostRecorder(DummyVecEnv([Push] * 4)), cost_limit=limit, multiplier_rate=0.05, n_steps=50,
-        batch_size=100, n_epochs=5, learning_rate=5e-3, seed=1, device="cpu", policy_kwargs={"log_std_init": -1.5},
-    ).learn(steps, iterates)  # fmt: skip
+        "MlpPolicy",
+        CostRecorder(DummyVecEnv([Push] * 4)),
+        cost_limit=limit,
+        multiplier_rate=0.05,
+        n_steps=50,
+        batch_size=100,
+        n_epochs=5,
+        learning_rate=5e-3,
+        seed=1,
+        device="cpu",
+        policy_kwargs={"log_std_init": -1.5},
+    ).learn(steps, iterates)
     return np.mean(iterates.rows[-2 * len(iterates.rows) // 5 :], axis=0)
 
 

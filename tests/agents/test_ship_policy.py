@@ -45,9 +45,20 @@ def runs(tmp_path):
 
 
 def _ship(folder, pattern):
-    command = [sys.executable, str(AGENTS / "ship_policy.py"), "--evaluation", str(folder / "comparison"),
-               "--contender", CONTENDER, "--runs", str(folder / pattern), "--out", str(folder / "shipped"),
-               "--models", str(folder / "models")]  # fmt: skip
+    command = [
+        sys.executable,
+        str(AGENTS / "ship_policy.py"),
+        "--evaluation",
+        str(folder / "comparison"),
+        "--contender",
+        CONTENDER,
+        "--runs",
+        str(folder / pattern),
+        "--out",
+        str(folder / "shipped"),
+        "--models",
+        str(folder / "models"),
+    ]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 

@@ -125,9 +125,16 @@ def test_a_contest_reports_speed_beside_verdict() -> None:
     """At 10 Hz both find period 1; the ratio is that of the two rates."""
     pytest.importorskip("exudyn")
     contest = Contest(
-        machine=BEAM_30, speeds=(10.0,), settings=(ExudynSetting("RK44", "law", 1e-5),), cycles=60, judged=20, timed=5,
-        reference_cycles=80, repeatability=0.5, goal=80.0,
-    )  # fmt: skip
+        machine=BEAM_30,
+        speeds=(10.0,),
+        settings=(ExudynSetting("RK44", "law", 1e-5),),
+        cycles=60,
+        judged=20,
+        timed=5,
+        reference_cycles=80,
+        repeatability=0.5,
+        goal=80.0,
+    )
     row: dict[str, Any] = against_exudyn([contest], repeats=1)[0]
     rates_of = row["cycles_per_processor_second"]
     assert row["ratio"] == pytest.approx(rates_of["chaosgym"] / rates_of["exudyn"])

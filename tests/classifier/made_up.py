@@ -36,13 +36,17 @@ def made_up_sweep(seed=0):
     start = np.stack([logistic(rate, generator.uniform(0.2, 0.8), CYCLES) for rate in rates])
     late = np.stack([settled(rate) for rate in rates])
     columns = {
-        "excitation_frequency": speed, "clearance": clearance, "machine": machine,
-        "split": np.array(["test", "validation", "train", "train", "train"])[machine % 5], "response_type": types,
+        "excitation_frequency": speed,
+        "clearance": clearance,
+        "machine": machine,
+        "split": np.array(["test", "validation", "train", "train", "train"])[machine % 5],
+        "response_type": types,
         "nature": np.where(types == "III", "chaotic", "periodic"),
         "period": pa.array([{"I": 1, "II": 2}.get(kind) for kind in types], pa.int32()),
-        "exponent": np.where(types == "III", 0.5, -0.5), "peak_force_min": late.min(axis=1),
+        "exponent": np.where(types == "III", 0.5, -0.5),
+        "peak_force_min": late.min(axis=1),
         "peak_force_max": late.max(axis=1),
-    }  # fmt: skip
+    }
     kind = pa.list_(pa.float32(), CYCLES)
     for name, peaks in (("start", start), ("settled", late)):
         columns[f"{name}_peak_force"] = pa.array(peaks.astype(np.float32).tolist(), kind)

@@ -140,9 +140,12 @@ def test_file_survives_a_round_trip_and_rejects_damage(trained, tmp_path):
         np.savez(tmp_path / f"{key}.npz", **(arrays | {"head": np.frombuffer(text, dtype=np.uint8)}))
     (tmp_path / "short.npz").write_bytes(path.read_bytes()[:200])
     for file, message in (
-        ("changed", "does not match its hash"), ("card", "does not match its hash"), ("format", "format 99"),
-        ("short", "can't be read"), ("missing", "can't be read"),
-    ):  # fmt: skip
+        ("changed", "does not match its hash"),
+        ("card", "does not match its hash"),
+        ("format", "format 99"),
+        ("short", "can't be read"),
+        ("missing", "can't be read"),
+    ):
         with pytest.raises(ModelFileError, match=message):
             MachineClassifier.load(tmp_path / f"{file}.npz")
 

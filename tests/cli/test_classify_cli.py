@@ -17,8 +17,14 @@ from chaosgym.simulation import simulate
 from tests.classifier.made_up import settled
 
 KEYS = {
-    "response_type", "probabilities", "nature", "nature_probabilities", "confidence", "abstained", "reason",
-}  # fmt: skip
+    "response_type",
+    "probabilities",
+    "nature",
+    "nature_probabilities",
+    "confidence",
+    "abstained",
+    "reason",
+}
 
 
 @pytest.fixture(scope="module")

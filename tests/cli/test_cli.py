@@ -71,9 +71,17 @@ def test_show_prints_every_field_and_its_provenance():
 def test_sweep_writes_parquet_and_resumes(tmp_path):
     """A sweep fills its folder; the same command again is done at once; another one leaves it alone."""
     command = (
-        "sweep", "impact-beam", "--axis", "excitation_frequency=18:30:3", "--axis", "clearance=1e-4:1.3e-4:2",
-        "--budget", "100", "--out", str(tmp_path / "s"),
-    )  # fmt: skip
+        "sweep",
+        "impact-beam",
+        "--axis",
+        "excitation_frequency=18:30:3",
+        "--axis",
+        "clearance=1e-4:1.3e-4:2",
+        "--budget",
+        "100",
+        "--out",
+        str(tmp_path / "s"),
+    )
     first = run_json(*command)
     assert first["points"] == 6
     assert sum(first["nature"].values()) == 6

@@ -8,9 +8,21 @@ import pytest
 from tests.cli.test_cli import run, run_json
 
 SWEEP = (
-    "sweep", "impact-beam", "--axis", "damping_ratio=0.01:0.05:log", "--machines", "6", "--patch",
-    "excitation_frequency=18:30:3", "--patch", "clearance=1e-4:1.4e-4:3:log", "--budget", "100", "--full-types", "0.9",
-)  # fmt: skip
+    "sweep",
+    "impact-beam",
+    "--axis",
+    "damping_ratio=0.01:0.05:log",
+    "--machines",
+    "6",
+    "--patch",
+    "excitation_frequency=18:30:3",
+    "--patch",
+    "clearance=1e-4:1.4e-4:3:log",
+    "--budget",
+    "100",
+    "--full-types",
+    "0.9",
+)
 
 
 @pytest.fixture(scope="module")

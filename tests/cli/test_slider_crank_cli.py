@@ -36,9 +36,21 @@ def test_show_lists_only_the_degrees_of_freedom_of_the_scene():
 def test_the_models_of_both_joints_can_be_chosen():
     """``both`` takes a clearance and a model for the ball, and a model for the slider, each with its sensors."""
     shown = run_json(
-        "show", "slider-crank", "--clearance-joint", "both", "--clearance-mm", "0.1", "--ball-clearance-mm", "0.05",
-        "--ball-model", "instrumented", "--slider-model", "instrumented", "--motor-angle-deg", "20",
-    )  # fmt: skip
+        "show",
+        "slider-crank",
+        "--clearance-joint",
+        "both",
+        "--clearance-mm",
+        "0.1",
+        "--ball-clearance-mm",
+        "0.05",
+        "--ball-model",
+        "instrumented",
+        "--slider-model",
+        "instrumented",
+        "--motor-angle-deg",
+        "20",
+    )
     fields = shown["parameters"]
     assert (fields["slider_joint"], fields["ball_joint"]) == ("instrumented", "instrumented")
     assert (fields["slider_clearance"], fields["ball_clearance"]) == pytest.approx((1e-4, 5e-5))

@@ -12,10 +12,16 @@ from chaosgym.control.forecast import Forecast, constant_returns, worth_of_steps
 def _forecast(reward, wear, *, moves=1, steps=3, levels=201):
     reward, wear = np.asarray(reward, dtype=float), np.asarray(wear, dtype=float)
     return Forecast(
-        speeds=np.arange(len(reward), dtype=float), damage=np.linspace(0.0, 1.0, levels), time=reward,
-        type_iii=np.zeros((levels, len(reward))), wear=np.tile(wear, (levels, 1)), damage_weight=1.0, moves=moves,
-        steps=steps, fracture=-10.0,
-    )  # fmt: skip
+        speeds=np.arange(len(reward), dtype=float),
+        damage=np.linspace(0.0, 1.0, levels),
+        time=reward,
+        type_iii=np.zeros((levels, len(reward))),
+        wear=np.tile(wear, (levels, 1)),
+        damage_weight=1.0,
+        moves=moves,
+        steps=steps,
+        fracture=-10.0,
+    )
 
 
 def _earned(forecast, plan):

@@ -19,7 +19,7 @@ from chaosgym.control.learner_view import IdentifiedMemory, LearnerView
 from chaosgym.control.machine_search import EQUAL, MachineSearch, Record
 from chaosgym.envs.jobs import RUN_IN_CYCLES, bouncing_share, impacts_per_cycle
 from chaosgym.envs.observation import BOUNCING, LAST_ACTION, REMAINING, SPEED
-from chaosgym.simulation.batch import at_speed, fleet_of
+from chaosgym.simulation.batch import at_speed, batch_of
 
 UP = np.array([1.0], np.float32)
 
@@ -147,14 +147,14 @@ def test_a_record_knows_the_orbit_that_it_begins_on(crank, monkeypatch, period):
 def _record_of(crank, machine, speed, period, cycles):
     """Record of an experiment below a speed, after some cycles there from rest, on an orbit of ``period`` steps."""
     speeds = speed - crank.drive.slew_limit / 4.0 * np.array([0, *EXPERIMENT])
-    fleet, which = fleet_of(crank.pool[machine], 1), np.array([0])
-    fleet.start(0, at_speed(crank.pool[machine], speed))
-    seen = fleet.run(which, cycles)
+    batch, which = batch_of(crank.pool[machine], 1), np.array([0])
+    batch.start(0, at_speed(crank.pool[machine], speed))
+    seen = batch.run(which, cycles)
     orbit = [bouncing_share(seen.until(cycles - 5 * k), 5, crank.machine.period_at(speed))[0] for k in range(period)]
     shares, impacts = [orbit[0]], [impacts_per_cycle(seen, 5)[0]]
     for each in speeds[1:]:
-        fleet.set_speeds(which, np.array([each]))
-        seen = fleet.run(which, 5)
+        batch.set_speeds(which, np.array([each]))
+        seen = batch.run(which, 5)
         shares.append(bouncing_share(seen, 5, crank.machine.period_at(each))[0])
         impacts.append(impacts_per_cycle(seen, 5)[0])
     return Record(SETTLING_CYCLES, *map(np.array, (orbit[::-1], speeds, np.ones(len(speeds)), shares, impacts)))

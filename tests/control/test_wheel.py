@@ -31,9 +31,16 @@ def test_the_wheel_alone_plays_a_policy(folder, tmp_path, monkeypatch):  # noqa:
     assert "torch" not in _run(python, "-m", "pip", "list")
     out = tmp_path / "job.gif"
     told = _run(
-        python.with_name("chaosgym"), "run-agent", "chaosgym/ImpactBeam-v0", "--policy", folder, "--out", out, "--json",
+        python.with_name("chaosgym"),
+        "run-agent",
+        "chaosgym/ImpactBeam-v0",
+        "--policy",
+        folder,
+        "--out",
+        out,
+        "--json",
         cwd=tmp_path,
-    )  # fmt: skip
+    )
     assert json.loads(told)["status"] == "job_done"
     assert out.stat().st_size > 10_000
     shipped = _run(python.with_name("chaosgym"), "run-agent", "chaosgym/ImpactBeamTolerance-v0", "--json", cwd=tmp_path)

@@ -99,9 +99,16 @@ def test_energy_is_conserved_without_damping():
 def test_one_impact_of_one_mode_has_the_closed_form_restitution():
     """A single mode rebounds like a damped oscillator that lets go when spring and damper stop pushing."""
     beam = replace(
-        THESIS_IMPACT_BEAM, n_modes=1, force_amplitude=0.0, shaker_damping=0.0, damping_ratio=0.0,
-        pivot_rotational_stiffness=1e-3, shaker_stiffness=0.0, contact_damping=200.0, excitation_frequency=1000.0,
-    )  # fmt: skip
+        THESIS_IMPACT_BEAM,
+        n_modes=1,
+        force_amplitude=0.0,
+        shaker_damping=0.0,
+        damping_ratio=0.0,
+        pivot_rotational_stiffness=1e-3,
+        shaker_stiffness=0.0,
+        contact_damping=200.0,
+        excitation_frequency=1000.0,
+    )
     model = beam.reduce()
     mass = 1.0 / model.tip_shape[0] ** 2
     omega = np.sqrt(beam.contact_stiffness / mass)
@@ -167,10 +174,16 @@ def test_extreme_machines_end_in_an_answer_or_in_a_named_error(
 ):
     """Anywhere in the admissible box the result is finite and pushes only, or a SimulationError within its budget."""
     beam = ImpactBeam(
-        excitation_frequency=frequency, clearance=clearance, contact_stiffness=contact_stiffness,
-        contact_damping=contact_damping, damping_ratio=damping_ratio, shaker_damping=shaker_damping,
-        force_amplitude=force, n_modes=n_modes, damping_family=family,
-    )  # fmt: skip
+        excitation_frequency=frequency,
+        clearance=clearance,
+        contact_stiffness=contact_stiffness,
+        contact_damping=contact_damping,
+        damping_ratio=damping_ratio,
+        shaker_damping=shaker_damping,
+        force_amplitude=force,
+        n_modes=n_modes,
+        damping_family=family,
+    )
     try:
         record = simulate(beam, 2, samples_per_cycle=20, integrator=ExactEvents(event_budget=5000))
     except SimulationError:

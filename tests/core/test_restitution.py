@@ -99,9 +99,13 @@ def test_chatter_ends_in_rest_until_the_force_lets_go():
 def test_a_lossless_rebound_takes_no_energy_and_a_lossy_one_its_share():
     """With no force and no damper but the surface's, every impact leaves e^2 of the kinetic energy."""
     beam = replace(
-        BEAM, force_amplitude=0.0, damping_ratio=0.0, shaker_damping=0.0, shaker_stiffness=0.0,
+        BEAM,
+        force_amplitude=0.0,
+        damping_ratio=0.0,
+        shaker_damping=0.0,
+        shaker_stiffness=0.0,
         pivot_rotational_stiffness=1e-3,
-    )  # fmt: skip
+    )
     shape = beam.reduce().tip_shape[0]
     for damping in (0.0, 200.0):
         surfaced = replace(beam, contact_damping=damping)

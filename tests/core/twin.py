@@ -41,9 +41,17 @@ def twin_trajectory(model, cycles, samples_per_cycle, max_phase=0.5):
     t, y, state, side = 0.0, np.zeros(2 * n), "gap", 1.0
     while t < end:
         run = solve_ivp(
-            slope, (t, end), y, method="DOP853", rtol=1e-11, atol=1e-16, events=watched[state], args=(state, side),
-            dense_output=True, max_step=max_phase / model.regimes.fastest[1],
-        )  # fmt: skip
+            slope,
+            (t, end),
+            y,
+            method="DOP853",
+            rtol=1e-11,
+            atol=1e-16,
+            events=watched[state],
+            args=(state, side),
+            dense_output=True,
+            max_step=max_phase / model.regimes.fastest[1],
+        )
         inside = (instants >= t) & (instants < run.t[-1])
         if inside.any():
             path = run.sol(instants[inside])

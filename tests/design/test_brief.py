@@ -37,10 +37,12 @@ def test_template_of_every_machine_describes_the_machine_of_the_thesis(name, tmp
 def test_units_do_not_matter():
     """0.127 mm and 30 Hz are 0.005 in and 1800 rpm; half a kilonewton is 500 N."""
     metric = brief('[parameters]\nclearance = "0.127 mm"\nexcitation_frequency = "30 Hz"')
-    other = brief_from(tomllib.loads(
-        'machine = "impact-beam"\n[parameters]\nclearance = "0.005 in"\nexcitation_frequency = "1800 rpm"\n'
-        '[criteria]\nload_rating = "0.5 kN"\nlife = "10000000 cycles"\nreliability = "99 %"'
-    ))  # fmt: skip
+    other = brief_from(
+        tomllib.loads(
+            'machine = "impact-beam"\n[parameters]\nclearance = "0.005 in"\nexcitation_frequency = "1800 rpm"\n'
+            '[criteria]\nload_rating = "0.5 kN"\nlife = "10000000 cycles"\nreliability = "99 %"'
+        )
+    )
     assert other.machine.clearance == pytest.approx(metric.machine.clearance, rel=1e-12)
     assert other.machine.excitation_frequency == pytest.approx(metric.machine.excitation_frequency, rel=1e-12)
     for field in ("load_rating", "life", "reliability"):

@@ -51,8 +51,11 @@ def test_type_i_is_evaluated_by_its_trend():
     assert found.evaluation.force >= max(run.largest_peak for run in found.series.runs)
     assert found.evaluation.life < found.nominal_evaluation.life
     assert {check.name for check in found.checks} == {
-        "fatigue life", "reliability", "machines that meet", "safety factor",
-    }  # fmt: skip
+        "fatigue life",
+        "reliability",
+        "machines that meet",
+        "safety factor",
+    }
 
 
 def test_type_ii_is_evaluated_by_its_worst_case():

@@ -94,8 +94,12 @@ def test_the_place_of_a_sliding_peak_is_where_its_history_has_it():
 
 
 BALL = {
-    "slider_joint": "ideal", "ball_joint": "spherical", "gravity": 9.81, "rod": "rigid", "matrix_update_interval": 5.0
-}  # fmt: skip
+    "slider_joint": "ideal",
+    "ball_joint": "spherical",
+    "gravity": 9.81,
+    "rod": "rigid",
+    "matrix_update_interval": 5.0,
+}
 
 
 def ball(**settings):

@@ -81,8 +81,11 @@ def test_carried_and_parted_deviations_agree_on_the_beam():
     exact = largest_lyapunov_exponent(beam, 1000)
     parted = two_trajectory_exponent(
         lambda state: simulate(beam, 1, state).final_state.coordinates,
-        simulate(beam, 1, transient=200).final_state.coordinates, 600, distance=1e-12, cycle_period=beam.cycle_period,
-    )  # fmt: skip
+        simulate(beam, 1, transient=200).final_state.coordinates,
+        600,
+        distance=1e-12,
+        cycle_period=beam.cycle_period,
+    )
     assert exact.sign == 1
     assert exact.per_second == pytest.approx(30.0 * exact.per_cycle)
     error = np.hypot(exact.standard_error, parted.standard_error)

@@ -75,8 +75,13 @@ def test_default_tolerances_cover_speed_clearance_length_and_dampings():
     """+-2 % of the frequency, 5 % of the clearance, 0.1 % of the length, 10 % of each damping."""
     tolerances = default_tolerances(ImpactBeam())
     assert tolerances.keys() == {
-        "excitation_frequency", "clearance", "length", "damping_ratio", "shaker_damping", "contact_damping",
-    }  # fmt: skip
+        "excitation_frequency",
+        "clearance",
+        "length",
+        "damping_ratio",
+        "shaker_damping",
+        "contact_damping",
+    }
     assert tolerances["excitation_frequency"].at(20.0, 1.0) == pytest.approx(20.4)
     assert Tolerance(10.0, relative=False).at(200.0, -0.5) == 195.0
 

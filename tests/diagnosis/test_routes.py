@@ -20,9 +20,18 @@ from .maps import logistic
 
 @pytest.mark.parametrize(
     ("period", "doubling", "three"),
-    [(1, False, False), (2, True, False), (3, False, True), (4, True, False), (5, False, False), (6, False, True),
-     (8, True, False), (9, False, False), (None, False, False)],
-)  # fmt: skip
+    [
+        (1, False, False),
+        (2, True, False),
+        (3, False, True),
+        (4, True, False),
+        (5, False, False),
+        (6, False, True),
+        (8, True, False),
+        (9, False, False),
+        (None, False, False),
+    ],
+)
 def test_precursors_of_a_period(period, doubling, three):
     """Powers of two announce a cascade, multiples of three by a power of two a subharmonic of order three."""
     signs = precursors(period)

@@ -16,7 +16,7 @@ from chaosgym.envs import ENVIRONMENTS, machine_env
 from chaosgym.envs.machine_env import MachineEnv
 from chaosgym.envs.tasks import Status
 from chaosgym.errors import ParameterError, SimulationError
-from chaosgym.simulation import batch as fleet
+from chaosgym.simulation import batch as batch
 from chaosgym.simulation import simulate
 
 pytestmark = pytest.mark.parametrize("name", ENVIRONMENTS)
@@ -139,7 +139,7 @@ def test_a_failed_simulation_ends_the_job(name: str, monkeypatch: pytest.MonkeyP
     def fail(*_: Any, **__: Any) -> None:
         raise SimulationError("the motion grew beyond every bound")
 
-    monkeypatch.setattr(fleet, "simulate", fail)
+    monkeypatch.setattr(batch, "simulate", fail)
     observation, reward, terminated, truncated, info = env.step(np.zeros(1, np.float32))
     assert (terminated, truncated, info["status"]) == (True, False, Status.SIMULATION_FAILED)
     assert observation in env.observation_space
@@ -232,8 +232,11 @@ def test_human_mode_runs_without_a_screen(name: str) -> None:
     )
     run = subprocess.run(
         [sys.executable, "-W", "error", "-c", code],
-        capture_output=True, text=True, check=True, env={**_environment(), "MPLBACKEND": "agg"},
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**_environment(), "MPLBACKEND": "agg"},
+    )
     assert run.stdout.split() == ["None", "[]"]
     assert run.stderr == ""
 
@@ -274,9 +277,12 @@ def test_stable_baselines3_workers_run_the_same_job(name: str) -> None:
     env_util = pytest.importorskip("stable_baselines3.common.env_util")
     envs = env_util.make_vec_env(
         f"chaosgym:{name}",
-        n_envs=2, seed=4, vec_env_cls=vec_env.SubprocVecEnv, vec_env_kwargs={"start_method": "spawn"},
+        n_envs=2,
+        seed=4,
+        vec_env_cls=vec_env.SubprocVecEnv,
+        vec_env_kwargs={"start_method": "spawn"},
         env_kwargs=NOMINAL,
-    )  # fmt: skip
+    )
     expected = [_make(name).reset(seed=4 + i)[0] for i in range(2)]
     assert np.array_equal(envs.reset(), expected)
     envs.step(np.zeros((2, 1), np.float32))

@@ -27,9 +27,12 @@ def test_the_machine_is_that_of_the_thesis_but_for_clearance_and_contact_damping
     env = gym.make(ID, rod_diameter=3.175e-3, friction_coefficient=0.1).unwrapped
     assert env.nominal == replace(
         THESIS_SLIDER_CRANK,
-        slider_clearance=0.254e-3, contact_damping_ratio=0.13, matrix_update_interval=5.0, rod_diameter=3.175e-3,
+        slider_clearance=0.254e-3,
+        contact_damping_ratio=0.13,
+        matrix_update_interval=5.0,
+        rod_diameter=3.175e-3,
         friction_coefficient=0.1,
-    )  # fmt: skip
+    )
 
 
 def test_speeds_lie_on_the_grid_and_are_remembered() -> None:

@@ -14,7 +14,7 @@ from chaosgym.core.compilation import call
 from chaosgym.envs import ENVIRONMENTS
 from chaosgym.envs.tasks import Status
 from chaosgym.errors import ParameterError
-from chaosgym.simulation import batch as fleet
+from chaosgym.simulation import batch as batch
 
 BEAM, CRANK = "chaosgym/ImpactBeam-v0", "chaosgym/SliderCrank-v0"
 BEAMS = "chaosgym/ImpactBeamTolerance-v0"
@@ -141,7 +141,7 @@ def test_a_failed_simulation_ends_its_job_alone(monkeypatch: pytest.MonkeyPatch)
         arguments[5].peak_force[1] = np.nan
         arguments[-1][1] = status.DIVERGED
 
-    monkeypatch.setattr(fleet, "call", fail_second)
+    monkeypatch.setattr(batch, "call", fail_second)
     observation, reward, terminated, truncated, infos = envs.step(np.zeros((3, 1), np.float32))
     assert terminated.tolist() == [False, True, False]
     assert infos["status"].tolist() == [Status.RUNNING, Status.SIMULATION_FAILED, Status.RUNNING]

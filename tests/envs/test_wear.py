@@ -8,7 +8,7 @@ from chaosgym.envs import ENVIRONMENTS
 from chaosgym.envs.machine_env import MachineEnv
 from chaosgym.envs.pools import worn
 from chaosgym.simulation import simulate
-from chaosgym.simulation.batch import at_speed, fleet_of
+from chaosgym.simulation.batch import at_speed, batch_of
 
 RANGES = {"chaosgym/ImpactBeamWear-v0": (29.5, 30.0), "chaosgym/SliderCrankWear-v0": (290.0, 300.0)}
 """Range of the drive in which the tables of the nominal machine are soon known."""
@@ -45,10 +45,10 @@ def test_clearance_is_the_new_one_times_one_plus_damage(name: str) -> None:
 def test_the_motion_of_a_fleet_goes_on_when_a_machine_changes(name: str) -> None:
     """Another clearance in place of the old one changes no coordinate: the next cycle is that of ``simulate``."""
     machine = at_speed(_env(name).nominal, RANGES[name][0])
-    fleet = fleet_of(machine, 1)
-    fleet.start(0, machine)
-    fleet.run(np.zeros(1, np.int64), 5)
-    fleet.change(0, worn(machine, 1.3))
-    after = fleet.run(np.zeros(1, np.int64), 3)
+    batch = batch_of(machine, 1)
+    batch.start(0, machine)
+    batch.run(np.zeros(1, np.int64), 5)
+    batch.change(0, worn(machine, 1.3))
+    after = batch.run(np.zeros(1, np.int64), 3)
     record = simulate(worn(machine, 1.3), 3, simulate(machine, 5).final_state)
     assert np.array_equal(after.peak_force[0], record.peak_force)

@@ -175,9 +175,14 @@ def test_modes_too_far_apart_to_tell_are_refused_by_name():
     """A tiny stiff beam on a soft pivot with 40 modes: rounding would hide the slow one, and the error says so."""
     with pytest.raises(ParameterError, match=r"n_modes = 40 .* rounding hides the slowest"):
         ImpactBeam(
-            length=0.01, force_position=0.005, height=0.05, youngs_modulus=1e13, pivot_rotational_stiffness=0.0,
-            shaker_stiffness=1e-9, n_modes=40,
-        ).reduce()  # fmt: skip
+            length=0.01,
+            force_position=0.005,
+            height=0.05,
+            youngs_modulus=1e13,
+            pivot_rotational_stiffness=0.0,
+            shaker_stiffness=1e-9,
+            n_modes=40,
+        ).reduce()
 
 
 def _field(low, high):
@@ -192,11 +197,13 @@ def _box(machine):
     """Any machine of the admissible box: each field as it is, or anywhere in its range."""
     whole = {name for name in admissible_box(machine) if isinstance(getattr(machine, name), int)}
     fields = {
-        name: st.sampled_from(allowed) if isinstance(allowed[0], str)
-        else st.integers(int(allowed[0]), int(allowed[1])) if name in whole
+        name: st.sampled_from(allowed)
+        if isinstance(allowed[0], str)
+        else st.integers(int(allowed[0]), int(allowed[1]))
+        if name in whole
         else _field(*allowed)
         for name, allowed in admissible_box(machine).items()
-    }  # fmt: skip
+    }
     return st.fixed_dictionaries({}, optional=fields)
 
 

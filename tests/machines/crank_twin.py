@@ -94,9 +94,15 @@ def rigid_twin(machine, instants):
         return [phi_rate, moment / inertia]
 
     run = solve_ivp(
-        slope, (0.0, instants[-1]), [0.0, r * rate / length], method="DOP853", t_eval=instants, rtol=1e-10,
-        atol=1e-13, max_step=2e-5,
-    )  # fmt: skip
+        slope,
+        (0.0, instants[-1]),
+        [0.0, r * rate / length],
+        method="DOP853",
+        t_eval=instants,
+        rtol=1e-10,
+        atol=1e-13,
+        max_step=2e-5,
+    )
     return r * np.sin(rate * instants) - length * np.sin(run.y[0])
 
 

@@ -128,7 +128,13 @@ class RigidMechanism:
             return np.concatenate([q_rate, np.linalg.solve(mass, force)])
 
         run = solve_ivp(
-            slope, (0.0, instants[-1]), np.zeros(4), method="DOP853", t_eval=instants, rtol=1e-8, atol=1e-12,
+            slope,
+            (0.0, instants[-1]),
+            np.zeros(4),
+            method="DOP853",
+            t_eval=instants,
+            rtol=1e-8,
+            atol=1e-12,
             max_step=2e-4,
-        )  # fmt: skip
+        )
         return run.y[:2].T

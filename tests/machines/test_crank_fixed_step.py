@@ -11,8 +11,13 @@ from chaosgym.simulation import RungeKutta4, simulate
 
 SMALL_GAP = replace(THESIS_SLIDER_CRANK, crank_speed=250.0, slider_clearance=0.032e-3, matrix_update_interval=5.0)
 BALL = replace(
-    SMALL_GAP, slider_joint="ideal", ball_joint="spherical", gravity=9.81, crank_speed=120.0, rod="rigid",
-)  # fmt: skip
+    SMALL_GAP,
+    slider_joint="ideal",
+    ball_joint="spherical",
+    gravity=9.81,
+    crank_speed=120.0,
+    rod="rigid",
+)
 
 
 @pytest.mark.parametrize(

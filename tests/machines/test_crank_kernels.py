@@ -72,9 +72,14 @@ def frozen_model(machine, duration):
     order = series_order(spectrum * step)
     table = propagator_table(acceleration, duration / 2, step, order)
     return model._replace(
-        bin_duration=duration / 2, steps=steps, order=order, spectrum=spectrum,
-        acceleration=acceleration, propagator=table, curvature=model.row @ acceleration,
-    )  # fmt: skip
+        bin_duration=duration / 2,
+        steps=steps,
+        order=order,
+        spectrum=spectrum,
+        acceleration=acceleration,
+        propagator=table,
+        curvature=model.row @ acceleration,
+    )
 
 
 def test_energy_is_conserved_without_damping():
@@ -140,10 +145,12 @@ def test_a_run_can_be_continued_to_the_bit():
 @pytest.mark.parametrize(
     "change",
     [
-        {}, {"slider_clearance": 0.032e-3}, {"slider_joint": "instrumented"},
+        {},
+        {"slider_clearance": 0.032e-3},
+        {"slider_joint": "instrumented"},
         {"slider_joint": "ideal", "ball_joint": "spherical", "rod": "rigid", "gravity": 9.81},
     ],
-)  # fmt: skip
+)
 def test_sampling_only_reads(change):
     """A time history of any density changes nothing else by a bit: states, peaks, impacts, times in contact."""
     machine = replace(CRANK, **change)

@@ -14,9 +14,15 @@ from tests.machines.crank_twin import rigid_ball_twin
 
 SMALL_GAP = replace(THESIS_SLIDER_CRANK, crank_speed=250.0, slider_clearance=0.032e-3)
 BALL = replace(
-    THESIS_SLIDER_CRANK, slider_joint="ideal", ball_joint="spherical", gravity=9.81, crank_speed=120.0, rod="rigid",
-    housing_offset_along=0.0, yoke_offset_along=0.0,
-)  # fmt: skip
+    THESIS_SLIDER_CRANK,
+    slider_joint="ideal",
+    ball_joint="spherical",
+    gravity=9.81,
+    crank_speed=120.0,
+    rod="rigid",
+    housing_offset_along=0.0,
+    yoke_offset_along=0.0,
+)
 
 
 def stepped(machine, cycles, step_phase):
@@ -79,9 +85,15 @@ def test_hertzian_contact_gives_forces_of_the_same_size():
 def test_a_hertzian_drop_keeps_its_restitution():
     """A rigid slider that strikes at the reference force leaves with the linear law's speed, within 2 %."""
     machine = replace(
-        THESIS_SLIDER_CRANK, crank_speed=1.0, rod="rigid", matrix_update_interval=30.0, contact_law="hertz",
-        contact_damping_ratio=0.025, slider_clearance=0.1e-3, hertz_reference_force=50.0,
-    )  # fmt: skip
+        THESIS_SLIDER_CRANK,
+        crank_speed=1.0,
+        rod="rigid",
+        matrix_update_interval=30.0,
+        contact_law="hertz",
+        contact_damping_ratio=0.025,
+        slider_clearance=0.1e-3,
+        hertz_reference_force=50.0,
+    )
     model = stepped_model(machine, 0.25)
     total = machine.slider_mass + machine.yoke_mass
     # the speed at which the reference force is reached with the law's mass, as the effective mass has it

@@ -41,9 +41,12 @@ def test_static_tip_deflection_is_the_unit_of_clearance():
 def test_a_beam_on_a_hard_pivot_has_pinned_free_modes():
     """Without springs and shaker the bending modes are pinned-free: beta L = 3.9266, 7.0686, 10.2102."""
     beam = replace(
-        THESIS_IMPACT_BEAM, pivot_translational_stiffness=1e13, pivot_rotational_stiffness=1e-6, shaker_stiffness=0.0,
+        THESIS_IMPACT_BEAM,
+        pivot_translational_stiffness=1e13,
+        pivot_rotational_stiffness=1e-6,
+        shaker_stiffness=0.0,
         shaker_mass=0.0,
-    )  # fmt: skip
+    )
     radius = beam.height / math.sqrt(12)
     wave = math.sqrt(beam.youngs_modulus / beam.density)
     expected = np.array([3.92660231, 7.06858275, 10.21017612]) ** 2 * radius * wave / beam.length**2

@@ -21,9 +21,14 @@ from chaosgym.machines.slider_crank.parameters import (
 
 CRANK = THESIS_SLIDER_CRANK
 RIGID = replace(
-    CRANK, rod="rigid", geometric_stiffness="on", gravity=9.81, gravity_angle=20.0, housing_offset_across=0.004,
+    CRANK,
+    rod="rigid",
+    geometric_stiffness="on",
+    gravity=9.81,
+    gravity_angle=20.0,
+    housing_offset_across=0.004,
     yoke_offset_across=-0.006,
-)  # fmt: skip
+)
 
 
 def test_the_slider_crank_is_a_machine():
@@ -78,9 +83,15 @@ def test_no_elastic_force_depends_on_the_crank_angle(ball_joint):
 def test_a_bare_rod_is_a_pinned_pinned_beam():
     """Without housing and yoke the modes are (k pi / l)^2 sqrt(E I / rho A): 232.0 Hz first."""
     bare = replace(
-        CRANK, housing_mass=0.0, housing_inertia=0.0, yoke_mass=0.0, yoke_inertia=0.0, housing_offset_along=0.0,
-        yoke_offset_along=0.0, slider_mass=50.0,
-    )  # fmt: skip
+        CRANK,
+        housing_mass=0.0,
+        housing_inertia=0.0,
+        yoke_mass=0.0,
+        yoke_inertia=0.0,
+        housing_offset_along=0.0,
+        yoke_offset_along=0.0,
+        slider_mass=50.0,
+    )
     radius = bare.rod_diameter / 4
     wave = math.sqrt(bare.youngs_modulus / bare.density)
     expected = np.array([1, 2, 3]) ** 2 * math.pi / 2 * radius * wave / bare.rod_length**2
@@ -169,11 +180,19 @@ def test_the_rigid_swing_is_the_linearised_pendulum(degrees):
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("rod_length", 0.04), ("motor_angle", 26.0), ("motor_angle", -1.0), ("slider_clearance", 5e-2),
-        ("slider_clearance", -1e-6), ("crank_speed", 0.0), ("crank_speed", math.nan), ("matrix_update_interval", 7.0),
-        ("slider_joint", "loose"), ("housing_inertia", 1e-9), ("n_modes", 2.5),
+        ("rod_length", 0.04),
+        ("motor_angle", 26.0),
+        ("motor_angle", -1.0),
+        ("slider_clearance", 5e-2),
+        ("slider_clearance", -1e-6),
+        ("crank_speed", 0.0),
+        ("crank_speed", math.nan),
+        ("matrix_update_interval", 7.0),
+        ("slider_joint", "loose"),
+        ("housing_inertia", 1e-9),
+        ("n_modes", 2.5),
     ],
-)  # fmt: skip
+)
 def test_a_field_out_of_range_is_named(field, value):
     """A bad value raises an error that names the field, the value and the allowed range."""
     with pytest.raises(ParameterError, match=field):
@@ -190,8 +209,12 @@ def test_only_the_required_coordinates_are_integrated():
     """A rigid rod with slider clearance is one coordinate; flexibility and pitch add theirs."""
     assert replace(CRANK, rod="rigid").degrees_of_freedom == ("slider across the guide",)
     assert CRANK.degrees_of_freedom == (
-        "rod stretch", "slider across the guide", "rod mode 1", "rod mode 2", "rod mode 3",
-    )  # fmt: skip
+        "rod stretch",
+        "slider across the guide",
+        "rod mode 1",
+        "rod mode 2",
+        "rod mode 3",
+    )
     assert "slider pitch" in replace(CRANK, slider_joint="instrumented").degrees_of_freedom
 
 

@@ -19,20 +19,29 @@ from tests.machines.spatial_twin import RigidMechanism
 
 CRANK = replace(THESIS_SLIDER_CRANK, matrix_update_interval=5.0)
 LOPSIDED = replace(
-    CRANK, housing_offset_across=0.004, yoke_offset_across=-0.006, gravity=9.81, gravity_angle=20.0,
-)  # fmt: skip
+    CRANK,
+    housing_offset_across=0.004,
+    yoke_offset_across=-0.006,
+    gravity=9.81,
+    gravity_angle=20.0,
+)
 ANGLES = np.radians([0.0, 37.0, 100.0, 205.0, 301.0])
 
 
 @pytest.mark.parametrize(
     "change",
     [
-        {}, {"rod": "rigid"}, {"ball_joint": "spherical"}, {"ball_joint": "spherical", "rod": "rigid"},
-        {"ball_joint": "spherical", "slider_joint": "ideal"}, {"damping_family": "uniform"},
-        {"geometric_stiffness": "on"}, {"geometric_stiffness": "on", "rod": "rigid", "ball_joint": "instrumented"},
+        {},
+        {"rod": "rigid"},
+        {"ball_joint": "spherical"},
+        {"ball_joint": "spherical", "rod": "rigid"},
+        {"ball_joint": "spherical", "slider_joint": "ideal"},
+        {"damping_family": "uniform"},
+        {"geometric_stiffness": "on"},
+        {"geometric_stiffness": "on", "rod": "rigid", "ball_joint": "instrumented"},
         {"slider_joint": "instrumented", "slider_offset_across": 0.01, "geometric_stiffness": "on"},
     ],
-)  # fmt: skip
+)
 def test_at_zero_motor_angle_particles_give_the_planar_equations(change):
     """Inertia of particles in space equals the planar frame equations term by term, and nothing couples sideways."""
     machine = replace(LOPSIDED, **change)
@@ -69,9 +78,15 @@ def test_the_vector_loop_closes_in_space():
 def test_the_rigid_reaction_at_an_angle_is_that_of_newton_and_euler():
     """A straight rod with end masses at 25 deg: the guide's forces follow from the moments about the ball centre."""
     machine = replace(
-        LOPSIDED, motor_angle=25.0, rod="rigid", housing_offset_across=0.0, yoke_offset_across=0.0,
-        yoke_offset_along=0.0, yoke_inertia=0.0, housing_inertia=0.36 * 0.003**2,
-    )  # fmt: skip
+        LOPSIDED,
+        motor_angle=25.0,
+        rod="rigid",
+        housing_offset_across=0.0,
+        yoke_offset_across=0.0,
+        yoke_offset_along=0.0,
+        yoke_inertia=0.0,
+        housing_inertia=0.36 * 0.003**2,
+    )
     load = spatial_loads(machine, ANGLES)
     rate = 20.0
     reaction = load[0] + rate**2 * load[1]
@@ -118,9 +133,14 @@ def test_a_rigid_rod_in_space_is_the_linearised_exact_mechanism(slider_joint, de
     With geometric stiffness, the stiffness of the slider's translations is exact too.
     """
     machine = replace(
-        LOPSIDED, motor_angle=25.0, rod="rigid", slider_joint=slider_joint, geometric_stiffness="on",
-        slider_offset_across=0.01, slider_offset_along=-0.005,
-    )  # fmt: skip
+        LOPSIDED,
+        motor_angle=25.0,
+        rod="rigid",
+        slider_joint=slider_joint,
+        geometric_stiffness="on",
+        slider_offset_across=0.01,
+        slider_offset_along=-0.005,
+    )
     own = spatial_equations(machine, np.radians([degrees]))
     exact = RigidMechanism(machine, len(machine.degrees_of_freedom)).linearised(math.radians(degrees))
     for mine, expected in ((own.mass[0], exact.mass), (own.damping[1, 0], exact.damping), (own.load[:, 0], exact.load)):
@@ -133,9 +153,14 @@ def test_a_rigid_rod_in_space_is_the_linearised_exact_mechanism(slider_joint, de
 def test_a_rigid_rod_rattles_in_space_like_the_exact_mechanism():
     """From rest at 25 deg through impacts on the guide, both ways: within 2 % of the clearance of DOP853's motion."""
     machine = replace(
-        CRANK, motor_angle=25.0, rod="rigid", geometric_stiffness="on", crank_speed=250.0, matrix_update_interval=0.5,
+        CRANK,
+        motor_angle=25.0,
+        rod="rigid",
+        geometric_stiffness="on",
+        crank_speed=250.0,
+        matrix_update_interval=0.5,
         slider_clearance=0.1e-3,
-    )  # fmt: skip
+    )
     samples = 720
     instants = np.arange(1, 200) * (machine.cycle_period / samples)
     history = simulate(machine, 1, samples_per_cycle=samples).history[0, 1:200]
@@ -151,10 +176,19 @@ def test_tension_stiffens_both_planes_of_bending(force):
     Standing at 90 deg of a motor at 20 deg, the rod's pull is the slider's weight along the guide over its slope.
     """
     machine = replace(
-        CRANK, motor_angle=20.0, crank_radius=0.01, housing_mass=0.0, housing_inertia=0.0, housing_offset_along=0.0,
-        yoke_mass=0.0, yoke_inertia=0.0, yoke_offset_along=0.0, slider_mass=100.0, gravity=abs(force) / 100.0,
+        CRANK,
+        motor_angle=20.0,
+        crank_radius=0.01,
+        housing_mass=0.0,
+        housing_inertia=0.0,
+        housing_offset_along=0.0,
+        yoke_mass=0.0,
+        yoke_inertia=0.0,
+        yoke_offset_along=0.0,
+        slider_mass=100.0,
+        gravity=abs(force) / 100.0,
         gravity_angle=math.copysign(90.0, force),
-    )  # fmt: skip
+    )
     names = degrees_of_freedom(machine)
     first = {"swing": names.index("rod mode 1"), "sideways": names.index("sideways rod mode 1")}
     found = {}

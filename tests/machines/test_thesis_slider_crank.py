@@ -86,9 +86,13 @@ def test_pitch_makes_impacts_in_spite_of_gravity():
     down; centred it stays at rest.
     """
     machine = replace(
-        CRANK, crank_speed=230.0, slider_clearance=0.032e-3, slider_joint="instrumented", gravity=9.81,
+        CRANK,
+        crank_speed=230.0,
+        slider_clearance=0.032e-3,
+        slider_joint="instrumented",
+        gravity=9.81,
         slider_pitch_inertia=3e-4,
-    )  # fmt: skip
+    )
     assert simulate(machine, 5, transient=40).impacts.sum() == 0
     rocking = simulate(replace(machine, slider_offset_across=0.03), 5, transient=40)
     assert rocking.impacts.sum() > 0
@@ -135,8 +139,9 @@ def test_geometric_stiffness_lifts_the_fourth_order_into_the_peak_force():
     """With the rod's tension the force at 1130 rpm is at least 1.7 times that 2 % above and below, without it 1.1."""
     ratios = []
     for switch in ("off", "on"):
-        machine = replace(SUPERHARMONIC_SLIDER_CRANK, matrix_update_interval=2.0, slider_clearance=0.0,
-                          geometric_stiffness=switch)  # fmt: skip
+        machine = replace(
+            SUPERHARMONIC_SLIDER_CRANK, matrix_update_interval=2.0, slider_clearance=0.0, geometric_stiffness=switch
+        )
         crest, *beside = (
             peaks(machine, cycles=20, transient=250, crank_speed=speed).mean() for speed in (1130.0, 1106.0, 1154.0)
         )

@@ -12,9 +12,22 @@ from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
 
 POINTS = 1100
 COMMAND = (
-    sys.executable, "-m", "chaosgym", "sweep", "impact-beam", "--axis", "excitation_frequency=10:30",
-    "--axis", "clearance=5e-5:2e-4", "--random", str(POINTS), "--seed", "4", "--budget", "100",
-)  # fmt: skip
+    sys.executable,
+    "-m",
+    "chaosgym",
+    "sweep",
+    "impact-beam",
+    "--axis",
+    "excitation_frequency=10:30",
+    "--axis",
+    "clearance=5e-5:2e-4",
+    "--random",
+    str(POINTS),
+    "--seed",
+    "4",
+    "--budget",
+    "100",
+)
 
 
 def start(log, *arguments):
@@ -36,18 +49,32 @@ def cluster(tmp_path):
     """Address of a scheduler, and its two workers."""
     file = tmp_path / "scheduler.json"
     scheduler = start(
-        tmp_path / "scheduler.log", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0",
-        "--no-dashboard", "--scheduler-file", str(file),
-    )  # fmt: skip
+        tmp_path / "scheduler.log",
+        "distributed.cli.dask_scheduler",
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        "--no-dashboard",
+        "--scheduler-file",
+        str(file),
+    )
     wait_until(file.exists)
     address = json.loads(file.read_text())["address"]
     workers = [
         start(
-            tmp_path / f"worker-{number}.log", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny",
-            "--no-dashboard", "--local-directory", str(tmp_path / f"worker-{number}"),
+            tmp_path / f"worker-{number}.log",
+            "distributed.cli.dask_worker",
+            address,
+            "--nthreads",
+            "1",
+            "--no-nanny",
+            "--no-dashboard",
+            "--local-directory",
+            str(tmp_path / f"worker-{number}"),
         )
         for number in range(2)
-    ]  # fmt: skip
+    ]
     wait_until(lambda: scheduler_workers(address) == 2)
     yield address, workers
     for process in (*workers, scheduler):

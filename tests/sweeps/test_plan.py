@@ -33,9 +33,7 @@ def test_grid_has_every_combination_with_the_first_axis_slowest():
 def test_drawn_points_fill_the_range_and_depend_on_the_seed_alone(sampling):
     """Same seed, same points; another seed, others; all inside the ranges."""
     axes = (Axis("excitation_frequency", 4.0, 16.0, scale="log"), Axis("clearance", 1e-5, 3e-5))
-    first, again, other = (
-        SweepPlan(THESIS_IMPACT_BEAM, axes, sampling, 100, seed).points() for seed in (1, 1, 2)
-    )  # fmt: skip
+    first, again, other = (SweepPlan(THESIS_IMPACT_BEAM, axes, sampling, 100, seed).points() for seed in (1, 1, 2))
     for name, low, high in (("excitation_frequency", 4.0, 16.0), ("clearance", 1e-5, 3e-5)):
         np.testing.assert_array_equal(first[name], again[name])
         assert not np.array_equal(first[name], other[name])

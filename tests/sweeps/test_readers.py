@@ -13,9 +13,15 @@ from chaosgym.machines import THESIS_IMPACT_BEAM
 from chaosgym.sweeps import Axis, Patch, SweepPlan, run_sweep
 
 PLAN = SweepPlan(
-    THESIS_IMPACT_BEAM, (Axis("length", 0.27, 0.28),), "lattice", 2, 0,
-    (Patch("excitation_frequency", 8.0, 12.0, 4), Patch("clearance", 1e-4, 2e-4, 3)), 100, 0.5,
-)  # fmt: skip
+    THESIS_IMPACT_BEAM,
+    (Axis("length", 0.27, 0.28),),
+    "lattice",
+    2,
+    0,
+    (Patch("excitation_frequency", 8.0, 12.0, 4), Patch("clearance", 1e-4, 2e-4, 3)),
+    100,
+    0.5,
+)
 
 
 @pytest.fixture(scope="module")

@@ -220,10 +220,24 @@ def test_a_killed_sweep_goes_on(tmp_path):
     axes = (Axis("excitation_frequency", 10.0, 30.0), Axis("clearance", 5e-5, 2e-4))
     plan = SweepPlan(THESIS_IMPACT_BEAM, axes, "sobol", size=900, seed=2, budget=100)
     command = [
-        sys.executable, "-m", "chaosgym", "sweep", "impact-beam", "--axis", "excitation_frequency=10:30",
-        "--axis", "clearance=5e-5:2e-4", "--sobol", "900", "--seed", "2", "--budget", "100",
-        "--out", str(tmp_path / "s"),
-    ]  # fmt: skip
+        sys.executable,
+        "-m",
+        "chaosgym",
+        "sweep",
+        "impact-beam",
+        "--axis",
+        "excitation_frequency=10:30",
+        "--axis",
+        "clearance=5e-5:2e-4",
+        "--sobol",
+        "900",
+        "--seed",
+        "2",
+        "--budget",
+        "100",
+        "--out",
+        str(tmp_path / "s"),
+    ]
     run = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     deadline = time.monotonic() + 120.0
     while len(list(tmp_path.glob("s/chunks/0*.parquet"))) < 2 and time.monotonic() < deadline:

@@ -74,9 +74,15 @@ def test_the_map_of_the_slider_is_calm_at_small_clearance():
 
 @pytest.mark.parametrize(
     ("number", "part", "target"),
-    [("3.8", "a", "IBS-021"), ("3.13", "dampings", "IBS-045"), ("4.8", "ball", "SSC-028"), ("4.9", "map", "SSC-033"),
-     ("4.13", "slider", "SSC-042"), ("4.14", "b", "SSC-055")],
-)  # fmt: skip
+    [
+        ("3.8", "a", "IBS-021"),
+        ("3.13", "dampings", "IBS-045"),
+        ("4.8", "ball", "SSC-028"),
+        ("4.9", "map", "SSC-033"),
+        ("4.13", "slider", "SSC-042"),
+        ("4.14", "b", "SSC-055"),
+    ],
+)
 def test_a_figure_draws_the_runs_that_its_statements_are_judged_by(number, part, target):
     """Every point of the scorecard's grid is drawn, and its run is as long."""
     drawn, judged = FIGURES[number].parts(1.0)[part], comparison(target)
@@ -93,6 +99,12 @@ def test_every_printed_sensitivity_is_answered(tmp_path):
     drawn = draw_figures([FIGURES[name] for name in ids], tmp_path, resolution=0.1)
     assert not [one.error for one in drawn if one.error]
     assert set(sensitivities(drawn)) == {
-        "speed", "clearance", "beam length", "rod length", "structural damping", "contact damping", "friction",
+        "speed",
+        "clearance",
+        "beam length",
+        "rod length",
+        "structural damping",
+        "contact damping",
+        "friction",
         "flexibility",
-    }  # fmt: skip
+    }

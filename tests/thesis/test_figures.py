@@ -53,17 +53,27 @@ def test_a_figure_says_of_a_statement_what_the_scorecard_says(number, tmp_path):
     """Verdict, value and tolerance of a statement are the same on both pages, whatever else the figure draws."""
     (one,) = draw_figures(chosen([number]), tmp_path, resolution=0.1)
     names = [target for finding in one.findings for target in finding.targets]
-    judged = evaluate([comparison(name) for name in names], {name: make() for name, make in MACHINES.items()},
-                      efforts=THOROUGH, folder=default_folder())  # fmt: skip
+    judged = evaluate(
+        [comparison(name) for name in names],
+        {name: make() for name, make in MACHINES.items()},
+        efforts=THOROUGH,
+        folder=default_folder(),
+    )
     assert [finding.agrees for finding in one.findings] == [found.verdict == "hit" for found in judged]
     assert [finding.here.split(";")[0] for finding in one.findings] == [found.shown_value for found in judged]
 
 
 @pytest.mark.parametrize(
     ("number", "label"),
-    [("5.1", "both agree, printed"), ("5.6", "bouncing, printed"), ("5.10", "spread of 30 deg, printed"),
-     ("5.11", "spread of 6 mm, printed"), ("4.17", "periodic, printed"), ("3.13", "no chaos, printed")],
-)  # fmt: skip
+    [
+        ("5.1", "both agree, printed"),
+        ("5.6", "bouncing, printed"),
+        ("5.10", "spread of 30 deg, printed"),
+        ("5.11", "spread of 6 mm, printed"),
+        ("4.17", "periodic, printed"),
+        ("3.13", "no chaos, printed"),
+    ],
+)
 def test_what_the_text_prints_is_drawn_over_the_figure(number, label):
     """Cycles, durations, spreads and natures stand on the axes beside what is found here."""
     drawn = FIGURES[number].draw(made_up_parts(number))
@@ -80,17 +90,24 @@ def made_up_parts(number):
     """A few points for each part of a figure, in place of a simulation."""
     values = np.array([0.01, 0.08])
     runs = {
-        "damping_ratio": values, "crank_speed": np.array([100.0, 300.0]), "peaks": np.full((2, 20), 40.0),
-        "nature": np.array(["periodic"] * 2), "period": np.ones(2, dtype=int),
-    }  # fmt: skip
+        "damping_ratio": values,
+        "crank_speed": np.array([100.0, 300.0]),
+        "peaks": np.full((2, 20), 40.0),
+        "nature": np.array(["periodic"] * 2),
+        "period": np.ones(2, dtype=int),
+    }
     force = np.tile([1.0, 0.0, -1.0, 0.0], 4)
     history = {"time": np.linspace(0.0, 0.2, len(force)), "force": force}
     impacts = {"location": np.array([0.0, 1e-3]), "force": np.ones(2)}
     cloud = {unit: {**impacts, "unit": np.array(unit)} for unit in ("m", "deg")}
     return {
-        "5.1": {"runs": runs}, "5.6": {"a": history, "b": history}, "5.10": {"a": cloud["deg"], "b": cloud["deg"]},
-        "5.11": {"cloud": cloud["m"]}, "4.17": {"without": runs, "with": runs}, "3.13": {"dampings": runs},
-    }[number]  # fmt: skip
+        "5.1": {"runs": runs},
+        "5.6": {"a": history, "b": history},
+        "5.10": {"a": cloud["deg"], "b": cloud["deg"]},
+        "5.11": {"cloud": cloud["m"]},
+        "4.17": {"without": runs, "with": runs},
+        "3.13": {"dampings": runs},
+    }[number]
 
 
 def test_pictures_are_replaced_only_on_request(tmp_path):
@@ -110,10 +127,14 @@ def test_a_result_is_kept_under_all_that_it_depends_on(tmp_path, monkeypatch):
     """Another machine, count of cycles or source is another file; the same description is read, not computed."""
     runs = Runs(machines=(THESIS_IMPACT_BEAM,), fields=("clearance",), cycles=20, transient=0)
     others = [
-        Runs(machines=(with_settings(THESIS_IMPACT_BEAM, {"width": 0.0176}),), fields=("clearance",), cycles=20,
-             transient=0),
+        Runs(
+            machines=(with_settings(THESIS_IMPACT_BEAM, {"width": 0.0176}),),
+            fields=("clearance",),
+            cycles=20,
+            transient=0,
+        ),
         Runs(machines=(THESIS_IMPACT_BEAM,), fields=("clearance",), cycles=21, transient=0),
-    ]  # fmt: skip
+    ]
     assert len({result_path(one, tmp_path) for one in (runs, *others)}) == 3
     first = computed(runs, tmp_path)
     assert np.array_equal(first["peaks"][0], simulate(THESIS_IMPACT_BEAM, 20).peak_force[:, 0])
@@ -155,9 +176,7 @@ def test_the_command_lists_draws_and_refuses(tmp_path):
     """``figures`` names every figure, draws the one asked for, and refuses without a folder."""
     run = CliRunner().invoke
     assert json.loads(run(app, ["figures", "--list", "--json"]).stdout)["figures"].keys() == FIGURES.keys()
-    result = json.loads(
-        run(app, ["figures", "3.6", "--out", str(tmp_path), "--resolution", "0.1", "--json"]).stdout
-    )  # fmt: skip
+    result = json.loads(run(app, ["figures", "3.6", "--out", str(tmp_path), "--resolution", "0.1", "--json"]).stdout)
     assert [one["id"] for one in result["figures"]] == ["3.6"]
     assert result["totals"] == {"agree": 1, "differ": 0, "contradictory": 0, "undecided": 0}
     assert run(app, ["figures", "3.6"]).exit_code == 2

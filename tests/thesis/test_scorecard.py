@@ -107,15 +107,22 @@ def test_what_is_not_known_to_be_chaotic_agrees_with_no_chaos(nature):
     found = {
         name: RESPONSE_QUANTITIES[COMPARED[name].quantity].finding(THESIS_IMPACT_BEAM, COMPARED[name], results)
         for name, results in {
-            "IBS-013": one, "IBS-014": one, "IBS-028": one, "IBS-043": one, "IBS-074": one, "IBS-075": one,
-            "SSC-056": one, "SSC-065": [*curve(["chaotic"], [40.0]), *one],
-            "IBS-021": curve_of_30, "IBS-023": curve_of_30,
+            "IBS-013": one,
+            "IBS-014": one,
+            "IBS-028": one,
+            "IBS-043": one,
+            "IBS-074": one,
+            "IBS-075": one,
+            "SSC-056": one,
+            "SSC-065": [*curve(["chaotic"], [40.0]), *one],
+            "IBS-021": curve_of_30,
+            "IBS-023": curve_of_30,
             "SSC-066": curve(["periodic"] * 10 + [nature], [40.0] * 11),
             "SSC-067": curve(["periodic"] * 20 + [nature], [40.0] * 21),
             "SSC-042": curve([nature] * 11, [40.0] * 11),
             "IBS-031": curve((["periodic"] * 16 + [nature] + ["chaotic"] * 13) * 4, [40.0] * 120),
         }.items()
-    }  # fmt: skip
+    }
     assert [name for name, finding in found.items() if finding.agrees] == []
 
 

@@ -11,9 +11,11 @@ from chaosgym.cli.output import emit
 @click.command()
 @click.argument("machine", type=click.Choice(["impact-beam", "slider-crank"]))
 @click.option(
-    "--budget", required=True, metavar="MINUTES|TRIALS",
+    "--budget",
+    required=True,
+    metavar="MINUTES|TRIALS",
     help="Of the search, as in 20min, or a number of trials in all; the thorough runs that judge it come on top.",
-)  # fmt: skip
+)
 @click.option("--out", type=click.Path(file_okay=False), required=True, help="Folder; the same command again resumes.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")

@@ -16,9 +16,16 @@ from chaosgym.cli.output import emit
 @click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def figures(
-    ids: tuple[str, ...], out: str | None, only_list: bool, resolution: float, results: str | None,
-    gallery: str | None, overwrite: bool, workers: int | None, as_json: bool,
-) -> None:  # fmt: skip
+    ids: tuple[str, ...],
+    out: str | None,
+    only_list: bool,
+    resolution: float,
+    results: str | None,
+    gallery: str | None,
+    overwrite: bool,
+    workers: int | None,
+    as_json: bool,
+) -> None:
     """Draw the simulated figures of the thesis (IDS such as 3.8, or all) and compare them with the print."""
     from pathlib import Path
 

@@ -34,12 +34,10 @@ def transient_chaos(resolution: float) -> Mapping[str, Computation]:
     beam = replace(BEAM, excitation_frequency=30.0, clearance=LARGE)
     around = steps(0.0090, 0.0130, 0.0001 / resolution, BRIEF_DAMPING, ENDLESS_DAMPING)
     return {
-        "printed": sweep(
-            beam, "damping_ratio", (BRIEF_DAMPING, ENDLESS_DAMPING), cycles=LONGEST, transient=0
-        ),
+        "printed": sweep(beam, "damping_ratio", (BRIEF_DAMPING, ENDLESS_DAMPING), cycles=LONGEST, transient=0),
         "around": sweep(beam, "damping_ratio", around, cycles=2000, transient=0),
         **scored("IBS-069", "IBS-070", "IBS-071"),
-    }  # fmt: skip
+    }
 
 
 def paint_settling(parts: Parts, ax: Axes) -> None:
@@ -47,13 +45,28 @@ def paint_settling(parts: Parts, ax: Axes) -> None:
     data = parts["around"]
     damping, settle, period = DAMPING.factor * data["damping_ratio"], data["settle"], data["period"]
     settled = settle >= 0
-    ax.plot(damping[~settled], np.full(np.sum(~settled), data["peaks"].shape[1]), "^", ms=4, mew=0,
-            color=NATURE_COLOURS["chaotic"], label="not settled")  # fmt: skip
+    ax.plot(
+        damping[~settled],
+        np.full(np.sum(~settled), data["peaks"].shape[1]),
+        "^",
+        ms=4,
+        mew=0,
+        color=NATURE_COLOURS["chaotic"],
+        label="not settled",
+    )
     ax.plot(damping[settled], settle[settled], "o", ms=4, mew=0, color=ACCENT, label="settled")
     for x, y, number in zip(damping[settled], settle[settled], period[settled], strict=True):
         ax.annotate(f"{number}", (x, y), xytext=(0, 4), textcoords="offset points", ha="center", fontsize=6.5)
-    ax.plot(DAMPING.factor * BRIEF_DAMPING, printed("IBS-069").low, "D", ms=7, mfc="none", mew=1.6,
-            label="printed, period 4", **thesis.PRINTED)  # fmt: skip
+    ax.plot(
+        DAMPING.factor * BRIEF_DAMPING,
+        printed("IBS-069").low,
+        "D",
+        ms=7,
+        mfc="none",
+        mew=1.6,
+        label="printed, period 4",
+        **thesis.PRINTED,
+    )
     ax.set(xlabel=DAMPING.label, ylabel="cycle from which it repeats", yscale="log", ylim=(5.0, 6000.0))
     ax.legend(loc="lower left", ncols=3)
 
@@ -79,11 +92,17 @@ def transients(parts: Parts) -> Sequence[Finding]:
             f"{settled_words(data, 0)}; of {len(long)} dampings from 0.9 to 1.3 % chaos ends between "
             f"cycles 100 and 1000 at {elsewhere}",
             agrees(parts, "IBS-069", "IBS-070"),
-            ("IBS-069", "IBS-070"), "structural damping",
+            ("IBS-069", "IBS-070"),
+            "structural damping",
         ),
-        Finding("at 1.0 % chaotic up to 4000 cycles", settled_words(data, 1), agrees(parts, "IBS-071"),
-                ("IBS-071",), "structural damping"),
-    ]  # fmt: skip
+        Finding(
+            "at 1.0 % chaotic up to 4000 cycles",
+            settled_words(data, 1),
+            agrees(parts, "IBS-071"),
+            ("IBS-071",),
+            "structural damping",
+        ),
+    ]
 
 
 TRANSIENT_CHAOS = ThesisFigure(
@@ -115,7 +134,7 @@ def bouncing(resolution: float) -> Mapping[str, Computation]:
     }
     return {
         name: History(machine=beam, cycles=4, transient=TRANSIENT, samples=4000) for name, beam in beams.items()
-    } | dict(scored("IBS-074", "IBS-075"))  # fmt: skip
+    } | dict(scored("IBS-074", "IBS-075"))
 
 
 def first_touches(data: Data) -> Array:
@@ -137,9 +156,13 @@ def bouncing_share(parts: Parts) -> Sequence[Finding]:
     wanted = printed("IBS-074").low
     return [
         scored_finding(parts, "IBS-074", f"±0.03 mm, 18 Hz: bouncing lasts {wanted:.2g} of the half cycle"),
-        scored_finding(parts, "IBS-075", "±0.127 mm, 30 Hz: in some cycles bouncing lasts to the end of the half cycle",
-                       more="what is left includes the flight to the other side"),
-    ]  # fmt: skip
+        scored_finding(
+            parts,
+            "IBS-075",
+            "±0.127 mm, 30 Hz: in some cycles bouncing lasts to the end of the half cycle",
+            more="what is left includes the flight to the other side",
+        ),
+    ]
 
 
 BOUNCING = ThesisFigure(
@@ -166,9 +189,10 @@ def beam_histograms(resolution: float) -> Mapping[str, Computation]:
     return {
         "long": runs(
             [replace(BEAM, excitation_frequency=frequency, clearance=LARGE) for frequency in HISTOGRAM_FREQUENCIES],
-            "excitation_frequency", cycles=round(3000 * resolution),
+            "excitation_frequency",
+            cycles=round(3000 * resolution),
         )
-    }  # fmt: skip
+    }
 
 
 def multiple_peaks(parts: Parts) -> Sequence[Finding]:
@@ -182,9 +206,10 @@ def multiple_peaks(parts: Parts) -> Sequence[Finding]:
             Finding(
                 f"{frequency:g} Hz: chaotic, bounded, several peaks in the histogram",
                 f"{nature}, {peaks.min():.3g} to {peaks.max():.3g} N, {modes} mode{'s' * (modes > 1)}",
-                nature == "chaotic" and modes > 1, ("IBS-077",) if frequency == 25.0 else ("IBS-076",),
+                nature == "chaotic" and modes > 1,
+                ("IBS-077",) if frequency == 25.0 else ("IBS-076",),
             )
-        )  # fmt: skip
+        )
     return found
 
 

@@ -67,9 +67,10 @@ def fluctuation(parts: Parts) -> Sequence[Finding]:
     here = float(np.mean(rough))
     return [
         scored_finding(parts, "IBS-037", f"Type I, a smooth rise, to {low:g} Hz at the three lengths"),
-        Finding(f"{low:g} to {high:g} Hz: fluctuates", f"{here:.0%} of the force about its trend", here > 0.05,
-                ("IBS-036",)),
-    ]  # fmt: skip
+        Finding(
+            f"{low:g} to {high:g} Hz: fluctuates", f"{here:.0%} of the force about its trend", here > 0.05, ("IBS-036",)
+        ),
+    ]
 
 
 def collapse(parts: Parts) -> Sequence[Finding]:
@@ -92,9 +93,11 @@ def collapse(parts: Parts) -> Sequence[Finding]:
                 f"(factor {expected:.4f})",
                 f"correlation {agreement:.2f} at that factor, {np.interp(1.0, scales, match):.2f} over the frequency; "
                 f"best {max(match):.2f} at {best:.4f}",
-                agreement > 0.8 or abs(best - expected) < 0.002, ("IBS-038",), "beam length",
+                agreement > 0.8 or abs(best - expected) < 0.002,
+                ("IBS-038",),
+                "beam length",
             )
-        )  # fmt: skip
+        )
     return found
 
 

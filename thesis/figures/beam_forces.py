@@ -48,9 +48,12 @@ def bands_and_jumps(parts: Parts) -> Sequence[Finding]:
         scored_finding(parts, "IBS-023", "±0.127 mm: Type III, chaotic, from 16 Hz on"),
         Finding(
             "±0.032 mm: the force fluctuates above 8 Hz, and not below (change per hertz, from 4 Hz on)",
-            f"at most {smooth:.0%} per hertz up to 8 Hz, up to {rough:.0%} above", smooth < 0.1 < rough, (), "speed",
+            f"at most {smooth:.0%} per hertz up to 8 Hz, up to {rough:.0%} above",
+            smooth < 0.1 < rough,
+            (),
+            "speed",
         ),
-    ]  # fmt: skip
+    ]
 
 
 FORCE_AGAINST_FREQUENCY = ThesisFigure(
@@ -60,22 +63,30 @@ FORCE_AGAINST_FREQUENCY = ThesisFigure(
     parts=force_against_frequency,
     panels=(
         force_diagram(
-            "(a) ±0.032 mm clearance (dimensionless 0.01)", "a", FREQUENCY,
-            marks=(Mark(18.0, "IBS-024", "periodic", sensitivity="speed"),
-                   Mark(19.0, "IBS-025", "periodic", sensitivity="speed"),
-                   Mark(20.0, "IBS-026", "periodic", sensitivity="speed")),
+            "(a) ±0.032 mm clearance (dimensionless 0.01)",
+            "a",
+            FREQUENCY,
+            marks=(
+                Mark(18.0, "IBS-024", "periodic", sensitivity="speed"),
+                Mark(19.0, "IBS-025", "periodic", sensitivity="speed"),
+                Mark(20.0, "IBS-026", "periodic", sensitivity="speed"),
+            ),
             bands=(("I", "IBS-020"), ("II", "IBS-021")),
         ),
         force_diagram(
-            "(b) ±0.127 mm clearance (dimensionless 0.04)", "b", FREQUENCY,
-            marks=(Mark(29.0, "IBS-028", "periodic", sensitivity="speed"),
-                   Mark(30.0, "IBS-029", "chaotic", sensitivity="speed")),
+            "(b) ±0.127 mm clearance (dimensionless 0.04)",
+            "b",
+            FREQUENCY,
+            marks=(
+                Mark(29.0, "IBS-028", "periodic", sensitivity="speed"),
+                Mark(30.0, "IBS-029", "chaotic", sensitivity="speed"),
+            ),
             bands=(("I", "IBS-020"), ("II", "IBS-022"), ("III", "IBS-023")),
         ),
     ),
     height=3.4,
     compare=bands_and_jumps,
-)  # fmt: skip
+)
 
 
 def length_sweep(resolution: float) -> Mapping[str, Computation]:
@@ -92,9 +103,11 @@ def length_flip(parts: Parts) -> Sequence[Finding]:
         Finding(
             "+1 % of length, 281.5 to 284 mm, turns periodic into chaotic",
             f"{natures[0]} to {natures[1]} there; the nature changes at {flips(data, LENGTH, 2.5)}",
-            natures == ["periodic", "chaotic"], ("IBS-042", "IBS-043"), "beam length",
+            natures == ["periodic", "chaotic"],
+            ("IBS-042", "IBS-043"),
+            "beam length",
         )
-    ]  # fmt: skip
+    ]
 
 
 FORCE_AGAINST_LENGTH = ThesisFigure(
@@ -104,14 +117,18 @@ FORCE_AGAINST_LENGTH = ThesisFigure(
     parts=length_sweep,
     panels=(
         force_diagram(
-            "", "lengths", LENGTH,
-            marks=(Mark(281.5, "IBS-042", "periodic", sensitivity="beam length"),
-                   Mark(284.0, "IBS-043", "chaotic", "largest", "beam length")),
+            "",
+            "lengths",
+            LENGTH,
+            marks=(
+                Mark(281.5, "IBS-042", "periodic", sensitivity="beam length"),
+                Mark(284.0, "IBS-043", "chaotic", "largest", "beam length"),
+            ),
         ),
     ),
     height=3.6,
     compare=length_flip,
-)  # fmt: skip
+)
 
 
 def damping_sweep(resolution: float) -> Mapping[str, Computation]:
@@ -133,13 +150,18 @@ def damping_calms(parts: Parts) -> Sequence[Finding]:
             "the variation of the peak force falls from 1 % to 8 % structural damping",
             f"{spread[0]:.3g} N at 1 %, {spread[len(spread) // 2]:.3g} N at 4.5 %, {spread[-1]:.3g} N at 8 %; "
             f"last chaotic at {last}; rank correlation with damping {parts['IBS-045']['value']}",
-            agrees(parts, "IBS-045"), ("IBS-045",), "structural damping",
-        ),
-        Finding(
-            "no chaos at 8 %", describe_forces(end[0], str(end[1]), int(end[2])), end[1] == "periodic", ("IBS-046",),
+            agrees(parts, "IBS-045"),
+            ("IBS-045",),
             "structural damping",
         ),
-    ]  # fmt: skip
+        Finding(
+            "no chaos at 8 %",
+            describe_forces(end[0], str(end[1]), int(end[2])),
+            end[1] == "periodic",
+            ("IBS-046",),
+            "structural damping",
+        ),
+    ]
 
 
 FORCE_AGAINST_DAMPING = ThesisFigure(

@@ -63,9 +63,12 @@ def criterion(parts: Parts) -> Sequence[Finding]:
         Finding(
             "chaos only above both",
             f"{rate.hit_rate:.0%} of the chaotic points of this map lie there; of the points there "
-            f"{rate.precision:.0%} are chaotic, of those outside {1.0 - rate.quiet:.0%}", None, (), "clearance",
+            f"{rate.precision:.0%} are chaotic, of those outside {1.0 - rate.quiet:.0%}",
+            None,
+            (),
+            "clearance",
         ),
-    ]  # fmt: skip
+    ]
 
 
 NATURE_MAP = ThesisFigure(

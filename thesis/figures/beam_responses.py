@@ -107,9 +107,13 @@ def motion_ranges(parts: Parts) -> Sequence[Finding]:
     return [
         scored_finding(parts, "IBS-060", f"displacement of {words(printed('IBS-060'))} mm"),
         scored_finding(parts, "IBS-061", f"velocity of {words(printed('IBS-061'))} m/s"),
-        Finding(f"peaks of {words(printed('IBS-062'))} N", f"{low:.3g} to {high:.3g} N", within("IBS-062", (low, high)),
-                ("IBS-062",)),
-    ]  # fmt: skip
+        Finding(
+            f"peaks of {words(printed('IBS-062'))} N",
+            f"{low:.3g} to {high:.3g} N",
+            within("IBS-062", (low, high)),
+            ("IBS-062",),
+        ),
+    ]
 
 
 FORCE_POINT_MOTION = ThesisFigure(

@@ -143,14 +143,19 @@ class Types:
     def run(self, workers: int | None = None) -> Data:
         """Judge every point and its neighbourhood."""
         found = response_map(
-            self.machine, self.speeds, self.clearances, budget=self.budget, sensor_error=self.reading_error,
+            self.machine,
+            self.speeds,
+            self.clearances,
+            budget=self.budget,
+            sensor_error=self.reading_error,
             workers=workers,
-        )  # fmt: skip
+        )
         speed, clearance = self.machine.speed_field, self.machine.clearance_field
         machines = [
             with_settings(self.machine, {speed: float(at), clearance: float(gap)})
-            for at in found.speed for gap in found.clearance
-        ]  # fmt: skip
+            for at in found.speed
+            for gap in found.clearance
+        ]
         effort = THOROUGH[self.machine.name]
         seen = parallel_map(lambda machine: observe(machine, effort).nature, machines, workers=workers)
         nature = np.array(seen).reshape(found.nature.shape)

@@ -32,9 +32,13 @@ def slider(clearance: float, **settings: Any) -> SliderCrank:
 def ball(clearance: float, joint: str = "spherical", **settings: Any) -> SliderCrank:
     """The mechanism with clearance at the ball joint, upright."""
     return replace(
-        THESIS_SLIDER_CRANK, slider_joint="ideal", ball_joint=joint, ball_clearance=clearance, gravity=GRAVITY,
+        THESIS_SLIDER_CRANK,
+        slider_joint="ideal",
+        ball_joint=joint,
+        ball_clearance=clearance,
+        gravity=GRAVITY,
         **settings,
-    )  # fmt: skip
+    )
 
 
 def runs(machines: Sequence[SliderCrank], *fields: str, cycles: int = CYCLES, transient: int = TRANSIENT) -> Runs:

@@ -112,9 +112,13 @@ def ball_spread(parts: Parts) -> Sequence[Finding]:
     """Share of half the bearing, 180 deg, over which the impacts spread."""
     return [
         scored_finding(parts, "SSC-122", "±0.064 mm, 120 rpm: impacts spread over a sixth of half the bearing"),
-        scored_finding(parts, "SSC-123", "±0.245 mm, 110 rpm: impacts spread over almost all of half the bearing",
-                       sensitivity="clearance"),
-    ]  # fmt: skip
+        scored_finding(
+            parts,
+            "SSC-123",
+            "±0.245 mm, 110 rpm: impacts spread over almost all of half the bearing",
+            sensitivity="clearance",
+        ),
+    ]
 
 
 BALL_CLOUDS = ThesisFigure(
@@ -172,8 +176,16 @@ def paint_lives(parts: Parts, ax: Axes) -> None:
     thesis.relative_lives(parts["slider"]["crank_speed"], lowest, highest, statistical, ax)
     for k, (speed, target) in enumerate(((140.0, "SSC-126"), (200.0, "SSC-127"), (210.0, "SSC-128"))):
         low, high = printed(target)
-        ax.plot([speed, speed], [low, high], "-D", ms=5, mfc="none", lw=1.4, label=None if k else "measured, printed",
-                **thesis.PRINTED)  # fmt: skip
+        ax.plot(
+            [speed, speed],
+            [low, high],
+            "-D",
+            ms=5,
+            mfc="none",
+            lw=1.4,
+            label=None if k else "measured, printed",
+            **thesis.PRINTED,
+        )
     ax.set(xlabel=CRANK_SPEED.label)
     thesis.legend(ax, "lower left")
 
@@ -186,10 +198,13 @@ def life_ranges(parts: Parts) -> Sequence[Finding]:
         here = lives(parts)[int(np.argmin(np.abs(speed - at)))]
         low, high = printed(target)
         found.append(
-            Finding(f"{at:g} rpm: measured relative life {low:g}" + (f" to {high:g}" if high > low else ""),
-                    f"{here.lowest:.2g} to {here.highest:.2g}, statistical mean {here.statistical:.2g}",
-                    None, (target,))
-        )  # fmt: skip
+            Finding(
+                f"{at:g} rpm: measured relative life {low:g}" + (f" to {high:g}" if high > low else ""),
+                f"{here.lowest:.2g} to {here.highest:.2g}, statistical mean {here.statistical:.2g}",
+                None,
+                (target,),
+            )
+        )
     return found
 
 
@@ -212,11 +227,15 @@ def filling(parts: Parts) -> Sequence[Finding]:
     cycles = filling_cycles(diagram)
     wanted = printed("SSC-130").low
     return [
-        Finding(f"the diagram takes shape after {wanted:g} cycles",
-                f"95 % of the impacts fall into visited sections after {cycles} cycles" if cycles
-                else f"not within {len(data['force'])} cycles",
-                cycles is not None and 0.5 * wanted <= cycles <= 2.0 * wanted, ("SSC-130",))
-    ]  # fmt: skip
+        Finding(
+            f"the diagram takes shape after {wanted:g} cycles",
+            f"95 % of the impacts fall into visited sections after {cycles} cycles"
+            if cycles
+            else f"not within {len(data['force'])} cycles",
+            cycles is not None and 0.5 * wanted <= cycles <= 2.0 * wanted,
+            ("SSC-130",),
+        )
+    ]
 
 
 GROWING_CLOUD = ThesisFigure(
@@ -252,11 +271,14 @@ def converged(parts: Parts) -> Sequence[Finding]:
     wanted = printed("SSC-130").low
     found = convergence(parts["long"]["peaks"][0])
     return [
-        Finding(f"mean and STD converge after {wanted:g} cycles",
-                f"within 2 % and 15 % of their final values after {found.cycles} cycles; by their standard errors "
-                f"{found.needed} cycles are needed",
-                0.5 * wanted <= found.cycles <= 2.0 * wanted, ("SSC-130",))
-    ]  # fmt: skip
+        Finding(
+            f"mean and STD converge after {wanted:g} cycles",
+            f"within 2 % and 15 % of their final values after {found.cycles} cycles; by their standard errors "
+            f"{found.needed} cycles are needed",
+            0.5 * wanted <= found.cycles <= 2.0 * wanted,
+            ("SSC-130",),
+        )
+    ]
 
 
 RUNNING_STATISTICS = ThesisFigure(
@@ -273,6 +295,11 @@ RUNNING_STATISTICS = ThesisFigure(
 )
 
 FIGURES = (
-    CLEARANCE_HISTOGRAMS, SLIDER_HISTOGRAM, BALL_CLOUDS, SLIDER_CLOUD, RELATIVE_LIVES, GROWING_CLOUD,
+    CLEARANCE_HISTOGRAMS,
+    SLIDER_HISTOGRAM,
+    BALL_CLOUDS,
+    SLIDER_CLOUD,
+    RELATIVE_LIVES,
+    GROWING_CLOUD,
     RUNNING_STATISTICS,
-)  # fmt: skip
+)

@@ -46,13 +46,19 @@ FORCE_AGAINST_SPEED = ThesisFigure(
     shows="Chaotic from 110 to 190 rpm and at other speeds, periodic at 100 and 200 rpm.",
     parts=lambda resolution: {**over_speed(resolution, slider=LOOSE), **scored("SSC-042")},
     panels=(
-        force_diagram("", "slider", CRANK_SPEED,
-                      marks=(Mark(100.0, "SSC-043", "periodic", "none", "speed"),
-                             Mark(200.0, "SSC-044", "periodic", "none", "speed"))),
+        force_diagram(
+            "",
+            "slider",
+            CRANK_SPEED,
+            marks=(
+                Mark(100.0, "SSC-043", "periodic", "none", "speed"),
+                Mark(200.0, "SSC-044", "periodic", "none", "speed"),
+            ),
+        ),
     ),
     height=3.6,
     compare=chaotic_band,
-)  # fmt: skip
+)
 
 
 def spread_of(data: Data) -> float:
@@ -73,14 +79,18 @@ def no_chaos(parts: Parts) -> Sequence[Finding]:
             "±0.032 mm: chaos at 2.5 % contact damping, none at 5 %",
             f"chaotic at {before} of {total} speeds at 2.5 %, at {after} at 5 %; mean range {spread_of(loose):.2g} N "
             f"and {spread_of(stiff):.2g} N",
-            agrees(parts, "SSC-066", "SSC-067"), ("SSC-066", "SSC-067"), "contact damping",
+            agrees(parts, "SSC-066", "SSC-067"),
+            ("SSC-066", "SSC-067"),
+            "contact damping",
         ),
         Finding(
             "5 % contact damping: no chaos at ±0.032 mm, chaos at ±0.254 mm",
             f"chaotic at {after} of {total} speeds at ±0.032 mm, at {wild} of {wild_total} at ±0.254 mm",
-            agrees(parts, "SSC-067", "SSC-055"), ("SSC-067", "SSC-055"), "clearance",
+            agrees(parts, "SSC-067", "SSC-055"),
+            ("SSC-067", "SSC-055"),
+            "clearance",
         ),
-    ]  # fmt: skip
+    ]
 
 
 FORCE_FOR_CLEARANCES = ThesisFigure(
@@ -92,20 +102,32 @@ FORCE_FOR_CLEARANCES = ThesisFigure(
         **scored("SSC-049", "SSC-055", "SSC-066", "SSC-067"),
     },
     panels=(
-        force_diagram("(a) ±0.032 mm clearance (dimensionless 0.002)", "a", CRANK_SPEED,
-                      marks=(Mark(270.0, "SSC-051", "periodic", sensitivity="speed"),
-                             Mark(280.0, "SSC-052", "periodic", sensitivity="speed"),
-                             Mark(290.0, "SSC-053", "periodic", sensitivity="speed")),
-                      bands=(("I", "SSC-049"), ("II", "SSC-050"))),
-        force_diagram("(b) ±0.254 mm clearance (dimensionless 0.016)", "b", CRANK_SPEED,
-                      marks=(Mark(190.0, "SSC-056", "chaotic", sensitivity="speed"),
-                             Mark(210.0, "SSC-057", "periodic", sensitivity="speed"),
-                             Mark(220.0, "SSC-058", "chaotic", sensitivity="speed")),
-                      bands=(("III", "SSC-055"),)),
+        force_diagram(
+            "(a) ±0.032 mm clearance (dimensionless 0.002)",
+            "a",
+            CRANK_SPEED,
+            marks=(
+                Mark(270.0, "SSC-051", "periodic", sensitivity="speed"),
+                Mark(280.0, "SSC-052", "periodic", sensitivity="speed"),
+                Mark(290.0, "SSC-053", "periodic", sensitivity="speed"),
+            ),
+            bands=(("I", "SSC-049"), ("II", "SSC-050")),
+        ),
+        force_diagram(
+            "(b) ±0.254 mm clearance (dimensionless 0.016)",
+            "b",
+            CRANK_SPEED,
+            marks=(
+                Mark(190.0, "SSC-056", "chaotic", sensitivity="speed"),
+                Mark(210.0, "SSC-057", "periodic", sensitivity="speed"),
+                Mark(220.0, "SSC-058", "chaotic", sensitivity="speed"),
+            ),
+            bands=(("III", "SSC-055"),),
+        ),
     ),
     height=3.5,
     compare=no_chaos,
-)  # fmt: skip
+)
 
 
 def rod_lengths(resolution: float) -> Mapping[str, Computation]:
@@ -122,9 +144,11 @@ def rod_flip(parts: Parts) -> Sequence[Finding]:
         Finding(
             "-1 % of rod length, 0.2575 to 0.255 m, turns periodic into chaotic",
             f"{natures[0]} to {natures[1]} there; the nature changes at {flips(data, ROD_LENGTH, 0.0025)}",
-            natures == ["periodic", "chaotic"], ("SSC-060", "SSC-061"), "rod length",
+            natures == ["periodic", "chaotic"],
+            ("SSC-060", "SSC-061"),
+            "rod length",
         )
-    ]  # fmt: skip
+    ]
 
 
 FORCE_AGAINST_ROD = ThesisFigure(
@@ -133,13 +157,19 @@ FORCE_AGAINST_ROD = ThesisFigure(
     shows="The nature changes for 1 % of length: 34 N, periodic, at 0.2575 m; 33 to 43 N, chaotic, at 0.255 m.",
     parts=rod_lengths,
     panels=(
-        force_diagram("", "lengths", ROD_LENGTH,
-                      marks=(Mark(0.2575, "SSC-060", "periodic", sensitivity="rod length"),
-                             Mark(0.255, "SSC-061", "chaotic", sensitivity="rod length"))),
+        force_diagram(
+            "",
+            "lengths",
+            ROD_LENGTH,
+            marks=(
+                Mark(0.2575, "SSC-060", "periodic", sensitivity="rod length"),
+                Mark(0.255, "SSC-061", "chaotic", sensitivity="rod length"),
+            ),
+        ),
     ),
     height=3.6,
     compare=rod_flip,
-)  # fmt: skip
+)
 
 
 FRICTION_SPEEDS = {"SSC-064": 230.0, "SSC-065": 260.0}
@@ -164,9 +194,11 @@ def friction_flips(parts: Parts) -> Sequence[Finding]:
             Finding(
                 f"{speed:g} rpm: friction of 0.1 turns {wanted[0]} into {wanted[1]}",
                 f"{natures[0]} to {natures[1]} there; changed at {elsewhere or 'no speed'}",
-                natures == wanted, (target,), "friction",
+                natures == wanted,
+                (target,),
+                "friction",
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -182,6 +214,6 @@ FORCE_WITH_FRICTION = ThesisFigure(
     height=3.3,
     compare=friction_flips,
     remark="at 230 rpm without friction the text is periodic here and chaotic in 4.4.2: it contradicts itself",
-)  # fmt: skip
+)
 
 FIGURES = (FORCE_AGAINST_SPEED, FORCE_FOR_CLEARANCES, FORCE_AGAINST_ROD, FORCE_WITH_FRICTION)

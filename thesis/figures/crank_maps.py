@@ -47,8 +47,17 @@ def impact_spans(parts: Parts, ax: Axes) -> None:
     thesis.printed_span(*printed("SSC-028"), ax, "impacts, printed")
     thesis.printed_span(*printed("SSC-029"), ax, None)
     here = impact_speeds(parts["ball"])
-    ax.plot(here, np.full(len(here), 1.0), "^", ms=4, mew=0, color=INK, label="impacts here",
-            transform=ax.get_xaxis_transform(), clip_on=False)  # fmt: skip
+    ax.plot(
+        here,
+        np.full(len(here), 1.0),
+        "^",
+        ms=4,
+        mew=0,
+        color=INK,
+        label="impacts here",
+        transform=ax.get_xaxis_transform(),
+        clip_on=False,
+    )
 
 
 def ball_impacts(parts: Parts) -> Sequence[Finding]:
@@ -65,13 +74,20 @@ BALL_FORCE_AGAINST_SPEED = ThesisFigure(
     shows="Impacts from 110 to 190 rpm and at 280 rpm; chaos at 120, 130 and 140 rpm.",
     parts=ball_speeds,
     panels=(
-        force_diagram("", "ball", CRANK_SPEED, extra=impact_spans,
-                      marks=tuple(Mark(speed, target, "chaotic", "none") for speed, target in
-                                  ((120.0, "SSC-030"), (130.0, "SSC-031"), (140.0, "SSC-032")))),
+        force_diagram(
+            "",
+            "ball",
+            CRANK_SPEED,
+            extra=impact_spans,
+            marks=tuple(
+                Mark(speed, target, "chaotic", "none")
+                for speed, target in ((120.0, "SSC-030"), (130.0, "SSC-031"), (140.0, "SSC-032"))
+            ),
+        ),
     ),
     height=3.8,
     compare=ball_impacts,
-)  # fmt: skip
+)
 
 
 def ball_map(resolution: float) -> Mapping[str, Computation]:
@@ -108,9 +124,12 @@ def ball_region(parts: Parts) -> Sequence[Finding]:
     return [
         scored_finding(parts, "SSC-033", f"below ±0.127 mm impacts from {speeds} rpm, and only there"),
         scored_finding(parts, "SSC-034", "no impacts above 300 rpm"),
-        Finding("chaos only where there are impacts",
-                f"{np.sum(chaos & lost)} of {np.sum(chaos)} chaotic points have impacts", bool(np.all(lost[chaos]))),
-    ]  # fmt: skip
+        Finding(
+            "chaos only where there are impacts",
+            f"{np.sum(chaos & lost)} of {np.sum(chaos)} chaotic points have impacts",
+            bool(np.all(lost[chaos])),
+        ),
+    ]
 
 
 BALL_MAP = ThesisFigure(
@@ -152,19 +171,24 @@ def slider_criterion(parts: Parts) -> Sequence[Finding]:
     """Chaos only above the printed clearance and speed?"""
     data = parts["map"]
     columns = zip(data["crank_speed"], data["slider_clearance"], strict=True)
-    machines = [slider(float(gap), crank_speed=float(speed), contact_damping_ratio=HIGH_DAMPING)
-                for speed, gap in columns]  # fmt: skip
+    machines = [
+        slider(float(gap), crank_speed=float(speed), contact_damping_ratio=HIGH_DAMPING) for speed, gap in columns
+    ]
     rate = criterion_rate(machines, [str(kind) for kind in data["nature"]])  # type: ignore[misc]
     return [
-        scored_finding(parts, "SSC-117", "chaos only above dimensionless clearance 0.004 (±0.064 mm)",
-                       sensitivity="clearance"),
+        scored_finding(
+            parts, "SSC-117", "chaos only above dimensionless clearance 0.004 (±0.064 mm)", sensitivity="clearance"
+        ),
         scored_finding(parts, "SSC-118", "chaos only above 100 rpm", sensitivity="speed"),
         Finding(
             "chaos only above both",
             f"{rate.hit_rate:.0%} of the chaotic points of this map lie there; of the points there "
-            f"{rate.precision:.0%} are chaotic, of those outside {1.0 - rate.quiet:.0%}", None, (), "clearance",
+            f"{rate.precision:.0%} are chaotic, of those outside {1.0 - rate.quiet:.0%}",
+            None,
+            (),
+            "clearance",
         ),
-    ]  # fmt: skip
+    ]
 
 
 SLIDER_MAP = ThesisFigure(

@@ -82,8 +82,15 @@ def paint_resonances(parts: Parts, ax: Axes, *, part: str, tight: str | None = N
     peaks = data["peaks"]
     for kind in ("periodic", "chaotic", "undetermined"):
         of_kind = data["nature"] == kind
-        ax.plot(np.repeat(speed[of_kind], peaks.shape[1]), peaks[of_kind].ravel(), ".", ms=2.2, mew=0.0,
-                color=NATURE_COLOURS[kind], rasterized=True)  # fmt: skip
+        ax.plot(
+            np.repeat(speed[of_kind], peaks.shape[1]),
+            peaks[of_kind].ravel(),
+            ".",
+            ms=2.2,
+            mew=0.0,
+            color=NATURE_COLOURS[kind],
+            rasterized=True,
+        )
         ax.plot([], [], ".", ms=8.0, mew=0.0, color=NATURE_COLOURS[kind], label=kind)
     ax.plot(speed, force, lw=0.7, color=ACCENT)
     if tight is not None:
@@ -109,21 +116,33 @@ def orders_found(parts: Parts) -> Sequence[Finding]:
         where = "15 Hz, that is 900 rpm" if order == 5 else f"{SPEEDS[order]:g} rpm"
         found.append(
             scored_finding(
-                parts, target, f"resonance of order {order} at {where}", more="; ".join(texts),
+                parts,
+                target,
+                f"resonance of order {order} at {where}",
+                more="; ".join(texts),
                 sensitivity="flexibility",
             )
-        )  # fmt: skip
+        )
     wanted = printed("SSC-073").low
     _, force, _ = resonance(parts["offset"], 3)
     _, free, _ = resonance(parts["tight"], 3)
     return [
         *found,
-        scored_finding(parts, "SSC-073", f"up to {wanted:g} N at 1500 rpm", more=f"offset end bodies: {force:.0f} N",
-                       sensitivity="flexibility"),
-        Finding("resonances do not depend on the clearance and are there at zero clearance",
-                f"with offset end bodies order 3 has {force:.0f} N at ±0.127 mm, {free:.0f} N at zero clearance",
-                None, ("SSC-074",), "flexibility"),
-    ]  # fmt: skip
+        scored_finding(
+            parts,
+            "SSC-073",
+            f"up to {wanted:g} N at 1500 rpm",
+            more=f"offset end bodies: {force:.0f} N",
+            sensitivity="flexibility",
+        ),
+        Finding(
+            "resonances do not depend on the clearance and are there at zero clearance",
+            f"with offset end bodies order 3 has {force:.0f} N at ±0.127 mm, {free:.0f} N at zero clearance",
+            None,
+            ("SSC-074",),
+            "flexibility",
+        ),
+    ]
 
 
 SUPERHARMONICS = ThesisFigure(
@@ -133,12 +152,14 @@ SUPERHARMONICS = ThesisFigure(
     parts=superharmonics,
     panels=(
         Panel("(a) the machine that fits figures 4.13 to 4.16", partial(paint_resonances, part="thesis")),
-        Panel("(b) end bodies whose centres of gravity lie along the rod, structural damping 0.07 %",
-              partial(paint_resonances, part="offset", tight="tight")),
+        Panel(
+            "(b) end bodies whose centres of gravity lie along the rod, structural damping 0.07 %",
+            partial(paint_resonances, part="offset", tight="tight"),
+        ),
     ),
     height=3.8,
     compare=orders_found,
     remark="the force axis is logarithmic; no one set of parameters gives both the resonances and figures 4.13 to 4.16",
-)  # fmt: skip
+)
 
 FIGURES = (SUPERHARMONICS,)

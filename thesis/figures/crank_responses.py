@@ -55,10 +55,13 @@ BALL_FORCE = ThesisFigure(
     title="Contact force in the ball joint, spherical clearance: ±0.0635 mm, 120 rpm",
     shows="Contact to 70 deg, none to 95 deg, then an impact and bouncing until 130 deg.",
     parts=lambda resolution: revolutions(SPHERICAL, "SSC-025", "SSC-026"),
-    panels=(angle_panel("dotted: bouncing from 95 to 130 deg, printed", "force", "contact force [N]",
-                        sign=False, extra=ball_spans),),
+    panels=(
+        angle_panel(
+            "dotted: bouncing from 95 to 130 deg, printed", "force", "contact force [N]", sign=False, extra=ball_spans
+        ),
+    ),
     compare=ball_angles,
-)  # fmt: skip
+)
 
 
 def impulse_angles(parts: Parts) -> Sequence[Finding]:
@@ -152,11 +155,19 @@ def thin_rod(parts: Parts) -> Sequence[Finding]:
     first = float(frequencies_at(longer, 0.0)[0])
     force = np.abs(parts["force"]["force"])
     return [
-        Finding("the model's first natural frequency lies above the measured 18 Hz (rod of 240 mm)",
-                f"{first:.1f} Hz", first > 18.0, ("SSC-108",)),
-        Finding("similar pattern and order of magnitude as measured", f"largest force {force.max():.0f} N", None,
-                ("SSC-107",)),
-    ]  # fmt: skip
+        Finding(
+            "the model's first natural frequency lies above the measured 18 Hz (rod of 240 mm)",
+            f"{first:.1f} Hz",
+            first > 18.0,
+            ("SSC-108",),
+        ),
+        Finding(
+            "similar pattern and order of magnitude as measured",
+            f"largest force {force.max():.0f} N",
+            None,
+            ("SSC-107",),
+        ),
+    ]
 
 
 THIN_ROD_FORCE = ThesisFigure(

@@ -28,9 +28,7 @@ def updated(
 ) -> Mapping[str, Computation]:
     """Runs with several intervals."""
     machines = tuple(replace(machine, matrix_update_interval=interval) for interval in intervals)
-    return {
-        "runs": Runs(machines=machines, fields=("matrix_update_interval",), cycles=cycles, transient=transient)
-    }  # fmt: skip
+    return {"runs": Runs(machines=machines, fields=("matrix_update_interval",), cycles=cycles, transient=transient)}
 
 
 def pair(first: float, second: float) -> list[tuple[str, int, str]]:
@@ -82,10 +80,12 @@ def parting(parts: Parts) -> Sequence[Finding]:
     return [
         scored_finding(parts, "SSC-112", "runs with 5 and 6 deg part", more=f"{when}, at most {apart.max():.3g} N"),
         Finding(
-            f"cycle 62: {wanted[0]:g} N with 5 deg, {wanted[1]:g} N with 6 deg", f"{here[0]:.3g} N and {here[1]:.3g} N",
-            None, ("SSC-113", "SSC-114"),
+            f"cycle 62: {wanted[0]:g} N with 5 deg, {wanted[1]:g} N with 6 deg",
+            f"{here[0]:.3g} N and {here[1]:.3g} N",
+            None,
+            ("SSC-113", "SSC-114"),
         ),
-    ]  # fmt: skip
+    ]
 
 
 CHAOTIC_TEST = ThesisFigure(
@@ -117,9 +117,10 @@ def steady_statistics(parts: Parts) -> Sequence[Finding]:
         Finding(
             "mean and STD vary very little with the interval",
             f"mean {mean.min():.3g} to {mean.max():.3g} N, STD {deviation.min():.2g} to {deviation.max():.2g} N",
-            bool(np.ptp(mean) <= 0.05 * mean.mean()), ("SSC-115",),
+            bool(np.ptp(mean) <= 0.05 * mean.mean()),
+            ("SSC-115",),
         )
-    ]  # fmt: skip
+    ]
 
 
 UPDATE_STATISTICS = ThesisFigure(

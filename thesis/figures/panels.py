@@ -109,10 +109,14 @@ class ForceDiagram:
             else:
                 found.append(
                     compare_response(
-                        where, mark.target, response, mark.nature,
-                        largest_only=mark.force == "largest", sensitivity=mark.sensitivity,
+                        where,
+                        mark.target,
+                        response,
+                        mark.nature,
+                        largest_only=mark.force == "largest",
+                        sensitivity=mark.sensitivity,
                     )
-                )  # fmt: skip
+                )
         return found
 
     def panel(self) -> Panel:
@@ -229,8 +233,17 @@ def cycles_panel(
             peaks = parts[part]["peaks"][row]
             number = np.arange(1, len(peaks) + 1)
             style = "-o" if joined else "o"
-            ax.plot(number, peaks, style, ms=2.0 + width if joined else 1.8, lw=0.8 * width, mew=0.0, color=colour,
-                    label=label, rasterized=not joined)  # fmt: skip
+            ax.plot(
+                number,
+                peaks,
+                style,
+                ms=2.0 + width if joined else 1.8,
+                lw=0.8 * width,
+                mew=0.0,
+                color=colour,
+                label=label,
+                rasterized=not joined,
+            )
         ax.set(xlabel="cycle", ylabel="peak impact force [N]")
         if cycles is not None:
             ax.set_xlim(*cycles)

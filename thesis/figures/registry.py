@@ -39,9 +39,9 @@ def _place(figure: ThesisFigure) -> tuple[int, int]:
     return int(chapter), int(number)
 
 
-FIGURES: Mapping[str, ThesisFigure] = MappingProxyType({
-    figure.id: figure for figure in sorted((figure for module in _MODULES for figure in module.FIGURES), key=_place)
-})  # fmt: skip
+FIGURES: Mapping[str, ThesisFigure] = MappingProxyType(
+    {figure.id: figure for figure in sorted((figure for module in _MODULES for figure in module.FIGURES), key=_place)}
+)
 
 
 def chosen(ids: Sequence[str]) -> list[ThesisFigure]:

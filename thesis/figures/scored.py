@@ -30,8 +30,10 @@ class Scored:
         machines = {self.machine.name: self.machine}
         (judged,) = evaluate([self.comparison], machines, efforts=THOROUGH, folder=default_folder(), workers=workers)
         return {
-            "hit": np.array(judged.error <= 1.0), "value": np.array(judged.shown_value), "notes": np.array(judged.notes)
-        }  # fmt: skip
+            "hit": np.array(judged.error <= 1.0),
+            "value": np.array(judged.shown_value),
+            "notes": np.array(judged.notes),
+        }
 
 
 def scored(*targets: str) -> Mapping[str, Computation]:

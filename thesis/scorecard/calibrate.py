@@ -160,11 +160,15 @@ def calibrate(
     values, best, present = _final(space, finished, workers, cache, progress)
     machine = space.machine(values)
     result = Calibration(
-        machine=machine, values=values, objective=best, present_objective=present, trials=len(finished),
+        machine=machine,
+        values=values,
+        objective=best,
+        present_objective=present,
+        trials=len(finished),
         card=scorecard([name], bases={name: machine}, folder=cache, workers=workers, progress=progress),
         present_card=scorecard([name], bases={name: space.base}, folder=cache, workers=workers, progress=progress),
         determination=determine(space, values, _complete(finished), workers=workers, progress=progress),
-    )  # fmt: skip
+    )
     text = json.dumps(result.as_dict(), indent=2, allow_nan=False) + "\n"
     write_atomically(folder / RESULT_FILE, lambda temporary: temporary.write_text(text))
     return result
@@ -194,9 +198,7 @@ def _open(folder: Path, plan: dict[str, Any], space: SearchSpace) -> Any:
     begun = plan_file.is_file()
     if not begun:
         write_atomically(plan_file, lambda temporary: temporary.write_text(json.dumps(plan, indent=2) + "\n"))
-    storage = optuna.storages.JournalStorage(
-        optuna.storages.journal.JournalFileBackend(str(folder / JOURNAL_FILE))
-    )  # fmt: skip
+    storage = optuna.storages.JournalStorage(optuna.storages.journal.JournalFileBackend(str(folder / JOURNAL_FILE)))
     study = optuna.create_study(storage=storage, study_name="calibration", load_if_exists=True)
     running = [trial for trial in study.trials if trial.state == optuna.trial.TrialState.RUNNING]
     for trial in running:
@@ -221,8 +223,9 @@ def _search(
         while _goes_on(budget, len(finished), began):
             study.sampler = optuna.samplers.TPESampler(
                 seed=int(np.random.SeedSequence([seed, len(finished)]).generate_state(1)[0]),
-                multivariate=True, n_startup_trials=space.random_trials,
-            )  # fmt: skip
+                multivariate=True,
+                n_startup_trials=space.random_trials,
+            )
             trial = study.ask()
             threshold = _threshold(finished)
             try:
@@ -292,9 +295,7 @@ def _final(
     statements = [one for stage in calibration_statements(space.base.name) for one in stage]
 
     def thorough(machine: Machine) -> float:
-        return objective(
-            evaluate(statements, {machine.name: machine}, efforts=THOROUGH, folder=cache, workers=workers)
-        )  # fmt: skip
+        return objective(evaluate(statements, {machine.name: machine}, efforts=THOROUGH, folder=cache, workers=workers))
 
     present = thorough(space.base)
     best: tuple[float, Mapping[str, Any]] = (present, space.starts[0])

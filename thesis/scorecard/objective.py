@@ -25,9 +25,10 @@ from thesis.statements import Comparison, read_comparisons
 def calibration_statements(machine: str) -> tuple[tuple[Comparison, ...], ...]:
     """Statements that a calibration may see, in stages: single runs, then curves; contradictory ones left out."""
     seen = [
-        one for one in read_comparisons().compared
+        one
+        for one in read_comparisons().compared
         if one.machine == machine and one.part == "calibration" and not one.contradictory
-    ]  # fmt: skip
+    ]
     return tuple(one for one in seen if one.along is None), tuple(one for one in seen if one.along is not None)
 
 

@@ -127,9 +127,13 @@ def observe(machine: Machine, effort: Effort) -> Observation:
     settle = two_step_test(plotted, sensor_error=READING_ERROR).settle_cycle if effort.budget else None
     shares = settled.bounce_duration[settled.bounce_duration > 0.0] / (0.5 * machine.cycle_period)
     return Observation(
-        nature=read.nature, period=read.period, exact_nature=exact.nature,
-        low=float(peaks.min()), mean=float(peaks.mean()), high=float(peaks.max()),
+        nature=read.nature,
+        period=read.period,
+        exact_nature=exact.nature,
+        low=float(peaks.min()),
+        mean=float(peaks.mean()),
+        high=float(peaks.max()),
         bounce_share=float(np.median(shares)) if len(shares) else 0.0,
         longest_bounce_share=float(shares.max()) if len(shares) else 0.0,
         settle_cycle=settle if read.nature == "periodic" else None,
-    )  # fmt: skip
+    )

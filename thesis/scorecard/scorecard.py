@@ -37,18 +37,22 @@ class Scorecard:
             for group in (one.comparison.group, "all"):
                 groups.setdefault(group, Counter())[one.verdict] += 1
         return {
-            machine: {group: {**{name: count[name] for name in COUNTED}, "total": count.total()}
-                      for group, count in sorted(groups.items(), key=lambda item: item[0] == "all")}
+            machine: {
+                group: {**{name: count[name] for name in COUNTED}, "total": count.total()}
+                for group, count in sorted(groups.items(), key=lambda item: item[0] == "all")
+            }
             for machine, groups in found.items()
-        }  # fmt: skip
+        }
 
     def hit_rate(self, machine: str, part: str | None = None) -> tuple[int, int]:
         """Hits, and statements that count, of a machine; of one part of them if one is named."""
         counted = [
-            one for one in self.judged
-            if one.comparison.machine == machine and one.verdict != "contradictory"
+            one
+            for one in self.judged
+            if one.comparison.machine == machine
+            and one.verdict != "contradictory"
             and part in (None, one.comparison.part)
-        ]  # fmt: skip
+        ]
         return sum(one.verdict == "hit" for one in counted), len(counted)
 
     def as_dict(self) -> dict[str, Any]:
@@ -91,10 +95,14 @@ def scorecard(
     made = {name: (bases or {}).get(name) or MACHINES[name]() for name in wanted}
     return Scorecard(
         evaluate(
-            comparisons, made, efforts=efforts, folder=folder, workers=workers,
+            comparisons,
+            made,
+            efforts=efforts,
+            folder=folder,
+            workers=workers,
             progress="scorecard" if progress else None,
         )
-    )  # fmt: skip
+    )
 
 
 def evaluate(
@@ -115,7 +123,12 @@ def evaluate(
     jobs = [job for plan in plans for _, needed in plan for job in needed]
     results = run_jobs(jobs, folder=folder, workers=workers, progress=progress)
     return tuple(
-        judge(one, [QUANTITIES[one.quantity].finding(machine, one, [results[job] for job in needed])
-                    for machine, needed in plan])
+        judge(
+            one,
+            [
+                QUANTITIES[one.quantity].finding(machine, one, [results[job] for job in needed])
+                for machine, needed in plan
+            ],
+        )
         for one, plan in zip(comparisons, plans, strict=True)
-    )  # fmt: skip
+    )

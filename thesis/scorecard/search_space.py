@@ -119,9 +119,14 @@ def with_printed_frequency(crank: SliderCrank, inertia_ratio: float) -> SliderCr
     def excess(log_inertia: float) -> float:
         housing = math.exp(log_inertia)
         trial = replace(
-            crank, housing_inertia=housing, yoke_inertia=housing * inertia_ratio, housing_offset_along=0.0,
-            housing_offset_across=0.0, yoke_offset_along=0.0, yoke_offset_across=0.0,
-        )  # fmt: skip
+            crank,
+            housing_inertia=housing,
+            yoke_inertia=housing * inertia_ratio,
+            housing_offset_along=0.0,
+            housing_offset_across=0.0,
+            yoke_offset_along=0.0,
+            yoke_offset_across=0.0,
+        )
         return float(frequencies_at(trial, 0.0)[0]) - FIRST_FREQUENCY
 
     housing = math.exp(scipy.optimize.brentq(excess, math.log(1e-5), math.log(1e-1), xtol=1e-8))
@@ -168,33 +173,80 @@ def _present(machine: Machine, dimensions: tuple[Dimension, ...]) -> dict[str, A
 
 SEARCH_SPACES: Mapping[str, SearchSpace] = {
     ImpactBeam.name: SearchSpace(
-        THESIS_IMPACT_BEAM, _BEAM_FIELDS, _beam,
+        THESIS_IMPACT_BEAM,
+        _BEAM_FIELDS,
+        _beam,
         (
             _present(THESIS_IMPACT_BEAM, _BEAM_FIELDS),
-            {"width": 17.71e-3, "force_position": 0.1969, "shaker_mass": 0.111, "shaker_damping": 30.4,
-             "pivot_translational_stiffness": 9.7e7, "damping_family": "stiffness", "n_modes": 5},
-            {"width": 12.7e-3, "force_position": 0.160, "shaker_mass": 0.195, "shaker_damping": 11.3,
-             "pivot_translational_stiffness": 3.6e7, "damping_family": "stiffness", "n_modes": 7},
-            {"width": 25.4e-3, "force_position": 0.209, "shaker_mass": 0.1, "shaker_damping": 30.0,
-             "pivot_translational_stiffness": 1e8, "damping_family": "uniform", "n_modes": 5},
-            {"width": 0.0210043483, "force_position": 0.2010367187, "shaker_mass": 0.1016893242,
-             "shaker_damping": 43.65022747, "pivot_translational_stiffness": 36299594.42, "damping_family": "stiffness",
-             "n_modes": 5},
+            {
+                "width": 17.71e-3,
+                "force_position": 0.1969,
+                "shaker_mass": 0.111,
+                "shaker_damping": 30.4,
+                "pivot_translational_stiffness": 9.7e7,
+                "damping_family": "stiffness",
+                "n_modes": 5,
+            },
+            {
+                "width": 12.7e-3,
+                "force_position": 0.160,
+                "shaker_mass": 0.195,
+                "shaker_damping": 11.3,
+                "pivot_translational_stiffness": 3.6e7,
+                "damping_family": "stiffness",
+                "n_modes": 7,
+            },
+            {
+                "width": 25.4e-3,
+                "force_position": 0.209,
+                "shaker_mass": 0.1,
+                "shaker_damping": 30.0,
+                "pivot_translational_stiffness": 1e8,
+                "damping_family": "uniform",
+                "n_modes": 5,
+            },
+            {
+                "width": 0.0210043483,
+                "force_position": 0.2010367187,
+                "shaker_mass": 0.1016893242,
+                "shaker_damping": 43.65022747,
+                "pivot_translational_stiffness": 36299594.42,
+                "damping_family": "stiffness",
+                "n_modes": 5,
+            },
         ),
         60,
     ),
     SliderCrank.name: SearchSpace(
-        THESIS_SLIDER_CRANK, _CRANK_FIELDS, _crank,
+        THESIS_SLIDER_CRANK,
+        _CRANK_FIELDS,
+        _crank,
         (
-            {**_present(THESIS_SLIDER_CRANK, _CRANK_FIELDS),
-             "inertia_ratio": THESIS_SLIDER_CRANK.yoke_inertia / THESIS_SLIDER_CRANK.housing_inertia},
-            {**_present(THESIS_SLIDER_CRANK, _CRANK_FIELDS), "slider_mass": 0.12, "yoke_mass": 0.26,
-             "yoke_offset_along": 0.02, "inertia_ratio": 1.8},
-            {"slider_mass": 0.118758, "yoke_mass": 0.244289, "housing_mass": 0.545084,
-             "housing_offset_along": 0.0101523, "yoke_offset_along": 0.0114435, "inertia_ratio": 1.98658,
-             "damping_ratio": 0.0430875, "damping_family": "stiffness", "n_modes": 4, "geometric_stiffness": "off"},
+            {
+                **_present(THESIS_SLIDER_CRANK, _CRANK_FIELDS),
+                "inertia_ratio": THESIS_SLIDER_CRANK.yoke_inertia / THESIS_SLIDER_CRANK.housing_inertia,
+            },
+            {
+                **_present(THESIS_SLIDER_CRANK, _CRANK_FIELDS),
+                "slider_mass": 0.12,
+                "yoke_mass": 0.26,
+                "yoke_offset_along": 0.02,
+                "inertia_ratio": 1.8,
+            },
+            {
+                "slider_mass": 0.118758,
+                "yoke_mass": 0.244289,
+                "housing_mass": 0.545084,
+                "housing_offset_along": 0.0101523,
+                "yoke_offset_along": 0.0114435,
+                "inertia_ratio": 1.98658,
+                "damping_ratio": 0.0430875,
+                "damping_family": "stiffness",
+                "n_modes": 4,
+                "geometric_stiffness": "off",
+            },
         ),
         20,
     ),
-}  # fmt: skip
+}
 """By machine. Ranges and candidates: algebra on printed numbers, and fits that preceded this one."""

@@ -172,12 +172,20 @@ def _comparison(statement: Statement, entry: Mapping[str, Any], tolerances: Mapp
     if entry["tolerance"] not in tolerances:
         raise DatasetError(f"{statement.id}: tolerance = {entry['tolerance']!r} is not one of {', '.join(tolerances)}")
     return Comparison(
-        statement=statement, machine=machine, group=entry["group"], part=entry["part"], quantity=entry["quantity"],
-        printed=_printed(statement, entry), tolerance=tolerances[entry["tolerance"]], at=tuple(entry["at"]),
-        along=_axis(entry.get("along")), across=_axis(entry.get("across")),
-        contradictory=entry.get("contradictory", ""), not_computed=entry.get("not_computed", ""),
+        statement=statement,
+        machine=machine,
+        group=entry["group"],
+        part=entry["part"],
+        quantity=entry["quantity"],
+        printed=_printed(statement, entry),
+        tolerance=tolerances[entry["tolerance"]],
+        at=tuple(entry["at"]),
+        along=_axis(entry.get("along")),
+        across=_axis(entry.get("across")),
+        contradictory=entry.get("contradictory", ""),
+        not_computed=entry.get("not_computed", ""),
         unit=entry.get("unit", statement.unit),
-    )  # fmt: skip
+    )
 
 
 def _printed(statement: Statement, entry: Mapping[str, Any]) -> Printed:

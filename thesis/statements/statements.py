@@ -12,9 +12,19 @@ from types import MappingProxyType
 from chaosgym.errors import DatasetError
 
 COLUMNS = (
-    "id", "section", "figure_or_table", "system", "kind", "quantity", "value_low", "value_high", "unit", "conditions",
-    "exact_or_approx", "note",
-)  # fmt: skip
+    "id",
+    "section",
+    "figure_or_table",
+    "system",
+    "kind",
+    "quantity",
+    "value_low",
+    "value_high",
+    "unit",
+    "conditions",
+    "exact_or_approx",
+    "note",
+)
 
 SYSTEMS = {"IBS": "impact-beam", "SSC": "slider-crank", "BOTH": None}
 """Machine by the prefix of a statement's name; None speaks of both."""
@@ -100,10 +110,19 @@ def _statement(row: Mapping[str, str], where: str) -> Statement:
     if (low is None) != (high is None):
         raise DatasetError(f"{where}: value_low = {low} and value_high = {high}; allowed: both or none")
     return Statement(
-        id=row["id"], section=row["section"], figure=row["figure_or_table"], system=row["system"], kinds=kinds,
-        quantity=row["quantity"], low=low, high=high, unit=row["unit"], conditions=row["conditions"],
-        exact=row["exact_or_approx"] == "exact", note=row["note"],
-    )  # fmt: skip
+        id=row["id"],
+        section=row["section"],
+        figure=row["figure_or_table"],
+        system=row["system"],
+        kinds=kinds,
+        quantity=row["quantity"],
+        low=low,
+        high=high,
+        unit=row["unit"],
+        conditions=row["conditions"],
+        exact=row["exact_or_approx"] == "exact",
+        note=row["note"],
+    )
 
 
 def _number(text: str, what: str) -> float | None:

@@ -47,9 +47,11 @@ def classify_file(classifier: MachineClassifier, source: str | Path, out: str | 
     write_atomically(target, lambda temporary: pq.write_table(table, temporary))
     counts = Counter(str(kind) for kind in answers["response_type"] if kind is not None)
     return {
-        "rows": len(table), "abstained": int(answers["abstained"].sum()), "out": str(out),
+        "rows": len(table),
+        "abstained": int(answers["abstained"].sum()),
+        "out": str(out),
         "response_types": {name: counts[name] for name in sorted(counts)},
-    }  # fmt: skip
+    }
 
 
 def _of_parameters(classifier: MachineClassifier, table: pa.Table, source: str) -> dict[str, Any]:

@@ -49,9 +49,7 @@ class SwingTable(NamedTuple):
 def swing_table(machine: Machine | None, fields: tuple[str, ...], grid: Array) -> SwingTable:
     """Table for a beam whose ``fields`` vary, over lengths ``grid``; without modes for whatever has no such groups."""
     vary = {"excitation_frequency", "clearance"} <= set(fields) <= set(FIELDS)
-    if not (
-        isinstance(machine, ImpactBeam) and machine.contact_law == "linear" and machine.n_modes >= FREE and vary
-    ):  # fmt: skip
+    if not (isinstance(machine, ImpactBeam) and machine.contact_law == "linear" and machine.n_modes >= FREE and vary):
         return SwingTable(np.full(len(FIELDS), -1), np.zeros(len(FIELDS)), np.zeros(1), np.empty((0, 1)))
     places = np.array([fields.index(name) if name in fields else -1 for name in FIELDS])
     fixed = np.array([getattr(machine, name) for name in FIELDS], dtype=float)
@@ -68,10 +66,14 @@ def _modes(machine: ImpactBeam, length: float) -> Array:
     squares, shapes = np.linalg.eigh(np.diag(none.stiffness) + push)
     shapes = shapes[:, :RINGING]
     bending = slice(1, FREE)
-    return np.concatenate([
-        np.sqrt(none.stiffness[:FREE]), np.sqrt(squares[:RINGING]),
-        [none.damping[0, 0], none.tip_shape[0], none.force_shape[0]],
-        *(0.5 * np.einsum("ik,ij,jk->k", shapes, part, shapes) for part in (none.damping, slope)),
-        0.5 * (shapes.T @ none.tip_shape) ** 2,
-        0.5 * np.diag(none.damping)[bending], 0.5 * np.diag(slope)[bending],
-    ])  # fmt: skip
+    return np.concatenate(
+        [
+            np.sqrt(none.stiffness[:FREE]),
+            np.sqrt(squares[:RINGING]),
+            [none.damping[0, 0], none.tip_shape[0], none.force_shape[0]],
+            *(0.5 * np.einsum("ik,ij,jk->k", shapes, part, shapes) for part in (none.damping, slope)),
+            0.5 * (shapes.T @ none.tip_shape) ** 2,
+            0.5 * np.diag(none.damping)[bending],
+            0.5 * np.diag(slope)[bending],
+        ]
+    )

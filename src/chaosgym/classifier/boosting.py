@@ -18,16 +18,29 @@ def without_empty_columns(features: Array) -> Array:
 
 
 def train_forest(
-    features: Array, labels: NDArray[np.int64], *, rounds: int, leaves: int = 15, learning_rate: float = 0.1,
-    least_rows: int = 20, depth: int | None = None, seed: int = 0,
-) -> Forest:  # fmt: skip
+    features: Array,
+    labels: NDArray[np.int64],
+    *,
+    rounds: int,
+    leaves: int = 15,
+    learning_rate: float = 0.1,
+    least_rows: int = 20,
+    depth: int | None = None,
+    seed: int = 0,
+) -> Forest:
     """Train a boosted classifier of class numbers (n,) on features (n, n_features)."""
     from sklearn.ensemble import HistGradientBoostingClassifier
 
     model = HistGradientBoostingClassifier(
-        max_iter=rounds, max_leaf_nodes=leaves, max_depth=depth, learning_rate=learning_rate, l2_regularization=L2,
-        min_samples_leaf=min(least_rows, max(1, len(labels) // 20)), early_stopping=False, random_state=seed,
-    )  # fmt: skip
+        max_iter=rounds,
+        max_leaf_nodes=leaves,
+        max_depth=depth,
+        learning_rate=learning_rate,
+        l2_regularization=L2,
+        min_samples_leaf=min(least_rows, max(1, len(labels) // 20)),
+        early_stopping=False,
+        random_state=seed,
+    )
     return forest_of(model.fit(without_empty_columns(features), labels))
 
 
@@ -36,7 +49,14 @@ def train_quantile_forest(features: Array, values: Array, quantile: float, round
     from sklearn.ensemble import HistGradientBoostingRegressor
 
     model = HistGradientBoostingRegressor(
-        loss="quantile", quantile=quantile, max_iter=rounds, learning_rate=0.1, l2_regularization=L2,
-        max_leaf_nodes=16, min_samples_leaf=LEAST_ROWS, early_stopping=False, random_state=seed,
-    )  # fmt: skip
+        loss="quantile",
+        quantile=quantile,
+        max_iter=rounds,
+        learning_rate=0.1,
+        l2_regularization=L2,
+        max_leaf_nodes=16,
+        min_samples_leaf=LEAST_ROWS,
+        early_stopping=False,
+        random_state=seed,
+    )
     return forest_of(model.fit(without_empty_columns(features), values))

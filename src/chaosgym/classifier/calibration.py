@@ -41,6 +41,9 @@ def conformal_threshold(chances: Array, labels: NDArray[np.int64], coverage: flo
 def calibration_error(confidence: Array, correct: NDArray[np.bool_], bins: int = BINS) -> float:
     """Expected calibration error: mean gap between confidence (n,) and share correct over bins of equal mass."""
     order = np.argsort(confidence, kind="stable")
-    gaps = [len(part) * abs(confidence[part].mean() - correct[part].mean())
-            for part in np.array_split(order, bins) if len(part)]  # fmt: skip
+    gaps = [
+        len(part) * abs(confidence[part].mean() - correct[part].mean())
+        for part in np.array_split(order, bins)
+        if len(part)
+    ]
     return float(np.sum(gaps) / len(order))

@@ -82,8 +82,10 @@ class Examples:
 
     def signals_where(self, chosen: NDArray[np.bool_]) -> dict[str, tuple[Array, Array, NDArray[np.int64]]]:
         """Signals of the rows that are chosen (n,)."""
-        return {window: tuple(part[chosen[rows]] for part in (peaks, section, rows))  # type: ignore[misc]
-                for window, (peaks, section, rows) in self.signals.items()}  # fmt: skip
+        return {
+            window: tuple(part[chosen[rows]] for part in (peaks, section, rows))  # type: ignore[misc]
+            for window, (peaks, section, rows) in self.signals.items()
+        }
 
 
 def thinned(sweep: LabelledSweep, seed: int) -> LabelledSweep:
@@ -129,11 +131,20 @@ def examples_of(sweep: LabelledSweep, seed: int) -> Examples:
             kept = usable[at]
             signals[window] = (peaks[kept], section[kept], place[at[kept]])
     return Examples(
-        machine=machine(**sweep.settings["base"]), fields=fields, values=values, response_type=types[usable],
-        nature=natures[usable], period=np.nan_to_num(sweep.column("period")[usable].astype(float)).astype(np.int64),
-        groups=groups, calibration=calibration, test=test, clear=_clear(sweep, usable, natures[usable]),
-        signals=signals, left_out=int(np.sum(~usable)), ranges=_ranges(sweep.settings, values),
-    )  # fmt: skip
+        machine=machine(**sweep.settings["base"]),
+        fields=fields,
+        values=values,
+        response_type=types[usable],
+        nature=natures[usable],
+        period=np.nan_to_num(sweep.column("period")[usable].astype(float)).astype(np.int64),
+        groups=groups,
+        calibration=calibration,
+        test=test,
+        clear=_clear(sweep, usable, natures[usable]),
+        signals=signals,
+        left_out=int(np.sum(~usable)),
+        ranges=_ranges(sweep.settings, values),
+    )
 
 
 def _ranges(settings: dict[str, Any], values: Array) -> tuple[Array, Array]:
@@ -146,8 +157,9 @@ def _ranges(settings: dict[str, Any], values: Array) -> tuple[Array, Array]:
 def _clear(sweep: LabelledSweep, usable: NDArray[np.bool_], nature: NDArray[np.str_]) -> NDArray[np.bool_]:
     if "exponent" not in sweep.table.column_names:
         return np.ones(len(nature), dtype=bool)
-    exponent, low, high = (sweep.column(name)[usable].astype(float)
-                           for name in ("exponent", "peak_force_min", "peak_force_max"))  # fmt: skip
+    exponent, low, high = (
+        sweep.column(name)[usable].astype(float) for name in ("exponent", "peak_force_min", "peak_force_max")
+    )
     return np.asarray((np.abs(exponent) > AWAY_EXPONENT) & ((nature == "periodic") | (high - low > AWAY_SPREAD)))
 
 

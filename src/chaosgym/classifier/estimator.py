@@ -192,8 +192,9 @@ class ResponseClassifier:
         trees = Trees(self.rounds, self.leaves, self.depth, self.learning_rate, self.least_rows)
         trained = train_scorers(self.model, trees, features[~held], pair[~held], self.seed)
         tick()
-        self.log_losses_ = {name: self._calibrate(scorers, features[held], pair[held])
-                            for name, scorers in trained.items()}  # fmt: skip
+        self.log_losses_ = {
+            name: self._calibrate(scorers, features[held], pair[held]) for name, scorers in trained.items()
+        }
         self.model_ = min(self.log_losses_, key=self.log_losses_.__getitem__)
         self.scorers_ = trained[self.model_]
         if self.pupil:

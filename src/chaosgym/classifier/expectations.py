@@ -39,9 +39,12 @@ def learn_expectations(features: Array, period: Labels | None, force: Array | No
     forces = constant_forest(np.zeros(0))
     if force is not None and (force > 0.0).any():
         rows = force > 0.0
-        forces = joined(tuple(
-            train_quantile_forest(features[rows], np.log(force[rows]), quantile, ROUNDS, seed) for quantile in QUANTILES
-        ))  # fmt: skip
+        forces = joined(
+            tuple(
+                train_quantile_forest(features[rows], np.log(force[rows]), quantile, ROUNDS, seed)
+                for quantile in QUANTILES
+            )
+        )
     return Expectations(known, judge, forces)
 
 

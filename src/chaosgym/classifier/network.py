@@ -64,8 +64,9 @@ def train_network(features: Array, targets: Array, seed: int) -> Network:
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     generator = torch.Generator().manual_seed(seed)
-    layers = [torch.nn.Linear(before, after) for before, after in
-              pairwise((inputs.shape[1], HIDDEN, HIDDEN, wanted.shape[1]))]  # fmt: skip
+    layers = [
+        torch.nn.Linear(before, after) for before, after in pairwise((inputs.shape[1], HIDDEN, HIDDEN, wanted.shape[1]))
+    ]
     with torch.no_grad():
         for layer in layers:
             torch.nn.init.kaiming_uniform_(layer.weight, nonlinearity="relu", generator=generator)
@@ -82,6 +83,8 @@ def train_network(features: Array, targets: Array, seed: int) -> Network:
         schedule.step()
     torch.set_num_threads(threads)
     return Network(
-        centre, spread, tuple(layer.weight.detach().numpy().T.copy() for layer in layers),
+        centre,
+        spread,
+        tuple(layer.weight.detach().numpy().T.copy() for layer in layers),
         tuple(layer.bias.detach().numpy().copy() for layer in layers),
-    )  # fmt: skip
+    )

@@ -61,8 +61,9 @@ def neighbourhood(features: Array, groups: NDArray[np.int64], seed: int) -> Neig
     known = whole._replace(prototypes=_drawn(features[~held], whole, generator))
     tried = _some(features[held], generator)
     distances, band = novelty(known, tried), np.searchsorted(edges, tried[:, 0])
-    thresholds = [np.quantile(distances[band == i], 1.0 - FALSE_REFUSALS) if np.any(band == i) else np.inf
-                  for i in range(BANDS)]  # fmt: skip
+    thresholds = [
+        np.quantile(distances[band == i], 1.0 - FALSE_REFUSALS) if np.any(band == i) else np.inf for i in range(BANDS)
+    ]
     return whole._replace(prototypes=_drawn(features, whole, generator), thresholds=np.array(thresholds))
 
 

@@ -58,8 +58,10 @@ class Pairs(NamedTuple):
         nature = self.nature_of[pair]
         types = np.where(self.nature_of[None, :] == nature[:, None], scores - top, ELSEWHERE)
         several = np.bincount(self.nature_of)[nature] > 1
-        found = [best_temperature(natures, nature) if natures.shape[1] > 1 else 1.0,
-                 best_temperature(types[several], pair[several]) if several.any() else 1.0]  # fmt: skip
+        found = [
+            best_temperature(natures, nature) if natures.shape[1] > 1 else 1.0,
+            best_temperature(types[several], pair[several]) if several.any() else 1.0,
+        ]
         return self._replace(temperatures=np.array(found))
 
 

@@ -53,14 +53,16 @@ def parameter_scaling(machine: Machine | None, fields: tuple[str, ...], values: 
     )
     if machine is None or machine.speed_field not in fields:
         return plain
-    places = np.array([fields.index(name) if name in fields else -1
-                       for name in (machine.speed_field, machine.clearance_field)] + [-1])  # fmt: skip
+    places = np.array(
+        [fields.index(name) if name in fields else -1 for name in (machine.speed_field, machine.clearance_field)] + [-1]
+    )
     hertz = 1.0 / (machine.cycle_period * float(getattr(machine, machine.speed_field)))
     rest = machine.natural_frequencies[:MODES]
     changing = [
-        index for index, name in enumerate(fields)
+        index
+        for index, name in enumerate(fields)
         if any(not np.array_equal(_natural(machine, name, end), rest) for end in (low[index], high[index]))
-    ]  # fmt: skip
+    ]
     if len(changing) > 1:
         return plain
     grid, frequencies = np.zeros(1), np.ascontiguousarray(rest[:, None])

@@ -55,10 +55,11 @@ def signals_of(table: Any, window: str) -> tuple[Array, Array, NDArray[np.int64]
     kept = [table.column(name).combine_chunks() for name in names]
     rows = np.flatnonzero(kept[0].is_valid().to_numpy(zero_copy_only=False))
     peaks, displacement, velocity = (
-        np.stack(column.take(rows).to_numpy(zero_copy_only=False)).astype(float) if len(rows)
+        np.stack(column.take(rows).to_numpy(zero_copy_only=False)).astype(float)
+        if len(rows)
         else np.empty((0, MAX_CYCLES))
         for column in kept
-    )  # fmt: skip
+    )
     return peaks, np.stack([displacement, velocity], axis=2), rows
 
 

@@ -79,8 +79,9 @@ def _block(title: str, methods: Mapping[str, Any]) -> list[str]:
 
 
 def _line(name: str, scores: Mapping[str, Any]) -> str:
-    shown = [f"{value:.3f} [{low:.3f}, {high:.3f}]" for value, low, high in
-             (scores["accuracy"], scores["balanced_accuracy"])]  # fmt: skip
+    shown = [
+        f"{value:.3f} [{low:.3f}, {high:.3f}]" for value, low, high in (scores["accuracy"], scores["balanced_accuracy"])
+    ]
     rest = ""
     if "calibration_error" in scores:
         rest = f"   {scores['calibration_error']:.3f}  {scores['accuracy_on_most_confident']:.3f}"

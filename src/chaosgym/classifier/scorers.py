@@ -63,8 +63,10 @@ def train_scorers(
     if not set(kinds) <= set(MODELS):
         raise ValueError(f"model = {model!r} is not best, nor made of {', '.join(MODELS)} joined by +")
     trained = {kind: _train(kind, trees, features, labels, seed) for kind in kinds}
-    return {candidate: tuple(scorer for kind in candidate.split("+") for scorer in trained[kind])
-            for candidate in candidates}  # fmt: skip
+    return {
+        candidate: tuple(scorer for kind in candidate.split("+") for scorer in trained[kind])
+        for candidate in candidates
+    }
 
 
 def _train(kind: str, trees: Trees, features: Array, labels: Labels, seed: int) -> tuple[Scorer, ...]:

@@ -172,9 +172,10 @@ class MachineClassifier:
         if getter(machine) == expected:
             return ""
         name = next(
-            name for name in parameters_of(machine)
+            name
+            for name in parameters_of(machine)
             if name not in self.fields and getattr(machine, name) != getattr(self.machine, name)
-        )  # fmt: skip
+        )
         return (
             f"{name} = {getattr(machine, name)} differs from the classifier's training machine; "
             f"known: {getattr(self.machine, name)}"
@@ -233,9 +234,10 @@ class MachineClassifier:
             **{f"probability_{name}": natures[:, place] for place, name in enumerate(known.natures_)},
             "confidence": confidence,
             "abstained": abstained,
-            "reason": np.where(outside, "outside what the classifier was trained on",
-                               np.where(unsure, "too close to call", "")),
-        }  # fmt: skip
+            "reason": np.where(
+                outside, "outside what the classifier was trained on", np.where(unsure, "too close to call", "")
+            ),
+        }
 
     def save(self, path: str | Path) -> None:
         """Write the model file."""

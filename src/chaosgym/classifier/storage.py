@@ -40,8 +40,10 @@ _KINDS: Mapping[str, Any] = {
 def write_model(path: str | Path, card: Mapping[str, Any], parts: Mapping[str, Mapping[str, Any]]) -> None:
     """Write named parts, each a mapping of fitted attributes, and a model card."""
     arrays: dict[str, Any] = {}
-    described = {name: {key: _describe(value, f"{name}.{key}", arrays) for key, value in part.items()}
-                 for name, part in parts.items()}  # fmt: skip
+    described = {
+        name: {key: _describe(value, f"{name}.{key}", arrays) for key, value in part.items()}
+        for name, part in parts.items()
+    }
     head: dict[str, Any] = {"format": FORMAT, "card": card, "parts": described}
     head["sha256"] = model_hash(head, arrays)
     buffer = io.BytesIO()
@@ -72,8 +74,9 @@ def read_model(path: str | Path) -> tuple[dict[str, Any], dict[str, dict[str, An
             )
         if head["sha256"] != model_hash(head, arrays):
             raise ModelFileError(f"{path} is damaged: its content does not match its hash")
-        parts = {name: {key: _restore(value, arrays) for key, value in part.items()}
-                 for name, part in head["parts"].items()}  # fmt: skip
+        parts = {
+            name: {key: _restore(value, arrays) for key, value in part.items()} for name, part in head["parts"].items()
+        }
         return {**head["card"], "sha256": head["sha256"]}, parts
     except (
         OSError,

@@ -116,9 +116,10 @@ def train_classifier(
         records = both if own and both and both.log_loss_ < own.log_loss_ else own
         seconds = time.perf_counter() - began
         report = _rows(sparse) | {
-            "training_seconds": round(seconds, 1), "model": parameters.model_,
+            "training_seconds": round(seconds, 1),
+            "model": parameters.model_,
             "log_loss": {**parameters.log_losses_, "its pupil": parameters.log_loss_},
-        }  # fmt: skip
+        }
         report["ceiling"] = ceilings(sweep, noise)
         report["parameters"] = compare_parameters(sparse, parameters, seed)
         report["parameters"]["refused"] = outside_parameters(sparse, parameters, seed)
@@ -142,9 +143,13 @@ def train_classifier(
 
 
 def fit_parameters(
-    examples: Examples, rows: Any, model: str, seed: int, *,
+    examples: Examples,
+    rows: Any,
+    model: str,
+    seed: int,
+    *,
     tick: Callable[[], object] = lambda: None,
-) -> ResponseClassifier:  # fmt: skip
+) -> ResponseClassifier:
     """Train from parameters on some rows (n,), those that calibrate included."""
     peaks = np.full(len(examples.values), np.nan)
     if examples.signals:
@@ -155,10 +160,16 @@ def fit_parameters(
         "parameters", model, pupil, examples.machine, examples.fields, rounds=ROUNDS, least_rows=LEAST_ROWS, seed=seed
     )
     return classifier.fit(
-        examples.values[rows], examples.response_type[rows], nature=examples.nature[rows],
-        period=examples.period[rows], peak_force=peaks[rows] if np.isfinite(peaks[rows]).any() else None,
-        groups=examples.groups[rows], calibration=examples.calibration[rows], ranges=examples.ranges, tick=tick,
-    )  # fmt: skip
+        examples.values[rows],
+        examples.response_type[rows],
+        nature=examples.nature[rows],
+        period=examples.period[rows],
+        peak_force=peaks[rows] if np.isfinite(peaks[rows]).any() else None,
+        groups=examples.groups[rows],
+        calibration=examples.calibration[rows],
+        ranges=examples.ranges,
+        tick=tick,
+    )
 
 
 def fit_records(
@@ -184,10 +195,15 @@ def _record_columns(examples: Examples, seed: int) -> dict[str, Any]:
     where[at] = np.arange(len(at))
     cycle = np.random.default_rng(seed + 1).integers(0, settled.shape[1], len(noisy.rows))
     return {
-        "X": noisy.peaks, "y": examples.response_type[noisy.rows], "nature": examples.nature[noisy.rows],
-        "peak_force": settled[where[noisy.rows], cycle], "groups": examples.groups[noisy.rows],
-        "calibration": examples.calibration[noisy.rows], "section": noisy.section, "sensor_error": noisy.sensor_error,
-    }  # fmt: skip
+        "X": noisy.peaks,
+        "y": examples.response_type[noisy.rows],
+        "nature": examples.nature[noisy.rows],
+        "peak_force": settled[where[noisy.rows], cycle],
+        "groups": examples.groups[noisy.rows],
+        "calibration": examples.calibration[noisy.rows],
+        "section": noisy.section,
+        "sensor_error": noisy.sensor_error,
+    }
 
 
 def _learning_curve(
@@ -221,10 +237,14 @@ def _learning_curve(
 def _accuracies(examples: Examples, classifier: ResponseClassifier, chances: NDArray[np.float64]) -> dict[str, Any]:
     """Scores of probabilities of pairs on the held-out rows, for types and natures."""
     test, pairs = examples.test, classifier.pairs_
-    told = {"response_type": (pairs.types, pairs.types_from(chances), examples.response_type),
-            "nature": (pairs.natures, pairs.natures_from(chances), examples.nature)}  # fmt: skip
-    return {name: probability_scores(kinds, shares, truth[test], examples.groups[test])
-            for name, (kinds, shares, truth) in told.items()}  # fmt: skip
+    told = {
+        "response_type": (pairs.types, pairs.types_from(chances), examples.response_type),
+        "nature": (pairs.natures, pairs.natures_from(chances), examples.nature),
+    }
+    return {
+        name: probability_scores(kinds, shares, truth[test], examples.groups[test])
+        for name, (kinds, shares, truth) in told.items()
+    }
 
 
 def _transfer(other: Examples, records: ResponseClassifier, seed: int) -> dict[str, Any]:
@@ -240,7 +260,7 @@ def _rows(examples: Examples) -> dict[str, Any]:
         "machines": {name: len(np.unique(examples.groups[rows])) for name, rows in parts.items()},
         "share_of_types": {name: float((examples.response_type == name).mean()) for name in ("I", "II", "III")},
         "share_of_natures": {str(name): float((examples.nature == name).mean()) for name in np.unique(examples.nature)},
-    }  # fmt: skip
+    }
 
 
 def _card(
@@ -252,8 +272,9 @@ def _card(
         "machine": examples.machine.name,
         "base": {name: getattr(examples.machine, name) for name in parameters_of(examples.machine)},
         "fields": list(examples.fields),
-        "ranges": {name: [float(low), float(high)]
-                   for name, low, high in zip(examples.fields, *examples.ranges, strict=True)},
+        "ranges": {
+            name: [float(low), float(high)] for name, low, high in zip(examples.fields, *examples.ranges, strict=True)
+        },
         "data": {key: sweep.settings[key] for key in kept if key in sweep.settings},
         "rows": {
             "parameters": int(sparse.training.sum()),
@@ -270,4 +291,4 @@ def _card(
             "the sensor's noise looks periodic"
         ),
         "report": {name: value for name, value in report.items() if name not in TIMED},
-    }  # fmt: skip
+    }

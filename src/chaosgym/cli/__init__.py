@@ -31,9 +31,21 @@ def app() -> None:
 
 
 for command in (
-    simulate, show, diagnose, classify, sweep, dataset, train_classifier, demo, design,
-    tradeoff, stability, regimes, run_agent, info,
-):  # fmt: skip
+    simulate,
+    show,
+    diagnose,
+    classify,
+    sweep,
+    dataset,
+    train_classifier,
+    demo,
+    design,
+    tradeoff,
+    stability,
+    regimes,
+    run_agent,
+    info,
+):
     app.add_command(command)
 
 

@@ -114,10 +114,14 @@ def _classify_batch(classifier: Any, source: str, out: str, as_json: bool) -> No
     from chaosgym.classifier.batch import classify_file
 
     summary = classify_file(classifier, source, out)
-    emit(summary, as_json, lambda: [
-        f"{summary['rows']} rows judged, {summary['abstained']} of them without an answer; written to {out}",
-        *(f"  Type {name:4s} {count}" for name, count in summary["response_types"].items()),
-    ])  # fmt: skip
+    emit(
+        summary,
+        as_json,
+        lambda: [
+            f"{summary['rows']} rows judged, {summary['abstained']} of them without an answer; written to {out}",
+            *(f"  Type {name:4s} {count}" for name, count in summary["response_types"].items()),
+        ],
+    )
 
 
 def _follow(classifier: Any, lines: Iterable[str], sensor_error: float | None, as_json: bool) -> None:

@@ -46,8 +46,10 @@ def _lines(folder: str, found: dict[str, Any]) -> list[str]:
     lines.append(f"  {'faults':20s}" + ", ".join(f"{name} {count}" for name, count in found["faults"].items()))
     if found["types"]:
         types = found["types"]
-        lines.append(f"  types from neighbours and over the full window differ at {types['disagreement']:.1%} "
-                     f"of {types['points']} points")  # fmt: skip
+        lines.append(
+            f"  types from neighbours and over the full window differ at {types['disagreement']:.1%} "
+            f"of {types['points']} points"
+        )
     lines.append("  columns:")
     lines += [f"    {name:20s}{meaning}" for name, meaning in found["definitions"].items()]
     return [*lines, *(f"  made by {', '.join(f'{k} {v}' for k, v in made.items())}" for made in found["provenance"])]
@@ -78,11 +80,17 @@ def noise(folder: str, points: int, seed: int, workers: int | None, as_json: boo
     found = label_noise(read_sweep(folder), points, seed=seed, workers=workers, progress=True)
     text = json.dumps(found, indent=2) + "\n"
     write_atomically(Path(folder) / NOISE_FILE, lambda temporary: temporary.write_text(text))
-    emit(found, as_json, lambda: [
-        f"{folder}: {found['points']} rows diagnosed again; nature differs / still periodic, peak moved by 10 %",
-        *(f"  {name:36s}{change['nature']:6.1%} +- {change['half_interval']:.1%}  {change['largest_peak']:6.1%}"
-          for name, change in found["changes"].items()),
-    ])  # fmt: skip
+    emit(
+        found,
+        as_json,
+        lambda: [
+            f"{folder}: {found['points']} rows diagnosed again; nature differs / still periodic, peak moved by 10 %",
+            *(
+                f"  {name:36s}{change['nature']:6.1%} +- {change['half_interval']:.1%}  {change['largest_peak']:6.1%}"
+                for name, change in found["changes"].items()
+            ),
+        ],
+    )
 
 
 @dataset.command("map")

@@ -16,9 +16,16 @@ from chaosgym.cli.output import emit
 @click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def design(
-    brief: str | None, template: str | None, peaks: str | None, load_rating: float | None, out: str | None,
-    overwrite: bool, seed: int, workers: int | None, as_json: bool,
-) -> None:  # fmt: skip
+    brief: str | None,
+    template: str | None,
+    peaks: str | None,
+    load_rating: float | None,
+    out: str | None,
+    overwrite: bool,
+    seed: int,
+    workers: int | None,
+    as_json: bool,
+) -> None:
     """Say whether a machine meets its criteria within its tolerances, and what to change if not."""
     from chaosgym.design import brief as briefs
     from chaosgym.design import measured

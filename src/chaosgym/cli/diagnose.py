@@ -16,9 +16,12 @@ SUMMARY_CYCLES = 200
 @click.command()
 @functools.partial(machine_command, required=False)
 @click.option(
-    "--test", type=click.Choice(["adaptive", "mut"]), default="adaptive", show_default=True,
+    "--test",
+    type=click.Choice(["adaptive", "mut"]),
+    default="adaptive",
+    show_default=True,
     help="All tests in stages, or the Matrix Update Test alone.",
-)  # fmt: skip
+)
 @click.option("--budget", type=click.IntRange(100, 10**7), default=3200, show_default=True, help="Cycles at the most.")
 @click.option("--types", is_flag=True, help="Also tell the response type (I, II, III) over the tolerances.")
 @click.option("--step-check", is_flag=True, help="Repeat with a finer step and say whether the verdict stays.")

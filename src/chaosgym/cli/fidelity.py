@@ -22,15 +22,24 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
 @click.option("--cycles", type=click.IntRange(20, 10**5), default=120, show_default=True, help="Cycles that count.")
 @click.option("--transient", type=click.IntRange(0, 10**5), default=80, show_default=True, help="Cycles before them.")
 @click.option(
-    "--budget", type=click.FloatRange(0.0, min_open=True), default=10.0, show_default=True,
+    "--budget",
+    type=click.FloatRange(0.0, min_open=True),
+    default=10.0,
+    show_default=True,
     help="Processor time of each setting [s].",
-)  # fmt: skip
+)
 @click.option("--workers", type=click.IntRange(1), default=None, help="Threads; all processors by default.")
 @click.option("--out", type=_FOLDER, default=None, help="Write tradeoff.json and tradeoff.png there.")
 def tradeoff(
-    machine: Any, points: int, cycles: int, transient: int, budget: float, workers: int | None, out: Path | None,
+    machine: Any,
+    points: int,
+    cycles: int,
+    transient: int,
+    budget: float,
+    workers: int | None,
+    out: Path | None,
     as_json: bool,
-) -> None:  # fmt: skip
+) -> None:
     """Measure every rung, integrator and step of a machine against its reference: cost, errors, Pareto front."""
     from chaosgym.fidelity.tradeoff import tradeoff as measure
 

@@ -30,9 +30,13 @@ def info(as_json: bool) -> None:
         "packages": packages,
         "kernel_cache": KERNEL_CACHE,
     }
-    emit(result, as_json, lambda: [
-        f"chaosgym {__version__} on Python {result['python']}, {result['platform']}",
-        "machines: " + ", ".join(MACHINE_OPTIONS),
-        *(f"{package:18s} {version or 'not installed'}" for package, version in packages.items()),
-        f"kernel cache: {KERNEL_CACHE}",
-    ])  # fmt: skip
+    emit(
+        result,
+        as_json,
+        lambda: [
+            f"chaosgym {__version__} on Python {result['python']}, {result['platform']}",
+            "machines: " + ", ".join(MACHINE_OPTIONS),
+            *(f"{package:18s} {version or 'not installed'}" for package, version in packages.items()),
+            f"kernel cache: {KERNEL_CACHE}",
+        ],
+    )

@@ -14,14 +14,18 @@ if TYPE_CHECKING:
 @click.command("run-agent")
 @click.argument("env")
 @click.option(
-    "--policy", type=click.Path(file_okay=False, path_type=Path), default=None,
+    "--policy",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=None,
     help="Folder with policy.json and weights.npz; default: the shipped policy of ENV.",
-)  # fmt: skip
+)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the machine and the sensor.")
 @click.option(
-    "--out", type=click.Path(dir_okay=False, path_type=Path), default=None,
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default=None,
     help="Figure (.png) or animation (.gif, .mp4) of speed, forces and regime.",
-)  # fmt: skip
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def run_agent(env: str, policy: Path | None, seed: int, out: Path | None, as_json: bool) -> None:
     """Let a trained agent run one job of ENV, such as chaosgym/ImpactBeam-v0, on a held-out machine if it has any."""

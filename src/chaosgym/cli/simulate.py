@@ -32,15 +32,19 @@ def simulate(machine: Any, cycles: int, transient: int, as_json: bool) -> None:
     sensors = dict(zip(getattr(machine, "sensors", ()), _largest(record.sensor_peak), strict=True))
     if sensors:
         result["largest_sensor_force_N"] = sensors
-    emit(result, as_json, lambda: [
-        f"{machine.name}: {cycles} cycles after {transient}",
-        f"peak force, {machine.sides[0]} side   {peaks.min():.2f} to {peaks.max():.2f} N, mean {peaks.mean():.2f} N",
-        f"last peaks                {' '.join(f'{peak:.2f}' for peak in peaks[-8:])}",
-        f"impacts per cycle         {record.impacts.sum(axis=1).mean():.1f}",
-        f"share in contact          {record.contact_fraction.sum(axis=1).mean():.2f}",
-        *(f"largest force, {name:16s} {force:.2f} N" for name, force in sensors.items()),
-        f"computing time            {1e6 * seconds_per_cycle:.0f} us per cycle",
-    ])  # fmt: skip
+    emit(
+        result,
+        as_json,
+        lambda: [
+            f"{machine.name}: {cycles} cycles after {transient}",
+            f"peak force, {machine.sides[0]} side   {peaks.min():.2f} to {peaks.max():.2f} N, mean {peaks.mean():.2f} N",
+            f"last peaks                {' '.join(f'{peak:.2f}' for peak in peaks[-8:])}",
+            f"impacts per cycle         {record.impacts.sum(axis=1).mean():.1f}",
+            f"share in contact          {record.contact_fraction.sum(axis=1).mean():.2f}",
+            *(f"largest force, {name:16s} {force:.2f} N" for name, force in sensors.items()),
+            f"computing time            {1e6 * seconds_per_cycle:.0f} us per cycle",
+        ],
+    )
 
 
 def _largest(sensor_peak: Any) -> list[float]:

@@ -15,13 +15,19 @@ from chaosgym.cli.output import emit
 @click.option("--random", "random_size", type=click.IntRange(1), metavar="N", help="N random points.")
 @click.option("--sobol", "sobol_size", type=click.IntRange(1), metavar="N", help="N points of a Sobol sequence.")
 @click.option(
-    "--machines", "machine_count", type=click.IntRange(1), metavar="N",
+    "--machines",
+    "machine_count",
+    type=click.IntRange(1),
+    metavar="N",
     help="N machines of a Sobol sequence over the axes, each on a small lattice of its own (--patch).",
-)  # fmt: skip
+)
 @click.option(
-    "--patch", "patches", multiple=True, metavar="FIELD=LOW:HIGH:COUNT[:STEP][:lin|log]",
+    "--patch",
+    "patches",
+    multiple=True,
+    metavar="FIELD=LOW:HIGH:COUNT[:STEP][:lin|log]",
     help="A dimension of the lattice, at a random place of the range; STEP 2% or 10, default one tolerance.",
-)  # fmt: skip
+)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.option(
     "--budget", type=click.IntRange(100, 10**7), default=400, show_default=True, help="Cycles at the most, by point."
@@ -67,11 +73,19 @@ def sweep(
     chosen = tuple(Axis.parse(text) for text in axes) or (() if lattice else default_axes(machine, kind))
     plan = SweepPlan(machine, chosen, kind, sizes.get(kind) or 0, seed, lattice, budget, signals, full_types)
     labelled = run_sweep(plan, out, workers=workers, scheduler=scheduler, repair=repair, progress=True)
-    counts = {name: dict(Counter(str(value) for value in labelled.column(name)))
-              for name in ("nature", "response_type", "status")}  # fmt: skip
+    counts = {
+        name: dict(Counter(str(value) for value in labelled.column(name)))
+        for name in ("nature", "response_type", "status")
+    }
     result = {"machine": machine.name, "folder": out, "complete": True, "points": len(labelled.table), **counts}
-    emit(result, as_json, lambda: [
-        f"{machine.name}: complete, {len(labelled.table)} points in {out}",
-        *(f"  {name:14s}" + ", ".join(f"{key} {count}" for key, count in sorted(counts[name].items()))
-          for name in counts),
-    ])  # fmt: skip
+    emit(
+        result,
+        as_json,
+        lambda: [
+            f"{machine.name}: complete, {len(labelled.table)} points in {out}",
+            *(
+                f"  {name:14s}" + ", ".join(f"{key} {count}" for key, count in sorted(counts[name].items()))
+                for name in counts
+            ),
+        ],
+    )

@@ -14,9 +14,10 @@ from chaosgym.cli.output import emit
 @click.option("--out", type=click.Path(), required=True, help="New folder for classifier, report, card and pictures.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.option(
-    "--model", default=None,
+    "--model",
+    default=None,
     help="boosting, linear, network, or several joined by +; default: the best of three in cross-validation.",
-)  # fmt: skip
+)
 @click.option("--curve/--no-curve", default=True, show_default=True, help="Measure the learning curve.")
 @click.option(
     "--transfer",
@@ -40,9 +41,14 @@ def train_classifier(
     if not target.absolute().parent.is_dir():
         raise click.UsageError(f"--out {out} lies in a folder that does not exist")
     trained = train(
-        read_sweep(data), seed, model=model, curve=curve, transfer=read_sweep(transfer) if transfer else None,
-        noise=read_noise(data), progress=True,
-    )  # fmt: skip
+        read_sweep(data),
+        seed,
+        model=model,
+        curve=curve,
+        transfer=read_sweep(transfer) if transfer else None,
+        noise=read_noise(data),
+        progress=True,
+    )
     trained.save(target)
     save_pictures(trained, target)
     emit({"out": out, **trained.report}, as_json, lambda: report_table(trained.report))

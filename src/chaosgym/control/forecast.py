@@ -83,13 +83,16 @@ def forecast_of(pool: Pool, tables: Sequence[RegimeTable], task: Task) -> Foreca
     forces = np.array([np.tile(table.equivalent_force, (task.cycles_per_step, 1)) for table in at_level])
     spacing = pool.speeds[1] - pool.speeds[0]
     return Forecast(
-        speeds=pool.speeds, damage=damage,
+        speeds=pool.speeds,
+        damage=damage,
         time=-task.time_weight * task.cycles_per_step * period_at(pool.speeds) / job_time,
-        type_iii=-task.type_iii_step * type_iii, wear=np.minimum(task.damage(forces), 1.0),
+        type_iii=-task.type_iii_step * type_iii,
+        wear=np.minimum(task.damage(forces), 1.0),
         damage_weight=task.damage_weight,
-        moves=max(1, int(drive.slew_limit / spacing * (1.0 + 1e-12))), steps=task.steps,
+        moves=max(1, int(drive.slew_limit / spacing * (1.0 + 1e-12))),
+        steps=task.steps,
         fracture=-task.failure_weight,
-    )  # fmt: skip
+    )
 
 
 def forecast_for(env: Any, model: Model) -> Forecast:

@@ -64,10 +64,16 @@ def run_job(env: gym.Env[Any, Any], policy: Policy, machine: int, seed: int) -> 
         steps += 1
         ended = terminated or truncated
     return JobRow(
-        machine=machine, seed=seed, job_return=total, type_iii_share=type_iii / steps, cost_share=cost / steps,
-        damage=info["damage"], cycles=steps * cycles_per_step, duration=duration,
+        machine=machine,
+        seed=seed,
+        job_return=total,
+        type_iii_share=type_iii / steps,
+        cost_share=cost / steps,
+        damage=info["damage"],
+        cycles=steps * cycles_per_step,
+        duration=duration,
         failed=info["status"] in (Status.FRACTURE, Status.SIMULATION_FAILED),
-    )  # fmt: skip
+    )
 
 
 def run_jobs(

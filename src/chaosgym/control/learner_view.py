@@ -179,8 +179,10 @@ class IdentifiedMemory(BeliefMemory):
     def start(self, observations: Observation, excluded: Numbers | None = None) -> Observation:
         """Forget everything and take in the first observations (n, d) of n jobs; return (n, d + features)."""
         self._number = np.full(len(observations), -1) if excluded is None else excluded.copy()
-        self._looking = [self._identification(number, first)
-                         for number, first in zip(self._number.tolist(), observations, strict=True)]  # fmt: skip
+        self._looking = [
+            self._identification(number, first)
+            for number, first in zip(self._number.tolist(), observations, strict=True)
+        ]
         return super().start(observations, excluded)
 
     def restart(
@@ -230,9 +232,12 @@ def remembered_space(space: Box) -> Box:
 
 
 def commanded(
-    answers: Actions, observations: Observation, memory: SpeedMemory | BeliefMemory | None, space: Box,
+    answers: Actions,
+    observations: Observation,
+    memory: SpeedMemory | BeliefMemory | None,
+    space: Box,
     largest: float | None,
-) -> Actions:  # fmt: skip
+) -> Actions:
     """Return the actions (n, 1) of an environment that a learner's answers (n, 1) stand for.
 
     An increment changes the observed speed, or with a belief the planned one, to a speed at which the motion can

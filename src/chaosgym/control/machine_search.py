@@ -22,7 +22,7 @@ from chaosgym.envs.jobs import bouncing_share, impacts_per_cycle
 from chaosgym.envs.pools import Pool, worn
 from chaosgym.envs.tasks import Task
 from chaosgym.machines.machine import Machine
-from chaosgym.simulation.batch import Cycles, Fleet, at_speed, fleet_of
+from chaosgym.simulation.batch import Batch, Cycles, at_speed, batch_of
 
 Array = NDArray[np.float64]
 
@@ -158,35 +158,35 @@ class MachineSearch:
     def _simulated(self, points: Array) -> tuple[Array, Array]:
         """Shares and impacts a cycle of machines at points (k, fields) in the steps of the record, (k, n) each."""
         record, machines = self.record, [machine_at(self._pool, point) for point in points]
-        fleet, which = fleet_of(machines[0], len(machines)), np.arange(len(machines))
+        batch, which = batch_of(machines[0], len(machines)), np.arange(len(machines))
         shares = np.empty((len(machines), len(record.shares)))
         impacts = np.empty_like(shares)
         for step, (speed, ratio) in enumerate(zip(record.speeds.tolist(), record.ratios.tolist(), strict=True)):
             if step == 0 or ratio != record.ratios[step - 1]:
-                put = fleet.change if step else fleet.start
+                put = batch.change if step else batch.start
                 for place, machine in enumerate(machines):
                     put(place, at_speed(worn(machine, ratio) if self._pool.wears else machine, speed))
-            fleet.set_speeds(which, np.full(len(which), speed))
+            batch.set_speeds(which, np.full(len(which), speed))
             if step == 0:
-                self._begin(fleet)
-            cycles = fleet.run(which, self._task.cycles_per_step)
+                self._begin(batch)
+            cycles = batch.run(which, self._task.cycles_per_step)
             shares[:, step], impacts[:, step] = self._observed(cycles, speed)
         return shares, impacts
 
-    def _begin(self, fleet: Fleet) -> None:
+    def _begin(self, batch: Batch) -> None:
         """Run machines from rest to the beginning of the first observation, at the phase that fits the orbit best."""
-        orbit, each, all_of_them = self.record.orbit, self._task.cycles_per_step, np.arange(len(fleet))
+        orbit, each, all_of_them = self.record.orbit, self._task.cycles_per_step, np.arange(len(batch))
         if len(orbit) == 1:
-            fleet.run(all_of_them, self.record.cycles - each)
+            batch.run(all_of_them, self.record.cycles - each)
             return
         period = each * len(orbit)
-        cycles = fleet.run(all_of_them, self.record.cycles + 2 * period - 1)
+        cycles = batch.run(all_of_them, self.record.cycles + 2 * period - 1)
         ends = self.record.cycles + np.arange(period)[:, None] + each * (1 + np.arange(len(orbit)))
         shares = [[self._observed(cycles.until(end), self.record.speeds[0])[0] for end in row] for row in ends.tolist()]
         fitting = np.abs(np.array(shares) - orbit[:, None]).max(axis=1).argmin(axis=0)
         for phase in range(period):
             # from the end of the last phase to the same point of a later period, but for the step to be observed
-            fleet.run(np.flatnonzero(fitting == phase), (phase + 1 - each) % period)
+            batch.run(np.flatnonzero(fitting == phase), (phase + 1 - each) % period)
 
     def _observed(self, cycles: Cycles, speed: float) -> tuple[Array, Array]:
         """Shares and impacts a cycle (k,) of the last step of k machines."""

@@ -42,9 +42,15 @@ def bootstrap_interval(count: int, statistic: Callable[[NDArray[np.int64]], Arra
     if count == 1:
         return np.full(2, float(statistic(places)))
     result = stats.bootstrap(
-        (places,), lambda drawn, axis: statistic(drawn), n_resamples=RESAMPLES, confidence_level=CONFIDENCE,
-        method="percentile", vectorized=True, batch=500, rng=np.random.default_rng(seed),
-    )  # fmt: skip
+        (places,),
+        lambda drawn, axis: statistic(drawn),
+        n_resamples=RESAMPLES,
+        confidence_level=CONFIDENCE,
+        method="percentile",
+        vectorized=True,
+        batch=500,
+        rng=np.random.default_rng(seed),
+    )
     return np.array(result.confidence_interval)
 
 

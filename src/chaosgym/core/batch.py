@@ -34,10 +34,18 @@ class Settings(NamedTuple):
 def rows_of(arrays, k):
     """Arrays of the machine in row k."""
     return CycleArrays(
-        arrays.section[k], arrays.tip[k], arrays.peak_force[k], arrays.impacts[k], arrays.contact_time[k],
-        arrays.bounce_time[k], arrays.events[k], arrays.history[k], arrays.peak_instant[k], arrays.peak_vector[k],
+        arrays.section[k],
+        arrays.tip[k],
+        arrays.peak_force[k],
+        arrays.impacts[k],
+        arrays.contact_time[k],
+        arrays.bounce_time[k],
+        arrays.events[k],
+        arrays.history[k],
+        arrays.peak_instant[k],
+        arrays.peak_vector[k],
         arrays.channel_peak[k],
-    )  # fmt: skip
+    )
 
 
 @njit(cache=True, inline="always")
@@ -50,19 +58,35 @@ def episode_of(motions, i):
 def regimes_of(regimes, i):
     """Regimes of machine i."""
     return Regimes(
-        regimes.rotates[i], regimes.rate[i], regimes.to_modal[i], regimes.from_modal[i], regimes.output[i],
-        regimes.magnitude[i], regimes.forcing[i], regimes.modulus[i], regimes.fastest[i],
-    )  # fmt: skip
+        regimes.rotates[i],
+        regimes.rate[i],
+        regimes.to_modal[i],
+        regimes.from_modal[i],
+        regimes.output[i],
+        regimes.magnitude[i],
+        regimes.forcing[i],
+        regimes.modulus[i],
+        regimes.fastest[i],
+    )
 
 
 @njit(cache=True, inline="always")
 def beam_of(batch, regimes, i):
     """Model of machine i."""
     return ModalImpactModel(
-        batch.excitation_frequency[i], batch.force_amplitude[i], batch.clearance[i], batch.contact_stiffness[i],
-        batch.contact_damping[i], batch.stiffness[i], batch.damping[i], batch.tip_shape[i], batch.force_shape[i],
-        regimes_of(regimes, i), batch.rest[i], batch.rest_penetration[i],
-    )  # fmt: skip
+        batch.excitation_frequency[i],
+        batch.force_amplitude[i],
+        batch.clearance[i],
+        batch.contact_stiffness[i],
+        batch.contact_damping[i],
+        batch.stiffness[i],
+        batch.damping[i],
+        batch.tip_shape[i],
+        batch.force_shape[i],
+        regimes_of(regimes, i),
+        batch.rest[i],
+        batch.rest_penetration[i],
+    )
 
 
 @njit(cache=True, nogil=True, parallel=True)
@@ -75,19 +99,32 @@ def advance_beams(batch, regimes, which, motions, arrays, settings, outcome):
     for k in prange(which.shape[0]):
         i = which[k]
         outcome[k] = advance_beam(
-            beam_of(batch, regimes, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
-            settings.step_phase, settings.event_tolerance, settings.event_budget,
-        )[0]  # fmt: skip
+            beam_of(batch, regimes, i),
+            motions.coordinates[i],
+            episode_of(motions, i),
+            rows_of(arrays, k),
+            settings.step_phase,
+            settings.event_tolerance,
+            settings.event_budget,
+        )[0]
 
 
 @njit(cache=True, inline="always")
 def rigid_beam_of(batch, regimes, i):
     """Model of machine i."""
     return RestitutionModel(
-        batch.excitation_frequency[i], batch.force_amplitude[i], batch.clearance[i], batch.stiffness[i],
-        batch.damping[i], batch.tip_shape[i], batch.force_shape[i], regimes_of(regimes, i), batch.restitution[i],
-        batch.contact_duration[i], batch.force_per_speed[i],
-    )  # fmt: skip
+        batch.excitation_frequency[i],
+        batch.force_amplitude[i],
+        batch.clearance[i],
+        batch.stiffness[i],
+        batch.damping[i],
+        batch.tip_shape[i],
+        batch.force_shape[i],
+        regimes_of(regimes, i),
+        batch.restitution[i],
+        batch.contact_duration[i],
+        batch.force_per_speed[i],
+    )
 
 
 @njit(cache=True, nogil=True, parallel=True)
@@ -96,6 +133,10 @@ def advance_rigid_beams(batch, regimes, which, motions, arrays, settings, outcom
     for k in prange(which.shape[0]):
         i = which[k]
         outcome[k] = advance_restitution(
-            rigid_beam_of(batch, regimes, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
-            settings.step_phase, settings.event_budget,
-        )[0]  # fmt: skip
+            rigid_beam_of(batch, regimes, i),
+            motions.coordinates[i],
+            episode_of(motions, i),
+            rows_of(arrays, k),
+            settings.step_phase,
+            settings.event_budget,
+        )[0]

@@ -414,14 +414,46 @@ def advance(model, state, episode, arrays, step_phase, event_tolerance, event_bu
                 until2 = suspect(e2, d2, g2, k2, h, doubt * curvature2 * h * h) if h > safe2 else -1.0
                 instant = math.inf
                 if until1 >= 0.0:
-                    instant = locate(model, regimes, tip_state, side, 1, u, spare, h, until1, safe1,
-                                     e1, d1, g1, k1, fastest, event_tolerance)  # fmt: skip
+                    instant = locate(
+                        model,
+                        regimes,
+                        tip_state,
+                        side,
+                        1,
+                        u,
+                        spare,
+                        h,
+                        until1,
+                        safe1,
+                        e1,
+                        d1,
+                        g1,
+                        k1,
+                        fastest,
+                        event_tolerance,
+                    )
                     if instant < math.inf:
                         event = 1
                         moved[:] = spare
                 if until2 >= 0.0:
-                    instant2 = locate(model, regimes, tip_state, side, 2, u, spare, h, until2, safe2,
-                                      e2, d2, g2, k2, fastest, event_tolerance)  # fmt: skip
+                    instant2 = locate(
+                        model,
+                        regimes,
+                        tip_state,
+                        side,
+                        2,
+                        u,
+                        spare,
+                        h,
+                        until2,
+                        safe2,
+                        e2,
+                        d2,
+                        g2,
+                        k2,
+                        fastest,
+                        event_tolerance,
+                    )
                     if instant2 < instant:
                         event, instant = 2, instant2
                         moved[:] = spare
@@ -431,8 +463,16 @@ def advance(model, state, episode, arrays, step_phase, event_tolerance, event_bu
 
             # record the step
             while sample < samples and sample * period < (time + h) * samples:
-                sample_motion(model, regimes, tip_state, side, u, spare, sample * period / samples - time,
-                              arrays.history[cycle, sample])  # fmt: skip
+                sample_motion(
+                    model,
+                    regimes,
+                    tip_state,
+                    side,
+                    u,
+                    spare,
+                    sample * period / samples - time,
+                    arrays.history[cycle, sample],
+                )
                 sample += 1
             if tip_state == CONTACT:
                 arrays.contact_time[cycle, column] += h

@@ -141,9 +141,11 @@ def enter(model, regimes, x, v, time, omega, u):
 def tip_of(regimes, row, u):
     """Displacement, velocity or acceleration of the tip, by row of the output."""
     return (
-        regimes.output[0, row, 0] * u[0] + regimes.output[0, row, 1] * u[1]
-        + regimes.output[0, row, 2] * u[2] + regimes.output[0, row, 3] * u[3]
-    )  # fmt: skip
+        regimes.output[0, row, 0] * u[0]
+        + regimes.output[0, row, 1] * u[1]
+        + regimes.output[0, row, 2] * u[2]
+        + regimes.output[0, row, 3] * u[3]
+    )
 
 
 @njit(cache=True)
@@ -361,20 +363,23 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
                     arrays.peak_force[cycle, column], largest_hold(tip, c, side, time, elapsed)
                 )
                 arrays.contact_time[cycle, column] += elapsed
-                sample = sample_flight(model, regimes, tip, x, v, time, elapsed, True, sample, period, u, moved,
-                                       arrays.history[cycle])  # fmt: skip
+                sample = sample_flight(
+                    model, regimes, tip, x, v, time, elapsed, True, sample, period, u, moved, arrays.history[cycle]
+                )
                 if c == 0.0 and not last:
                     side = -side
                     arrays.impacts[cycle, UPPER if side > 0.0 else LOWER] += 1
                     note_touch(episode, side, time + elapsed, arrays.bounce_time[cycle])
             else:
-                elapsed, struck, x1, v1 = fly(model, regimes, tip, x, v, time, period - time, step_phase, u, moved,
-                                              spare, series)  # fmt: skip
+                elapsed, struck, x1, v1 = fly(
+                    model, regimes, tip, x, v, time, period - time, step_phase, u, moved, spare, series
+                )
                 last = struck == 0.0
                 if touched:
                     arrays.contact_time[cycle, column] += min(elapsed, model.contact_duration)
-                sample = sample_flight(model, regimes, tip, x, v, time, elapsed, False, sample, period, u, moved,
-                                       arrays.history[cycle])  # fmt: skip
+                sample = sample_flight(
+                    model, regimes, tip, x, v, time, elapsed, False, sample, period, u, moved, arrays.history[cycle]
+                )
                 if tangents is not None:
                     carry(model.stiffness, regimes, 0, elapsed, vectors, growth, spare)
                 x, v, released = x1, v1, False

@@ -87,9 +87,12 @@ def evaluate_peaks(peaks: ArrayLike, criteria: Criteria) -> MeasuredPeaks:
     """
     values = require_enough(peaks)
     return MeasuredPeaks(
-        values, criteria, convergence(values), histogram(values),
+        values,
+        criteria,
+        convergence(values),
+        histogram(values),
         evaluate(time_blocks(values), criteria, "statistics of the measured peak forces"),
-    )  # fmt: skip
+    )
 
 
 def read_peaks(path: str | Path) -> Array:

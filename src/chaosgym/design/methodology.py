@@ -344,11 +344,20 @@ def assess(
     share = _share_that_meets(series.runs or (nominal,), criteria, seed)
     checks = _checks(response.type, evaluation, share, criteria)
     return Assessment(
-        machine=machine, criteria=criteria, region=region, response=response, nominal=nominal,
-        convergence=convergence(nominal.worse_side(exponent)), series=series, trend=trend, nominal_evaluation=own,
-        evaluation=evaluation, checks=checks, verdict=_verdict(response.type, checks),
+        machine=machine,
+        criteria=criteria,
+        region=region,
+        response=response,
+        nominal=nominal,
+        convergence=convergence(nominal.worse_side(exponent)),
+        series=series,
+        trend=trend,
+        nominal_evaluation=own,
+        evaluation=evaluation,
+        checks=checks,
+        verdict=_verdict(response.type, checks),
         machines_that_meet=share,
-    )  # fmt: skip
+    )
 
 
 def _by_type(

@@ -137,7 +137,11 @@ def mean_interval(blocks: Sequence[ArrayLike], confidence: float = 0.95, seed: i
     if np.ptp(means) == 0.0:
         return Interval(float(means[0]), float(means[0]))
     result = stats.bootstrap(
-        (means,), np.mean, n_resamples=RESAMPLES, confidence_level=confidence, method="percentile",
+        (means,),
+        np.mean,
+        n_resamples=RESAMPLES,
+        confidence_level=confidence,
+        method="percentile",
         rng=np.random.default_rng(seed),
-    )  # fmt: skip
+    )
     return Interval(float(result.confidence_interval.low), float(result.confidence_interval.high))

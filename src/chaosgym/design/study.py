@@ -94,14 +94,18 @@ class DesignStudy:
             "chaosgym": __version__,
             "seed": self.seed,
             **self.assessment.as_dict(),
-            "improvement": None if found is None else {
+            "improvement": None
+            if found is None
+            else {
                 "best": None if found.best is None else found.best.as_dict(),
                 "suggestions": [trial.as_dict() for trial in found.suggestions],
             },
-            "map": None if self.map is None else {
-                name: getattr(self.map, name).tolist() for name in ("speed", "clearance", "type", "largest_peak")
-            },
-            "life_over_speed": None if self.life_over_speed is None else {
+            "map": None
+            if self.map is None
+            else {name: getattr(self.map, name).tolist() for name in ("speed", "clearance", "type", "largest_peak")},
+            "life_over_speed": None
+            if self.life_over_speed is None
+            else {
                 "speed": self.life_over_speed.values.tolist(),
                 "nature": list(self.life_over_speed.nature),
                 "relative_life": _finite(self.life_over_speed.statistical),
@@ -110,9 +114,11 @@ class DesignStudy:
             },
             "force_of_every_impact_N": self.force_of_every_impact,
             "peak_impacts": {
-                "spread": self.diagram.spread, "unit": self.diagram.unit, "cycles_to_fill": self.cycles_to_fill,
+                "spread": self.diagram.spread,
+                "unit": self.diagram.unit,
+                "cycles_to_fill": self.cycles_to_fill,
             },
-        }  # fmt: skip
+        }
 
 
 def _finite(values: Any) -> list[float | None]:
@@ -142,21 +148,37 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
     """
     machine = brief.machine
     assessment = assess(
-        machine, brief.region, brief.criteria, series_size=brief.series_size, seed=seed, workers=workers,
+        machine,
+        brief.region,
+        brief.criteria,
+        series_size=brief.series_size,
+        seed=seed,
+        workers=workers,
         progress=progress,
-    )  # fmt: skip
+    )
     improvement = None
     if assessment.verdict != "meets":
         improvement = improve(
-            assessment, brief.changes, brief.costs, series_size=brief.series_size, seed=seed, workers=workers,
+            assessment,
+            brief.changes,
+            brief.costs,
+            series_size=brief.series_size,
+            seed=seed,
+            workers=workers,
             progress=progress,
-        )  # fmt: skip
+        )
     record = simulate(machine, DIAGRAM_CYCLES, transient=DIAGRAM_CYCLES, samples_per_cycle=HISTORY_SAMPLES)
     side = int(np.argmax(np.sum(record.peak_force**brief.criteria.life_exponent, axis=0)))
     return DesignStudy(
-        brief, assessment, improvement, _map(brief, workers, progress), _life_over_speed(machine, workers, progress),
-        peak_impacts(record, worn_side(record, brief.criteria.life_exponent)), _every_impact(record, side, brief), seed,
-    )  # fmt: skip
+        brief,
+        assessment,
+        improvement,
+        _map(brief, workers, progress),
+        _life_over_speed(machine, workers, progress),
+        peak_impacts(record, worn_side(record, brief.criteria.life_exponent)),
+        _every_impact(record, side, brief),
+        seed,
+    )
 
 
 def _every_impact(record: CycleRecord, side: int, brief: DesignBrief) -> float:

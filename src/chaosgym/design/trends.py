@@ -102,9 +102,15 @@ def life_against(
         raise DesignError(f"{field} = {chosen[0]:g} can't be the reference of a relative life: there is no contact")
     lives = np.array([relative_life(each, reference, exponent) for each in peaks])
     return LifeTrend(
-        field, chosen, tuple(run.nature for run in runs), lives[:, 0], lives[:, 1], lives[:, 2],
-        np.array([run.largest_peak for run in runs]), np.array([float(np.mean(each)) for each in peaks]),
-    )  # fmt: skip
+        field,
+        chosen,
+        tuple(run.nature for run in runs),
+        lives[:, 0],
+        lives[:, 1],
+        lives[:, 2],
+        np.array([run.largest_peak for run in runs]),
+        np.array([float(np.mean(each)) for each in peaks]),
+    )
 
 
 class ClearancePoint(NamedTuple):

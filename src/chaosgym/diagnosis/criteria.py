@@ -111,7 +111,8 @@ def criterion_rate(machines: Iterable[Machine], natures: Sequence[Nature]) -> Cr
     not_possible = [chaotic for expected, chaotic in pairs if not expected]
     chaos = [expected for expected, chaotic in pairs if chaotic]
     return CriterionRate(
-        points=len(pairs), hit_rate=float(np.mean(chaos)) if chaos else 0.0,
+        points=len(pairs),
+        hit_rate=float(np.mean(chaos)) if chaos else 0.0,
         precision=float(np.mean(possible)) if possible else 0.0,
         quiet=1.0 - float(np.mean(not_possible)) if not_possible else 0.0,
-    )  # fmt: skip
+    )

@@ -143,17 +143,18 @@ def _with_update_test(machine: Machine, verdict: Diagnosis, record: CycleRecord,
     """Let the Matrix Update Test vote on a verdict, from the state in which the run ended."""
     interval = getattr(machine, FIELD)
     update = matrix_update_test(
-        machine, intervals=(interval, neighbouring_interval(interval)), transient=0, cycles=UPDATE_CYCLES,
+        machine,
+        intervals=(interval, neighbouring_interval(interval)),
+        transient=0,
+        cycles=UPDATE_CYCLES,
         initial_state=record.final_state,
-    )  # fmt: skip
+    )
     evidence = {**verdict.evidence, "matrix_update": update.reason}
     evidence["cycles_used"] += 4 * UPDATE_CYCLES
     status = verdict.status
     if status == "agreed" and sensor_error == 0.0 and update.nature not in (verdict.nature, "undetermined"):
         status = "disputed"
-    return replace(
-        verdict, status=status, votes={**verdict.votes, "matrix_update": update.nature}, evidence=evidence
-    )  # fmt: skip
+    return replace(verdict, status=status, votes={**verdict.votes, "matrix_update": update.nature}, evidence=evidence)
 
 
 def _stage(machine: Machine, record: CycleRecord, growth: Array, searched: int) -> _Stage:
@@ -222,14 +223,22 @@ def _periodic(stage: _Stage) -> Diagnosis | None:
     settle = verdict.settle_cycle if verdict.settle_cycle is not None else len(stage.record)
     if transient:
         return Diagnosis(
-            nature="chaotic", period=orbit.period if orbit else verdict.period, margin=margin, transient=True,
-            status="transient", settle_cycle=settle,
+            nature="chaotic",
+            period=orbit.period if orbit else verdict.period,
+            margin=margin,
+            transient=True,
+            status="transient",
+            settle_cycle=settle,
             reason=f"transient chaos for {verdict.evidence['irregular_cycles']} cycles; then {reason}",
-        )  # fmt: skip
+        )
     return Diagnosis(
-        nature="periodic", period=orbit.period if orbit else verdict.period, margin=margin, status=status,
-        settle_cycle=settle, reason=reason,
-    )  # fmt: skip
+        nature="periodic",
+        period=orbit.period if orbit else verdict.period,
+        margin=margin,
+        status=status,
+        settle_cycle=settle,
+        reason=reason,
+    )
 
 
 def _periodic_within(stage: _Stage, sensor_error: float) -> Diagnosis | None:
@@ -274,9 +283,12 @@ def _not_periodic(stage: _Stage) -> Diagnosis:
             nature="periodic", period=verdict.period, margin=0.0, status="agreed", reason=f"{shown}; {verdict.reason}"
         )
     return Diagnosis(
-        nature="undetermined", period=None, margin=0.0, status="unresolved",
+        nature="undetermined",
+        period=None,
+        margin=0.0,
+        status="unresolved",
         reason=f"not settled after {len(stage.record)} cycles: {shown}; {verdict.reason}",
-    )  # fmt: skip
+    )
 
 
 def _votes(stage: _Stage) -> dict[str, Nature]:
@@ -288,9 +300,12 @@ def _votes(stage: _Stage) -> dict[str, Nature]:
     statistic = figures.get("zero_one")
     if statistic is not None:
         votes["zero_one"] = (
-            "chaotic" if statistic > CHAOTIC_STATISTIC
-            else "quasiperiodic" if statistic < REGULAR_STATISTIC else "undetermined"
-        )  # fmt: skip
+            "chaotic"
+            if statistic > CHAOTIC_STATISTIC
+            else "quasiperiodic"
+            if statistic < REGULAR_STATISTIC
+            else "undetermined"
+        )
     votes["newton"] = "periodic" if stage.orbit is not None else "undetermined"
     return votes
 

@@ -86,8 +86,13 @@ class LyapunovExponent:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        return {"value": self.per_cycle, "standard_error": self.standard_error, "per_second": self.per_second,
-                "cycles": self.cycles, "history": list(self.history)}  # fmt: skip
+        return {
+            "value": self.per_cycle,
+            "standard_error": self.standard_error,
+            "per_second": self.per_second,
+            "cycles": self.cycles,
+            "history": list(self.history),
+        }
 
 
 def average_growth(log_growth: ArrayLike, cycle_period: float = 1.0) -> LyapunovExponent:
@@ -100,9 +105,12 @@ def average_growth(log_growth: ArrayLike, cycle_period: float = 1.0) -> Lyapunov
 
     error = max(float(np.std(means(count), ddof=1) / np.sqrt(count)) for count in (BLOCKS, BLOCKS // 2))
     return LyapunovExponent(
-        per_cycle=float(growth.mean()), standard_error=error, cycle_period=cycle_period,
-        history=tuple(float(value) for value in means(BLOCKS)), cycles=len(growth),
-    )  # fmt: skip
+        per_cycle=float(growth.mean()),
+        standard_error=error,
+        cycle_period=cycle_period,
+        history=tuple(float(value) for value in means(BLOCKS)),
+        cycles=len(growth),
+    )
 
 
 def _any_direction(dimension: int) -> Array:
@@ -206,9 +214,7 @@ def lyapunov_spectrum(
     Where impacts take no time, 2 log(e) each stands for the contact; rest on a surface forgets, which no sum shows.
     """
     states = len(rest_state(machine).coordinates)
-    first, vectors, _ = simulate_with_deviations(
-        machine, max(1, transient), initial_state, deviations=np.eye(states)
-    )  # fmt: skip
+    first, vectors, _ = simulate_with_deviations(machine, max(1, transient), initial_state, deviations=np.eye(states))
     record, _, growth = simulate_with_deviations(machine, cycles, first.final_state, deviations=vectors)
     model = machine.reduce()
     contact_time = float(record.contact_fraction.sum(axis=1).mean()) * machine.cycle_period

@@ -129,9 +129,12 @@ def compare_outcomes(first: ArrayLike, second: ArrayLike, *, tolerance: float = 
         )
     nature: Literal["chaotic", "undetermined"] = "chaotic" if agreeing <= 0.5 else "undetermined"
     return Diagnosis(
-        nature=nature, period=None, margin=max(0.0, 1.0 - 2.0 * agreeing), evidence=evidence,
+        nature=nature,
+        period=None,
+        margin=max(0.0, 1.0 - 2.0 * agreeing),
+        evidence=evidence,
         reason=f"runs agree in only {agreeing:.0%} of the cycles",
-    )  # fmt: skip
+    )
 
 
 def compare_attractors(first: ArrayLike, second: ArrayLike, *, tolerance: float = TOLERANCE) -> Diagnosis:
@@ -155,9 +158,12 @@ def compare_attractors(first: ArrayLike, second: ArrayLike, *, tolerance: float 
         )
     if distance <= tolerance * scale:
         return Diagnosis(
-            nature="periodic", period=None, margin=1.0 - distance / (tolerance * scale), evidence=evidence,
+            nature="periodic",
+            period=None,
+            margin=1.0 - distance / (tolerance * scale),
+            evidence=evidence,
             reason=f"runs agree within {distance / scale:.1e} of the largest peak",
-        )  # fmt: skip
+        )
     if any(period is not None for period in periods):
         return Diagnosis(
             nature="undetermined",
@@ -168,9 +174,12 @@ def compare_attractors(first: ArrayLike, second: ArrayLike, *, tolerance: float 
         )
     margin = float(np.clip(np.log10(distance / (tolerance * scale)), 0.0, 1.0))
     return Diagnosis(
-        nature="chaotic", period=None, margin=margin, evidence=evidence,
+        nature="chaotic",
+        period=None,
+        margin=margin,
+        evidence=evidence,
         reason=f"neither run repeats, and they part by {distance / scale:.0%} of the largest peak",
-    )  # fmt: skip
+    )
 
 
 def _pair(first: ArrayLike, second: ArrayLike) -> tuple[Array, Array, float]:

@@ -67,8 +67,13 @@ class PeriodicOrbit:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        return {"period": self.period, "residual": self.residual, "largest_multiplier": self.largest_multiplier,
-                "distance": self.distance, "certified": self.certified}  # fmt: skip
+        return {
+            "period": self.period,
+            "residual": self.residual,
+            "largest_multiplier": self.largest_multiplier,
+            "distance": self.distance,
+            "certified": self.certified,
+        }
 
 
 def find_periodic_orbit(
@@ -113,11 +118,13 @@ def find_periodic_orbit(
     residual, state, monodromy = best
     multipliers = np.linalg.eigvals(monodromy)
     return PeriodicOrbit(
-        period=period, state=state, residual=residual,
+        period=period,
+        state=state,
+        residual=residual,
         multipliers=np.asarray(multipliers[np.argsort(-np.abs(multipliers))], dtype=complex),
         derivative=monodromy,
         distance=float(np.linalg.norm(weight * (state - origin)) / np.linalg.norm(weight * origin)),
-    )  # fmt: skip
+    )
 
 
 def _weights(machine: Machine, state: Array) -> Array:

@@ -134,9 +134,15 @@ def response_map(
         neighbours = [_neighbour(name, side, runs[near]) for name, side, near in around[at]]
         types[at] = judge_type(centre.nature, float(peaks[at]), neighbours, others)[0]
     return ResponseMap(
-        machine=machine, speed=speed, clearance=clearance, type=types, nature=natures, largest_peak=peaks,
-        runs=len(places), definition=define(allowed, "speed-clearance", "rest", initial_states, budget, sensor_error),
-    )  # fmt: skip
+        machine=machine,
+        speed=speed,
+        clearance=clearance,
+        type=types,
+        nature=natures,
+        largest_peak=peaks,
+        runs=len(places),
+        definition=define(allowed, "speed-clearance", "rest", initial_states, budget, sensor_error),
+    )
 
 
 def _place(speed: float, clearance: float) -> Place:
@@ -185,8 +191,12 @@ def type_stability(
         given = default_tolerances(machine)
         half, wide = ({name: t._replace(value=f * t.value) for name, t in given.items()} for f in (0.5, 2.5))
         variants: list[dict[str, Any]] = [
-            {}, {"tolerances": half}, {"tolerances": wide}, {"start": "continuation"}, {"initial_states": 1},
-        ]  # fmt: skip
+            {},
+            {"tolerances": half},
+            {"tolerances": wide},
+            {"start": "continuation"},
+            {"initial_states": 1},
+        ]
         return [
             response_type(machine, window="speed-clearance", budget=budget, workers=1, **variant).type
             for variant in variants

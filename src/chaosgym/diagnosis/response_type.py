@@ -170,9 +170,14 @@ def response_type(
         coexisting = coexisting_peaks(machine, centre, initial_states, budget)
     kind, reason = judge_type(centre.nature, centre.evidence["largest_peak"], neighbours, coexisting)
     return ResponseType(
-        type=kind, reason=reason, centre=centre, largest_peak=centre.evidence["largest_peak"], neighbours=neighbours,
-        coexisting_peaks=coexisting, definition=define(allowed, window, start, initial_states, budget, sensor_error),
-    )  # fmt: skip
+        type=kind,
+        reason=reason,
+        centre=centre,
+        largest_peak=centre.evidence["largest_peak"],
+        neighbours=neighbours,
+        coexisting_peaks=coexisting,
+        definition=define(allowed, window, start, initial_states, budget, sensor_error),
+    )
 
 
 def _points(machine: Machine, tolerances: Mapping[str, Tolerance]) -> list[tuple[str, int, Machine]]:

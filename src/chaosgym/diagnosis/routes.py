@@ -64,9 +64,11 @@ def precursors(period: int | None, bounce_fraction: float = 0.0) -> Precursors:
         odd //= 2
         doublings += 1
     return Precursors(
-        period_doubling=odd == 1 and doublings > 0, period_three=odd == 3,
-        long_bouncing=bounce_fraction >= LONG_BOUNCING, bounce_fraction=float(bounce_fraction),
-    )  # fmt: skip
+        period_doubling=odd == 1 and doublings > 0,
+        period_three=odd == 3,
+        long_bouncing=bounce_fraction >= LONG_BOUNCING,
+        bounce_fraction=float(bounce_fraction),
+    )
 
 
 def bounce_fraction(record: CycleRecord) -> float:

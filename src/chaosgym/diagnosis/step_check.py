@@ -93,9 +93,12 @@ def step_check(
     given = simulate(machine, cycles, transient=transient, integrator=chosen)
     finer = simulate(machine, cycles, transient=transient, integrator=chosen.refined())
     return StepCheck(
-        two_step_test(given), two_step_test(finer), _spread(given), _spread(finer),
+        two_step_test(given),
+        two_step_test(finer),
+        _spread(given),
+        _spread(finer),
         float(max(given.peak_force.max(), finer.peak_force.max())),
-    )  # fmt: skip
+    )
 
 
 def _spread(record: CycleRecord) -> float:

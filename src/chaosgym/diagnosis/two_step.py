@@ -104,9 +104,13 @@ def two_step_test(
         evidence["contact"] = bool(np.any(x.peak_force > 0.0))
     elif not np.any(samples):
         return Diagnosis(
-            nature="undetermined", period=None, margin=0.0, horizon=len(samples), evidence=evidence,
+            nature="undetermined",
+            period=None,
+            margin=0.0,
+            horizon=len(samples),
+            evidence=evidence,
             reason="the series is zero throughout: there is no contact to judge",
-        )  # fmt: skip
+        )
     scale = scales(samples)
     scaled = samples / scale
     allowed = tolerance + sensor_error / scale
@@ -162,9 +166,12 @@ def _repeating(
     evidence["irregular_cycles"] = irregular
     if irregular > initial_transient:
         return Diagnosis(
-            nature="chaotic", margin=0.0, transient=True, **common,
+            nature="chaotic",
+            margin=0.0,
+            transient=True,
+            **common,
             reason=f"transient chaos: irregular for {irregular} cycles before it settled on period {period}",
-        )  # fmt: skip
+        )
     allowed = evidence["residual_allowed"]
     margin = _decades(allowed, recurrence.residual)
     reason = f"repeats every {'cycle' if period == 1 else f'{period} cycles'} within {recurrence.residual:.1e}"

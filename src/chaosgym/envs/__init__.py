@@ -36,9 +36,11 @@ def register_environments() -> None:
             name = f"chaosgym/{machine}{task}-v0"
             if name not in registry:
                 register(
-                    id=name, entry_point=f"{module}:{machine}Env", vector_entry_point=f"{module}:{machine}VectorEnv",
+                    id=name,
+                    entry_point=f"{module}:{machine}Env",
+                    vector_entry_point=f"{module}:{machine}VectorEnv",
                     kwargs=keywords,
-                )  # fmt: skip
+                )
 
 
 register_environments()

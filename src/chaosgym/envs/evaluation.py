@@ -88,13 +88,15 @@ def evaluate(
             rewards.append(float(reward))
             infos.append(info)
             ended = terminated or truncated
-        rows.append((
-            sum(rewards),
-            np.mean([info["cost_type_iii"] for info in infos]),
-            np.mean([info["cost"] for info in infos]),
-            infos[-1]["damage"],
-            -sum(info["reward_time"] for info in infos),
-        ))  # fmt: skip
+        rows.append(
+            (
+                sum(rewards),
+                np.mean([info["cost_type_iii"] for info in infos]),
+                np.mean([info["cost"] for info in infos]),
+                infos[-1]["damage"],
+                -sum(info["reward_time"] for info in infos),
+            )
+        )
         speeds = np.array([info["speed"] for info in infos])
     returns, type_iii, cost, damage, time_cost = np.array(rows, dtype=float).T
     return Evaluation(returns, type_iii, cost, damage, time_cost, speeds)

@@ -149,7 +149,7 @@ class ImpactBeamEnv(MachineEnv):
     | `sensor_error`    | **float** | `3.0`     | half width of the uniform error of a measured peak force [N] |
     | `render_mode`     | **str**   | `None`    | `"rgb_array"` or `"human"`                                   |
     | `fidelity`        | **str**   | `None`    | rung of the ladder of models; none is "modes-5"              |
-    | any field         | **float** |           | of `chaosgym.machines.impact_beam.parameters.ImpactBeam`, in SI units   |
+    | any field         | **float** |           | of `chaosgym.ImpactBeam`, in SI units                         |
 
     The rungs of `fidelity` are `"restitution"`, `"rigid"`, `"modes-3"`, `"modes-5"`, `"modes-8"` and `"reference"`; a
     field that a rung sets may not be given beside it.

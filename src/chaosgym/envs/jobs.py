@@ -15,7 +15,7 @@ from chaosgym.envs.regimes import RegimeTable, nearest
 from chaosgym.envs.tasks import Status, Step, Task
 from chaosgym.errors import SimulationError
 from chaosgym.machines.machine import Machine
-from chaosgym.simulation.batch import Cycles, Fleet, at_speed
+from chaosgym.simulation.batch import Batch, Cycles, at_speed
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -61,7 +61,7 @@ def impacts_per_cycle(cycles: Cycles, last: int) -> Array:
 
 
 class Jobs:
-    """Jobs on the machines of a fleet.
+    """Jobs on the machines of a batch.
 
     Attributes
     ----------
@@ -75,9 +75,9 @@ class Jobs:
         Share of its life that each surface has used up.
     """
 
-    def __init__(self, rules: Rules, fleet: Fleet) -> None:
-        count, cycles = len(fleet), rules.task.cycles_per_step
-        self.rules, self.fleet = rules, fleet
+    def __init__(self, rules: Rules, batch: Batch) -> None:
+        count, cycles = len(batch), rules.task.cycles_per_step
+        self.rules, self.batch = rules, batch
         self.machines = [rules.machine] * count
         self._new = [rules.machine] * count
         self.chosen = np.zeros(count, np.int64)
@@ -126,11 +126,11 @@ class Jobs:
         for i, k in zip(which.tolist(), self.chosen[which].tolist(), strict=True):
             self._type_iii[i] = [table.type_iii for table in pool.regimes(k)]
             self.machines[i] = self._new[i] = at_speed(pool[k], speed)
-            self.fleet.start(i, self.machines[i])
+            self.batch.start(i, self.machines[i])
         speeds = np.full(len(which), speed)
         self.speed[which], self._action[which] = speeds, self.rules.drive.action_for(speed)
         self.damage[which], self._cycles_done[which] = 0.0, 0
-        cycles = self.fleet.run(which, max(RUN_IN_CYCLES, task.cycles_per_step))
+        cycles = self.batch.run(which, max(RUN_IN_CYCLES, task.cycles_per_step))
         if cycles.failed.any():
             machine = self.machines[which[int(cycles.failed.argmax())]]
             raise SimulationError(f"a job can't start at a speed of {speed:g}; {machine}")
@@ -155,11 +155,11 @@ class Jobs:
         self._action[which], target = drive.target_of(actions)
         speed = drive.approach(self.speed[which], target)
         self.speed[which] = speed
-        self.fleet.set_speeds(which, speed)
+        self.batch.set_speeds(which, speed)
         if self.rules.pool.wears:
             self._wear(which)
         levels = self._levels(which)
-        cycles = self.fleet.run(which, task.cycles_per_step)
+        cycles = self.batch.run(which, task.cycles_per_step)
 
         before = self.damage[which]
         after = before + task.damage(cycles.peak_force)
@@ -171,14 +171,19 @@ class Jobs:
         status = task.status(cycles.failed, self._cycles_done[which], worse)
         duration = task.cycles_per_step * self.rules.machine.period_at(speed)
         reward, named = task.judge(
-            Step(speed, duration, cycles.peak_force), status,
+            Step(speed, duration, cycles.peak_force),
+            status,
             type_iii=self._type_iii[which, levels, nearest(self.rules.pool.speeds, speed)],
-            damage_increase=worse - before.max(axis=-1), job_time=self._job_time,
-        )  # fmt: skip
+            damage_increase=worse - before.max(axis=-1),
+            job_time=self._job_time,
+        )
         info = named | {
-            "speed": speed, "damage": worse, "status": status, "is_success": status == int(Status.JOB_DONE),
+            "speed": speed,
+            "damage": worse,
+            "status": status,
+            "is_success": status == int(Status.JOB_DONE),
             "machine": self.chosen[which],
-        }  # fmt: skip
+        }
         return Outcome(self._observe(which, generators), reward, status != int(Status.RUNNING), info)
 
     def _levels(self, which: Indices) -> Indices:
@@ -189,7 +194,7 @@ class Jobs:
         """Let clearances grow with the damage; the motion goes on."""
         for i, damage in zip(which.tolist(), self.damage[which].max(axis=-1).tolist(), strict=True):
             self.machines[i] = worn(self._new[i], 1.0 + damage)
-            self.fleet.change(i, self.machine_at(i))
+            self.batch.change(i, self.machine_at(i))
 
     def _note(self, which: Indices, speed: Array, cycles: Cycles) -> None:
         """Keep what the next observation and judgement need, of the machines that did not fail."""
@@ -205,8 +210,12 @@ class Jobs:
     def _observe(self, which: Indices, generators: Generators) -> Observation:
         rules = self.rules
         return observe(
-            rules.space, self.speed[which], self._action[which],
-            1.0 - self._cycles_done[which] / rules.task.job_cycles, self._impacts[which], self._bouncing[which],
+            rules.space,
+            self.speed[which],
+            self._action[which],
+            1.0 - self._cycles_done[which] / rules.task.job_cycles,
+            self._impacts[which],
+            self._bouncing[which],
             sensor_readings(self._peaks[which], rules.sensor_error, generators),
             self.damage[which].max(axis=-1) if rules.pool.wears else None,
-        )  # fmt: skip
+        )

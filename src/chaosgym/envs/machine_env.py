@@ -23,7 +23,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import CycleRecord, simulate
-from chaosgym.simulation.batch import SerialFleet, at_speed
+from chaosgym.simulation.batch import SerialBatch, at_speed
 
 if TYPE_CHECKING:
     from chaosgym.envs.rendering import Dashboard
@@ -147,11 +147,15 @@ class MachineEnv(gym.Env[Observation, Action]):
         self.observation_space = cast(Space[Observation], space)
         self.action_space = cast(Space[Action], Box(-1.0, 1.0, (1,), np.float32))
         self.rules = Rules(
-            machine, drive, task, space, self.pool,
+            machine,
+            drive,
+            task,
+            space,
+            self.pool,
             sensor_error=checked_number("sensor_error", sensor_error, 0.0, FORCE_RANGE * task.force_limit),
-        )  # fmt: skip
-        self._fleet = SerialFleet(1)
-        self._job = Jobs(self.rules, self._fleet)
+        )
+        self._batch = SerialBatch(1)
+        self._job = Jobs(self.rules, self._batch)
         self._runs = False
         self._dashboard: Dashboard | None = None
 
@@ -186,7 +190,7 @@ class MachineEnv(gym.Env[Observation, Action]):
         return float(self._job.damage.max())
 
     def _last_step(self) -> CycleRecord:
-        record = self._fleet.records[0]
+        record = self._batch.records[0]
         assert record is not None
         return record.after(len(record) - self.task.cycles_per_step)
 

@@ -21,9 +21,17 @@ def observation_names(cycles_per_step: int, wears: bool) -> tuple[str, ...]:
     """Name every entry of the observation; the last one is the damage if the machine wears."""
     peaks = tuple(f"peak_force_{i + 1}" for i in range(cycles_per_step))
     return (
-        "speed", "last_action", "remaining_share", "max_peak_force", "mean_peak_force", "std_peak_force",
-        "impacts_per_cycle", "bouncing_share", *peaks, *(("damage",) if wears else ()),
-    )  # fmt: skip
+        "speed",
+        "last_action",
+        "remaining_share",
+        "max_peak_force",
+        "mean_peak_force",
+        "std_peak_force",
+        "impacts_per_cycle",
+        "bouncing_share",
+        *peaks,
+        *(("damage",) if wears else ()),
+    )
 
 
 def observation_space(
@@ -45,9 +53,15 @@ def sensor_readings(peaks: Array, sensor_error: float, generators: Sequence[np.r
 
 
 def observe(
-    space: Box, speed: Array, action: Array, remaining: Array, impacts: Array, bouncing: Array, peaks: Array,
+    space: Box,
+    speed: Array,
+    action: Array,
+    remaining: Array,
+    impacts: Array,
+    bouncing: Array,
+    peaks: Array,
     damage: Array | None = None,
-) -> Observation:  # fmt: skip
+) -> Observation:
     """Compose the observations of k machines, clipped to their space.
 
     Parameters
@@ -71,9 +85,7 @@ def observe(
     mean = peaks.sum(axis=-1) / cycles
     deviation = np.sqrt(((peaks - mean[:, None]) ** 2).sum(axis=-1) / cycles)
     values = np.empty((len(peaks), len(space.low)), np.float32)
-    for column, entry in enumerate(
-        (speed, action, remaining, peaks.max(axis=-1), mean, deviation, impacts, bouncing)
-    ):  # fmt: skip
+    for column, entry in enumerate((speed, action, remaining, peaks.max(axis=-1), mean, deviation, impacts, bouncing)):
         values[:, column] = entry
     values[:, FIRST_PEAK : FIRST_PEAK + cycles] = peaks
     if damage is not None:

@@ -71,13 +71,22 @@ def draw_beam(panel: Any, record: CycleRecord, colour: str, moment: float, force
         peak = float(record.peak_force[:, side].max())
         edge = sign * (gap + 0.014)
         panel.fill_between([0.93, 1.07], edge, edge + sign * 0.05, color=colour, linewidth=0)
-        panel.text(1.0, edge + sign * 0.07, f"{name} sensor: {peak:.0f} N", ha="center", fontsize=8, color=INK,
-                   va="bottom" if sign > 0 else "top")  # fmt: skip
+        panel.text(
+            1.0,
+            edge + sign * 0.07,
+            f"{name} sensor: {peak:.0f} N",
+            ha="center",
+            fontsize=8,
+            color=INK,
+            va="bottom" if sign > 0 else "top",
+        )
     panel.set(xlim=(-0.1, 1.24), ylim=(-0.32, 0.32))
     panel.set_title(
         f"Beam in its gap of ±{beam.clearance * 1e3:.3g} mm, exaggerated; peak forces of the step",
-        fontsize=9, loc="left", color=INK,
-    )  # fmt: skip
+        fontsize=9,
+        loc="left",
+        color=INK,
+    )
     panel.axis("off")
 
 
@@ -154,8 +163,15 @@ def draw_crank(panel: Any, record: CycleRecord, colour: str, moment: float, forc
     degrees = math.degrees(angle[now])
     panel.text(0.0, -62.0, f"crank angle {degrees:.0f}°", ha="center", va="top", fontsize=8, color=INK)
     for side, (sign, word) in enumerate(((-1.0, "up"), (1.0, "down"))):
-        panel.text(330.0, sign * 84.0, f"largest force {word}: {record.peak_force[:, side].max():.0f} N", fontsize=8,
-                   color=INK, ha="right", va="center")  # fmt: skip
+        panel.text(
+            330.0,
+            sign * 84.0,
+            f"largest force {word}: {record.peak_force[:, side].max():.0f} N",
+            fontsize=8,
+            color=INK,
+            ha="right",
+            va="center",
+        )
     box = panel.get_window_extent()
     reach = 0.5 * WIDTH * box.height / box.width
     panel.set(xlim=(-60.0, WIDTH - 60.0), ylim=(-reach, reach))
@@ -163,8 +179,10 @@ def draw_crank(panel: Any, record: CycleRecord, colour: str, moment: float, forc
     bars = "; bars: contact forces" if rattles else ""
     panel.set_title(
         f"Gap of ±{clearance * 1e3:.3g} mm at the {machine.monitored_joint}, drawn {times:.0f} times{bars}",
-        fontsize=9, loc="left", color=INK,
-    )  # fmt: skip
+        fontsize=9,
+        loc="left",
+        color=INK,
+    )
     panel.axis("off")
 
 

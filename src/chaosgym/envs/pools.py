@@ -114,9 +114,13 @@ class Pool:
     """
 
     def __init__(
-        self, nominal: Machine, drive: SpeedDrive, tolerances: Mapping[str, float], name: str = "nominal",
+        self,
+        nominal: Machine,
+        drive: SpeedDrive,
+        tolerances: Mapping[str, float],
+        name: str = "nominal",
         wear: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.nominal, self.drive, self.tolerances = at_speed(nominal, drive.lowest_speed), drive, dict(tolerances)
         self.name, self.task = name, "wear" if wear else "tolerance"
         self.levels = np.array(WORN if wear else WORN[:1])
@@ -236,9 +240,14 @@ def make_pools(pool: Pool, folder: Path, command: str, machines: int | None = No
     speeds = pool.drive.regime_speeds
     tables = [pool.computed(row, speeds) for row in rows]
     about = {
-        "machine": repr(pool.nominal), "tolerances": pool.tolerances, "levels": pool.levels.tolist(),
-        "seed": SEEDS[pool.task], "horizon": HORIZON, "chaosgym": __version__, "command": command,
-    }  # fmt: skip
+        "machine": repr(pool.nominal),
+        "tolerances": pool.tolerances,
+        "levels": pool.levels.tolist(),
+        "seed": SEEDS[pool.task],
+        "horizon": HORIZON,
+        "chaosgym": __version__,
+        "command": command,
+    }
     nature, equivalent, peak = (
         np.array([[getattr(table, name) for table in row] for row in tables])
         for name in ("nature", "equivalent_force", "peak_force")

@@ -101,8 +101,12 @@ class Dashboard:
         done = len(self._speeds) * self._task.cycles_per_step
         self._figure.suptitle(
             f"{_speed(record):.2f} {self._unit}    {done} of {self._task.job_cycles} cycles    peak force {verdict}",
-            color=colour, fontsize=12, x=0.075, ha="left", fontweight="bold",
-        )  # fmt: skip
+            color=colour,
+            fontsize=12,
+            x=0.075,
+            ha="left",
+            fontweight="bold",
+        )
 
     def _draw_portrait(self, panel: Any, record: CycleRecord, colour: str) -> None:
         samples = samples_of(record)

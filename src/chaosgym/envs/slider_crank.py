@@ -167,7 +167,7 @@ class SliderCrankEnv(MachineEnv):
     | `contact_damping_ratio` | **float**      | `0.13`     | damping ratio of a joint in contact                   |
     | `fidelity`              | **str**        | `None`     | rung of the ladder of models; none is "flexible-5deg" |
     | `render_mode`           | **str**        | `None`     | `"rgb_array"` or `"human"`                            |
-    | any field               | **float, str** |            | of `chaosgym.machines.slider_crank.parameters.SliderCrank`       |
+    | any field               | **float, str** |            | of `chaosgym.SliderCrank`                             |
 
     Fields are in SI units, angles in degrees. They include the motor angle, the joints (`slider_joint`, `ball_joint`),
     their clearances, the rod (`rod`, `rod_diameter`, `rod_length`), friction and gravity. The ball joint has no

@@ -84,9 +84,13 @@ class Task:
     )
     """Peak force above which a step costs."""
     load_rating: float = parameter(
-        70.0, unit="N", low=1e-6, high=1e9, provenance="derived",
+        70.0,
+        unit="N",
+        low=1e-6,
+        high=1e9,
+        provenance="derived",
         source="largest equivalent force of the nominal machine at constant speed; each environment has its own",
-    )  # fmt: skip
+    )
     """Force under which a surface lasts a million cycles."""
     damage_acceleration: float = parameter(
         1000.0, low=0.0, high=1e9, provenance="assumed", source="the worst constant speed uses up one life in a job"

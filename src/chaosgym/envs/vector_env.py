@@ -19,15 +19,23 @@ from chaosgym.envs.jobs import Indices, Jobs
 from chaosgym.envs.machine_env import METADATA, MachineEnv, Start, start_of
 from chaosgym.envs.observation import Observation
 from chaosgym.errors import ParameterError
-from chaosgym.simulation.batch import fleet_of
+from chaosgym.simulation.batch import batch_of
 
 Actions = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 
 SHARED = (
-    "action_space", "drive", "nominal", "observation_names", "observation_space", "pool", "render_mode", "rules",
-    "task", "tolerances",
-)  # fmt: skip
+    "action_space",
+    "drive",
+    "nominal",
+    "observation_names",
+    "observation_space",
+    "pool",
+    "render_mode",
+    "rules",
+    "task",
+    "tolerances",
+)
 """Attributes that all sub-environments have in common."""
 
 
@@ -75,7 +83,7 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         if autoreset_mode not in (*AutoresetMode, *modes):
             raise ParameterError(f"autoreset_mode = {autoreset_mode!r} is not one of {', '.join(modes)}")
         self._single = type(self).single(**keywords)
-        self._jobs = Jobs(self._single.rules, fleet_of(self._single.machine, num_envs))
+        self._jobs = Jobs(self._single.rules, batch_of(self._single.machine, num_envs))
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._limit = max_episode_steps
         self._elapsed = np.zeros(num_envs, np.int64)

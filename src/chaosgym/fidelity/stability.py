@@ -221,9 +221,14 @@ def try_run(run: Run) -> StabilityCell:
     except Exception as error:
         outcome, detail = "failure", f"{type(error).__name__}: {error}"
     return StabilityCell(
-        extreme=run.extreme, model=run.model, outcome=outcome, detail=detail, largest_peak=peak, share_of_bound=share,
+        extreme=run.extreme,
+        model=run.model,
+        outcome=outcome,
+        detail=detail,
+        largest_peak=peak,
+        share_of_bound=share,
         seconds=time.thread_time() - start,
-    )  # fmt: skip
+    )
 
 
 def share_of_bound(record: CycleRecord) -> float:

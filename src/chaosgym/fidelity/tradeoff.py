@@ -155,9 +155,15 @@ class _Measured(NamedTuple):
 
 
 def tradeoff(
-    machine: Machine, *, points: int = 12, cycles: int = 120, transient: int = 80, budget: float = 10.0,
-    workers: int | None = None, progress: bool = False,
-) -> Tradeoff:  # fmt: skip
+    machine: Machine,
+    *,
+    points: int = 12,
+    cycles: int = 120,
+    transient: int = 80,
+    budget: float = 10.0,
+    workers: int | None = None,
+    progress: bool = False,
+) -> Tradeoff:
     """Measure the fidelity ladder of a machine.
 
     Parameters
@@ -193,8 +199,9 @@ def tradeoff(
     rows = [_row(setting, result, reference) for setting, result in found.items() if isinstance(result, _Measured)]
     refused = {
         f"{setting.rung}, {setting.method}, {setting.step:g} rad": str(error).split(";")[0]
-        for setting, error in found.items() if isinstance(error, ChaosgymError)
-    }  # fmt: skip
+        for setting, error in found.items()
+        if isinstance(error, ChaosgymError)
+    }
     return Tradeoff(machine.name, tuple(_with_front(rows, points)), scene_costs(machine), refused, sample)
 
 
@@ -310,9 +317,10 @@ def _with_front(rows: Sequence[TradeoffRow], points: int) -> list[TradeoffRow]:
     full = [row for row in rows if row.points == points and row.wasserstein is not None]
     costs = np.array([[row.microseconds_per_cycle, row.wasserstein] for row in full])
     front = {
-        id(row) for row, own in zip(full, costs, strict=True)
+        id(row)
+        for row, own in zip(full, costs, strict=True)
         if not np.any(np.all(costs <= own, axis=1) & np.any(costs < own, axis=1))
-    }  # fmt: skip
+    }
     return [replace(row, on_front=id(row) in front) for row in rows]
 
 

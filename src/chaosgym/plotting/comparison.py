@@ -33,9 +33,13 @@ def _draw_scores(axes: Axes, summaries: Mapping[str, Mapping[str, Any]]) -> None
         hidden = row["score"] < LOWEST_SHOWN
         axes.plot(max(row["score"], LOWEST_SHOWN), height, "<" if hidden else "o", color="tab:blue", clip_on=False)
         axes.annotate(
-            f"{row['score']:.2f}", (max(row["score"], LOWEST_SHOWN), height), xytext=(0, 4), fontsize=7, ha="center",
+            f"{row['score']:.2f}",
+            (max(row["score"], LOWEST_SHOWN), height),
+            xytext=(0, 4),
+            fontsize=7,
+            ha="center",
             textcoords="offset points",
-        )  # fmt: skip
+        )
     axes.set_yticks(range(len(ordered)), [f"{name} ({row['knows']})" for name, row in ordered], fontsize=8)
     for worth in (0.0, 1.0):
         axes.axvline(worth, color="0.8", zorder=0)

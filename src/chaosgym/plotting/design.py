@@ -26,12 +26,26 @@ INK, ACCENT, BAD, MUTED = "#22303c", "#1f6f8b", "#b3392f", "#8a97a3"
 NATURE_COLOURS = {"periodic": ACCENT, "quasiperiodic": "#8e5ea2", "chaotic": "#d1495b", "undetermined": MUTED}
 
 STYLE: Any = {
-    "font.size": 9.5, "axes.edgecolor": MUTED, "axes.labelcolor": INK, "axes.titlesize": 10.5,
-    "axes.titlelocation": "left", "axes.titleweight": "bold", "axes.spines.top": False, "axes.spines.right": False,
-    "axes.grid": True, "grid.color": "#e6eaee", "grid.linewidth": 0.7, "axes.axisbelow": True, "text.color": INK,
-    "xtick.color": INK, "ytick.color": INK, "legend.frameon": False, "legend.fontsize": 8.5,
-    "svg.hashsalt": "chaosgym", "svg.fonttype": "path",
-}  # fmt: skip
+    "font.size": 9.5,
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.titlesize": 10.5,
+    "axes.titlelocation": "left",
+    "axes.titleweight": "bold",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e6eaee",
+    "grid.linewidth": 0.7,
+    "axes.axisbelow": True,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "svg.hashsalt": "chaosgym",
+    "svg.fonttype": "path",
+}
 """Settings for ``matplotlib.rc_context`` around these figures."""
 
 PLACES = {
@@ -95,9 +109,18 @@ def type_map_around(result: ResponseMap, region: Any, ax: Axes) -> Axes:
     names = (machine.speed_field, machine.clearance_field)
     (across, wide), (up, high) = (axis_label(machine, name) for name in names)
     ax.pcolormesh(
-        wide * result.speed, high * result.clearance, index.T, cmap=ListedColormap(list(TYPE_COLOURS.values())),
-        vmin=-0.5, vmax=len(kinds) - 0.5, shading="nearest", alpha=0.85, rasterized=False, edgecolors="white", lw=0.5,
-    )  # fmt: skip
+        wide * result.speed,
+        high * result.clearance,
+        index.T,
+        cmap=ListedColormap(list(TYPE_COLOURS.values())),
+        vmin=-0.5,
+        vmax=len(kinds) - 0.5,
+        shading="nearest",
+        alpha=0.85,
+        rasterized=False,
+        edgecolors="white",
+        lw=0.5,
+    )
     corners = [
         [factor * region[name].at(getattr(machine, name), share) for share in (-1.0, 1.0)]
         for name, factor in zip(names, (wide, high), strict=True)
@@ -189,9 +212,12 @@ def series_life(assessment: Assessment, ax: Axes) -> Axes:
     handles = [
         Line2D([], [], color=BAD, lw=1.3, ls="--", label=f"required {criteria.life:,.0f}"),
         Line2D([], [], color=MUTED, lw=1.0, ls=":", label="nominal machine"),
-        *(Line2D([], [], ls="", marker="o", ms=5, color=NATURE_COLOURS[kind], label=kind)
-          for kind in NATURE_COLOURS if any(run.nature == kind for run in runs)),
-    ]  # fmt: skip
+        *(
+            Line2D([], [], ls="", marker="o", ms=5, color=NATURE_COLOURS[kind], label=kind)
+            for kind in NATURE_COLOURS
+            if any(run.nature == kind for run in runs)
+        ),
+    ]
     ax.legend(handles=handles, loc="upper left", ncols=2)
     finite = lives[np.isfinite(lives)]
     if len(finite):

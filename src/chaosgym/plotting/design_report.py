@@ -213,19 +213,35 @@ def _cards(found: Assessment) -> str:
     by_name = {check.name: check for check in found.checks}
     cards = [
         ("", "response type", f"Type {found.type}" if found.type != "undetermined" else "open", found.nominal.nature),
-        (_tone(by_name["fatigue life"].met), "fatigue life", _life(value.life_interval.low),
-         f"million cycles ({_hours(hours)}); required {found.criteria.life:,g}"),
-        (_tone(by_name["reliability"].met), "reliability", _share(value.reliability_interval.low),
-         f"required {_share(found.criteria.reliability)}"),
+        (
+            _tone(by_name["fatigue life"].met),
+            "fatigue life",
+            _life(value.life_interval.low),
+            f"million cycles ({_hours(hours)}); required {found.criteria.life:,g}",
+        ),
+        (
+            _tone(by_name["reliability"].met),
+            "reliability",
+            _share(value.reliability_interval.low),
+            f"required {_share(found.criteria.reliability)}",
+        ),
         ("", "largest peak force", f"{value.largest_force:.1f} N", f"equivalent {value.force:.1f} N"),
         ("", "load rating needed", f"{value.required_load_rating:.0f} N", f"chosen {found.criteria.load_rating:g} N"),
-        (_tone(by_name["machines that meet"].met), "machines that meet", _percent(found.machines_that_meet),
-         f"of {max(len(found.series.runs), 1)} in tolerance, each by its own force"),
-    ]  # fmt: skip
-    return '<div class="cards">' + "".join(
-        f'<div class="card {tone}"><span class="label">{label}</span><b>{big}</b><span>{small}</span></div>'
-        for tone, label, big, small in cards
-    ) + "</div>"  # fmt: skip
+        (
+            _tone(by_name["machines that meet"].met),
+            "machines that meet",
+            _percent(found.machines_that_meet),
+            f"of {max(len(found.series.runs), 1)} in tolerance, each by its own force",
+        ),
+    ]
+    return (
+        '<div class="cards">'
+        + "".join(
+            f'<div class="card {tone}"><span class="label">{label}</span><b>{big}</b><span>{small}</span></div>'
+            for tone, label, big, small in cards
+        )
+        + "</div>"
+    )
 
 
 def _checks(checks: Iterable[Check]) -> str:
@@ -256,10 +272,17 @@ def _changes(study: DesignStudy) -> str:
     rows = []
     for trial in trials:
         value = trial.assessment.evaluation
-        rows.append((
-            _change(machine, trial), _type(trial.assessment.type), f"{trial.cost:.2f}", _life(value.life_interval.low),
-            _share(value.reliability_interval.low), f"{value.largest_force:.1f} N", _mark(trial.meets),
-        ))  # fmt: skip
+        rows.append(
+            (
+                _change(machine, trial),
+                _type(trial.assessment.type),
+                f"{trial.cost:.2f}",
+                _life(value.life_interval.low),
+                _share(value.reliability_interval.low),
+                f"{value.largest_force:.1f} N",
+                _mark(trial.meets),
+            )
+        )
     head = ("change", "type", "cost", "life [10<sup>6</sup> cycles]", "reliability", "largest peak", "meets all")
     note = (
         '<p class="note">Every change was built and simulated over the same tolerances. Cost: weight &times; '
@@ -348,14 +371,16 @@ def _evaluation_table(columns: Mapping[str, Evaluation]) -> str:
         row("largest peak force", lambda value: f"{value.largest_force:.2f} N"),
         row("life by Palmgren-Miner (eq. 5.4)", lambda value: f"{_life(value.life)} &middot; 10<sup>6</sup>"),
         row("its interval", lambda value: " to ".join(_life(end) for end in value.life_interval)),
-        row("conservative life, largest force throughout (eq. 5.2)",
-            lambda value: f"{_life(value.conservative_life)} &middot; 10<sup>6</sup>"),
+        row(
+            "conservative life, largest force throughout (eq. 5.2)",
+            lambda value: f"{_life(value.conservative_life)} &middot; 10<sup>6</sup>",
+        ),
         row("load rating for the required life (eq. 5.5)", lambda value: f"{value.required_load_rating:.1f} N"),
         row("reliability over the distribution (eq. 5.8)", lambda value: _share(value.reliability)),
         row("its interval", lambda value: " to ".join(_share(end) for end in value.reliability_interval)),
         row("reliability, normal approximation (eq. 5.9)", lambda value: _share(value.normal_reliability)),
         row("safety factor at the largest stress (eq. 5.6)", lambda value: _number(value.safety_factor)),
-    ]  # fmt: skip
+    ]
     return _table(("quantity", *columns), rows, numeric=range(1, len(columns) + 1))
 
 

@@ -30,9 +30,15 @@ def _cost_against(
         colour = f"C{rungs.index(row.rung)}"
         height = max(shown, FLOOR) if logarithmic else shown
         ax.plot(
-            row.microseconds_per_cycle, height, MARKERS[row.method], color=colour, ms=8, mec="black",
-            mew=1.5 if row.on_front else 0.3, alpha=1.0 if row.on_front else 0.6,
-        )  # fmt: skip
+            row.microseconds_per_cycle,
+            height,
+            MARKERS[row.method],
+            color=colour,
+            ms=8,
+            mec="black",
+            mew=1.5 if row.on_front else 0.3,
+            alpha=1.0 if row.on_front else 0.6,
+        )
     ax.set(xscale="log", xlabel="processor time [µs per cycle]")
     if logarithmic:
         ax.set_yscale("log")

@@ -42,8 +42,9 @@ def draw_job(job: PlayedJob, figure: Figure, steps: int | None = None) -> None:
     figure.suptitle(
         f"{job.env}, seed {job.seed}: return {job.reward[done].sum():.2f}, Type III in {job.type_iii[done].mean():.0%} "
         f"of the steps, damage {job.damage[done][-1]:.2f}",
-        fontsize=10, color=INK,
-    )  # fmt: skip
+        fontsize=10,
+        color=INK,
+    )
 
 
 def draw_speed(job: PlayedJob, ax: Axes, steps: int | None = None) -> Axes:
@@ -70,9 +71,11 @@ def draw_forces(job: PlayedJob, ax: Axes, steps: int | None = None) -> Axes:
         ax.plot(cycle[chosen], peaks[chosen], ".", color=colour, markersize=3)
     ax.axhline(job.force_limit, color=LIMIT, linewidth=1.0, linestyle="--")
     ax.set(
-        xlim=(0, job.peak_force.size), ylim=(0.0, 1.1 * max(job.force_limit, float(job.peak_force.max()))),
-        xlabel="cycle", ylabel="measured peak force [N]",
-    )  # fmt: skip
+        xlim=(0, job.peak_force.size),
+        ylim=(0.0, 1.1 * max(job.force_limit, float(job.peak_force.max()))),
+        xlabel="cycle",
+        ylabel="measured peak force [N]",
+    )
     return ax
 
 

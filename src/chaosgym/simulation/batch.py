@@ -1,11 +1,11 @@
 """How do many machines run side by side? Each goes on from where it is, at a speed of its own.
 
-fleet = fleet_of(THESIS_IMPACT_BEAM, 256)
-fleet.start(0, machine)                  # from rest; the same for 1, 2, ...
-fleet.set_speeds(which, speeds)
-cycles = fleet.run(which, 5)             # one compiled call on all processors
+batch = batch_of(THESIS_IMPACT_BEAM, 256)
+batch.start(0, machine)                  # from rest; the same for 1, 2, ...
+batch.set_speeds(which, speeds)
+cycles = batch.run(which, 5)             # one compiled call on all processors
 
-Every machine moves as ``simulate`` moves it, bit for bit. All machines of a fleet are variants of one: they differ in
+Every machine moves as ``simulate`` moves it, bit for bit. All machines of a batch are variants of one: they differ in
 numbers, not in the joints or in how many modes they have.
 """
 
@@ -66,7 +66,7 @@ def at_speed(machine: Machine, speed: float) -> Machine:
     return with_settings(machine, {machine.speed_field: speed})
 
 
-class Fleet(Protocol):
+class Batch(Protocol):
     """Machines that run side by side."""
 
     def __len__(self) -> int:
@@ -94,7 +94,7 @@ class Fleet(Protocol):
         ...
 
 
-class SerialFleet:
+class SerialBatch:
     """Machines that run one after the other; ``records`` holds the last cycles of each that did not fail."""
 
     def __init__(self, count: int) -> None:
@@ -123,9 +123,7 @@ class SerialFleet:
     def run(self, which: Indices, cycles: int) -> Cycles:
         """Run the machines ``which`` (k,) for some cycles."""
         shape = (len(which), cycles, 2)
-        results = Cycles(
-            np.zeros(len(which), np.bool_), np.zeros(shape), np.zeros(shape, np.int64), np.zeros(shape)
-        )  # fmt: skip
+        results = Cycles(np.zeros(len(which), np.bool_), np.zeros(shape), np.zeros(shape, np.int64), np.zeros(shape))
         for k, i in enumerate(which.tolist()):
             machine = self._machines[i]
             assert machine is not None
@@ -161,7 +159,7 @@ _one_call_at_a_time = Lock()
 """Some of numba's threading layers abort the process if two threads call parallel kernels at once."""
 
 
-class _CompiledFleet(ABC):
+class _CompiledBatch(ABC):
     """Machines that move in one compiled call; ``change``, ``set_speeds`` and ``_advance`` know their kind."""
 
     def __init__(self, machine: Machine, count: int, integrator: ExactEvents | None = None) -> None:
@@ -211,7 +209,7 @@ class _CompiledFleet(ABC):
         """Run the machines ``which`` (k,) in place; rows of ``arrays`` and ``outcome`` (k,) in that order."""
 
 
-class BeamFleet(_CompiledFleet):
+class BeamBatch(_CompiledBatch):
     """Impact beams."""
 
     def __init__(self, machine: Machine, count: int) -> None:
@@ -234,7 +232,7 @@ class BeamFleet(_CompiledFleet):
         call(advance_beams, self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
 
 
-class RigidBeamFleet(BeamFleet):
+class RigidBeamBatch(BeamBatch):
     """Impact beams whose impacts take no time."""
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
@@ -245,7 +243,7 @@ SPEED_FIELDS = ("bin_duration", "steps", "order")
 """Fields of a slider crank's model that change with its speed, apart from the tables."""
 
 
-class CrankFleet(_CompiledFleet):
+class CrankBatch(_CompiledBatch):
     """Slider cranks that ``has_propagators``."""
 
     def __init__(self, machine: Any, count: int) -> None:
@@ -288,7 +286,7 @@ class CrankFleet(_CompiledFleet):
         call(advance_cranks, self._batch, self._bins, which, self._motions, arrays, self._settings, outcome)
 
 
-class SteppedCrankFleet(_CompiledFleet):
+class SteppedCrankBatch(_CompiledBatch):
     """Slider cranks that need the stepper."""
 
     def __init__(self, machine: Machine, count: int) -> None:
@@ -311,16 +309,16 @@ class SteppedCrankFleet(_CompiledFleet):
         call(advance_stepped_cranks, self._batch, which, self._motions, arrays, self._settings, outcome)
 
 
-_COMPILED: dict[type, type[BeamFleet] | type[CrankFleet] | type[SteppedCrankFleet]] = {
-    ModalImpactModel: BeamFleet,
-    RestitutionModel: RigidBeamFleet,
-    SliderCrankModel: CrankFleet,
-    SteppedCrankModel: SteppedCrankFleet,
+_COMPILED: dict[type, type[BeamBatch] | type[CrankBatch] | type[SteppedCrankBatch]] = {
+    ModalImpactModel: BeamBatch,
+    RestitutionModel: RigidBeamBatch,
+    SliderCrankModel: CrankBatch,
+    SteppedCrankModel: SteppedCrankBatch,
 }
 """By model: who moves many at once. Machines of another model run one after the other."""
 
 
-def fleet_of(machine: Machine, count: int) -> Fleet:
-    """Return a fleet of ``count`` variants of a machine, compiled if its model can be."""
+def batch_of(machine: Machine, count: int) -> Batch:
+    """Return a batch of ``count`` variants of a machine, compiled if its model can be."""
     compiled = _COMPILED.get(type(machine.reduce()))
-    return SerialFleet(count) if compiled is None else compiled(machine, count)
+    return SerialBatch(count) if compiled is None else compiled(machine, count)

@@ -103,6 +103,15 @@ class CycleRecord:
 
 
 _PER_CYCLE = (
-    "section", "displacement", "velocity", "peak_force", "impacts", "contact_fraction", "bounce_duration", "history",
-    "peak_phase", "peak_vector", "sensor_peak",
-)  # fmt: skip
+    "section",
+    "displacement",
+    "velocity",
+    "peak_force",
+    "impacts",
+    "contact_fraction",
+    "bounce_duration",
+    "history",
+    "peak_phase",
+    "peak_vector",
+    "sensor_peak",
+)

@@ -266,9 +266,7 @@ def simulate_with_deviations(
         )
     log_growth = np.empty((cycles, len(vectors) if orthonormal else 0))
     integrator = integrator or default_integrator(machine)
-    outcome, done, record = _run_impact_beam(
-        machine, state, cycles, 0, integrator, Tangents(vectors, log_growth)
-    )  # fmt: skip
+    outcome, done, record = _run_impact_beam(machine, state, cycles, 0, integrator, Tangents(vectors, log_growth))
     if outcome != status.OK:
         raise _failure(machine, outcome, done, integrator)
     return record, vectors, log_growth

@@ -97,7 +97,9 @@ def schema(plan: SweepPlan, settings: Mapping[str, Any]) -> pa.Schema:
         columns |= signal_columns()
     definitions = {name: column.meaning for name, column in columns.items() if name not in plan.fields}
     return pa.schema(
-        [pa.field(name, kind, metadata={"unit": unit, "meaning": meaning})
-         for name, (kind, unit, meaning) in columns.items()],
+        [
+            pa.field(name, kind, metadata={"unit": unit, "meaning": meaning})
+            for name, (kind, unit, meaning) in columns.items()
+        ],
         metadata={"chaosgym": json.dumps(settings, sort_keys=True), "definitions": json.dumps(definitions)},
-    )  # fmt: skip
+    )

@@ -254,9 +254,11 @@ class SweepPlan:
         patches = tuple(Patch(**{**patch, "step": Tolerance(*patch["step"])}) for patch in settings["patches"])
         machine: Any = MACHINES[settings["machine"]]
         return cls(
-            machine(**settings["base"]), tuple(Axis(**axis) for axis in settings["axes"]), patches=patches,
+            machine(**settings["base"]),
+            tuple(Axis(**axis) for axis in settings["axes"]),
+            patches=patches,
             **{name: settings[name] for name in _PLAIN_FIELDS},
-        )  # fmt: skip
+        )
 
 
 _PLAIN_FIELDS = ("sampling", "size", "seed", "budget", "signals", "full_types")

@@ -58,9 +58,13 @@ def run_sweep(
         done = on_cluster(plan, missing, scheduler) if scheduler else on_threads(plan, missing, workers)
         waiting = sum(len(rows) for rows in missing)
         with tqdm(
-            total=len(plan), initial=len(plan) - waiting, desc="sweep", unit="point", disable=not progress,
+            total=len(plan),
+            initial=len(plan) - waiting,
+            desc="sweep",
+            unit="point",
+            disable=not progress,
             mininterval=1.0,
-        ) as bar:  # fmt: skip
+        ) as bar:
             for rows, table in done:
                 _check_version(table)
                 store.keep(rows, table)

@@ -256,14 +256,32 @@ def _features(x: Array, sensor_error: float, out: Array) -> None:
     for i in range(n - 2):
         turning += (z[i + 1] - z[i]) * (z[i + 2] - z[i + 1]) < 0.0
     rest = (
-        _log(residual), float(repeat_period), _log(scatter), _log(late_scatter), float(scatter_period),
-        _log(scatter / (deviation + _FLOOR)), _log(late_scatter / error) if error > 0.0 else np.nan,
-        slope, straightness, late_mean - mean, _log(late_deviation) - _log(early_deviation),
-        _log(forecast), _log(distance), _flatness(z - mean),
-        _autocorrelation(z, mean, deviation, 1), _autocorrelation(z, mean, deviation, 2),
-        _autocorrelation(z, mean, deviation, 3), _pattern_entropy(z), turning / (n - 2), skewness, kurtosis,
-        _distinct(ordered, 0.01), _distinct(ordered, 0.05), _log(np.min(z)), _log(np.max(z)),
-    )  # fmt: skip
+        _log(residual),
+        float(repeat_period),
+        _log(scatter),
+        _log(late_scatter),
+        float(scatter_period),
+        _log(scatter / (deviation + _FLOOR)),
+        _log(late_scatter / error) if error > 0.0 else np.nan,
+        slope,
+        straightness,
+        late_mean - mean,
+        _log(late_deviation) - _log(early_deviation),
+        _log(forecast),
+        _log(distance),
+        _flatness(z - mean),
+        _autocorrelation(z, mean, deviation, 1),
+        _autocorrelation(z, mean, deviation, 2),
+        _autocorrelation(z, mean, deviation, 3),
+        _pattern_entropy(z),
+        turning / (n - 2),
+        skewness,
+        kurtosis,
+        _distinct(ordered, 0.01),
+        _distinct(ordered, 0.05),
+        _log(np.min(z)),
+        _log(np.max(z)),
+    )
     for i in range(len(rest)):
         out[at + i] = rest[i]
 

@@ -63,9 +63,18 @@ def walk_blocks(
     for block in range((len(features) + BLOCK - 1) // BLOCK):
         start, stop = block * BLOCK, min(len(features), (block + 1) * BLOCK)
         _walk(
-            feature, threshold, missing_right, child, value, roots, depths, score, baseline, features[start:stop],
+            feature,
+            threshold,
+            missing_right,
+            child,
+            value,
+            roots,
+            depths,
+            score,
+            baseline,
+            features[start:stop],
             out[start:stop],
-        )  # fmt: skip
+        )
 
 
 @njit(cache=True, nogil=True)

@@ -15,12 +15,12 @@ from chaosgym.control.controllers.controller import Action, Controller, Knowledg
 from chaosgym.control.forecast import Model, forecast_for, worth_of_steps
 from chaosgym.envs.jobs import RUN_IN_CYCLES
 from chaosgym.envs.pools import worn
-from chaosgym.simulation.batch import at_speed, fleet_of
+from chaosgym.simulation.batch import at_speed, batch_of
 
 Array = NDArray[np.float64]
 
 COPY = np.zeros(1, np.int64)
-"""Place of the copy in the fleet; the others are for what may happen."""
+"""Place of the copy in the batch; the others are for what may happen."""
 
 
 class RecedingHorizon(Controller):
@@ -51,10 +51,10 @@ class RecedingHorizon(Controller):
         self._worth = worth_of_steps(self._forecast)
         self._speed: Any = np.array([self.env.speed])
         self._damage = np.zeros((1, len(machine.sides)))
-        self._fleet = fleet_of(machine, 2 * self._forecast.moves * self.horizon + 2)
-        for place in range(len(self._fleet)):
-            self._fleet.start(place, at_speed(machine, float(self._speed[0])))
-        self._fleet.run(COPY, max(RUN_IN_CYCLES, self.task.cycles_per_step))
+        self._batch = batch_of(machine, 2 * self._forecast.moves * self.horizon + 2)
+        for place in range(len(self._batch)):
+            self._batch.start(place, at_speed(machine, float(self._speed[0])))
+        self._batch.run(COPY, max(RUN_IN_CYCLES, self.task.cycles_per_step))
         self._action: Action | None = None
 
     def __call__(self, observation: Observation) -> Action:
@@ -73,13 +73,13 @@ class RecedingHorizon(Controller):
         if self.env.pool.wears:
             machine = at_speed(worn(self._new, 1.0 + float(self._damage.max())), float(self._speed[0]))
             for place in which.tolist():
-                self._fleet.change(place, machine)
+                self._batch.change(place, machine)
 
     def _run(self, which: NDArray[np.int64], speed: Array, target: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Run some places (k,) for a step: speeds (k,), what each side wore (k, sides), whose simulation failed."""
         speed = self.drive.approach(speed, target)
-        self._fleet.set_speeds(which, speed)
-        cycles = self._fleet.run(which, self.task.cycles_per_step)
+        self._batch.set_speeds(which, speed)
+        cycles = self._batch.run(which, self.task.cycles_per_step)
         return speed, self.task.damage(cycles.peak_force), cycles.failed
 
     def _best_target(self, step: int) -> float:
@@ -89,7 +89,7 @@ class RecedingHorizon(Controller):
         targets = forecast.speeds[max(0, at - reach) : at + reach + 1]
         which = np.arange(1, len(targets) + 1)
         self._wear(which)
-        self._fleet.branch(0, which)
+        self._batch.branch(0, which)
         speed, damage = np.repeat(self._speed, len(which)), np.repeat(self._damage, len(which), axis=0)
         worth, failed = np.zeros(len(which)), np.zeros(len(which), np.bool_)
         for _ in range(ahead):

@@ -53,10 +53,15 @@ def exported(
     names = [*((f"{hidden}.{place}", activation) for place in places), (last, "none")]
     network = Network(_lstm(weights), tuple(_dense(weights, name, kind) for name, kind in names))
     return TrainedPolicy(
-        env, envs.observation_space, envs.action_space, network, _normalisation(normalise),
-        memory, envs.get_attr("drive")[0].slew_limit if increments else None,
+        env,
+        envs.observation_space,
+        envs.action_space,
+        network,
+        _normalisation(normalise),
+        memory,
+        envs.get_attr("drive")[0].slew_limit if increments else None,
         bool(model.policy.squash_output),
-    )  # fmt: skip
+    )
 
 
 def _dense(weights: dict[str, Any], name: str, activation: str) -> Dense:

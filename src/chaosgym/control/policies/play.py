@@ -82,6 +82,15 @@ def play(env: gym.Env[Any, Any], policy: Callable[[Any], Any], seed: int) -> Pla
     machine: Any = env.get_wrapper_attr("nominal")
     assert env.spec is not None
     return PlayedJob(
-        env.spec.id, seed, parameters_of(machine)[machine.speed_field].unit, speed, np.array(peaks, dtype=float),
-        type_iii > 0.0, cost > 0.0, damage, rewards, env.get_wrapper_attr("task").force_limit, status,
-    )  # fmt: skip
+        env.spec.id,
+        seed,
+        parameters_of(machine)[machine.speed_field].unit,
+        speed,
+        np.array(peaks, dtype=float),
+        type_iii > 0.0,
+        cost > 0.0,
+        damage,
+        rewards,
+        env.get_wrapper_attr("task").force_limit,
+        status,
+    )

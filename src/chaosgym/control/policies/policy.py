@@ -225,10 +225,15 @@ def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPol
         for place, activation in enumerate(description["activations"])
     )
     return TrainedPolicy(
-        env, _space(description["observation"]), _space(description["action"]), Network(lstm, layers),
+        env,
+        _space(description["observation"]),
+        _space(description["action"]),
+        Network(lstm, layers),
         None if limit is None else Normalisation(arrays["mean"], arrays["deviation"], float(limit)),
-        description["memory"], None if step is None else float(step), bool(description["squashed"]),
-    )  # fmt: skip
+        description["memory"],
+        None if step is None else float(step),
+        bool(description["squashed"]),
+    )
 
 
 def _arrays(path: Path, digest: str) -> dict[str, Array]:

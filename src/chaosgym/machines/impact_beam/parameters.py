@@ -81,9 +81,13 @@ class ImpactBeam(FidelityLadder):
     length: float = parameter(0.279, unit="m", low=0.01, high=10.0, provenance="printed", source="thesis 3.5.2")
     """From the pivot to the tip [m]."""
     height: float = parameter(
-        10.156e-3, unit="m", low=1e-4, high=1.0, provenance="derived",
+        10.156e-3,
+        unit="m",
+        low=1e-4,
+        high=1.0,
+        provenance="derived",
         source="pinned-pinned frequency 288.2 Hz at 284.0 mm, thesis table 3.1",
-    )  # fmt: skip
+    )
     """Thickness in the direction of bending [m]."""
     width: float = parameter(17.58e-3, unit="m", low=1e-4, high=1.0, provenance="calibrated", source=_FIT)
     """Across the direction of bending [m]."""
@@ -94,9 +98,13 @@ class ImpactBeam(FidelityLadder):
     force_position: float = parameter(0.1809, unit="m", low=1e-3, high=10.0, provenance="calibrated", source=_FIT)
     """Distance of the shaker's push rod from the pivot, at most the length [m]."""
     pivot_rotational_stiffness: float = parameter(
-        128.572, unit="N m/rad", low=0.0, high=1e9, provenance="derived",
+        128.572,
+        unit="N m/rad",
+        low=0.0,
+        high=1e9,
+        provenance="derived",
         source="static tip deflection 3.175 mm under 8.9 N: dimensionless clearance 0.04 is 0.127 mm, thesis 3.5.1",
-    )  # fmt: skip
+    )
     """Rotational spring of the flexure pivot [N m/rad]."""
     pivot_translational_stiffness: float = parameter(
         9.7e7, unit="N/m", low=1.0, high=1e13, provenance="calibrated", source=_FIT
@@ -174,10 +182,24 @@ class ImpactBeam(FidelityLadder):
 
 
 _STRUCTURE_FIELDS = (
-    "length", "height", "width", "youngs_modulus", "density", "force_position", "pivot_rotational_stiffness",
-    "pivot_translational_stiffness", "shaker_stiffness", "shaker_damping", "shaker_mass", "damping_ratio",
-    "damping_family", "contact_stiffness", "contact_damping", "contact_law", "n_modes",
-)  # fmt: skip
+    "length",
+    "height",
+    "width",
+    "youngs_modulus",
+    "density",
+    "force_position",
+    "pivot_rotational_stiffness",
+    "pivot_translational_stiffness",
+    "shaker_stiffness",
+    "shaker_damping",
+    "shaker_mass",
+    "damping_ratio",
+    "damping_family",
+    "contact_stiffness",
+    "contact_damping",
+    "contact_law",
+    "n_modes",
+)
 
 THESIS_IMPACT_BEAM = ImpactBeam()
 """The beam of the thesis; ``parameters_of(ImpactBeam)`` says where each number comes from."""
@@ -233,9 +255,10 @@ def modal_analysis(beam: ImpactBeam, elements: int | None = None) -> ModalAnalys
     scale = 1.0 / np.sqrt(np.diag(stiffness))
     try:
         inverse_squares, shapes = eigh(
-            mass * np.outer(scale, scale), stiffness * np.outer(scale, scale),
+            mass * np.outer(scale, scale),
+            stiffness * np.outer(scale, scale),
             subset_by_index=[size - wanted, size - 1],
-        )  # fmt: skip
+        )
     except np.linalg.LinAlgError as error:
         raise _inseparable(beam) from error
     if inverse_squares[0] < 1e-14 * inverse_squares[-1]:

@@ -152,9 +152,13 @@ def connecting_rod(bar: Bar, housing: EndBody, yoke: EndBody, n_modes: int, elem
         [slope.T @ ((points.weight * (points.position / bar.length) ** k)[:, None] * slope) for k in range(3)]
     )
     load = np.stack(
-        [along.T @ weighted[:, 0], across.T @ weighted[:, 0], across.T @ (weighted[:, 0] * points.position),
-         along.T @ (weighted[:, 0] * points.position)]
-    )  # fmt: skip
+        [
+            along.T @ weighted[:, 0],
+            across.T @ weighted[:, 0],
+            across.T @ (weighted[:, 0] * points.position),
+            along.T @ (weighted[:, 0] * points.position),
+        ]
+    )
 
     inertia = np.zeros((size, size))
     end_rotation = np.zeros((2, size, size))

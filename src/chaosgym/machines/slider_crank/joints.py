@@ -133,11 +133,14 @@ class InstrumentedSlider:
             return tuple(contact for station, xi in stations for contact in self._station(station, xi))
         return tuple(
             Contact(
-                {SLIDER_ACROSS: _ONE, SLIDER_PITCH: xi * _ONE}, np.array([[0.0, -1.0, 0.0]]), 0.5, slides=True,
+                {SLIDER_ACROSS: _ONE, SLIDER_PITCH: xi * _ONE},
+                np.array([[0.0, -1.0, 0.0]]),
+                0.5,
+                slides=True,
                 sensors=((f"{station} lower",), (f"{station} upper",)),
             )
             for station, xi in stations
-        )  # fmt: skip
+        )
 
     def _station(self, station: str, xi: float) -> tuple[Contact, ...]:
         """Four single sensors; each is closed by the motion of its tip against its own side."""
@@ -206,11 +209,14 @@ class InstrumentedBall:
         # the ball's eccentricity in its housing is minus the motion of the rod's end
         return tuple(
             Contact(
-                {name: -normal[[axis]] for axis, name in enumerate(names)}, normal[None], share, False,
+                {name: -normal[[axis]] for axis, name in enumerate(names)},
+                normal[None],
+                share,
+                False,
                 sensors=(own, ()),
             )
             for normal, share, own in zip(normals, shares, sensors, strict=True)
-        )  # fmt: skip
+        )
 
 
 _ONE = np.ones(1)

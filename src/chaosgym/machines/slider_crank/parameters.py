@@ -107,9 +107,13 @@ class SliderCrank(FidelityLadder):
     housing_mass: float = parameter(0.36, unit="kg", low=0.0, high=100.0, provenance="calibrated", source=_FIT)
     """Ball joint housing at the rod's end [kg]."""
     housing_inertia: float = parameter(
-        3.922e-4, unit="kg m^2", low=0.0, high=10.0, provenance="calibrated",
+        3.922e-4,
+        unit="kg m^2",
+        low=0.0,
+        high=10.0,
+        provenance="calibrated",
         source="first natural frequency 75.6 Hz, thesis 4.5.5",
-    )  # fmt: skip
+    )
     """Moment of inertia of the housing about the ball centre [kg m^2]."""
     housing_offset_along: float = parameter(3e-3, unit="m", low=-0.1, high=0.1, provenance="calibrated", source=_FIT)
     """Centre of gravity of the housing from the ball centre towards the slider [m]."""
@@ -118,9 +122,13 @@ class SliderCrank(FidelityLadder):
     yoke_mass: float = parameter(0.16, unit="kg", low=0.0, high=100.0, provenance="calibrated", source=_FIT)
     """Yoke at the rod's other end [kg]."""
     yoke_inertia: float = parameter(
-        7.059e-4, unit="kg m^2", low=0.0, high=10.0, provenance="calibrated",
+        7.059e-4,
+        unit="kg m^2",
+        low=0.0,
+        high=10.0,
+        provenance="calibrated",
         source="first natural frequency 75.6 Hz, thesis 4.5.5",
-    )  # fmt: skip
+    )
     """Moment of inertia of the yoke about the slider pivot [kg m^2]."""
     yoke_offset_along: float = parameter(-8e-3, unit="m", low=-0.1, high=0.1, provenance="calibrated", source=_FIT)
     """Centre of gravity of the yoke from the slider pivot, positive away from the crank [m]."""
@@ -178,9 +186,13 @@ class SliderCrank(FidelityLadder):
     )
     """From the middle of the guide's face to a sensor, across the guide [m]; matters at a motor angle alone."""
     ball_sensor_angle: float = parameter(
-        -90.0, unit="deg", low=-180.0, high=180.0, provenance="calibrated",
+        -90.0,
+        unit="deg",
+        low=-180.0,
+        high=180.0,
+        provenance="calibrated",
         source="impacts from 100 and from 300 deg on, figure 4.10",
-    )  # fmt: skip
+    )
     """Direction halfway between the two in-plane sensors of an instrumented ball joint, from the rod's axis [deg]."""
     contact_law: str = parameter("linear", choices=("linear", "hertz"), provenance="printed", source="thesis 3.3")
     """"linear": spring and damper; "hertz": penetration to the power of 1.5 with dissipation."""
@@ -337,10 +349,19 @@ THESIS_SLIDER_CRANK = SliderCrank()
 
 SUPERHARMONIC_SLIDER_CRANK = replace(
     THESIS_SLIDER_CRANK,
-    crank_speed=1508.0, slider_clearance=0.127e-3, n_modes=4, damping_ratio=0.0007, damping_family="uniform",
-    housing_mass=0.4, housing_inertia=5.68e-4, housing_offset_along=0.035,
-    yoke_mass=0.25, yoke_inertia=5.68e-4, yoke_offset_along=-0.040, slider_mass=0.1,
-)  # fmt: skip
+    crank_speed=1508.0,
+    slider_clearance=0.127e-3,
+    n_modes=4,
+    damping_ratio=0.0007,
+    damping_family="uniform",
+    housing_mass=0.4,
+    housing_inertia=5.68e-4,
+    housing_offset_along=0.035,
+    yoke_mass=0.25,
+    yoke_inertia=5.68e-4,
+    yoke_offset_along=-0.040,
+    slider_mass=0.1,
+)
 """The mechanism of figure 4.18: end bodies whose centres of gravity lie along the rod excite its first mode."""
 
 

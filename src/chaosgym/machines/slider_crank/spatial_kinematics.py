@@ -216,6 +216,4 @@ def shapes_at(machine: "SliderCrank", angle: Array, rods: Rods) -> Shapes:
     )
     slider = at_b + np.cross(slider_turn, slider_offset(machine), axisa=0, axisb=0, axisc=0)
     bodies = np.stack([housing, yoke, slider, turn_a, yoke_turn], axis=1)
-    return Shapes(
-        np.concatenate([bar, bodies], axis=1), strain, at_a, at_b, turn_a, turn_b, swing, spin, slider_turn
-    )  # fmt: skip
+    return Shapes(np.concatenate([bar, bodies], axis=1), strain, at_a, at_b, turn_a, turn_b, swing, spin, slider_turn)

@@ -34,13 +34,24 @@ def crank_of(batch, bins, i):
     size = 2 * n + FORCING_TERMS + m
     sets = batch.radix[i] ** m
     return SliderCrankModel(
-        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.order[i], batch.spectrum[i], batch.row[i],
-        batch.gap[i], batch.stiffness[i], batch.damping[i], batch.two_sided[i], batch.radix[i], batch.reading[i],
-        batch.reach[i], batch.display[i],
+        batch.bin_duration[i],
+        batch.steps[i],
+        batch.contact_rate[i],
+        batch.order[i],
+        batch.spectrum[i],
+        batch.row[i],
+        batch.gap[i],
+        batch.stiffness[i],
+        batch.damping[i],
+        batch.two_sided[i],
+        batch.radix[i],
+        batch.reading[i],
+        batch.reach[i],
+        batch.display[i],
         carray(pointer(batch.acceleration[i]), (sets, bins, n, size), np.float64),
         carray(pointer(batch.curvature[i]), (sets, bins, m, size), np.float64),
         carray(pointer(batch.propagator[i]), (sets, bins, size, 2 * n), np.float64),
-    )  # fmt: skip
+    )
 
 
 @njit(cache=True, nogil=True, parallel=True)
@@ -49,19 +60,36 @@ def advance_cranks(batch, bins, which, motions, arrays, settings, outcome):
     for k in prange(which.shape[0]):
         i = which[k]
         outcome[k] = advance_crank(
-            crank_of(batch, bins, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
-            settings.event_tolerance / batch.contact_rate[i], settings.event_budget,
-        )[0]  # fmt: skip
+            crank_of(batch, bins, i),
+            motions.coordinates[i],
+            episode_of(motions, i),
+            rows_of(arrays, k),
+            settings.event_tolerance / batch.contact_rate[i],
+            settings.event_budget,
+        )[0]
 
 
 @njit(cache=True, inline="always")
 def stepped_crank_of(batch, i):
     """Model of machine i."""
     return SteppedCrankModel(
-        batch.bin_duration[i], batch.steps[i], batch.contact_rate[i], batch.acceleration[i], batch.first[i],
-        batch.row[i], batch.answer[i], batch.friction[i], batch.gap[i], batch.stiffness[i], batch.damping[i],
-        batch.law[i], batch.two_sided[i], batch.reading[i], batch.monitored[i], batch.display[i],
-    )  # fmt: skip
+        batch.bin_duration[i],
+        batch.steps[i],
+        batch.contact_rate[i],
+        batch.acceleration[i],
+        batch.first[i],
+        batch.row[i],
+        batch.answer[i],
+        batch.friction[i],
+        batch.gap[i],
+        batch.stiffness[i],
+        batch.damping[i],
+        batch.law[i],
+        batch.two_sided[i],
+        batch.reading[i],
+        batch.monitored[i],
+        batch.display[i],
+    )
 
 
 @njit(cache=True, nogil=True, parallel=True)
@@ -70,6 +98,10 @@ def advance_stepped_cranks(batch, which, motions, arrays, settings, outcome):
     for k in prange(which.shape[0]):
         i = which[k]
         outcome[k] = advance_stepped_crank(
-            stepped_crank_of(batch, i), motions.coordinates[i], episode_of(motions, i), rows_of(arrays, k),
-            settings.event_tolerance / batch.contact_rate[i], settings.event_budget,
-        )[0]  # fmt: skip
+            stepped_crank_of(batch, i),
+            motions.coordinates[i],
+            episode_of(motions, i),
+            rows_of(arrays, k),
+            settings.event_tolerance / batch.contact_rate[i],
+            settings.event_budget,
+        )[0]

@@ -150,9 +150,17 @@ def motion_of(model):
     size, n = model.acceleration.shape[3], model.acceleration.shape[2]
     m, order = model.row.shape[0], model.order
     return Motion(
-        np.zeros(size), np.zeros(size), np.zeros(m), np.zeros((3, m)), np.zeros((3, m)), np.zeros((3, m)),
-        np.zeros((order + 1, n + m)), np.zeros(m), np.zeros(m), np.zeros((2, 5)),
-    )  # fmt: skip
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(m),
+        np.zeros((3, m)),
+        np.zeros((3, m)),
+        np.zeros((3, m)),
+        np.zeros((order + 1, n + m)),
+        np.zeros(m),
+        np.zeros(m),
+        np.zeros((2, 5)),
+    )
 
 
 @leaf
@@ -224,9 +232,23 @@ def bend(h, start, end, j):
 
 @leaf
 def quiet_steps(
-    table, row, curvature, surface, side, z, moved, start, end, duration, step, first, limit,
-    peak, channel_peak, contact_time,
-):  # fmt: skip
+    table,
+    row,
+    curvature,
+    surface,
+    side,
+    z,
+    moved,
+    start,
+    end,
+    duration,
+    step,
+    first,
+    limit,
+    peak,
+    channel_peak,
+    contact_time,
+):
     """Take up to ``limit`` whole steps in which no contact changes and no force passes its peak; how many.
 
     ``first`` steps of the bin have been taken. ``peak`` (2, 5) are those of the resultant, ``channel_peak`` (m, 2)
@@ -316,9 +338,23 @@ def note_channels(surface, side, start, end, spare, series, last, since, h, chan
 
 @leaf
 def careful_step(
-    surface, side, start, end, spare, series, last, until, towards, now, h, pieces, tolerance,
-    peak, channel_peak, contact_time,
-):  # fmt: skip
+    surface,
+    side,
+    start,
+    end,
+    spare,
+    series,
+    last,
+    until,
+    towards,
+    now,
+    h,
+    pieces,
+    tolerance,
+    peak,
+    channel_peak,
+    contact_time,
+):
     """Follow the expanded motion for at most h, up to the first change of contact, and record what happens.
 
     ``now`` is the time in the revolution. Leaves the reading ``start`` somewhere in the step.
@@ -407,14 +443,38 @@ def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
                 if sampled:
                     expand(acceleration[chosen, b], row, z, duration, order, series)
                 taken = quiet_steps(
-                    propagator[chosen, b], row, curvature, surface, side, z, moved, start, end, duration, step,
-                    done, limit, peak, channel_peak, contact_time,
-                )  # fmt: skip
+                    propagator[chosen, b],
+                    row,
+                    curvature,
+                    surface,
+                    side,
+                    z,
+                    moved,
+                    start,
+                    end,
+                    duration,
+                    step,
+                    done,
+                    limit,
+                    peak,
+                    channel_peak,
+                    contact_time,
+                )
                 if sampled and taken == 1:
                     sample = write_samples(
-                        display, surface, side, moved, spare, series, order, begin + time,
-                        begin + (done + 1) * step, spacing, sample, history,
-                    )  # fmt: skip
+                        display,
+                        surface,
+                        side,
+                        moved,
+                        spare,
+                        series,
+                        order,
+                        begin + time,
+                        begin + (done + 1) * step,
+                        spacing,
+                        sample,
+                        history,
+                    )
                 done += taken
                 time = done * step
                 if taken == limit:
@@ -423,14 +483,38 @@ def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
             last = order_for(model.spectrum * h, order)
             expand(acceleration[chosen, b], row, z, duration, last, series)
             changed, h = careful_step(
-                surface, side, start, end, spare, series, last, until, towards, begin + time, h,
-                PIECES if PIECES * h > step else 1, tolerance, peak, channel_peak, contact_time,
-            )  # fmt: skip
+                surface,
+                side,
+                start,
+                end,
+                spare,
+                series,
+                last,
+                until,
+                towards,
+                begin + time,
+                h,
+                PIECES if PIECES * h > step else 1,
+                tolerance,
+                peak,
+                channel_peak,
+                contact_time,
+            )
             if sample < history.shape[0]:
                 sample = write_samples(
-                    display, surface, side, moved, spare, series, last, begin + time, begin + time + h, spacing,
-                    sample, history,
-                )  # fmt: skip
+                    display,
+                    surface,
+                    side,
+                    moved,
+                    spare,
+                    series,
+                    last,
+                    begin + time,
+                    begin + time + h,
+                    spacing,
+                    sample,
+                    history,
+                )
             evaluate(series, n, last, h, z)
             if changed < 0:
                 done += 1
