@@ -1,10 +1,30 @@
 """What an engineer writes down: a machine in SI units, and its reduction to the model that the kernels know."""
 
-from chaosgym.machines.impact_beam import THESIS_IMPACT_BEAM, ImpactBeam
+from typing import TYPE_CHECKING, Any
+
 from chaosgym.machines.machine import Machine
-from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK, SliderCrank
+from chaosgym.machines.registry import MACHINES, register_machine
 
-MACHINES: dict[str, type[Machine]] = {machine.name: machine for machine in (ImpactBeam, SliderCrank)}
-"""Every machine by its name on the command line."""
+if TYPE_CHECKING:
+    from chaosgym.machines.impact_beam import THESIS_IMPACT_BEAM, ImpactBeam
+    from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK, SliderCrank
 
-__all__ = ["MACHINES", "THESIS_IMPACT_BEAM", "THESIS_SLIDER_CRANK", "ImpactBeam", "Machine", "SliderCrank"]
+__all__ = [
+    "MACHINES",
+    "THESIS_IMPACT_BEAM",
+    "THESIS_SLIDER_CRANK",
+    "ImpactBeam",
+    "Machine",
+    "SliderCrank",
+    "register_machine",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in ("ImpactBeam", "THESIS_IMPACT_BEAM"):
+        from chaosgym.machines import impact_beam as home
+    elif name in ("SliderCrank", "THESIS_SLIDER_CRANK"):
+        from chaosgym.machines import slider_crank as home
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(home, name)

@@ -1,0 +1,48 @@
+"""The registry of machines: every machine by its name on the command line, imported when it is asked for."""
+
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from chaosgym.machines.machine import Machine
+
+
+class MachineRegistry(Mapping[str, "type[Machine]"]):
+    """Machine classes by name.
+
+    ``entry_points`` says where each is: module and class, as in ``"package.module:Class"``.
+    """
+
+    def __init__(self, entry_points: Mapping[str, str]) -> None:
+        self.entry_points = dict(entry_points)
+
+    def __getitem__(self, name: str) -> "type[Machine]":
+        module, _, kind = self.entry_points[name].partition(":")
+        found: type[Machine] = getattr(import_module(module), kind)
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.entry_points)
+
+    def __len__(self) -> int:
+        return len(self.entry_points)
+
+    def class_name(self, name: str) -> str:
+        """Name of a machine's class, such as ``ImpactBeam``, without importing it."""
+        return self.entry_points[name].rpartition(":")[2]
+
+
+MACHINES = MachineRegistry(
+    {
+        "impact-beam": "chaosgym.machines.impact_beam:ImpactBeam",
+        "slider-crank": "chaosgym.machines.slider_crank:SliderCrank",
+    }
+)
+"""A new machine of chaosgym adds one line here; one from outside calls ``register_machine``."""
+
+
+def register_machine(machine: "type[Machine]") -> "type[Machine]":
+    """Make a machine known to every command and task; also a class decorator."""
+    MACHINES.entry_points[machine.name] = f"{machine.__module__}:{machine.__qualname__}"
+    return machine
