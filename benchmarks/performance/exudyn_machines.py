@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from benchmarks.performance.timing import processor_seconds
 from chaosgym.core.modal_impact import ModalImpactModel
 from chaosgym.errors import ChaosgymError
-from chaosgym.machines.impact_beam.parameters import ImpactBeam
+from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.machines.machine import Machine
-from chaosgym.machines.slider_crank.parameters import SliderCrank
+from chaosgym.machines.slider_crank import SliderCrank
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
-from chaosgym.machines.slider_crank.parameters import THESIS_SLIDER_CRANK
+from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.simulation import simulate
 
 _BALL = {"slider_joint": "ideal", "gravity": 9.81}

@@ -4,7 +4,7 @@ import statistics
 import time
 from dataclasses import replace
 
-from chaosgym.machines.slider_crank.parameters import THESIS_SLIDER_CRANK, SliderCrank
+from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK, SliderCrank
 
 
 def set_up_times(repeats: int = 5) -> dict[str, float]:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chaosgym.errors import SimulationError
-from chaosgym.machines.impact_beam.parameters import THESIS_IMPACT_BEAM, ImpactBeam
+from chaosgym.machines.impact_beam import THESIS_IMPACT_BEAM, ImpactBeam
 from chaosgym.simulation import ExactEvents, RungeKutta4, simulate
 from tests.core.twin import twin_trajectory
 

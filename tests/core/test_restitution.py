@@ -10,7 +10,7 @@ from scipy.optimize import fsolve
 from chaosgym.diagnosis import diagnose
 from chaosgym.diagnosis.lyapunov import lyapunov_spectrum
 from chaosgym.errors import ParameterError
-from chaosgym.machines.impact_beam.parameters import ImpactBeam
+from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.simulation import RungeKutta4, simulate, simulate_with_deviations
 
 BEAM = ImpactBeam(fidelity="restitution", contact_damping=200.0)

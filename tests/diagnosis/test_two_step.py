@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from chaosgym.diagnosis import two_step_test
 from chaosgym.errors import DiagnosisError
-from chaosgym.machines.impact_beam.parameters import ImpactBeam
+from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.simulation import simulate
 
 from .maps import GOLDEN, circle, henon, logistic, three_frequencies

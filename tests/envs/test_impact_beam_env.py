@@ -9,7 +9,7 @@ import pytest
 from chaosgym.envs.impact_beam import ImpactBeamEnv
 from chaosgym.envs.tasks import Status
 from chaosgym.errors import ParameterError
-from chaosgym.machines.impact_beam.parameters import ImpactBeam
+from chaosgym.machines.impact_beam import ImpactBeam
 
 ID = "chaosgym/ImpactBeam-v0"
 

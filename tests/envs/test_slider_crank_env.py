@@ -10,7 +10,7 @@ from gymnasium.utils.env_checker import check_env
 
 from chaosgym.envs.slider_crank import SliderCrankEnv
 from chaosgym.errors import ParameterError
-from chaosgym.machines.slider_crank.parameters import THESIS_SLIDER_CRANK
+from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 
 ID = "chaosgym/SliderCrank-v0"
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
-from chaosgym.fidelity.stability import Run, admissible_box, runs_of, share_of_bound, stability_map, try_run
+from chaosgym.fidelity.stability import Run, runs_of, share_of_bound, stability_map, try_run
 from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam, SliderCrank
 from chaosgym.simulation import ExactEvents, RungeKutta4, simulate
 from tests.machines.crank_twin import continuous_twin

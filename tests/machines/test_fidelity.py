@@ -14,7 +14,7 @@ from chaosgym.cli import app
 from chaosgym.errors import ParameterError
 from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.machines.parameters import with_settings
-from chaosgym.simulation import CycleRecord, default_integrator, simulate
+from chaosgym.simulation import CycleRecord, simulate
 
 
 @pytest.mark.parametrize("machine", [ImpactBeam, SliderCrank])
@@ -78,9 +78,9 @@ def test_more_modes_come_nearer_to_the_reference():
 
 def test_the_reference_places_events_most_tightly():
     """Without an integrator the reference runs at an event tolerance of 1e-13, all others at 1e-9."""
-    assert default_integrator(ImpactBeam(fidelity="reference")).event_tolerance == 1e-13
-    assert default_integrator(ImpactBeam(fidelity="modes-8")).event_tolerance == 1e-9
-    assert default_integrator(SliderCrank(fidelity="reference")).event_tolerance == 1e-9
+    assert ImpactBeam(fidelity="reference").default_integrator.event_tolerance == 1e-13
+    assert ImpactBeam(fidelity="modes-8").default_integrator.event_tolerance == 1e-9
+    assert SliderCrank(fidelity="reference").default_integrator.event_tolerance == 1e-9
 
 
 @pytest.mark.parametrize(

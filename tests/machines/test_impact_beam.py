@@ -7,13 +7,8 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.impact_beam.parameters import (
-    THESIS_IMPACT_BEAM,
-    ImpactBeam,
-    modal_analysis,
-    pinned_pinned_frequency,
-    static_tip_deflection,
-)
+from chaosgym.machines.impact_beam import THESIS_IMPACT_BEAM, ImpactBeam
+from chaosgym.machines.impact_beam.modes import modal_analysis, pinned_pinned_frequency, static_tip_deflection
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
 

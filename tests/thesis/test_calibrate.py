@@ -8,7 +8,7 @@ import pytest
 
 from chaosgym.errors import DatasetError, ParameterError
 from chaosgym.machines import THESIS_IMPACT_BEAM
-from chaosgym.machines.impact_beam.parameters import static_tip_deflection
+from chaosgym.machines.impact_beam.modes import static_tip_deflection
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.machines.slider_crank.parameters import frequencies_at
 from thesis.scorecard import calibrate as calibration

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from chaosgym.diagnosis.criteria import criterion_rate
-from chaosgym.machines.impact_beam.parameters import static_tip_deflection
+from chaosgym.machines.impact_beam.modes import static_tip_deflection
 from thesis import plotting as thesis
 from thesis.figures.beam import BEAM, LARGE
 from thesis.figures.computations import Computation, Types

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from chaosgym.machines import ImpactBeam, Machine
-from chaosgym.machines.impact_beam.parameters import pinned_pinned_frequency
+from chaosgym.machines.impact_beam.modes import pinned_pinned_frequency
 from thesis.scorecard import beam_runs
 from thesis.scorecard.findings import Finding, Quantity, Results, no_jobs
 from thesis.scorecard.jobs import Job

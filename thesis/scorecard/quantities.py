@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from chaosgym.machines import ImpactBeam, Machine, SliderCrank
-from chaosgym.machines.impact_beam.parameters import static_tip_deflection
+from chaosgym.machines.impact_beam.modes import static_tip_deflection
 from thesis.scorecard.beam_quantities import BEAM_QUANTITIES
 from thesis.scorecard.crank_quantities import CRANK_QUANTITIES
 from thesis.scorecard.findings import Finding, Quantity, Results, no_jobs

@@ -13,7 +13,7 @@ import scipy.optimize
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, ImpactBeam, Machine, SliderCrank
-from chaosgym.machines.impact_beam.parameters import static_tip_deflection
+from chaosgym.machines.impact_beam.modes import static_tip_deflection
 from chaosgym.machines.slider_crank.parameters import frequencies_at
 
 STATIC_TIP_DEFLECTION = 3.175e-3

@@ -17,7 +17,7 @@ import numpy as np
 from chaosgym.diagnosis.response import Nature
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import ImpactBeam, Machine
-from chaosgym.machines.impact_beam.parameters import static_tip_deflection
+from chaosgym.machines.impact_beam.modes import static_tip_deflection
 
 BEAM_FREQUENCY = 16.0
 """Frequency [Hz] above which chaos was seen."""

@@ -88,7 +88,7 @@ def diagnose(
         Peak forces [N] that differ by less count as equal (thesis 3.6: 3 N); 0 judges exactly. Small clearances give
         chaos whose peak forces differ by a fraction of a newton, which no sensor would tell from a period.
     integrator
-        ``simulation.default_integrator(machine)`` by default.
+        ``machine.default_integrator`` by default.
 
     Returns
     -------

@@ -10,7 +10,7 @@ from typing import Any
 from chaosgym.diagnosis.response import Diagnosis
 from chaosgym.diagnosis.two_step import two_step_test
 from chaosgym.machines import Machine
-from chaosgym.simulation import CycleRecord, Integrator, default_integrator, simulate
+from chaosgym.simulation import CycleRecord, Integrator, simulate
 
 SPREAD_CHANGE = 0.05
 """Largest change of the spread of the peak force, as a share of the largest peak, that counts as none."""
@@ -87,9 +87,9 @@ def step_check(
     cycles, transient
         Cycles to judge, and to run before.
     integrator
-        ``default_integrator(machine)`` by default.
+        ``machine.default_integrator`` by default.
     """
-    chosen = integrator or default_integrator(machine)
+    chosen = integrator or machine.default_integrator
     given = simulate(machine, cycles, transient=transient, integrator=chosen)
     finer = simulate(machine, cycles, transient=transient, integrator=chosen.refined())
     return StepCheck(

@@ -6,7 +6,7 @@ from chaosgym.envs.drive import SpeedDrive
 from chaosgym.envs.machine_env import SENSOR_ERROR, MachineEnv, nominal_machine
 from chaosgym.envs.tasks import Task
 from chaosgym.envs.vector_env import MachineVectorEnv
-from chaosgym.machines.impact_beam.parameters import THESIS_IMPACT_BEAM, ImpactBeam
+from chaosgym.machines.impact_beam import THESIS_IMPACT_BEAM, ImpactBeam
 
 TOLERANCES = {"clearance": 0.2, "damping_ratio": 0.2, "length": 0.002}
 """Half widths as shares of the nominal value. Clearance: +-0.0254 mm at +-0.127 mm, the repeatability of the thesis'

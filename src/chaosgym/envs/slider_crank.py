@@ -6,7 +6,7 @@ from chaosgym.envs.drive import SpeedDrive
 from chaosgym.envs.machine_env import SENSOR_ERROR, MachineEnv, nominal_machine
 from chaosgym.envs.tasks import Task
 from chaosgym.envs.vector_env import MachineVectorEnv
-from chaosgym.machines.slider_crank.parameters import THESIS_SLIDER_CRANK, SliderCrank
+from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK, SliderCrank
 
 SLIDER_CLEARANCE = 0.254e-3
 """Half clearance [m] of the slider joint; printed (thesis figure 4.14b)."""

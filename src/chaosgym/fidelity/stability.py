@@ -22,8 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.errors import ChaosgymError
-from chaosgym.machines import ImpactBeam, Machine, SliderCrank
-from chaosgym.machines.impact_beam.parameters import modal_analysis
+from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
 from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, RungeKutta4, parallel_map, simulate
 
@@ -35,53 +34,6 @@ CYCLES = 3
 
 OVERSHOOT = 1e-6
 """Share by which rounding may exceed the bound."""
-
-_UNDAMPED = {"damping_ratio": 0.0, "shaker_damping": 0.0, "contact_damping": 0.0}
-
-EXTREMES: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
-    ImpactBeam.name: {
-        "clearance 0": {"clearance": 0.0},
-        "clearance 1e-9 m": {"clearance": 1e-9},
-        "clearance 1 m": {"clearance": 1.0},
-        "0.01 Hz": {"excitation_frequency": 0.01},
-        "1000 Hz": {"excitation_frequency": 1000.0},
-        "contact stiffness 1e3 N/m": {"contact_stiffness": 1e3},
-        "contact stiffness 1e9 N/m": {"contact_stiffness": 1e9},
-        "contact stiffness 1e12 N/m": {"contact_stiffness": 1e12},
-        "contact damping 0": {"contact_damping": 0.0},
-        "contact damping 1e4 N s/m": {"contact_damping": 1e4},
-        "contact damping 1e6 N s/m": {"contact_damping": 1e6},
-        "damping ratio 0": {"damping_ratio": 0.0},
-        "damping ratio 1": {"damping_ratio": 1.0},
-        "damping ratio 100": {"damping_ratio": 100.0},
-        "shaker damping 0": {"shaker_damping": 0.0},
-        "shaker damping 1e3 N s/m": {"shaker_damping": 1e3},
-        "shaker damping 1e6 N s/m": {"shaker_damping": 1e6},
-        "no damping at all": _UNDAMPED,
-        "force 0": {"force_amplitude": 0.0},
-        "force 1e6 N": {"force_amplitude": 1e6},
-    },
-    SliderCrank.name: {
-        "clearance 0": {"slider_clearance": 0.0},
-        "clearance 1e-9 m": {"slider_clearance": 1e-9},
-        "clearance 20 mm": {"slider_clearance": 0.02},
-        "1 rpm": {"crank_speed": 1.0},
-        "5000 rpm": {"crank_speed": 5000.0},
-        "contact stiffness 1e3 N/m": {"contact_stiffness": 1e3},
-        "contact stiffness 1e10 N/m": {"contact_stiffness": 1e10},
-        "contact stiffness 1e12 N/m": {"contact_stiffness": 1e12},
-        "contact damping ratio 0": {"contact_damping_ratio": 0.0},
-        "contact damping ratio 1": {"contact_damping_ratio": 1.0},
-        "contact damping ratio 100": {"contact_damping_ratio": 100.0},
-        "damping ratio 0": {"damping_ratio": 0.0},
-        "damping ratio 1": {"damping_ratio": 1.0},
-        "damping ratio 100": {"damping_ratio": 100.0},
-        "friction 0.5": {"friction_coefficient": 0.5},
-        "Hertzian contact": {"contact_law": "hertz"},
-        "gravity 100 m/s2": {"gravity": 100.0},
-    },
-}
-"""By machine: the extremes, as fields."""
 
 MODES = (1, 2, 20, 40)
 """Numbers of modes that are tried besides those of the ladder."""
@@ -176,22 +128,22 @@ def stability_map(machine: Machine, *, workers: int | None = None, progress: boo
 
 def runs_of(machine: Machine) -> list[Run]:
     """All runs of the map."""
-    ladder: Mapping[str, Any] = getattr(machine, "fidelity_ladder", {})
+    ladder = machine.fidelity_ladder
+    fixed = [rung for rung in ladder if with_settings(machine, {"fidelity": rung}).runs_fixed_steps]
     runs = [
         Run(extreme, rung, _changed(machine, {"fidelity": rung}, fields), None)
-        for extreme, fields in EXTREMES[machine.name].items()
+        for extreme, fields in machine.extremes.items()
         for rung in ladder
     ]
-    default = str(getattr(type(machine)(), "rung", ""))
+    default = str(type(machine)().rung)
     runs += [
         Run("1 mode" if count == 1 else f"{count} modes", default, _changed(machine, {}, {"n_modes": count}), None)
-        for count in MODES
+        for count in (MODES if "n_modes" in parameters_of(machine) else ())
     ]
     runs += [
         Run(f"{steps} steps a cycle", rung, _changed(machine, {"fidelity": rung}, {}), RungeKutta4(steps))
         for steps in COARSE_STEPS
-        for rung in ladder
-        if rung != "restitution"
+        for rung in fixed
     ]
     runs += [
         Run("longest exact steps", rung, _changed(machine, {"fidelity": rung}, {}), ExactEvents(step_phase=1.0))
@@ -236,39 +188,5 @@ def share_of_bound(record: CycleRecord) -> float:
     values = (record.section, record.final_state.coordinates, record.peak_force, record.contact_fraction)
     if not all(np.all(np.isfinite(value)) for value in values):
         return math.inf
-    machine = record.machine
-    if isinstance(machine, ImpactBeam):
-        return _share_of_passive_bound(machine, record)
-    assert isinstance(machine, SliderCrank)
-    return float(record.peak_force.max()) / _crank_force_bound(machine)
-
-
-def _share_of_passive_bound(beam: ImpactBeam, record: CycleRecord) -> float:
-    modes = modal_analysis(beam)
-    n = beam.n_modes
     states = np.vstack([record.section, record.final_state.coordinates])
-    energy = np.sum(states[:, n:] ** 2 + (modes.angular_frequency * states[:, :n]) ** 2, axis=1)
-    instants = np.arange(len(states)) * beam.cycle_period
-    speed = beam.force_amplitude * float(np.linalg.norm(modes.force_shape)) * instants
-    surface = math.sqrt(beam.contact_stiffness) + beam.contact_damping * float(np.linalg.norm(modes.tip_shape))
-    force = surface * speed[1:]
-    if beam.force_amplitude == 0.0:
-        return 0.0 if not energy.any() and not record.peak_force.any() else math.inf
-    return max(float(np.max(np.sqrt(energy[1:]) / speed[1:])), float(np.max(record.peak_force.max(axis=1) / force)))
-
-
-def _crank_force_bound(crank: SliderCrank) -> float:
-    rod = crank.density * crank.rod_length * math.pi / 4.0 * crank.rod_diameter**2
-    mass = crank.slider_mass + crank.yoke_mass + crank.housing_mass + rod
-    speed = 10.0 * (crank.crank_radius * crank.crank_rate + math.sqrt(crank.gravity * crank.rod_length))
-    damping = crank.contact_damping * math.sqrt(mass / (crank.slider_mass + crank.yoke_mass))
-    bound = (math.sqrt(crank.contact_stiffness * mass) + damping) * speed
-    if crank.contact_law == "hertz":
-        # k of the secant at the reference force; stiffer in proportion to the cube root of a larger force
-        bound *= max(1.0, bound / crank.hertz_reference_force) ** 0.2
-    return bound
-
-
-def admissible_box(machine: type) -> dict[str, tuple[float, float] | tuple[str, ...]]:
-    """Range or choices of every field of a machine."""
-    return {name: about.choices or (about.low, about.high) for name, about in parameters_of(machine).items()}
+    return record.machine.share_of_bound(states, record.peak_force)

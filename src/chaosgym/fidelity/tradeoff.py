@@ -26,9 +26,8 @@ from chaosgym.diagnosis.response_type import SHARES, default_tolerances
 from chaosgym.diagnosis.two_step import two_step_test
 from chaosgym.diagnosis.type_rule import Neighbour, judge_type
 from chaosgym.errors import ChaosgymError, ParameterError
-from chaosgym.machines import ImpactBeam, Machine, SliderCrank
+from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
-from chaosgym.machines.slider_crank.model import STEP_PHASE, fastest_rate, stepped_model
 from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, RungeKutta4, parallel_map, simulate
 
 Array = NDArray[np.float64]
@@ -61,15 +60,7 @@ class Setting(NamedTuple):
         if self.method == "exact":
             given = ExactEvents(step_phase=self.step)
             return replace(given, event_tolerance=1e-13) if self.rung == REFERENCE else given
-        return RungeKutta4(math.ceil(machine.cycle_period * _fastest(machine) / self.step))
-
-
-def _fastest(machine: Machine) -> float:
-    """Largest modulus [1/s] of an eigenvalue, contacts closed."""
-    if isinstance(machine, SliderCrank):
-        return float(fastest_rate(machine, stepped_model(machine, STEP_PHASE)))
-    assert isinstance(machine, ImpactBeam)
-    return float(np.max(machine.reduce().regimes.fastest))
+        return RungeKutta4(math.ceil(machine.cycle_period * machine.fastest_rate / self.step))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -207,10 +198,10 @@ def tradeoff(
 
 def settings_of(machine: Machine) -> list[Setting]:
     """Every rung with every integrator that runs it and every step."""
-    rungs: Sequence[str] = list(getattr(machine, "fidelity_ladder", {}))
-    chosen = [Setting(rung, "exact", step) for rung in rungs for step in EXACT_STEPS]
-    return chosen + [
-        Setting(rung, "Runge-Kutta 4", step) for rung in rungs if rung != "restitution" for step in FIXED_STEPS
+    rungs = list(machine.fidelity_ladder)
+    fixed = [rung for rung in rungs if with_settings(machine, {"fidelity": rung}).runs_fixed_steps]
+    return [Setting(rung, "exact", step) for rung in rungs for step in EXACT_STEPS] + [
+        Setting(rung, "Runge-Kutta 4", step) for rung in fixed for step in FIXED_STEPS
     ]
 
 
@@ -324,25 +315,10 @@ def _with_front(rows: Sequence[TradeoffRow], points: int) -> list[TradeoffRow]:
     return [replace(row, on_front=id(row) in front) for row in rows]
 
 
-SCENES: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
-    "impact-beam": {"as in the thesis": {}},
-    "slider-crank": {
-        "slider joint": {},
-        "ball joint, spherical": {"slider_joint": "ideal", "ball_joint": "spherical", "gravity": 9.81},
-        "ball joint, instrumented": {"slider_joint": "ideal", "ball_joint": "instrumented", "gravity": 9.81},
-        "both joints": {"ball_joint": "spherical"},
-        "motor at 20 deg": {"motor_angle": 20.0},
-        "friction 0.1": {"friction_coefficient": 0.1},
-        "Hertzian contact": {"contact_law": "hertz"},
-    },
-}
-"""Scenes whose cost is shown: what is in them are the machine's own fields."""
-
-
 def scene_costs(machine: Machine, cycles: int = 40) -> dict[str, float]:
     """Microseconds of processor time per cycle of each scene, at the machine's own rung."""
     costs = {}
-    for scene, fields in SCENES[machine.name].items():
+    for scene, fields in machine.scenes.items():
         place = with_settings(machine, fields)
         state = simulate(place, 2).final_state
         start = time.thread_time()

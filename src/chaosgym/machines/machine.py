@@ -1,17 +1,38 @@
-"""What must a machine be able to do, so that simulation, diagnosis, sweeps and environments can use it?"""
+"""The protocol of a machine: all that simulation, diagnosis, sweeps, environments and the command line ask of one."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.core.cycle import CycleArrays, cycle_arrays
+from chaosgym.core.tangent import Tangents
+from chaosgym.errors import ParameterError
+from chaosgym.machines.fidelity import FidelityLadder
+from chaosgym.machines.integrators import ExactEvents, Integrator
+from chaosgym.machines.options import Option
+from chaosgym.machines.parameters import check_parameter, validate
 
-@runtime_checkable
-class Machine(Protocol):
-    """A frozen dataclass of parameters in SI units, with everything that the floors above need to know of it.
+if TYPE_CHECKING:
+    from chaosgym.machines.batch import CompiledBatch
 
-    A new machine is one file beside this one, one kernel file in ``core`` and one line in ``simulation``.
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Machine(FidelityLadder, ABC):
+    """A frozen dataclass of parameters in SI units, and how the machine runs.
+
+    A subclass declares its fields with ``parameter`` and defines what is abstract here. The rest has a default.
+    ``ModalImpactMachine`` defines all but the fields and the model of a machine that is a few modes and one gap.
+
+    Raises
+    ------
+    ParameterError
+        On construction, if a field is outside its range; names the field, the value and the range.
     """
 
     name: ClassVar[str]
@@ -20,33 +41,145 @@ class Machine(Protocol):
     """Field that an operator changes while the machine runs."""
     usual_ranges: ClassVar[Mapping[str, tuple[float, float]]]
     """Ranges of speed and clearance, in the fields' units, that sweeps and environments cover by default."""
-    sides: ClassVar[tuple[str, ...]]
+    sides: ClassVar[tuple[str, ...]] = ("upper", "lower")
     """Names of the bearing surfaces whose contact force is recorded."""
+    fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {"reference": {}}
+    """Fields that each rung sets, from the cheapest rung to the reference."""
+    options: ClassVar[Mapping[str, Option]] = {}
+    """Options on the command line, in the order in which they take effect; other fields are reached by ``--set``."""
+    scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = {"as it is": {}}
+    """Scenes whose cost the trade-off shows: the fields in which they differ from the default."""
+    extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
+    """Ends of what is admissible, by the fields that they set, at which the stability map runs the machine."""
+
+    def __post_init__(self, fidelity: str | None) -> None:
+        super().__post_init__(fidelity)
+        validate(self)
 
     @property
+    @abstractmethod
     def clearance_field(self) -> str:
-        """Field that holds the clearance of the monitored joint."""
-        ...
+        """Field that holds the clearance of the monitored joint; a class attribute serves too."""
+
+    @staticmethod
+    @abstractmethod
+    def period_at(speed: Any) -> Any:
+        """Duration of one operating cycle [s] at a speed, in the unit of the speed field, or at many."""
+
+    @property
+    @abstractmethod
+    def natural_frequencies(self) -> Array:
+        """Natural frequencies [Hz] of the machine free of contact, those of the kept modes."""
+
+    @property
+    @abstractmethod
+    def n_states(self) -> int:
+        """Number of states of the equations of motion."""
+
+    @property
+    @abstractmethod
+    def fastest_rate(self) -> float:
+        """Largest modulus [1/s] of an eigenvalue, contacts closed."""
+
+    @abstractmethod
+    def reduce(self) -> Any:
+        """Return the model, a NamedTuple of numbers and arrays, that the kernels integrate."""
+
+    @abstractmethod
+    def run(
+        self,
+        coordinates: Array,
+        bouncing: Array,
+        arrays: CycleArrays,
+        integrator: Integrator,
+        tangents: Tangents | None = None,
+    ) -> tuple[int, int]:
+        """Run as many cycles as ``arrays`` has rows; ``coordinates`` (n_states,), ``bouncing`` (3,) change in place.
+
+        Parameters
+        ----------
+        tangents
+            Deviations that travel along, for a machine that ``carries_deviations``.
+
+        Returns
+        -------
+        (status, cycles)
+            One of ``core.status``, and the number of cycles that were finished.
+        """
+
+    @abstractmethod
+    def share_of_bound(self, states: Array, peak_force: Array) -> float:
+        """Largest ratio of a run from rest to the bound that physics sets to it; at most 1 but for rounding.
+
+        Parameters
+        ----------
+        states : (cycles + 1, n_states)
+            States at the beginning of each cycle, and at the end.
+        peak_force : (cycles, sides)
+            Peak forces [N].
+        """
 
     @property
     def cycle_period(self) -> float:
         """Duration of one operating cycle [s]."""
-        ...
-
-    @staticmethod
-    def period_at(speed: Any) -> Any:
-        """Duration of one operating cycle [s] at a speed, in the unit of the speed field, or at many."""
-        ...
+        return float(self.period_at(getattr(self, self.speed_field)))
 
     @property
-    def natural_frequencies(self) -> NDArray[np.float64]:
-        """Natural frequencies [Hz] of the machine free of contact, those of the kept modes."""
-        ...
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the force sensors; ``CycleRecord.sensor_peak`` has their columns."""
+        return ()
 
-    def __hash__(self) -> int:
-        """Equal fields, equal hash: results of a machine can be kept."""
-        ...
+    @property
+    def degrees_of_freedom(self) -> tuple[str, ...]:
+        """Names of the coordinates that are integrated; empty where they are modes."""
+        return ()
 
-    def reduce(self) -> Any:
-        """Return the model, a NamedTuple of numbers and arrays, that the kernels integrate."""
-        ...
+    @property
+    def default_integrator(self) -> ExactEvents:
+        """Integrator where none is given."""
+        return ExactEvents()
+
+    @property
+    def carries_deviations(self) -> bool:
+        """True if ``run`` takes ``tangents``, so that Lyapunov exponents and derivatives of orbits are exact."""
+        return False
+
+    @property
+    def runs_fixed_steps(self) -> bool:
+        """True if ``run`` takes ``RungeKutta4``."""
+        return True
+
+    def at(self, speed: float | None = None, clearance: float | None = None) -> Self:
+        """Return the machine at another operating point: what else it is was checked when it was made.
+
+        Raises
+        ------
+        ParameterError
+            If the speed or the clearance, in their fields' units, is out of range.
+        """
+        point = {self.speed_field: speed, self.clearance_field: clearance}
+        given = {field: value for field, value in point.items() if value is not None}
+        return self._with_unchecked(**{field: check_parameter(self, field, value) for field, value in given.items()})
+
+    def _with_unchecked(self, **fields: Any) -> Self:
+        """Return the machine with some fields replaced by values that are known to be allowed."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__, **fields)
+        return other
+
+    def arrays(self, cycles: int, samples: int = 0) -> CycleArrays:
+        """Return the arrays into which ``run`` writes what happens in some cycles, with samples of the history."""
+        return cycle_arrays(cycles, self.n_states, samples)
+
+    def further_results(self, arrays: CycleArrays) -> dict[str, Any]:
+        """Return those fields of ``CycleRecord`` that not every machine has, such as ``sensor_peak``."""
+        return {}
+
+    def batch(self, count: int) -> "CompiledBatch | None":
+        """Return ``count`` variants that move in one compiled call; None if there is no such kernel."""
+        return None
+
+
+def refuse_fixed_steps(integrator: Integrator, machine: Machine) -> ParameterError:
+    """Error for an integrator that a machine's model can't be run with."""
+    return ParameterError(f"integrator = {integrator} does not run {machine.name}; allowed: ExactEvents(...)")

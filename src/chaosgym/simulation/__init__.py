@@ -1,9 +1,8 @@
 """Whole operating cycles in, one row of results per cycle out."""
 
-from chaosgym.simulation.integrators import ExactEvents, Integrator, RungeKutta4, default_integrator
+from chaosgym.machines.integrators import ExactEvents, Integrator, RungeKutta4
 from chaosgym.simulation.record import CycleRecord, MotionState
 from chaosgym.simulation.run import (
-    batch_arrays,
     parallel_map,
     rest_state,
     simulate,
@@ -17,8 +16,6 @@ __all__ = [
     "Integrator",
     "MotionState",
     "RungeKutta4",
-    "batch_arrays",
-    "default_integrator",
     "parallel_map",
     "rest_state",
     "simulate",

@@ -1,4 +1,4 @@
-"""What does a run leave behind? One row of results per operating cycle, and the state from which it goes on."""
+"""Records of runs: one row of results per operating cycle, and the state from which it goes on."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""How does a machine run? Whole operating cycles in, one row of results per cycle out.
+"""Runs of a machine: whole operating cycles in, one row of results per cycle out.
 
 record = simulate(ImpactBeam(excitation_frequency=19.0), cycles=100, transient=200)
 record.peak_force          # (100, 2) newton, upper and lower surface
@@ -7,7 +7,6 @@ record.peak_force          # (100, 2) newton, upper and lower surface
 import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,60 +14,29 @@ from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
 from chaosgym.core import status
-from chaosgym.core.compilation import call
-from chaosgym.core.cycle import CycleArrays, Episode, cycle_arrays
-from chaosgym.core.fixed_step import advance_fixed_step
-from chaosgym.core.modal_impact import ModalImpactModel, advance
-from chaosgym.core.restitution import advance_restitution
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError, SimulationError
-from chaosgym.machines.impact_beam.parameters import ImpactBeam
+from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
-from chaosgym.machines.slider_crank.joints import sensor_peaks
-from chaosgym.machines.slider_crank.kernels.exact import advance as advance_slider_crank
-from chaosgym.machines.slider_crank.kernels.fixed_step import advance_crank_fixed_step
-from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
-from chaosgym.machines.slider_crank.kernels.stepped import advance as advance_stepped_crank
-from chaosgym.machines.slider_crank.model import STEP_PHASE, fastest_rate, stepped_model
-from chaosgym.machines.slider_crank.parameters import SliderCrank
-from chaosgym.simulation.integrators import ExactEvents, Integrator, RungeKutta4, default_integrator
 from chaosgym.simulation.record import CycleRecord, MotionState
-
-__all__ = [
-    "CycleRecord",
-    "ExactEvents",
-    "Integrator",
-    "MotionState",
-    "RungeKutta4",
-    "batch_arrays",
-    "default_integrator",
-    "parallel_map",
-    "rest_state",
-    "simulate",
-    "simulate_many",
-    "simulate_with_deviations",
-]
 
 Array = NDArray[np.float64]
 
 
-def _arrays(machine: Machine, model: Any, cycles: int, samples: int = 0) -> CycleArrays:
-    """Return the arrays into which the kernels write what a machine does."""
-    if isinstance(machine, SliderCrank):
-        channels = len(model.gap) if machine.sensors else 0
-        return cycle_arrays(cycles, _states(machine), samples, travels=True, channels=channels)
-    return cycle_arrays(cycles, _states(machine), samples)
-
-
-def batch_arrays(machine: Machine, count: int, cycles: int) -> CycleArrays:
-    """Return arrays for ``count`` variants of a machine: those of one, with one more axis, the machines, in front."""
-    one = _arrays(machine, machine.reduce(), cycles)
-    return CycleArrays(*(np.empty((count, *array.shape), array.dtype) for array in one))
-
-
-def _record(machine: Machine, arrays: CycleArrays, final_state: MotionState) -> CycleRecord:
-    return CycleRecord(
+def _run(
+    machine: Machine,
+    state: MotionState,
+    cycles: int,
+    samples: int,
+    integrator: Integrator,
+    tangents: Tangents | None = None,
+) -> tuple[int, int, CycleRecord]:
+    """Status of the kernel, number of cycles that it finished, and the record."""
+    arrays = machine.arrays(cycles, samples)
+    final = MotionState(state.coordinates.copy(), state.bouncing.copy())
+    outcome, done = machine.run(*final, arrays, integrator, tangents)
+    record = CycleRecord(
         machine=machine,
         section=arrays.section,
         displacement=arrays.tip[:, 0],
@@ -77,81 +45,16 @@ def _record(machine: Machine, arrays: CycleArrays, final_state: MotionState) -> 
         impacts=arrays.impacts,
         contact_fraction=arrays.contact_time / machine.cycle_period,
         bounce_duration=arrays.bounce_time,
-        final_state=final_state,
-        history=arrays.history if arrays.history.shape[1] else None,
-    )
-
-
-def _run_impact_beam(
-    beam: ImpactBeam,
-    state: MotionState,
-    cycles: int,
-    samples: int,
-    integrator: Integrator,
-    tangents: Tangents | None = None,
-) -> tuple[int, int, CycleRecord]:
-    model = beam.reduce()
-    arrays = _arrays(beam, model, cycles, samples)
-    coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
-    episode = Episode(side=bouncing[:1], touch=bouncing[1:])
-    along = () if tangents is None else (tangents,)
-    motion = (model, coordinates, episode, arrays)
-    if isinstance(integrator, ExactEvents):
-        settings = (integrator.step_phase, integrator.event_tolerance, integrator.event_budget)
-        if isinstance(model, ModalImpactModel):
-            outcome, done = call(advance, *motion, *settings, *along)
-        else:
-            outcome, done = call(advance_restitution, *motion, integrator.step_phase, integrator.event_budget, *along)
-    elif isinstance(model, ModalImpactModel):
-        outcome, done = call(advance_fixed_step, *motion, integrator.steps_per_cycle)
-    else:
-        raise ParameterError(
-            f"integrator = {integrator} does not run contact_law = 'restitution'; allowed: ExactEvents(...)"
-        )
-    return outcome, done, _record(beam, arrays, MotionState(coordinates, bouncing))
-
-
-def _run_slider_crank(
-    crank: SliderCrank, state: MotionState, cycles: int, samples: int, integrator: Integrator
-) -> tuple[int, int, CycleRecord]:
-    coordinates, bouncing = state.coordinates.copy(), state.bouncing.copy()
-    episode = Episode(side=bouncing[:1], touch=bouncing[1:])
-    if isinstance(integrator, ExactEvents):
-        # its peaks and events are refined on the exact motion, so its steps may be twice as long as the beam's
-        model = crank.reduce(2.0 * integrator.step_phase)
-        arrays = _arrays(crank, model, cycles, samples)
-        kernel = advance_stepped_crank if isinstance(model, SteppedCrankModel) else advance_slider_crank
-        tolerance, budget = integrator.event_tolerance / model.contact_rate, integrator.event_budget
-        outcome, done = call(kernel, model, coordinates, episode, arrays, tolerance, budget)
-    else:
-        stepped = stepped_model(crank, STEP_PHASE)
-        arrays = _arrays(crank, stepped, cycles, samples)
-        fastest, steps = fastest_rate(crank, stepped), integrator.steps_per_cycle
-        outcome, done = call(advance_crank_fixed_step, stepped, coordinates, episode, arrays, steps, fastest)
-    record = replace(
-        _record(crank, arrays, MotionState(coordinates, bouncing)),
-        peak_phase=arrays.peak_instant * crank.crank_rate,
-        peak_vector=arrays.peak_vector,
-        sensor_peak=sensor_peaks(crank, arrays.channel_peak) if crank.sensors else None,
+        final_state=final,
+        history=arrays.history if samples else None,
+        **machine.further_results(arrays),
     )
     return outcome, done, record
 
 
-_Run = Callable[[Any, MotionState, int, int, Integrator], tuple[int, int, CycleRecord]]
-_RUNS: dict[str, tuple[_Run, Callable[[Any], int]]] = {
-    ImpactBeam.name: (_run_impact_beam, lambda beam: 2 * beam.n_modes),
-    SliderCrank.name: (_run_slider_crank, lambda crank: 2 * len(crank.degrees_of_freedom)),
-}
-"""By machine: what runs it, and its number of states. A new machine adds one line."""
-
-
 def rest_state(machine: Machine) -> MotionState:
     """Return the state of rest in the middle of the gap."""
-    return MotionState(np.zeros(_states(machine)), np.zeros(3))
-
-
-def _states(machine: Machine) -> int:
-    return _RUNS[machine.name][1](machine)
+    return MotionState(np.zeros(machine.n_states), np.zeros(3))
 
 
 def _initial(machine: Machine, given: MotionState | ArrayLike | None) -> MotionState:
@@ -212,13 +115,12 @@ def simulate(
     cycles = _count("cycles", cycles, 1)
     transient = _count("transient", transient, 0)
     samples_per_cycle = _count("samples_per_cycle", samples_per_cycle, 0)
-    integrator = integrator or default_integrator(machine)
+    integrator = integrator or machine.default_integrator
     state = _initial(machine, initial_state)
-    run, _ = _RUNS[machine.name]
     first = 0
     for count, samples in ((transient, 0), (cycles, samples_per_cycle)):
         if count:
-            outcome, done, record = run(machine, state, count, samples, integrator)
+            outcome, done, record = _run(machine, state, count, samples, integrator)
             if outcome != status.OK:
                 raise _failure(machine, outcome, first + done, integrator)
             state = record.final_state
@@ -227,7 +129,7 @@ def simulate(
 
 
 def simulate_with_deviations(
-    machine: ImpactBeam,
+    machine: Machine,
     cycles: int,
     initial_state: MotionState | ArrayLike | None = None,
     *,
@@ -235,7 +137,7 @@ def simulate_with_deviations(
     orthonormal: bool = True,
     integrator: ExactEvents | None = None,
 ) -> tuple[CycleRecord, Array, Array]:
-    """Run an impact beam and carry small deviations of its state through every contact, exactly.
+    """Run a machine that ``carries_deviations`` and take small ones of its state through every contact, exactly.
 
     Parameters
     ----------
@@ -265,8 +167,8 @@ def simulate_with_deviations(
             f"deviations have shape {vectors.shape}; allowed: (m, {len(state.coordinates)}), all values finite"
         )
     log_growth = np.empty((cycles, len(vectors) if orthonormal else 0))
-    integrator = integrator or default_integrator(machine)
-    outcome, done, record = _run_impact_beam(machine, state, cycles, 0, integrator, Tangents(vectors, log_growth))
+    integrator = integrator or machine.default_integrator
+    outcome, done, record = _run(machine, state, cycles, 0, integrator, Tangents(vectors, log_growth))
     if outcome != status.OK:
         raise _failure(machine, outcome, done, integrator)
     return record, vectors, log_growth

@@ -26,15 +26,23 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.core.cycle import CycleArrays
+from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
-from chaosgym.machines.fidelity import FidelityLadder
-from chaosgym.machines.parameters import parameter, validate
+from chaosgym.machines.batch import CompiledBatch
+from chaosgym.machines.integrators import Integrator
+from chaosgym.machines.machine import Machine
+from chaosgym.machines.options import Option
+from chaosgym.machines.parameters import parameter
+from chaosgym.machines.slider_crank import run as running
+from chaosgym.machines.slider_crank.batch import CrankBatch, SteppedCrankBatch
 from chaosgym.machines.slider_crank.equations import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom, equations
 from chaosgym.machines.slider_crank.joints import sensors_of
 from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
 from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
 from chaosgym.machines.slider_crank.kinematics import slider_position
-from chaosgym.machines.slider_crank.model import STEP_PHASE, exact_model, has_propagators, stepped_model
+from chaosgym.machines.slider_crank.model import STEP_PHASE, exact_model, fastest_rate, has_propagators, stepped_model
+from chaosgym.machines.slider_crank.scenes import EXTREMES, OPTIONS, SCENES
 from chaosgym.machines.slider_crank.spatial_equations import spatial_equations
 
 Array = NDArray[np.float64]
@@ -44,7 +52,7 @@ _STEEL = "steel"
 
 
 @dataclass(frozen=True, kw_only=True)
-class SliderCrank(FidelityLadder):
+class SliderCrank(Machine):
     """The Spatial Slider Crank; the defaults are the planar mechanism of the thesis with clearance at the slider.
 
     Raises
@@ -67,6 +75,9 @@ class SliderCrank(FidelityLadder):
         "slider_clearance": (0.02e-3, 0.3e-3),
         "ball_clearance": (0.02e-3, 0.3e-3),
     }
+    options: ClassVar[Mapping[str, Option]] = OPTIONS
+    scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = SCENES
+    extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = EXTREMES
     sides: ClassVar[tuple[str, ...]] = ("upper", "lower")
     """Surfaces whose force points up and down: on the slider, or on the housing if the ball joint is monitored."""
 
@@ -229,7 +240,6 @@ class SliderCrank(FidelityLadder):
 
     def __post_init__(self, fidelity: str | None) -> None:
         super().__post_init__(fidelity)
-        validate(self)
         if self.rod_length <= self.crank_radius:
             raise ParameterError(
                 f"rod_length = {self.rod_length:g} m is out of range; "
@@ -258,11 +268,6 @@ class SliderCrank(FidelityLadder):
                 f"{field} = {getattr(self, field):g} kg m^2 is out of range; "
                 f"allowed: from mass times squared offset, {least:g} kg m^2, on"
             )
-
-    @property
-    def cycle_period(self) -> float:
-        """Duration of one revolution [s]."""
-        return float(self.period_at(self.crank_speed))
 
     @staticmethod
     def period_at(speed: Any) -> Any:
@@ -342,6 +347,43 @@ class SliderCrank(FidelityLadder):
         share the assembly.
         """
         return exact_model(self, step_phase) if has_propagators(self) else stepped_model(self, step_phase)
+
+    @property
+    def n_states(self) -> int:
+        """Displacement and velocity of every degree of freedom."""
+        return 2 * len(self.degrees_of_freedom)
+
+    @property
+    def fastest_rate(self) -> float:
+        """Largest modulus [1/s] of an eigenvalue, contacts closed."""
+        return fastest_rate(self, stepped_model(self, STEP_PHASE))
+
+    def arrays(self, cycles: int, samples: int = 0) -> CycleArrays:
+        """Return the arrays into which ``run`` writes what happens in some cycles, with samples of the history."""
+        return running.arrays_of(self, cycles, samples)
+
+    def run(
+        self,
+        coordinates: Array,
+        bouncing: Array,
+        arrays: CycleArrays,
+        integrator: Integrator,
+        tangents: Tangents | None = None,
+    ) -> tuple[int, int]:
+        """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
+        return running.run(self, coordinates, bouncing, arrays, integrator)
+
+    def further_results(self, arrays: CycleArrays) -> dict[str, Any]:
+        """Phase and components of each peak force, and the peaks of the sensors."""
+        return running.further_results(self, arrays)
+
+    def share_of_bound(self, states: Array, peak_force: Array) -> float:
+        """Largest force, as a share of that of an impact of all masses at ten times the speed of the crank pin."""
+        return float(peak_force.max()) / running.force_bound(self)
+
+    def batch(self, count: int) -> CompiledBatch:
+        """Return ``count`` variants that move in one compiled call."""
+        return (CrankBatch if has_propagators(self) else SteppedCrankBatch)(self, count)
 
 
 THESIS_SLIDER_CRANK = SliderCrank()

@@ -1,9 +1,8 @@
-"""How does a simulation go through time? Exactly from one contact event to the next, or in fixed steps."""
+"""Ways through time: exactly from one contact event to the next, or in fixed steps."""
 
 from dataclasses import dataclass, replace
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.machine import Machine
 
 
 @dataclass(frozen=True)
@@ -53,11 +52,6 @@ class RungeKutta4:
 
 
 TIGHTEST_EVENTS = ExactEvents(step_phase=0.25, event_tolerance=1e-13)
-"""The default of machines whose ``event_accuracy`` is "tightest"."""
+"""Events placed as closely as rounding allows."""
 
 Integrator = ExactEvents | RungeKutta4
-
-
-def default_integrator(machine: Machine) -> ExactEvents:
-    """Integrator of a machine where none is given."""
-    return TIGHTEST_EVENTS if getattr(machine, "event_accuracy", "standard") == "tightest" else ExactEvents()

@@ -1,0 +1,150 @@
+"""Batches: variants of one machine that move side by side in one compiled call.
+
+They differ in numbers, not in their joints or in how many modes they have. Each moves as it would alone, bit for bit.
+"""
+
+from abc import ABC, abstractmethod
+from threading import Lock
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.core import status
+from chaosgym.core.batch import Motions, Settings, advance_beams, advance_rigid_beams
+from chaosgym.core.compilation import call
+from chaosgym.core.cycle import CycleArrays
+from chaosgym.machines.integrators import ExactEvents
+
+if TYPE_CHECKING:
+    from chaosgym.machines.machine import Machine
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+class Cycles(NamedTuple):
+    """What k machines did in n cycles; the last axis is the two sides, as in ``CycleRecord``.
+
+    ``failed`` (k,) tells whose simulation failed; ``peak_force`` [N], ``impacts`` and ``bounce_duration`` [s]
+    (k, n, sides) are zero there.
+    """
+
+    failed: NDArray[np.bool_]
+    peak_force: Array
+    impacts: NDArray[np.int64]
+    bounce_duration: Array
+
+    def of(self, chosen: NDArray[np.bool_]) -> "Cycles":
+        """Return those of some of the machines."""
+        return Cycles(self.failed[chosen], self.peak_force[chosen], self.impacts[chosen], self.bounce_duration[chosen])
+
+    def until(self, end: int) -> "Cycles":
+        """Return the first ``end`` cycles."""
+        return Cycles(self.failed, self.peak_force[:, :end], self.impacts[:, :end], self.bounce_duration[:, :end])
+
+
+def stacked(models: list[Any]) -> Any:
+    """Batch of models: a model whose fields have one more axis in front."""
+    return type(models[0])(*(np.array(values) for values in zip(*models, strict=True)))
+
+
+def put(batch: Any, i: int, model: Any) -> None:
+    """Write a model into place i of a batch."""
+    for column, value in zip(batch, model, strict=True):
+        column[i] = value
+
+
+_one_call_at_a_time = Lock()
+"""Some of numba's threading layers abort the process if two threads call parallel kernels at once."""
+
+
+class CompiledBatch(ABC):
+    """Machines that move in one compiled call.
+
+    ``change``, ``set_speeds``, ``set_clearances`` and ``_advance`` know their kind.
+    """
+
+    def __init__(self, machine: "Machine", count: int) -> None:
+        integrator = ExactEvents()
+        self._settings = Settings(integrator.step_phase, integrator.event_tolerance, integrator.event_budget)
+        self._machine = machine
+        self._motions = Motions(np.zeros((count, machine.n_states)), np.zeros((count, 3)))
+
+    def __len__(self) -> int:
+        return len(self._motions.bouncing)
+
+    def start(self, i: int, machine: "Machine") -> None:
+        """Put a machine at rest into place i."""
+        self._motions.coordinates[i] = 0.0
+        self._motions.bouncing[i] = 0.0
+        self.change(i, machine)
+
+    def run(self, which: Indices, cycles: int) -> Cycles:
+        """Run the machines ``which`` (k,) for some cycles."""
+        one = self._machine.arrays(cycles)
+        arrays = CycleArrays(*(np.empty((len(which), *array.shape), array.dtype) for array in one))
+        outcome = np.empty(len(which), np.int64)
+        with _one_call_at_a_time:
+            self._advance(which, arrays, outcome)
+        failed = outcome != status.OK
+        results = Cycles(failed, arrays.peak_force, arrays.impacts, arrays.bounce_time)
+        if failed.any():
+            for values in results[1:]:
+                values[failed] = 0
+        return results
+
+    def branch(self, i: int, which: Indices) -> None:
+        """Let the machines ``which`` (k,), which differ from machine i in speed alone, go on from its motion."""
+        for values in self._motions:
+            values[which] = values[i]
+
+    @abstractmethod
+    def change(self, i: int, machine: "Machine") -> None:
+        """Put another machine into place i, whose motion goes on."""
+
+    @abstractmethod
+    def set_speeds(self, which: Indices, speeds: Array) -> None:
+        """Change the speeds of the machines ``which`` (k,) to ``speeds`` (k,), in the unit of their speed field."""
+
+    @abstractmethod
+    def set_clearances(self, which: Indices, clearances: Array) -> None:
+        """Change the clearances of the machines ``which`` (k,) to ``clearances`` (k,) [m]."""
+
+    @abstractmethod
+    def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
+        """Run the machines ``which`` (k,) in place; rows of ``arrays`` and ``outcome`` (k,) in that order."""
+
+
+class ModalImpactBatch(CompiledBatch):
+    """Machines of a few modes and one gap."""
+
+    def __init__(self, machine: "Machine", count: int) -> None:
+        super().__init__(machine, count)
+        model = machine.reduce()
+        self._regimes = stacked([model.regimes] * count)
+        self._batch = stacked([model._replace(regimes=0.0)] * count)
+
+    def change(self, i: int, machine: "Machine") -> None:
+        """Put another machine into place i, whose motion goes on."""
+        model = machine.reduce()
+        put(self._regimes, i, model.regimes)
+        put(self._batch, i, model._replace(regimes=0.0))
+
+    def set_speeds(self, which: Indices, speeds: Array) -> None:
+        """Change the excitation frequencies [Hz]."""
+        self._batch.excitation_frequency[which] = speeds
+
+    def set_clearances(self, which: Indices, clearances: Array) -> None:
+        """Change the clearances [m]."""
+        self._batch.clearance[which] = clearances
+
+    def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
+        call(advance_beams, self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
+
+
+class RestitutionBatch(ModalImpactBatch):
+    """The same, for impacts that take no time."""
+
+    def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
+        call(advance_rigid_beams, self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)

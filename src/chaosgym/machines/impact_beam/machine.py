@@ -1,0 +1,47 @@
+"""The Impact Beam System: finite elements, the modes that are kept, and the model that the kernels integrate."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from chaosgym.core.modal_impact import ModalImpactModel
+from chaosgym.core.restitution import RestitutionModel
+from chaosgym.machines.impact_beam.modes import modal_analysis
+from chaosgym.machines.impact_beam.parameters import BeamParameters
+from chaosgym.machines.integrators import TIGHTEST_EVENTS, ExactEvents
+from chaosgym.machines.modal_impact import flexible_model, rigid_model
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImpactBeam(BeamParameters):
+    """The Impact Beam System; the defaults are the beam of the thesis at 30 Hz and +-0.127 mm.
+
+    Raises
+    ------
+    ParameterError
+        On construction, if a field is outside its range; names the field, the value and the range.
+    """
+
+    @property
+    def n_states(self) -> int:
+        """Displacement and velocity of every mode."""
+        return 2 * self.n_modes
+
+    @property
+    def default_integrator(self) -> ExactEvents:
+        """Integrator where none is given."""
+        return TIGHTEST_EVENTS if self.event_accuracy == "tightest" else ExactEvents()
+
+    @property
+    def structure(self) -> ModalImpactModel | RestitutionModel:
+        """Model of the beam, whatever frequency, force and clearance; beams that differ in these alone share it."""
+        return _structure(self._with_unchecked(excitation_frequency=1.0, force_amplitude=0.0, clearance=0.0))
+
+
+THESIS_IMPACT_BEAM = ImpactBeam()
+"""The beam of the thesis; ``parameters_of(ImpactBeam)`` says where each number comes from."""
+
+
+@lru_cache(maxsize=256)
+def _structure(beam: ImpactBeam) -> ModalImpactModel | RestitutionModel:
+    make = rigid_model if beam.contact_law == "restitution" else flexible_model
+    return make(modal_analysis(beam), beam.contact_stiffness, beam.contact_damping)

@@ -1,0 +1,104 @@
+"""Natural modes of the impact beam between its sensors, by finite elements."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.beam_element import bending_matrices, graded_mesh
+from chaosgym.machines.impact_beam.parameters import BeamParameters
+from chaosgym.machines.modal_impact import Modes
+
+Array = NDArray[np.float64]
+
+MIN_ELEMENTS = 24
+"""Elements of the finest default mesh; more modes take three elements a mode."""
+
+
+def _assembled(beam: BeamParameters, elements: int) -> tuple[Array, Array, int, int]:
+    """Mass and stiffness matrices with springs and shaker mass, and the numbers of the force and tip deflections."""
+    stations = (0.0, beam.force_position, beam.length)
+    at_tip = beam.length - beam.force_position < 1e-9 * beam.length
+    lengths = graded_mesh((0.0, beam.length) if at_tip else stations, elements)
+    section = beam.width * beam.height
+    bending_stiffness = beam.youngs_modulus * beam.width * beam.height**3 / 12.0
+    mass, stiffness = bending_matrices(lengths, bending_stiffness, beam.density * section)
+    tip = len(mass) - 2
+    at_force = 2 * int(np.argmin(np.abs(np.concatenate([[0.0], np.cumsum(lengths)]) - beam.force_position)))
+    stiffness[0, 0] += beam.pivot_translational_stiffness
+    stiffness[1, 1] += beam.pivot_rotational_stiffness
+    stiffness[at_force, at_force] += beam.shaker_stiffness
+    mass[at_force, at_force] += beam.shaker_mass
+    return mass, stiffness, at_force, tip
+
+
+def modal_analysis(beam: BeamParameters, elements: int | None = None) -> Modes:
+    """Natural modes of the beam between the sensors.
+
+    Parameters
+    ----------
+    beam
+        The machine.
+    elements
+        Number of finite elements; at least 24 and three a mode by default.
+    """
+    from scipy.linalg import eigh
+
+    mass, stiffness, at_force, tip = _assembled(beam, elements or max(MIN_ELEMENTS, 3 * beam.n_modes))
+    wanted = max(beam.n_modes, 2)
+    # the inverse problem, M s = K s / w^2, keeps the slow rocking mode exact on fine meshes
+    size = len(mass)
+    scale = 1.0 / np.sqrt(np.diag(stiffness))
+    try:
+        inverse_squares, shapes = eigh(
+            mass * np.outer(scale, scale),
+            stiffness * np.outer(scale, scale),
+            subset_by_index=[size - wanted, size - 1],
+        )
+    except np.linalg.LinAlgError as error:
+        raise _inseparable(beam) from error
+    if inverse_squares[0] < 1e-14 * inverse_squares[-1]:
+        raise _inseparable(beam)
+    angular = 1.0 / np.sqrt(inverse_squares[::-1])
+    shapes = (scale[:, None] * shapes / np.sqrt(inverse_squares))[:, ::-1]
+    shapes = shapes * np.where(shapes[tip] < 0.0, -1.0, 1.0)
+    if beam.damping_family == "uniform":
+        ratio = np.full(wanted, beam.damping_ratio)
+    else:
+        ratio = beam.damping_ratio * angular / angular[1]
+    kept = slice(0, beam.n_modes)
+    angular, ratio, force_shape = angular[kept], ratio[kept], shapes[at_force, kept]
+    damping = np.diag(2.0 * ratio * angular) + beam.shaker_damping * np.outer(force_shape, force_shape)
+    return Modes(angular, damping, shapes[tip, kept].copy(), force_shape.copy())
+
+
+def _inseparable(beam: BeamParameters) -> ParameterError:
+    return ParameterError(
+        f"n_modes = {beam.n_modes} of a beam with length = {beam.length:g} m, height = {beam.height:g} m, "
+        f"pivot_rotational_stiffness = {beam.pivot_rotational_stiffness:g} N m/rad and shaker_stiffness = "
+        f"{beam.shaker_stiffness:g} N/m differ so much in frequency that rounding hides the slowest; "
+        "allowed: fewer modes, or stiffer springs"
+    )
+
+
+def static_tip_deflection(beam: BeamParameters) -> float:
+    """Tip deflection [m] without sensors when the force amplitude acts statically: the unit of clearance (3.5.1)."""
+    _, stiffness, at_force, tip = _assembled(beam, MIN_ELEMENTS)
+    load = np.zeros(len(stiffness))
+    load[at_force] = beam.force_amplitude
+    return float(np.linalg.solve(stiffness, load)[tip])
+
+
+def pinned_pinned_frequency(beam: BeamParameters, length: float) -> float:
+    """First natural frequency [Hz] of a beam of the same section, pinned at both ends (thesis table 3.1)."""
+    from scipy.linalg import eigh
+
+    section = beam.width * beam.height
+    bending_stiffness = beam.youngs_modulus * beam.width * beam.height**3 / 12.0
+    mass, stiffness = bending_matrices(
+        graded_mesh((0.0, length), MIN_ELEMENTS), bending_stiffness, beam.density * section
+    )
+    free = [i for i in range(len(mass)) if i not in (0, len(mass) - 2)]
+    lowest = eigh(stiffness[np.ix_(free, free)], mass[np.ix_(free, free)], eigvals_only=True, subset_by_index=[0, 0])
+    return float(math.sqrt(lowest[0]) / (2.0 * math.pi))
