@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from benchmarks.envs.audit import Score
 
 
-@click.command()
 @machine_command
 @click.option("--points", type=click.IntRange(1, 10**6), default=500, show_default=True, help="Random machines.")
 @click.option("--cycles", type=click.IntRange(1000, 10**7), default=10_000, show_default=True, help="Of the reference.")

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
 from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
+from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
 from chaosgym.simulation import simulate
 
 _BALL = {"slider_joint": "ideal", "gravity": 9.81}

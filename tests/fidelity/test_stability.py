@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
 from chaosgym.fidelity.stability import Run, runs_of, share_of_bound, stability_map, try_run
 from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam, SliderCrank
+from chaosgym.machines.parameters import parameters_of
 from chaosgym.simulation import ExactEvents, RungeKutta4, simulate
 from tests.machines.crank_twin import continuous_twin
 
@@ -195,14 +196,15 @@ def _field(low, high):
 
 def _box(machine):
     """Any machine of the admissible box: each field as it is, or anywhere in its range."""
-    whole = {name for name in admissible_box(machine) if isinstance(getattr(machine, name), int)}
+    box = {name: about.choices or (about.low, about.high) for name, about in parameters_of(machine).items()}
+    whole = {name for name in box if isinstance(getattr(machine, name), int)}
     fields = {
         name: st.sampled_from(allowed)
         if isinstance(allowed[0], str)
         else st.integers(int(allowed[0]), int(allowed[1]))
         if name in whole
         else _field(*allowed)
-        for name, allowed in admissible_box(machine).items()
+        for name, allowed in box.items()
     }
     return st.fixed_dictionaries({}, optional=fields)
 

@@ -8,10 +8,10 @@ import pytest
 
 from chaosgym.core.cycle import Episode, cycle_arrays
 from chaosgym.errors import SimulationError
+from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.kernels.exact import advance
 from chaosgym.machines.slider_crank.kernels.propagator import propagator_table, series_order
-from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.simulation import ExactEvents, simulate
 from tests.machines.crank_twin import continuous_twin, rigid_twin
 

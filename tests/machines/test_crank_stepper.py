@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from chaosgym.core.cycle import Episode, cycle_arrays
+from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.machines.slider_crank.kernels.stepped import advance
 from chaosgym.machines.slider_crank.model import stepped_model
-from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.simulation import ExactEvents, simulate
 from tests.machines.crank_twin import rigid_ball_twin
 

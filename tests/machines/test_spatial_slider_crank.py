@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.machines.slider_crank.equations import degrees_of_freedom, equations
 from chaosgym.machines.slider_crank.joints import InstrumentedSlider
 from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
 from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
 from chaosgym.machines.slider_crank.kinematics import crank_pin, slider_position, slider_rate
-from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.machines.slider_crank.spatial_equations import spatial_equations, spatial_loads
 from chaosgym.simulation import simulate
 from tests.machines.spatial_twin import RigidMechanism

@@ -5,48 +5,52 @@ standard error. Exit codes: 0 done, 1 a computation failed, 2 wrong usage.
 """
 
 import sys
+from importlib import import_module
 
 import click
 
-from chaosgym.cli.classify import classify
-from chaosgym.cli.dataset import dataset
-from chaosgym.cli.demo import demo
-from chaosgym.cli.design import design
-from chaosgym.cli.diagnose import diagnose
-from chaosgym.cli.fidelity import stability, tradeoff
-from chaosgym.cli.info import info
-from chaosgym.cli.regimes import regimes
-from chaosgym.cli.run_agent import run_agent
-from chaosgym.cli.simulate import show, simulate
-from chaosgym.cli.sweep import sweep
-from chaosgym.cli.train_classifier import train_classifier
 from chaosgym.errors import ChaosgymError, SimulationError, UnfinishedError
 from chaosgym.version import __version__
 
+COMMANDS = {
+    "simulate": "simulate:simulate",
+    "show": "simulate:show",
+    "diagnose": "diagnose:diagnose",
+    "classify": "classify:classify",
+    "sweep": "sweep:sweep",
+    "dataset": "dataset:dataset",
+    "train-classifier": "train_classifier:train_classifier",
+    "design": "design:design",
+    "tradeoff": "fidelity:tradeoff",
+    "stability": "fidelity:stability",
+    "regimes": "regimes:regimes",
+    "run-agent": "run_agent:run_agent",
+    "demo": "demo:demo",
+    "info": "info:info",
+}
+"""Module in this folder and function of every command."""
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+
+class Commands(click.Group):
+    """Commands that are imported when they are called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of all commands."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command; None if there is none of that name."""
+        if cmd_name not in COMMANDS:
+            return None
+        module, _, function = COMMANDS[cmd_name].partition(":")
+        command: click.Command = getattr(import_module(f"chaosgym.cli.{module}"), function)
+        return command
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(__version__, prog_name="chaosgym")
 def app() -> None:
     """Machines with clearance that rattle: simulate, diagnose, sweep and classify them."""
-
-
-for command in (
-    simulate,
-    show,
-    diagnose,
-    classify,
-    sweep,
-    dataset,
-    train_classifier,
-    demo,
-    design,
-    tradeoff,
-    stability,
-    regimes,
-    run_agent,
-    info,
-):
-    app.add_command(command)
 
 
 def main() -> None:

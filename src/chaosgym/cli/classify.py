@@ -1,33 +1,25 @@
 """What does the learned classifier say of a machine, of measured records, of many at once, or live? ``classify``."""
 
-import functools
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import click
 
-from chaosgym.cli.machine_options import MACHINE_OPTIONS, machine_command
+from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import emit
+from chaosgym.machines.registry import MACHINES
 
 
-def _quick_start(command: Callable[..., None]) -> Callable[..., None]:
-    """Let one question be answered by the kernels' Python source: loading their machine code takes much longer."""
-
-    @functools.wraps(command)
-    def wrapped(**options: Any) -> None:
-        if not (options["follow"] or options["batch"] or "numba" in sys.modules):
-            os.environ["NUMBA_DISABLE_JIT"] = "1"
-        command(**options)
-
-    return wrapped
+def _quick_start(arguments: list[str]) -> None:
+    """Run the Python source of the kernels for one question: loading their machine code would take longer."""
+    if not ({"--follow", "--batch"} & set(arguments) or "numba" in sys.modules):
+        os.environ["NUMBA_DISABLE_JIT"] = "1"
 
 
-@click.command()
-@_quick_start
-@functools.partial(machine_command, required=False)
+@machine_command(required=False, before=_quick_start)
 @click.option(
     "--peaks", type=click.Path(), help="Judge measured peak forces [N]: CSV, one run a column; - is standard input."
 )
@@ -50,7 +42,7 @@ def classify(
 ) -> None:
     """Tell the response type (I, II, III) and the nature by the learned classifier, without simulating."""
     if machine is None:
-        raise click.UsageError(f"give a machine: {', '.join(MACHINE_OPTIONS)}")
+        raise click.UsageError(f"give a machine: {', '.join(MACHINES)}")
     if sum(map(bool, (peaks, follow, batch))) > 1:
         raise click.UsageError("--peaks, --follow and --batch exclude each other")
     if bool(batch) != bool(out):

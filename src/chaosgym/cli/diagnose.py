@@ -1,20 +1,19 @@
 """Is a response periodic or chaotic? ``diagnose`` and ``agreement``."""
 
-import functools
 from collections.abc import Mapping
 from typing import Any
 
 import click
 
-from chaosgym.cli.machine_options import MACHINE_OPTIONS, machine_command
+from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import emit
+from chaosgym.machines.registry import MACHINES
 
 SUMMARY_CYCLES = 200
 """Settled cycles that the summary of the peak force covers."""
 
 
-@click.command()
-@functools.partial(machine_command, required=False)
+@machine_command(required=False)
 @click.option(
     "--test",
     type=click.Choice(["adaptive", "mut"]),
@@ -47,7 +46,7 @@ def diagnose(
             raise click.UsageError("give --peaks FILE, or --series FILE with --period-s T, or a machine")
         result, lines = _diagnose_measured(peaks, series, period_s, sensor_error)
     elif machine is None:
-        raise click.UsageError(f"give a machine ({', '.join(MACHINE_OPTIONS)}), --peaks FILE or --series FILE")
+        raise click.UsageError(f"give a machine ({', '.join(MACHINES)}), --peaks FILE or --series FILE")
     elif test == "mut":
         result, lines = _matrix_update(machine)
     else:

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 _FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
-@click.command()
 @machine_command
 @click.option("--points", type=click.IntRange(1, 1000), default=12, show_default=True, help="Operating points.")
 @click.option("--cycles", type=click.IntRange(20, 10**5), default=120, show_default=True, help="Cycles that count.")
@@ -79,7 +78,6 @@ def _tradeoff_line(row: "TradeoffRow") -> str:
     )
 
 
-@click.command()
 @machine_command
 @click.option("--workers", type=click.IntRange(1), default=None, help="Threads; all processors by default.")
 @click.option("--out", type=_FOLDER, default=None, help="Write stability.json and stability.png there.")

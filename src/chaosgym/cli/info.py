@@ -2,8 +2,8 @@
 
 import click
 
-from chaosgym.cli.machine_options import MACHINE_OPTIONS
 from chaosgym.cli.output import emit
+from chaosgym.machines.registry import MACHINES
 from chaosgym.version import __version__
 
 
@@ -26,7 +26,7 @@ def info(as_json: bool) -> None:
         "version": __version__,
         "python": platform.python_version(),
         "platform": platform.platform(),
-        "machines": sorted(MACHINE_OPTIONS),
+        "machines": sorted(MACHINES),
         "packages": packages,
         "kernel_cache": KERNEL_CACHE,
     }
@@ -35,7 +35,7 @@ def info(as_json: bool) -> None:
         as_json,
         lambda: [
             f"chaosgym {__version__} on Python {result['python']}, {result['platform']}",
-            "machines: " + ", ".join(MACHINE_OPTIONS),
+            "machines: " + ", ".join(MACHINES),
             *(f"{package:18s} {version or 'not installed'}" for package, version in packages.items()),
             f"kernel cache: {KERNEL_CACHE}",
         ],

@@ -1,103 +1,108 @@
-"""How does a command line describe a machine? Short options in shop-floor units, ``--set FIELD=VALUE`` for the rest.
+"""The machine of a command line: short options in shop-floor units, ``--set FIELD=VALUE`` for the rest.
 
 A number option sets one field; a choice option sets several at once, such as which joints have clearance, and
-``--fidelity`` those that make the model a rung of the machine's ladder.
+``--fidelity`` those that make the model a rung of the machine's ladder. Options are the machine's own.
 """
 
 import functools
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 import click
 
 from chaosgym.errors import ParameterError
+from chaosgym.machines.options import Choice, Number, Option
+from chaosgym.machines.registry import MACHINES
 
-STANDARD_GRAVITY = 9.81
+
+class MachineName(click.ParamType):
+    """Name of a machine that is registered when the command runs."""
+
+    name = "machine"
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
+        """Return the known names, as ``click.Choice`` shows them."""
+        names = "|".join(sorted(MACHINES))
+        return f"{{{names}}}" if param.required else f"[{names}]"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the name, or say which there are."""
+        if value not in MACHINES:
+            self.fail(f"{value!r} is not one of {', '.join(repr(name) for name in sorted(MACHINES))}.", param, ctx)
+        return str(value)
 
 
-class Number(NamedTuple):
-    """A number: the field that it sets, its unit on the command line, and how many SI units that is.
+class MachineCommand(click.Command):
+    """A command whose options are those of the machine that is named on its line; of all of them in its help.
 
-    ``joints`` are the words of ``--clearance-joint`` with which it makes sense; all if there are none.
+    ``before`` is called with the arguments before the machine is imported.
     """
 
-    field: str
-    unit: str
-    factor: float = 1.0
-    joints: tuple[str, ...] = ()
+    def __init__(self, *args: Any, before: Callable[[list[str]], None] | None = None, **keywords: Any) -> None:
+        super().__init__(*args, **keywords)
+        self._before = before
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse with the options of the machine; one of another machine ends in a line that names the own ones."""
+        if self._before is not None:
+            self._before(args)
+        named = [argument for argument in args if argument in MACHINES][:1]
+        ctx.meta[__name__] = named or list(MACHINES)
+        try:
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            if named and error.option_name in _options_of(MACHINES):
+                known = ", ".join(MACHINES[named[0]].options)
+                message = f"{error.option_name} is no option of {named[0]}; it takes {known} and --set FIELD=VALUE"
+                raise click.UsageError(message, ctx) from error
+            raise
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """Return the command's own parameters and the machine's."""
+        offered = _options_of(ctx.meta.get(__name__, MACHINES))
+        return [*offered.values(), *super().get_params(ctx)]
 
 
-class Choice(NamedTuple):
-    """A word: the fields that each word sets, and the options that it redirects to another field."""
-
-    words: Mapping[str, Mapping[str, Any]]
-    redirects: Mapping[str, Mapping[str, str]] = {}
-    joints: tuple[str, ...] = ()
-
-
-_BALL_ALONE = {"slider_joint": "ideal", "gravity": STANDARD_GRAVITY}
-
-MACHINE_OPTIONS: Mapping[str, Mapping[str, Number | Choice]] = {
-    "impact-beam": {
-        "--frequency-hz": Number("excitation_frequency", "Hz"),
-        "--clearance-mm": Number("clearance", "mm", 1e-3),
-    },
-    "slider-crank": {
-        "--clearance-joint": Choice(
-            {
-                "slider": {"slider_joint": "clearance", "ball_joint": "ideal"},
-                "ball-spherical": {"ball_joint": "spherical", **_BALL_ALONE},
-                "ball-instrumented": {"ball_joint": "instrumented", **_BALL_ALONE},
-                "both": {"slider_joint": "clearance", "ball_joint": "spherical"},
-            },
-            redirects={
-                "ball-spherical": {"--clearance-mm": "ball_clearance"},
-                "ball-instrumented": {"--clearance-mm": "ball_clearance"},
-            },
-        ),
-        "--slider-model": Choice(
-            {"plain": {"slider_joint": "clearance"}, "instrumented": {"slider_joint": "instrumented"}},
-            joints=("slider", "both"),
-        ),
-        "--ball-model": Choice(
-            {"spherical": {"ball_joint": "spherical"}, "instrumented": {"ball_joint": "instrumented"}},
-            joints=("both",),
-        ),
-        "--gravity": Choice({"on": {"gravity": STANDARD_GRAVITY}, "off": {"gravity": 0.0}}),
-        "--speed-rpm": Number("crank_speed", "rpm"),
-        "--clearance-mm": Number("slider_clearance", "mm", 1e-3),
-        "--ball-clearance-mm": Number("ball_clearance", "mm", 1e-3, ("ball-spherical", "ball-instrumented", "both")),
-        "--motor-angle-deg": Number("motor_angle", "deg"),
-        "--contact-damping-ratio": Number("contact_damping_ratio", "-"),
-        "--friction": Number("friction_coefficient", "-"),
-    },
-}
-"""By machine: its options, in the order in which they take effect. Every other field is reached by ``--set``."""
+def _options_of(machines: Iterable[str]) -> dict[str, click.Option]:
+    """Options of some machines by name; the help says whose each is."""
+    owners: dict[str, list[str]] = {}
+    kinds: dict[str, Option] = {}
+    for machine in machines:
+        for name, kind in MACHINES[machine].options.items():
+            owners.setdefault(name, []).append(machine)
+            kinds[name] = kind
+    return {
+        name: click.Option(
+            [name],
+            type=click.Choice(list(kind.words)) if isinstance(kind, Choice) else float,
+            help=f"[{', '.join(owners[name])}]",
+        )
+        for name, kind in kinds.items()
+    }
 
 
-def machine_command(function: Callable[..., None], *, required: bool = True) -> Callable[..., None]:
-    """Give a command the MACHINE argument, the options of all machines, ``--set`` and ``--json``.
+def machine_command(
+    function: Callable[..., None] | None = None,
+    *,
+    required: bool = True,
+    before: Callable[[list[str]], None] | None = None,
+) -> Any:
+    """Make a command with the MACHINE argument, the options of that machine, ``--set``, ``--fidelity`` and ``--json``.
 
     The function receives ``machine`` (constructed, or None if it is not required and not given) and ``as_json``.
     """
-    owners: dict[str, list[str]] = {}
-    kinds: dict[str, Number | Choice] = {}
-    for machine, options in MACHINE_OPTIONS.items():
-        for name, kind in options.items():
-            owners.setdefault(name, []).append(machine)
-            kinds[name] = kind
+    if function is None:
+        return functools.partial(machine_command, required=required, before=before)
+    own = {parameter.name for parameter in getattr(function, "__click_params__", [])} | {"as_json"}
 
     @functools.wraps(function)
     def wrapped(machine: str | None, settings: tuple[str, ...], fidelity: str | None, **others: Any) -> None:
-        given = {name: others.pop(name.lstrip("-").replace("-", "_")) for name in kinds}
+        given = {f"--{name.replace('_', '-')}": others.pop(name) for name in set(others) - own}
         given = {name: value for name, value in given.items() if value is not None}
         if machine is None and (settings or given or fidelity):
-            raise click.UsageError(f"these options need a machine: {', '.join(MACHINE_OPTIONS)}")
+            raise click.UsageError(f"these options need a machine: {', '.join(MACHINES)}")
         function(machine=machine and build_machine(machine, given, settings, fidelity), **others)
 
-    for name, kind in reversed(kinds.items()):
-        values: Any = click.Choice(list(kind.words)) if isinstance(kind, Choice) else float
-        wrapped = click.option(name, type=values, default=None, help=f"[{', '.join(owners[name])}]")(wrapped)
     wrapped = click.option(
         "--fidelity", metavar="RUNG", help="Rung of the machine's ladder of models, such as rigid or reference."
     )(wrapped)
@@ -105,7 +110,8 @@ def machine_command(function: Callable[..., None], *, required: bool = True) -> 
         "--set", "settings", multiple=True, metavar="FIELD=VALUE", help="Any field of the machine, in SI; repeatable."
     )(wrapped)
     wrapped = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")(wrapped)
-    return click.argument("machine", type=click.Choice(sorted(MACHINE_OPTIONS)), required=required)(wrapped)
+    wrapped = click.argument("machine", type=MachineName(), required=required)(wrapped)
+    return click.command(cls=MachineCommand, before=before)(wrapped)
 
 
 def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...], fidelity: str | None = None) -> Any:
@@ -116,16 +122,10 @@ def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...]
     click.UsageError
         If an option is not the machine's, or its value is not allowed; names option, value and range.
     """
-    from chaosgym.machines import MACHINES
     from chaosgym.machines.parameters import with_settings
 
     owner = MACHINES[name]
-    known = MACHINE_OPTIONS[name]
-    for option in given:
-        if option not in known:
-            raise click.UsageError(
-                f"{option} is no option of {name}; it takes {', '.join(known)} and --set FIELD=VALUE"
-            )
+    known = owner.options
     fields: dict[str, Any] = {}
     redirects: dict[str, str] = {}
     numbers: dict[str, str] = {}

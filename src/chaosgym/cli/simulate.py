@@ -9,7 +9,6 @@ from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import emit
 
 
-@click.command()
 @machine_command
 @click.option("--cycles", type=click.IntRange(1, 10**7), default=100, show_default=True, help="Cycles to record.")
 @click.option("--transient", type=click.IntRange(0, 10**7), default=0, show_default=True, help="Cycles to skip first.")
@@ -37,7 +36,8 @@ def simulate(machine: Any, cycles: int, transient: int, as_json: bool) -> None:
         as_json,
         lambda: [
             f"{machine.name}: {cycles} cycles after {transient}",
-            f"peak force, {machine.sides[0]} side   {peaks.min():.2f} to {peaks.max():.2f} N, mean {peaks.mean():.2f} N",
+            f"peak force, {machine.sides[0]} side   {peaks.min():.2f} to {peaks.max():.2f} N, "
+            f"mean {peaks.mean():.2f} N",
             f"last peaks                {' '.join(f'{peak:.2f}' for peak in peaks[-8:])}",
             f"impacts per cycle         {record.impacts.sum(axis=1).mean():.1f}",
             f"share in contact          {record.contact_fraction.sum(axis=1).mean():.2f}",
@@ -51,7 +51,6 @@ def _largest(sensor_peak: Any) -> list[float]:
     return [] if sensor_peak is None else [float(force) for force in sensor_peak.max(axis=0)]
 
 
-@click.command()
 @machine_command
 @click.option("--markdown", is_flag=True, help="Print the table of the documentation.")
 def show(machine: Any, markdown: bool, as_json: bool) -> None:

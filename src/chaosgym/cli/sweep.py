@@ -8,7 +8,6 @@ from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import emit
 
 
-@click.command()
 @machine_command
 @click.option("--axis", "axes", multiple=True, metavar="FIELD=LOW:HIGH[:COUNT][:lin|log]", help="Repeatable, in SI.")
 @click.option("--grid", "sampling", flag_value="grid", default="grid", help="All combinations (default).")
