@@ -1,4 +1,4 @@
-"""Does the whole promise work? One pass through every floor on the real impact beam, in a few minutes.
+"""A tour of chaosgym on the impact beam: one pass through every floor, in a few minutes.
 
 Simulate a Type I, II and III point, label a sweep, train and test the classifier, train an agent briefly, compare it
 with constant speed. Every number is computed here and now.

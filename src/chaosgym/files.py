@@ -1,4 +1,4 @@
-"""How is a file written so that it is either whole or not there?"""
+"""Files that are either whole or not there."""
 
 import os
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What can all this do in a few minutes? ``demo``."""
+"""The command ``demo``: what chaosgym does, in a few minutes."""
 
 import click
 

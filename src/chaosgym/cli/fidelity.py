@@ -1,4 +1,4 @@
-"""What does accuracy cost, and where does a model stop answering? ``tradeoff`` and ``stability``."""
+"""The commands ``tradeoff`` and ``stability``: what accuracy costs, and where a model stops answering."""
 
 import json
 from pathlib import Path

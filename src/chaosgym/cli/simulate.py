@@ -1,4 +1,4 @@
-"""What does a machine do? ``simulate`` and ``show``."""
+"""The commands ``simulate`` and ``show``: what a machine does, and what it is made of."""
 
 import time
 from typing import Any

@@ -12,8 +12,8 @@ from numba import config
 
 
 def source_digest(*folders: Path) -> str:
-    """Hash of all Python sources in some folders."""
-    sources = [path for folder in folders for path in sorted(folder.glob("*.py"))]
+    """Hash of all Python sources in some folders and below."""
+    sources = [path for folder in folders for path in sorted(folder.rglob("*.py"))]
     return hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
 
 

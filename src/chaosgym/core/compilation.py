@@ -1,4 +1,4 @@
-"""How is a kernel compiled once, however many processes need it?
+"""Compilation of kernels: once on a computer, however many processes need them.
 
 The first call of a kernel in a process loads its machine code from the disk, or compiles it, which takes seconds, and
 keeps it there. A lock lets one process do that while the others wait and then load; a message says what takes so long.

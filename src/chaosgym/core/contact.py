@@ -1,4 +1,4 @@
-"""What force does a bearing surface exert? Linear stiffness and damping that push and never pull (thesis 3.3)."""
+"""Force of a bearing surface: a linear spring and damper that push and never pull (thesis 3.3)."""
 
 from numba import njit
 

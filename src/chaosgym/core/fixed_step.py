@@ -1,4 +1,4 @@
-r"""How does a fixed-step integrator move the same beam? The comparison for the exact propagation.
+r"""Fixed steps of Runge-Kutta for machines with modal impacts: the comparison for exact propagation.
 
 The classical Runge-Kutta method of order four on q'' = -D q' - K q + phi_f F sin(w t) - phi_t N, with the same contact
 force N and no event location: touch and release are placed to O(h), so each impact gains or loses a little energy.

@@ -1,4 +1,4 @@
-"""How is a kernel compiled that only computes?
+"""Decorator of kernels that only compute.
 
 Numba counts references to every array that a function is handed, two atomic operations each, which cost more than the
 arithmetic of a short kernel. One that neither allocates nor returns an array needs no count: its caller keeps what it

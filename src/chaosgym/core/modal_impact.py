@@ -1,4 +1,4 @@
-r"""How does a beam move whose tip rattles between two stops?
+r"""Exact motion of a few modes whose tip rattles between two stops.
 
 Between contact events the beam is linear (thesis 3.3): mass-normalised modes q with
 

@@ -1,4 +1,4 @@
-r"""How does a linear system with a sinusoidal force move, exactly?
+r"""Exact propagation of a linear system under a sinusoidal force.
 
 A regime is a set of equations of motion that hold between two contact events: y' = A y + b sin(w t), where y holds n
 displacements and n velocities. In the regime's own modal coordinates u, A consists of n real 2 x 2 blocks B. A pair

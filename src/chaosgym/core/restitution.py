@@ -1,4 +1,4 @@
-r"""How does a rigid beam move whose impacts take no time?
+r"""Exact motion of one mode whose impacts take no time.
 
 Its one degree of freedom, written for the tip between two surfaces at +-c, obeys
 

@@ -1,4 +1,4 @@
-r"""How does a small deviation of a beam's motion grow, contacts included?
+r"""Small deviations of a motion with modal impacts, carried through every contact.
 
 Within a regime a deviation w of the state decays freely: w' = A w, so the exact propagators carry it in one step from
 one contact event to the next. At an event the two neighbours change their regime at slightly different instants, which

@@ -1,4 +1,4 @@
-r"""Where does a machine still answer, and where does it say that it can't? Every rung at every extreme.
+r"""The stability map: every rung of a machine at every extreme of its parameters.
 
 An extreme sets one field, or two that belong together, to the end of what is admissible. A run there ends in
 

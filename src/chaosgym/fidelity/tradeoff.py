@@ -1,4 +1,4 @@
-"""Which model is worth its cost? Every rung, integrator and step of a machine against the reference, in one run.
+"""The trade of speed for accuracy: every rung, integrator and step of a machine against the reference.
 
 Cost is processor time per operating cycle. Accuracy is measured three ways, at a fixed sample of operating points over
 the range that the machine usually runs in:

@@ -1,4 +1,4 @@
-"""How does a slender beam bend? Cubic finite elements of Euler-Bernoulli theory.
+"""Cubic finite elements of a slender beam after Euler and Bernoulli.
 
 Degrees of freedom run node by node: deflection [m], slope [rad]. What the closed-form matrices leave out (geometric
 stiffness, gyroscopic coupling, distributed loads) is integrated with the shape functions of ``interpolation``.

@@ -1,4 +1,4 @@
-"""How faithful is a machine's model? Named rungs of a ladder, from the cheapest model to the reference.
+"""The fidelity ladder: named rungs of a machine's model, from the cheapest to the reference.
 
     ImpactBeam(fidelity="modes-3", clearance=0.1e-3)
 

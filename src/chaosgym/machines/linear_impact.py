@@ -1,4 +1,4 @@
-r"""What is left of an impact on a spring and damper that push and never pull?
+r"""An impact on a spring and damper that push and never pull, seen from outside.
 
 A mass m meets the surface at speed v. While the force N = k x + d x' pushes, with w = sqrt(k / m) and
 z = d / (2 sqrt(k m)) = cos(a), 0 < a <= pi / 2 below critical damping:

@@ -1,4 +1,4 @@
-"""What is a machine parameter? A number with a unit, an allowed range and a provenance.
+"""Machine parameters: numbers with a unit, an allowed range and a provenance.
 
 A machine is a frozen dataclass whose fields are made by ``parameter``. Default, unit, range and source of a number
 live there and nowhere else; validation, the command line and the documentation read them.

@@ -1,4 +1,4 @@
-r"""When does a contact of the slider crank begin or end?
+r"""Contacts of the slider crank: when they begin and end.
 
 A channel's margin is positive as long as it keeps its contact state. Whether it may have fallen to zero within a step
 is judged by the cubic through both ends; when it did is found on the Taylor series of the motion. The cubic is off by

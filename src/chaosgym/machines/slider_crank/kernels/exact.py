@@ -1,4 +1,4 @@
-r"""How does a slider crank move whose joints rattle in their clearance?
+r"""Exact motion of a slider crank whose joints rattle in their clearance.
 
 Coordinates p are small motions about the nominal motion of the crank. A contact channel j measures row_j . p against
 its clearance c_j on one side or on both; closed on side s = +-1 it pushes with

@@ -1,4 +1,4 @@
-r"""How does a fixed-step integrator move the same slider crank? The comparison for exact propagation.
+r"""Fixed steps of Runge-Kutta for the slider crank: the comparison for exact propagation.
 
 The classical Runge-Kutta method of order four on the equations of ``crank_stepper``, any joint and contact law, without
 event location: which joints push is judged at every stage, so touch and release are placed to O(h). Matrices are those

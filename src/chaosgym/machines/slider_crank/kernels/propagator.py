@@ -1,4 +1,4 @@
-r"""How does a mechanism with held matrices move, exactly, while its contacts stay as they are?
+r"""Exact propagation of a mechanism with held matrices while its contacts stay as they are.
 
 Over one bin of crank angle, and for one set of closed contacts, the n coordinates obey
 

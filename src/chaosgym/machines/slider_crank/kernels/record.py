@@ -1,4 +1,4 @@
-"""What is recorded of the joints of a slider crank?
+"""Records of the joints of a slider crank.
 
 The resultant of the monitored joint is a tuple (upward part, size, rate of the size, along, sideways). Channels are
 rows of ``crank_contact.surfaces``.

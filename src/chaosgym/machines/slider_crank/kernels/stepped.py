@@ -1,4 +1,4 @@
-r"""How does a slider crank move whose contact force turns or is not linear?
+r"""Motion of a slider crank whose contact force turns or is not linear, by steps.
 
 The equations of ``slider_crank`` between contacts, and joints whose force no propagator knows: a ball in a spherical
 shell, whose force turns with the ball, and Hertzian contact. Joint j measures e = (row_1 . p, row_2 . p, ...) and
