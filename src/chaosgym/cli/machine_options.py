@@ -15,7 +15,7 @@ from chaosgym.machines.options import Choice, Number, Option
 from chaosgym.machines.registry import MACHINES
 
 
-class MachineName(click.ParamType):
+class MachineName(click.ParamType):  # type: ignore[type-arg]
     """Name of a machine that is registered when the command runs."""
 
     name = "machine"

@@ -28,7 +28,7 @@ def simulate(machine: Any, cycles: int, transient: int, as_json: bool) -> None:
         "contact_fraction": record.contact_fraction.sum(axis=1).tolist(),
         "seconds_per_cycle": seconds_per_cycle,
     }
-    sensors = dict(zip(getattr(machine, "sensors", ()), _largest(record.sensor_peak), strict=True))
+    sensors = dict(zip(machine.sensors, _largest(record.sensor_peak), strict=True))
     if sensors:
         result["largest_sensor_force_N"] = sensors
     emit(
@@ -73,7 +73,7 @@ def show(machine: Any, markdown: bool, as_json: bool) -> None:
         "parameters": {name: getattr(machine, name) for name in described},
         "natural_frequencies_hz": frequencies,
         "provenance": provenance,
-        **{name: getattr(machine, name) for name in ("degrees_of_freedom", "sensors") if hasattr(machine, name)},
+        **{name: getattr(machine, name) for name in ("degrees_of_freedom", "sensors") if machine.degrees_of_freedom},
     }
 
     def lines() -> list[str]:
@@ -86,7 +86,7 @@ def show(machine: Any, markdown: bool, as_json: bool) -> None:
             rows.append(f"{name:30s} {shown:>11s} {unit:8s} {origin['grade']:10s} {origin['source']}")
         rows.append("natural frequencies [Hz]: " + ", ".join(f"{value:.1f}" for value in frequencies))
         for name in ("degrees_of_freedom", "sensors"):
-            if names := getattr(machine, name, ()):
+            if names := getattr(machine, name):
                 rows.append(f"{len(names)} {name.replace('_', ' ')}: {', '.join(names)}")
         return rows
 

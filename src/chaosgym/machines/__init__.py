@@ -22,9 +22,11 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name in ("ImpactBeam", "THESIS_IMPACT_BEAM"):
-        from chaosgym.machines import impact_beam as home
-    elif name in ("SliderCrank", "THESIS_SLIDER_CRANK"):
-        from chaosgym.machines import slider_crank as home
-    else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(home, name)
+        from chaosgym.machines import impact_beam
+
+        return getattr(impact_beam, name)
+    if name in ("SliderCrank", "THESIS_SLIDER_CRANK"):
+        from chaosgym.machines import slider_crank
+
+        return getattr(slider_crank, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
