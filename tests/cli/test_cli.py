@@ -141,3 +141,15 @@ def test_a_folder_with_other_things_in_it_is_left_alone(tmp_path):
         assert code == 2
         assert "choose another folder" in err
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
+
+
+@pytest.mark.parametrize("options", [("--types",), ("--types", "--sensor-error", "3"), ("--step-check",)])
+def test_one_command_gives_one_answer(options):
+    """Type and step check rest on the very verdict that is printed, with its budget and its sensor error."""
+    point = ("--frequency-hz", "16.411929633605986", "--set", "clearance=0.00010630650223074161", "--budget", "100")
+    found = run_json("diagnose", "impact-beam", *point, *options)
+    if "response_type" in found:
+        assert (found["response_type"] == "III") == (found["nature"] == "chaotic")
+        assert (found["response_type"] == "undetermined") == (found["nature"] == "undetermined")
+    else:
+        assert found["step_check"]["nature_stays"] == (found["step_check"]["finer_nature"] == found["nature"])

@@ -1,4 +1,4 @@
-"""Is a response periodic or chaotic? ``diagnose`` and ``agreement``."""
+"""The command ``diagnose``: is a response periodic or chaotic?"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,9 +8,6 @@ import click
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import emit
 from chaosgym.machines.registry import MACHINES
-
-SUMMARY_CYCLES = 200
-"""Settled cycles that the summary of the peak force covers."""
 
 
 @machine_command(required=False)
@@ -93,10 +90,9 @@ def _diagnose_measured(
 
 def _matrix_update(machine: Any) -> tuple[dict[str, Any], list[str]]:
     from chaosgym.diagnosis import matrix_update_test
-    from chaosgym.simulation import simulate
 
     verdict = matrix_update_test(machine)
-    summary = _summary(simulate(machine, SUMMARY_CYCLES, transient=SUMMARY_CYCLES).peak_force[:, 0])
+    summary = _summary(verdict.judged.peak_force[:, 0])
     result = {"machine": machine.name, **verdict.as_dict(), "peak_force_summary_N": summary, "warnings": []}
     return result, _verdict_lines(f"{machine.name}, Matrix Update Test", verdict, summary, " N")
 
@@ -106,11 +102,9 @@ def _diagnose_machine(
 ) -> tuple[dict[str, Any], list[str]]:
     from chaosgym.diagnosis import diagnose, response_type
     from chaosgym.diagnosis.step_check import step_check
-    from chaosgym.simulation import simulate
 
     verdict = diagnose(machine, budget=budget, sensor_error=sensor_error)
-    settled = simulate(machine, SUMMARY_CYCLES, verdict.evidence["final_state"])
-    summary = _summary(settled.peak_force[:, 0])
+    summary = _summary(verdict.judged.peak_force[:, 0])
     exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
     result = {
         "machine": machine.name,
@@ -124,11 +118,11 @@ def _diagnose_machine(
     lines = _verdict_lines(machine.name, verdict, summary, " N")
     lines.append(f"  {result['cycles_used']} cycles used; votes: {votes}")
     if types:
-        judged = response_type(machine, sensor_error=sensor_error)
+        judged = response_type(machine, budget=budget, sensor_error=sensor_error, centre=verdict)
         result |= {"response_type": judged.type, "response_type_reason": judged.reason}
         lines.append(f"  Type {judged.type}: {judged.reason}")
     if check:
-        compared = step_check(machine)
+        compared = step_check(machine, verdict, budget=budget, sensor_error=sensor_error)
         result["step_check"] = compared.as_dict()
         lines.append(f"  {compared.summary}")
     return result, lines

@@ -1,37 +1,16 @@
-r"""Where may chaos be expected, without any simulation? The predictive criteria of thesis 5.3.1.
+"""The predictive criteria of thesis 5.3.1: where chaos is possible, without any simulation.
 
-Beam     clearance above 0.02 of the static tip deflection and frequency above 16 Hz at 1 % structural damping; at 8 %
-         there is no chaos at 0.04 either. Between the two dampings the least clearance is interpolated.
-Crank    clearance above 0.064 mm and speed above 100 rpm at 5 % contact damping; above 0.032 mm at 2.5 %. Between and
-         beyond, the least clearance is taken proportional to the damping.
-
-They say where chaos is possible, not that it occurs: periodic windows lie inside.
+A machine's ``chaos_thresholds`` hold the printed ones. They do not say that chaos occurs: periodic windows lie inside.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from chaosgym.diagnosis.response import Nature
 from chaosgym.errors import DiagnosisError
-from chaosgym.machines import ImpactBeam, Machine
-from chaosgym.machines.impact_beam.modes import static_tip_deflection
-
-BEAM_FREQUENCY = 16.0
-"""Frequency [Hz] above which chaos was seen."""
-
-BEAM_CLEARANCE, BEAM_CLEARANCE_DAMPED = 0.02, 0.04
-"""Least dimensionless clearance at 1 % and at 8 % structural damping."""
-
-BEAM_DAMPING, BEAM_DAMPING_HIGH = 0.01, 0.08
-
-CRANK_SPEED = 100.0
-"""Speed [rpm] above which chaos was seen."""
-
-CRANK_CLEARANCE, CRANK_DAMPING = 0.064e-3, 0.05
-"""Least clearance [m] at a contact damping ratio."""
+from chaosgym.machines import Machine
 
 
 @dataclass(frozen=True)
@@ -54,21 +33,13 @@ def predictive_criteria(machine: Machine) -> PredictiveCriterion:
     DiagnosisError
         If the thesis gives no criterion for the machine.
     """
-    if isinstance(machine, ImpactBeam):
-        share = (machine.damping_ratio - BEAM_DAMPING) / (BEAM_DAMPING_HIGH - BEAM_DAMPING)
-        least = max(0.0, BEAM_CLEARANCE + share * (BEAM_CLEARANCE_DAMPED - BEAM_CLEARANCE))
-        clearance = machine.clearance / static_tip_deflection(machine)
-        return _criterion(
-            {"clearance": (clearance, least), "frequency": (machine.excitation_frequency, BEAM_FREQUENCY)}
-        )
-    if machine.name == "slider-crank":
-        crank: Any = machine
-        least = CRANK_CLEARANCE * crank.contact_damping_ratio / CRANK_DAMPING
-        return _criterion({"clearance": (crank.slider_clearance, least), "speed": (crank.crank_speed, CRANK_SPEED)})
-    raise DiagnosisError(f"there is no printed criterion for {machine.name}; known: impact-beam, slider-crank")
+    thresholds = machine.chaos_thresholds
+    if not thresholds:
+        raise DiagnosisError(f"there is no printed criterion for {machine.name}")
+    return _criterion(thresholds)
 
 
-def _criterion(values: dict[str, tuple[float, float]]) -> PredictiveCriterion:
+def _criterion(values: Mapping[str, tuple[float, float]]) -> PredictiveCriterion:
     margins = {name: value / least - 1.0 if least > 0.0 else np.inf for name, (value, least) in values.items()}
     lacking = [name for name, margin in margins.items() if margin <= 0.0]
     if lacking:

@@ -93,8 +93,8 @@ def diagnose(
     Returns
     -------
     Diagnosis
-        With status, horizon, settle cycle and the votes of all tests. ``evidence`` holds the figures of the Two-Step
-        Test, ``largest_lyapunov_exponent_per_cycle``, the ``orbit`` if one was found, ``largest_peak`` [N] of the
+        With status, horizon, settle cycle, the votes of all tests and the run itself. ``evidence`` holds the figures
+        of the Two-Step Test, ``largest_lyapunov_exponent_per_cycle``, the ``orbit`` if one was found, ``largest_peak`` [N] of the
         settled cycles, ``cycles_used`` (Newton's method included) and ``final_state``.
 
     Raises
@@ -136,7 +136,8 @@ def diagnosed_run(
     evidence = _evidence(stage, verdict, initial_state)
     if stage.orbit is not None:
         evidence["largest_peak"] = float(np.max(simulate(machine, stage.orbit.period, stage.orbit.state).peak_force))
-    return replace(verdict, votes=_votes(stage), horizon=len(record), evidence=evidence), record
+    verdict = replace(verdict, votes=_votes(stage), horizon=len(record), evidence=evidence, record=record)
+    return verdict, record
 
 
 def _with_update_test(machine: Machine, verdict: Diagnosis, record: CycleRecord, sensor_error: float) -> Diagnosis:

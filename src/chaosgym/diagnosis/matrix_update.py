@@ -1,4 +1,4 @@
-r"""Is the response sensitive to small disturbances? The Matrix Update Test (thesis 5.2.2).
+r"""The Matrix Update Test: is a response sensitive to small disturbances? (thesis 5.2.2)
 
 A machine whose matrices depend on its configuration is run twice, with two slightly different intervals between
 updates of these matrices. Each update disturbs the motion a little, so the two runs amount to two initial conditions.
@@ -20,7 +20,7 @@ from chaosgym.diagnosis.response import Diagnosis
 from chaosgym.diagnosis.stroboscopic import as_samples, find_decay, find_recurrence, scales
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import parameters_of
+from chaosgym.machines.parameters import parameters_of, with_settings
 from chaosgym.simulation import MotionState, simulate
 
 Array = NDArray[np.float64]
@@ -85,16 +85,18 @@ def matrix_update_test(
         )
     if form not in ("literal", "attractors"):
         raise DiagnosisError(f"form = {form!r} is not one of 'literal', 'attractors'")
-    machine, other = (replace(machine, **{FIELD: interval}) for interval in intervals)  # type: ignore[type-var]
+    machine, other = (with_settings(machine, {FIELD: interval}) for interval in intervals)
     evidence: dict[str, Any] = {"form": form, "intervals_deg": list(intervals), "transient": transient}
     if form == "literal":
-        runs = [simulate(one, cycles, initial_state, transient).peak_force for one in (machine, other)]
-        verdict = compare_outcomes(*runs, tolerance=tolerance)
+        runs = [simulate(one, cycles, initial_state, transient) for one in (machine, other)]
+        compare = compare_outcomes
     else:
         start = simulate(machine, transient, initial_state).final_state if transient else initial_state
-        runs = [simulate(one, cycles, start, transient=cycles).peak_force for one in (machine, other)]
-        verdict = compare_attractors(*runs, tolerance=tolerance)
-    return replace(verdict, evidence={**evidence, **verdict.evidence}, horizon=transient + cycles)
+        runs = [simulate(one, cycles, start, transient=cycles) for one in (machine, other)]
+        compare = compare_attractors
+    verdict = compare(*(run.peak_force for run in runs), tolerance=tolerance)
+    evidence |= verdict.evidence
+    return replace(verdict, evidence=evidence, horizon=transient + cycles, record=runs[0])
 
 
 def neighbouring_interval(interval: float) -> float:

@@ -1,4 +1,4 @@
-"""What is said of a response? Its nature, how sure that is, and why.
+"""The verdict on a response: its nature, how sure that is, and why.
 
 The words are those of the thesis: periodic, quasiperiodic, chaotic (2.3, 5.2) and Types I, II, III (5.5).
 """
@@ -6,7 +6,12 @@ The words are those of the thesis: periodic, quasiperiodic, chaotic (2.3, 5.2) a
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+from chaosgym.errors import DiagnosisError
+
+if TYPE_CHECKING:
+    from chaosgym.simulation.record import CycleRecord
 
 Nature = Literal["periodic", "quasiperiodic", "chaotic", "undetermined"]
 """Nature of one response; undetermined where the evidence does not decide."""
@@ -51,6 +56,8 @@ class Diagnosis:
         First cycle of the stretch that repeats, counted from the first cycle judged; None if none does.
     votes
         Nature according to each test.
+    record
+        The run that was judged; None where a plain series was.
     """
 
     nature: Nature
@@ -63,8 +70,22 @@ class Diagnosis:
     horizon: int | None = None
     settle_cycle: int | None = None
     votes: Mapping[str, Nature] = field(default_factory=lambda: _EMPTY)
+    record: "CycleRecord | None" = field(default=None, repr=False, compare=False)
+
+    @property
+    def judged(self) -> "CycleRecord":
+        """The last half of the run: the cycles that count as settled.
+
+        Raises
+        ------
+        DiagnosisError
+            If the verdict was reached on a plain series.
+        """
+        if self.record is None:
+            raise DiagnosisError("the verdict was reached on a plain series; diagnose a machine to get its run")
+        return self.record.after(len(self.record) // 2)
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        plain = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        plain = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "record"}
         return {**plain, "evidence": dict(self.evidence), "votes": dict(self.votes)}

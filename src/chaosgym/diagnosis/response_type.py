@@ -114,6 +114,7 @@ def response_type(
     initial_states: int = 3,
     budget: int = 1600,
     sensor_error: float = 0.0,
+    centre: Diagnosis | None = None,
     workers: int | None = None,
 ) -> ResponseType:
     """Type of a machine's response over its tolerance neighbourhood.
@@ -136,6 +137,8 @@ def response_type(
         Cycles that each run may take.
     sensor_error
         Peak forces [N] that differ by less count as equal; see ``diagnose``.
+    centre
+        Verdict on the nominal machine from rest, if it is known already.
     workers
         Number of threads; all processors by default.
 
@@ -152,7 +155,7 @@ def response_type(
     check_initial_states(initial_states)
     if start not in ("rest", "continuation"):
         raise DiagnosisError(f"start = {start!r} is not one of 'rest', 'continuation'")
-    centre = diagnose(machine, budget=budget, sensor_error=sensor_error)
+    centre = centre or diagnose(machine, budget=budget, sensor_error=sensor_error)
     origin = centre.evidence["final_state"] if start == "continuation" else None
     neighbours: tuple[Neighbour, ...] = ()
     coexisting: tuple[float, ...] = ()

@@ -1,4 +1,4 @@
-"""Does the verdict belong to the machine or to the integrator? Run again with a finer step and compare.
+"""The step check: a machine judged again with a finer step, so that the verdict is the machine's and not the step's.
 
 Touch and release that are placed wrongly by a fraction of a step add or remove energy at every impact, which turns
 periodic responses into chaos and the reverse. A verdict that a finer step changes is no verdict.
@@ -7,10 +7,12 @@ periodic responses into chaos and the reverse. A verdict that a finer step chang
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from chaosgym.diagnosis.diagnose import DEFAULT_BUDGET, diagnose
 from chaosgym.diagnosis.response import Diagnosis
-from chaosgym.diagnosis.two_step import two_step_test
 from chaosgym.machines import Machine
-from chaosgym.simulation import CycleRecord, Integrator, simulate
+from chaosgym.simulation import Integrator
 
 SPREAD_CHANGE = 0.05
 """Largest change of the spread of the peak force, as a share of the largest peak, that counts as none."""
@@ -24,17 +26,16 @@ class StepCheck:
     ----------
     given, finer : Diagnosis
         Verdicts.
-    spread, finer_spread : float
-        Largest minus smallest peak force of the judged cycles [N].
-    largest : float
-        Largest peak force [N] of either run.
     """
 
     given: Diagnosis
     finer: Diagnosis
-    spread: float
-    finer_spread: float
-    largest: float
+
+    @property
+    def spreads(self) -> tuple[float, float]:
+        """Largest minus smallest peak force [N] of the settled cycles, given and finer."""
+        given, finer = (float(np.ptp(one.judged.peak_force[:, 0])) for one in (self.given, self.finer))
+        return given, finer
 
     @property
     def nature_stays(self) -> bool:
@@ -49,7 +50,8 @@ class StepCheck:
     @property
     def spread_stays(self) -> bool:
         """True if the spread of the peak force changes by less than 5 % of the largest peak."""
-        return abs(self.spread - self.finer_spread) <= SPREAD_CHANGE * self.largest
+        largest = max(float(one.judged.peak_force.max()) for one in (self.given, self.finer))
+        return abs(self.spreads[0] - self.spreads[1]) <= SPREAD_CHANGE * largest
 
     @property
     def summary(self) -> str:
@@ -57,8 +59,8 @@ class StepCheck:
         finer = self.finer.nature + (f" with period {self.finer.period}" if self.finer.period else "")
         kept = "keeps" if self.nature_stays and self.period_stays else "CHANGES"
         return (
-            f"a finer step {kept} the verdict ({finer}); spread of the peak force {self.spread:.2f} N, "
-            f"finer {self.finer_spread:.2f} N"
+            f"a finer step {kept} the verdict ({finer}); spread of the peak force {self.spreads[0]:.2f} N, "
+            f"finer {self.spreads[1]:.2f} N"
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -67,8 +69,8 @@ class StepCheck:
             "nature_stays": self.nature_stays,
             "period_stays": self.period_stays,
             "spread_stays": self.spread_stays,
-            "spread_N": self.spread,
-            "finer_spread_N": self.finer_spread,
+            "spread_N": self.spreads[0],
+            "finer_spread_N": self.spreads[1],
             "finer_nature": self.finer.nature,
             "finer_period": self.finer.period,
             "summary": self.summary,
@@ -76,7 +78,12 @@ class StepCheck:
 
 
 def step_check(
-    machine: Machine, *, cycles: int = 200, transient: int = 200, integrator: Integrator | None = None
+    machine: Machine,
+    given: Diagnosis | None = None,
+    *,
+    budget: int = DEFAULT_BUDGET,
+    sensor_error: float = 0.0,
+    integrator: Integrator | None = None,
 ) -> StepCheck:
     """Judge a machine with an integrator and with ``integrator.refined()``.
 
@@ -84,22 +91,14 @@ def step_check(
     ----------
     machine
         What to judge, from rest.
-    cycles, transient
-        Cycles to judge, and to run before.
+    given
+        Verdict with the first integrator, if it is known already.
+    budget, sensor_error
+        As in ``diagnose``.
     integrator
         ``machine.default_integrator`` by default.
     """
     chosen = integrator or machine.default_integrator
-    given = simulate(machine, cycles, transient=transient, integrator=chosen)
-    finer = simulate(machine, cycles, transient=transient, integrator=chosen.refined())
-    return StepCheck(
-        two_step_test(given),
-        two_step_test(finer),
-        _spread(given),
-        _spread(finer),
-        float(max(given.peak_force.max(), finer.peak_force.max())),
-    )
-
-
-def _spread(record: CycleRecord) -> float:
-    return float(record.peak_force[:, 0].max() - record.peak_force[:, 0].min())
+    given = given or diagnose(machine, budget=budget, sensor_error=sensor_error, integrator=chosen)
+    finer = diagnose(machine, budget=budget, sensor_error=sensor_error, integrator=chosen.refined())
+    return StepCheck(given, finer)

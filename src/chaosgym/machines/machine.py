@@ -140,6 +140,11 @@ class Machine(FidelityLadder, ABC):
         return ExactEvents()
 
     @property
+    def chaos_thresholds(self) -> Mapping[str, tuple[float, float]]:
+        """Quantities that chaos needs above a printed threshold: (value, threshold) by name; empty if unknown."""
+        return {}
+
+    @property
     def carries_deviations(self) -> bool:
         """True if ``run`` takes ``tangents``, so that Lyapunov exponents and derivatives of orbits are exact."""
         return False

@@ -1,11 +1,12 @@
 """The Impact Beam System: finite elements, the modes that are kept, and the model that the kernels integrate."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
 from chaosgym.core.modal_impact import ModalImpactModel
 from chaosgym.core.restitution import RestitutionModel
-from chaosgym.machines.impact_beam.modes import modal_analysis
+from chaosgym.machines.impact_beam.modes import modal_analysis, static_tip_deflection
 from chaosgym.machines.impact_beam.parameters import BeamParameters
 from chaosgym.machines.integrators import TIGHTEST_EVENTS, ExactEvents
 from chaosgym.machines.modal_impact import flexible_model, rigid_model
@@ -30,6 +31,16 @@ class ImpactBeam(BeamParameters):
     def default_integrator(self) -> ExactEvents:
         """Integrator where none is given."""
         return TIGHTEST_EVENTS if self.event_accuracy == "tightest" else ExactEvents()
+
+    @property
+    def chaos_thresholds(self) -> Mapping[str, tuple[float, float]]:
+        """Clearance over the static tip deflection, and frequency [Hz] (thesis 5.3.1).
+
+        The least clearance is printed for structural dampings of 1 and 8 %, and interpolated between them.
+        """
+        clearance = self.clearance / static_tip_deflection(self)
+        least = 0.02 + 0.02 * (self.damping_ratio - 0.01) / 0.07
+        return {"clearance": (clearance, max(0.0, least)), "frequency": (self.excitation_frequency, 16.0)}
 
     @property
     def structure(self) -> ModalImpactModel | RestitutionModel:

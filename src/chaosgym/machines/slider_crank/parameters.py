@@ -322,6 +322,15 @@ class SliderCrank(Machine):
         return f"{self.monitored_joint}_clearance"
 
     @property
+    def chaos_thresholds(self) -> Mapping[str, tuple[float, float]]:
+        """Clearance [m] of the slider, and speed [rpm] (thesis 5.3.1).
+
+        The least clearance is printed for contact dampings of 2.5 and 5 %, in proportion; so it is taken beyond them.
+        """
+        least = 0.064e-3 * self.contact_damping_ratio / 0.05
+        return {"clearance": (self.slider_clearance, least), "speed": (self.crank_speed, 100.0)}
+
+    @property
     def natural_frequencies(self) -> Array:
         """Natural frequencies [Hz] at rest at crank angle zero, every joint tight, (n_modes + 1,).
 
