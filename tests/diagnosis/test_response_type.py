@@ -11,7 +11,6 @@ from chaosgym.diagnosis import (
     judge_type,
     response_map,
     response_type,
-    type_stability,
     types_on_grid,
 )
 from chaosgym.errors import DiagnosisError, ParameterError
@@ -121,9 +120,7 @@ def test_wrong_requests_are_refused():
 
 
 def test_the_definition_of_the_window_is_part_of_the_label():
-    """A wide window at 16.5 Hz reaches what a narrow one does not; far from any change no definition matters."""
-    flips = type_stability([ImpactBeam(excitation_frequency=7.0), ImpactBeam()], budget=400, workers=1)
-    assert set(flips.values()) == {0.0}
+    """A wide window at 16.5 Hz reaches what a narrow one does not."""
     narrow = {"excitation_frequency": Tolerance(0.001)}
     wide = {"excitation_frequency": Tolerance(0.2)}
     beam = ImpactBeam(excitation_frequency=16.5)

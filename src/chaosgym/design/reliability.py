@@ -22,11 +22,11 @@ H. R. Kuensch, The jackknife and the bootstrap for general stationary observatio
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import integrate, stats
+from scipy import stats
 
 from chaosgym.errors import DesignError
 
@@ -50,13 +50,6 @@ class Strength(NamedTuple):
         if self.deviation == 0.0:
             return np.asarray(np.asarray(stress, dtype=float) < self.mean, dtype=float)
         return np.asarray(stats.norm.sf(stress, self.mean, self.deviation))
-
-
-def effective_modulus(
-    youngs_modulus: float, poisson_ratio: float, other_modulus: float = math.inf, other_poisson_ratio: float = 0.0
-) -> float:
-    """Contact modulus E* [Pa] of two surfaces; the other one is rigid by default."""
-    return 1.0 / ((1.0 - poisson_ratio**2) / youngs_modulus + (1.0 - other_poisson_ratio**2) / other_modulus)
 
 
 def hertz_pressure(forces: ArrayLike, radius: float, modulus: float) -> Array:
@@ -84,16 +77,6 @@ def safety_factor(stress: float, strength: float, fatigue_factor: float = 1.0) -
 def reliability(stresses: ArrayLike, strength: Strength) -> float:
     """Reliability over recorded stresses [Pa], eq. 5.8."""
     return float(np.mean(strength.exceeds(stresses)))
-
-
-def reliability_of_distributions(stress: Any, strength: Any) -> float:
-    """Reliability of two distributions (frozen, of ``scipy.stats``) by numerical integration of eq. 5.8."""
-    low, high = stress.ppf(1e-12), stress.isf(1e-12)
-    middle = stress.ppf(np.linspace(0.05, 0.95, 19))
-    value, _ = integrate.quad(
-        lambda s: stress.pdf(s) * strength.sf(s), low, high, points=middle, limit=400, epsabs=1e-13, epsrel=1e-10
-    )
-    return float(value)
 
 
 def normal_reliability(

@@ -1,4 +1,4 @@
-"""What kind of response is this? Tests take a ``CycleRecord`` or a plain array of one sample a cycle."""
+"""Tests of a response: periodic, quasiperiodic or chaotic; they take a ``CycleRecord`` or one sample a cycle."""
 
 from chaosgym.diagnosis.criteria import CriterionRate, PredictiveCriterion, criterion_rate, predictive_criteria
 from chaosgym.diagnosis.diagnose import diagnose
@@ -11,19 +11,10 @@ from chaosgym.diagnosis.lyapunov import (
 )
 from chaosgym.diagnosis.matrix_update import compare_attractors, compare_outcomes, matrix_update_test
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
+from chaosgym.diagnosis.precursors import Precursors, bounce_fraction, precursors
 from chaosgym.diagnosis.response import NATURES, STATUSES, TYPES, Diagnosis, Nature, Status, Type
-from chaosgym.diagnosis.response_map import ResponseMap, geometric_grid, response_map, type_stability
+from chaosgym.diagnosis.response_map import ResponseMap, geometric_grid, response_map
 from chaosgym.diagnosis.response_type import ResponseType, Tolerance, default_tolerances, response_type
-from chaosgym.diagnosis.routes import (
-    Intermittency,
-    Precursors,
-    WarningRate,
-    bounce_fraction,
-    find_crises,
-    find_intermittency,
-    precursors,
-    warning_rates,
-)
 from chaosgym.diagnosis.spectrum import Spectrum, power_spectrum
 from chaosgym.diagnosis.stroboscopic import Recurrence, find_recurrence
 from chaosgym.diagnosis.two_step import two_step_test
@@ -36,7 +27,6 @@ __all__ = [
     "TYPES",
     "CriterionRate",
     "Diagnosis",
-    "Intermittency",
     "LyapunovExponent",
     "Nature",
     "Neighbour",
@@ -50,7 +40,6 @@ __all__ = [
     "Status",
     "Tolerance",
     "Type",
-    "WarningRate",
     "bounce_fraction",
     "compare_attractors",
     "compare_outcomes",
@@ -58,8 +47,6 @@ __all__ = [
     "default_tolerances",
     "diagnose",
     "exponent_from_series",
-    "find_crises",
-    "find_intermittency",
     "find_periodic_orbit",
     "find_recurrence",
     "geometric_grid",
@@ -74,8 +61,6 @@ __all__ = [
     "response_type",
     "two_step_test",
     "two_trajectory_exponent",
-    "type_stability",
     "types_on_grid",
-    "warning_rates",
     "zero_one_statistic",
 ]

@@ -94,8 +94,8 @@ def diagnose(
     -------
     Diagnosis
         With status, horizon, settle cycle, the votes of all tests and the run itself. ``evidence`` holds the figures
-        of the Two-Step Test, ``largest_lyapunov_exponent_per_cycle``, the ``orbit`` if one was found, ``largest_peak`` [N] of the
-        settled cycles, ``cycles_used`` (Newton's method included) and ``final_state``.
+        of the Two-Step Test, ``largest_lyapunov_exponent_per_cycle``, the ``orbit`` if one was found, ``largest_peak``
+        [N] of the settled cycles, ``cycles_used`` (Newton's method included) and ``final_state``.
 
     Raises
     ------

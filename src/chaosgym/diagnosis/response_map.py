@@ -1,6 +1,6 @@
-"""How do response types lie over speed and clearance, and how much do they depend on their definition?"""
+"""Response types over speed and clearance."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,16 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.diagnosis.diagnose import diagnose
-from chaosgym.diagnosis.response import Diagnosis, Type
+from chaosgym.diagnosis.response import Diagnosis
 from chaosgym.diagnosis.response_type import (
     SHARES,
     Tolerance,
     check_initial_states,
     chosen_tolerances,
     coexisting_peaks,
-    default_tolerances,
     define,
-    response_type,
 )
 from chaosgym.diagnosis.type_rule import Neighbour, judge_type
 from chaosgym.errors import SimulationError
@@ -166,45 +164,3 @@ def _neighbour(name: str, side: int, run: Diagnosis | None) -> Neighbour:
     if run is None:
         return Neighbour(name, side, "undetermined", np.nan)
     return Neighbour(name, side, run.nature, run.evidence["largest_peak"])
-
-
-def type_stability(
-    machines: Sequence[Machine], *, budget: int = 800, workers: int | None = None, progress: bool = False
-) -> dict[str, float]:
-    """Share of type labels that change with the definition, over machines.
-
-    Parameters
-    ----------
-    machines
-        What to label, in the two-parameter window.
-    budget, workers, progress
-        As for ``response_map``.
-
-    Returns
-    -------
-    dict
-        "window x 0.5" and "window x 2.5" (frequency +-1 % and +-5 % instead of +-2 %), "continuation" (runs of the
-        neighbourhood start where the centre ended) and "one initial state" (no search for coexisting attractors).
-    """
-
-    def labels(machine: Machine) -> list[Type]:
-        given = default_tolerances(machine)
-        half, wide = ({name: t._replace(value=f * t.value) for name, t in given.items()} for f in (0.5, 2.5))
-        variants: list[dict[str, Any]] = [
-            {},
-            {"tolerances": half},
-            {"tolerances": wide},
-            {"start": "continuation"},
-            {"initial_states": 1},
-        ]
-        return [
-            response_type(machine, window="speed-clearance", budget=budget, workers=1, **variant).type
-            for variant in variants
-        ]
-
-    rows = parallel_map(labels, machines, workers=workers, progress="types" if progress else None)
-    names = ("window x 0.5", "window x 2.5", "continuation", "one initial state")
-    return {
-        name: sum(row[0] != row[column] for row in rows) / max(1, len(rows))
-        for column, name in enumerate(names, start=1)
-    }

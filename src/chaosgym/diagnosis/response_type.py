@@ -1,10 +1,9 @@
-r"""What may a designer rely on? Types I, II and III of a response over a tolerance neighbourhood (thesis 5.5).
+"""Types I, II and III of a response over a tolerance neighbourhood: what a designer may rely on (thesis 5.5).
 
 The machine is run at its nominal parameters and, one parameter at a time, at two points on either side of them: half
 the tolerance and all of it, each from rest. The statistic is the largest peak force of the settled cycles.
 
-What follows from that is the rule of ``type_rule``. Window, statistic and initial states are part of the label:
-``type_stability`` counts how many labels change with them.
+What follows from that is the rule of ``type_rule``. Window, statistic and initial states are part of the label.
 """
 
 from collections.abc import Mapping

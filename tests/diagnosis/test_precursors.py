@@ -1,21 +1,13 @@
-import numpy as np
 import pytest
 
 from chaosgym.diagnosis import (
     bounce_fraction,
     criterion_rate,
-    find_crises,
-    find_intermittency,
     precursors,
     predictive_criteria,
-    two_step_test,
-    warning_rates,
 )
-from chaosgym.errors import DiagnosisError
 from chaosgym.machines import ImpactBeam
 from chaosgym.simulation import simulate
-
-from .maps import logistic
 
 
 @pytest.mark.parametrize(
@@ -46,40 +38,6 @@ def test_long_bouncing_announces_chaos_on_the_beam():
     assert wild > 0.75
     assert precursors(1, wild).any
     assert not precursors(1, calm).any
-
-
-def test_warning_rates_on_the_logistic_map():
-    """Along r, period doubling and period three warn of chaos better than the base rate."""
-    natures, periods = [], []
-    for r in np.linspace(3.4, 3.9, 101):
-        verdict = two_step_test(logistic(r, 300))
-        natures.append(verdict.nature)
-        periods.append(verdict.period)
-    rates = warning_rates(natures, periods, np.zeros(101), reach=4)
-    assert rates["period_three"].hits > rates["period_three"].base_rate
-    assert rates["long_bouncing"].warned == 0
-    assert rates["any"].warned >= rates["period_doubling"].warned > 0
-    with pytest.raises(DiagnosisError, match="equal"):
-        warning_rates(natures, periods[1:], np.zeros(101))
-
-
-def test_intermittency_is_found_below_the_window_of_period_three():
-    """Just below r = 1 + sqrt(8) stretches of period 3 alternate with bursts; at r = 4 and in a window they don't."""
-    found = find_intermittency(logistic(1.0 + np.sqrt(8.0) - 1e-4, 2000))
-    assert found.intermittent
-    assert found.period == 3
-    assert found.mean_length > 20
-    assert not find_intermittency(logistic(4.0, 2000)).intermittent
-    assert not find_intermittency(logistic(3.835, 2000)).intermittent
-
-
-def test_crises_of_the_logistic_map():
-    """At r = 3.8568 three bands merge in an interior crisis; chaos that dies out beside chaos is a boundary crisis."""
-    rs = np.array([3.8560, 3.8566, 3.8569, 3.8575])
-    spreads = [np.ptp(logistic(r, 4000)[::3]) for r in rs]
-    assert find_crises(["chaotic"] * 4, spreads) == [(1, "interior")]
-    assert find_crises(["chaotic", "chaotic", "periodic"], [5.0, 5.0, 0.1], [False, True, False]) == [(0, "boundary")]
-    assert find_crises(["periodic", "chaotic"], [0.0, 5.0]) == []
 
 
 def test_predictive_criteria_of_the_beam():
