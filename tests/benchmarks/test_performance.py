@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from benchmarks.cli import app
 from benchmarks.performance import rates, scaling
 from benchmarks.performance.against_exudyn import Contest, against_exudyn, period_of
 from benchmarks.performance.exudyn_machines import ExudynSetting, load_exudyn, run_in_exudyn
 from benchmarks.performance.timing import processor_seconds, rate
-from chaosgym.cli import app
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK
 from chaosgym.simulation import simulate

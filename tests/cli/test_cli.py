@@ -11,15 +11,15 @@ from chaosgym.machines.parameters import parameters_of
 from chaosgym.simulation import simulate
 
 
-def run(*arguments):
-    """Run the command in a process of its own: (exit code, standard output, standard error)."""
-    done = subprocess.run([sys.executable, "-m", "chaosgym", *arguments], capture_output=True, text=True, check=False)
+def run(*arguments, module="chaosgym"):
+    """Run a command of a package in a process of its own: (exit code, standard output, standard error)."""
+    done = subprocess.run([sys.executable, "-m", module, *arguments], capture_output=True, text=True, check=False)
     return done.returncode, done.stdout, done.stderr
 
 
-def run_json(*arguments):
+def run_json(*arguments, module="chaosgym"):
     """Run with --json and return the object, which must be all of standard output."""
-    code, out, err = run(*arguments, "--json")
+    code, out, err = run(*arguments, "--json", module=module)
     assert code == 0, err
     return json.loads(out)
 

@@ -79,11 +79,11 @@ def test_card_holds_the_command_that_makes_the_dataset_again(folder, tmp_path):
 
 def test_cost_is_measured_against_every_axis(folder):
     """Mean cost, cost by axis, and what larger sweeps would take."""
-    cost = run_json("dataset", "cost", str(folder), "--points", "6")
+    cost = run_json("sweep-cost", str(folder), "--points", "6", module="benchmarks")
     assert 1e-4 < cost["seconds"] < 10.0
     assert set(cost["by"]) == {"nature", "damping_ratio", "excitation_frequency", "clearance"}
     assert cost["hours"]["1e+09"]["64"] == pytest.approx(1e9 * cost["seconds"] / 64 / 3600)
-    code, _, err = run("dataset", "cost", str(folder), "--points", "55")
+    code, _, err = run("sweep-cost", str(folder), "--points", "55", module="benchmarks")
     assert code == 2
     assert "3 to 54" in err
 
@@ -122,8 +122,8 @@ def test_bad_input_is_one_line(arguments, message, tmp_path, monkeypatch):
 
 def test_check_labels_rows_again(folder):
     """Where the rows were computed they come out the same."""
-    found = run_json("dataset", "check", str(folder), "--points", "5", "--seed", "3")
+    found = run_json("check-sweep", str(folder), "--points", "5", "--seed", "3", module="benchmarks")
     assert (found["points"], found["identical"], found["sound"]) == (5, 5, True)
-    code, _, error = run("dataset", "check", str(folder), "--points", "60")
+    code, _, error = run("check-sweep", str(folder), "--points", "60", module="benchmarks")
     assert code == 2
     assert "allowed: 1 to 54" in error

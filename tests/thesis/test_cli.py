@@ -19,7 +19,7 @@ from tests.cli.test_cli import run
 def test_wrong_input_is_refused_in_one_line(arguments, complaint, tmp_path):
     """Exit code 2, one line on standard error that names the value, no folder."""
     folder = tmp_path / "out"
-    code, out, err = run(*(str(folder) if word == "FOLDER" else word for word in arguments))
+    code, out, err = run(*(str(folder) if word == "FOLDER" else word for word in arguments), module="thesis")
     assert (code, out) == (2, "")
     assert len(err.splitlines()) == 1
     assert complaint in err

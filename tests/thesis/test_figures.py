@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from chaosgym.cli import app
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines import MACHINES, THESIS_IMPACT_BEAM, ImpactBeam
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
+from thesis.cache import default_folder
+from thesis.cli import app
 from thesis.figures import FIGURES, chosen, draw_figures
-from thesis.figures.cache import computed, result_path
 from thesis.figures.computations import ForcePointHistory, Runs
 from thesis.figures.figure import steps
 from thesis.figures.findings import compare_response
 from thesis.figures.gallery import gallery
 from thesis.figures.printed import comparison
-from thesis.scorecard.jobs import default_folder
+from thesis.figures.produce import computed
 from thesis.scorecard.observation import THOROUGH
 from thesis.scorecard.scorecard import evaluate
 
@@ -135,14 +135,21 @@ def test_a_result_is_kept_under_all_that_it_depends_on(tmp_path, monkeypatch):
         ),
         Runs(machines=(THESIS_IMPACT_BEAM,), fields=("clearance",), cycles=21, transient=0),
     ]
-    assert len({result_path(one, tmp_path) for one in (runs, *others)}) == 3
     first = computed(runs, tmp_path)
     assert np.array_equal(first["peaks"][0], simulate(THESIS_IMPACT_BEAM, 20).peak_force[:, 0])
-    result_path(runs, tmp_path).touch()
-    assert all(np.array_equal(first[name], kept) for name, kept in computed(runs, tmp_path).items())
-    before = result_path(runs, tmp_path)
-    monkeypatch.setattr("thesis.figures.cache.SOURCES", "edited")
-    assert result_path(runs, tmp_path) != before
+    (kept,) = tmp_path.iterdir()
+    monkeypatch.setattr(Runs, "run", lambda *_: pytest.fail("computed again"))
+    assert all(np.array_equal(first[name], again) for name, again in computed(runs, tmp_path).items())
+    monkeypatch.undo()
+    for damaged in (b"", kept.read_bytes()[:-40], b"garbage"):
+        kept.write_bytes(damaged)
+        assert np.array_equal(computed(runs, tmp_path)["peaks"], first["peaks"]), "a damaged file is computed again"
+    for other in others:
+        computed(other, tmp_path)
+    assert len(list(tmp_path.iterdir())) == 3
+    monkeypatch.setattr("thesis.cache.SOURCES", "edited")
+    computed(runs, tmp_path)
+    assert len(list(tmp_path.iterdir())) == 4
 
 
 def test_the_force_point_follows_the_recorded_forces():

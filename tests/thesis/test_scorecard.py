@@ -9,7 +9,6 @@ import pytest
 from chaosgym.diagnosis import diagnose, two_step_test
 from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK
 from chaosgym.simulation import simulate
-from thesis.scorecard import jobs
 from thesis.scorecard.beam_runs import force_point_motion, long_run
 from thesis.scorecard.crank_runs import median_angles
 from thesis.scorecard.jobs import Job, observation, run_jobs
@@ -181,7 +180,7 @@ def test_results_are_kept_and_found_again(tmp_path, monkeypatch):
     assert len(kept) == 1
     kept[0].write_text(json.dumps({**first[job], "mean": -1.0}))
     assert run_jobs([job], folder=tmp_path)[job]["mean"] == -1.0
-    monkeypatch.setattr(jobs, "SOURCES", "edited")
+    monkeypatch.setattr("thesis.cache.SOURCES", "edited")
     assert run_jobs([job], folder=tmp_path)[job]["mean"] == first[job]["mean"]
     assert len(list(tmp_path.glob("*.json"))) == 2
     kept[0].write_text("{")

@@ -14,7 +14,7 @@ from chaosgym.cli.output import emit
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def scorecard(machine: tuple[str, ...], workers: int | None, markdown: bool, as_json: bool) -> None:
     """Compare every simulated statement of the thesis with the machines here; misses are shown."""
-    from thesis.scorecard.jobs import default_folder
+    from thesis.cache import default_folder
     from thesis.scorecard.page import page
     from thesis.scorecard.scorecard import scorecard as judge
 

@@ -10,7 +10,8 @@ from tqdm import tqdm
 
 from chaosgym.errors import ChaosgymError, SimulationError
 from chaosgym.files import write_atomically
-from thesis.figures.cache import computed
+from thesis.cache import kept_arrays
+from thesis.figures.computations import Computation, Data
 from thesis.figures.figure import Finding, ThesisFigure
 from thesis.figures.printed import contradiction
 
@@ -132,3 +133,8 @@ def _draw(figure: ThesisFigure, path: Path, resolution: float, kept: Path, worke
         path, lambda temporary: picture.savefig(temporary, format="png", dpi=110, metadata={"Software": ""})
     )
     return Drawn(figure, path, tuple(figure.findings(parts)), time.perf_counter() - began)
+
+
+def computed(computation: Computation, folder: Path, workers: int | None = None) -> Data:
+    """Result of a computation, kept in a folder under its description."""
+    return kept_arrays(repr(computation), folder, lambda: computation.run(workers))

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from chaosgym.machines import MACHINES, Machine
+from thesis.cache import default_folder
 from thesis.figures.computations import Computation, Data
 from thesis.figures.figure import Finding, Parts
 from thesis.figures.printed import comparison
-from thesis.scorecard.jobs import default_folder
 from thesis.scorecard.observation import THOROUGH
 from thesis.scorecard.scorecard import evaluate
 from thesis.statements import Comparison

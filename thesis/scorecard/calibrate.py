@@ -20,8 +20,8 @@ from chaosgym.files import write_atomically
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.version import __version__
+from thesis.cache import default_folder
 from thesis.scorecard.determination import Determination, determine
-from thesis.scorecard.jobs import default_folder
 from thesis.scorecard.objective import calibration_statements, objective, staged_objective
 from thesis.scorecard.observation import THOROUGH
 from thesis.scorecard.scorecard import Scorecard, evaluate, scorecard

@@ -1,33 +1,15 @@
-"""Which runs does a comparison need, and which are known already? Jobs with plain results, kept on disk.
+"""Runs that comparisons need: jobs with plain results, which the cache finds again by machine, kind and settings."""
 
-A result is found again by machine, kind of run, settings, and a digest of the sources that decide it; an edit of a
-kernel, a machine or a test of chaos makes all of them anew.
-"""
-
-import hashlib
 import json
-import os
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import chaosgym
-from chaosgym.files import write_atomically
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.simulation import parallel_map
+from thesis.cache import kept_values
 from thesis.scorecard.observation import Effort, Observation, observe
-
-DECISIVE_SOURCES = (
-    "core",
-    "machines",
-    "diagnosis",
-    "simulation.py",
-    "atlas/observation.py",
-    "atlas/beam_runs.py",
-    "atlas/crank_runs.py",
-)
-"""Sources of the package that decide the result of a job."""
 
 Run = Callable[..., Mapping[str, Any]]
 
@@ -71,45 +53,15 @@ def run_jobs(
     return dict(zip(wanted, results, strict=True))
 
 
-def default_folder() -> Path:
-    """Where results are kept unless another folder is named: the user's cache."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "chaosgym" / "atlas"
-
-
 def _result(job: Job, folder: Path | None) -> Mapping[str, Any]:
-    if folder is None:
-        return job.run(job.machine, *job.settings)
-    path = folder / f"{_key(job)}.json"
-    try:
-        known: Mapping[str, Any] = json.loads(path.read_text())
-    except (OSError, ValueError):
-        known = job.run(job.machine, *job.settings)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, lambda temporary: temporary.write_text(json.dumps(known, allow_nan=False)))
-    return known
+    return kept_values(_described(job), folder, lambda: job.run(job.machine, *job.settings))
 
 
-def _key(job: Job) -> str:
+def _described(job: Job) -> str:
     described = {
         "run": job.run.__name__,
         "machine": job.machine.name,
         "parameters": {name: getattr(job.machine, name) for name in parameters_of(job.machine)},
         "settings": job.settings,
-        "sources": SOURCES,
     }
-    return hashlib.sha256(json.dumps(described, sort_keys=True).encode()).hexdigest()[:32]
-
-
-def digest(names: Iterable[str]) -> str:
-    """Hash of the text of some sources of the package, files or folders, at the time of the call."""
-    root = Path(chaosgym.__file__).parent
-    found = hashlib.sha256()
-    for name in names:
-        path = root / name
-        for source in sorted(path.glob("*.py")) if path.is_dir() else [path]:
-            found.update(source.read_bytes())
-    return found.hexdigest()
-
-
-SOURCES = digest(DECISIVE_SOURCES)
-"""Digest of the sources at the time of import: those that run."""
+    return json.dumps(described, sort_keys=True)
