@@ -1,4 +1,4 @@
-"""How far do the tests agree, and at what cost? All of them on the same random machines against a long reference.
+"""Agreement of all tests on the same random machines with a long reference, and what each costs.
 
 The reference of a machine is what it does in the end: of the last 4000 of 10,000 cycles from rest, the last 400 repeat
 within 1e-6 (periodic), or else the largest exponent exceeds three standard errors (chaotic), or lies within them

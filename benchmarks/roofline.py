@@ -1,4 +1,4 @@
-"""How far is the beam's kernel from the arithmetic limit of a core? ``python -m benchmarks.roofline``
+"""The roofline of the beam's kernel: how far it is from the arithmetic limit of a core.
 
 The kernel runs once more uncompiled, with its parts counted. Each part is a known number of additions and
 multiplications for n modes; exp, sine, cosine, division and square root count for themselves. The same parts are timed,

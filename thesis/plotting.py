@@ -1,4 +1,4 @@
-"""What do the figures of the thesis look like? One function a kind of figure, on plain arrays.
+"""Drawings of the thesis' figures: one function a kind of figure, on plain arrays.
 
 Every function draws on an ``Axes`` and returns it. Printed values are marked in one colour throughout.
 """

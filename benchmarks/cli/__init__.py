@@ -46,7 +46,8 @@ def check(folder: str, points: int, seed: int | None, as_json: bool) -> None:
         found.as_dict(),
         as_json,
         lambda: [
-            f"{folder}: {found.identical} of {points} rows identical, {found.same_nature} of the same nature ({platform})"
+            f"{folder}: {found.identical} of {points} rows identical, {found.same_nature} of the same nature "
+            f"({platform})"
         ],
     )
     if not found.sound:
@@ -68,8 +69,8 @@ def cost(folder: str, points: int, seed: int, as_json: bool) -> None:
         found,
         as_json,
         lambda: [
-            f"{found['machine']}: {1e3 * found['seconds']:.1f} +- {1e3 * found['standard_error']:.1f} ms of processor time "
-            f"a point, {found['points_per_second']:.1f} points a second and core ({points} rows)",
+            f"{found['machine']}: {1e3 * found['seconds']:.1f} +- {1e3 * found['standard_error']:.1f} ms of processor "
+            f"time a point, {found['points_per_second']:.1f} points a second and core ({points} rows)",
             *(
                 f"  {name:22s}" + ", ".join(f"{part}: {1e3 * mean:.1f} ms" for part, mean in parts.items())
                 for name, parts in found["by"].items()

@@ -1,4 +1,4 @@
-"""How fast is this computer? ``bench``."""
+"""The command ``bench``: how fast this computer is."""
 
 from dataclasses import asdict
 from typing import Any

@@ -1,4 +1,4 @@
-"""How fast is it here? Numbers that a reader can rerun with ``chaosgym bench``."""
+"""Rates of this computer: numbers that a reader can rerun with ``python -m benchmarks bench``."""
 
 from benchmarks.performance.rates import benchmark
 from benchmarks.performance.scaling import vector_scaling

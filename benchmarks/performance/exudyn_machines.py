@@ -1,4 +1,4 @@
-"""How does Exudyn simulate the same machines? The best general simulator for them, driven as its manual advises.
+"""The same machines in Exudyn, the best general simulator for them, driven as its manual advises.
 
 The impact beam is a body with mass, stiffness and damping matrices (``ObjectGenericODE2``): those of our modes, turned
 into coordinates of which the first is the tip and the second the point of the force. So both simulators integrate

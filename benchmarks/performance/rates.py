@@ -1,4 +1,4 @@
-"""How many cycles, environment steps, sweep points and classifier rows per second?
+"""Cycles, environment steps, sweep points and classifier rows per second.
 
 Rates per second of the wall clock, and per second of processor time, which suffer less where a computer is busy with
 something else. Environments take random actions. CartPole, and HalfCheetah where mujoco is installed, stand beside

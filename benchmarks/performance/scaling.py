@@ -1,4 +1,4 @@
-"""How well do many machines share the processors, and what does an environment cost beside its physics?
+"""Scaling over processors, and what an environment costs beside its physics.
 
 A vector environment takes the same random actions from the same seeds on one thread and on all, so that both compute
 the same bytes. Wall time tells how well the threads share the work, which only an idle computer shows; processor time

@@ -1,4 +1,4 @@
-"""What does each scene of the slider crank require, and what does it cost?
+"""Scenes of the slider crank: what each requires and costs.
 
 Processor time of the thread counts, which other load on the computer hardly changes.
 """

@@ -1,4 +1,4 @@
-"""How long does it take to make a slider crank ready to run?"""
+"""Time to make a slider crank ready to run."""
 
 import statistics
 import time

@@ -1,4 +1,4 @@
-"""How long does it take? Medians of repeated runs."""
+"""Medians of repeated runs."""
 
 import statistics
 import time

@@ -1,4 +1,4 @@
-"""Does a dataset still say what this installation computes? Some of its rows, labelled again and compared.
+"""Rows of a dataset labelled again: does it still say what this installation computes?
 
 The same packages on the same kind of processor give the same bits. Elsewhere the last bit of a sine differs, which a
 chaotic response amplifies, and a few rows near a boundary change their nature.

@@ -1,4 +1,4 @@
-"""What does a point cost, and what would a billion? Processor time of rows labelled again, against every axis.
+"""Processor time of rows labelled again, against every axis, and what larger sweeps would take.
 
 Rows are independent, so the time of a sweep is the mean cost times the points, over the processors. Joining the chunks
 reads and writes them once more, a few seconds for each million rows.

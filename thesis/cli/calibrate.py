@@ -1,4 +1,4 @@
-"""Which unprinted parameters bring a machine closest to the thesis? ``calibrate``."""
+"""The command ``calibrate``: which unprinted parameters bring a machine closest to the thesis."""
 
 from pathlib import Path
 from typing import Any

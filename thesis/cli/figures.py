@@ -1,4 +1,4 @@
-"""What does the thesis show, and what is found here? ``figures``."""
+"""The command ``figures``: what the thesis shows, and what is found here."""
 
 import click
 

@@ -1,4 +1,4 @@
-"""How many printed results of the thesis are hit? ``scorecard``."""
+"""The command ``scorecard``: how many printed results of the thesis are hit."""
 
 from typing import Any
 

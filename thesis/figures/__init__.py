@@ -1,4 +1,4 @@
-"""What does the thesis show, and what do the machines here show in its place? Its simulated figures, drawn again."""
+"""The simulated figures of the thesis, drawn again on the machines here."""
 
 from thesis.figures.figure import Finding, ThesisFigure
 from thesis.figures.produce import Drawn, draw_figures

@@ -1,4 +1,4 @@
-"""Which beams do the figures of chapters 3 and 5 show? Clearances, lengths, and runs over one field."""
+"""Beams of the figures of chapters 3 and 5: clearances, lengths, and runs over one field."""
 
 from collections.abc import Sequence
 from dataclasses import replace

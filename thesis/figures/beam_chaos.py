@@ -1,4 +1,4 @@
-"""How long is the beam's chaos, how does it announce itself and how are its forces spread? Figures 5.4, 5.6 and 5.7."""
+"""The beam's chaos: its length, its announcement and the spread of its forces. Figures 5.4, 5.6 and 5.7."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

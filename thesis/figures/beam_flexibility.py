@@ -1,4 +1,4 @@
-"""Do the crests of the peak force follow the beam's first bending frequency? Figures 3.10 and 3.11."""
+"""Crests of the peak force and the beam's first bending frequency. Figures 3.10 and 3.11."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

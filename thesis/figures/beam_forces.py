@@ -1,4 +1,4 @@
-"""How does the beam's peak force depend on frequency, length and damping? Figures 3.8, 3.12 and 3.13."""
+"""The beam's peak force against frequency, length and damping. Figures 3.8, 3.12 and 3.13."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

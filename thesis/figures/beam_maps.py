@@ -1,4 +1,4 @@
-"""Where is the beam's response chaotic? Figures 3.9 and 3.18."""
+"""Maps of the beam's chaos. Figures 3.9 and 3.18."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""How does the beam move at one operating point? Figures 3.6, 3.7, 3.17 and 5.6."""
+"""The beam's motion at one operating point. Figures 3.6, 3.7, 3.17 and 5.6."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

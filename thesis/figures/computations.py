@@ -1,4 +1,4 @@
-"""What has to be computed for a figure? Frozen descriptions that run, and give plain arrays.
+"""Computations behind the figures: frozen descriptions that run, and give plain arrays.
 
 A description holds everything that its result depends on, so that the result can be kept under it.
 """

@@ -1,4 +1,4 @@
-"""Which slider cranks do the figures of chapters 4 and 5 show? Joints, clearances, and runs over one field."""
+"""Slider cranks of the figures of chapters 4 and 5: joints, clearances, and runs over one field."""
 
 from collections.abc import Sequence
 from dataclasses import replace

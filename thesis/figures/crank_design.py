@@ -1,4 +1,4 @@
-"""Which statistics of the crank's forces may a designer use? Figures 5.8 to 5.14."""
+"""Statistics of the crank's forces for a designer. Figures 5.8 to 5.14."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial

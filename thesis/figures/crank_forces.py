@@ -1,4 +1,4 @@
-"""How does the slider's peak force depend on the machine? Figures 4.13, 4.14, 4.16 and 4.17."""
+"""The slider's peak force against the machine's parameters. Figures 4.13, 4.14, 4.16 and 4.17."""
 
 from collections.abc import Mapping, Sequence
 

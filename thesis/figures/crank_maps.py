@@ -1,4 +1,4 @@
-"""Where does the slider crank rattle, and where chaotically? Figures 4.8, 4.9 and 4.15."""
+"""Maps of the slider crank's rattling and chaos. Figures 4.8, 4.9 and 4.15."""
 
 from collections.abc import Mapping, Sequence
 

@@ -1,4 +1,4 @@
-"""Does the rod resonate with high orders of the crank speed? Figure 4.18."""
+"""Resonances of the rod with high orders of the crank speed. Figure 4.18."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

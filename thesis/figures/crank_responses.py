@@ -1,4 +1,4 @@
-"""How does the slider crank's contact force run over a revolution? Figures 4.7, 4.10 to 4.12 and 4.25."""
+"""The slider crank's contact force over a revolution. Figures 4.7, 4.10 to 4.12 and 4.25."""
 
 from collections.abc import Mapping, Sequence
 

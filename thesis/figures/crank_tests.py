@@ -1,4 +1,4 @@
-"""Do two intervals between matrix updates lead to the same forces? Figures 5.1 to 5.3."""
+"""Two intervals between matrix updates, and the forces that they lead to. Figures 5.1 to 5.3."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

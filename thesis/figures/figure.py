@@ -1,4 +1,4 @@
-"""What is a figure of the thesis, and what does its comparison with the print say?"""
+"""A figure of the thesis, and what its comparison with the print says."""
 
 import textwrap
 from collections.abc import Callable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""When does a value here agree with a printed one?"""
+"""The rule by which a value here agrees with a printed one."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Where along an axis does the nature of a response change?"""
+"""Places along an axis where the nature of a response changes."""
 
 from itertools import pairwise
 

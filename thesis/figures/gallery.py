@@ -1,4 +1,4 @@
-"""What do the figures say, all together? A page with what agrees with the print and what does not."""
+"""The gallery: a page with what agrees with the print and what does not."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Which kinds of panels are there? Each function takes names of parts and gives a panel that several figures share."""
+"""Panels that several figures share: each function takes names of parts and gives a panel."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

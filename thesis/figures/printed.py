@@ -1,4 +1,4 @@
-"""Which values does the text print, and which statements does it contradict itself? By the name of the statement."""
+"""Values that the text prints, and statements that it contradicts itself, by the name of the statement."""
 
 from functools import cache
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""How are figures made? Computed or read back, drawn, compared with the print, and written whole or not at all."""
+"""Production of figures: computed or read back, drawn, compared with the print, and written whole or not at all."""
 
 import time
 from collections.abc import Sequence

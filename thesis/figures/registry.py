@@ -1,4 +1,4 @@
-"""Which figures are there? By their number in the thesis, in its order."""
+"""All figures, by their number in the thesis, in its order."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType

@@ -1,4 +1,4 @@
-"""What does the scorecard say of a statement? A figure about a statement shows that verdict, from the same runs."""
+"""The scorecard's verdict on a statement, for a figure about it, from the same runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

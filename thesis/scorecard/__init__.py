@@ -1,1 +1,1 @@
-"""How close are the machines here to the published ones? Calibration, scorecard and figures of the thesis."""
+"""The scorecard and the calibration: how close the machines here are to the published ones."""

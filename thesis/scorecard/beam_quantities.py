@@ -1,4 +1,4 @@
-"""Which quantities are the Impact Beam System's own? Its scales, the motion of the force point, long transients."""
+"""Quantities of the Impact Beam System alone: its scales, the motion of the force point, long transients."""
 
 from collections.abc import Callable
 

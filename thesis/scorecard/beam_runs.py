@@ -1,4 +1,4 @@
-"""Which runs do statements about the beam need, beyond the peak forces of a settled response?"""
+"""Runs for statements about the beam, beyond the peak forces of a settled response."""
 
 import math
 from typing import Any

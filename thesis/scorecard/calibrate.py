@@ -1,4 +1,4 @@
-"""Which values of the parameters that are not in print bring a machine closest to the thesis?
+"""The calibration: values of the parameters that are not in print which bring a machine closest to the thesis.
 
 A tree-structured Parzen estimator (Optuna) proposes candidates; those that the single runs rule out are given up before
 the curves. The journal in the folder is written after every trial, and every trial draws from its own seed, so that a

@@ -1,4 +1,4 @@
-"""Which quantities are the Spatial Slider Crank's own? Crank angles, impacts, frequencies, matrix updates."""
+"""Quantities of the Spatial Slider Crank alone: crank angles, impacts, frequencies, matrix updates."""
 
 from collections.abc import Callable
 

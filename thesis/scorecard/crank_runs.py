@@ -1,4 +1,4 @@
-"""Which runs do statements about the crank need, beyond the peak forces of a settled response?"""
+"""Runs for statements about the crank, beyond the peak forces of a settled response."""
 
 from dataclasses import replace
 from typing import Any

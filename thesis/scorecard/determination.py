@@ -1,4 +1,4 @@
-"""How well does a calibration determine each parameter? The spread of near-best candidates, and the cost of a step."""
+"""How well a calibration determines each parameter: the spread of near-best candidates, and the cost of a step."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass

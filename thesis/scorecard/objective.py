@@ -1,4 +1,4 @@
-r"""How far is a candidate from the thesis? One number over the statements that a calibration may see.
+r"""The distance of a candidate from the thesis: one number over the statements that a calibration may see.
 
 A statement that is e tolerances off costs e / (1 + e): half at the edge of a hit, less than one however wild the miss,
 so that no single statement rules the search. A wrong nature adds to it: 1 - (1 - e/(1+e)) (1 - d), with d how far the

@@ -1,4 +1,4 @@
-"""What does a run look like to a reader of the thesis' figures? Its nature and the peak forces of 100 cycles.
+"""What a reader of the thesis' figures sees of a run: its nature and the peak forces of 100 cycles.
 
 The thesis judges a response by the dots of its figures, one a cycle (``plotted_peaks``): one dot is periodic, a few are
 a subharmonic, a distribution is chaos (3.5.1). Two dots closer than the width of a dot are one; ``READING_ERROR`` is

@@ -1,4 +1,4 @@
-"""What does the scorecard look like in the documentation? One table a machine, misses shown like hits."""
+"""The page of the scorecard: one table a machine, misses shown like hits."""
 
 from thesis.scorecard.scorecard import Scorecard
 from thesis.scorecard.verdicts import Judged

@@ -1,4 +1,4 @@
-"""How is each quantity of the thesis computed? One entry for each kind; ``reference`` has the statements."""
+"""Quantities of the thesis: one entry for each kind, and how it is computed."""
 
 from collections.abc import Mapping
 

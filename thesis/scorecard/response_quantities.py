@@ -1,4 +1,4 @@
-"""Which quantities follow from the peak forces of responses? Single runs, curves over one axis, maps over two.
+"""Quantities from the peak forces of responses: single runs, curves over one axis, maps over two.
 
 A nature agrees if it is the printed word. The thesis knows quasiperiodic responses and saw none (5.5), so its "chaotic"
 is not "quasiperiodic"; a response that is undetermined or failed agrees with nothing and decides no boundary.

@@ -1,4 +1,4 @@
-"""How many printed results does a machine hit? Every simulated statement of the thesis, judged.
+"""The scorecard: every simulated statement of the thesis, judged.
 
 Near, missed and not computed statements count as not hit. Statements that the text itself contradicts are shown and
 left out of the ratio.

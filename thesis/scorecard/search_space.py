@@ -1,4 +1,4 @@
-"""Which parameters of a machine are not in print, and within which ranges may a calibration move them?
+"""The search space: parameters that are not in print, and the ranges within which a calibration moves them.
 
 Printed and derived numbers stay: where one follows from the others (the static deflection of the beam, the first
 frequency of the crank), it is solved for anew for every candidate.

@@ -1,4 +1,4 @@
-"""Is a printed value hit? Hit, near or miss, by the tolerance of its kind; the worst condition decides."""
+"""Hit, near or miss, by the tolerance of a value's kind; the worst condition decides."""
 
 import math
 from collections.abc import Sequence

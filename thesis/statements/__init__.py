@@ -1,4 +1,4 @@
-"""What does the thesis state in numbers, and how is each statement compared?
+"""What the thesis states in numbers, and how each statement is compared.
 
 ``targets.csv`` lists every quantitative statement of the source, with its conditions and with what its own text
 contradicts. ``comparisons.toml`` says of each how it is computed here, or why it is not.

@@ -1,4 +1,4 @@
-"""How is each simulated quantity of the thesis compared? The table ``comparisons.toml``, read and checked.
+"""Comparisons of the simulated quantities: the table ``comparisons.toml``, read and checked.
 
 Every statement about a simulation is either compared or left out with a reason; none is forgotten.
 """

@@ -1,4 +1,4 @@
-"""Which numbers does the thesis print? The table ``targets.csv``, read and checked."""
+"""Printed numbers: the table ``targets.csv``, read and checked."""
 
 import csv
 import io

@@ -1,4 +1,4 @@
-"""What is in a dataset, and how far may it be trusted? The commands ``chaosgym dataset ...``."""
+"""The commands ``chaosgym dataset ...``: what is in a dataset, and how far it may be trusted."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Which versions and folders are in use? ``info``."""
+"""The command ``info``: versions and folders in use."""
 
 import click
 

@@ -1,4 +1,4 @@
-"""How does a command answer? A table for people, or one JSON object."""
+"""The answer of a command: a table for people, or one JSON object."""
 
 import json
 from collections.abc import Callable, Mapping

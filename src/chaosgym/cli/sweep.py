@@ -1,4 +1,4 @@
-"""Which response do many machines have? ``sweep``."""
+"""The command ``sweep``: the responses of many machines."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What may a designer rely on? From the type of a response to life, reliability and the next change (thesis 5.4, 5.6).
+"""What a designer may rely on: from the type of a response to life, reliability and the next change (thesis 5.4, 5.6).
 
 from chaosgym.design import Criteria, assess, improve
 assessment = assess(ImpactBeam(), criteria=Criteria(load_rating=500.0, life=500.0))

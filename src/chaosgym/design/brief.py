@@ -1,4 +1,4 @@
-"""What has an engineer asked for? The design brief: machine, tolerances, criteria and changes in one TOML file."""
+"""The design brief: machine, tolerances, criteria and changes in one TOML file."""
 
 import tomllib
 from collections.abc import Iterable, Mapping

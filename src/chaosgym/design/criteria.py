@@ -1,4 +1,4 @@
-"""What does the designer ask for? A bearing, its strength, and the life and reliability that it must reach."""
+"""The criteria: a bearing, its strength, and the life and reliability that it must reach."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

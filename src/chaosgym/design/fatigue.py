@@ -1,4 +1,4 @@
-r"""How long does a bearing surface last under forces that vary from cycle to cycle? (thesis 5.4.2)
+r"""Fatigue life of a bearing surface under forces that vary from cycle to cycle (thesis 5.4.2).
 
     L = (C / F)^p                          (5.2)  life in millions of cycles, constant force
     C = F L^(1/p)                          (5.3)  load rating for a life

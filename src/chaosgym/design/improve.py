@@ -1,4 +1,4 @@
-r"""What should be changed next, and what is the cheapest change that suffices? Phase VII of thesis 5.6, closed.
+r"""The next change, and the cheapest one that suffices: phase VII of thesis 5.6, closed.
 
 Candidates follow the thesis: less clearance, more damping, another speed, a stiffer member. Each is built and assessed
 anew, so that its effect is simulated and not extrapolated: responses of Type II and III have no derivative to trust.

@@ -1,4 +1,4 @@
-r"""Where on the bearing do the peak impacts act? The Peak Impact Diagram (thesis 5.4.1 and 5.4.3).
+r"""The Peak Impact Diagram: where on the bearing the peak impacts act (thesis 5.4.1 and 5.4.3).
 
 Each cycle gives one point: the place of its peak force on the bearing surface and the force. In a slider joint that is
 the place of the slider on its guide, in a ball joint the polar angle on the housing. A periodic response gives a point

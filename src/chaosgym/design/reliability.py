@@ -1,4 +1,4 @@
-r"""How likely does the surface endure the stress of an impact? (thesis 5.4.2)
+r"""Reliability of a surface under the stress of impacts (thesis 5.4.2).
 
     S_e >= SF K_f s                                        (5.6)  single values
     R = P(S_e > s)                                         (5.7)

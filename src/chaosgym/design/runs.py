@@ -1,4 +1,4 @@
-"""Which peak forces does a machine give once it has settled? One machine, or a series built to its tolerances."""
+"""Settled runs of one machine, or of a series built to its tolerances."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

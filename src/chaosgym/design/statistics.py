@@ -1,4 +1,4 @@
-r"""What may be said of a force that never repeats? Its statistics, and how many cycles they take (thesis 5.4.1, 5.4.3).
+r"""Statistics of a force that never repeats, and how many cycles they take (thesis 5.4.1, 5.4.3).
 
 Running mean and deviation over the first n cycles
 

@@ -1,4 +1,4 @@
-r"""What do speed and clearance cost? Life against either, over a whole range (thesis figure 5.12 and 5.4.1).
+r"""Life against speed or clearance, over a whole range (thesis figure 5.12 and 5.4.1).
 
 Life is relative to the first value of the range, by the cubic law: the statistical mean life (eq. 5.4), and what the
 largest and the smallest peak alone would suggest. Where the response is chaotic the two are far apart.

@@ -1,4 +1,4 @@
-"""What kind of response has this machine? Runs it in stages, each twice as long, until the verdict is sure.
+"""The diagnosis of a machine: it runs in stages, each twice as long, until the verdict is sure.
 
 After 100, 200, 400 ... cycles from the initial condition:
 

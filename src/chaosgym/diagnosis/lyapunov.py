@@ -1,4 +1,4 @@
-r"""Do neighbouring motions part or meet? Lyapunov exponents, per cycle and per second.
+r"""Lyapunov exponents, per cycle and per second: do neighbouring motions part or meet?
 
     value = lim  1/N  log |w(N)| / |w(0)|         w: a small deviation of the state, N cycles
 

@@ -1,4 +1,4 @@
-r"""Is a periodic response proven? Newton's method on the map of k cycles, and its Floquet multipliers.
+r"""Proof of a periodic response: Newton's method on the map of k cycles, and its Floquet multipliers.
 
     y <- y - (M - I)^-1 (P(y) - y)         P: the motion over k cycles, M = dP/dy
 

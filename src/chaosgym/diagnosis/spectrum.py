@@ -1,4 +1,4 @@
-r"""Few lines or a broad band? The spectrum of a response, sampled once a cycle.
+r"""The spectrum of a response, sampled once a cycle: few lines or a broad band?
 
 A quasiperiodic response has a few well pronounced lines, a chaotic one a broad band (thesis 2.3.1, 5.2.1). With a
 window whose side lobes lie 92 dB below its main lobe (Blackman-Harris), lines leave nothing between them, so the

@@ -1,4 +1,4 @@
-r"""Periodic, quasiperiodic or chaotic? The Two-Step Test (thesis 5.2.1) on one sample of the motion a cycle.
+r"""The Two-Step Test (thesis 5.2.1) on one sample of the motion a cycle: periodic, quasiperiodic or chaotic?
 
 Step I   Does the time history repeat? Then it is periodic, with the period of the recurrence. A history that
          approaches a repetition steadily is periodic too.

@@ -1,4 +1,4 @@
-r"""Which type follows from what a response and its neighbourhood do? The rule of thesis 5.5.
+r"""The rule of thesis 5.5: which type follows from what a response and its neighbourhood do.
 
     III           the centre is not periodic; or points that are not periodic lie on both sides along one parameter;
                   or attractors that coexist at the centre have largest peaks more than 10 % apart

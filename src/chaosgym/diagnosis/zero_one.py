@@ -1,4 +1,4 @@
-r"""Regular or chaotic, from a series alone? The 0-1 test on one sample a cycle.
+r"""The 0-1 test on one sample a cycle: regular or chaotic, from a series alone.
 
 The series drives p(n + 1) = p(n) + x(n) cos(c n), q(n + 1) = q(n) + x(n) sin(c n). Regular motion keeps (p, q)
 bounded, chaos makes it wander like a random walk: K, the correlation of its mean square displacement with time, is

@@ -1,4 +1,4 @@
-"""What does a sweep look like over speed and clearance? The maps of thesis figures 3.9 and 4.15."""
+"""Maps of a sweep over speed and clearance, as thesis figures 3.9 and 4.15."""
 
 from typing import Any
 

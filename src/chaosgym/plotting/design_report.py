@@ -96,7 +96,6 @@ def _rendered(template: str, command: str, **names: object) -> str:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("chaosgym.plotting"),
         autoescape=True,
-        trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )

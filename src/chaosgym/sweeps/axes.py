@@ -1,4 +1,4 @@
-"""Along what does a sweep vary a machine? Axes over a range, and patches of a lattice with a fixed step."""
+"""Axes of a sweep: ranges of parameters, and patches of a lattice with a fixed step."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What should a user of a dataset know? Its card: how it was made, what it holds, how far to trust it, its licence."""
+"""The card of a dataset: how it was made, what it holds, how far to trust it, its licence."""
 
 import json
 import shlex

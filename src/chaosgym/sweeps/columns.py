@@ -1,4 +1,4 @@
-"""What do the columns of a sweep mean? Names, types, units and definitions, which travel in the Parquet schema."""
+"""Columns of a sweep: names, types, units and definitions, which travel in the Parquet schema."""
 
 import json
 from collections.abc import Mapping

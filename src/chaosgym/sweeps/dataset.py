@@ -1,4 +1,4 @@
-"""How is a labelled sweep kept and read? One Parquet file whose schema says units, definitions and provenance.
+"""A labelled sweep as one Parquet file whose schema says units, definitions and provenance.
 
 Any Parquet reader opens it; the columns are the swept fields in SI units, then the labels, their evidence and the
 signals. Every page has a checksum, so that damage is found and named. Row groups are the chunks of the run.

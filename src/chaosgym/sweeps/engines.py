@@ -1,4 +1,4 @@
-"""Where are the chunks of a sweep computed? On threads of this process, or on the workers of a Dask cluster.
+"""Places where chunks of a sweep are computed: threads of this process, or the workers of a Dask cluster.
 
 Both yield finished chunks in any order and hand out only a few ahead, so that a sweep of any size takes little memory.
 Threads suffice on one machine: the kernels release the interpreter's lock. Dask gives the chunks of a lost worker to

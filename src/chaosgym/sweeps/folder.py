@@ -1,4 +1,4 @@
-"""What does a sweep keep in its folder while it runs? Its plan, and every finished chunk in a file of its own.
+"""The folder of a running sweep: its plan, and every finished chunk in a file of its own.
 
 A file appears under its name only when it is whole. At the end the chunks become the row groups of one file. Damaged
 chunks are named; they are computed again only if that is asked for.

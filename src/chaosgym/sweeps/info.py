@@ -1,4 +1,4 @@
-"""What is in a sweep's folder? Rows, classes, settings, label definitions, provenance and faults, without computing."""
+"""Contents of a sweep's folder: rows, classes, settings, label definitions, provenance and faults."""
 
 import json
 from collections import Counter

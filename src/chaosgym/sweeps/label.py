@@ -1,4 +1,4 @@
-"""What is said of one point? One run from rest, judged in stages; its evidence and its signals come from that run."""
+"""The label of one point: one run from rest, judged in stages; evidence and signals come from that run."""
 
 from typing import Any
 

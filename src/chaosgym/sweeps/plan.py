@@ -1,4 +1,4 @@
-"""Which machines does a sweep try? A base machine, axes of parameters, and a rule that places points on them.
+"""The plan of a sweep: a base machine, axes of parameters, and a rule that places points on them.
 
     grid      all combinations of the axes
     random    points uniform in the axes' scales

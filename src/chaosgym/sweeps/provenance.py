@@ -1,4 +1,4 @@
-"""What computed these rows? Version, sources, packages and processor: the same ones give the same bytes again."""
+"""Provenance of rows: version, sources, packages and processor. The same ones give the same bytes again."""
 
 import platform
 import subprocess

@@ -1,4 +1,4 @@
-"""How is a sweep computed? In chunks, in parallel, each chunk kept at once, so that a stopped run goes on."""
+"""The run of a sweep: in chunks, in parallel, each kept at once, so that a stopped run goes on."""
 
 import json
 from collections.abc import Iterable

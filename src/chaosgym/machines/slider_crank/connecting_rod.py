@@ -1,4 +1,4 @@
-r"""How does a flexible connecting rod with a housing and a yoke at its ends move in its own frame?
+r"""The flexible connecting rod, with a housing and a yoke at its ends, in its own frame.
 
 The frame sits at the nominal ball centre A, x along the nominal rod towards the slider pivot B, and turns at the rate
 Omega. A point at s moves by u(s, t) along the rod and w(s, t) across it, small against the nominal motion:

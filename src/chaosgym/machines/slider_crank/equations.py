@@ -1,4 +1,4 @@
-r"""Which equations govern small motions of the planar slider crank about its nominal motion?
+r"""Equations of small motions of the planar slider crank about its nominal motion.
 
 Rod coordinates (ends and modes, ``connecting_rod``) and the slider's (x_S, y_S, pitch) follow from as few coordinates
 p as the scene requires, q = R(phi) p. Ball clearance opens the rod's end A in the frame of the rod, slider clearance

@@ -1,4 +1,4 @@
-"""Which surfaces can touch in the joints of a slider crank, and how hard do they push?
+"""Joints of a slider crank: which surfaces can touch, and how hard they push.
 
 Every joint is a small class that lists its contacts: which motion closes each, which share of the joint's stiffness it
 has, and which force it exerts on the body whose joint force is recorded (slider or housing). A contact along a single

@@ -1,4 +1,4 @@
-r"""Where do the links of a slider crank stand when every joint is tight?
+r"""Positions of the links of a slider crank with every joint tight.
 
 Vector loop of the mechanism. X runs along the guide from the crank to the slider, Y upward, Z = X x Y is the motor axis
 at zero motor angle; the crank angle is zero at the outer dead point. With crank pin P and slider pivot S = (s, 0, 0)

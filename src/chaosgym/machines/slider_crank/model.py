@@ -1,4 +1,4 @@
-r"""How do the equations of a slider crank become the model that the kernels integrate?
+r"""From the equations of a slider crank to the model that the kernels integrate.
 
 Matrices are held at the middle of each bin of crank angle, loads follow as cubics in the time of a bin, and every set
 of closed contacts adds its stiffness and damping. Mass matrices, loads and contacts of all bins depend neither on the

@@ -1,4 +1,4 @@
-r"""What is the Spatial Slider Crank? A flywheel, a connecting rod and a slider whose joints rattle in their clearance.
+r"""The Spatial Slider Crank: a flywheel, a connecting rod and a slider whose joints rattle in their clearance.
 
 A motor turns the crank at constant speed. A ball joint drives a slender steel rod; at its other end a yoke pivots on a
 slider that runs along a straight guide (thesis 4.2). Clearance in the slider joint lets the slider rattle across the

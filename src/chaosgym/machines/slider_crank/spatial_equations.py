@@ -1,4 +1,4 @@
-r"""Which equations govern small motions of the slider crank when the motor stands at an angle?
+r"""Equations of small motions of the slider crank when the motor stands at an angle.
 
 With particles at x_i = X_i(th) + Phi_i(th) p (``spatial_kinematics``) and th = w t,
 

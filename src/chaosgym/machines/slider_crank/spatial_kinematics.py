@@ -1,4 +1,4 @@
-r"""How do the bodies of a slider crank move in space, nominally and by small motions about that?
+r"""Motions of the bodies of a slider crank in space, nominal and small ones about that.
 
 With the crank plane turned about the vertical, the rod swings in two planes: d from the ball to the slider, n across it
 in the yoke's plane of swing (about the slider's pivot axis Z), b = d x n. The yoke carries the rod in a bearing about

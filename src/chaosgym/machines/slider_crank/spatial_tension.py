@@ -1,4 +1,4 @@
-r"""How do the forces of the nominal motion stiffen a rod that swings in two planes?
+r"""Stiffening of a rod that swings in two planes by the forces of the nominal motion.
 
 A tension P(s) along the rod pulls it straight in either plane, and bodies off the rod's ends work against their own
 acceleration as they turn. Both are the second-order parts of the motion, times the forces of the nominal motion:
