@@ -56,7 +56,9 @@ def test_kernels_of_the_classifier_are_cached_by_their_content():
     from chaosgym.classifier.kernels.trees import walk_rows
     from chaosgym.core import KERNEL_CACHE, source_digest
 
-    folder = Path(KERNEL_CACHE).with_name(source_digest(ROOT / "src/chaosgym/classifier/kernels"))
+    folder = Path(KERNEL_CACHE).with_name(
+        source_digest(*(ROOT / "src/chaosgym" / part for part in ("core", "classifier/kernels")))
+    )
     assert Path(walk_rows.stats.cache_path).is_relative_to(folder)
 
 

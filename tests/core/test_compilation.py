@@ -74,3 +74,39 @@ def test_an_edit_in_a_helper_reaches_the_kernels_of_other_files(tmp_path):
     helper = package / "core" / "contact.py"
     helper.write_text(helper.read_text().replace("return stiffness *", "return 2.0 * stiffness *"))
     assert peak() > 1.1 * before
+
+
+SIMULATE_RIGID = "from chaosgym import *; print(simulate(ImpactBeam(n_modes=1), 1).peak_force.max())"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("ending", "damage"), [("nbi", "empty"), ("nbi", "half"), ("nbc", "bit")])
+def test_damaged_machine_code_is_compiled_anew(tmp_path, ending, damage):
+    """An index or code file that is empty, cut or has one bit flipped is named in a line, and the answer is right."""
+
+    def answer():
+        out, err = _in_a_process(SIMULATE_RIGID, NUMBA_CACHE_DIR=str(tmp_path)).communicate()
+        return float(out), err.decode()
+
+    right, _ = answer()
+    assert answer() == (right, "")
+    for path in tmp_path.rglob(f"*.{ending}"):
+        content = bytearray(path.read_bytes())
+        content[len(content) // 2] ^= 1
+        path.write_bytes({"empty": b"", "half": bytes(content[: len(content) // 2]), "bit": bytes(content)}[damage])
+    again, said = answer()
+    assert again == right
+    assert "is damaged" in said
+    assert answer() == (right, "")
+
+
+@pytest.mark.slow
+def test_a_cache_that_cannot_be_written_is_replaced(tmp_path):
+    """Where the cache folder is a file, kernels are compiled into a temporary folder, which a line says."""
+    wall = tmp_path / "wall"
+    wall.write_text("")
+    process = _in_a_process(SIMULATE_RIGID, NUMBA_CACHE_DIR=str(wall / "cache"), TMPDIR=str(tmp_path))
+    out, err = process.communicate()
+    assert float(out) > 0.0
+    assert "can't be written to; NUMBA_CACHE_DIR names another" in err.decode()
+    assert [path.name for path in tmp_path.iterdir()] == ["wall"], "the temporary folder is removed"

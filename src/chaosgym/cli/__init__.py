@@ -4,8 +4,10 @@ Tables for people go to standard output, ``--json`` prints one JSON object there
 standard error. Exit codes: 0 done, 1 a computation failed, 2 wrong usage.
 """
 
+import errno
 import sys
 from importlib import import_module
+from typing import NoReturn
 
 import click
 
@@ -29,6 +31,9 @@ COMMANDS = {
     "info": "info:info",
 }
 """Module in this folder and function of every command."""
+
+BEYOND_THE_USER = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS)
+"""Errors of a disk that no other way of asking would have avoided."""
 
 
 class Commands(click.Group):
@@ -62,12 +67,21 @@ def run_command(command: click.Command) -> None:
     """Run a command line: one clear line instead of a traceback for every error that chaosgym raises on purpose."""
     try:
         command(standalone_mode=False)
-    except click.exceptions.Abort:
+    except click.exceptions.Abort as stop:
+        if isinstance(stop.__cause__, EOFError):  # click takes the end of a damaged file for that of a person's input
+            _end(f"a file ended too early: {stop.__cause__}", 1)
         click.echo("Aborted.", err=True)
         sys.exit(130)
     except click.ClickException as error:
-        click.echo(f"Error: {error.format_message()}", err=True)
-        sys.exit(error.exit_code)
-    except (ChaosgymError, OSError) as error:
-        click.echo(f"Error: {error}", err=True)
-        sys.exit(1 if isinstance(error, SimulationError | UnfinishedError) else 2)
+        _end(error.format_message(), error.exit_code)
+    except (SimulationError, UnfinishedError) as error:
+        _end(error, 1)
+    except ChaosgymError as error:
+        _end(error, 2)
+    except OSError as error:
+        _end(error, 1 if error.errno in BEYOND_THE_USER else 2)
+
+
+def _end(message: object, code: int) -> NoReturn:
+    click.echo(f"Error: {message}", err=True)
+    sys.exit(code)

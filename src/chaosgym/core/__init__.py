@@ -6,6 +6,7 @@ file of the function that is called, and would keep serving old machine code aft
 
 import hashlib
 import os
+import tempfile
 from pathlib import Path
 
 from numba import config
@@ -17,11 +18,26 @@ def source_digest(*folders: Path) -> str:
     return hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()[:16]
 
 
-_cache_root = os.environ.get("NUMBA_CACHE_DIR") or os.path.join(
+def _is_writable(folder: str) -> bool:
+    try:
+        os.makedirs(folder, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(b"x")
+    except OSError:
+        return False
+    return True
+
+
+WANTED_CACHE = os.environ.get("NUMBA_CACHE_DIR") or os.path.join(
     os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "chaosgym", "kernels"
 )
-KERNEL_CACHE = os.path.join(_cache_root, source_digest(Path(__file__).parent))
-"""Folder of the compiled kernels."""
+"""Where compiled kernels are kept if that folder can be written to."""
+
+KERNEL_CACHE = os.path.join(
+    WANTED_CACHE if _is_writable(WANTED_CACHE) else tempfile.mkdtemp(prefix="chaosgym-kernels-"),
+    source_digest(Path(__file__).parent),
+)
+"""Folder of the compiled kernels: in a new temporary folder where the wanted one is read-only or the disk is full."""
 
 _previous_cache_folder = config.CACHE_DIR
 config.CACHE_DIR = KERNEL_CACHE

@@ -2,18 +2,25 @@
 
 The first call of a kernel in a process loads its machine code from the disk, or compiles it, which takes seconds, and
 keeps it there. A lock lets one process do that while the others wait and then load; a message says what takes so long.
+
+The machine code has a checksum beside it: a damaged file is compiled anew.
 """
 
+import atexit
+import hashlib
 import logging
 import os
+import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numba
+from filelock import FileLock
 
-from chaosgym.core import KERNEL_CACHE, source_digest
+from chaosgym.core import KERNEL_CACHE, WANTED_CACHE, source_digest
 
 logger = logging.getLogger("chaosgym")
 
@@ -35,15 +42,25 @@ def prepare(kernel: Any, *arguments: Any) -> None:
     missing = kernel.py_func.__code__.co_argcount - len(types)
     defaults = (kernel.py_func.__defaults__ or ())[-missing:] if missing else ()
     signature = (*types, *(numba.types.Omitted(default) for default in defaults))
-    with _alone():
-        if not is_cached(kernel):
-            logger.warning("compiling %s: once on this computer, some ten seconds", name_of(kernel))
+    with FileLock(_lock_file()):
+        _discard_damaged(kernel)
+        cached = is_cached(kernel)
+        if not cached:
+            logger.warning("compiling %s: %s", name_of(kernel), _how_often())
         kernel.compile(signature)
+        if not cached or any(kernel.stats.cache_misses.values()):
+            _keep_checksums(kernel)
+
+
+def _how_often() -> str:
+    if Path(KERNEL_CACHE).is_relative_to(WANTED_CACHE):
+        return "once on this computer, some ten seconds"
+    return f"some ten seconds in every process, since {WANTED_CACHE} can't be written to; NUMBA_CACHE_DIR names another"
 
 
 def is_cached(kernel: Any) -> bool:
     """True if machine code of a kernel lies on the disk, for arguments of some types."""
-    return any(Path(KERNEL_CACHE).parent.glob(f"*/*/{name_of(kernel)}-*.nbi"))
+    return any(_files_of(kernel))
 
 
 def name_of(kernel: Any) -> str:
@@ -66,15 +83,58 @@ def cached_by_content(folder: Path) -> Iterator[None]:
         numba.config.CACHE_DIR = previous
 
 
-@contextmanager
-def _alone() -> Iterator[None]:
-    """Wait until no other process compiles; without file locks on this system, don't wait."""
-    try:
-        import fcntl
-    except ImportError:
-        yield
-        return
+def _lock_file() -> str:
     os.makedirs(KERNEL_CACHE, exist_ok=True)
-    with open(os.path.join(KERNEL_CACHE, "compiling.lock"), "w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
+    return os.path.join(KERNEL_CACHE, "compiling.lock")
+
+
+def _files_of(kernel: Any) -> list[Path]:
+    """Index and machine code of a kernel on the disk."""
+    return list(Path(kernel.stats.cache_path).glob(f"{name_of(kernel)}-*.nb[ci]"))
+
+
+def _all_files(kernel: Any) -> list[Path]:
+    """Those of every kernel that it may be linked with."""
+    roots = {Path(KERNEL_CACHE), Path(kernel.stats.cache_path).parent}
+    return [path for root in roots for path in root.rglob("*.nb[ci]")]
+
+
+def _checksum(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _checksum_file(path: Path) -> Path:
+    return path.with_name(path.name + ".sha256")
+
+
+def _keep_checksums(kernel: Any) -> None:
+    for path in _all_files(kernel):
+        _checksum_file(path).write_text(_checksum(path))
+
+
+def _is_sound(path: Path) -> bool:
+    try:
+        return _checksum_file(path).read_text() == _checksum(path)
+    except (OSError, ValueError):
+        return False
+
+
+def _discard_damaged(kernel: Any) -> None:
+    """Remove damaged machine code of a kernel; where it must be compiled, also of those that it may be linked with."""
+    files = _files_of(kernel)
+    if not files or not all(map(_is_sound, files)):
+        files = _all_files(kernel)
+    for path in files:
+        if not _is_sound(path):
+            if _checksum_file(path).exists():
+                logger.warning("%s is damaged and made anew", path)
+            path.unlink()
+
+
+def _remove_temporary_cache() -> None:
+    root = Path(KERNEL_CACHE).parent
+    if root.name.startswith("chaosgym-kernels-") and root.parent == Path(tempfile.gettempdir()):
+        shutil.rmtree(root, ignore_errors=True)
+
+
+atexit.register(_remove_temporary_cache)

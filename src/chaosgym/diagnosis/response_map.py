@@ -18,7 +18,7 @@ from chaosgym.diagnosis.response_type import (
     define,
 )
 from chaosgym.diagnosis.type_rule import Neighbour, judge_type
-from chaosgym.errors import SimulationError
+from chaosgym.errors import DiagnosisError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import parallel_map
@@ -114,7 +114,7 @@ def response_map(
     def judge(place: Place) -> Diagnosis | None:
         try:
             return diagnose(at_place(place), budget=budget, sensor_error=sensor_error)
-        except SimulationError:
+        except (DiagnosisError, SimulationError):
             return None
 
     found = parallel_map(judge, places, workers=workers, progress="map" if progress else None)

@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from chaosgym.errors import DatasetError, UnfinishedError
-from chaosgym.files import write_atomically
+from chaosgym.files import is_empty, write_atomically
 from chaosgym.sweeps.columns import schema
 from chaosgym.sweeps.dataset import DAMAGE, DATA_FILE, parquet_writer
 from chaosgym.sweeps.plan import SweepPlan
@@ -53,10 +53,7 @@ class SweepFolder:
                 raise DatasetError(
                     f"{self.path} holds another sweep (it differs in {', '.join(differing)}); choose another folder"
                 )
-        elif self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
-            raise DatasetError(f"{self.path} exists and is no run of this sweep; choose another folder")
         else:
-            self.path.mkdir(parents=True, exist_ok=True)
             text = json.dumps(self.settings, indent=2) + "\n"
             write_atomically(plan_file, lambda temporary: temporary.write_text(text))
 
@@ -187,6 +184,20 @@ class SweepFolder:
             raise UnfinishedError(
                 f"no space left for {path}; finished chunks are kept: free space, then run the same command again"
             ) from error
+
+
+def claimed(folder: str | Path) -> Path:
+    """Folder of a sweep: new, empty, or begun.
+
+    Raises
+    ------
+    DatasetError
+        If it holds anything else. Nothing in it is touched.
+    """
+    path = Path(folder)
+    if path.exists() and not (path.is_dir() and ((path / PLAN_FILE).is_file() or is_empty(path))):
+        raise DatasetError(f"{path} exists and is no run of this sweep; choose another folder")
+    return path
 
 
 def _as_list(value: Any) -> list[Any]:

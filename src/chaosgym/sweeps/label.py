@@ -7,7 +7,7 @@ import pyarrow as pa
 
 from chaosgym.diagnosis import bounce_fraction, response_type
 from chaosgym.diagnosis.diagnose import diagnosed_run
-from chaosgym.errors import ParameterError, SimulationError
+from chaosgym.errors import DiagnosisError, ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, simulate
 from chaosgym.sweeps.columns import SIGNALS, WINDOW, WINDOWS, schema
@@ -24,7 +24,7 @@ def label_point(machine: Machine, budget: int, *, signals: bool = False) -> dict
         verdict, record = diagnosed_run(machine, budget=budget)
         if verdict.nature == "undetermined":
             verdict, record = diagnosed_run(machine, budget=RETRY * budget)
-    except SimulationError as error:
+    except (DiagnosisError, SimulationError) as error:
         return {"status": "failed", "reason": str(error)}
     judged = record.after(len(record) // 2)
     peaks = judged.peak_force[:, 0]
@@ -71,7 +71,7 @@ def _signals(machine: Machine, record: CycleRecord) -> dict[str, Any]:
 def _full_type(machine: Machine, budget: int) -> str | None:
     try:
         return response_type(machine, budget=budget, workers=1).type
-    except (ParameterError, SimulationError):
+    except (DiagnosisError, ParameterError, SimulationError):
         return None
 
 

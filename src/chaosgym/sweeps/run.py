@@ -8,9 +8,10 @@ import pyarrow as pa
 from tqdm import tqdm
 
 from chaosgym.errors import DatasetError
+from chaosgym.files import held
 from chaosgym.sweeps.dataset import LabelledSweep, read_sweep
 from chaosgym.sweeps.engines import on_cluster, on_threads
-from chaosgym.sweeps.folder import SweepFolder
+from chaosgym.sweeps.folder import SweepFolder, claimed
 from chaosgym.sweeps.label import label_rows
 from chaosgym.sweeps.plan import SweepPlan
 from chaosgym.version import __version__
@@ -50,28 +51,29 @@ def run_sweep(
     DatasetError
         If the folder holds anything else, or a damaged chunk. Nothing in it is touched.
     UnfinishedError
-        If the disk is full or the cluster is lost. What was kept stays; the same call goes on.
+        If the disk is full, the cluster is lost, or another process writes into the folder. What was kept stays; the
+        same call goes on.
     """
-    store = SweepFolder(folder, plan, __version__)
-    missing = store.missing(repair=repair)
-    if missing:
-        done = on_cluster(plan, missing, scheduler) if scheduler else on_threads(plan, missing, workers)
-        waiting = sum(len(rows) for rows in missing)
-        with tqdm(
-            total=len(plan),
-            initial=len(plan) - waiting,
-            desc="sweep",
-            unit="point",
-            disable=not progress,
-            mininterval=1.0,
-        ) as bar:
-            for rows, table in done:
-                _check_version(table)
-                store.keep(rows, table)
-                bar.update(len(rows))
-    if not store.data.is_file():
-        store.finish()
+    with held(claimed(folder)):
+        store = SweepFolder(folder, plan, __version__)
+        missing = store.missing(repair=repair)
+        if missing:
+            done = on_cluster(plan, missing, scheduler) if scheduler else on_threads(plan, missing, workers)
+            _keep(store, missing, done, progress)
+        if not store.data.is_file():
+            store.finish()
     return read_sweep(folder)
+
+
+def _keep(store: SweepFolder, missing: list[range], done: Iterable[tuple[range, pa.Table]], progress: bool) -> None:
+    """Keep every chunk as it is done."""
+    size = len(store.plan)
+    first = size - sum(len(rows) for rows in missing)
+    with tqdm(total=size, initial=first, desc="sweep", unit="point", disable=not progress, mininterval=1.0) as bar:
+        for rows, table in done:
+            _check_version(table)
+            store.keep(rows, table)
+            bar.update(len(rows))
 
 
 def _check_version(table: pa.Table) -> None:
