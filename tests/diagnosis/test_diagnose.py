@@ -3,7 +3,8 @@ import json
 import numpy as np
 import pytest
 
-from chaosgym.diagnosis import agreement, diagnose, random_machines
+from benchmarks.agreement import agreement, random_machines
+from chaosgym.diagnosis import diagnose
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import ImpactBeam, SliderCrank
 

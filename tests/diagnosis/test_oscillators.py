@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from chaosgym.diagnosis import diagnose, find_periodic_orbit, random_machines, two_step_test, two_trajectory_exponent
+from benchmarks.agreement import random_machines
+from chaosgym.diagnosis import diagnose, find_periodic_orbit, two_step_test, two_trajectory_exponent
 from chaosgym.machines import ImpactBeam
 from chaosgym.simulation import simulate
 
