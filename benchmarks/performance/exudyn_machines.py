@@ -21,7 +21,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from benchmarks.performance.timing import processor_seconds
-from chaosgym.core.modal_impact import ModalImpactModel
+from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.machines.machine import Machine
@@ -193,7 +193,7 @@ def _add_beam(exudyn: Any, system: Any, beam: ImpactBeam, setting: ExudynSetting
     """Add an impact beam; its node and the number of the tip's coordinate."""
     items, model = exudyn.itemInterface, beam.reduce()
     assert isinstance(model, ModalImpactModel)
-    shapes = np.vstack([model.tip_shape, model.force_shape])
+    shapes = np.vstack([model.tip_shape, beam.force_shape])
     modal = np.linalg.inv(np.vstack([shapes, scipy.linalg.null_space(shapes).T]))
     n = len(modal)
     node = system.AddNode(
@@ -213,13 +213,13 @@ def _add_beam(exudyn: Any, system: Any, beam: ImpactBeam, setting: ExudynSetting
         )
     )
     tip, shaker = (system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=i)) for i in (0, 1))
-    load = system.AddLoad(items.LoadCoordinate(markerNumber=shaker, load=model.force_amplitude))
+    load = system.AddLoad(items.LoadCoordinate(markerNumber=shaker, load=beam.force_amplitude))
     omega = 2.0 * math.pi * model.excitation_frequency
     drive = exudyn.utilities.CreateSymbolicUserFunction(
         system, lambda mbs, t, amplitude: amplitude * exudyn.symbolic.sin(omega * t), "loadUserFunction", load
     )
     system.SetLoadParameter(load, "loadUserFunction", drive)
-    _add_contact(exudyn, system, tip, setting, model.clearance, model.contact_stiffness, model.contact_damping)
+    _add_contact(exudyn, system, tip, setting, beam.clearance, beam.contact_stiffness, beam.contact_damping)
     return node, 0
 
 

@@ -1,4 +1,4 @@
-"""The impact beam once more, by a general-purpose integrator with event location: the twin of the exact kernel."""
+"""A machine of a few modes by a general-purpose integrator with event location: the twin of the exact kernel."""
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -11,15 +11,21 @@ def twin_trajectory(model, cycles, samples_per_cycle, max_phase=0.5):
     """
     n = len(model.stiffness)
     omega = 2 * np.pi * model.excitation_frequency
-    k, d, c = model.contact_stiffness, model.contact_damping, model.clearance
+    stops, stiffness, damping = (
+        dict(zip((1.0, -1.0), values, strict=True))
+        for values in (model.stops, model.contact_stiffness, model.contact_damping)
+    )
     p = model.tip_shape
+    drive = model.drive[0] + omega**2 * model.drive[1]
+    harmonics = np.arange(1, len(drive) + 1)
 
     def force(y, side):
-        return k * (side * (p @ y[:n]) - c) + d * side * (p @ y[n:])
+        return stiffness[side] * side * (p @ y[:n] - stops[side]) + damping[side] * side * (p @ y[n:])
 
     def slope(t, y, state, side):
         q, v = y[:n], y[n:]
-        load = model.force_shape * model.force_amplitude * np.sin(omega * t) - model.stiffness * q - model.damping @ v
+        load = model.static_force - model.stiffness * q - model.damping @ v
+        load = load + np.cos(harmonics * omega * t) @ drive[:, 0] + np.sin(harmonics * omega * t) @ drive[:, 1]
         if state == "contact":
             load = load - p * side * force(y, side)
         return np.concatenate([v, load])
@@ -28,11 +34,11 @@ def twin_trajectory(model, cycles, samples_per_cycle, max_phase=0.5):
         function.terminal, function.direction = True, direction
         return function
 
-    upper = event(lambda t, y, state, side: p @ y[:n] - c, 1)
-    lower = event(lambda t, y, state, side: p @ y[:n] + c, -1)
+    upper = event(lambda t, y, state, side: p @ y[:n] - stops[1.0], 1)
+    lower = event(lambda t, y, state, side: p @ y[:n] - stops[-1.0], -1)
     release = event(lambda t, y, state, side: force(y, side), -1)
     press = event(lambda t, y, state, side: force(y, side), 1)
-    back = event(lambda t, y, state, side: side * (p @ y[:n]) - c, -1)
+    back = event(lambda t, y, state, side: side * (p @ y[:n] - stops[side]), -1)
     watched = {"gap": [upper, lower], "contact": [release], "detached": [back, press]}
 
     instants = np.arange(cycles * samples_per_cycle) / (samples_per_cycle * model.excitation_frequency)
@@ -50,7 +56,7 @@ def twin_trajectory(model, cycles, samples_per_cycle, max_phase=0.5):
             events=watched[state],
             args=(state, side),
             dense_output=True,
-            max_step=max_phase / model.regimes.fastest[1],
+            max_step=max_phase / model.regimes.fastest.max(),
         )
         inside = (instants >= t) & (instants < run.t[-1])
         if inside.any():

@@ -72,7 +72,7 @@ def test_the_bilinear_beam_contracts_area_by_its_damping():
     model = beam.reduce()
     contact = simulate(beam, orbit.period, orbit.state).contact_fraction.sum() * beam.cycle_period
     log_area = -model.damping[0, 0] * orbit.period * beam.cycle_period
-    log_area -= model.contact_damping * model.tip_shape[0] ** 2 * contact
+    log_area -= beam.contact_damping * model.tip_shape[0] ** 2 * contact
     assert np.log(abs(np.prod(orbit.multipliers))) == pytest.approx(log_area, rel=1e-6)
 
 

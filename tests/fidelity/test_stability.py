@@ -22,7 +22,7 @@ def _linear_response(beam, phase):
     model = beam.reduce()
     omega = 2 * np.pi * beam.excitation_frequency
     dynamic = np.diag(model.stiffness - omega**2) + 1j * omega * model.damping
-    amplitude = model.tip_shape @ np.linalg.solve(dynamic, model.force_shape * beam.force_amplitude)
+    amplitude = model.tip_shape @ np.linalg.solve(dynamic, beam.force_shape * beam.force_amplitude)
     return (amplitude * np.exp(1j * phase)).imag, abs(amplitude)
 
 
@@ -82,7 +82,7 @@ def test_a_closed_gap_carries_the_quasi_static_force(clearance):
     """With no gap to speak of, at 0.1 Hz, the larger surface force is what a pinned tip needs: no impact adds to it."""
     beam = ImpactBeam(fidelity="rigid", clearance=clearance, excitation_frequency=0.1, contact_damping=1e3)
     model = beam.reduce()
-    held = beam.force_amplitude * model.force_shape[0] / model.tip_shape[0]
+    held = beam.force_amplitude * beam.force_shape[0] / model.tip_shape[0]
     pinned = held / (1 + model.stiffness[0] / model.tip_shape[0] ** 2 / beam.contact_stiffness)
     record = simulate(beam, 2)
     np.testing.assert_allclose(record.peak_force, pinned, rtol=2e-3)
@@ -93,7 +93,7 @@ def test_overdamped_modes_have_real_eigenvalues_and_still_answer():
     """A structure far beyond critical damping creeps: every block decays, and the force bound holds."""
     for fields in ({"damping_ratio": 100.0}, {"contact_damping": 1e6}, {"shaker_damping": 1e6}):
         beam = replace(THESIS_IMPACT_BEAM, **fields)
-        assert not beam.reduce().regimes.rotates.all()
+        assert np.any(beam.reduce().regimes.generator[:, 2] == 0.0)
         assert share_of_bound(simulate(beam, 3)) < 1.0
 
 

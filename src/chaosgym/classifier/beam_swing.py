@@ -59,7 +59,8 @@ def swing_table(machine: Machine | None, fields: tuple[str, ...], grid: Array) -
 
 def _modes(machine: ImpactBeam, length: float) -> Array:
     """One row of the table."""
-    none = with_settings(machine, {"length": length, "damping_ratio": 0.0}).reduce()
+    undamped = with_settings(machine, {"length": length, "damping_ratio": 0.0})
+    none = undamped.reduce()
     whole = with_settings(machine, {"length": length, "damping_ratio": 1.0}).reduce()
     slope = whole.damping - none.damping
     push = machine.contact_stiffness * np.outer(none.tip_shape, none.tip_shape)
@@ -70,7 +71,7 @@ def _modes(machine: ImpactBeam, length: float) -> Array:
         [
             np.sqrt(none.stiffness[:FREE]),
             np.sqrt(squares[:RINGING]),
-            [none.damping[0, 0], none.tip_shape[0], none.force_shape[0]],
+            [none.damping[0, 0], none.tip_shape[0], undamped.force_shape[0]],
             *(0.5 * np.einsum("ik,ij,jk->k", shapes, part, shapes) for part in (none.damping, slope)),
             0.5 * (shapes.T @ none.tip_shape) ** 2,
             0.5 * np.diag(none.damping)[bending],

@@ -9,8 +9,9 @@ import numpy as np
 from numba import njit, prange
 
 from chaosgym.core.cycle import CycleArrays, Episode
-from chaosgym.core.modal_impact import ModalImpactModel
+from chaosgym.core.event_tables import Tables
 from chaosgym.core.modal_impact import advance as advance_beam
+from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.core.propagator import Regimes
 from chaosgym.core.restitution import RestitutionModel, advance_restitution
 
@@ -58,48 +59,60 @@ def episode_of(motions, i):
 def regimes_of(regimes, i):
     """Regimes of machine i."""
     return Regimes(
-        regimes.rotates[i],
-        regimes.rate[i],
-        regimes.to_modal[i],
-        regimes.from_modal[i],
-        regimes.output[i],
-        regimes.magnitude[i],
-        regimes.forcing[i],
-        regimes.modulus[i],
-        regimes.fastest[i],
+        regimes.generator[i], regimes.to_modal[i], regimes.from_modal[i], regimes.output[i], regimes.fastest[i]
     )
 
 
 @njit(cache=True, inline="always")
-def beam_of(batch, regimes, i):
+def tables_of(tables, i):
+    """Tables of machine i."""
+    return Tables(
+        tables.step_phase[i],
+        tables.shortest[i],
+        tables.ahead[i],
+        tables.turn[i],
+        tables.fine[i],
+        tables.generator[i],
+        tables.taylor[i],
+        tables.now[i],
+        tables.bounds[i],
+        tables.switch[i],
+    )
+
+
+@njit(cache=True, inline="always")
+def beam_of(batch, regimes, tables, i):
     """Model of machine i."""
     return ModalImpactModel(
         batch.excitation_frequency[i],
-        batch.force_amplitude[i],
-        batch.clearance[i],
+        batch.drive[i],
+        batch.static_force[i],
+        batch.stops[i],
         batch.contact_stiffness[i],
         batch.contact_damping[i],
         batch.stiffness[i],
         batch.damping[i],
         batch.tip_shape[i],
-        batch.force_shape[i],
+        batch.pressed[i],
         regimes_of(regimes, i),
         batch.rest[i],
+        batch.drift[i],
         batch.rest_penetration[i],
+        tables_of(tables, i),
     )
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def advance_beams(batch, regimes, which, motions, arrays, settings, outcome):
+def advance_beams(batch, regimes, tables, which, motions, arrays, settings, outcome):
     """Advance the machines ``which`` (k,) of a batch in place by whole cycles; rows of ``arrays`` in that order.
 
-    Writes the status of each into ``outcome`` (k,). The batch comes without its regimes, and they by themselves: a
-    parallel loop takes no tuples of tuples.
+    Writes the status of each into ``outcome`` (k,). The batch comes without its regimes and tables, and they by
+    themselves: a parallel loop takes no tuples of tuples.
     """
     for k in prange(which.shape[0]):
         i = which[k]
         outcome[k] = advance_beam(
-            beam_of(batch, regimes, i),
+            beam_of(batch, regimes, tables, i),
             motions.coordinates[i],
             episode_of(motions, i),
             rows_of(arrays, k),

@@ -1,7 +1,7 @@
 r"""Fixed steps of Runge-Kutta for machines with modal impacts: the comparison for exact propagation.
 
-The classical Runge-Kutta method of order four on q'' = -D q' - K q + phi_f F sin(w t) - phi_t N, with the same contact
-force N and no event location: touch and release are placed to O(h), so each impact gains or loses a little energy.
+The classical Runge-Kutta method of order four on the equations of ``modal_model``, with the same contact force and no
+event location: touch and release are placed to O(h), so each impact gains or loses a little energy.
 That can turn a periodic response into chaos and the reverse.
 """
 
@@ -24,26 +24,38 @@ RUNAWAY = 1e9
 
 @njit(cache=True, inline="always")
 def surface_force(model, x, v):
-    """Contact force on the tip: positive from the upper surface, negative from the lower."""
-    if x > 0.0:
-        return contact_force(x - model.clearance, v, model.contact_stiffness, model.contact_damping)
-    return -contact_force(-x - model.clearance, -v, model.contact_stiffness, model.contact_damping)
+    """Contact force on the tip: positive from the upper stop, negative from the lower."""
+    k, d = model.contact_stiffness, model.contact_damping
+    if x > model.stops[0]:
+        return contact_force(x - model.stops[0], v, k[0], d[0])
+    return -contact_force(model.stops[1] - x, -v, k[1], d[1])
 
 
 @njit(cache=True)
-def _slope(model, state, sine, slope):
-    """Time derivative of the modal state (2n,); returns the contact force."""
+def _load(model, phase, load):
+    """Modal forces (n,) of drive and static force at a phase of the cycle [rad]."""
+    omega = 2.0 * math.pi * model.excitation_frequency
+    for i in range(load.shape[0]):
+        load[i] = model.static_force[i]
+    for g in range(model.drive.shape[1]):
+        c, s = math.cos((g + 1) * phase), math.sin((g + 1) * phase)
+        for i in range(load.shape[0]):
+            load[i] += (model.drive[0, g, 0, i] + omega * omega * model.drive[1, g, 0, i]) * c
+            load[i] += (model.drive[0, g, 1, i] + omega * omega * model.drive[1, g, 1, i]) * s
+
+
+@njit(cache=True)
+def _slope(model, state, load, slope):
+    """Time derivative of the modal state (2n,)."""
     n = model.stiffness.shape[0]
     x, v = tip_of_state(model, state)
     force = surface_force(model, x, v)
     for i in range(n):
         slope[i] = state[n + i]
-        total = model.force_shape[i] * model.force_amplitude * sine - model.tip_shape[i] * force
-        total -= model.stiffness[i] * state[i]
+        total = load[i] - model.tip_shape[i] * force - model.stiffness[i] * state[i]
         for j in range(n):
             total -= model.damping[i, j] * state[n + j]
         slope[n + i] = total
-    return force
 
 
 @njit(cache=True, inline="always")
@@ -57,7 +69,7 @@ def _sample(model, state, history, cycle, sample):
 
 @njit(cache=True, nogil=True)
 def advance_fixed_step(model, state, episode, arrays, steps):
-    """Advance ``state`` and ``episode`` by whole cycles of ``steps`` equal steps; see ``impact_beam.advance``.
+    """Advance ``state`` and ``episode`` by whole cycles of ``steps`` equal steps; see ``modal_impact.advance``.
 
     Peaks and samples are taken at the ends of steps, a sample at the next one after its instant.
     """
@@ -70,7 +82,7 @@ def advance_fixed_step(model, state, episode, arrays, steps):
         return status.STEP_TOO_COARSE, 0
     samples = arrays.history.shape[1]
     k1, k2, k3, k4 = np.empty(n2), np.empty(n2), np.empty(n2), np.empty(n2)
-    inner = np.empty(n2)
+    inner, load = np.empty(n2), np.empty(n2 // 2)
     for cycle in range(arrays.section.shape[0]):
         arrays.section[cycle] = state
         arrays.tip[cycle, 0], arrays.tip[cycle, 1] = tip_of_state(model, state)
@@ -85,19 +97,19 @@ def advance_fixed_step(model, state, episode, arrays, steps):
             while sample < samples and sample * steps <= step * samples:
                 _sample(model, state, arrays.history, cycle, sample)
                 sample += 1
-            sine0 = math.sin(omega * h * step)
-            sine1 = math.sin(omega * h * (step + 0.5))
-            sine2 = math.sin(omega * h * (step + 1))
-            _slope(model, state, sine0, k1)
+            _load(model, omega * h * step, load)
+            _slope(model, state, load, k1)
+            _load(model, omega * h * (step + 0.5), load)
             for i in range(n2):
                 inner[i] = state[i] + 0.5 * h * k1[i]
-            _slope(model, inner, sine1, k2)
+            _slope(model, inner, load, k2)
             for i in range(n2):
                 inner[i] = state[i] + 0.5 * h * k2[i]
-            _slope(model, inner, sine1, k3)
+            _slope(model, inner, load, k3)
             for i in range(n2):
                 inner[i] = state[i] + h * k3[i]
-            _slope(model, inner, sine2, k4)
+            _load(model, omega * h * (step + 1), load)
+            _slope(model, inner, load, k4)
             for i in range(n2):
                 state[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
             x, v = tip_of_state(model, state)

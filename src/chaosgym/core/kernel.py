@@ -15,3 +15,14 @@ def leaf(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a kernel that allocates no array and returns none, without reference counts."""
     compiled: Callable[..., Any] = njit(cache=True, nogil=True, _nrt=False)(function)
     return compiled
+
+
+def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """As ``leaf``, for parts of a kernel that are handed many arrays: they become part of their caller.
+
+    A call would copy every array's pointer, shape and strides to the stack, which takes longer than the part.
+    """
+    compiled: Callable[..., Any] = njit(cache=True, nogil=True, _nrt=False, forceinline=True, error_model="numpy")(
+        function
+    )
+    return compiled

@@ -1,13 +1,14 @@
-r"""Exact propagation of a linear system under a sinusoidal force.
+r"""Exact propagation of a linear system under a periodic force.
 
-A regime is a set of equations of motion that hold between two contact events: y' = A y + b sin(w t), where y holds n
-displacements and n velocities. In the regime's own modal coordinates u, A consists of n real 2 x 2 blocks B. A pair
-of complex eigenvalues a +- i b turns and shrinks, a pair of real ones only shrinks:
+A regime is a set of equations of motion that hold between two contact events: y' = A y + f(t), where y holds n
+displacements and n velocities. In the regime's own modal coordinates u, A consists of n real 2 x 2 blocks B:
 
-    exp(B t) = e^{a t} [[cos b t, -sin b t], [sin b t, cos b t]]      or      diag(e^{l1 t}, e^{l2 t})
+    a pair of complex eigenvalues a +- i b     [[a, -b], [b, a]]     turns and shrinks
+    two real ones                              [[a, 0], [0, b]]      shrinks, or rests where one is zero
+    an undamped motion of a rigid body         [[0, 1], [0, 0]]      drifts
 
-The force is one more block, (cos w t, sin w t), and the steady response to it is part of the maps between y and u.
-What is left in u decays freely, so a step costs n + 1 small rotations whatever its length and has no truncation error.
+The steady response to a harmonic of the force is taken off, and so is that to a constant force where there is one.
+What is left in u moves freely, so a step costs n small blocks whatever its length and has no truncation error.
 """
 
 import math
@@ -20,150 +21,102 @@ from chaosgym.core.kernel import leaf
 
 
 class Regimes(NamedTuple):
-    """R linear regimes of one system with n degrees of freedom, each in its own m modal blocks.
+    """R linear regimes of one system with n degrees of freedom, each in its own n modal blocks.
 
-    m = n for the system alone, m = n + 1 once ``with_force`` has added the block of the force.
+    Modal coordinates (2n,) are the first ones of all blocks, then the second ones.
 
     Attributes
     ----------
-    rotates : (R, m) bool
-        True where the block turns (complex pair), False where it holds two real eigenvalues.
-    rate : (R, m, 2)
-        a and b of a complex pair, or the two real eigenvalues [1/s]; none grows.
-    to_modal : (R, 2n, 2n) or (R, 2n, 2n + 2)
-        Free modal coordinates from y, or from y followed by (cos w t, sin w t).
-    from_modal : (R, 2n, 2m)
-        y from modal coordinates.
-    output : (R, 3, 2m)
-        Displacement [m], velocity and acceleration of the tip per unit modal coordinate.
-    magnitude : (R, 2, 2m)
-        Bounds of the second and third derivative of the tip displacement per unit modal coordinate.
-    forcing : (R, 2n)
-        Modal coordinates of b for a unit force amplitude.
-    modulus : (R, 2m)
-        Modulus of the eigenvalue of each modal coordinate [1/s].
+    generator : (R, 4, n)
+        Entries 11, 12, 21, 22 of each block [1/s]; none grows.
+    to_modal, from_modal : (R, 2n, 2n)
+        Modal coordinates from y, and y from modal coordinates.
+    output : (R, 2n)
+        Displacement of the tip [m] per unit modal coordinate.
     fastest : (R,)
-        Largest of them.
+        Largest modulus of an eigenvalue [1/s].
     """
 
-    rotates: np.ndarray
-    rate: np.ndarray
+    generator: np.ndarray
     to_modal: np.ndarray
     from_modal: np.ndarray
     output: np.ndarray
-    magnitude: np.ndarray
-    forcing: np.ndarray
-    modulus: np.ndarray
     fastest: np.ndarray
 
 
-@njit(cache=True)
-def with_force(regimes, amplitude, angular_frequency):
-    """The regimes with the block of the force amplitude * sin(w t) added, and its steady response in the maps."""
-    count, n = regimes.rotates.shape
-    w = angular_frequency
-    rotates = np.ones((count, n + 1), dtype=np.bool_)
-    rotates[:, :n] = regimes.rotates
-    rate = np.zeros((count, n + 1, 2))
-    rate[:, :n] = regimes.rate
-    rate[:, n, 1] = w
-    to_modal = np.zeros((count, 2 * n, 2 * n + 2))
-    from_modal = np.zeros((count, 2 * n, 2 * n + 2))
-    output = np.zeros((count, 3, 2 * n + 2))
-    magnitude = np.zeros((count, 2, 2 * n + 2))
-    to_modal[:, :, : 2 * n] = regimes.to_modal
-    from_modal[:, :, : 2 * n] = regimes.from_modal
-    output[:, :, : 2 * n] = regimes.output
-    magnitude[:, :, : 2 * n] = regimes.magnitude
-    modulus = np.full((count, 2 * n + 2), w)
-    modulus[:, : 2 * n] = regimes.modulus
-    fastest = np.maximum(regimes.fastest, w)
-    steady = np.empty((2 * n, 2))
-    for r in range(count):
-        for j in range(n):
-            f1 = amplitude * regimes.forcing[r, 2 * j]
-            f2 = amplitude * regimes.forcing[r, 2 * j + 1]
-            if regimes.rotates[r, j]:
-                eigenvalue = complex(regimes.rate[r, j, 0], regimes.rate[r, j, 1])
-                cosine = -complex(f1, f2) * w / (w * w + eigenvalue * eigenvalue)
-                sine = eigenvalue * cosine / w
-                steady[2 * j, 0], steady[2 * j, 1] = cosine.real, sine.real
-                steady[2 * j + 1, 0], steady[2 * j + 1, 1] = cosine.imag, sine.imag
-            else:
-                for i in range(2):
-                    eigenvalue = regimes.rate[r, j, i]
-                    force = f1 if i == 0 else f2
-                    steady[2 * j + i, 0] = -force * w / (w * w + eigenvalue * eigenvalue)
-                    steady[2 * j + i, 1] = steady[2 * j + i, 0] * eigenvalue / w
-        for i in range(2 * n):
-            for k in range(2):
-                to_modal[r, i, 2 * n + k] = -steady[i, k]
-                for j in range(2 * n):
-                    from_modal[r, i, 2 * n + k] += regimes.from_modal[r, i, j] * steady[j, k]
-        x_cosine, x_sine = 0.0, 0.0
-        for j in range(2 * n):
-            x_cosine += regimes.output[r, 0, j] * steady[j, 0]
-            x_sine += regimes.output[r, 0, j] * steady[j, 1]
-        output[r, 0, 2 * n], output[r, 0, 2 * n + 1] = x_cosine, x_sine
-        output[r, 1, 2 * n], output[r, 1, 2 * n + 1] = w * x_sine, -w * x_cosine
-        output[r, 2, 2 * n], output[r, 2, 2 * n + 1] = -w * w * x_cosine, -w * w * x_sine
-        size = math.hypot(x_cosine, x_sine)
-        magnitude[r, 0, 2 * n :] = w**2 * size
-        magnitude[r, 1, 2 * n :] = w**3 * size
-    return Regimes(rotates, rate, to_modal, from_modal, output, magnitude, regimes.forcing, modulus, fastest)
+@njit(cache=True, inline="always")
+def turns(generator, j):
+    """True if block j holds a complex pair."""
+    return generator[2, j] != 0.0
 
 
 @njit(cache=True, inline="always")
-def block(regimes, r, j, time):
-    """Entries (11, 12, 21, 22) of exp(B time) for block j of regime r."""
-    if regimes.rotates[r, j]:
-        decay = math.exp(regimes.rate[r, j, 0] * time)
-        angle = regimes.rate[r, j, 1] * time
-        c = decay * math.cos(angle)
-        s = decay * math.sin(angle)
+def block(generator, j, time):
+    """Entries (11, 12, 21, 22) of exp(B time) for block j of a regime's generator (4, n)."""
+    if turns(generator, j):
+        decay = math.exp(generator[0, j] * time)
+        angle = generator[2, j] * time
+        c, s = decay * math.cos(angle), decay * math.sin(angle)
         return c, -s, s, c
-    return math.exp(regimes.rate[r, j, 0] * time), 0.0, 0.0, math.exp(regimes.rate[r, j, 1] * time)
+    return math.exp(generator[0, j] * time), generator[1, j] * time, 0.0, math.exp(generator[3, j] * time)
+
+
+@leaf
+def move(generator, u, time, moved):
+    """moved = exp(B time) u for modal coordinates (2n,); ``moved`` may be u."""
+    n = generator.shape[1]
+    for j in range(n):
+        e11, e12, e21, e22 = block(generator, j, time)
+        first, second = u[j], u[n + j]
+        moved[j] = e11 * first + e12 * second
+        moved[n + j] = e21 * first + e22 * second
 
 
 @njit(cache=True)
-def step_table(regimes, shortest, levels):
-    """exp(B h) for the steps h = shortest[r] * 2**level: shape (R, levels, 4, m)."""
-    count, m = regimes.rotates.shape
-    table = np.empty((count, levels, 4, m))
-    for r in range(count):
-        for level in range(levels):
-            for j in range(m):
-                entries = block(regimes, r, j, math.ldexp(shortest[r], level))
-                for i in range(4):
-                    table[r, level, i, j] = entries[i]
-    return table
+def derivative(generator, row, result):
+    """Row of the time derivative of the quantity that ``row`` (2n,) reads off modal coordinates."""
+    n = generator.shape[1]
+    for j in range(n):
+        first, second = row[j], row[n + j]
+        result[j] = first * generator[0, j] + second * generator[2, j]
+        result[n + j] = first * generator[1, j] + second * generator[3, j]
 
 
-@leaf
-def move(regimes, r, u, time, moved):
-    """moved = exp(B time) u, for any time."""
-    for j in range(regimes.rotates.shape[1]):
-        e11, e12, e21, e22 = block(regimes, r, j, time)
-        moved[2 * j] = e11 * u[2 * j] + e12 * u[2 * j + 1]
-        moved[2 * j + 1] = e21 * u[2 * j] + e22 * u[2 * j + 1]
+@njit(cache=True)
+def bound(generator, row, result):
+    """Coefficients m (2n,) with abs(row . exp(B t) u) <= sum m abs(u) for all t >= 0, for a row that does not drift."""
+    n = generator.shape[1]
+    for j in range(n):
+        size = math.hypot(row[j], row[n + j])
+        result[j] = size if turns(generator, j) else abs(row[j])
+        result[n + j] = size if turns(generator, j) else abs(row[n + j])
 
 
-@leaf
-def nudge(regimes, r, u, time):
-    """u = exp(B time) u in place by a Taylor series of order five: for times well below 1 / fastest."""
-    for j in range(regimes.rotates.shape[1]):
-        rate1 = regimes.rate[r, j, 0] * time
-        rate2 = regimes.rate[r, j, 1] * time
-        term1, term2 = u[2 * j], u[2 * j + 1]
-        sum1, sum2 = term1, term2
-        for order in range(1, 6):
-            if regimes.rotates[r, j]:
-                term1, term2 = (rate1 * term1 - rate2 * term2) / order, (rate2 * term1 + rate1 * term2) / order
+@njit(cache=True)
+def steady_response(generator, cosine, sine, w, steady):
+    """Steady modal response (2n, 2) to a force with modal parts ``cosine`` and ``sine`` (2n,) at w [rad/s].
+
+    The columns are what goes with cos(w t) and with sin(w t): (B^2 + w^2) C = -(B g_c + w g_s) and
+    (B^2 + w^2) S = w g_c - B g_s.
+    """
+    n = generator.shape[1]
+    for j in range(n):
+        p, q, r, s = generator[0, j], generator[1, j], generator[2, j], generator[3, j]
+        m11, m12 = p * p + q * r + w * w, q * (p + s)
+        m21, m22 = r * (p + s), s * s + q * r + w * w
+        determinant = m11 * m22 - m12 * m21
+        for column in range(2):
+            if column == 0:
+                x = -(p * cosine[j] + q * cosine[n + j]) - w * sine[j]
+                y = -(r * cosine[j] + s * cosine[n + j]) - w * sine[n + j]
             else:
-                term1, term2 = rate1 * term1 / order, rate2 * term2 / order
-            sum1 += term1
-            sum2 += term2
-        u[2 * j], u[2 * j + 1] = sum1, sum2
+                x = w * cosine[j] - (p * sine[j] + q * sine[n + j])
+                y = w * cosine[n + j] - (r * sine[j] + s * sine[n + j])
+            if determinant == 0.0:
+                steady[j, column], steady[n + j, column] = math.inf, math.inf
+            else:
+                steady[j, column] = (m22 * x - m12 * y) / determinant
+                steady[n + j, column] = (m11 * y - m21 * x) / determinant
 
 
 @njit(cache=True, inline="always")
@@ -173,6 +126,8 @@ def safe_time(distance, slope, curvature):
     Its slope is ``slope`` and the modulus of its second derivative never exceeds ``curvature``, so the answer is the
     first positive root of distance + slope t - curvature t^2 / 2. A distance below zero counts as zero.
     """
+    if distance == math.inf:
+        return math.inf
     distance = max(distance, 0.0)
     if curvature <= 0.0:
         return math.inf if slope >= 0.0 else -distance / slope

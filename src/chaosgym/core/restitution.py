@@ -26,9 +26,10 @@ import numpy as np
 from numba import njit
 
 from chaosgym.core import status
+from chaosgym.core.cubic import cubic, cubic_extremum
 from chaosgym.core.cycle import LOWER, UPPER, note_touch
-from chaosgym.core.modal_impact import suspect
-from chaosgym.core.propagator import Regimes, move, safe_time, with_force
+from chaosgym.core.kernel import leaf
+from chaosgym.core.propagator import Regimes, block, bound, derivative, safe_time, steady_response
 from chaosgym.core.tangent import carry, orthonormalise
 
 CHATTER_PHASE = 0.01
@@ -126,36 +127,91 @@ def landing(series):
     return math.inf
 
 
+class Beam(NamedTuple):
+    """The free beam under its force: coordinates u (4,) are its block's two, then cosine and sine of the force's phase.
+
+    ``generator`` (4, 1), ``to_modal`` (2, 2) as in ``Regimes``; ``steady`` (2, 2) response to the force; ``output``
+    (3, 4) displacement, velocity and acceleration of the tip; ``size`` (4,) bound of the acceleration.
+    """
+
+    generator: np.ndarray
+    to_modal: np.ndarray
+    steady: np.ndarray
+    output: np.ndarray
+    size: np.ndarray
+    omega: float
+
+
 @njit(cache=True)
-def enter(model, regimes, x, v, time, omega, u):
+def beam_under_force(model, omega):
+    """Beam at one frequency [rad/s]."""
+    generator, to_modal = model.regimes.generator[0], model.regimes.to_modal[0]
+    steady, output, size = np.empty((2, 2)), np.empty((3, 4)), np.empty(4)
+    sine = model.force_amplitude * model.force_shape[0] * to_modal[:, 1]
+    steady_response(generator, np.zeros(2), sine, omega, steady)
+    row, rate = model.regimes.output[0].copy(), np.empty(2)
+    cosine, sine = row[0] * steady[0, 0] + row[1] * steady[1, 0], row[0] * steady[0, 1] + row[1] * steady[1, 1]
+    for q in range(3):
+        output[q, :2] = row
+        output[q, 2], output[q, 3] = cosine, sine
+        if q < 2:
+            derivative(generator, row, rate)
+            row[:] = rate
+            cosine, sine = omega * sine, -omega * cosine
+    bound(generator, row, size[:2])
+    size[2:] = math.hypot(cosine, sine)
+    return Beam(generator, to_modal, steady, output, size, omega)
+
+
+@leaf
+def move(beam, u, time, moved):
+    """moved = u after a time."""
+    e11, e12, e21, e22 = block(beam.generator, 0, time)
+    moved[0], moved[1] = e11 * u[0] + e12 * u[1], e21 * u[0] + e22 * u[1]
+    c, s = math.cos(beam.omega * time), math.sin(beam.omega * time)
+    moved[2], moved[3] = c * u[2] - s * u[3], s * u[2] + c * u[3]
+
+
+@leaf
+def enter(model, beam, x, v, time, u):
     """Modal coordinates u (4,) of tip displacement x and velocity v."""
-    cosine, sine = math.cos(omega * time), math.sin(omega * time)
+    cosine, sine = math.cos(beam.omega * time), math.sin(beam.omega * time)
     q, p = x / model.tip_shape[0], v / model.tip_shape[0]
-    to_modal = regimes.to_modal
     for i in range(2):
-        u[i] = to_modal[0, i, 0] * q + to_modal[0, i, 1] * p + to_modal[0, i, 2] * cosine + to_modal[0, i, 3] * sine
+        u[i] = beam.to_modal[i, 0] * q + beam.to_modal[i, 1] * p
+        u[i] -= beam.steady[i, 0] * cosine + beam.steady[i, 1] * sine
     u[2], u[3] = cosine, sine
 
 
 @njit(cache=True, inline="always")
-def tip_of(regimes, row, u):
+def tip_of(beam, row, u):
     """Displacement, velocity or acceleration of the tip, by row of the output."""
-    return (
-        regimes.output[0, row, 0] * u[0]
-        + regimes.output[0, row, 1] * u[1]
-        + regimes.output[0, row, 2] * u[2]
-        + regimes.output[0, row, 3] * u[3]
-    )
+    output = beam.output
+    return output[row, 0] * u[0] + output[row, 1] * u[1] + output[row, 2] * u[2] + output[row, 3] * u[3]
+
+
+@leaf
+def suspect(e0, d0, e1, d1, h, doubt):
+    """End of the interval in (0, h] where e may have fallen to zero, or -1 if it surely has not.
+
+    ``doubt`` bounds the distance of e from the cubic through both ends.
+    """
+    if e1 <= 0.0:
+        return h
+    dip = cubic_extremum(e0, d0, e1, d1, h, 1.0)
+    if dip > 0.0 and cubic(e0, d0, e1, d1, h, dip)[0] <= doubt:
+        return dip
+    return -1.0
 
 
 @njit(cache=True)
-def crossing(regimes, clearance, side, u, moved, low, until, h):
+def crossing(beam, clearance, side, u, moved, low, until, h):
     """Instant up to h at which the tip reaches a surface, or inf if it only comes close by ``until``."""
     high = until
     for _ in range(MAX_POLISH):
-        move(regimes, 0, u, high, moved)
-        e, rate = clearance - side * tip_of(regimes, 0, moved), -side * tip_of(regimes, 1, moved)
-        bend = -side * tip_of(regimes, 2, moved)
+        move(beam, u, high, moved)
+        e, rate = clearance - side * tip_of(beam, 0, moved), -side * tip_of(beam, 1, moved)
+        bend = -side * tip_of(beam, 2, moved)
         if e <= 0.0:
             break
         if bend <= 0.0 or rate * rate < 0.5 * bend * e or not 0.0 < high - rate / bend <= h:
@@ -176,41 +232,41 @@ def crossing(regimes, clearance, side, u, moved, low, until, h):
         if abs(newton - t) <= 1e-15 * high or newton in (low, high):
             break
         t = newton
-        move(regimes, 0, u, t, moved)
-        e, rate = clearance - side * tip_of(regimes, 0, moved), -side * tip_of(regimes, 1, moved)
+        move(beam, u, t, moved)
+        e, rate = clearance - side * tip_of(beam, 0, moved), -side * tip_of(beam, 1, moved)
     return t
 
 
 @njit(cache=True)
-def long_flight(model, regimes, tip, x, v, time, remaining, step_phase, u, moved, spare):
+def long_flight(model, beam, tip, x, v, time, remaining, step_phase, u, moved, spare):
     """Fly on to the next surface or to the end: (elapsed, side or 0, x, v)."""
     c = model.clearance
     shortest = step_phase / tip.fastest
     doubt = step_phase * step_phase / 384.0
-    enter(model, regimes, x, v, time, tip.omega, u)
+    enter(model, beam, x, v, time, u)
     elapsed = 0.0
     while True:
         bend = 0.0
         for j in range(4):
-            bend += regimes.magnitude[0, 0, j] * abs(u[j])
+            bend += beam.size[j] * abs(u[j])
         safe = min(safe_time(c - x, -v, bend), safe_time(c + x, v, bend))
         h = max(safe, shortest)
         last = h >= remaining - elapsed
         if last:
             h = remaining - elapsed
-        move(regimes, 0, u, h, moved)
-        x1, v1 = tip_of(regimes, 0, moved), tip_of(regimes, 1, moved)
+        move(beam, u, h, moved)
+        x1, v1 = tip_of(beam, 0, moved), tip_of(beam, 1, moved)
         if h > safe:
             first, struck = math.inf, 0.0
             for side in (1.0, -1.0):
                 until = suspect(c - side * x, -side * v, c - side * x1, -side * v1, h, doubt * bend * h * h)
                 if until >= 0.0:
-                    t = crossing(regimes, c, side, u, spare, safe, until, h)
+                    t = crossing(beam, c, side, u, spare, safe, until, h)
                     if t < first:
                         first, struck = t, side
             if struck != 0.0:
-                move(regimes, 0, u, first, moved)
-                return elapsed + first, struck, struck * c, struck * max(0.0, struck * tip_of(regimes, 1, moved))
+                move(beam, u, first, moved)
+                return elapsed + first, struck, struck * c, struck * max(0.0, struck * tip_of(beam, 1, moved))
         elapsed += h
         for j in range(4):
             u[j] = moved[j]
@@ -220,7 +276,7 @@ def long_flight(model, regimes, tip, x, v, time, remaining, step_phase, u, moved
 
 
 @njit(cache=True)
-def fly(model, regimes, tip, x, v, time, remaining, step_phase, u, moved, spare, series):
+def fly(model, beam, tip, x, v, time, remaining, step_phase, u, moved, spare, series):
     """From x, v to the next surface or for ``remaining`` seconds: (elapsed, side or 0, x, v)."""
     side = 1.0 if x > 0.0 else -1.0
     a = acceleration(tip, x, v, time)
@@ -232,7 +288,7 @@ def fly(model, regimes, tip, x, v, time, remaining, step_phase, u, moved, spare,
             if t < math.inf:
                 mean, velocity = short_flight(series, min(t, remaining))
                 return (t, side, x, velocity) if t <= remaining else (remaining, 0.0, x + mean * remaining, velocity)
-    return long_flight(model, regimes, tip, x, v, time, remaining, step_phase, u, moved, spare)
+    return long_flight(model, beam, tip, x, v, time, remaining, step_phase, u, moved, spare)
 
 
 @njit(cache=True)
@@ -268,7 +324,7 @@ def rebound(model, tip, x, v, time, vectors):
 
 
 @njit(cache=True)
-def sample_flight(model, regimes, tip, x, v, time, span, rests, first, period, u, moved, rows):
+def sample_flight(model, beam, tip, x, v, time, span, rests, first, period, u, moved, rows):
     """Write the samples from number ``first`` on that lie in ``span``; returns the number of the next one."""
     samples = rows.shape[0]
     sample = first
@@ -280,10 +336,10 @@ def sample_flight(model, regimes, tip, x, v, time, span, rests, first, period, u
             push = tip.load * math.sin(tip.omega * (time + t)) - tip.spring * x
             rows[sample, 2] = side * max(0.0, side * push) * tip.mass
         else:
-            enter(model, regimes, x, v, time, tip.omega, u)
-            move(regimes, 0, u, t, moved)
-            rows[sample, 0] = min(max(tip_of(regimes, 0, moved), -model.clearance), model.clearance)
-            rows[sample, 1], rows[sample, 2] = tip_of(regimes, 1, moved), 0.0
+            enter(model, beam, x, v, time, u)
+            move(beam, u, t, moved)
+            rows[sample, 0] = min(max(tip_of(beam, 0, moved), -model.clearance), model.clearance)
+            rows[sample, 1], rows[sample, 2] = tip_of(beam, 1, moved), 0.0
         sample += 1
     return sample
 
@@ -301,7 +357,7 @@ def comes_to_rest(model, tip, side, speed, push):
 
 @njit(cache=True, nogil=True)
 def advance_restitution(model, state, episode, arrays, step_phase, event_budget, tangents=None):
-    """Advance ``state`` (2,) and ``episode`` in place by whole cycles; see ``impact_beam.advance``.
+    """Advance ``state`` (2,) and ``episode`` in place by whole cycles; see ``modal_impact.advance``.
 
     A tip that starts beyond a surface is put on it.
     """
@@ -309,9 +365,10 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
     omega = 2.0 * math.pi * model.excitation_frequency
     period = 1.0 / model.excitation_frequency
     c, e = model.clearance, model.restitution
-    regimes = with_force(model.regimes, model.force_amplitude, omega)
+    beam = beam_under_force(model, omega)
+    fastest = max(model.regimes.fastest[0], omega)
     load = shape * model.force_shape[0] * model.force_amplitude
-    tip = Tip(model.stiffness[0], model.damping[0, 0], load, omega, regimes.fastest[0], 1.0 / shape**2)
+    tip = Tip(model.stiffness[0], model.damping[0, 0], load, omega, fastest, 1.0 / shape**2)
     u, moved, spare, series = np.empty(4), np.empty(4), np.empty(4), np.empty(SERIES_TERMS)
 
     for cycle in range(arrays.section.shape[0]):
@@ -327,8 +384,7 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
             arrays.contact_time[cycle, column] = 0.0
             arrays.bounce_time[cycle, column] = 0.0
         if tangents is not None:
-            vectors, growth = tangents.vectors, tangents.log_growth[cycle]
-            growth[:] = 0.0
+            tangents.log_growth[cycle] = 0.0
         time, sample, events = 0.0, 0, 0
         side = 1.0 if x > 0.0 else -1.0
         struck = side if abs(x) == c and side * v > 0.0 else 0.0
@@ -350,7 +406,7 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
                 if comes_to_rest(model, tip, side, abs(v), push):
                     v = 0.0
                 if tangents is not None and v != 0.0:
-                    rebound(model, tip, x, side * speed, time, vectors)
+                    rebound(model, tip, x, side * speed, time, tangents.vectors)
             column = UPPER if side > 0.0 else LOWER
             rests = c == 0.0 or (v == 0.0 and abs(x) == c and push > 0.0 and not released)
             struck = 0.0
@@ -358,13 +414,13 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
                 elapsed = min(hold(tip, c, side, time), period - time)
                 last, released = elapsed == period - time, True
                 if tangents is not None:
-                    vectors *= FORGOTTEN
+                    tangents.vectors[:] = tangents.vectors * FORGOTTEN
                 arrays.peak_force[cycle, column] = max(
                     arrays.peak_force[cycle, column], largest_hold(tip, c, side, time, elapsed)
                 )
                 arrays.contact_time[cycle, column] += elapsed
                 sample = sample_flight(
-                    model, regimes, tip, x, v, time, elapsed, True, sample, period, u, moved, arrays.history[cycle]
+                    model, beam, tip, x, v, time, elapsed, True, sample, period, u, moved, arrays.history[cycle]
                 )
                 if c == 0.0 and not last:
                     side = -side
@@ -372,16 +428,16 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
                     note_touch(episode, side, time + elapsed, arrays.bounce_time[cycle])
             else:
                 elapsed, struck, x1, v1 = fly(
-                    model, regimes, tip, x, v, time, period - time, step_phase, u, moved, spare, series
+                    model, beam, tip, x, v, time, period - time, step_phase, u, moved, spare, series
                 )
                 last = struck == 0.0
                 if touched:
                     arrays.contact_time[cycle, column] += min(elapsed, model.contact_duration)
                 sample = sample_flight(
-                    model, regimes, tip, x, v, time, elapsed, False, sample, period, u, moved, arrays.history[cycle]
+                    model, beam, tip, x, v, time, elapsed, False, sample, period, u, moved, arrays.history[cycle]
                 )
                 if tangents is not None:
-                    carry(model.stiffness, regimes, 0, elapsed, vectors, growth, spare)
+                    carry(model.stiffness, model.regimes, 0, elapsed, tangents, cycle, spare)
                 x, v, released = x1, v1, False
             time += elapsed
             touched = False
@@ -394,7 +450,7 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
         arrays.events[cycle] = events
         state[0], state[1] = x / shape, v / shape
         if tangents is not None:
-            orthonormalise(model.stiffness, vectors, growth)
+            orthonormalise(model.stiffness, tangents, cycle)
         if not (math.isfinite(state[0]) and math.isfinite(state[1])):
             return status.DIVERGED, cycle
         episode.touch[0] -= period

@@ -21,10 +21,15 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from chaosgym.core.propagator import block
+from chaosgym.core.kernel import leaf
+from chaosgym.core.propagator import move
 
 MAX_CONTRACTION = 8.0
 """Logarithm of the largest contraction between two orthonormalisations of several deviations."""
+
+
+VANISHED = 1e-300
+"""Length below which a deviation has died out; a new one takes its place, and its growth counts as this at most."""
 
 
 class Tangents(NamedTuple):
@@ -38,43 +43,40 @@ class Tangents(NamedTuple):
     log_growth: np.ndarray
 
 
-@njit(cache=True)
-def carry(stiffness, regimes, r, elapsed, vectors, growth, u):
-    """Advance deviations (m, 2n) by ``elapsed`` seconds in regime r; u (2n or more,) is work space.
+@leaf
+def carry(weights, regimes, r, elapsed, tangents, cycle, work):
+    """Advance deviations (m, 2n) by ``elapsed`` seconds in regime r; ``work`` (2n or more,) is work space.
 
     Several deviations that are kept orthonormal are made so after every ``MAX_CONTRACTION``: the fastest modes decay
-    by factors of e^50 a cycle, which would drown the small deviations in the rounding of the large ones. ``growth``
-    is their row of ``log_growth``.
+    by factors of e^50 a cycle, which would drown the small deviations in the rounding of the large ones.
     """
+    vectors, generator = tangents.vectors, regimes.generator[r]
     n2 = vectors.shape[1]
-    to_modal, from_modal, rotates, rate = regimes.to_modal, regimes.from_modal, regimes.rotates, regimes.rate
+    several = tangents.log_growth.shape[1] > 1
     pieces = 1
-    if growth.shape[0] > 1:
+    if several:
         steepest = 0.0
         for j in range(n2 // 2):
-            steepest = min(steepest, rate[r, j, 0] if rotates[r, j] else min(rate[r, j, 0], rate[r, j, 1]))
+            steepest = min(steepest, generator[0, j], generator[3, j])
         pieces += int(-steepest * elapsed / MAX_CONTRACTION)
     for _ in range(pieces):
         for m in range(vectors.shape[0]):
             for i in range(n2):
                 total = 0.0
                 for j in range(n2):
-                    total += to_modal[r, i, j] * vectors[m, j]
-                u[i] = total
-            for j in range(n2 // 2):
-                e11, e12, e21, e22 = block(regimes, r, j, elapsed / pieces)
-                u1, u2 = u[2 * j], u[2 * j + 1]
-                u[2 * j], u[2 * j + 1] = e11 * u1 + e12 * u2, e21 * u1 + e22 * u2
+                    total += regimes.to_modal[r, i, j] * vectors[m, j]
+                work[i] = total
+            move(generator, work, elapsed / pieces, work)
             for i in range(n2):
                 total = 0.0
                 for j in range(n2):
-                    total += from_modal[r, i, j] * u[j]
+                    total += regimes.from_modal[r, i, j] * work[j]
                 vectors[m, i] = total
-        if growth.shape[0] > 1:
-            orthonormalise(stiffness, vectors, growth)
+        if several:
+            orthonormalise(weights, tangents, cycle)
 
 
-@njit(cache=True)
+@leaf
 def touch(tip_shape, contact_damping, vectors):
     """Saltation at the touch of a surface."""
     n = tip_shape.shape[0]
@@ -87,26 +89,33 @@ def touch(tip_shape, contact_damping, vectors):
 
 
 @njit(cache=True, inline="always")
-def _product(stiffness, a, b):
-    """Scalar product of energy: K q . q + q' . q'."""
-    n = stiffness.shape[0]
+def _product(weights, vectors, a, b):
+    """Scalar product of energy of two deviations: sum w q q + q' q'."""
+    n = weights.shape[0]
     total = 0.0
     for i in range(n):
-        total += stiffness[i] * a[i] * b[i] + a[n + i] * b[n + i]
+        total += weights[i] * vectors[a, i] * vectors[b, i] + vectors[a, n + i] * vectors[b, n + i]
     return total
 
 
-@njit(cache=True)
-def orthonormalise(stiffness, vectors, growth):
-    """Make deviations orthonormal in energy (modified Gram-Schmidt, twice) and add to ``growth`` how much they grew."""
+@leaf
+def orthonormalise(weights, tangents, cycle):
+    """Make deviations orthonormal in energy (modified Gram-Schmidt, twice); note in ``log_growth`` how much they grew.
+
+    ``weights`` (n,) [1/s^2] are those of displacements: the stiffness of each mode.
+    """
+    vectors, growth = tangents.vectors, tangents.log_growth
     n2 = vectors.shape[1]
-    for m in range(growth.shape[0]):
+    for m in range(growth.shape[1]):
         for _ in range(2):
             for k in range(m):
-                overlap = _product(stiffness, vectors[k], vectors[m])
+                overlap = _product(weights, vectors, k, m)
                 for i in range(n2):
                     vectors[m, i] -= overlap * vectors[k, i]
-        length = math.sqrt(_product(stiffness, vectors[m], vectors[m]))
-        growth[m] += math.log(length) if length > 0.0 else -math.inf
+        length = math.sqrt(_product(weights, vectors, m, m))
+        growth[cycle, m] += math.log(max(length, VANISHED))
         for i in range(n2):
-            vectors[m, i] = vectors[m, i] / length if length > 0.0 else 0.0
+            if length > VANISHED:
+                vectors[m, i] /= length
+            else:
+                vectors[m, i] = 1.0 if i == n2 // 2 + m % (n2 // 2) else 0.0

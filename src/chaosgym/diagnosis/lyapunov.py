@@ -217,12 +217,12 @@ def lyapunov_spectrum(
     first, vectors, _ = simulate_with_deviations(machine, max(1, transient), initial_state, deviations=np.eye(states))
     record, _, growth = simulate_with_deviations(machine, cycles, first.final_state, deviations=vectors)
     model = machine.reduce()
-    contact_time = float(record.contact_fraction.sum(axis=1).mean()) * machine.cycle_period
+    contact_time = record.contact_fraction.mean(axis=0) * machine.cycle_period
     trace = -float(np.trace(model.damping)) * machine.cycle_period
     if isinstance(model, RestitutionModel):
         trace += 2.0 * math.log(model.restitution) * float(record.impacts.sum(axis=1).mean())
     else:
-        trace -= model.contact_damping * float(np.sum(model.tip_shape**2)) * contact_time
+        trace -= float(model.contact_damping @ contact_time) * float(np.sum(model.tip_shape**2))
     return np.asarray(growth.mean(axis=0)), trace
 
 

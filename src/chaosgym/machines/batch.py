@@ -116,20 +116,27 @@ class CompiledBatch(ABC):
         """Run the machines ``which`` (k,) in place; rows of ``arrays`` and ``outcome`` (k,) in that order."""
 
 
-class ModalImpactBatch(CompiledBatch):
-    """Machines of a few modes and one gap."""
+class RestitutionBatch(CompiledBatch):
+    """Machines of one mode and one gap, whose impacts take no time."""
+
+    nested: tuple[str, ...] = ("regimes",)
+    """Parts of the model that are models themselves."""
 
     def __init__(self, machine: "Machine", count: int) -> None:
         super().__init__(machine, count)
         model = machine.reduce()
-        self._regimes = stacked([model.regimes] * count)
-        self._batch = stacked([model._replace(regimes=0.0)] * count)
+        self._parts = [stacked([getattr(model, name)] * count) for name in self.nested]
+        self._batch = stacked([self._flat(model)] * count)
+
+    def _flat(self, model: Any) -> Any:
+        return model._replace(**dict.fromkeys(self.nested, 0.0))
 
     def change(self, i: int, machine: "Machine") -> None:
         """Put another machine into place i, whose motion goes on."""
         model = machine.reduce()
-        put(self._regimes, i, model.regimes)
-        put(self._batch, i, model._replace(regimes=0.0))
+        for name, part in zip(self.nested, self._parts, strict=True):
+            put(part, i, getattr(model, name))
+        put(self._batch, i, self._flat(model))
 
     def set_speeds(self, which: Indices, speeds: Array) -> None:
         """Change the excitation frequencies [Hz]."""
@@ -140,11 +147,19 @@ class ModalImpactBatch(CompiledBatch):
         self._batch.clearance[which] = clearances
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
-        call(advance_beams, self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
+        given = (self._batch, *self._parts, which, self._motions, arrays, self._settings, outcome)
+        call(advance_rigid_beams, *given)
 
 
-class RestitutionBatch(ModalImpactBatch):
-    """The same, for impacts that take no time."""
+class ModalImpactBatch(RestitutionBatch):
+    """Machines of a few modes and one gap."""
+
+    nested = ("regimes", "tables")
+
+    def set_clearances(self, which: Indices, clearances: Array) -> None:
+        """Change the clearances [m]."""
+        self._batch.stops[which] = self._machine.stops_at(clearances)  # type: ignore[attr-defined]
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
-        call(advance_rigid_beams, self._batch, self._regimes, which, self._motions, arrays, self._settings, outcome)
+        given = (self._batch, *self._parts, which, self._motions, arrays, self._settings, outcome)
+        call(advance_beams, *given)

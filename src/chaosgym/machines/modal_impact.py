@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays, Episode
+from chaosgym.core.event_tables import make_tables, shortest_intervals
 from chaosgym.core.fixed_step import advance_fixed_step
-from chaosgym.core.modal_impact import ModalImpactModel, advance
+from chaosgym.core.modal_impact import advance
+from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.core.propagator import Regimes
 from chaosgym.core.restitution import RestitutionModel, advance_restitution
 from chaosgym.core.tangent import Tangents
@@ -29,12 +31,16 @@ Array = NDArray[np.float64]
 MAX_CONDITION = 1e8
 """Largest condition number of a usable set of eigenvectors."""
 
+NEGLIGIBLE = 1e-13
+"""Stiffness and damping, against the largest, of a direction that neither springs nor dampers resist."""
+
 
 class Modes(NamedTuple):
     """Modes of a machine free of contact.
 
-    ``angular_frequency`` (n,) [rad/s]; ``damping`` (n, n) modal damping [1/s]; ``tip_shape``, ``force_shape`` (n,)
-    mass-normalised shapes [kg^-1/2] at the place in the gap and where the force acts.
+    ``angular_frequency`` (n,) [rad/s], 0 for motions of a rigid body; ``damping`` (n, n) modal damping [1/s];
+    ``tip_shape``, ``force_shape`` (n,) mass-normalised shapes [kg^-1/2] at the place in the gap and where the force
+    acts.
     """
 
     angular_frequency: Array
@@ -43,104 +49,167 @@ class Modes(NamedTuple):
     force_shape: Array
 
 
-def _modal_blocks(stiffness: Array, damping: Array) -> tuple[Array, Array, Array]:
-    """Real 2 x 2 blocks of q'' + damping q' + stiffness q = 0: (rotates (n,), rate (n, 2), from_modal (2n, 2n)).
+class Stop(NamedTuple):
+    """A surface that pushes with a spring [N/m] and a damper [N s/m]."""
+
+    stiffness: float
+    damping: float
+
+
+def _modal_blocks(stiffness: Array, damping: Array, rigid: bool) -> tuple[Array, Array]:
+    """Real 2 x 2 blocks of q'' + damping q' + stiffness q = 0: generator (4, n) and from_modal (2n, 2n).
+
+    Where the machine can move as a ``rigid`` body, a direction that neither spring nor damper resists drifts, in a
+    block of its own.
+    """
+    scale = math.sqrt(np.linalg.norm(stiffness, 2)) or 1.0
+    held, directions = np.linalg.eigh(stiffness / scale**2 + damping / scale)
+    loose = (held < NEGLIGIBLE * max(1.0, float(held[-1]))) & rigid
+    blocks, columns = [], []
+    for free in directions[:, loose].T:
+        blocks.append((0.0, 1.0, 0.0, 0.0))
+        columns.append((np.concatenate([free, 0.0 * free]), np.concatenate([0.0 * free, free])))
+    # without such directions, the modes stay as they are, to the last digit
+    basis = directions[:, ~loose] if loose.any() else np.eye(len(stiffness))
+    if basis.shape[1]:
+        own = (basis.T @ stiffness @ basis, basis.T @ damping @ basis)
+        _add_damped(*own, basis, rigid, blocks, columns)
+    first, second = zip(*columns, strict=True)
+    return np.array(blocks).T, np.column_stack([*first, *second])
+
+
+def _add_damped(
+    stiffness: Array,
+    damping: Array,
+    basis: Array,
+    rigid: bool,
+    blocks: list[tuple[float, float, float, float]],
+    columns: list[tuple[Array, Array]],
+) -> None:
+    """Add the blocks of coordinates, columns of ``basis``, that all have a spring or a damper.
 
     A mode that is critically damped to the last digit has one eigenvector instead of two. Its damping is then moved by
     a billionth, which separates the pair.
     """
     n = len(stiffness)
-    scale = math.sqrt(np.linalg.norm(stiffness, 2))
+    scale = math.sqrt(np.linalg.norm(stiffness, 2)) or 1.0
     for nudged in (1.0, 1.0 + 1e-9, 1.0 + 1e-8):
         system = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -nudged * damping]])
         values, vectors = np.linalg.eig(system)
         balanced = vectors * np.concatenate([np.full(n, scale), np.ones(n)])[:, None]
         if np.linalg.cond(balanced / np.linalg.norm(balanced, axis=0)) < MAX_CONDITION:
             break
+    resting = int(np.sum(np.linalg.eigvalsh(stiffness) < NEGLIGIBLE * scale**2)) if rigid else 0
+    values[np.argsort(np.abs(values))[:resting]] = 0.0
+    vectors = np.concatenate([basis @ vectors[:n], basis @ vectors[n:]])
     turning = [i for i in np.argsort(np.abs(values)) if values[i].imag > 0.0]
     decaying = [i for i in np.argsort(np.abs(values)) if values[i].imag == 0.0]
-    rotates, rate, columns = [], [], []
     for i in turning:
-        rotates.append(True)
-        rate.append((min(values[i].real, 0.0), values[i].imag))
-        columns += [vectors[:, i].real, -vectors[:, i].imag]
+        a, b = min(values[i].real, 0.0), values[i].imag
+        blocks.append((a, -b, b, a))
+        columns.append((vectors[:, i].real, -vectors[:, i].imag))
     for i, k in zip(decaying[::2], decaying[1::2], strict=True):
-        rotates.append(False)
-        rate.append((min(values[i].real, 0.0), min(values[k].real, 0.0)))
-        columns += [vectors[:, i].real, vectors[:, k].real]
-    return np.array(rotates), np.array(rate), np.column_stack(columns)
-
-
-def _derivative(rotates: Array, rate: Array) -> Array:
-    """Block-diagonal matrix B of u' = B u."""
-    from scipy.linalg import block_diag
-
-    blocks = [[[a, -b], [b, a]] if turns else [[a, 0.0], [0.0, b]] for turns, (a, b) in zip(rotates, rate, strict=True)]
-    return np.asarray(block_diag(*blocks))
-
-
-def _bound(rotates: Array, row: Array) -> Array:
-    """Coefficients m with |row . exp(B t) u| <= sum m |u| for all t >= 0."""
-    pairs = np.abs(row).reshape(-1, 2)
-    turning = np.hypot(pairs[:, 0], pairs[:, 1])[:, None]
-    return np.where(rotates[:, None], turning, pairs).ravel()
+        blocks.append((min(values[i].real, 0.0), 0.0, 0.0, min(values[k].real, 0.0)))
+        columns.append((vectors[:, i].real, vectors[:, k].real))
 
 
 def _regimes(modes: Modes, *systems: tuple[Array, Array]) -> Regimes:
     """Regimes of several (stiffness, damping) of the same modes."""
-    tip = modes.tip_shape
-    n = len(tip)
-    load = np.concatenate([np.zeros(n), modes.force_shape])
+    n, rigid = len(modes.tip_shape), bool(np.any(modes.angular_frequency == 0.0))
     parts = []
     for matrices in systems:
-        rotates, rate, from_modal = _modal_blocks(*matrices)
-        to_modal = np.linalg.inv(from_modal)
-        derivative = _derivative(rotates, rate)
-        displacement = tip @ from_modal[:n]
-        rows = [displacement]
-        for _ in range(3):
-            rows.append(rows[-1] @ derivative)
-        magnitude = np.stack([_bound(rotates, rows[2]), _bound(rotates, rows[3])])
-        modulus = np.where(rotates[:, None], np.hypot(rate[:, :1], rate[:, 1:]), np.abs(rate)).ravel()
-        parts.append(
-            (
-                rotates,
-                rate,
-                to_modal,
-                from_modal,
-                np.stack(rows[:3]),
-                magnitude,
-                to_modal @ load,
-                modulus,
-                modulus.max(),
-            )
-        )
+        generator, from_modal = _modal_blocks(*matrices, rigid)
+        # the modulus of a pair is the root of its determinant, of two real eigenvalues the larger one
+        turns = generator[2] != 0.0
+        modulus = np.where(turns, np.hypot(generator[0], generator[2]), np.max(np.abs(generator[[0, 3]]), axis=0))
+        output = modes.tip_shape @ from_modal[:n]
+        parts.append((generator, np.linalg.inv(from_modal), from_modal, output, modulus.max()))
     return Regimes(*(np.ascontiguousarray(np.stack(part)) for part in zip(*parts, strict=True)))
 
 
-def flexible_model(modes: Modes, contact_stiffness: float, contact_damping: float) -> ModalImpactModel:
-    """Model of a machine whose surfaces are a spring [N/m] and a damper [N s/m]; not yet at an operating point."""
+def _settled(generator: Array, force: Array) -> tuple[Array, Array]:
+    """Position of rest (2n,) of modal coordinates under a constant force (2n,), and the rate of those without one."""
+    n = generator.shape[1]
+    rest, drift = np.zeros(2 * n), np.zeros(2 * n)
+    for j, (p, q, r, s) in enumerate(generator.T):
+        pair = [j, n + j]
+        if r != 0.0:
+            rest[pair] = -np.linalg.solve([[p, q], [r, s]], force[pair])
+        elif q != 0.0:
+            drift[pair] = force[pair]
+        else:
+            for i, rate in zip(pair, (p, s), strict=True):
+                if rate == 0.0:
+                    drift[i] = force[i]
+                else:
+                    rest[i] = -force[i] / rate
+    return rest, drift
+
+
+def flexible_model(
+    modes: Modes,
+    contact_stiffness: float,
+    contact_damping: float,
+    *,
+    lower: Stop | None = None,
+    static_force: Array | None = None,
+    step_phase: float = ExactEvents.step_phase,
+) -> ModalImpactModel:
+    """Model of a machine with springs [N/m] and dampers [N s/m] for stops, under a sine of 1 N; not yet at a speed.
+
+    Parameters
+    ----------
+    modes
+        The machine free of contact.
+    contact_stiffness, contact_damping
+        Of the upper stop, and of the lower one if ``lower`` is not given.
+    static_force : (n,)
+        Modal force that is always there [N kg^-1/2]; none by default.
+    step_phase
+        For which the tables are made; see ``ExactEvents``.
+    """
     n, tip, stiffness = len(modes.tip_shape), modes.tip_shape, modes.angular_frequency**2
-    pressed_stiffness = np.diag(stiffness) + contact_stiffness * np.outer(tip, tip)
-    pressed_damping = modes.damping + contact_damping * np.outer(tip, tip)
-    regimes = _regimes(modes, (np.diag(stiffness), modes.damping), (pressed_stiffness, pressed_damping))
-    # rest with one surface pressing: (K + k p p') q = k c p, so x - c = -c / (1 + k p' K^-1 p)
-    compliance = contact_stiffness * float(np.sum(tip**2 / stiffness))
-    position = contact_stiffness * (tip / stiffness) / (1.0 + compliance)
-    rest = regimes.to_modal[1] @ np.concatenate([position, np.zeros(n)])
+    upper = Stop(contact_stiffness, contact_damping)
+    stops = [upper] if lower in (None, upper) else [upper, lower]
+    systems = [(np.diag(stiffness), modes.damping)]
+    for stop in stops:
+        push = np.outer(tip, tip)
+        systems.append((np.diag(stiffness) + stop.stiffness * push, modes.damping + stop.damping * push))
+    regimes = _regimes(modes, *systems)
+    static = np.zeros(n) if static_force is None else np.array(static_force, dtype=float)
+    with np.errstate(divide="ignore"):
+        compliance = float(np.sum(np.divide(tip**2, stiffness, where=tip != 0.0, out=np.zeros(n))))
+    rest, drift, penetration = [], [], []
+    for r, stop in enumerate([Stop(0.0, 0.0), *stops]):
+        parts = []
+        for force in (stop.stiffness * tip, static):
+            load = regimes.to_modal[r] @ np.concatenate([np.zeros(n), force])
+            parts.append(_settled(regimes.generator[r], load))
+        rest.append([part[0] for part in parts])
+        drift.append([part[1] for part in parts])
+        # (K + k p p') q = k c p at rest, so the tip rests at x with x - c = -c / (1 + k p' K^-1 p)
+        penetration.append(-1.0 / (1.0 + stop.stiffness * compliance))
+    of_regime = np.array([0.0, *(stop.stiffness for stop in stops)]), np.array([0.0, *(s.damping for s in stops)])
+    shortest = shortest_intervals(regimes, step_phase, 0.0)
+    both = [stops[0], stops[-1]]
+    unit_sine = np.zeros((2, 1, 2, n))
+    unit_sine[0, 0, 1] = modes.force_shape
     return ModalImpactModel(
         excitation_frequency=math.nan,
-        force_amplitude=math.nan,
-        clearance=math.nan,
-        contact_stiffness=contact_stiffness,
-        contact_damping=contact_damping,
+        drive=unit_sine,
+        static_force=static,
+        stops=np.full(2, math.nan),
+        contact_stiffness=np.array([stop.stiffness for stop in both]),
+        contact_damping=np.array([stop.damping for stop in both]),
         stiffness=stiffness,
         damping=modes.damping,
         tip_shape=tip,
-        force_shape=modes.force_shape,
+        pressed=np.array([0, 1, len(stops)]),
         regimes=regimes,
-        rest=np.ascontiguousarray(rest),
-        rest_penetration=-1.0 / (1.0 + compliance),
+        rest=np.array(rest),
+        drift=np.array(drift),
+        rest_penetration=np.array(penetration),
+        tables=call(make_tables, regimes, *of_regime, step_phase, shortest),
     )
 
 
@@ -189,13 +258,30 @@ class ModalImpactMachine(Machine):
         """Duration of one operating cycle [s] at a speed [Hz], or at many."""
         return 1.0 / speed
 
+    @property
+    def force_shape(self) -> Array:
+        """Mass-normalised mode shapes where the force acts, (n,) [kg^-1/2]."""
+        structure = self.structure
+        if isinstance(structure, ModalImpactModel):
+            return np.asarray(structure.drive[0, 0, 1])
+        return structure.force_shape
+
+    @staticmethod
+    def stops_at(clearance: Any) -> Array:
+        """Positions of the upper and the lower stop [m] at a clearance, (2,), or at many, (k, 2)."""
+        return np.stack([clearance, -np.asarray(clearance)], axis=-1)
+
     def reduce(self) -> ModalImpactModel | RestitutionModel:
         """Return the modal model; machines that differ in frequency, force or clearance share the costly part."""
-        return self.structure._replace(
-            excitation_frequency=getattr(self, self.speed_field),
-            force_amplitude=self.force_amplitude,
-            clearance=getattr(self, self.clearance_field),
-        )
+        speed, clearance = getattr(self, self.speed_field), getattr(self, self.clearance_field)
+        structure = self.structure
+        if isinstance(structure, ModalImpactModel):
+            stops = self.stops_at(clearance)
+            return structure._replace(
+                excitation_frequency=speed, drive=self.force_amplitude * structure.drive, stops=stops
+            )
+        force = self.force_amplitude
+        return structure._replace(excitation_frequency=speed, force_amplitude=force, clearance=clearance)
 
     @property
     def natural_frequencies(self) -> Array:
@@ -254,10 +340,10 @@ class ModalImpactMachine(Machine):
         """
         model, n = self.reduce(), len(self.structure.stiffness)
         energy = np.sum(states[:, n:] ** 2 + model.stiffness * states[:, :n] ** 2, axis=1)
-        if model.force_amplitude == 0.0:
+        if self.force_amplitude == 0.0:
             return 0.0 if not energy.any() and not peak_force.any() else math.inf
         instants = np.arange(1, len(states)) * self.cycle_period
-        speed = model.force_amplitude * float(np.linalg.norm(model.force_shape)) * instants
+        speed = self.force_amplitude * float(np.linalg.norm(self.force_shape)) * instants
         surface = math.sqrt(self.contact_stiffness) + self.contact_damping * float(np.linalg.norm(model.tip_shape))
         force = surface * speed
         return max(float(np.max(np.sqrt(energy[1:]) / speed)), float(np.max(peak_force.max(axis=1) / force)))

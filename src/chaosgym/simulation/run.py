@@ -5,6 +5,7 @@ record.peak_force          # (100, 2) newton, upper and lower surface
 """
 
 import os
+import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
 from chaosgym.core import status
+from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines.integrators import ExactEvents, Integrator
@@ -22,6 +24,12 @@ from chaosgym.machines.parameters import parameters_of
 from chaosgym.simulation.record import CycleRecord, MotionState
 
 Array = NDArray[np.float64]
+
+FIRST_SLICE, MAX_GROWTH = 16, 8.0
+"""Cycles of the first call of a kernel, and how much longer than the last one a call may be."""
+
+SLICE_SECONDS = 0.2
+"""Duration that calls of a kernel aim at."""
 
 
 def _run(
@@ -35,7 +43,7 @@ def _run(
     """Status of the kernel, number of cycles that it finished, and the record."""
     arrays = machine.arrays(cycles, samples)
     final = MotionState(state.coordinates.copy(), state.bouncing.copy())
-    outcome, done = machine.run(*final, arrays, integrator, tangents)
+    outcome, done = _in_slices(machine, final, arrays, integrator, tangents)
     record = CycleRecord(
         machine=machine,
         section=arrays.section,
@@ -50,6 +58,23 @@ def _run(
         **machine.further_results(arrays),
     )
     return outcome, done, record
+
+
+def _in_slices(
+    machine: Machine, motion: MotionState, arrays: CycleArrays, integrator: Integrator, tangents: Tangents | None
+) -> tuple[int, int]:
+    """Run a machine by calls of its kernel that are short enough for Ctrl-C to be heard; see ``Machine.run``."""
+    cycles, done, count, outcome = len(arrays.section), 0, FIRST_SLICE, status.OK
+    while done < cycles and outcome == status.OK:
+        part = slice(done, done + count)
+        along = None if tangents is None else tangents._replace(log_growth=tangents.log_growth[part])
+        began = time.perf_counter()
+        rows = CycleArrays(*(array[part] for array in arrays))
+        outcome, finished = machine.run(*motion, rows, integrator, along)
+        spent = max(time.perf_counter() - began, 1e-9)
+        done += finished
+        count = max(1, int(count * min(MAX_GROWTH, SLICE_SECONDS / spent)))
+    return outcome, done
 
 
 def rest_state(machine: Machine) -> MotionState:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
-from chaosgym.core.modal_impact import ModalImpactModel
+from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.core.restitution import RestitutionModel
 from chaosgym.machines.impact_beam.modes import modal_analysis, static_tip_deflection
 from chaosgym.machines.impact_beam.parameters import BeamParameters
@@ -54,5 +54,7 @@ THESIS_IMPACT_BEAM = ImpactBeam()
 
 @lru_cache(maxsize=256)
 def _structure(beam: ImpactBeam) -> ModalImpactModel | RestitutionModel:
-    make = rigid_model if beam.contact_law == "restitution" else flexible_model
-    return make(modal_analysis(beam), beam.contact_stiffness, beam.contact_damping)
+    modes, contact = modal_analysis(beam), (beam.contact_stiffness, beam.contact_damping)
+    if beam.contact_law == "restitution":
+        return rigid_model(modes, *contact)
+    return flexible_model(modes, *contact, step_phase=beam.default_integrator.step_phase)
