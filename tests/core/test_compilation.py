@@ -17,7 +17,7 @@ from chaosgym.simulation import RungeKutta4, simulate, simulate_with_deviations
 
 COUNT = "; print(sum(kernel.stats.cache_misses.values()), sum(kernel.stats.cache_hits.values()))"
 ONE_MACHINE = (
-    "from chaosgym import *; simulate(ImpactBeam(fidelity='rigid'), 1, integrator=RungeKutta4(4000));"
+    "from chaosgym import *; simulate(ImpactBeam(n_modes=1), 1, integrator=RungeKutta4(4000));"
     "from chaosgym.core.fixed_step import advance_fixed_step as kernel" + COUNT
 )
 MANY_MACHINES = (
@@ -25,7 +25,7 @@ MANY_MACHINES = (
     "from chaosgym.core.batch import advance_beams as kernel" + COUNT
 )
 PEAK_FORCE = (
-    "from chaosgym import *; run = simulate(ImpactBeam(fidelity='rigid'), 1, integrator=RungeKutta4(4000));"
+    "from chaosgym import *; run = simulate(ImpactBeam(n_modes=1), 1, integrator=RungeKutta4(4000));"
     "print(run.peak_force.max())"
 )
 

@@ -13,7 +13,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.simulation import RungeKutta4, simulate, simulate_with_deviations
 
-BEAM = ImpactBeam(fidelity="restitution", contact_damping=200.0)
+BEAM = ImpactBeam(contact_law="restitution", n_modes=1, fitted_modes=0, contact_damping=200.0)
 LOSSY = replace(BEAM, contact_damping=2000.0, excitation_frequency=10.0)
 
 

@@ -110,7 +110,15 @@ def test_every_kind_of_slider_crank(keywords: dict[str, Any]) -> None:
 
 def test_a_beam_whose_impacts_take_no_time() -> None:
     """The cheapest rung of the ladder of fidelity runs side by side too."""
-    envs = _pair(BEAM, AutoresetMode.SAME_STEP, fidelity="restitution", job_cycles=20, lowest_speed=29.0)
+    envs = _pair(
+        BEAM,
+        AutoresetMode.SAME_STEP,
+        contact_law="restitution",
+        n_modes=1,
+        fitted_modes=0,
+        job_cycles=20,
+        lowest_speed=29.0,
+    )
     assert _assert_same_episodes(envs, 9) == 6
 
 

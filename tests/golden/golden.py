@@ -26,8 +26,8 @@ BEAMS: dict[str, dict[str, Any]] = {
     "narrow": {"excitation_frequency": 7.0, "clearance": 0.03e-3},
     "wide": {"excitation_frequency": 24.0, "clearance": 0.254e-3},
     "uniform damping": {"damping_family": "uniform", "excitation_frequency": 13.0},
-    "rigid": {"fidelity": "rigid"},
-    "restitution": {"fidelity": "restitution"},
+    "rigid": {"n_modes": 1, "fitted_modes": 0},
+    "restitution": {"contact_law": "restitution", "n_modes": 1, "fitted_modes": 0},
     "many modes": {"n_modes": 12, "event_accuracy": "tightest"},
 }
 

@@ -17,9 +17,9 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
 
 
 @machine_command
-@click.option("--points", type=click.IntRange(1, 1000), default=12, show_default=True, help="Operating points.")
-@click.option("--cycles", type=click.IntRange(20, 10**5), default=120, show_default=True, help="Cycles that count.")
-@click.option("--transient", type=click.IntRange(0, 10**5), default=80, show_default=True, help="Cycles before them.")
+@click.option("--points", type=click.IntRange(1, 1000), default=60, show_default=True, help="Operating points.")
+@click.option("--cycles", type=click.IntRange(20, 10**5), default=200, show_default=True, help="Cycles that count.")
+@click.option("--transient", type=click.IntRange(0, 10**5), default=100, show_default=True, help="Cycles before them.")
 @click.option(
     "--budget",
     type=click.FloatRange(0.0, min_open=True),
@@ -55,13 +55,17 @@ def tradeoff(
 def _tradeoff_lines(result: "Tradeoff") -> list[str]:
     title = (
         f"{'rung':14s} {'method':13s} {'step':>4s} {'us/cycle':>9s} {'cycles/s':>8s} {'path':>8s} {'mean':>8s} "
-        f"{'spread':>8s} {'maximum':>8s} {'Wasserst.':>9s} {'nature':>6s} {'type':>5s} {'points':>6s}"
+        f"{'spread':>8s} {'maximum':>8s} {'Wasserst.':>9s} {'chaotic':>8s} {'nature':>6s} {'type':>5s} {'points':>6s}"
     )
     lines = [title]
     for row in sorted(result.rows, key=lambda row: row.microseconds_per_cycle):
         lines.append(_tradeoff_line(row))
     lines += [f"not run: {setting}: {why}" for setting, why in result.refused.items()]
-    lines += ["", "* on the Pareto front of cost and Wasserstein distance; errors are shares of the reference", ""]
+    lines += ["", "* on the Pareto front of cost and Wasserstein distance; errors are shares of the reference"]
+    if result.noise is not None:
+        scatter = f"two halves of the reference's run are {result.noise:.2g} apart"
+        lines.append(f"chaotic: Wasserstein distance at {result.chaotic} chaotic points, where {scatter}")
+    lines.append("")
     return lines + [f"{scene:28s} {cost:9.1f} us per cycle" for scene, cost in result.costs.items()]
 
 
@@ -73,7 +77,8 @@ def _tradeoff_line(row: "TradeoffRow") -> str:
     return (
         f"{row.rung:14s} {row.method:13s} {row.step:4g} {row.microseconds_per_cycle:9.1f} "
         f"{row.cycles_per_second:8.0f} {share(row.trajectory_error, 8)} {' '.join(share(e, 8) for e in errors)} "
-        f"{share(row.wasserstein, 9)} {share(row.nature_agreement, 6)} {share(row.type_agreement, 5)} {row.points:6d}"
+        f"{share(row.wasserstein, 9)} {share(row.chaotic_wasserstein, 8)} {share(row.nature_agreement, 6)} "
+        f"{share(row.type_agreement, 5)} {row.points:6d}"
         f"{' *' if row.on_front else ''}"
     )
 

@@ -148,11 +148,11 @@ class ImpactBeamEnv(MachineEnv):
     | `wear`            | **bool**  | `False`   | the clearance grows with the damage                          |
     | `sensor_error`    | **float** | `3.0`     | half width of the uniform error of a measured peak force [N] |
     | `render_mode`     | **str**   | `None`    | `"rgb_array"` or `"human"`                                   |
-    | `fidelity`        | **str**   | `None`    | rung of the ladder of models; none is "modes-5"              |
+    | `fidelity`        | **str**   | `None`    | rung of the ladder of models; none is five plain modes       |
     | any field         | **float** |           | of `chaosgym.ImpactBeam`, in SI units                         |
 
-    The rungs of `fidelity` are `"restitution"`, `"rigid"`, `"modes-3"`, `"modes-5"`, `"modes-8"` and `"reference"`; a
-    field that a rung sets may not be given beside it.
+    The rungs of `fidelity` are `"draft"`, `"standard"`, `"fine"` and `"reference"`; a field that a rung sets may not be
+    given beside it.
 
     Tolerances are +-20 % of the clearance, +-20 % of the damping ratio and +-0.2 % of the length. Their machines are
     fixed and seeded: 128 to train on and 32 held out, in Wear 32 and 16. The agent is not told which machine it got.

@@ -135,7 +135,7 @@ def runs_of(machine: Machine) -> list[Run]:
         for extreme, fields in machine.extremes.items()
         for rung in ladder
     ]
-    default = str(type(machine)().rung)
+    default = type(machine)().rung or "as it is"
     runs += [
         Run("1 mode" if count == 1 else f"{count} modes", default, _changed(machine, {}, {"n_modes": count}), None)
         for count in (MODES if "n_modes" in parameters_of(machine) else ())

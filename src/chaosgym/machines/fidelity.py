@@ -1,6 +1,6 @@
 """The fidelity ladder: named rungs of a machine's model, from the cheapest to the reference.
 
-    ImpactBeam(fidelity="modes-3", clearance=0.1e-3)
+    ImpactBeam(fidelity="draft", clearance=0.1e-3)
 
 A rung is a short name for some fields that are set together and that decide accuracy alone. The machine keeps the
 fields, not the name, so that ``dataclasses.replace`` and ``with_settings`` may change any of them afterwards.
@@ -25,6 +25,8 @@ class FidelityLadder:
 
     fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]]
     """Fields that each rung sets, from the cheapest rung to the reference."""
+    former_rungs: ClassVar[Mapping[str, str]] = {}
+    """Rungs of earlier versions, and what stands for them now."""
 
     fidelity: InitVar[str | None] = None
 
@@ -59,6 +61,9 @@ def expand_fidelity(machine: Any, settings: Mapping[str, Any]) -> dict[str, Any]
     if rung is None:
         return others
     ladder = getattr(machine, "fidelity_ladder", {})
+    former = getattr(machine, "former_rungs", {})
+    if rung in former:
+        raise ParameterError(f"fidelity = {rung!r} is no rung any more; allowed: {former[rung]}")
     if rung not in ladder:
         raise ParameterError(f"fidelity = {rung!r} is not one of {', '.join(ladder)}")
     for name, value in ladder[rung].items():

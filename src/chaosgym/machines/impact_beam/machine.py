@@ -25,7 +25,7 @@ class ImpactBeam(BeamParameters):
     @property
     def n_states(self) -> int:
         """Displacement and velocity of every mode."""
-        return 2 * self.n_modes
+        return 2 * (self.n_modes + self.fitted_modes)
 
     @property
     def default_integrator(self) -> ExactEvents:

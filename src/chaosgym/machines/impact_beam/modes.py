@@ -34,7 +34,7 @@ def _assembled(beam: BeamParameters, elements: int) -> tuple[Array, Array, int, 
 
 
 def modal_analysis(beam: BeamParameters, elements: int | None = None) -> Modes:
-    """Natural modes of the beam between the sensors.
+    """Natural modes of the beam between the sensors, then those fitted to all others.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ def modal_analysis(beam: BeamParameters, elements: int | None = None) -> Modes:
     from scipy.linalg import eigh
 
     mass, stiffness, at_force, tip = _assembled(beam, elements or max(MIN_ELEMENTS, 3 * beam.n_modes))
-    wanted = max(beam.n_modes, 2)
-    # the inverse problem, M s = K s / w^2, keeps the slow rocking mode exact on fine meshes
     size = len(mass)
+    wanted = size if beam.fitted_modes else max(beam.n_modes, 2)
+    # the inverse problem, M s = K s / w^2, keeps the slow rocking mode exact on fine meshes
     scale = 1.0 / np.sqrt(np.diag(stiffness))
     try:
         inverse_squares, shapes = eigh(
@@ -58,19 +58,63 @@ def modal_analysis(beam: BeamParameters, elements: int | None = None) -> Modes:
         )
     except np.linalg.LinAlgError as error:
         raise _inseparable(beam) from error
-    if inverse_squares[0] < 1e-14 * inverse_squares[-1]:
+    inverse_squares, shapes = inverse_squares[::-1], shapes[:, ::-1]
+    slowest, slow = float(inverse_squares[0]), max(beam.n_modes, 2)
+    if inverse_squares[slow - 1] < 1e-14 * slowest:
         raise _inseparable(beam)
-    angular = 1.0 / np.sqrt(inverse_squares[::-1])
-    shapes = (scale[:, None] * shapes / np.sqrt(inverse_squares))[:, ::-1]
+    # what rounding leaves of the fastest modes of the mesh bends no tip
+    kept = inverse_squares > 1e-14 * slowest
+    angular = 1.0 / np.sqrt(inverse_squares[kept])
+    shapes = scale[:, None] * shapes[:, kept] / np.sqrt(inverse_squares[kept])
     shapes = shapes * np.where(shapes[tip] < 0.0, -1.0, 1.0)
-    if beam.damping_family == "uniform":
-        ratio = np.full(wanted, beam.damping_ratio)
+    reference, ends = angular[1], np.stack([shapes[tip], shapes[at_force]])
+    if beam.fitted_modes:
+        others = fitted_modes(angular[beam.n_modes :], ends[:, beam.n_modes :], beam.fitted_modes)
+        angular, ends = (
+            np.concatenate([own[..., : beam.n_modes], other], axis=-1)
+            for own, other in zip((angular, ends), others, strict=True)
+        )
     else:
-        ratio = beam.damping_ratio * angular / angular[1]
-    kept = slice(0, beam.n_modes)
-    angular, ratio, force_shape = angular[kept], ratio[kept], shapes[at_force, kept]
-    damping = np.diag(2.0 * ratio * angular) + beam.shaker_damping * np.outer(force_shape, force_shape)
-    return Modes(angular, damping, shapes[tip, kept].copy(), force_shape.copy())
+        angular, ends = angular[: beam.n_modes], ends[:, : beam.n_modes]
+    if beam.damping_family == "uniform":
+        ratio = np.full(len(angular), beam.damping_ratio)
+    else:
+        ratio = beam.damping_ratio * angular / reference
+    damping = np.diag(2.0 * ratio * angular) + beam.shaker_damping * np.outer(ends[1], ends[1])
+    return Modes(angular, damping, ends[0].copy(), ends[1].copy())
+
+
+def fitted_modes(angular: Array, shapes: Array, count: int) -> tuple[Array, Array]:
+    """A few modes that deflect the tip as many do.
+
+    They are the Ritz vectors of the Krylov space of the tip's static deflection, by Lanczos: the nodes 1 / w^2 and
+    weights phi^2 / w^2 of the Gauss quadrature of sum phi_i^2 / w_i^2 over 1 / w_i^2, which match the first 2 count
+    moments of the tip's response to a slow force on it, its compliance first.
+
+    Parameters
+    ----------
+    angular : (m,)
+        Angular frequencies [rad/s] of the modes that are replaced.
+    shapes : (2, m)
+        Their mass-normalised shapes [kg^-1/2] at the tip and at a second place.
+    count
+        Number of modes that replace them.
+
+    References
+    ----------
+    G. H. Golub, G. Meurant, Matrices, Moments and Quadrature with Applications, Princeton 2010, chapter 6.
+    """
+    basis = np.empty((len(angular), count))
+    column = shapes[0] / angular
+    for k in range(count):
+        for _ in range(2):
+            column = column - basis[:, :k] @ (basis[:, :k].T @ column)
+        basis[:, k] = column / np.linalg.norm(column)
+        column = basis[:, k] / angular**2
+    inverse_squares, turn = np.linalg.eigh(basis.T @ (basis / angular[:, None] ** 2))
+    fitted = 1.0 / np.sqrt(inverse_squares[::-1])
+    ends = (shapes / angular) @ (basis @ turn[:, ::-1]) * fitted
+    return fitted, ends * np.where(ends[0] < 0.0, -1.0, 1.0)
 
 
 def _inseparable(beam: BeamParameters) -> ParameterError:

@@ -32,12 +32,20 @@ class BeamParameters(ModalImpactMachine):
     """
 
     fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        "restitution": {"contact_law": "restitution", "n_modes": 1, "event_accuracy": "standard"},
-        "rigid": {"contact_law": "linear", "n_modes": 1, "event_accuracy": "standard"},
-        "modes-3": {"contact_law": "linear", "n_modes": 3, "event_accuracy": "standard"},
-        "modes-5": {"contact_law": "linear", "n_modes": 5, "event_accuracy": "standard"},
-        "modes-8": {"contact_law": "linear", "n_modes": 8, "event_accuracy": "standard"},
-        "reference": {"contact_law": "linear", "n_modes": 12, "event_accuracy": "tightest"},
+        rung: {"contact_law": "linear", "n_modes": modes, "fitted_modes": fitted, "event_accuracy": accuracy}
+        for rung, modes, fitted, accuracy in (
+            ("draft", 4, 1, "standard"),
+            ("standard", 4, 2, "standard"),
+            ("fine", 6, 2, "standard"),
+            ("reference", 20, 2, "tightest"),
+        )
+    }
+    former_rungs: ClassVar[Mapping[str, str]] = {
+        "restitution": "contact_law='restitution', n_modes=1, fitted_modes=0",
+        "rigid": "n_modes=1, fitted_modes=0",
+        "modes-3": "fidelity='draft'",
+        "modes-5": "fidelity='standard', or n_modes=5, fitted_modes=0 for the model of the thesis",
+        "modes-8": "fidelity='fine'",
     }
 
     name: ClassVar[str] = "impact-beam"
@@ -142,13 +150,15 @@ class BeamParameters(ModalImpactMachine):
     """How closely contact events are placed where no integrator is given."""
     n_modes: int = parameter(5, low=1, high=40, provenance="printed", source="thesis 5.2.3: 5 degrees of freedom")
     """Modes kept, the rocking mode included."""
+    fitted_modes: int = parameter(0, low=0, high=6, provenance="assumed", source="a matter of computing")
+    """Modes added that stand for all that are left out: they give the tip its compliance."""
 
     def __post_init__(self, fidelity: str | None) -> None:
         super().__post_init__(fidelity)
-        if self.contact_law == "restitution" and self.n_modes > 1:
+        if self.contact_law == "restitution" and self.n_modes + self.fitted_modes > 1:
             raise ParameterError(
-                f"n_modes = {self.n_modes} is out of range; allowed: 1 with contact_law = 'restitution', whose beam is "
-                "rigid"
+                f"n_modes = {self.n_modes} and fitted_modes = {self.fitted_modes} are out of range; allowed: 1 and 0 "
+                "with contact_law = 'restitution', whose beam is rigid"
             )
         if self.force_position > self.length:
             raise ParameterError(
