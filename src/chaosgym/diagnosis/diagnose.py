@@ -126,8 +126,12 @@ def diagnosed_run(
     searched = 0
     while True:
         stage = _stage(machine, record, growth, searched)
-        verdict = _periodic(stage) or _periodic_within(stage, sensor_error)
-        if verdict is not None or 2 * len(record) > budget:
+        last = 2 * len(record) > budget
+        if last or _periodic(stage) or _periodic_within(stage, sensor_error):
+            if stage.verdict.nature == "undetermined":
+                # only the last stage needs step II
+                stage = replace(stage, verdict=two_step_test(record))
+            verdict = _periodic(stage) or _periodic_within(stage, sensor_error)
             break
         searched = stage.cycles_used - len(record)
         more, more_growth = deviation.run(len(record))
@@ -159,7 +163,7 @@ def _with_update_test(machine: Machine, verdict: Diagnosis, record: CycleRecord,
 
 
 def _stage(machine: Machine, record: CycleRecord, growth: Array, searched: int) -> _Stage:
-    verdict = two_step_test(record)
+    verdict = two_step_test(record, repeats_only=True)
     exponent = average_growth(growth[len(growth) // 2 :], machine.cycle_period)
     orbit, spent = None, 0
     if verdict.period is not None or exponent.sign < 0:

@@ -143,7 +143,7 @@ class Deviation:
     def run(self, cycles: int) -> tuple[CycleRecord, Array]:
         """Run on; return the record and the logarithm of the deviation's growth in each cycle, (cycles,)."""
         exact = self._integrator is None or isinstance(self._integrator, ExactEvents)
-        if isinstance(self._machine, ImpactBeam) and exact:
+        if self._machine.carries_deviations and exact:
             integrator = self._integrator if isinstance(self._integrator, ExactEvents) else None
             record, vectors, growth = simulate_with_deviations(
                 self._machine, cycles, self.state, deviations=self._direction, integrator=integrator

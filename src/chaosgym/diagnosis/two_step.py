@@ -65,6 +65,7 @@ def two_step_test(
     tolerance: float = TOLERANCE,
     max_period: int = MAX_PERIOD,
     initial_transient: int = INITIAL_TRANSIENT,
+    repeats_only: bool = False,
 ) -> Diagnosis:
     """Tell the nature of a response.
 
@@ -82,6 +83,8 @@ def two_step_test(
     initial_transient
         Cycles that the motion may take to come near a periodic motion; if it is irregular for longer, it is transient
         chaos.
+    repeats_only
+        Leave out step II, which costs most: "undetermined" where the motion does not repeat.
 
     Raises
     ------
@@ -122,6 +125,11 @@ def two_step_test(
     decay = find_decay(scaled, max_period) if sensor_error == 0.0 else None
     if decay is not None:
         return _approaching(decay, evidence)
+    if repeats_only:
+        reason = "does not repeat"
+        return Diagnosis(
+            nature="undetermined", period=None, margin=0.0, horizon=len(samples), evidence=evidence, reason=reason
+        )
     verdict = _step_two(series, evidence, sensor_error)
     longest = (len(samples) - len(samples) // 2) // NOISY_REPEATS
     if verdict.nature == "undetermined" and sensor_error > 0.0 and longest < max_period:
