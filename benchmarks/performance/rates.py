@@ -42,6 +42,16 @@ STEPS = {"chaosgym": (200, 5), "CartPole-v1": (5000, 500), "HalfCheetah-v5": (10
 OTHER_ENVIRONMENTS = ("CartPole-v1", "HalfCheetah-v5")
 
 
+RANGE = [
+    (float(frequency), float(clearance))
+    for frequency in np.geomspace(4.0, 30.0, 5)
+    for clearance in np.geomspace(0.03e-3, 0.254e-3, 4)
+]
+"""Frequencies [Hz] and clearances [m] of the points over which the beam's rate is averaged."""
+
+RANGE_CYCLES = 100
+"""Cycles of a timed run at each."""
+
 Measure = Callable[[Any, int], Rate]
 
 
@@ -51,11 +61,13 @@ def benchmark(repeats: int = 5, *, progress: bool = False) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``cycles``, ``env_steps``, ``vector_env_steps``, ``sweep_points``, ``classifier_rows``: by name, how many
+        ``range``, the mean over the beam's range and its ends, then ``cycles``, ``env_steps``, ``vector_env_steps``,
+        ``sweep_points``, ``classifier_rows``: by name, how many
         ``per_second`` and ``per_processor_second``. ``load_average``: how busy the computer was before and after.
     """
     beam, crank = THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK
     environments = {name: name for name in _environments()}
+    results: dict[str, Any] = {"load_average": {"before": os.getloadavg()[0]}, "range": beam_range(repeats)}
     work: dict[str, tuple[Measure, dict[str, Any]]] = {
         "cycles": (cycle_rate, _points()),
         "env_steps": (env_rate, environments),
@@ -63,7 +75,6 @@ def benchmark(repeats: int = 5, *, progress: bool = False) -> dict[str, Any]:
         "sweep_points": (sweep_rate, {beam.name: beam, crank.name: crank}),
         "classifier_rows": (classifier_rate, {beam.name: beam.name}),
     }
-    results: dict[str, Any] = {"load_average": {"before": os.getloadavg()[0]}}
     with tqdm(total=sum(len(subjects) for _, subjects in work.values()), desc="bench", disable=not progress) as bar:
         for quantity, (measure, subjects) in work.items():
             results[quantity] = {}
@@ -72,6 +83,22 @@ def benchmark(repeats: int = 5, *, progress: bool = False) -> dict[str, Any]:
                 bar.update()
     results["load_average"]["after"] = os.getloadavg()[0]
     return results
+
+
+def beam_range(repeats: int) -> dict[str, dict[str, float]]:
+    """Cycles of the beam over its range of frequency and clearance: the mean cycle, the cheapest and the dearest."""
+    found = {}
+    for frequency, clearance in RANGE:
+        beam = replace(THESIS_IMPACT_BEAM, excitation_frequency=frequency, clearance=clearance)
+        name = f"{frequency:.3g} Hz, {1e3 * clearance:.3g} mm"
+        found[name] = np.array(cycle_rate((beam, ExactEvents(), RANGE_CYCLES), repeats))
+    by_cost = sorted(found, key=lambda name: -found[name][1])
+    mean = 1.0 / np.mean([1.0 / both for both in found.values()], axis=0)
+    return {
+        f"impact beam, mean cycle of {len(RANGE)} points": Rate(*mean.tolist())._asdict(),
+        f"cheapest: {by_cost[0]}": Rate(*found[by_cost[0]].tolist())._asdict(),
+        f"dearest: {by_cost[-1]}": Rate(*found[by_cost[-1]].tolist())._asdict(),
+    }
 
 
 def _points() -> dict[str, tuple[Machine, Integrator, int]]:

@@ -41,6 +41,7 @@ def test_every_rate_comes_out_positive(monkeypatch: pytest.MonkeyPatch) -> None:
     """The command prints one JSON object with finite rates by name, ours beside CartPole."""
     monkeypatch.setattr(rates, "SUB_ENVIRONMENTS", 2)
     monkeypatch.setattr(rates, "SWEEP_POINTS", 1)
+    monkeypatch.setattr(rates, "RANGE", rates.RANGE[:2])
     monkeypatch.setattr(rates, "STEPS", dict.fromkeys(rates.STEPS, (2, 1)))
     monkeypatch.setattr(rates, "_points", lambda: {name: (m, i, 2) for name, (m, i, _) in list(_points().items())[:1]})
     monkeypatch.setattr(rates, "sweep_rate", lambda machine, repeats: rate(lambda: 1, repeats))
@@ -57,6 +58,8 @@ def test_every_rate_comes_out_positive(monkeypatch: pytest.MonkeyPatch) -> None:
         for figure in both.values()
     ]
     assert len(figures) >= 16
+    mean, cheapest, dearest = (both["per_processor_second"] for both in result["range"].values())
+    assert dearest <= mean <= cheapest
     assert all(math.isfinite(figure) and figure > 0.0 for figure in figures)
 
 
