@@ -1,0 +1,246 @@
+r"""Which part of a record is the sensor's? Its stated or estimated error, single wrong readings, and missing cycles.
+
+Peaks are compared with those one period earlier. What all cycles scatter by is noise or chaos; what single cycles
+leave by far, and return from at once, is a wrong reading: a machine would need some cycles to come back.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.errors import DiagnosisError
+
+Array = NDArray[np.float64]
+
+LONGEST_PERIOD = 64
+"""Longest period that is looked for."""
+
+REPEATS = 6
+"""How often a period must be seen before cycles are compared with it."""
+
+FAR = 8.0
+"""Robust standard deviations beyond which a reading may be wrong."""
+
+OUTLIER_SHARE = 0.02
+"""Share of the cycles that may be wrong readings; more of them belong to the motion."""
+
+MOST_GAPS = 4
+"""Places at which cycles may be missing."""
+
+NORMAL = 1.4826
+"""Standard deviation of a normal variable over its median absolute deviation."""
+
+
+class SensorError(NamedTuple):
+    """Error of one reading, in the unit of the record.
+
+    ``half_width`` is its largest value, ``sigma`` its standard deviation; ``source`` says which of them was "stated",
+    or "estimated" from the record.
+    """
+
+    half_width: float
+    sigma: float
+    source: str
+
+
+def stated_error(half_width: float | None, sigma: float | None) -> SensorError | None:
+    """Error that was stated as a half width or as a standard deviation; None if neither was.
+
+    Raises
+    ------
+    DiagnosisError
+        If both are given, or one is negative or not finite.
+    """
+    if half_width is not None and sigma is not None:
+        raise DiagnosisError("the sensor's error is given twice; allowed: --sensor-error or --sensor-sigma")
+    for name, value in (("error", half_width), ("sigma", sigma)):
+        if value is not None and not (math.isfinite(value) and value >= 0.0):
+            raise DiagnosisError(f"sensor {name} = {value:g} N is out of range; allowed: finite, 0 or more")
+    if half_width is not None:
+        return SensorError(half_width, half_width / math.sqrt(3.0), "stated")
+    return None if sigma is None else SensorError(3.0 * sigma, sigma, "stated")
+
+
+def quantum(values: Array) -> float:
+    """Step of a converter whose multiples all values are; 0 if there is none."""
+    levels = np.unique(values)
+    if len(levels) < 2 or 3 * len(levels) > len(values):
+        return 0.0
+    step = float(np.min(np.diff(levels)))
+    steps = (levels - levels[0]) / step
+    whole = np.max(np.abs(steps - np.round(steps))) < 1e-3
+    return step if whole and step > 1e-6 * float(np.max(np.abs(values))) else 0.0
+
+
+def local_scatter(values: Array, period: int) -> float:
+    """Robust standard deviation of a reading, from the differences of cycles one period apart."""
+    differences = values[period:] - values[:-period]
+    return float(NORMAL * np.median(np.abs(differences - np.median(differences))) / math.sqrt(2.0))
+
+
+def dominant_period(values: Array, floor: float = 0.0) -> int:
+    """Smallest period after which readings come back nearly as well as after any other.
+
+    Parameters
+    ----------
+    values : (cycles,)
+        Readings.
+    floor
+        Differences that do not count.
+    """
+    longest = max(1, min(LONGEST_PERIOD, len(values) // REPEATS))
+    back = np.array([np.median(np.abs(values[k:] - values[:-k])) for k in range(1, longest + 1)])
+    return int(np.flatnonzero(back <= 1.3 * back.min() + floor)[0]) + 1
+
+
+class Repaired(NamedTuple):
+    """A record without wrong readings, and with a stand-in for every missing cycle.
+
+    ``outliers`` are the cycles whose readings are wrong, ``gaps`` those before which cycles are missing, both counted
+    from 1 in the record as it was read.
+    """
+
+    values: Array
+    outliers: tuple[int, ...]
+    gaps: tuple[int, ...]
+
+
+def repair(values: Array) -> Repaired:
+    """Replace single wrong readings, and fill in missing cycles of a response that otherwise repeats."""
+    floor = max(quantum(values), 1e-6 * float(np.max(np.abs(values))))
+    period = dominant_period(values, 0.5 * floor)
+    whole, origin = _with_missing_cycles(values, period, floor)
+    gaps = tuple(int(origin[place + 1]) + 1 for place in np.flatnonzero(origin < 0) if origin[place + 1] >= 0)
+    expected = _running_medians(whole, np.arange(len(whole)) % period, period)
+    limit = max(FAR * local_scatter(whole, period), 2.5 * floor)
+    wrong = np.flatnonzero(np.abs(whole - expected) > limit)
+    if len(wrong) == 0 or len(wrong) > max(1.0, OUTLIER_SHARE * len(whole)) or _longest_run(wrong) > 2:
+        return Repaired(whole, (), gaps)
+    mended = whole.copy()
+    mended[wrong] = expected[wrong]
+    return Repaired(mended, tuple(int(origin[place]) + 1 for place in wrong if origin[place] >= 0), gaps)
+
+
+def _running_medians(values: Array, phase: NDArray[np.int64], period: int, reach: int = 4) -> Array:
+    """Median of the readings of the same phase up to ``reach`` periods away, for each reading."""
+    expected = np.empty_like(values)
+    for first in range(period):
+        column = values[phase == first]
+        width = min(2 * reach + 1, len(column))
+        starts = np.clip(np.arange(len(column)) - reach, 0, len(column) - width)
+        windows = np.lib.stride_tricks.sliding_window_view(column, width)[starts]
+        expected[phase == first] = np.median(windows, axis=1)
+    return expected
+
+
+def _longest_run(places: NDArray[np.intp]) -> int:
+    """Most places in succession."""
+    breaks = np.flatnonzero(np.diff(places) > 1)
+    return int(np.max(np.diff(np.concatenate([[-1], breaks, [len(places) - 1]]))))
+
+
+def _with_missing_cycles(values: Array, period: int, floor: float) -> tuple[Array, NDArray[np.int64]]:
+    """(record with stand-ins for missing cycles, which reading each is, -1 for a stand-in)."""
+    whole, origin = values, np.arange(len(values))
+    for _ in range(MOST_GAPS if period > 1 else 0):
+        limit = max(6.0 * local_scatter(whole, period), 2.5 * floor)
+        start = _first_slip(np.abs(whole[period:] - whole[:-period]) > limit, period)
+        if start is None:
+            break
+        place = start + period
+        missing = min(range(1, period), key=lambda count: _misfit(whole, place, count, period))
+        if _misfit(whole, place, missing, period) > limit:
+            break
+        stand_in = whole[place - period : place - period + missing]
+        whole = np.concatenate([whole[:place], stand_in, whole[place:]])
+        origin = np.insert(origin, place, np.full(missing, -1))
+    return whole, origin
+
+
+def _first_slip(far: NDArray[np.bool_], period: int) -> int | None:
+    """First place from which most differences over one period are far, and none over the period after it."""
+    for start in np.flatnonzero(far):
+        during, after = far[start : start + period], far[start + period : start + 3 * period]
+        if len(after) >= period and not after.any() and during.mean() > 0.5 and during.sum() >= 2:
+            return int(start)
+    return None
+
+
+def _misfit(values: Array, place: int, missing: int, period: int) -> float:
+    """Largest difference over one period if ``missing`` cycles lack before ``place``."""
+    later = values[place : place + period]
+    earlier = values[place - period : place]
+    return float(np.median(np.abs(later - np.roll(earlier, -missing)[: len(later)])))
+
+
+def predictability(values: Array, residual: Array) -> float:
+    r"""How well do earlier readings predict what is left of a reading? About normal(0, 1) for a random sensor error.
+
+    The nearest neighbours of each delay vector (one to four readings) predict the residual of the next reading; the
+    correlation with what came, times the root of the number of cycles, is the figure. Autocorrelation counts as well.
+
+    References
+    ----------
+    G. Sugihara, R. M. May, Nonlinear forecasting as a way of distinguishing chaos from measurement error in time
+    series, Nature 344 (1990), 734-741.
+    """
+    if np.ptp(residual) == 0.0:
+        return 0.0
+    values, residual = values[-MOST_READINGS:], residual[-MOST_READINGS:]
+    return max(_forecast(values, residual, delays) for delays in (1, 2, 3, 4))
+
+
+MOST_READINGS = 600
+"""Readings, the last ones, that the forecast uses."""
+
+
+def _forecast(values: Array, residual: Array, delays: int, neighbours: int = 3) -> float:
+    vectors = np.lib.stride_tricks.sliding_window_view(values[:-1], delays)
+    following = residual[delays:]
+    distance = np.max(np.abs(vectors[:, None] - vectors[None]), axis=2)
+    np.fill_diagonal(distance, np.inf)
+    nearest = np.argpartition(distance, neighbours, axis=1)[:, :neighbours]
+    told = following[nearest].mean(axis=1)
+    if np.ptp(told) == 0.0 or np.ptp(following) == 0.0:
+        return 0.0
+    return float(np.corrcoef(told, following)[0, 1] * math.sqrt(len(following)))
+
+
+def class_residual(values: Array, period: int) -> Array:
+    """Readings less the mean of all readings of the same phase, (cycles,)."""
+    phase = np.arange(len(values)) % period
+    means = np.bincount(phase, weights=values) / np.bincount(phase)
+    return np.asarray(values - means[phase])
+
+
+def without_drift(values: Array, period: int) -> tuple[Array, float]:
+    """(readings without a linear drift, change over the record); 0 if there is none to be sure of."""
+    size = len(values)
+    time = (np.arange(size) - 0.5 * (size - 1)) / size
+    residual = class_residual(values, period)
+    slope = float(np.sum(time * residual) / np.sum(time**2))
+    left = residual - slope * time
+    error = float(np.std(left)) / np.sqrt(np.sum(time**2))
+    if abs(slope) <= max(6.0 * error, 1e-9 * float(np.max(np.abs(values)))):
+        return values, 0.0
+    return values - slope * time, slope
+
+
+def nonlinear_part(residual: Array, lags: int = 4) -> Array:
+    """What a linear forecast from the last readings leaves of a residual, (cycles - lags,): coloured noise goes."""
+    centred = residual - residual.mean()
+    past = np.lib.stride_tricks.sliding_window_view(centred[:-1], lags)
+    weights = np.linalg.lstsq(past, centred[lags:], rcond=None)[0]
+    return np.asarray(centred[lags:] - past @ weights)
+
+
+def correlation(residual: Array, lags: int = 10) -> float:
+    """Largest autocorrelation over the first lags, times the root of the number of cycles."""
+    centred = residual - residual.mean()
+    power = float(np.sum(centred**2))
+    if power == 0.0:
+        return 0.0
+    found = [abs(float(np.sum(centred[k:] * centred[:-k]))) for k in range(1, min(lags, len(residual) // 4) + 1)]
+    return max(found, default=0.0) / power * math.sqrt(len(residual))
