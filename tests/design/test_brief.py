@@ -7,7 +7,7 @@ import pytest
 from chaosgym.design import Criteria
 from chaosgym.design.brief import brief_from, read_brief, template
 from chaosgym.design.measured import evaluate_peaks, read_peaks
-from chaosgym.design.units import parse_quantity
+from chaosgym.machines.units import parse_quantity
 from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import MACHINES, ImpactBeam

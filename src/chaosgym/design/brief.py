@@ -10,7 +10,7 @@ from typing import Any
 from chaosgym.design.criteria import Criteria, variation_region
 from chaosgym.design.improve import default_changes
 from chaosgym.design.methodology import SERIES_SIZE
-from chaosgym.design.units import parse_quantity
+from chaosgym.machines.units import parse_quantity
 from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError
 from chaosgym.machines import MACHINES, Machine

@@ -40,7 +40,7 @@ FEWEST_CYCLES, SHORT_RECORD = 8, 16
 LARGEST_FORCE = 1e9
 """Force [N] beyond which a unit must be wrong."""
 
-RANDOM = 4.0
+RANDOM = 3.6
 """Predictability below which a scatter may be a sensor's."""
 
 SMALL_SCATTER, LARGE_SCATTER = 0.02, 0.08

@@ -1,21 +1,22 @@
 """How is a quantity written? A number and a unit, such as ``0.127 mm``: a bare number would invite a wrong guess.
 
 Each unit of a field has its alternatives and what one of them is in the field's own unit. A frequency of a cycle and a
-rotation differ by 60, never by 2 pi. Units that are not listed are written as the field states them.
+rotation differ by 60, never by 2 pi. Units that are not listed are written as the field states them. µ is u.
 """
 
 from collections.abc import Mapping
 from typing import Any
 
-from chaosgym.errors import DesignError
+from chaosgym.errors import ParameterError
 
 ALTERNATIVES: Mapping[str, Mapping[str, float]] = {
     "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3},
     "Hz": {"Hz": 1.0, "kHz": 1e3, "rpm": 1.0 / 60.0},
     "rpm": {"rpm": 1.0, "Hz": 60.0},
-    "N": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605},
+    "N": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "lbf": 4.4482216152605},
     "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "ksi": 6894757.293168},
     "kg": {"kg": 1.0, "g": 1e-3},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
     "Mcycles": {"Mcycles": 1.0, "cycles": 1e-6},
     "deg": {"deg": 1.0},
     "-": {"": 1.0, "%": 1e-2},
@@ -42,32 +43,59 @@ def parse_quantity(name: str, given: Any, unit: str) -> float:
 
     Raises
     ------
-    DesignError
+    ParameterError
         If the unit is missing or unknown, or the number is none; says what is allowed.
     """
     allowed = units_of(unit)
     listed = ", ".join(each or "no unit" for each in allowed)
     if isinstance(given, bool) or not isinstance(given, int | float | str):
-        raise DesignError(f"{name} = {given!r} is not a quantity; allowed: a number with a unit ({listed})")
+        raise ParameterError(f"{name} = {given!r} is not a quantity; allowed: a number with a unit ({listed})")
     if not isinstance(given, str):
         if unit != "-":
             best = next(iter(allowed))
-            raise DesignError(f'{name} = {given:g} has no unit; write {name} = "{given:g} {best}" (allowed: {listed})')
+            raise ParameterError(f'{name} = {given:g} has no unit; write {name} = "{given:g} {best}" (allowed: {listed})')
         return float(given)
     number, written = _split(given)
     try:
         value = float(number)
     except ValueError:
-        raise DesignError(f"{name} = {given!r} does not begin with a number") from None
+        raise ParameterError(f"{name} = {given!r} does not begin with a number") from None
     if written not in allowed:
         what = f"has the unknown unit {written!r}" if written else "has no unit"
-        raise DesignError(f"{name} = {given!r} {what} (allowed: {listed})")
+        raise ParameterError(f"{name} = {given!r} {what} (allowed: {listed})")
     return value * allowed[written]
+
+
+def parse_option(name: str, text: str, unit: str, bare: str) -> float:
+    """Value in the field's own unit, where a number without a unit is in the unit ``bare``.
+
+    Raises
+    ------
+    ParameterError
+        If the unit is unknown, or the number is none; says what is allowed.
+    """
+    number, written = _split(text)
+    try:
+        value = float(number if written else text)
+    except ValueError:
+        raise ParameterError(
+            f"{name} = {text!r} is not a valid float, nor one with a unit ({', '.join(filter(None, units_of(unit)))})"
+        ) from None
+    return parse_quantity(name, f"{value!r} {written or bare}", unit) if written or bare else value
+
+
+LOOKS_SCALED = (100.0, 10_000.0)
+"""Multiples of a machine's usual length between which a bare number in metres was probably meant in millimetres."""
+
+
+def looks_like_millimetres(value: float, usual: float) -> bool:
+    """Whether a length [m] is about a thousand times the usual one."""
+    return usual != 0.0 and LOOKS_SCALED[0] < abs(value / usual) < LOOKS_SCALED[1]
 
 
 def _split(text: str) -> tuple[str, str]:
     """Number and unit: ``30 Hz`` and ``2%``."""
-    words = text.strip().split(maxsplit=1)
+    words = text.strip().replace("\u00b5", "u").replace("\u03bc", "u").split(maxsplit=1)
     if len(words) == 2:
         return words[0], " ".join(words[1].split())
     word = words[0] if words else ""
