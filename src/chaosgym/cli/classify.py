@@ -3,12 +3,12 @@
 import os
 import sys
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 import click
 
 from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, verdict_lines
 from chaosgym.cli.output import emit
 from chaosgym.machines.registry import MACHINES
 
@@ -20,21 +20,17 @@ def _quick_start(arguments: list[str]) -> None:
 
 
 @machine_command(required=False, before=_quick_start)
-@click.option(
-    "--peaks", type=click.Path(), help="Judge measured peak forces [N]: CSV, one run a column; - is standard input."
-)
 @click.option("--follow", is_flag=True, help="Judge peaks from standard input as they come, one a line: a monitor.")
-@click.option("--sensor-error", type=click.FloatRange(0.0), help="Largest error of a measured peak [N], if known.")
 @click.option("--batch", type=click.Path(exists=True, dir_okay=False), help="Judge every row of a Parquet file.")
 @click.option("--out", type=click.Path(dir_okay=False), help="Parquet file for the answers of --batch.")
+@measured_options
 @click.option(
     "--model", type=click.Path(exists=True, dir_okay=False), help="Classifier file; default: the shipped one."
 )
 def classify(
     machine: Any,
-    peaks: str | None,
+    measured: Measured,
     follow: bool,
-    sensor_error: float | None,
     batch: str | None,
     out: str | None,
     model: str | None,
@@ -43,21 +39,20 @@ def classify(
     """Tell the response type (I, II, III) and the nature by the learned classifier, without simulating."""
     if machine is None:
         raise click.UsageError(f"give a machine: {', '.join(MACHINES)}")
-    if sum(map(bool, (peaks, follow, batch))) > 1:
-        raise click.UsageError("--peaks, --follow and --batch exclude each other")
+    if sum(map(bool, (measured, follow, batch))) > 1:
+        raise click.UsageError("--peaks or --series, --follow and --batch exclude each other")
     if bool(batch) != bool(out):
         raise click.UsageError("--batch FILE and --out FILE belong together: give both or neither")
-    if sensor_error is not None and not (peaks or follow):
-        raise click.UsageError("--sensor-error belongs to --peaks or --follow")
+    half_width = _half_width(measured, follow)
     from chaosgym.classifier import MachineClassifier, default_classifier
 
     classifier = MachineClassifier.load(model) if model else default_classifier(machine.name)
     if classifier.machine.name != machine.name:
         raise click.UsageError(f"--model {model} knows {classifier.machine.name}, not {machine.name}")
     if follow:
-        _follow(classifier, sys.stdin, sensor_error, as_json)
-    elif peaks:
-        _classify_peaks(classifier, peaks, sensor_error, as_json)
+        _follow(classifier, sys.stdin, half_width, as_json)
+    elif measured:
+        _classify_measured(classifier, measured, half_width, as_json)
     elif batch and out:
         _classify_batch(classifier, batch, out, as_json)
     else:
@@ -82,24 +77,41 @@ def _lines(subject: str, answer: Any) -> list[str]:
     return [head, *bars, *([f"  peak force of a settled cycle [N], quantiles {forces}"] if forces else [])]
 
 
-def _classify_peaks(classifier: Any, source: str, sensor_error: float | None, as_json: bool) -> None:
-    from chaosgym.classifier.peak_files import read_peaks
+def _half_width(measured: Measured, follow: bool) -> float | None:
+    """Half width [N] of the stated error; None if none is stated."""
+    from chaosgym.signals.noise import stated_error
+
+    told = stated_error(measured.sensor_error, measured.sensor_sigma)
+    if told is not None and not (measured or follow):
+        raise click.UsageError("--sensor-error belongs to --peaks, --series or --follow")
+    return None if told is None else told.half_width
+
+
+def _classify_measured(classifier: Any, measured: Measured, half_width: float | None, as_json: bool) -> None:
+    """Print the one verdict on each run, and the classifier's chances as further evidence."""
     from chaosgym.errors import DiagnosisError
 
-    runs = read_peaks(sys.stdin if source == "-" else Path(source))
-    answers = {}
-    for name, record in runs.items():
-        try:
-            answers[name] = classifier.classify_record(record, sensor_error=sensor_error)
-        except DiagnosisError as error:
-            raise DiagnosisError(f"{'standard input' if source == '-' else source}, run {name!r}: {error}") from error
     machine = classifier.machine.name
-    if len(answers) == 1:
-        (answer,) = answers.values()
-        emit({"machine": machine, **answer.as_dict()}, as_json, lambda: _lines(f"{machine}, measured", answer))
-        return
-    result = {"machine": machine, "runs": {name: answer.as_dict() for name, answer in answers.items()}}
-    emit(result, as_json, lambda: [line for name, answer in answers.items() for line in _lines(name, answer)])
+    results, lines = {}, []
+    runs = measured_runs(measured, several=True)
+    for run in runs:
+        try:
+            learned = classifier.classify_record(run.peaks, sensor_error=half_width)
+        except DiagnosisError as error:
+            raise DiagnosisError(f"{run.source}, run {run.name!r}: {error}") from error
+        verdict = run.verdict.diagnosis
+        results[run.name] = {
+            **learned.as_dict(),
+            "nature": verdict.nature,
+            "period": verdict.period,
+            "learned_nature": learned.nature,
+            "verdict": run_as_dict(run),
+        }
+        lines += verdict_lines(f"{machine}, measured" if len(runs) == 1 else run.name, run)
+        lines += [f"  learned {line.strip()}" if not place else line for place, line in enumerate(_lines(machine, learned))]
+    (only,) = results.values() if len(results) == 1 else (None,)
+    result = {"machine": machine, **only} if only else {"machine": machine, "runs": results}
+    emit(result, as_json, lambda: lines)
 
 
 def _classify_batch(classifier: Any, source: str, out: str, as_json: bool) -> None:
@@ -119,13 +131,15 @@ def _classify_batch(classifier: Any, source: str, out: str, as_json: bool) -> No
 def _follow(classifier: Any, lines: Iterable[str], sensor_error: float | None, as_json: bool) -> None:
     """Print a verdict each cycle; the last 64 cycles count."""
     from chaosgym.classifier.features import MIN_CYCLES
-    from chaosgym.classifier.peak_files import parse_peak
+    from chaosgym.signals.read import parse_reading
 
     record: list[float] = []
     for number, line in enumerate(lines, start=1):
-        peak = parse_peak(line, number, first=not record)
+        peak = parse_reading(line, number, first=not record)
         if peak is None:
             continue
+        if peak < 0.0:
+            raise click.UsageError(f"standard input, line {number}: {peak:g} N is a negative force; allowed: 0 and more")
         record.append(peak)
         missing = MIN_CYCLES - len(record)
         answer = classifier.classify_record(record, sensor_error=sensor_error) if missing <= 0 else None

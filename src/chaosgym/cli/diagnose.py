@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, verdict_lines
 from chaosgym.cli.output import emit
 from chaosgym.machines.registry import MACHINES
 
@@ -21,33 +22,30 @@ from chaosgym.machines.registry import MACHINES
 @click.option("--budget", type=click.IntRange(100, 10**7), default=3200, show_default=True, help="Cycles at the most.")
 @click.option("--types", is_flag=True, help="Also tell the response type (I, II, III) over the tolerances.")
 @click.option("--step-check", is_flag=True, help="Repeat with a finer step and say whether the verdict stays.")
-@click.option("--peaks", type=click.Path(), help="Judge measured peak forces instead: one column, one line a cycle.")
-@click.option("--series", type=click.Path(), help="Judge a measured time series instead: columns time [s] and value.")
-@click.option("--period-s", type=float, help="Operating cycle of the series [s].")
-@click.option("--sensor-error", type=float, default=0.0, show_default=True, help="Differences within it do not count.")
+@measured_options
 def diagnose(
     machine: Any,
     test: str,
     budget: int,
     types: bool,
     step_check: bool,
-    peaks: str | None,
-    series: str | None,
-    period_s: float | None,
-    sensor_error: float,
+    measured: Measured,
     as_json: bool,
 ) -> None:
     """Tell periodic from chaotic: a machine by simulation, or a measured signal."""
-    if peaks or series:
-        if machine or types or step_check or (peaks and series) or (series and period_s is None):
-            raise click.UsageError("give --peaks FILE, or --series FILE with --period-s T, or a machine")
-        result, lines = _diagnose_measured(peaks, series, period_s, sensor_error)
+    if measured:
+        if machine or types or step_check:
+            raise click.UsageError("--peaks and --series go without a machine, --types and --step-check")
+        (run,) = measured_runs(measured)
+        result, lines = run_as_dict(run), verdict_lines(run.source, run)
     elif machine is None:
         raise click.UsageError(f"give a machine ({', '.join(MACHINES)}), --peaks FILE or --series FILE")
     elif test == "mut":
         result, lines = _matrix_update(machine)
     else:
-        result, lines = _diagnose_machine(machine, budget, types, step_check, sensor_error)
+        if measured.sensor_sigma is not None:
+            raise click.UsageError("--sensor-sigma belongs to --peaks or --series")
+        result, lines = _diagnose_machine(machine, budget, types, step_check, measured.sensor_error or 0.0)
     emit(result, as_json, lambda: lines)
 
 
@@ -62,37 +60,12 @@ def _verdict_lines(subject: str, verdict: Any, summary: Mapping[str, float], uni
     ]
 
 
-def _summary(values: Any) -> dict[str, float]:
-    return {
-        "min": float(values.min()),
-        "max": float(values.max()),
-        "mean": float(values.mean()),
-        "std": float(values.std()),
-    }
-
-
-def _diagnose_measured(
-    peaks: str | None, series: str | None, period: float | None, sensor_error: float
-) -> tuple[dict[str, Any], list[str]]:
-    from chaosgym.diagnosis import two_step_test
-    from chaosgym.diagnosis.measured import read_columns, samples_per_period
-
-    if peaks:
-        samples = read_columns(peaks, 1)[:, 0]
-    else:
-        time, value = read_columns(str(series), 2).T
-        samples = samples_per_period(time, value, float(period or 0.0))
-    verdict = two_step_test(samples, sensor_error=sensor_error)
-    summary = _summary(samples if peaks else samples[:, 1])
-    result = {"file": peaks or series, **verdict.as_dict(), "peak_force_summary_N": summary, "warnings": []}
-    return result, _verdict_lines(str(peaks or series), verdict, summary, "")
-
-
 def _matrix_update(machine: Any) -> tuple[dict[str, Any], list[str]]:
+    from chaosgym.design.statistics import summary as summarize
     from chaosgym.diagnosis import matrix_update_test
 
     verdict = matrix_update_test(machine)
-    summary = _summary(verdict.judged.peak_force[:, 0])
+    summary = summarize(verdict.judged.peak_force[:, 0])
     result = {"machine": machine.name, **verdict.as_dict(), "peak_force_summary_N": summary, "warnings": []}
     return result, _verdict_lines(f"{machine.name}, Matrix Update Test", verdict, summary, " N")
 
@@ -100,11 +73,12 @@ def _matrix_update(machine: Any) -> tuple[dict[str, Any], list[str]]:
 def _diagnose_machine(
     machine: Any, budget: int, types: bool, check: bool, sensor_error: float
 ) -> tuple[dict[str, Any], list[str]]:
+    from chaosgym.design.statistics import summary as summarize
     from chaosgym.diagnosis import diagnose, response_type
     from chaosgym.diagnosis.step_check import step_check
 
     verdict = diagnose(machine, budget=budget, sensor_error=sensor_error)
-    summary = _summary(verdict.judged.peak_force[:, 0])
+    summary = summarize(verdict.judged.peak_force[:, 0])
     exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
     result = {
         "machine": machine.name,

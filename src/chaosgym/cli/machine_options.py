@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from chaosgym.cli.quantity import Quantity, note_millimetres
 from chaosgym.errors import ParameterError
 from chaosgym.machines.options import Choice, Number, Option
 from chaosgym.machines.registry import MACHINES
@@ -74,7 +75,7 @@ def _options_of(machines: Iterable[str]) -> dict[str, click.Option]:
     return {
         name: click.Option(
             [name],
-            type=click.Choice(list(kind.words)) if isinstance(kind, Choice) else float,
+            type=click.Choice(list(kind.words)) if isinstance(kind, Choice) else Quantity(kind.unit),
             help=f"[{', '.join(owners[name])}]",
         )
         for name, kind in kinds.items()
@@ -107,7 +108,7 @@ def machine_command(
         "--fidelity", metavar="RUNG", help="Rung of the machine's ladder of models, such as rigid or reference."
     )(wrapped)
     wrapped = click.option(
-        "--set", "settings", multiple=True, metavar="FIELD=VALUE", help="Any field of the machine, in SI; repeatable."
+        "--set", "settings", multiple=True, metavar="FIELD=VALUE", help="Any field of the machine, in SI or with its unit ('clearance=0.1 mm'); repeatable."
     )(wrapped)
     wrapped = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")(wrapped)
     wrapped = click.argument("machine", type=MachineName(), required=required)(wrapped)
@@ -145,7 +146,7 @@ def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...]
             numbers[field] = option
             fields[field] = _checked(owner, option, kind._replace(field=field), given[option])
     for text in settings:
-        field, value = _setting(text)
+        field, value = _setting(owner, text)
         if field in numbers:
             raise click.UsageError(f"{field} is given twice: by {numbers[field]} and by --set")
         fields[field] = value
@@ -165,12 +166,19 @@ def _checked(owner: Any, option: str, number: Number, value: float) -> float:
         raise click.UsageError(f"{option} = {value:g} is out of range; allowed: {low:g} to {high:g}{unit}") from error
 
 
-def _setting(text: str) -> tuple[str, Any]:
-    """Parse FIELD=VALUE."""
+def _setting(owner: Any, text: str) -> tuple[str, Any]:
+    """Parse FIELD=VALUE; a number may have a unit."""
+    from chaosgym.machines.parameters import parameters_of
+    from chaosgym.machines.units import parse_option
+
     field, separator, value = text.partition("=")
     if not separator or not field or not value:
         raise click.UsageError(f"--set {text!r} is not of the form FIELD=VALUE")
-    try:
-        return field, int(value) if value.lstrip("+-").isdigit() else float(value)
-    except ValueError:
+    described = parameters_of(owner).get(field)
+    if described is None or described.choices:
         return field, value
+    unit = "" if described.unit == "-" else described.unit
+    number = parse_option(field, value, described.unit, unit)
+    if value.strip()[-1].isdigit():
+        note_millimetres(field, {value.strip(): number}, float(getattr(owner(), field)), described.unit)
+    return field, number

@@ -65,6 +65,12 @@ def as_forces(forces: ArrayLike, minimum: int = 1) -> Array:
     return values
 
 
+def summary(values: ArrayLike) -> dict[str, float]:
+    """Smallest, largest, mean and standard deviation of readings, for people and JSON."""
+    readings = np.asarray(values, dtype=float)
+    return {name: float(getattr(readings, name)()) for name in ("min", "max", "mean", "std")}
+
+
 @dataclass(frozen=True)
 class RunningStatistics:
     """Mean and standard deviation of the first n cycles, in the unit of the force; all arrays (cycles,)."""

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.diagnosis.response import Diagnosis, Nature
-from chaosgym.diagnosis.two_step import CHAOTIC_CYCLES, INITIAL_TRANSIENT, two_step_test
+from chaosgym.diagnosis.response import Diagnosis
+from chaosgym.diagnosis.two_step import INITIAL_TRANSIENT, MAX_LINES, QUASIPERIODIC_CYCLES, two_step_test
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals.changes import find_change
+from chaosgym.signals.lines import without_lines
 from chaosgym.signals.noise import (
     REPEATS,
     SensorError,
@@ -43,10 +44,14 @@ LARGEST_FORCE = 1e9
 RANDOM = 3.6
 """Predictability below which a scatter may be a sensor's."""
 
-SMALL_SCATTER, LARGE_SCATTER = 0.02, 0.08
-"""Standard deviations, as shares of the mean force: random scatter below is a sensor's, above it a machine's."""
+SMALL_SCATTER, LARGE_SCATTER = 0.015, 0.08
+"""Standard deviations, as shares of the mean force: random scatter below the first is a sensor's without being stated;
+a stated error above the second hides what would matter."""
 
-ENOUGH_CYCLES = 60
+TORUS_REST = 0.3
+"""Share of its standard deviation that the lines of a torus may leave."""
+
+ENOUGH_CYCLES = 100
 """Cycles from which random scatter can be told from chaos without a stated error."""
 
 MOST_PARTS = 3
@@ -124,6 +129,8 @@ def judge_peaks(
     parts = _parts(whole, resolved / math.sqrt(3.0) + 1e-5 * float(np.max(np.abs(whole))), MOST_PARTS)
     verdicts = [_judge_part(part, told, resolved) for part in parts]
     verdict = _joined(verdicts, [len(part) for part in parts])
+    if len(parts) > 2 and verdict.diagnosis.nature == "undetermined":
+        verdict = _judge_part(whole, told, resolved)
     changes = tuple(int(place) + 1 for place in np.cumsum([len(part) for part in parts])[:-1])
     notes = [*verdict.notes]
     if outliers:
@@ -209,9 +216,13 @@ class _Scatter:
     period: int
     drift: float
     sigma: float
-    relative: float
+    mean: float
     forecast: float
     nonlinear: float
+
+    @property
+    def relative(self) -> float:
+        return self.sigma / self.mean if self.mean else 0.0
 
     @property
     def random(self) -> bool:
@@ -242,7 +253,7 @@ def _scatter(readings: Array, floor: float) -> _Scatter:
     rest = nonlinear_part(residual)
     nonlinear = predictability(level[-len(rest) :], rest) if forecast >= RANDOM else 0.0
     mean = float(np.mean(np.abs(readings)))
-    return _Scatter(level, period, drift, sigma, sigma / mean if mean else 0.0, forecast, nonlinear)
+    return _Scatter(level, period, drift, sigma, mean, forecast, nonlinear)
 
 
 def _judge_part(readings: Array, told: SensorError | None, resolved: float) -> MeasuredVerdict:
@@ -250,11 +261,13 @@ def _judge_part(readings: Array, told: SensorError | None, resolved: float) -> M
     size = len(readings)
     if size < SHORT_RECORD:
         return MeasuredVerdict(_undetermined(f"{size} cycles are too few to judge", readings), told)
-    exact = two_step_test(readings)
-    if exact.nature in ("periodic", "quasiperiodic") or exact.transient:
-        return MeasuredVerdict(exact, told or SensorError(0.0, 0.0, "estimated"))
-    found = _scatter(readings, resolved / math.sqrt(3.0))
-    notes = (f"drifts by {found.drift:.3g} N over the record",) if found.drift else ()
+    found, exact = None, two_step_test(readings)
+    if exact.nature == "chaotic" and not exact.transient or exact.nature == "undetermined":
+        found = _scatter(readings, resolved / math.sqrt(3.0))
+        exact = two_step_test(found.readings) if found.drift else exact
+    notes = (f"drifts by {found.drift:.3g} N over the record",) if found is not None and found.drift else ()
+    if found is None or exact.nature in ("periodic", "quasiperiodic"):
+        return MeasuredVerdict(exact, told or SensorError(0.0, 0.0, "estimated"), notes=notes)
     judge = _with_stated if told is not None else _with_estimated
     return replace(judge(found, told, resolved), notes=notes)
 
@@ -281,7 +294,7 @@ def _open(found: _Scatter, reason: str, error: SensorError | None) -> MeasuredVe
 def _with_stated(found: _Scatter, told: SensorError | None, resolved: float) -> MeasuredVerdict:
     assert told is not None
     size = len(found.readings)
-    sigma = math.hypot(told.sigma, resolved / math.sqrt(3.0))
+    sigma = math.hypot(told.sigma, resolved)
     most = sigma * (1.05 + 3.0 / math.sqrt(2.0 * (size - found.period)))
     half_width = told.half_width + resolved
     if found.sigma > most:
@@ -291,7 +304,8 @@ def _with_stated(found: _Scatter, told: SensorError | None, resolved: float) -> 
                 "random: a worse sensor, or the machine"
             )
             return _open(found, reason, told)
-        return _irregular(found, half_width, told)
+        lead = f"irregular beyond the sensor's error of {_newton(half_width)}"
+        return _torus(found, most, told) or _irregular(found, half_width, lead, told)
     if not found.random:
         reason = f"can't tell: varies within the sensor's error of {_newton(half_width)}, but not at random"
         return _open(found, reason, told)
@@ -313,30 +327,53 @@ def _with_estimated(found: _Scatter, told: SensorError | None, resolved: float) 
     share = f"the scatter of {100.0 * found.relative:.2g} %"
     ask = "could be sensor or machine; state the sensor's error"
     if not found.random:
-        if found.nonlinear < RANDOM and found.relative < SMALL_SCATTER:
-            exact = two_step_test(found.readings, sensor_error=3.0 * found.sigma)
-            return _open(found, f"{share} wanders slowly and {ask}", error)
-        return _irregular(found, resolved, None)
-    if found.relative >= LARGE_SCATTER and size >= CHAOTIC_CYCLES:
-        return _irregular(found, resolved, None)
+        torus = _torus(found, max(SMALL_SCATTER * found.mean, resolved), None)
+        if torus is not None or found.nonlinear < RANDOM:
+            return torus or _open(found, f"{share} wanders slowly, and {ask}", None)
+        if _few_lines(found):
+            return _open(found, f"a few lines of the spectrum and a random rest: quasiperiodic or chaotic, as {share} {ask}", None)
+        return _irregular(found, resolved, f"irregular beyond any random error: {share} can be forecast", None)
     if found.relative <= SMALL_SCATTER and (size >= ENOUGH_CYCLES or found.relative <= 0.1 * SMALL_SCATTER):
-        return _periodic(found, 3.0 * found.sigma, "taken for the sensor's error, as it is small and random", error)
-    return _open(found, f"{share} {ask}", error)
+        return _periodic(found, 3.0 * found.sigma, "a sensor's error by its size; state the sensor's if you know it", error)
+    return _open(found, f"{share} {ask}", None)
 
 
-def _irregular(found: _Scatter, beyond: float, told: SensorError | None) -> MeasuredVerdict:
-    """Chaotic, quasiperiodic or undetermined: step II for what does not repeat within the error."""
+def _torus(found: _Scatter, most: float, told: SensorError | None) -> MeasuredVerdict | None:
+    """Quasiperiodic, if a few lines leave no more than the sensor's error; None if they leave more."""
     size = len(found.readings)
-    second = two_step_test(found.readings, sensor_error=beyond)
-    evidence = {**second.evidence, **found.evidence()}
-    error = told
-    lead = f"irregular beyond {_newton(beyond)}"
-    nature: Nature = second.nature if second.nature != "periodic" else "undetermined"
-    reason = f"{lead}: {second.reason}"
+    if size < QUASIPERIODIC_CYCLES or found.forecast < 2.0 * RANDOM:
+        return None
+    rest, lines = without_lines(found.readings, MAX_LINES, 0.5 * most if told is None else most)
+    sigma = float(np.std(rest))
+    if sigma > min(most, TORUS_REST * float(np.std(found.readings))) or correlation(rest) > 2.0 * RANDOM:
+        return None
+    reason = f"does not repeat; {lines} lines of the spectrum leave {_newton(sigma)}, no more than the sensor's error"
+    evidence = {"cycles": size, **found.evidence(), "spectral_lines": lines}
     diagnosis = Diagnosis(
-        nature=nature, period=None, margin=second.margin, reason=reason, horizon=size, evidence=evidence
+        nature="quasiperiodic", period=None, margin=1.0 - sigma / most, reason=reason, horizon=size, evidence=evidence
     )
-    return MeasuredVerdict(diagnosis, error)
+    return MeasuredVerdict(diagnosis, told or SensorError(3.0 * sigma, sigma, "estimated"))
+
+
+def _few_lines(found: _Scatter) -> bool:
+    """Whether a few lines leave a rest that is half as large and can't be forecast, as a torus and noise do."""
+    rest, _ = without_lines(found.readings, MAX_LINES // 2, 0.1 * float(np.std(found.readings)))
+    smaller = float(np.std(rest)) < 0.5 * float(np.std(found.readings))
+    return smaller and predictability(found.readings, rest) < RANDOM
+
+
+def _irregular(found: _Scatter, beyond: float, lead: str, told: SensorError | None) -> MeasuredVerdict:
+    """Chaotic, quasiperiodic or undetermined: step II for what does not repeat within the error."""
+    second = two_step_test(found.readings, sensor_error=beyond)
+    diagnosis = Diagnosis(
+        nature=second.nature if second.nature != "periodic" else "undetermined",
+        period=None,
+        margin=second.margin,
+        reason=f"{lead}: {second.reason}",
+        horizon=len(found.readings),
+        evidence={**second.evidence, **found.evidence()},
+    )
+    return MeasuredVerdict(diagnosis, told)
 
 
 def _newton(force: float) -> str:

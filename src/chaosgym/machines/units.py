@@ -74,13 +74,16 @@ def parse_option(name: str, text: str, unit: str, bare: str) -> float:
     ParameterError
         If the unit is unknown, or the number is none; says what is allowed.
     """
-    number, written = _split(text)
     try:
-        value = float(number if written else text)
+        value, written = float(text), ""
     except ValueError:
-        raise ParameterError(
-            f"{name} = {text!r} is not a valid float, nor one with a unit ({', '.join(filter(None, units_of(unit)))})"
-        ) from None
+        number, written = _split(text)
+        try:
+            value = float(number)
+        except ValueError:
+            listed = ", ".join(filter(None, units_of(unit)))
+            told = f", nor one with a unit ({listed})" if listed else ""
+            raise ParameterError(f"{name}: {text!r} is not a valid float{told}") from None
     return parse_quantity(name, f"{value!r} {written or bare}", unit) if written or bare else value
 
 

@@ -1,0 +1,152 @@
+"""Options of measured signals, the same for ``diagnose``, ``classify`` and ``design``, and what they read."""
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import click
+
+from chaosgym.cli.quantity import Quantity
+
+OPTIONS = (
+    click.option("--peaks", metavar="FILE", help="Peak forces, one a cycle: CSV, Parquet, .npy, .mat; - is stdin."),
+    click.option("--series", metavar="FILE", help="A force over time: the same formats, WAV and UFF; - is stdin."),
+    click.option("--column", metavar="NAME", help="Column of the force, where there are several (name or number)."),
+    click.option("--unit", metavar="UNIT", help="Unit of the force, if the file does not name it; default N."),
+    click.option("--rate-hz", type=Quantity("Hz"), help="Sampling rate of --series, if it has no time column."),
+    click.option("--hz", type=Quantity("Hz"), help="Cycles a second of --series; without it, the spectrum's line."),
+    click.option("--rpm", type=Quantity("rpm"), help="Cycles a minute instead."),
+    click.option("--period-s", type=Quantity("s"), help="Duration of a cycle instead."),
+    click.option("--tachometer", metavar="NAME", help="Column of --series that rises once a cycle instead."),
+    click.option(
+        "--sensor-error",
+        type=Quantity("N"),
+        help="Largest error of a reading (half width). Smaller differences are none.",
+    ),
+    click.option(
+        "--sensor-sigma",
+        type=Quantity("N"),
+        help="Standard deviation of a reading instead. Without either it is estimated from the record.",
+    ),
+)
+
+
+class Measured(NamedTuple):
+    """What the options say."""
+
+    peaks: str | None
+    series: str | None
+    column: str | None
+    unit: str | None
+    rate_hz: float | None
+    hz: float | None
+    rpm: float | None
+    period_s: float | None
+    tachometer: str | None
+    sensor_error: float | None
+    sensor_sigma: float | None
+
+    def __bool__(self) -> bool:
+        return bool(self.peaks or self.series)
+
+
+class Run(NamedTuple):
+    """One measured run: its peaks, what sampling leaves open, the verdict, and where it comes from."""
+
+    name: str
+    peaks: Any
+    verdict: Any
+    source: str
+    sha256: str
+    notes: tuple[str, ...]
+
+
+def measured_options(function: Callable[..., None]) -> Callable[..., None]:
+    """Add the options; the function receives them as ``measured``."""
+
+    @functools.wraps(function)
+    def wrapped(**keywords: Any) -> None:
+        given = Measured(**{name: keywords.pop(name) for name in Measured._fields})
+        _check(given)
+        function(measured=given, **keywords)
+
+    for option in reversed(OPTIONS):
+        wrapped = option(wrapped)
+    return wrapped
+
+
+def _check(given: Measured) -> None:
+    if given.peaks and given.series:
+        raise click.UsageError("--peaks and --series exclude each other")
+    of_series = ("rate_hz", "hz", "rpm", "period_s", "tachometer")
+    for name in of_series:
+        if getattr(given, name) is not None and not given.series:
+            raise click.UsageError(f"--{name.replace('_', '-')} belongs to --series")
+    if (given.column or given.unit) and not given:
+        raise click.UsageError("--column and --unit belong to --peaks or --series")
+    if given.tachometer and any((given.hz, given.rpm, given.period_s)):
+        raise click.UsageError("--tachometer and a stated cycle exclude each other")
+
+
+def measured_runs(given: Measured, *, several: bool = False) -> list[Run]:
+    """Read and judge what was measured: one run, or one a column where ``several`` are welcome."""
+    from chaosgym.diagnosis.measured import judge_peaks
+    from chaosgym.errors import DiagnosisError
+    from chaosgym.signals.columns import check_peaks, choose_force, forces
+    from chaosgym.signals.cycles import cycle_period, peaks_of_series
+    from chaosgym.signals.read import read_recording
+
+    recording = read_recording(given.peaks or given.series or "-")
+    found = []
+    if given.series:
+        period = cycle_period(given.rpm, given.hz, given.period_s)
+        signal, cut = peaks_of_series(
+            recording, given.column, given.unit, rate_hz=given.rate_hz, period=period, tachometer=given.tachometer
+        )
+        found.append((signal, cut.peaks, cut.resolution, (f"{len(cut.peaks)} cycles", *cut.notes)))
+    else:
+        chosen = forces if several else lambda *of: [choose_force(*of)]
+        for signal in chosen(recording, given.column, given.unit):
+            found.append((signal, check_peaks(signal, recording), 0.0, ()))
+    runs = []
+    for signal, peaks, resolution, notes in found:
+        try:
+            verdict = judge_peaks(
+                peaks, sensor_error=given.sensor_error, sensor_sigma=given.sensor_sigma, resolution=resolution
+            )
+        except DiagnosisError as error:
+            run = f", run {signal.name!r}" if len(found) > 1 else ""
+            raise DiagnosisError(f"{recording.source}{run}: {error}") from error
+        runs.append(
+            Run(signal.name, peaks, verdict, recording.source, recording.sha256, (f"read {signal.described}", *notes))
+        )
+    return runs
+
+
+def verdict_lines(subject: str, run: Run) -> list[str]:
+    """Lines for people: nature, why, how the readings lie, what was left out, and what was read."""
+    from chaosgym.design.statistics import summary
+
+    verdict, told = run.verdict.diagnosis, summary(run.peaks)
+    period = f", period {verdict.period}" if verdict.period else ""
+    return [
+        f"{subject}: {verdict.nature}{period} (margin {verdict.margin:.2f})",
+        f"  {verdict.reason}",
+        *(f"  {note}" for note in run.verdict.notes),
+        f"  {told['min']:.2f} to {told['max']:.2f} N, mean {told['mean']:.2f} N, standard deviation {told['std']:.2f} N",
+        *(f"  {note}" for note in run.notes),
+    ]
+
+
+def run_as_dict(run: Run) -> dict[str, Any]:
+    """Values of a run for JSON."""
+    from chaosgym.design.statistics import summary
+
+    return {
+        "file": run.source,
+        "column": run.name,
+        "sha256": run.sha256,
+        **run.verdict.as_dict(),
+        "peak_force_summary_N": summary(run.peaks),
+        "warnings": [*run.verdict.notes, *run.notes],
+    }
