@@ -7,10 +7,10 @@ import pytest
 from chaosgym.design import Criteria
 from chaosgym.design.brief import brief_from, read_brief, template
 from chaosgym.design.measured import evaluate_peaks, read_peaks
-from chaosgym.machines.units import parse_quantity
 from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import MACHINES, ImpactBeam
+from chaosgym.machines.units import parse_quantity
 
 CRITERIA = '[criteria]\nload_rating = "500 N"\nlife = "10 Mcycles"\nreliability = 0.99\n'
 

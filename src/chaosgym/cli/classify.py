@@ -108,7 +108,9 @@ def _classify_measured(classifier: Any, measured: Measured, half_width: float | 
             "verdict": run_as_dict(run),
         }
         lines += verdict_lines(f"{machine}, measured" if len(runs) == 1 else run.name, run)
-        lines += [f"  learned {line.strip()}" if not place else line for place, line in enumerate(_lines(machine, learned))]
+        lines += [
+            f"  learned {line.strip()}" if not place else line for place, line in enumerate(_lines(machine, learned))
+        ]
     (only,) = results.values() if len(results) == 1 else (None,)
     result = {"machine": machine, **only} if only else {"machine": machine, "runs": results}
     emit(result, as_json, lambda: lines)
@@ -139,7 +141,9 @@ def _follow(classifier: Any, lines: Iterable[str], sensor_error: float | None, a
         if peak is None:
             continue
         if peak < 0.0:
-            raise click.UsageError(f"standard input, line {number}: {peak:g} N is a negative force; allowed: 0 and more")
+            raise click.UsageError(
+                f"standard input, line {number}: {peak:g} N is a negative force; allowed: 0 and more"
+            )
         record.append(peak)
         missing = MIN_CYCLES - len(record)
         answer = classifier.classify_record(record, sensor_error=sensor_error) if missing <= 0 else None

@@ -1,15 +1,21 @@
 """May a designer rely on the machine? ``design``."""
 
+import datetime
+
 import click
 
+from chaosgym.cli.measured_options import Measured, measured_options, measured_runs
 from chaosgym.cli.output import emit
+from chaosgym.cli.quantity import Quantity
 
 
 @click.command()
 @click.argument("brief", type=click.Path(dir_okay=False), required=False, metavar="[FILE.toml]")
 @click.option("--template", metavar="MACHINE", help="Print a commented brief of a machine, ready to edit.")
-@click.option("--peaks", type=click.Path(dir_okay=False), help="CSV of measured peak forces [N], one a cycle.")
-@click.option("--load-rating", type=float, metavar="N", help="With --peaks and no brief: load rating [N].")
+@measured_options
+@click.option(
+    "--load-rating", type=Quantity("N"), help="With measured forces and no brief: load rating of the surface."
+)
 @click.option("--out", type=click.Path(dir_okay=False), help="HTML report to write, with a JSON file beside it.")
 @click.option("--overwrite", is_flag=True, help="Replace the report if it exists.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the machines in tolerance.")
@@ -18,7 +24,7 @@ from chaosgym.cli.output import emit
 def design(
     brief: str | None,
     template: str | None,
-    peaks: str | None,
+    measured: Measured,
     load_rating: float | None,
     out: str | None,
     overwrite: bool,
@@ -28,22 +34,31 @@ def design(
 ) -> None:
     """Say whether a machine meets its criteria within its tolerances, and what to change if not."""
     from chaosgym.design import brief as briefs
-    from chaosgym.design import measured
     from chaosgym.design.criteria import Criteria
+    from chaosgym.design.measured import evaluate_peaks
     from chaosgym.design.study import study
     from chaosgym.plotting import design_report as report
 
     if template is not None:
         return click.echo(briefs.template(template), nl=False)
-    if (brief is None) == (load_rating is None or peaks is None):
+    if (brief is None) == (load_rating is None or not measured):
         raise click.UsageError("give a brief (see --template), or --peaks FILE.csv with --load-rating")
     if out is not None:
         report.report_paths(out, overwrite)
     asked = briefs.read_brief(brief) if brief is not None else None
-    if peaks is not None:
+    if measured:
         criteria = asked.criteria if asked is not None else Criteria(load_rating=load_rating or 0.0)
-        found = measured.evaluate_peaks(measured.read_peaks(peaks), criteria)
-        page, result, lines = report.measured_report(found), found.as_dict(), found.lines()
+        (run,) = measured_runs(measured)
+        source = {
+            "file": run.source,
+            "sha256": run.sha256,
+            "column": run.name,
+            "date": datetime.date.today().isoformat(),
+            "read": "; ".join(run.notes),
+        }
+        stated = asked.stated if asked is not None else ("load_rating",)
+        found = evaluate_peaks(run.peaks, criteria, verdict=run.verdict, stated=stated, source=source)
+        page, result, lines = report.measured_report(found), found.as_dict(), [*found.lines(), *run.notes]
     elif asked is not None:
         answer = study(asked, seed=seed, workers=workers, progress=True)
         page, result, lines = (

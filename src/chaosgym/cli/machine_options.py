@@ -108,7 +108,11 @@ def machine_command(
         "--fidelity", metavar="RUNG", help="Rung of the machine's ladder of models, such as rigid or reference."
     )(wrapped)
     wrapped = click.option(
-        "--set", "settings", multiple=True, metavar="FIELD=VALUE", help="Any field of the machine, in SI or with its unit ('clearance=0.1 mm'); repeatable."
+        "--set",
+        "settings",
+        multiple=True,
+        metavar="FIELD=VALUE",
+        help="Any field of the machine, in SI or with its unit ('clearance=0.1 mm'); repeatable.",
     )(wrapped)
     wrapped = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")(wrapped)
     wrapped = click.argument("machine", type=MachineName(), required=required)(wrapped)

@@ -133,7 +133,8 @@ def verdict_lines(subject: str, run: Run) -> list[str]:
         f"{subject}: {verdict.nature}{period} (margin {verdict.margin:.2f})",
         f"  {verdict.reason}",
         *(f"  {note}" for note in run.verdict.notes),
-        f"  {told['min']:.2f} to {told['max']:.2f} N, mean {told['mean']:.2f} N, standard deviation {told['std']:.2f} N",
+        f"  {told['min']:.2f} to {told['max']:.2f} N, mean {told['mean']:.2f} N, "
+        f"standard deviation {told['std']:.2f} N",
         *(f"  {note}" for note in run.notes),
     ]
 

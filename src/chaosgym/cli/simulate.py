@@ -4,6 +4,7 @@ import time
 from typing import Any
 
 import click
+import numpy as np
 
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import emit
@@ -12,13 +13,29 @@ from chaosgym.cli.output import emit
 @machine_command
 @click.option("--cycles", type=click.IntRange(1, 10**7), default=100, show_default=True, help="Cycles to record.")
 @click.option("--transient", type=click.IntRange(0, 10**7), default=0, show_default=True, help="Cycles to skip first.")
-def simulate(machine: Any, cycles: int, transient: int, as_json: bool) -> None:
-    """Run a machine from rest and print the peak force of every cycle."""
+@click.option("--out", type=click.Path(dir_okay=False), help="Peak force of every cycle, all sides: CSV or Parquet.")
+@click.option("--series-out", type=click.Path(dir_okay=False), help="Force and motion over time: CSV or Parquet.")
+@click.option("--samples", type=click.IntRange(8, 10**5), default=256, show_default=True, help="A cycle, --series-out.")
+@click.option("--overwrite", is_flag=True, help="Replace these files if they exist.")
+def simulate(
+    machine: Any,
+    cycles: int,
+    transient: int,
+    out: str | None,
+    series_out: str | None,
+    samples: int,
+    overwrite: bool,
+    as_json: bool,
+) -> None:
+    """Run a machine from rest; print the last peak forces, and write those of every cycle to a file."""
+    from chaosgym.signals.write import check_target, write_table
     from chaosgym.simulation import simulate as run
 
+    for path in filter(None, (out, series_out)):
+        check_target(path, overwrite)
     run(machine, 1)  # compiles, or loads what is compiled
     start = time.process_time()
-    record = run(machine, cycles, transient=transient)
+    record = run(machine, cycles, transient=transient, samples_per_cycle=samples if series_out else 0)
     seconds_per_cycle = (time.process_time() - start) / (transient + cycles)
     peaks = record.peak_force[:, 0]
     result = {
@@ -28,6 +45,16 @@ def simulate(machine: Any, cycles: int, transient: int, as_json: bool) -> None:
         "contact_fraction": record.contact_fraction.sum(axis=1).tolist(),
         "seconds_per_cycle": seconds_per_cycle,
     }
+    no_contact = not record.peak_force.any()
+    result["warnings"] = ["no contact at all: the gap is never closed"] if no_contact else []
+    if out:
+        sides = {f"{side} [N]": record.peak_force[:, place] for place, side in enumerate(machine.sides)}
+        write_table({"cycle": np.arange(1, cycles + 1), **sides}, out)
+    if series_out and record.history is not None:
+        motion = record.history.reshape(-1, record.history.shape[2]).T
+        names = ("displacement [m]", "velocity [m/s]", "force [N]")
+        write_table({"time [s]": record.time, **dict(zip(names, motion, strict=False))}, series_out)
+    result["files"] = [path for path in (out, series_out) if path]
     sensors = dict(zip(machine.sensors, _largest(record.sensor_peak), strict=True))
     if sensors:
         result["largest_sensor_force_N"] = sensors
@@ -42,6 +69,8 @@ def simulate(machine: Any, cycles: int, transient: int, as_json: bool) -> None:
             f"impacts per cycle         {record.impacts.sum(axis=1).mean():.1f}",
             f"share in contact          {record.contact_fraction.sum(axis=1).mean():.2f}",
             *(f"largest force, {name:16s} {force:.2f} N" for name, force in sensors.items()),
+            *result["warnings"],
+            *(f"written to {path}" for path in result["files"]),
             f"computing time            {1e6 * seconds_per_cycle:.0f} us per cycle",
         ],
     )

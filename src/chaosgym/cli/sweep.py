@@ -6,10 +6,17 @@ import click
 
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import emit
+from chaosgym.cli.quantity import note_millimetres
 
 
 @machine_command
-@click.option("--axis", "axes", multiple=True, metavar="FIELD=LOW:HIGH[:COUNT][:lin|log]", help="Repeatable, in SI.")
+@click.option(
+    "--axis",
+    "axes",
+    multiple=True,
+    metavar="FIELD=LOW:HIGH[:COUNT][:lin|log]",
+    help="Repeatable; ends in SI or with a unit (0.1 mm).",
+)
 @click.option("--grid", "sampling", flag_value="grid", default="grid", help="All combinations (default).")
 @click.option("--random", "random_size", type=click.IntRange(1), metavar="N", help="N random points.")
 @click.option("--sobol", "sobol_size", type=click.IntRange(1), metavar="N", help="N points of a Sobol sequence.")
@@ -58,6 +65,7 @@ def sweep(
     """Label many machines and keep them as Parquet; the same command again resumes."""
     from collections import Counter
 
+    from chaosgym.machines.parameters import parameters_of
     from chaosgym.sweeps import Axis, Patch, SweepPlan, run_sweep
     from chaosgym.sweeps.plan import default_axes
 
@@ -68,15 +76,27 @@ def sweep(
     if bool(patches) != bool(machine_count):
         raise click.UsageError("--machines N and --patch belong together: give both or neither")
     kind: Any = given[0] if given else sampling
-    lattice = tuple(Patch.parse(text) for text in patches)
-    chosen = tuple(Axis.parse(text) for text in axes) or (() if lattice else default_axes(machine, kind))
+    described = parameters_of(machine)
+    units = {name: about.unit for name, about in described.items()}
+    lattice = tuple(Patch.parse(text, units) for text in patches)
+    for text in (*axes, *patches):
+        _note_millimetres(machine, text)
+    chosen = tuple(Axis.parse(text, units) for text in axes) or (() if lattice else default_axes(machine, kind))
     plan = SweepPlan(machine, chosen, kind, sizes.get(kind) or 0, seed, lattice, budget, signals, full_types)
     labelled = run_sweep(plan, out, workers=workers, scheduler=scheduler, repair=repair, progress=True)
     counts = {
         name: dict(Counter(str(value) for value in labelled.column(name)))
         for name in ("nature", "response_type", "status")
     }
-    result = {"machine": machine.name, "folder": out, "complete": True, "points": len(labelled.table), **counts}
+    warnings = _warnings(plan, labelled)
+    result = {
+        "machine": machine.name,
+        "folder": out,
+        "complete": True,
+        "points": len(labelled.table),
+        **counts,
+        "warnings": warnings,
+    }
     emit(
         result,
         as_json,
@@ -86,5 +106,31 @@ def sweep(
                 f"  {name:14s}" + ", ".join(f"{key} {count}" for key, count in sorted(counts[name].items()))
                 for name in counts
             ),
+            *(f"  {warning}" for warning in warnings),
         ],
     )
+
+
+def _note_millimetres(machine: Any, text: str) -> None:
+    """Say where the bare ends of an axis look like millimetres."""
+    from chaosgym.machines.parameters import parameters_of
+
+    field, _, span = text.partition("=")
+    ends = span.split(":")[:2]
+    described = parameters_of(machine).get(field)
+    if described is not None and described.unit == "m" and all(end and end[-1].isdigit() for end in ends):
+        note_millimetres(field, {end: float(end) for end in ends}, float(getattr(machine, field)), described.unit)
+
+
+def _warnings(plan: Any, labelled: Any) -> list[str]:
+    """What the counts do not say: points without contact, and why there are no response types."""
+    found = []
+    silent = sum(value == 0.0 for value in labelled.column("impacts_per_cycle").tolist())
+    if silent:
+        found.append(f"{silent} of {len(labelled.table)} points have no contact at all: the gap is never closed")
+    if plan.sampling == "grid" and not plan.type_reach() and plan.full_types < 1.0:
+        found.append(
+            "no response types: they compare points one tolerance apart, and the steps of this grid are wider; use a "
+            "finer grid, --machines with --patch, or --full-types 1"
+        )
+    return found

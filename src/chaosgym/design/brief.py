@@ -10,11 +10,11 @@ from typing import Any
 from chaosgym.design.criteria import Criteria, variation_region
 from chaosgym.design.improve import default_changes
 from chaosgym.design.methodology import SERIES_SIZE
-from chaosgym.machines.units import parse_quantity
 from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError
 from chaosgym.machines import MACHINES, Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
+from chaosgym.machines.units import parse_quantity
 
 REQUIRED_CRITERIA = ("load_rating", "life", "reliability")
 """Criteria that a brief must state; the others have defaults, which the report lists."""

@@ -1,8 +1,8 @@
-"""What do measured peak forces say? Life and reliability from your own signals, without a machine model."""
+"""What do measured peak forces say? Nature, life and reliability from your own signals, without a machine model."""
 
-import csv
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -11,16 +11,26 @@ from numpy.typing import ArrayLike, NDArray
 from chaosgym.design.criteria import Criteria
 from chaosgym.design.methodology import Evaluation, evaluate, plain
 from chaosgym.design.reliability import time_blocks
-from chaosgym.design.statistics import Convergence, Histogram, convergence, histogram, require_enough
+from chaosgym.design.statistics import Convergence, Histogram, as_forces, convergence, histogram, require_enough
+from chaosgym.diagnosis.measured import MeasuredVerdict, judge_peaks
 from chaosgym.errors import DesignError
-from chaosgym.machines.parameters import parameters_of
 
 Array = NDArray[np.float64]
+
+STRENGTH = ("strength", "strength_deviation", "contact_radius", "contact_modulus")
+"""Criteria that a reliability rests on; without them it is left out."""
+
+FOLLOWS = {
+    "periodic": "every cycle loads the surface alike, so that the life follows from one period",
+    "quasiperiodic": "forces never repeat but follow a pattern, so that the life follows from their statistics",
+    "chaotic": "single forces can't be foretold, so that only statistics of many cycles give a life",
+    "undetermined": "what the response is has to be settled before the life may be relied on",
+}
 
 
 @dataclass(frozen=True)
 class MeasuredPeaks:
-    """Statistics, life and reliability of measured peak forces.
+    """Nature, statistics, life and reliability of measured peak forces.
 
     Attributes
     ----------
@@ -28,49 +38,106 @@ class MeasuredPeaks:
         [N].
     criteria
         Bearing data.
+    verdict
+        Nature of the response.
     convergence
         Cycles that the statistics take.
     histogram
         Distribution and its modes.
     evaluation
         Life and reliability.
+    stated
+        Names of the criteria that were asked for; the others are examples, and nothing of theirs is told.
+    source
+        Where the peaks come from: "file", "sha256", "date" and the like.
     """
 
     peaks: Array
     criteria: Criteria
+    verdict: MeasuredVerdict
     convergence: Convergence
     histogram: Histogram
     evaluation: Evaluation
+    stated: tuple[str, ...] = ("load_rating",)
+    source: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def strength_stated(self) -> bool:
+        """Whether a reliability may be told."""
+        return all(name in self.stated for name in STRENGTH)
+
+    @property
+    def headline(self) -> str:
+        """Nature of the response, and what follows for its life."""
+        verdict = self.verdict.diagnosis
+        period = f", period {verdict.period}" if verdict.period else ""
+        return f"{verdict.nature}{period}: {FOLLOWS[verdict.nature]}"
+
+    @property
+    def doubt(self) -> str:
+        """Why the statistics are an estimate; empty if they are not."""
+        found = self.convergence
+        if found.recorded >= found.needed:
+            return ""
+        return f"estimate: {found.recorded} cycles recorded, {found.needed} needed for statistics to rely on"
 
     def lines(self) -> list[str]:
         """Return lines for people."""
         found, asked = self.evaluation, self.criteria
-        return [
-            f"{len(self.peaks)} cycles ({self.convergence.needed} needed), mean {np.mean(self.peaks):.2f} N, "
-            f"standard deviation {np.std(self.peaks):.2f} N, largest {found.largest_force:.2f} N",
-            f"equivalent force  {found.force:.2f} N with exponent {asked.life_exponent:.3g}",
+        lines = [
+            self.headline,
+            f"  {self.verdict.diagnosis.reason}",
+            *(f"  {note}" for note in self.verdict.notes),
+            *([self.doubt] if self.doubt else []),
             f"life              {found.life:.4g} million cycles, {found.life_interval.low:.4g} to "
             f"{found.life_interval.high:.4g}; conservative {found.conservative_life:.4g}",
-            f"reliability       {found.reliability:.6f}, {found.reliability_interval.low:.6f} to "
-            f"{found.reliability_interval.high:.6f}; normal approximation {found.normal_reliability:.6f}",
-            f"                  strength {1e-9 * asked.strength:g} +- {1e-9 * asked.strength_deviation:g} GPa, ball "
-            f"radius {1e3 * asked.contact_radius:g} mm, contact modulus {1e-9 * asked.contact_modulus:g} GPa",
+            f"equivalent force  {found.force:.2f} N with exponent {asked.life_exponent:.3g}; load rating "
+            f"{asked.load_rating:g} N",
+            f"{len(self.peaks)} cycles, mean {np.mean(self.peaks):.2f} N, standard deviation "
+            f"{np.std(self.peaks):.2f} N, largest {found.largest_force:.2f} N",
         ]
+        if self.strength_stated:
+            lines += [
+                f"reliability       {found.reliability:.6f}, {found.reliability_interval.low:.6f} to "
+                f"{found.reliability_interval.high:.6f}; normal approximation {found.normal_reliability:.6f}",
+                f"                  strength {1e-9 * asked.strength:g} +- {1e-9 * asked.strength_deviation:g} GPa, "
+                f"ball radius {1e3 * asked.contact_radius:g} mm, contact modulus {1e-9 * asked.contact_modulus:g} GPa",
+            ]
+        else:
+            lines.append(f"no reliability: it needs {', '.join(STRENGTH)} in a brief")
+        return lines
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON; None stands for an infinite life."""
+        """Return plain values for JSON; None stands for what was not asked for."""
+        evaluation = plain(vars(self.evaluation))
+        left_out = (
+            [] if self.strength_stated else [name for name in evaluation if "reliability" in name or "safety" in name]
+        )
+        left_out += [] if "life" in self.stated else ["required_load_rating"]
         return {
-            "criteria": {name: getattr(self.criteria, name) for name in parameters_of(self.criteria)},
+            "nature": self.verdict.diagnosis.nature,
+            "period": self.verdict.diagnosis.period,
+            "verdict": self.verdict.as_dict(),
+            "criteria": {name: getattr(self.criteria, name) for name in self.stated},
             "cycles": {**vars(self.convergence), "converged": self.convergence.converged},
+            "estimate": self.doubt or None,
             "mean_N": float(np.mean(self.peaks)),
             "standard_deviation_N": float(np.std(self.peaks)),
             "largest_N": float(np.max(self.peaks)),
             "modes_N": self.histogram.modes.tolist(),
-            "evaluation": plain(vars(self.evaluation)),
+            "evaluation": {**evaluation, **dict.fromkeys(left_out)},
+            "source": dict(self.source),
         }
 
 
-def evaluate_peaks(peaks: ArrayLike, criteria: Criteria) -> MeasuredPeaks:
+def evaluate_peaks(
+    peaks: ArrayLike,
+    criteria: Criteria,
+    *,
+    verdict: MeasuredVerdict | None = None,
+    stated: Iterable[str] = ("load_rating",),
+    source: Mapping[str, str] = MappingProxyType({}),
+) -> MeasuredPeaks:
     """Evaluate measured peak forces, one a cycle.
 
     Parameters
@@ -79,45 +146,29 @@ def evaluate_peaks(peaks: ArrayLike, criteria: Criteria) -> MeasuredPeaks:
         [N].
     criteria
         Bearing data.
+    verdict
+        Nature of the response; judged without a stated sensor error if None.
+    stated
+        Names of the criteria that were asked for.
+    source
+        Where the peaks come from, for the report.
 
     Raises
     ------
     DesignError
-        If a force is negative or not finite, or there are too few cycles; says how many are needed.
+        If a force is negative or not finite, all are zero, or there are too few cycles; says how many are needed.
     """
-    values = require_enough(peaks)
+    forces = as_forces(peaks)
+    if not np.any(forces):
+        raise DesignError("all peak forces are zero: no contact, so that there is no life to tell")
+    values = require_enough(forces)
     return MeasuredPeaks(
         values,
         criteria,
+        verdict or judge_peaks(values),
         convergence(values),
         histogram(values),
         evaluate(time_blocks(values), criteria, "statistics of the measured peak forces"),
+        tuple(stated),
+        source,
     )
-
-
-def read_peaks(path: str | Path) -> Array:
-    """Read peak forces [N], one a cycle: the first column of a CSV file, with or without a header.
-
-    Raises
-    ------
-    DesignError
-        If the file can't be read or a line does not begin with a number; names the line.
-    """
-    try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            rows = [
-                (number, row[0].strip()) for number, row in enumerate(csv.reader(file), 1) if row and row[0].strip()
-            ]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise DesignError(f"{path} can't be read: {error}") from None
-    peaks = []
-    for place, (number, text) in enumerate(rows):
-        try:
-            peaks.append(float(text))
-        except ValueError:
-            if place == 0:
-                continue
-            raise DesignError(f"{path}, line {number}: {text!r} is not a force in newton") from None
-    if not peaks:
-        raise DesignError(f"{path} holds no peak forces")
-    return np.array(peaks)

@@ -187,9 +187,7 @@ def _joined(verdicts: list[MeasuredVerdict], cycles: list[int]) -> MeasuredVerdi
     if len(verdicts) == 1:
         return last
     natures = [verdict.diagnosis.nature for verdict in verdicts]
-    irregular = [
-        verdict for verdict in verdicts if verdict.diagnosis.nature in ("chaotic", "quasiperiodic")
-    ]
+    irregular = [verdict for verdict in verdicts if verdict.diagnosis.nature in ("chaotic", "quasiperiodic")]
     horizon = sum(cycles)
     if len(verdicts) > 2 and irregular:
         reason = f"intermittent: {len(verdicts) - 1} changes between {' and '.join(dict.fromkeys(natures))} stretches"
@@ -241,14 +239,12 @@ def _scatter(readings: Array, floor: float) -> _Scatter:
     size = len(readings)
     level, drift = without_drift(readings, dominant_period(readings, floor))
     longest = max(1, size // REPEATS)
-    variances = np.array(
-        [np.sum(class_residual(level, k) ** 2) / (size - k) for k in range(1, min(64, longest) + 1)]
-    )
+    variances = np.array([np.sum(class_residual(level, k) ** 2) / (size - k) for k in range(1, min(64, longest) + 1)])
     allowed = variances.min() * (1.0 + 3.0 * math.sqrt(2.0 / size)) + floor**2
     period = int(np.flatnonzero(variances <= allowed)[0]) + 1
     residual = class_residual(level, period)
     sigma = math.sqrt(float(variances[period - 1]))
-    linear = correlation(residual)
+    linear = correlation(residual, period)
     forecast = max(predictability(level, residual), linear)
     rest = nonlinear_part(residual)
     nonlinear = predictability(level[-len(rest) :], rest) if forecast >= RANDOM else 0.0
@@ -262,14 +258,25 @@ def _judge_part(readings: Array, told: SensorError | None, resolved: float) -> M
     if size < SHORT_RECORD:
         return MeasuredVerdict(_undetermined(f"{size} cycles are too few to judge", readings), told)
     found, exact = None, two_step_test(readings)
-    if exact.nature == "chaotic" and not exact.transient or exact.nature == "undetermined":
+    if (exact.nature == "chaotic" and not exact.transient) or exact.nature == "undetermined":
         found = _scatter(readings, resolved / math.sqrt(3.0))
         exact = two_step_test(found.readings) if found.drift else exact
     notes = (f"drifts by {found.drift:.3g} N over the record",) if found is not None and found.drift else ()
     if found is None or exact.nature in ("periodic", "quasiperiodic"):
-        return MeasuredVerdict(exact, told or SensorError(0.0, 0.0, "estimated"), notes=notes)
+        told = told or SensorError(resolved, resolved / math.sqrt(3.0), "estimated")
+        return MeasuredVerdict(_in_newton(exact, readings, resolved), told, notes=notes)
     judge = _with_stated if told is not None else _with_estimated
     return replace(judge(found, told, resolved), notes=notes)
+
+
+def _in_newton(exact: Diagnosis, readings: Array, resolved: float) -> Diagnosis:
+    """The verdict of the Two-Step Test with its residual as a force."""
+    residual = exact.evidence.get("residual")
+    if exact.nature != "periodic" or not isinstance(residual, float) or exact.reason.startswith("approaches"):
+        return exact
+    within = max(residual * float(np.max(np.abs(readings))), resolved)
+    cycle = "cycle" if exact.period == 1 else f"{exact.period} cycles"
+    return replace(exact, reason=f"repeats every {cycle} within {_newton(within)}")
 
 
 def _periodic(found: _Scatter, within: float, why: str, error: SensorError) -> MeasuredVerdict:
@@ -323,7 +330,12 @@ def _with_estimated(found: _Scatter, told: SensorError | None, resolved: float) 
     error = SensorError(3.0 * found.sigma, found.sigma, "estimated")
     residual = class_residual(found.readings, found.period)
     if np.max(np.abs(residual)) <= 2.0 * resolved:
-        return _periodic(found, 2.0 * resolved, "the step of the record", SensorError(resolved, resolved / math.sqrt(3.0), "estimated"))
+        return _periodic(
+            found,
+            2.0 * resolved,
+            "the step of the record",
+            SensorError(resolved, resolved / math.sqrt(3.0), "estimated"),
+        )
     share = f"the scatter of {100.0 * found.relative:.2g} %"
     ask = "could be sensor or machine; state the sensor's error"
     if not found.random:
@@ -331,10 +343,16 @@ def _with_estimated(found: _Scatter, told: SensorError | None, resolved: float) 
         if torus is not None or found.nonlinear < RANDOM:
             return torus or _open(found, f"{share} wanders slowly, and {ask}", None)
         if _few_lines(found):
-            return _open(found, f"a few lines of the spectrum and a random rest: quasiperiodic or chaotic, as {share} {ask}", None)
+            return _open(
+                found,
+                f"a few lines of the spectrum and a random rest: quasiperiodic or chaotic, as {share} {ask}",
+                None,
+            )
         return _irregular(found, resolved, f"irregular beyond any random error: {share} can be forecast", None)
     if found.relative <= SMALL_SCATTER and (size >= ENOUGH_CYCLES or found.relative <= 0.1 * SMALL_SCATTER):
-        return _periodic(found, 3.0 * found.sigma, "a sensor's error by its size; state the sensor's if you know it", error)
+        return _periodic(
+            found, 3.0 * found.sigma, "a sensor's error by its size; state the sensor's if you know it", error
+        )
     return _open(found, f"{share} {ask}", None)
 
 

@@ -53,7 +53,9 @@ def parse_quantity(name: str, given: Any, unit: str) -> float:
     if not isinstance(given, str):
         if unit != "-":
             best = next(iter(allowed))
-            raise ParameterError(f'{name} = {given:g} has no unit; write {name} = "{given:g} {best}" (allowed: {listed})')
+            raise ParameterError(
+                f'{name} = {given:g} has no unit; write {name} = "{given:g} {best}" (allowed: {listed})'
+            )
         return float(given)
     number, written = _split(given)
     try:

@@ -60,7 +60,11 @@ def _speaks_against(recording: Recording, name: str) -> str:
         return f"is in {unit}"
     if recording.named and any(OTHER.fullmatch(word) for word in re.split(r"[\W_\d]+", name) if word):
         return "is no force by its name"
-    return "rises like a counter or a clock" if is_counter(finite) or (len(recording.columns) > 1 and is_clock(finite)) else ""
+    return (
+        "rises like a counter or a clock"
+        if is_counter(finite) or (len(recording.columns) > 1 and is_clock(finite))
+        else ""
+    )
 
 
 def choose_force(recording: Recording, column: str | None = None, unit: str | None = None) -> Signal:
@@ -85,7 +89,9 @@ def choose_force(recording: Recording, column: str | None = None, unit: str | No
         names = force_names(recording)
         if len(names) > 1:
             shown = ", ".join(map(repr, names))
-            raise DiagnosisError(f"{recording.source} has several columns that could be forces: {shown}; use --column NAME")
+            raise DiagnosisError(
+                f"{recording.source} has several columns that could be forces: {shown}; use --column NAME"
+            )
         if not names:
             why = "; ".join(f"{name!r} {_speaks_against(recording, name)}" for name in recording.columns)
             raise DiagnosisError(f"{recording.source} has no column that could be a force ({why}); use --column NAME")
@@ -145,7 +151,9 @@ def choose_time(recording: Recording) -> Signal | None:
     fits = [name for name in recording.columns if recording.units.get(name, "") in TIMES]
     fits += [name for name in recording.columns if re.search(r"time|zeit|temps|stamp", name, re.IGNORECASE)]
     if len(recording.columns) > 1:
-        fits += [name for name in recording.columns if is_clock(recording.columns[name]) and not recording.units.get(name)]
+        fits += [
+            name for name in recording.columns if is_clock(recording.columns[name]) and not recording.units.get(name)
+        ]
     if not fits:
         return None
     name = fits[0]

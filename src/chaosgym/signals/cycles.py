@@ -84,7 +84,9 @@ def sampling(recording: Recording, size: int, rate_hz: float | None = None) -> S
         return Sampling(np.arange(size) / rate, 1.0 / rate, ())
     stamps = choose_time(recording)
     if stamps is None:
-        raise DiagnosisError(f"{recording.source} has no time column; use --rate-hz, or name the time column 'time [s]'")
+        raise DiagnosisError(
+            f"{recording.source} has no time column; use --rate-hz, or name the time column 'time [s]'"
+        )
     return even_sampling(stamps.values[:size], recording)
 
 
@@ -99,8 +101,8 @@ def even_sampling(stamps: Array, recording: Recording) -> Sampling:
     steps = np.diff(stamps)
     falling = np.flatnonzero(~(steps >= 0.0))
     if len(steps) < 2 or len(falling):
-        place = recording.where(int(falling[0]) + 1) if len(falling) else recording.where(0)
-        raise DiagnosisError(f"{recording.source}, {place}: time does not rise; allowed: one series in increasing time")
+        where = recording.where(int(falling[0]) + 1) if len(falling) else recording.where(0)
+        raise DiagnosisError(f"{recording.source}, {where}: time does not rise; allowed: one series in increasing time")
     rounding = _rounding(stamps)
     typical = float(np.median(steps))
     typical = float(np.mean(steps[steps <= LONGEST_GAP * typical + 2.0 * rounding]))
@@ -109,9 +111,9 @@ def even_sampling(stamps: Array, recording: Recording) -> Sampling:
     gap = steps > LONGEST_GAP * typical + 1.01 * rounding
     odd = np.flatnonzero((np.abs(steps - typical) > UNEVEN * typical + 1.01 * rounding) & ~gap)
     if len(odd) or gap.mean() > 0.1:
-        place = int(odd[0] if len(odd) else np.flatnonzero(gap)[0])
+        first = int(odd[0] if len(odd) else np.flatnonzero(gap)[0])
         raise DiagnosisError(
-            f"{recording.source}, {recording.where(place + 1)}: sampled unevenly, a step of {steps[place]:.4g} s where "
+            f"{recording.source}, {recording.where(first + 1)}: sampled unevenly, a step of {steps[first]:.4g} s where "
             f"{typical:.4g} s are usual; resample at equal steps"
         )
     counted = np.where(gap, np.round(steps / typical), 1.0)
@@ -201,16 +203,20 @@ def tachometer_starts(pulses: Array, time: Array) -> Array:
     low, high = float(pulses.min()), float(pulses.max())
     middle, slack = 0.5 * (low + high), 0.1 * (high - low)
     above = np.where(pulses > middle + slack, 1, np.where(pulses < middle - slack, 0, -1))
-    for place in np.flatnonzero(above < 0):
-        above[place] = above[place - 1] if place else 0
+    for undecided in np.flatnonzero(above < 0):
+        above[undecided] = above[undecided - 1] if undecided else 0
     rises = np.flatnonzero(np.diff(above) == 1)
     if len(rises) < 9:
         raise DiagnosisError(f"the tachometer rises {len(rises)} times; needed: once a cycle, 9 times or more")
-    share = (middle - pulses[rises]) / np.where(pulses[rises + 1] > pulses[rises], pulses[rises + 1] - pulses[rises], 1.0)
+    share = (middle - pulses[rises]) / np.where(
+        pulses[rises + 1] > pulses[rises], pulses[rises + 1] - pulses[rises], 1.0
+    )
     return np.asarray(time[rises] + np.clip(share, 0.0, 1.0) * (time[rises + 1] - time[rises]))
 
 
-def cycle_peaks(value: Array, instants: Sampling, period: float | None = None, starts: Array | None = None) -> CyclePeaks:
+def cycle_peaks(
+    value: Array, instants: Sampling, period: float | None = None, starts: Array | None = None
+) -> CyclePeaks:
     """Largest modulus of each cycle of a series.
 
     Parameters
@@ -236,8 +242,8 @@ def cycle_peaks(value: Array, instants: Sampling, period: float | None = None, s
     elif period is None:
         cycle = estimated_period(value, instants.step)
         notes.append(
-            f"cycle estimated from the spectrum: {cycle:.6g} s ({1.0 / cycle:.5g} Hz); state it (--hz, --rpm) if that is "
-            "not the speed"
+            f"cycle estimated from the spectrum: {cycle:.6g} s ({1.0 / cycle:.5g} Hz); state it (--hz, --rpm) if that "
+            "is not the speed"
         )
     else:
         cycle = period
@@ -246,7 +252,9 @@ def cycle_peaks(value: Array, instants: Sampling, period: float | None = None, s
         if period is not None:
             other = None if instants.gaps else strongest_line_nearby(value, instants.step, period)
             if other is not None:
-                notes.append(f"the spectrum has its line at {1.0 / other:.6g} Hz, beside the stated {1.0 / period:.6g} Hz")
+                notes.append(
+                    f"the spectrum has its line at {1.0 / other:.6g} Hz, beside the stated {1.0 / period:.6g} Hz"
+                )
         first = instants.time[0]
         starts = first + cycle * np.arange(int((instants.time[-1] + instants.step - first) / cycle * (1.0 + 1e-12)) + 1)
     starts = _shifted_to_quiet(value, instants.time, starts)

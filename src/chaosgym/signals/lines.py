@@ -1,4 +1,6 @@
-"""What do a few lines of the spectrum leave of a record? A torus is a sum of them, and its rest is the sensor's error."""
+"""What do a few lines of the spectrum leave of a record? A torus is their sum, and its rest is the sensor's error."""
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,17 +29,18 @@ def without_lines(values: Array, most: int, enough: float) -> tuple[Array, int]:
     size = len(values)
     time = np.arange(size) - 0.5 * (size - 1)
     window = np.hanning(size)
-    rest, frequencies = values - values.mean(), np.empty(0)
+    rest: Array = values - values.mean()
+    frequencies: Array = np.empty(0)
     while len(frequencies) < most and np.std(rest) > enough:
         power = np.abs(np.fft.rfft(rest * window, PADDED * size))
         power[: 2 * PADDED] = 0.0
-        frequencies = np.append(frequencies, np.argmax(power) / (PADDED * size))
+        frequencies = np.asarray([*frequencies, float(np.argmax(power)) / (PADDED * size)])
         for _ in range(STEPS):
             frequencies, rest = _fitted(values, time, frequencies)
     return rest, len(frequencies)
 
 
-def _fitted(values: Array, time: Array, frequencies: Array) -> tuple[Array, Array]:
+def _fitted(values: Array, time: NDArray[Any], frequencies: Array) -> tuple[Array, Array]:
     """One Gauss-Newton step on the frequencies [1/cycle], and the rest before it."""
     angle = 2.0 * np.pi * np.outer(time, frequencies)
     cosine, sine = np.cos(angle), np.sin(angle)

@@ -219,10 +219,9 @@ def without_drift(values: Array, period: int) -> tuple[Array, float]:
     """(readings without a linear drift, change over the record); 0 if there is none to be sure of."""
     size = len(values)
     time = (np.arange(size) - 0.5 * (size - 1)) / size
-    residual = class_residual(values, period)
-    slope = float(np.sum(time * residual) / np.sum(time**2))
-    left = residual - slope * time
-    error = float(np.std(left)) / np.sqrt(np.sum(time**2))
+    residual, elapsed = class_residual(values, period), class_residual(time, period)
+    slope = float(np.sum(elapsed * residual) / np.sum(elapsed**2))
+    error = float(np.std(residual - slope * elapsed)) / np.sqrt(np.sum(elapsed**2))
     if abs(slope) <= max(6.0 * error, 1e-9 * float(np.max(np.abs(values)))):
         return values, 0.0
     return values - slope * time, slope
@@ -236,11 +235,12 @@ def nonlinear_part(residual: Array, lags: int = 4) -> Array:
     return np.asarray(centred[lags:] - past @ weights)
 
 
-def correlation(residual: Array, lags: int = 10) -> float:
-    """Largest autocorrelation over the first lags, times the root of the number of cycles."""
+def correlation(residual: Array, period: int = 1, lags: int = 10) -> float:
+    """Largest autocorrelation over the first lags and those of one and two periods, times the root of the cycles."""
     centred = residual - residual.mean()
     power = float(np.sum(centred**2))
     if power == 0.0:
         return 0.0
-    found = [abs(float(np.sum(centred[k:] * centred[:-k]))) for k in range(1, min(lags, len(residual) // 4) + 1)]
+    tried = {k for k in (*range(1, lags + 1), period, 2 * period) if k <= len(residual) // 4}
+    found = [abs(float(np.sum(centred[k:] * centred[:-k]))) for k in tried]
     return max(found, default=0.0) / power * math.sqrt(len(residual))

@@ -11,6 +11,7 @@ import sys
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -188,10 +189,17 @@ def _matlab(data: bytes) -> dict[str, Any]:
     found = loadmat(io.BytesIO(data))
     columns: dict[str, Array] = {}
     for name, value in found.items():
-        if name.startswith("__") or not isinstance(value, np.ndarray) or value.dtype.kind not in "fiu" or value.size < 2:
+        if (
+            name.startswith("__")
+            or not isinstance(value, np.ndarray)
+            or value.dtype.kind not in "fiu"
+            or value.size < 2
+        ):
             continue
         parts = _numbered(np.squeeze(value))
-        columns |= {name: next(iter(parts.values()))} if len(parts) == 1 else {f"{name} {k}": v for k, v in parts.items()}
+        columns |= (
+            {name: next(iter(parts.values()))} if len(parts) == 1 else {f"{name} {k}": v for k, v in parts.items()}
+        )
     return {"columns": columns}
 
 
@@ -253,7 +261,9 @@ def _csv(data: bytes) -> dict[str, Any]:
     if len(set(titles)) != len(titles):
         raise DiagnosisError(f"names two columns alike: {', '.join(titles)}")
     table, lines = _table(kept[start:], titles, mark), tuple(number for number, _ in kept[start:])
-    comma = delimiter != "," and any("," in (value or "") for column in table.columns for value in column[:50].to_pylist())
+    comma = delimiter != "," and any(
+        "," in (value or "") for column in table.columns for value in column[:50].to_pylist()
+    )
     columns, problems = {}, {}
     for title, column in zip(titles, table.columns, strict=True):
         columns[title], problem = _numbers(column, comma, lines)
@@ -293,7 +303,9 @@ def _delimiter(lines: list[str]) -> str:
     if spaced and not any(word.endswith(",") for row in words for word in row):
         return " "
     single = [line.strip().split(",") for line in tail]
-    decimal = all(len(row) == 2 and re.fullmatch(r"[+-]?\d+", row[0]) and re.fullmatch(r"\d+", row[1]) for row in single)
+    decimal = all(
+        len(row) == 2 and re.fullmatch(r"[+-]?\d+", row[0]) and re.fullmatch(r"\d+", row[1]) for row in single
+    )
     if decimal and not _two_columns(lines[0], single):
         return ";"
     return ","
@@ -303,7 +315,7 @@ def _two_columns(heading: str, rows: list[list[str]]) -> bool:
     """Whether ``48,9`` is two whole numbers: the heading says so, or the first one counts."""
     if not _is_number(heading.split(",")[0]):
         return "," in heading
-    steps = {int(after[0]) - int(before[0]) for before, after in zip(rows, rows[1:], strict=False)}
+    steps = {int(after[0]) - int(before[0]) for before, after in pairwise(rows)}
     return steps == {1} or len(rows) < 2
 
 
@@ -327,7 +339,45 @@ def _titles(fitting: list[list[str]], width: int) -> tuple[list[str], dict[str, 
 
 
 UNITS = frozenset(
-    "N kN mN MN lbf kgf s ms us µs μs min h rpm 1/min min-1 Hz kHz 1/s V mV g m/s² m/s2 m/s^2 m mm um µm deg ° rad °C K A % -".split()
+    [
+        "N",
+        "kN",
+        "mN",
+        "MN",
+        "lbf",
+        "kgf",
+        "s",
+        "ms",
+        "us",
+        "µs",
+        "μs",
+        "min",
+        "h",
+        "rpm",
+        "1/min",
+        "min-1",
+        "Hz",
+        "kHz",
+        "1/s",
+        "V",
+        "mV",
+        "g",
+        "m/s²",
+        "m/s2",
+        "m/s^2",
+        "m",
+        "mm",
+        "um",
+        "µm",
+        "deg",
+        "°",
+        "rad",
+        "°C",
+        "K",
+        "A",
+        "%",
+        "-",
+    ]
 )
 """Units that a heading may name."""
 
@@ -337,7 +387,7 @@ def split_unit(title: str) -> tuple[str, str]:
     text = title.strip()
     for pattern in (r"(.*?)[\s_]*[\[(]\s*([^\])]*?)\s*[\])]", r"(.+?)\s*/\s*(\S+)", r"(.+?)(?:_|\s+in\s+|\s+)(\S+)"):
         found = re.fullmatch(pattern, text)
-        if found and (found[2] in UNITS or "[" in pattern[:14] and "[" in text):
+        if found and (found[2] in UNITS or ("[" in pattern[:14] and "[" in text)):
             return found[1].strip() or text, found[2]
     return (text, "")
 

@@ -1,7 +1,8 @@
 """Axes of a sweep: ranges of parameters, and patches of a lattice with a fixed step."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -9,9 +10,12 @@ from numpy.typing import NDArray
 
 from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import ParameterError
+from chaosgym.machines.units import parse_option
 
 Array = NDArray[np.float64]
 Scale = Literal["lin", "log"]
+
+NO_UNITS: Mapping[str, str] = MappingProxyType({})
 
 AXIS_FORM = "FIELD=LOW:HIGH[:COUNT][:lin|log]"
 PATCH_FORM = "FIELD=LOW:HIGH:COUNT[:STEP][:lin|log]"
@@ -37,12 +41,12 @@ class Axis:
             raise ParameterError(f"{shown} has {self.count} points; allowed: 2 to 1000000")
 
     @classmethod
-    def parse(cls, text: str) -> "Axis":
-        """Read ``FIELD=LOW:HIGH[:COUNT][:lin|log]``."""
+    def parse(cls, text: str, units: Mapping[str, str] = NO_UNITS) -> "Axis":
+        """Read ``FIELD=LOW:HIGH[:COUNT][:lin|log]``; ends may have units, whose fields' own ``units`` names."""
         try:
             field, parts, scale = _split(text, (2, 3))
             count = int(parts[2]) if len(parts) == 3 else None
-            return cls(field, float(parts[0]), float(parts[1]), count, scale)
+            return cls(field, *_ends(field, parts, units), count, scale)
         except ParameterError:
             raise
         except ValueError:
@@ -94,15 +98,16 @@ class Patch:
                 raise ParameterError(f"{shown} is too narrow for {self.count} points {self.shown_step} apart")
 
     @classmethod
-    def parse(cls, text: str) -> "Patch":
+    def parse(cls, text: str, units: Mapping[str, str] = NO_UNITS) -> "Patch":
         """Read ``FIELD=LOW:HIGH:COUNT[:STEP][:lin|log]``; a STEP such as 2% is a ratio, a plain number a difference."""
         try:
             field, parts, scale = _split(text, (3, 4))
             step = None
             if len(parts) == 4:
                 relative = parts[3].endswith("%")
-                step = Tolerance(float(parts[3].rstrip("%")) / (100.0 if relative else 1.0), relative)
-            return cls(field, float(parts[0]), float(parts[1]), int(parts[2]), step, scale)
+                amount = float(parts[3][:-1]) / 100.0 if relative else _value(field, parts[3], units)
+                step = Tolerance(amount, relative)
+            return cls(field, *_ends(field, parts, units), int(parts[2]), step, scale)
         except ParameterError:
             raise
         except ValueError:
@@ -154,6 +159,18 @@ def _split(text: str, lengths: Sequence[int]) -> tuple[str, list[str], Scale]:
     if not separator or len(parts) not in lengths:
         raise ValueError(text)
     return field, parts, scale
+
+
+def _value(field: str, text: str, units: Mapping[str, str]) -> float:
+    """Number in the unit of its field, with or without a unit of its own."""
+    if field not in units:
+        return float(text)
+    unit = units[field]
+    return parse_option(field, text, unit, "" if unit == "-" else unit)
+
+
+def _ends(field: str, parts: Sequence[str], units: Mapping[str, str]) -> tuple[float, float]:
+    return _value(field, parts[0], units), _value(field, parts[1], units)
 
 
 def _written(span: Any, step: str) -> str:

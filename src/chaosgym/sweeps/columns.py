@@ -69,8 +69,8 @@ LABELS: Mapping[str, Column] = {
 }
 """Labels and their evidence."""
 
-_NEIGHBOURS = "I, II, III or undetermined over the neighbours in {fields}, one initial state"
-_FULL = "as full_response_type: the points have no neighbours in the sweep"
+_NEIGHBOURS = "I, II, III or undetermined over the neighbours in {fields} up to one tolerance away, one initial state"
+_FULL = "as full_response_type: the sweep has no neighbours one tolerance away"
 
 
 def signal_columns() -> dict[str, Column]:
@@ -83,10 +83,22 @@ def signal_columns() -> dict[str, Column]:
     }
 
 
+FIXED = "the same in every row"
+
+
+def fixed_fields(plan: SweepPlan) -> dict[str, Any]:
+    """Fields that the sweep does not vary, which every row repeats: a row alone describes its machine."""
+    values = {name: getattr(plan.machine, name) for name in parameters_of(plan.machine) if name not in plan.fields}
+    return {name: value if isinstance(value, str) else float(value) for name, value in values.items()}
+
+
 def schema(plan: SweepPlan, settings: Mapping[str, Any]) -> pa.Schema:
     """Schema of a plan's rows: units and meanings on the columns, settings and label definitions on the whole."""
     described = parameters_of(plan.machine)
     columns = {name: Column(pa.float64(), described[name].unit, described[name].source) for name in plan.fields}
+    for name, value in fixed_fields(plan).items():
+        kind = pa.string() if isinstance(value, str) else pa.float64()
+        columns[name] = Column(kind, described[name].unit, f"{FIXED}: {described[name].source}")
     if plan.sampling == "lattice":
         columns |= LATTICE_COLUMNS
     columns |= LABELS
@@ -95,7 +107,7 @@ def schema(plan: SweepPlan, settings: Mapping[str, Any]) -> pa.Schema:
     columns["response_type"] = LABELS["response_type"]._replace(meaning=about_type)
     if plan.signals:
         columns |= signal_columns()
-    definitions = {name: column.meaning for name, column in columns.items() if name not in plan.fields}
+    definitions = {name: column.meaning for name, column in columns.items() if name not in described}
     return pa.schema(
         [
             pa.field(name, kind, metadata={"unit": unit, "meaning": meaning})

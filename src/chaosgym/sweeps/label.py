@@ -10,7 +10,7 @@ from chaosgym.diagnosis.diagnose import diagnosed_run
 from chaosgym.errors import DiagnosisError, ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, simulate
-from chaosgym.sweeps.columns import SIGNALS, WINDOW, WINDOWS, schema
+from chaosgym.sweeps.columns import SIGNALS, WINDOW, WINDOWS, fixed_fields, schema
 from chaosgym.sweeps.plan import SweepPlan
 from chaosgym.sweeps.provenance import provenance
 
@@ -78,19 +78,19 @@ def _full_type(machine: Machine, budget: int) -> str | None:
 def label_rows(plan: SweepPlan, rows: range) -> pa.Table:
     """Label some rows of a plan; response types that rest on neighbours are left to the end of the sweep."""
     points = plan.points(rows)
-    lines: list[dict[str, Any]] = []
+    fixed, lines = fixed_fields(plan), list[dict[str, Any]]()
     with_signals, with_full_type = plan.with_signals(rows), plan.with_full_type(rows)
     for index in range(len(rows)):
         point = {name: float(column[index]) for name, column in points.items()}
         try:
             machine = plan.machine_at(point)
         except ParameterError as error:
-            lines.append({**point, "status": "failed", "reason": str(error)})
+            lines.append({**fixed, **point, "status": "failed", "reason": str(error)})
             continue
         label = label_point(machine, plan.budget, signals=bool(with_signals[index]))
         if with_full_type[index]:
             label["full_response_type"] = _full_type(machine, plan.budget)
-        lines.append(point | label)
+        lines.append(fixed | point | label)
     if plan.sampling == "lattice":
         for line, number, part in zip(lines, plan.machine_numbers(rows), plan.splits(rows), strict=True):
             line |= {"machine": int(number), "split": part}

@@ -36,6 +36,9 @@ DEFAULT_BUDGET = 400
 CHUNK_SIZE = 256
 """Points that are computed and kept together; on a lattice as many whole machines."""
 
+LEAST_STEPS = 0.9
+"""Steps that a tolerance must hold at least, so that neighbours on the grid are neighbours of a response type."""
+
 SPLIT = (("train", 0.70), ("validation", 0.15), ("test", 0.15))
 """Shares of the machines of a lattice."""
 
@@ -218,9 +221,9 @@ class SweepPlan:
     def type_reach(self) -> dict[str, int]:
         """Over which neighbours of a point its response type is judged: {field: steps}.
 
-        Along speed and clearance, as many steps as the default tolerance of the field holds, and at least one: where
-        steps are wider than the tolerance, the type stands for a wider neighbourhood. Empty unless on a grid or a
-        lattice.
+        Along speed and clearance, as many steps as the default tolerance of the field holds. Empty where the steps of
+        one of them are wider than its tolerance, because a type compares points one tolerance apart; and unless on a
+        grid or a lattice.
         """
         tolerances = default_tolerances(self.machine)
         spans: tuple[Axis | Patch, ...] = self.axes if self.sampling == "grid" else self.patches
@@ -233,7 +236,10 @@ class SweepPlan:
             else:
                 middle, following = span.at(np.array([0.5, 0.5 + 1.0 / ((span.count or 0) - 1)]))
             width = tolerances[span.field].at(float(middle), 1.0) - float(middle)
-            reach[span.field] = max(1, round(width / float(following - middle)))
+            steps = width / float(following - middle)
+            if steps < LEAST_STEPS:
+                return {}
+            reach[span.field] = round(steps)
         return reach
 
     def settings(self) -> dict[str, Any]:
