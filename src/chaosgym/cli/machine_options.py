@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from chaosgym.cli.quantity import Quantity, note_millimetres
+from chaosgym.cli.quantity import Quantity, millimetres_meant
 from chaosgym.errors import ParameterError
 from chaosgym.machines.options import Choice, Number, Option
 from chaosgym.machines.registry import MACHINES
@@ -134,6 +134,7 @@ def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...]
     fields: dict[str, Any] = {}
     redirects: dict[str, str] = {}
     numbers: dict[str, str] = {}
+    notes: list[str] = []
     for option, kind in known.items():
         if option not in given:
             continue
@@ -150,11 +151,15 @@ def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...]
             numbers[field] = option
             fields[field] = _checked(owner, option, kind._replace(field=field), given[option])
     for text in settings:
-        field, value = _setting(owner, text)
+        field, value, note = _setting(owner, text)
+        notes += [note] if note else []
         if field in numbers:
             raise click.UsageError(f"{field} is given twice: by {numbers[field]} and by --set")
         fields[field] = value
-    return with_settings(owner(), fields if fidelity is None else {**fields, "fidelity": fidelity})
+    machine = with_settings(owner(), fields if fidelity is None else {**fields, "fidelity": fidelity})
+    for note in notes:
+        click.echo(note, err=True)
+    return machine
 
 
 def _checked(owner: Any, option: str, number: Number, value: float) -> float:
@@ -170,8 +175,8 @@ def _checked(owner: Any, option: str, number: Number, value: float) -> float:
         raise click.UsageError(f"{option} = {value:g} is out of range; allowed: {low:g} to {high:g}{unit}") from error
 
 
-def _setting(owner: Any, text: str) -> tuple[str, Any]:
-    """Parse FIELD=VALUE; a number may have a unit."""
+def _setting(owner: Any, text: str) -> tuple[str, Any, str]:
+    """Parse FIELD=VALUE, where a number may have a unit: (field, value, a doubt about it)."""
     from chaosgym.machines.parameters import parameters_of
     from chaosgym.machines.units import parse_option
 
@@ -180,9 +185,9 @@ def _setting(owner: Any, text: str) -> tuple[str, Any]:
         raise click.UsageError(f"--set {text!r} is not of the form FIELD=VALUE")
     described = parameters_of(owner).get(field)
     if described is None or described.choices:
-        return field, value
+        return field, value, ""
     unit = "" if described.unit == "-" else described.unit
     number = parse_option(field, value, described.unit, unit)
-    if value.strip()[-1].isdigit():
-        note_millimetres(field, {value.strip(): number}, float(getattr(owner(), field)), described.unit)
-    return field, number
+    bare = value.strip()
+    doubt = millimetres_meant(field, bare, number, getattr(owner(), field)) if described.unit == "m" else ""
+    return field, number, doubt

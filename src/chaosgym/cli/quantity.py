@@ -1,6 +1,5 @@
 """Numbers with units on the command line: ``0.127 mm``, ``30 Hz``, ``120 rpm``; bare ones are in the option's unit."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import click
@@ -37,15 +36,12 @@ class Quantity(click.ParamType):  # type: ignore[type-arg]
         return found / units_of(base).get(self.bare, 1.0)
 
 
-def note_millimetres(field: str, values: Mapping[str, float], usual: float, unit: str) -> None:
-    """Say on standard error where bare numbers in metres look like millimetres; ``values`` by how they were written."""
+def millimetres_meant(field: str, written: str, value: float, usual: float) -> str:
+    """Doubt about a bare number in metres that looks like millimetres; empty if there is none."""
     from chaosgym.machines.units import looks_like_millimetres
 
-    for written, value in values.items():
-        if unit == "m" and looks_like_millimetres(value, usual):
-            click.echo(
-                f"note: {field} = {written} is {value:g} m, where {usual:g} m are usual; for millimetres write "
-                f"'{written} mm'",
-                err=True,
-            )
-            return
+    if not written[-1:].isdigit() or not looks_like_millimetres(value, usual):
+        return ""
+    return (
+        f"note: {field} = {written} is {value:g} m, where {usual:g} m are usual; for millimetres write '{written} mm'"
+    )

@@ -6,7 +6,7 @@ import click
 
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import emit
-from chaosgym.cli.quantity import note_millimetres
+from chaosgym.cli.quantity import millimetres_meant
 
 
 @machine_command
@@ -79,10 +79,10 @@ def sweep(
     described = parameters_of(machine)
     units = {name: about.unit for name, about in described.items()}
     lattice = tuple(Patch.parse(text, units) for text in patches)
-    for text in (*axes, *patches):
-        _note_millimetres(machine, text)
     chosen = tuple(Axis.parse(text, units) for text in axes) or (() if lattice else default_axes(machine, kind))
     plan = SweepPlan(machine, chosen, kind, sizes.get(kind) or 0, seed, lattice, budget, signals, full_types)
+    for text in (*axes, *patches):
+        _note_millimetres(machine, text)
     labelled = run_sweep(plan, out, workers=workers, scheduler=scheduler, repair=repair, progress=True)
     counts = {
         name: dict(Counter(str(value) for value in labelled.column(name)))
@@ -112,14 +112,15 @@ def sweep(
 
 
 def _note_millimetres(machine: Any, text: str) -> None:
-    """Say where the bare ends of an axis look like millimetres."""
+    """Say where a bare end of an axis looks like millimetres."""
     from chaosgym.machines.parameters import parameters_of
 
     field, _, span = text.partition("=")
-    ends = span.split(":")[:2]
-    described = parameters_of(machine).get(field)
-    if described is not None and described.unit == "m" and all(end and end[-1].isdigit() for end in ends):
-        note_millimetres(field, {end: float(end) for end in ends}, float(getattr(machine, field)), described.unit)
+    if parameters_of(machine)[field].unit == "m":
+        ends = [end for end in span.split(":")[:2] if end[-1:].isdigit()]
+        doubts = [millimetres_meant(field, end, float(end), getattr(machine, field)) for end in ends]
+        for doubt in list(filter(None, doubts))[:1]:
+            click.echo(doubt, err=True)
 
 
 def _warnings(plan: Any, labelled: Any) -> list[str]:
@@ -130,7 +131,7 @@ def _warnings(plan: Any, labelled: Any) -> list[str]:
         found.append(f"{silent} of {len(labelled.table)} points have no contact at all: the gap is never closed")
     if plan.sampling == "grid" and not plan.type_reach() and plan.full_types < 1.0:
         found.append(
-            "no response types: they compare points one tolerance apart, and the steps of this grid are wider; use a "
+            "no response types of periodic points: they compare points one tolerance apart, and the steps of this grid are wider; use a "
             "finer grid, --machines with --patch, or --full-types 1"
         )
     return found

@@ -97,8 +97,8 @@ def two_step_test(
     Fails, and says so by "undetermined", on weak chaos in short records (below about 200 cycles in bands), on tori
     that nearly repeat in fewer than 1000 cycles, and where noise is larger than stated.
     """
-    if not sensor_error >= 0.0:
-        raise DiagnosisError(f"sensor_error = {sensor_error!r} is out of range; allowed: 0 or more")
+    if not 0.0 <= sensor_error < np.inf:
+        raise DiagnosisError(f"sensor_error = {sensor_error!r} is out of range; allowed: finite, 0 or more")
     if not 0.0 < tolerance < 1.0:
         raise DiagnosisError(f"tolerance = {tolerance!r} is out of range; allowed: above 0, below 1")
     samples, series = _observables(x, sensor_error)

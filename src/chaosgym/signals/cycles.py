@@ -189,7 +189,7 @@ def strongest_line_nearby(value: Array, step: float, period: float) -> float | N
         return None
     peak = low + int(np.argmax(power[low:high]))
     stands_out = power[peak] > 1e-3 * power[8:].max() and low < peak < high - 1
-    return padded * step / peak if stands_out and abs(peak - place) > 6.0 else None
+    return padded * step / peak if stands_out and abs(peak - place) > 2.0 else None
 
 
 def tachometer_starts(pulses: Array, time: Array) -> Array:

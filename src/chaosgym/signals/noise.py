@@ -149,8 +149,13 @@ def _with_missing_cycles(values: Array, period: int, floor: float) -> tuple[Arra
         start = _first_slip(np.abs(whole[period:] - whole[:-period]) > limit, period)
         if start is None:
             break
-        place = start + period
-        missing = min(range(1, period), key=lambda count: _misfit(whole, place, count, period))
+        tried = [
+            (place, count)
+            for place in range(start + 1, start + period + 1)
+            for count in range(1, period)
+            if place >= period
+        ]
+        place, missing = min(tried, key=lambda cut: _misfit(whole, *cut, period))
         if _misfit(whole, place, missing, period) > limit:
             break
         stand_in = whole[place - period : place - period + missing]
@@ -160,19 +165,19 @@ def _with_missing_cycles(values: Array, period: int, floor: float) -> tuple[Arra
 
 
 def _first_slip(far: NDArray[np.bool_], period: int) -> int | None:
-    """First place from which most differences over one period are far, and none over the period after it."""
+    """First place from which several differences over one period are far, and none over two periods after it."""
     for start in np.flatnonzero(far):
         during, after = far[start : start + period], far[start + period : start + 3 * period]
-        if len(after) >= period and not after.any() and during.mean() > 0.5 and during.sum() >= 2:
+        if len(after) >= period and not after.any() and during.mean() > 0.25 and during.sum() >= 2:
             return int(start)
     return None
 
 
 def _misfit(values: Array, place: int, missing: int, period: int) -> float:
-    """Largest difference over one period if ``missing`` cycles lack before ``place``."""
+    """Mean difference from the period before if ``missing`` cycles lack before ``place``."""
     later = values[place : place + period]
     earlier = values[place - period : place]
-    return float(np.median(np.abs(later - np.roll(earlier, -missing)[: len(later)])))
+    return float(np.mean(np.abs(later - np.roll(earlier, -missing)[: len(later)])))
 
 
 def predictability(values: Array, residual: Array) -> float:

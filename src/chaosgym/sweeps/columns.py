@@ -70,7 +70,7 @@ LABELS: Mapping[str, Column] = {
 """Labels and their evidence."""
 
 _NEIGHBOURS = "I, II, III or undetermined over the neighbours in {fields} up to one tolerance away, one initial state"
-_FULL = "as full_response_type: the sweep has no neighbours one tolerance away"
+_FULL = "as full_response_type, since the sweep has no neighbours one tolerance away; on a grid III where not periodic"
 
 
 def signal_columns() -> dict[str, Column]:
