@@ -131,7 +131,8 @@ def _warnings(plan: Any, labelled: Any) -> list[str]:
         found.append(f"{silent} of {len(labelled.table)} points have no contact at all: the gap is never closed")
     if plan.sampling == "grid" and not plan.type_reach() and plan.full_types < 1.0:
         found.append(
-            "no response types of periodic points: they compare points one tolerance apart, and the steps of this grid are wider; use a "
+            "no response types of periodic points: they compare points one tolerance apart, and the "
+            "steps of this grid are wider; use a "
             "finer grid, --machines with --patch, or --full-types 1"
         )
     return found

@@ -17,11 +17,14 @@ Array = NDArray[np.float64]
 LONGEST_PERIOD = 64
 """Longest period that is looked for."""
 
-REPEATS = 6
+REPEATS = 7
 """How often a period must be seen before cycles are compared with it."""
 
 FAR = 8.0
 """Robust standard deviations beyond which a reading may be wrong."""
+
+REACH = 4
+"""Periods before and after a reading over whose median it is judged."""
 
 OUTLIER_SHARE = 0.02
 """Share of the cycles that may be wrong readings; more of them belong to the motion."""
@@ -65,13 +68,21 @@ def stated_error(half_width: float | None, sigma: float | None) -> SensorError |
 
 def quantum(values: Array) -> float:
     """Step of a converter whose multiples all values are; 0 if there is none."""
-    levels = np.unique(values)
-    if len(levels) < 2 or 3 * len(levels) > len(values):
+    levels, counts = np.unique(values, return_counts=True)
+    often = counts > 1
+    levels = levels[often] if counts[often].sum() > 0.5 * len(values) else levels
+    if len(levels) < 2 or 3 * len(levels) > len(values) or (len(levels) == 2 and _alternates(values)):
         return 0.0
     step = float(np.min(np.diff(levels)))
     steps = (levels - levels[0]) / step
     whole = np.max(np.abs(steps - np.round(steps))) < 1e-3
     return step if whole and step > 1e-6 * float(np.max(np.abs(values))) else 0.0
+
+
+def _alternates(values: Array) -> bool:
+    """Whether two levels follow a pattern, as a response of period two does, and a converter's flicker does not."""
+    longest = max(1, min(LONGEST_PERIOD, len(values) // REPEATS))
+    return max(float(np.mean(values[k:] == values[:-k])) for k in range(1, longest + 1)) > 0.95
 
 
 def local_scatter(values: Array, period: int) -> float:
@@ -114,7 +125,8 @@ def repair(values: Array) -> Repaired:
     whole, origin = _with_missing_cycles(values, period, floor)
     gaps = tuple(int(origin[place + 1]) + 1 for place in np.flatnonzero(origin < 0) if origin[place + 1] >= 0)
     expected = _running_medians(whole, np.arange(len(whole)) % period, period)
-    limit = max(FAR * local_scatter(whole, period), 2.5 * floor)
+    climb = abs(float(np.median(whole[period:] - whole[:-period])))
+    limit = max(FAR * local_scatter(whole, period), 2.5 * floor) + (REACH + 1) * climb
     wrong = np.flatnonzero(np.abs(whole - expected) > limit)
     if len(wrong) == 0 or len(wrong) > max(1.0, OUTLIER_SHARE * len(whole)) or _longest_run(wrong) > 2:
         return Repaired(whole, (), gaps)
@@ -123,13 +135,13 @@ def repair(values: Array) -> Repaired:
     return Repaired(mended, tuple(int(origin[place]) + 1 for place in wrong if origin[place] >= 0), gaps)
 
 
-def _running_medians(values: Array, phase: NDArray[np.int64], period: int, reach: int = 4) -> Array:
-    """Median of the readings of the same phase up to ``reach`` periods away, for each reading."""
+def _running_medians(values: Array, phase: NDArray[np.int64], period: int) -> Array:
+    """Median of the readings of the same phase up to ``REACH`` periods away, for each reading."""
     expected = np.empty_like(values)
     for first in range(period):
         column = values[phase == first]
-        width = min(2 * reach + 1, len(column))
-        starts = np.clip(np.arange(len(column)) - reach, 0, len(column) - width)
+        width = min(2 * REACH + 1, len(column))
+        starts = np.clip(np.arange(len(column)) - REACH, 0, len(column) - width)
         windows = np.lib.stride_tricks.sliding_window_view(column, width)[starts]
         expected[phase == first] = np.median(windows, axis=1)
     return expected

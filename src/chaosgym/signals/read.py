@@ -302,11 +302,11 @@ def _delimiter(lines: list[str]) -> str:
     spaced = sum(len(row) > 1 and all(map(_is_number, row)) for row in words) > 0.5 * len(tail)
     if spaced and not any(word.endswith(",") for row in words for word in row):
         return " "
-    single = [line.strip().split(",") for line in tail]
+    single = [row for row in (line.strip().split(",") for line in tail) if _is_number(row[0])]
     decimal = all(
         len(row) == 2 and re.fullmatch(r"[+-]?\d+", row[0]) and re.fullmatch(r"\d+", row[1]) for row in single
     )
-    if decimal and not _two_columns(lines[0], single):
+    if single and decimal and not _two_columns(lines[0], single):
         return ";"
     return ","
 
