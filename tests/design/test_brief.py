@@ -2,11 +2,12 @@
 
 import tomllib
 
+import numpy as np
 import pytest
 
 from chaosgym.design import Criteria
 from chaosgym.design.brief import brief_from, read_brief, template
-from chaosgym.design.measured import evaluate_peaks, read_peaks
+from chaosgym.design.measured import evaluate_peaks
 from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import MACHINES, ImpactBeam
@@ -111,27 +112,29 @@ def test_unusable_files_are_refused(text, message, tmp_path):
     assert message in str(error.value)
 
 
-def test_measured_peaks_give_what_simulated_ones_would(tmp_path):
-    """A file with header and further columns is read by its first column, and evaluated like any record."""
-    path = tmp_path / "peaks.csv"
-    path.write_text("peak force,cycle\n" + "".join(f"{40 + k % 3},{k}\n" for k in range(90)))
-    peaks = read_peaks(path)
-    assert len(peaks) == 90
-    found = evaluate_peaks(peaks, Criteria(load_rating=500.0))
+def test_measured_peaks_give_what_simulated_ones_would():
+    """Three forces in turn are three modes, and the equivalent force lies between them."""
+    found = evaluate_peaks([40.0 + k % 3 for k in range(90)], Criteria(load_rating=500.0))
     assert found.histogram.modes == pytest.approx([40.0, 41.0, 42.0], rel=1e-5)
     assert 40.0 < found.evaluation.force < 42.0
+    assert found.headline.startswith("periodic, period 3")
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
-    [("40\nforty\n", "line 2: 'forty'"), ("force\n", "holds no peak forces"), ("40\n-3\n" * 20, "-3 N in cycle 2")],
+    ("peaks", "message"),
+    [([40.0, -3.0] * 20, "-3 N in cycle 2"), ([0.0] * 40, "no contact"), ([30.0, 70.0, 45.0], "too few")],
 )
-def test_damaged_measurements_are_refused(text, message, tmp_path):
-    """The line or the cycle is named."""
-    path = tmp_path / "peaks.csv"
-    path.write_text(text)
+def test_damaged_measurements_are_refused(peaks, message):
+    """The cycle is named, or what is missing."""
     with pytest.raises(DesignError, match=message):
-        evaluate_peaks(read_peaks(path), Criteria())
+        evaluate_peaks(peaks, Criteria())
+
+
+def test_too_few_cycles_are_marked_as_an_estimate():
+    """Statistics that more cycles would change are an estimate, and say so."""
+    found = evaluate_peaks(np.random.default_rng(0).gamma(20.0, 2.5, 120), Criteria())
+    assert found.doubt.startswith("estimate: 120 cycles recorded")
+    assert found.doubt in found.lines()
 
 
 def test_default_machine_of_a_brief_is_the_one_of_the_thesis():

@@ -89,7 +89,7 @@ def test_a_hash_tells_files_apart(tmp_path):
         ("a [N],a [N]\n1,2\n", "two columns alike"),
         ("left [N],right [N]\n1,2\n3,1\n", "several columns that could be forces: 'left', 'right'; use --column"),
         ("cycle,rpm\n1,1140\n2,1141\n3,1139\n", "no column that could be a force"),
-        ("1\n2\n3\n4\n", "rises like a counter"),
+        ("1\n2\n3\n4\n5\n6\n", "rises like a counter"),
         ("F [V]\n1\n2\n1\n", "no column that could be a force"),
         ("a,b\n1,2\n1,2,3\n", "line 3 has 3 columns; allowed: 2"),
     ],

@@ -12,7 +12,8 @@ from chaosgym.design.criteria import Criteria
 from chaosgym.design.methodology import Evaluation, evaluate, plain
 from chaosgym.design.reliability import time_blocks
 from chaosgym.design.statistics import Convergence, Histogram, as_forces, convergence, histogram, require_enough
-from chaosgym.diagnosis.measured import MeasuredVerdict, judge_peaks
+from chaosgym.diagnosis.measured import judge_peaks
+from chaosgym.diagnosis.scatter import MeasuredVerdict
 from chaosgym.errors import DesignError
 
 Array = NDArray[np.float64]

@@ -34,7 +34,7 @@ class Signal(NamedTuple):
 def is_counter(values: Array) -> bool:
     """Whether values rise in equal steps, as a counter or an even time stamp does."""
     steps = np.diff(values)
-    return len(values) > 2 and bool(steps[0] > 0.0 and np.allclose(steps, steps[0], rtol=1e-6, atol=0.0))
+    return len(values) > 4 and bool(steps[0] > 0.0 and np.allclose(steps, steps[0], rtol=1e-6, atol=0.0))
 
 
 def is_clock(values: Array) -> bool:

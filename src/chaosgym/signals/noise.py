@@ -167,7 +167,7 @@ def _with_missing_cycles(values: Array, period: int, floor: float) -> tuple[Arra
             for count in range(1, period)
             if place >= period
         ]
-        place, missing = min(tried, key=lambda cut: _misfit(whole, *cut, period))
+        place, missing = min(tried, key=lambda cut: _misfit(whole, cut[0], cut[1], period))
         if _misfit(whole, place, missing, period) > limit:
             break
         stand_in = whole[place - period : place - period + missing]

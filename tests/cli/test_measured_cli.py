@@ -1,0 +1,228 @@
+"""Measured signals on the command line: three commands, one reader, one answer; units and files for the next tool."""
+
+import io
+import json
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from chaosgym.cli import main
+from tests.diagnosis.records import KINDS, make
+
+COMMANDS = (("diagnose",), ("classify", "impact-beam"), ("design", "--load-rating", "0.5 kN"))
+
+
+def run(*arguments, stdin=""):
+    """Exit code, standard output and standard error of ``chaosgym``, run in this process."""
+    out, err, code = io.StringIO(), io.StringIO(), 0
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        patch.setattr(sys, "argv", ["chaosgym", *map(str, arguments)])
+        patch.setattr(sys, "stdin", io.StringIO(stdin))
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code
+    return code, out.getvalue(), err.getvalue()
+
+
+def written(record, path, style):
+    """Write a record as one of five recorders would."""
+    rows = enumerate(record.peaks, start=1)
+    if style == 0:
+        path.write_text("".join(f"{peak:.9g}\n" for peak in record.peaks))
+    elif style == 1:
+        path.write_text("cycle,peak [N]\n" + "".join(f"{k},{peak:.9g}\n" for k, peak in rows))
+    elif style == 2:
+        text = "Zyklus;Kraft [N]\n" + "".join(f"{k};{peak:.9g}\n".replace(".", ",") for k, peak in rows)
+        path.write_bytes(text.encode("utf-16"))
+    elif style == 3:
+        path.write_text("stamp\tforce [kN]\n" + "".join(f"{1.7e9 + 0.05 * k:.2f}\t{1e-3 * f:.12g}\n" for k, f in rows))
+    else:
+        np.save(path.with_suffix(".npy"), record.peaks)
+        path.with_suffix(".npy").rename(path)
+
+
+def check_files(seeds, tmp_path):
+    """All three commands say the same nature and period of every file, and diagnose's reason is classify's."""
+    for number, (kind, seed) in enumerate((kind, seed) for seed in seeds for kind in KINDS if "simulated" not in kind):
+        record = make(kind, 6000 + seed)
+        path = tmp_path / f"{number}.txt"
+        written(record, path, number % 5)
+        options = [f"--{name.replace('_', '-')}={value:.9g}" for name, value in record.stated.items()]
+        told = []
+        for command in COMMANDS:
+            code, out, err = run(*command, "--peaks", path, *options, "--json")
+            if code == 2 and "cycles are too few for a statistic" in err:
+                continue
+            assert code == 0, err
+            answer = json.loads(out)
+            told.append((answer["nature"], answer["period"]))
+        assert len(told) >= 2
+        assert len(set(told)) == 1, (kind, seed, told)
+
+
+def test_three_commands_give_one_answer(tmp_path):
+    """Ten files of every kind of trouble, in five dialects."""
+    check_files(range(1), tmp_path)
+
+
+@pytest.mark.slow
+def test_three_commands_give_one_answer_on_a_hundred_files(tmp_path):
+    """A hundred files."""
+    check_files(range(10), tmp_path)
+
+
+def test_simulated_peaks_are_read_back(tmp_path):
+    """``simulate --out`` writes every cycle of both sides; ``diagnose``, ``classify`` and ``design`` read the file."""
+    for name in ("peaks.csv", "peaks.parquet"):
+        path = tmp_path / name
+        code, out, err = run(
+            "simulate",
+            "impact-beam",
+            "--frequency-hz",
+            "1140 rpm",
+            "--cycles",
+            80,
+            "--transient",
+            200,
+            "--out",
+            path,
+            "--json",
+        )
+        assert code == 0, err
+        peaks = json.loads(out)["peak_force_N"]
+        code, _, err = run("diagnose", "--peaks", path)
+        assert code == 2
+        assert "'upper', 'lower'; use --column NAME" in err
+        for command in COMMANDS:
+            code, out, err = run(*command, "--peaks", path, "--column", "upper", "--json")
+            assert code == 0, err
+            assert json.loads(out)["period"] == 1
+        code, out, _ = run("diagnose", "--peaks", path, "--column", "upper", "--json")
+        assert json.loads(out)["peak_force_summary_N"]["max"] == max(peaks)
+        assert run("simulate", "impact-beam", "--out", path)[0] == 2
+
+
+def test_simulated_series_are_read_back(tmp_path):
+    """``--series-out`` writes force and motion over time; cycles are found again, chaos stays chaos."""
+    path = tmp_path / "series.parquet"
+    run("simulate", "impact-beam", "--frequency-hz", 30, "--cycles", 300, "--transient", 200, "--series-out", path)
+    assert len(pq.read_table(path)) == 300 * 256
+    for cycle in (("--hz", "30"), ("--rpm", "1800"), ("--period-s", "33.333333333333 ms")):
+        code, out, err = run("diagnose", "--series", path, *cycle, "--json")
+        assert code == 0, err
+        assert json.loads(out)["nature"] == "chaotic"
+    assert run("classify", "impact-beam", "--series", path, "--hz", 30)[0] == 0
+    assert run("design", "--load-rating", "500 N", "--series", path, "--hz", 30)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("diagnose", "--peaks", "-", "--sensor-error", "inf"), "finite, 0 or more"),
+        (("diagnose", "--peaks", "-", "--sensor-error", "3 m"), "unknown unit 'm' (allowed: N, kN"),
+        (("diagnose", "impact-beam", "--sensor-error", "inf"), "finite, 0 or more"),
+        (("diagnose", "--peaks", "-", "--hz", "20"), "--hz belongs to --series"),
+        (("diagnose", "--peaks", "-", "--series", "-"), "exclude each other"),
+        (("diagnose", "--peaks", "-", "--sensor-error", "1", "--sensor-sigma", "1"), "given twice"),
+        (("diagnose", "--column", "upper"), "belong to --peaks or --series"),
+        (("classify", "impact-beam", "--peaks", "-", "--sensor-error", "nan"), "finite, 0 or more"),
+        (("diagnose", "--series", "-"), "no time column; use --rate-hz"),
+        (
+            ("simulate", "impact-beam", "--clearance-mm", "0.1 furlong"),
+            "unknown unit 'furlong' (allowed: m, mm, um, in)",
+        ),
+        (("simulate", "impact-beam", "--set", "clearance=0.1 kg"), "unknown unit 'kg'"),
+        (("simulate", "impact-beam", "--out", "peaks.xls"), "allowed: .csv, .parquet"),
+        (("simulate", "impact-beam", "--out", "nowhere/peaks.csv"), "is no folder"),
+    ],
+)
+def test_wrong_options_end_in_one_line(arguments, message):
+    """Exit code 2, nothing on standard output, one line that says what is allowed."""
+    code, out, err = run(*arguments, stdin="48.9\n48.8\n" * 20)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("value", ["1e308", "0"])
+def test_extreme_peaks_end_in_one_line_or_a_plain_answer(value):
+    """1e308 N is refused by all; all zeros are no contact."""
+    for command in COMMANDS:
+        code, out, err = run(*command, "--peaks", "-", stdin=f"{value}\n" * 60)
+        assert (code == 2 and len(err.strip().splitlines()) == 1) or "no contact" in out
+        assert value == "0" or "is no force in newton" in err
+
+
+def test_units_are_understood_by_options_fields_and_axes(tmp_path):
+    """0.1 mm, 100 µm and 1e-4 in SI are one clearance; 19 Hz are 1140 rpm."""
+    ways = (
+        ("--clearance-mm", "0.1", "--frequency-hz", "19"),
+        ("--clearance-mm", "100 µm", "--frequency-hz", "1140 rpm"),
+        ("--set", "clearance=0.1 mm", "--set", "excitation_frequency=0.019 kHz"),
+        ("--set", "clearance=1e-4", "--set", "excitation_frequency=19"),
+    )
+    shown = [json.loads(run("show", "impact-beam", *way, "--json")[1])["parameters"] for way in ways]
+    for parameters in shown:
+        assert parameters["clearance"] == pytest.approx(1e-4, rel=1e-12)
+        assert parameters["excitation_frequency"] == pytest.approx(19.0, rel=1e-12)
+    axes = ("--axis", "clearance=0.1 mm:120um:2", "--axis", "excitation_frequency=600 rpm:20 Hz:2")
+    code, _, err = run("sweep", "impact-beam", *axes, "--budget", 100, "--out", tmp_path / "s")
+    assert code == 0, err
+    table = pq.read_table(tmp_path / "s" / "sweep.parquet")
+    assert sorted(set(table["excitation_frequency"].to_pylist())) == [10.0, 20.0]
+    np.testing.assert_allclose(sorted(set(table["clearance"].to_pylist())), [1e-4, 1.2e-4])
+
+
+def test_millimetres_taken_for_metres_and_no_contact_are_said():
+    """A gap of 127 mm is doubted, and that it is never closed is said."""
+    code, out, err = run("simulate", "impact-beam", "--set", "clearance=0.127", "--cycles", "5")
+    assert code == 0
+    assert "for millimetres write '0.127 mm'" in err
+    assert "no contact at all" in out
+    _, _, err = run("simulate", "impact-beam", "--set", "clearance=0.127 mm", "--cycles", "5")
+    assert "millimetres" not in err
+
+
+def test_what_a_sweep_wrote_is_classified(tmp_path):
+    """Every row of a sweep describes its machine, so that ``classify --batch`` reads it."""
+    axes = ("--axis", "clearance=0.1 mm:0.12 mm:2", "--axis", "excitation_frequency=10:20:2")
+    assert run("sweep", "impact-beam", *axes, "--budget", 100, "--out", tmp_path / "s")[0] == 0
+    out = tmp_path / "answers.parquet"
+    code, _, err = run("classify", "impact-beam", "--batch", tmp_path / "s" / "sweep.parquet", "--out", out)
+    assert code == 0, err
+    assert not any(pq.read_table(out)["abstained"].to_pylist()[:1]) or len(pq.read_table(out)) == 4
+
+
+def test_a_coarse_sweep_calls_nothing_type_ii(tmp_path):
+    """Speeds 37 % apart are no neighbours: chaotic points are III, the others are left open, and that is said."""
+    axes = ("--axis", "clearance=0.1 mm:0.14 mm:2", "--axis", "excitation_frequency=4:30:4:log")
+    code, out, err = run("sweep", "impact-beam", *axes, "--budget", 100, "--out", tmp_path / "s", "--json")
+    assert code == 0, err
+    answer = json.loads(out)
+    assert set(answer["response_type"]) <= {"III", "undetermined"}
+    assert any("one tolerance apart" in warning for warning in answer["warnings"])
+
+
+def test_a_design_tells_its_source_and_no_examples(tmp_path):
+    """Without a strength there is no reliability; the file, its hash and the date are in the report."""
+    path, page = tmp_path / "peaks.csv", tmp_path / "report.html"
+    path.write_text("cycle,peak [N]\n" + "".join(f"{k},{50 + k % 2}\n" for k in range(60)))
+    code, out, err = run("design", "--peaks", path, "--load-rating", "500", "--out", page)
+    assert code == 0, err
+    assert out.startswith("periodic, period 2: every cycle loads the surface alike")
+    assert "no reliability" in out
+    numbers = json.loads(page.with_suffix(".json").read_text())
+    assert numbers["evaluation"]["reliability"] is None
+    assert numbers["criteria"] == {"load_rating": 500.0}
+    assert numbers["source"]["sha256"] in page.read_text()
+    assert numbers["source"]["date"] in page.read_text()
+    assert "Reliability over" not in page.read_text()
+    assert "GPa" not in page.read_text()
+    path.write_text("cycle,peak [N]\n" + "".join(f"{k},{50 + k % 2}\n" for k in range(6)))
+    code, _, err = run("design", "--peaks", path, "--load-rating", "500")
+    assert code == 2
+    assert "8 or more" in err
