@@ -20,6 +20,7 @@ from chaosgym.signals.noise import (
     class_residual,
     correlation,
     dominant_period,
+    local_scatter,
     nonlinear_part,
     predictability,
     without_drift,
@@ -33,6 +34,9 @@ RANDOM = 3.6
 SMALL_SCATTER, LARGE_SCATTER = 0.015, 0.08
 """Standard deviations, as shares of the mean force: random scatter below the first is a sensor's without being stated;
 a stated error above the second hides what would matter."""
+
+FEW_REPEATS = 12
+"""Periods below which a lost cycle can look like chaos."""
 
 TORUS_REST = 0.3
 """Share of its standard deviation that the lines of a torus may leave."""
@@ -173,6 +177,10 @@ def _with_stated(found: Scatter, told: SensorError, resolved: float) -> Measured
                 "random: a worse sensor, or the machine"
             )
             return _open(found, reason, told)
+        near = dominant_period(found.readings, resolved)
+        if size < FEW_REPEATS * near and local_scatter(found.readings, near) <= most:
+            few = f"most cycles come back after {near} others, but not all, and {size} cycles are too few to tell why"
+            return _open(found, few, told)
         lead = f"irregular beyond the sensor's error of {newton(half_width)}"
         return _torus(found, most, told) or _irregular(found, half_width, lead, told)
     if not found.random:
