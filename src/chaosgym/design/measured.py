@@ -1,4 +1,4 @@
-"""What do measured peak forces say? Nature, life and reliability from your own signals, without a machine model."""
+"""The message of measured peak forces: nature, life and reliability, without a machine model."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

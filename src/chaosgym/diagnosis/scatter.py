@@ -1,4 +1,4 @@
-r"""Is a scatter the sensor's or the machine's? What readings do about their repetition, and the verdict on it.
+r"""Scatter of the sensor or of the machine: what readings do about their repetition, and the verdict on it.
 
 With a stated error, what exceeds it is the machine's. Without one the scatter itself is judged: a sensor's is random
 from cycle to cycle and small, chaos can be forecast from what came before, a torus is a few lines of the spectrum.

@@ -1,4 +1,4 @@
-"""Where does a record change from one regime to another? Cut where two halves repeat, or scatter, far differently."""
+"""Changes of regime in a record: cut where two halves repeat, or scatter, far differently."""
 
 import numpy as np
 from numpy.typing import NDArray

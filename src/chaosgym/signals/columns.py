@@ -1,4 +1,4 @@
-"""Which column of a recording is the force, and which the time? Never a counter or a time stamp by mistake."""
+"""The force and the time among the columns of a recording; never a counter or a time stamp by mistake."""
 
 import re
 from typing import NamedTuple

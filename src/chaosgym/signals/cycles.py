@@ -1,4 +1,4 @@
-r"""How does a time series become one peak a cycle? Cut at the quietest phase of the cycle, largest modulus of each.
+r"""One peak a cycle of a time series: cut at the quietest phase of the cycle, largest modulus of each.
 
 The cycle is stated, taken from a tachometer, or estimated: the spectrum of a driven response has its lines at multiples
 of the driving frequency. A subharmonic response has lines between them, so that an estimate says that it is one.

@@ -1,4 +1,4 @@
-"""What do a few lines of the spectrum leave of a record? A torus is their sum, and its rest is the sensor's error."""
+"""A few lines of the spectrum: a torus is their sum, and what they leave is the sensor's error."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-r"""Which part of a record is the sensor's? Its stated or estimated error, single wrong readings, and missing cycles.
+r"""The sensor's part in a record: its stated or estimated error, single wrong readings, missing cycles.
 
 Peaks are compared with those one period earlier. What all cycles scatter by is noise or chaos; what single cycles
 leave by far, and return from at once, is a wrong reading: a machine would need some cycles to come back.

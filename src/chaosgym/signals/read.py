@@ -1,4 +1,4 @@
-"""What is in a recorder's file? Columns of numbers with names and units, whatever wrote them.
+"""Recorders' files as columns of numbers with names and units, whatever wrote them.
 
 CSV with any common delimiter, decimal comma, UTF-8 or UTF-16, comments and a line of units; Parquet, NumPy ``.npy``,
 MATLAB ``.mat``, WAV, and universal files (UFF 58, extra ``[uff]``). Formats are told by their first bytes.

@@ -1,4 +1,4 @@
-"""When was each sample taken? At a rate, or by time stamps whose rounding is forgiven and whose gaps are told."""
+"""Instants of samples: at a rate, or by time stamps whose rounding is forgiven and whose gaps are told."""
 
 import math
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""What does a text of columns say? CSV with any common delimiter, decimal comma, encoding, comments and headings."""
+"""Columns of a text: CSV with any common delimiter, decimal comma, encoding, comments and headings."""
 
 import io
 import re

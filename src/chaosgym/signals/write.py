@@ -1,4 +1,4 @@
-"""How are columns handed to the next tool? As CSV or Parquet, by the end of the name, whole or not at all."""
+"""Columns for the next tool, as CSV or Parquet by the end of the name, whole or not at all."""
 
 from collections.abc import Mapping
 from pathlib import Path

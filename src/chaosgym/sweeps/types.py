@@ -1,4 +1,4 @@
-"""Which response type has each point? That of the points up to one tolerance beside it, along speed and clearance."""
+"""Response type of each point: that of the points up to one tolerance beside it, along speed and clearance."""
 
 import numpy as np
 import pyarrow as pa
