@@ -115,7 +115,7 @@ def test_simulated_series_are_read_back(tmp_path):
     run("simulate", "impact-beam", "--frequency-hz", 30, "--cycles", 300, "--transient", 200, "--series-out", path)
     assert len(pq.read_table(path)) == 300 * 256
     for cycle in (("--hz", "30"), ("--rpm", "1800"), ("--period-s", "33.333333333333 ms")):
-        code, out, err = run("diagnose", "--series", path, *cycle, "--json")
+        code, out, err = run("diagnose", "--series", path, *cycle, "--sensor-error", "1 N", "--json")
         assert code == 0, err
         assert json.loads(out)["nature"] == "chaotic"
     assert run("classify", "impact-beam", "--series", path, "--hz", 30)[0] == 0

@@ -204,10 +204,10 @@ def test_command_evaluates_measured_peaks(run, tmp_path):
     code, out, err = run("--peaks", path, "--load-rating", "100", "--json")
     assert code == 0, err
     assert json.loads(out)["evaluation"]["life"] == pytest.approx(2.0 ** (10.0 / 3.0))
-    path.write_text("".join(f"{force}\n" for force in (30, 70, 45, 90, 38, 61)))
+    path.write_text("".join(f"{force}\n" for force in (30, 70, 45, 90, 38, 61) * 2))
     code, _, err = run("--peaks", path, "--load-rating", "100")
     assert code == 2
-    assert re.search(r"6 cycles are too few .* needed: \d+ or more", err)
+    assert re.search(r"12 cycles are too few .* needed: \d+ or more", err)
 
 
 @pytest.mark.parametrize(

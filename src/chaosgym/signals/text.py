@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 DELIMITERS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": "blanks"}
 """Delimiters in the order in which they are tried."""
 
+HEADING = 500
+"""Lines among which a heading ends."""
+
 COMMENT = re.compile(r"\s*(#|%|//|\")")
 NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.IGNORECASE)
 
@@ -39,8 +42,8 @@ def read_text(data: bytes) -> dict[str, Any]:
     if delimiter == " ":
         kept = [(number, "\t".join(line.split())) for number, line in kept]
     mark = "\t" if delimiter == " " else delimiter
-    rows = [[word.strip(' "') for word in line.split(mark)] for _, line in kept]
-    width = Counter(map(len, rows[-200:])).most_common(1)[0][0]
+    rows = [[word.strip(' "') for word in line.split(mark)] for _, line in kept[:HEADING]]
+    width = Counter(line.count(mark) + 1 for _, line in kept[-200:]).most_common(1)[0][0]
     start = next((i for i, row in enumerate(rows) if any(map(_is_number, row)) and len(row) == width), None)
     if start is None:
         raise DiagnosisError("holds no numbers")
@@ -214,7 +217,7 @@ def _numbers(column: Any, comma: bool, lines: tuple[int, ...]) -> tuple[Array | 
         return None, ""
     bad = np.flatnonzero(~good)
     values = np.full(size, np.nan)
-    values[good] = [float(entry) for entry in text.filter(pa.array(good)).to_pylist()]
+    values[good] = text.filter(pa.array(good)).cast(pa.float64()).to_numpy(zero_copy_only=False)
     if len(bad):
         entry = str(text[int(bad[0])])
         shown = repr(entry[:40]) if entry else "a blank between two numbers"
