@@ -54,7 +54,7 @@ def design(
             "sha256": run.sha256,
             "column": run.name,
             "date": datetime.date.today().isoformat(),
-            "read": "; ".join(run.notes),
+            "read as": "; ".join(run.notes).removeprefix("read "),
         }
         stated = asked.stated if asked is not None else ("load_rating",)
         found = evaluate_peaks(run.peaks, criteria, verdict=run.verdict, stated=stated, source=source)

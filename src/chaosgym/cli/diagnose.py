@@ -88,9 +88,13 @@ def _diagnose_machine(
         "cycles_used": verdict.evidence["cycles_used"],
         "warnings": [verdict.reason] if verdict.status in ("disputed", "transient", "unresolved") else [],
     }
+    if not verdict.judged.peak_force.any():
+        result["warnings"].append("no contact at all: the gap is never closed")
     votes = ", ".join(f"{test} {vote}" for test, vote in verdict.votes.items())
     lines = _verdict_lines(machine.name, verdict, summary, " N")
     lines.append(f"  {result['cycles_used']} cycles used; votes: {votes}")
+    if not verdict.judged.peak_force.any():
+        lines.append(f"  {result['warnings'][-1]}")
     if types:
         judged = response_type(machine, budget=budget, sensor_error=sensor_error, centre=verdict)
         result |= {"response_type": judged.type, "response_type_reason": judged.reason}
