@@ -36,7 +36,7 @@ def sweep(tmp_path_factory):
     """A small labelled sweep of the oscillator."""
     folder = tmp_path_factory.mktemp("sweep") / "sweep"
     axes = ("--axis", "frequency=5:9:9:log", "--axis", "gap=5e-4:1e-3:7:log")
-    found = answer("sweep", NAME, *axes, "--budget", 200, "--signals", 1, "--out", folder)
+    found = answer("sweep", NAME, *axes, "--budget", 200, "--signals", 1, "--full-types", 1, "--out", folder)
     assert found["points"] == 63
     return folder
 
