@@ -1,100 +1,85 @@
-"""How does an agent command a machine's speed? An action names a target that the drive approaches at a limited rate."""
+"""How does an agent set a machine's speed? It trims the speed that is demanded; a drive follows at a limited rate.
 
-import math
-from dataclasses import dataclass
+Three kinds of action say the same in different words:
+
+    trim         a number from 0 to 5: hold; 1 down, 1 up, 2 down, 2 up, in units of ``trim_step``; back to the demand
+    continuous   two numbers from -1 to 1: a change of the trim with a dead band, in units of 2 ``trim_step``; back to
+                 the demand if the second one is above 0.5
+    speed        the speed itself, for controllers
+
+Motion settles at a speed that is held. Actions that change the speed at every step keep it from settling, so each kind
+can hold a speed exactly.
+"""
+
 from typing import Any
 
 import numpy as np
+from gymnasium.spaces import Box, Discrete
 from numpy.typing import NDArray
 
+from chaosgym.envs.task import Task
 from chaosgym.errors import ParameterError
 
+Array = NDArray[np.float64]
 
-def checked_number(name: str, value: Any, low: float, high: float) -> float:
-    """Return the value as a float.
+MOVES = np.array([0, -1, 1, -2, 2])
+"""Trim steps of the discrete actions; one more action goes back to the demand."""
+
+BACK = len(MOVES)
+"""Discrete action that goes back to the demand."""
+
+DEAD_BAND = 0.4
+"""Continuous changes below this hold the speed."""
+
+KINDS = ("trim", "continuous", "speed")
+
+
+def action_space(task: Task) -> Box | Discrete[Any]:
+    """Return the space of actions of the task's kind."""
+    if task.action == "trim":
+        return Discrete(BACK + 1)
+    if task.action == "continuous":
+        return Box(-1.0, 1.0, (2,), np.float32)
+    return Box(np.array([task.lowest_speed], np.float32), np.array([task.highest_speed], np.float32))
+
+
+def checked_actions(task: Task, actions: Any, count: int) -> NDArray[Any]:
+    """Return the actions of ``count`` machines as an array, (count,) if they are discrete, otherwise (count, n).
 
     Raises
     ------
     ParameterError
-        If it is no number from ``low`` to ``high``; names it, its value and the range.
+        If they have another shape, or are no numbers of the space.
     """
-    if isinstance(value, str) or not hasattr(value, "__float__") or not low <= float(value) <= high:
-        raise ParameterError(f"{name} = {value!r} is out of range; allowed: {low:g} to {high:g}")
-    return float(value)
+    given = np.asarray(actions)
+    if task.action == "trim":
+        fits = given.shape == (count,) and np.issubdtype(given.dtype, np.integer)
+        if not fits or given.min() < 0 or given.max() > BACK:
+            raise ParameterError(f"action = {actions!r} is not usable; allowed: whole numbers from 0 to {BACK}")
+        return given
+    width = 2 if task.action == "continuous" else 1
+    if given.shape != (count, width) or not np.issubdtype(given.dtype, np.number) or not np.isfinite(given).all():
+        raise ParameterError(f"action = {actions!r} is not usable; allowed: {width} finite numbers for each machine")
+    return given.astype(float)
 
 
-@dataclass(frozen=True, kw_only=True)
-class SpeedDrive:
-    """Speed range and slew limit of a drive, in the unit of the machine's speed field.
+def trimmed(task: Task, actions: NDArray[Any], demand: Array, trim: Array) -> Array:
+    """Return the trims (k,) that checked actions of k machines ask for, at the demand and trim before."""
+    if task.action == "speed":
+        return actions[:, 0] - demand
+    if task.action == "trim":
+        back = actions == BACK
+        change = task.trim_step * MOVES[np.where(back, 0, actions)]
+    else:
+        back = actions[:, 1] > 0.5
+        size = np.clip((np.abs(actions[:, 0]) - DEAD_BAND) / (1.0 - DEAD_BAND), 0.0, 1.0)
+        change = 2.0 * task.trim_step * np.sign(actions[:, 0]) * size
+    return np.where(back, 0.0, np.clip(trim + change, -task.largest_trim, task.largest_trim))
 
-    Speeds and actions may be numbers or arrays of any shape.
-    """
 
-    lowest_speed: float
-    """Target speed of action -1."""
-    highest_speed: float
-    """Target speed of action +1."""
-    slew_limit: float
-    """Largest change of speed in one step."""
-    speed_grid: float = 0.0
-    """Spacing of the speeds that can be commanded, from the lowest one on; 0 if all can."""
-    regime_spacing: float = 1.0
-    """Spacing of the speeds at which the nature of a machine's response is looked up."""
-
-    def __post_init__(self) -> None:
-        for name in ("lowest_speed", "highest_speed", "slew_limit", "speed_grid"):
-            object.__setattr__(self, name, checked_number(name, getattr(self, name), 0.0, 1e6))
-        object.__setattr__(self, "regime_spacing", checked_number("regime_spacing", self.regime_spacing, 1e-3, 1e6))
-        if self.highest_speed <= self.lowest_speed:
-            raise ParameterError(
-                f"highest_speed = {self.highest_speed:g} is out of range; allowed: above lowest_speed = "
-                f"{self.lowest_speed:g}"
-            )
-        if self.speed_grid > 0.0:
-            self._check_grid()
-
-    def _check_grid(self) -> None:
-        spaces = (self.highest_speed - self.lowest_speed) / self.speed_grid
-        if abs(spaces - round(spaces)) > 1e-9 * max(1.0, spaces) or self.speed_grid > self.slew_limit:
-            raise ParameterError(
-                f"speed_grid = {self.speed_grid:g} is out of range; allowed: 0, or up to slew_limit = "
-                f"{self.slew_limit:g} and a whole number of times in the range of {self.lowest_speed:g} to "
-                f"{self.highest_speed:g}"
-            )
-
-    @property
-    def regime_speeds(self) -> NDArray[np.float64]:
-        """Speeds from the lowest one on, ``regime_spacing`` apart, that cover the range."""
-        spaces = math.ceil((self.highest_speed - self.lowest_speed) / self.regime_spacing - 1e-9)
-        return np.asarray(self.lowest_speed + self.regime_spacing * np.arange(spaces + 1))
-
-    def target_of(self, action: Any) -> tuple[Any, Any]:
-        """Return actions, clipped to [-1, 1], and the target speeds that they stand for, (...) for actions (..., 1).
-
-        Raises
-        ------
-        ParameterError
-            If an action is not finite.
-        """
-        value = np.asarray(action, dtype=float)[..., 0]
-        if not np.all(np.isfinite(value)):
-            raise ParameterError(f"action = {action!r} is not usable; allowed: numbers from -1 to 1")
-        value = np.clip(value, -1.0, 1.0)
-        return value, self.rounded(self.lowest_speed + 0.5 * (value + 1.0) * (self.highest_speed - self.lowest_speed))
-
-    def action_for(self, speed: float) -> float:
-        """Return the action whose target is ``speed``."""
-        return 2.0 * (speed - self.lowest_speed) / (self.highest_speed - self.lowest_speed) - 1.0
-
-    def rounded(self, speed: Any) -> Any:
-        """Return the speeds nearest to ``speed`` that can be commanded."""
-        if self.speed_grid == 0.0:
-            return speed
-        return self.lowest_speed + self.speed_grid * np.rint((speed - self.lowest_speed) / self.speed_grid)
-
-    def approach(self, speed: Any, target: Any) -> Any:
-        """Return the speeds of the next step, between speeds that can be commanded."""
-        limit = self.slew_limit
-        if self.speed_grid > 0.0:
-            limit = self.speed_grid * math.floor(limit / self.speed_grid * (1.0 + 1e-12))
-        return self.rounded(speed + np.clip(target - speed, -limit, limit))
+def approached(task: Task, speed: Array, target: Array) -> Array:
+    """Return the speeds (k,) of the next step, within the range of the drive, its rate and its grid."""
+    moved = speed + np.clip(target - speed, -task.slew_limit, task.slew_limit)
+    if task.speed_grid > 0.0:
+        moved = task.speed_grid * np.rint(moved / task.speed_grid)
+    return np.asarray(np.clip(moved, task.lowest_speed, task.highest_speed))

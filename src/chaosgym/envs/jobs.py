@@ -1,6 +1,5 @@
 """How do jobs go on? The bookkeeping of machines at work, whether one runs or a thousand side by side."""
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -8,36 +7,28 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from chaosgym.envs.drive import SpeedDrive
-from chaosgym.envs.observation import Observation, observe, sensor_readings
-from chaosgym.envs.pools import Pool, worn
-from chaosgym.envs.regimes import RegimeTable, nearest
-from chaosgym.envs.tasks import Status, Step, Task
+from chaosgym.envs.demand import demand_of
+from chaosgym.envs.drive import approached, trimmed
+from chaosgym.envs.judge import ExponentJudge, Judge, RecurrenceJudge
+from chaosgym.envs.observation import COMMANDED, OBSERVATION_NAMES, Observation, felt
+from chaosgym.envs.task import Status, Task
+from chaosgym.envs.variants import DRAWN, Variants
 from chaosgym.errors import SimulationError
+from chaosgym.machines.batch import Cycles
 from chaosgym.machines.machine import Machine
-from chaosgym.simulation.batch import Batch, Cycles, at_speed
+from chaosgym.simulation.batch import batch_of
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Generators = Sequence[np.random.Generator]
 
-RUN_IN_CYCLES = 20
-"""Cycles at the starting speed before the job begins; at least a step."""
-
 
 class Rules(NamedTuple):
-    """What all jobs have in common.
+    """What all jobs have in common: ``task``, ``variants`` of the machine, ``space`` of an observation."""
 
-    ``machine`` the nominal one; ``drive``; ``task``; ``space`` of an observation; ``pool`` of the machines;
-    ``sensor_error`` [N] half width of the error of a measured peak.
-    """
-
-    machine: Machine
-    drive: SpeedDrive
     task: Task
+    variants: Variants
     space: Box
-    pool: Pool
-    sensor_error: float
 
 
 class Outcome(NamedTuple):
@@ -49,66 +40,61 @@ class Outcome(NamedTuple):
     info: dict[str, NDArray[Any]]
 
 
-def bouncing_share(cycles: Cycles, last: int, period: Any) -> Array:
-    """Share of the half cycle that k machines spent bouncing on one side in their ``last`` cycles of a period [s]."""
-    duration = cycles.bounce_duration[:, -last:]
-    return np.asarray(2.0 * duration.reshape(len(duration), math.prod(duration.shape[1:])).mean(axis=1) / period)
+class Piece(NamedTuple):
+    """Part of a step: ``speeds`` (cycles,), run from ``coordinates`` and ``bouncing`` as in a ``MotionState``."""
 
-
-def impacts_per_cycle(cycles: Cycles, last: int) -> Array:
-    """Contacts begun in a cycle by k machines, mean of their ``last`` cycles."""
-    return np.asarray(cycles.impacts[:, -last:].sum(axis=(1, 2)) / last)
+    speeds: Array
+    coordinates: Array
+    bouncing: Array
 
 
 class Jobs:
-    """Jobs on the machines of a batch.
+    """Jobs on machines that run side by side.
 
     Attributes
     ----------
     machines
-        As drawn for the current job of each, with its present clearance, at its starting speed.
-    chosen : (N,)
-        Their numbers in the pool.
-    speed : (N,)
-        In the unit of the machine's speed field.
+        As drawn for the current job of each, with the clearance of the new machine.
+    number : (N,)
+        Their numbers among those kept for evaluation, -1 if drawn.
+    speed, trim : (N,)
+        Of the last step, in the unit of the machine's speed field.
+    demand : (N, steps + 1)
+        Of every step of the job.
+    done : (N,)
+        Steps done.
     damage : (N, sides)
         Share of its life that each surface has used up.
+    traced
+        Whether ``pieces`` keeps where the last step of job 0 began, for pictures.
     """
 
-    def __init__(self, rules: Rules, batch: Batch) -> None:
-        count, cycles = len(batch), rules.task.cycles_per_step
-        self.rules, self.batch = rules, batch
-        self.machines = [rules.machine] * count
-        self._new = [rules.machine] * count
-        self.chosen = np.zeros(count, np.int64)
-        self.speed = np.full(count, rules.drive.lowest_speed)
-        self.damage = np.zeros((count, len(rules.machine.sides)))
-        self._action = np.zeros(count)
-        self._cycles_done = np.zeros(count, np.int64)
-        self._type_iii = np.zeros((count, len(rules.pool.levels), len(rules.pool.speeds)), np.bool_)
-        self._peaks = np.zeros((count, cycles))
-        self._impacts = np.zeros(count)
-        self._bouncing = np.zeros(count)
-        self._job_time = rules.task.job_cycles * float(rules.machine.period_at(rules.drive.highest_speed))
+    def __init__(self, rules: Rules, count: int) -> None:
+        task, nominal = rules.task, rules.variants.nominal
+        self.rules, self.batch = rules, batch_of(nominal, count)
+        self.judge: Judge = ExponentJudge(count) if hasattr(self.batch, "run_varied") else RecurrenceJudge()
+        self.machines: list[Machine] = [nominal] * count
+        self.number = np.full(count, DRAWN)
+        self.speed, self.trim = np.full(count, task.lowest_speed), np.zeros(count)
+        self.demand = np.zeros((count, task.steps + 1))
+        self.done = np.zeros(count, np.int64)
+        self.damage = np.zeros((count, len(nominal.sides)))
+        self._changed = np.zeros(count, np.int64)
+        self._clearance = np.zeros(count)
+        self._job_time = task.job_cycles * float(nominal.period_at(task.highest_speed))
+        self.traced, self.pieces = False, list[Piece]()
 
     def machine_at(self, i: int) -> Machine:
-        """Machine of job i at its current speed."""
-        return at_speed(self.machines[i], float(self.speed[i]))
-
-    def regimes_at(self, i: int) -> RegimeTable:
-        """Regimes of the machine of job i with its present clearance."""
-        return self.rules.pool.regimes(int(self.chosen[i]))[int(self._levels(np.array([i]))[0])]
-
-    def nominal_regimes_at(self, i: int) -> RegimeTable:
-        """Regimes of the nominal machine, worn as that of job i is."""
-        return self.rules.pool.nominal_regimes[int(self._levels(np.array([i]))[0])]
+        """Machine of job i at its current speed and clearance."""
+        return self.machines[i].at(float(self.speed[i]), float(self._worn(np.array([i]))[0]))
 
     def start(
-        self, which: Indices, speed: float, generators: Generators, chosen: Indices | None = None
+        self, which: Indices, generators: Generators, numbers: Indices | None = None, speed: float | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start the jobs ``which`` (k,), each on a new machine that is run in from rest at a speed.
+        """Start the jobs ``which`` (k,), each on a new machine that is run in from rest.
 
-        ``chosen`` (k,) are the numbers of the machines in the pool; drawn by default.
+        ``numbers`` (k,) of machines kept for evaluation; drawn by default. ``speed`` of the start; by default below the
+        first demand.
 
         Returns
         -------
@@ -120,102 +106,144 @@ class Jobs:
         SimulationError
             If a machine can't be simulated at its starting speed.
         """
-        task, pool = self.rules.task, self.rules.pool
-        drawn = np.array([generator.integers(len(pool)) for generator in generators])
-        self.chosen[which] = drawn if chosen is None else chosen
-        for i, k in zip(which.tolist(), self.chosen[which].tolist(), strict=True):
-            self._type_iii[i] = [table.type_iii for table in pool.regimes(k)]
-            self.machines[i] = self._new[i] = at_speed(pool[k], speed)
-            self.batch.start(i, self.machines[i])
-        speeds = np.full(len(which), speed)
-        self.speed[which], self._action[which] = speeds, self.rules.drive.action_for(speed)
-        self.damage[which], self._cycles_done[which] = 0.0, 0
-        cycles = self.batch.run(which, max(RUN_IN_CYCLES, task.cycles_per_step))
+        task, variants = self.rules.task, self.rules.variants
+        for k, (i, generator) in enumerate(zip(which.tolist(), generators, strict=True)):
+            drawn = variants.drawn(generator)
+            self.demand[i] = demand_of(task, generator)
+            self.machines[i] = drawn if numbers is None else variants.held_out(int(numbers[k]))
+            self._clearance[i] = getattr(self.machines[i], drawn.clearance_field)
+        self.number[which] = DRAWN if numbers is None else numbers
+        wanted = self.demand[which, 0] - task.start_below if speed is None else np.full(len(which), speed)
+        speeds = np.clip(wanted, task.lowest_speed, task.highest_speed)
+        if task.speed_grid > 0.0:
+            speeds = task.speed_grid * np.rint(speeds / task.speed_grid)
+        self.speed[which], self.trim[which] = speeds, 0.0
+        self.damage[which], self.done[which], self._changed[which] = 0.0, 0, 0
+        self.judge.start(which)
+        for i in which.tolist():
+            self.batch.start(i, self.machines[i].at(float(self.speed[i])))
+        count = max(task.run_in_cycles, task.cycles_per_step)
+        cycles, growth = self._run(which, speeds, count, generators)
         if cycles.failed.any():
-            machine = self.machines[which[int(cycles.failed.argmax())]]
-            raise SimulationError(f"a job can't start at a speed of {speed:g}; {machine}")
-        self._note(which, speeds, cycles)
+            first = int(which[int(cycles.failed.argmax())])
+            raise SimulationError(f"a job can't start at a speed of {self.speed[first]:g}; {self.machines[first]}")
+        self.judge.verdict(which, growth, cycles.peak_force[:, :, 0])
         info = {
-            "speed": speeds,
+            "speed": speeds.copy(),
+            "demand": self.demand[which, 0],
             "damage": np.zeros(len(which)),
             "status": np.full(len(which), int(Status.RUNNING)),
-            "machine": self.chosen[which],
+            "machine": self.number[which],
+            "clearance": self._clearance[which],
         }
-        return self._observe(which, generators), info
+        return self._observe(which, cycles, generators), info
 
-    def step(self, which: Indices, actions: NDArray[np.float32], generators: Generators) -> Outcome:
-        """Run the jobs ``which`` (k,) for a step; a simulation that fails ends its job.
-
-        Raises
-        ------
-        ParameterError
-            If an action is not finite.
-        """
-        drive, task = self.rules.drive, self.rules.task
-        self._action[which], target = drive.target_of(actions)
-        speed = drive.approach(self.speed[which], target)
+    def step(self, which: Indices, actions: NDArray[Any], generators: Generators) -> Outcome:
+        """Run the jobs ``which`` (k,) for a step by checked actions; a simulation that fails ends its job."""
+        task = self.rules.task
+        now = self.done[which]
+        demand = self.demand[which, now]
+        self.trim[which] = trimmed(task, actions, demand, self.trim[which])
+        speed = approached(task, self.speed[which], demand + self.trim[which])
         self.speed[which] = speed
-        self.batch.set_speeds(which, speed)
-        if self.rules.pool.wears:
-            self._wear(which)
-        levels = self._levels(which)
-        cycles = self.batch.run(which, task.cycles_per_step)
+        if task.wear > 0.0:
+            self.batch.set_clearances(which, self._worn(which))
+        cycles, growth = self._run(which, speed, task.cycles_per_step, generators)
 
+        type_iii, irregularity = self.judge.verdict(which, growth, cycles.peak_force[:, :, 0])
         before = self.damage[which]
         after = before + task.damage(cycles.peak_force)
         self.damage[which] = after
-        self._cycles_done[which] += np.where(cycles.failed, 0, task.cycles_per_step)
-        self._note(which, speed, cycles)
-
         worse = after.max(axis=-1)
-        status = task.status(cycles.failed, self._cycles_done[which], worse)
-        duration = task.cycles_per_step * self.rules.machine.period_at(speed)
-        reward, named = task.judge(
-            Step(speed, duration, cycles.peak_force),
-            status,
-            type_iii=self._type_iii[which, levels, nearest(self.rules.pool.speeds, speed)],
-            damage_increase=worse - before.max(axis=-1),
-            job_time=self._job_time,
+        self.done[which] = now + 1
+        self._changed[which] = np.where(self.demand[which, now + 1] != demand, now + 1, self._changed[which])
+        status = task.status(cycles.failed, now + 1, worse)
+        terms = task.rewards(
+            deviation=np.abs(speed - demand),
+            type_iii=type_iii * ~cycles.failed,
+            damage=worse - before.max(axis=-1),
+            time=task.cycles_per_step * self.rules.variants.nominal.period_at(speed) / self._job_time,
+            failed=(status == int(Status.FRACTURE)) | (status == int(Status.SIMULATION_FAILED)),
+            steps_left=task.steps - now,
         )
-        info = named | {
+        info = terms | {
             "speed": speed,
+            "demand": demand,
+            "deviation": np.abs(speed - demand),
+            "type_iii": type_iii * ~cycles.failed,
+            "cost": type_iii * ~cycles.failed,
+            "irregularity": irregularity,
+            "largest_force": cycles.peak_force.reshape(len(which), -1).max(axis=1),
             "damage": worse,
             "status": status,
             "is_success": status == int(Status.JOB_DONE),
-            "machine": self.chosen[which],
+            "machine": self.number[which],
+            "clearance": self._worn(which),
         }
-        return Outcome(self._observe(which, generators), reward, status != int(Status.RUNNING), info)
+        reward = np.asarray(sum(terms.values()))
+        return Outcome(self._observe(which, cycles, generators), reward, status != int(Status.RUNNING), info)
 
-    def _levels(self, which: Indices) -> Indices:
-        """Which regime tables hold at the present clearances (k,)."""
-        return nearest(self.rules.pool.levels, 1.0 + self.damage[which].max(axis=-1))
+    def _worn(self, which: Indices) -> Array:
+        """Clearances (k,) [m] after the steps done."""
+        task = self.rules.task
+        return np.asarray(self._clearance[which] * (1.0 + task.wear * self.done[which] / task.steps))
 
-    def _wear(self, which: Indices) -> None:
-        """Let clearances grow with the damage; the motion goes on."""
-        for i, damage in zip(which.tolist(), self.damage[which].max(axis=-1).tolist(), strict=True):
-            self.machines[i] = worn(self._new[i], 1.0 + damage)
-            self.batch.change(i, self.machine_at(i))
+    def _run(self, which: Indices, speed: Array, count: int, generators: Generators) -> tuple[Cycles, Array]:
+        """Run machines at speeds (k,) that ripple, with kicks; growth is zero where it is not known."""
+        task = self.rules.task
+        speeds = np.repeat(speed[:, None], count, axis=1)
+        if task.speed_ripple > 0.0:
+            speeds *= 1.0 + task.speed_ripple * np.array([g.standard_normal(count) for g in generators])
+        half = self.rules.variants.nominal.n_states // 2
+        kicks = None
+        if task.kick > 0.0:
+            kicks = task.kick * np.array([g.standard_normal((count, half)) for g in generators])
+        self.pieces = []
+        if kicks is None and isinstance(self.judge, ExponentJudge):
+            self._trace(which, speeds)
+            cycles, growth = self.batch.run_varied(which, speeds)  # type: ignore[attr-defined]
+            growth[cycles.failed] = 0.0
+            return cycles, growth
+        if kicks is None and task.speed_ripple == 0.0:
+            self.batch.set_speeds(which, speed)
+            self._trace(which, speeds)
+            return self.batch.run(which, count), np.zeros_like(speeds)
+        return self._run_cycles(which, speeds, kicks)
 
-    def _note(self, which: Indices, speed: Array, cycles: Cycles) -> None:
-        """Keep what the next observation and judgement need, of the machines that did not fail."""
-        if cycles.failed.any():
-            ran = ~cycles.failed
-            which, speed, cycles = which[ran], speed[ran], cycles.of(ran)
-        monitored = cycles.peak_force[..., 0]
-        n = self._peaks.shape[1]
-        self._peaks[which] = monitored[:, -n:]
-        self._impacts[which] = impacts_per_cycle(cycles, n)
-        self._bouncing[which] = bouncing_share(cycles, n, self.rules.machine.period_at(speed))
+    def _run_cycles(self, which: Indices, speeds: Array, kicks: Array | None) -> tuple[Cycles, Array]:
+        """Run machines cycle by cycle; one that fails stays where it is."""
+        single: list[Cycles] = []
+        growth = np.zeros_like(speeds)
+        for cycle in range(speeds.shape[1]):
+            if kicks is not None:
+                self.batch.kick(which, kicks[:, cycle])
+            column = speeds[:, cycle : cycle + 1]
+            self._trace(which, column)
+            if isinstance(self.judge, ExponentJudge):
+                done, growth[:, cycle : cycle + 1] = self.batch.run_varied(which, column)  # type: ignore[attr-defined]
+            else:
+                self.batch.set_speeds(which, column[:, 0])
+                done = self.batch.run(which, 1)
+            single.append(done)
+        failed = np.any([done.failed for done in single], axis=0)
+        results = [np.concatenate(parts, axis=1) for parts in list(zip(*single, strict=True))[1:]]
+        for values in (*results, growth):
+            values[failed] = 0
+        return Cycles(failed, *results), growth
 
-    def _observe(self, which: Indices, generators: Generators) -> Observation:
-        rules = self.rules
-        return observe(
-            rules.space,
-            self.speed[which],
-            self._action[which],
-            1.0 - self._cycles_done[which] / rules.task.job_cycles,
-            self._impacts[which],
-            self._bouncing[which],
-            sensor_readings(self._peaks[which], rules.sensor_error, generators),
-            self.damage[which].max(axis=-1) if rules.pool.wears else None,
-        )
+    def _trace(self, which: Indices, speeds: Array) -> None:
+        if self.traced and which[0] == 0:
+            self.pieces.append(Piece(speeds[0], *self.batch.motion(0)))
+
+    def _observe(self, which: Indices, cycles: Cycles, generators: Generators) -> Observation:
+        rules, task = self.rules, self.rules.task
+        values = np.empty((len(which), len(OBSERVATION_NAMES)), np.float32)
+        speed, done = self.speed[which], self.done[which]
+        demand = self.demand[which, done]
+        age = np.minimum(done - self._changed[which], task.shortest_hold)
+        entries = (speed, demand, self.trim[which], speed - demand, 1.0 - done / task.steps, age)
+        for column, entry in enumerate(entries):
+            values[:, column] = entry
+        period = rules.variants.nominal.period_at(speed)
+        values[:, len(COMMANDED) :] = felt(task, cycles, task.cycles_per_step, period, generators)
+        return np.clip(values, rules.space.low, rules.space.high, out=values)

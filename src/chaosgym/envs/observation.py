@@ -1,4 +1,4 @@
-"""What does the agent see? The speed, the progress of the job, and what a force sensor reports of a step."""
+"""What does the agent see? The speed, what is asked for, and what a force sensor reports of a step, with its errors."""
 
 from collections.abc import Sequence
 
@@ -6,88 +6,90 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from chaosgym.envs.task import Task
+from chaosgym.machines.batch import Cycles
+
 Array = NDArray[np.float64]
 Observation = NDArray[np.float32]
+Generators = Sequence[np.random.Generator]
+
+FORCE_RANGE = 5.0
+"""Range of the force sensors in units of the load rating."""
 
 IMPACT_RANGE = 200.0
 """Impacts a cycle at which the counter saturates."""
 
-SPEED, LAST_ACTION, REMAINING, IMPACTS, BOUNCING, FIRST_PEAK = 0, 1, 2, 6, 7, 8
-"""Places in an observation of the speed, of the action behind it, of the remaining share of the job, of the impacts a
-cycle, of the share spent bouncing, and of the first measured peak."""
+LAGS = (1, 2, 4)
+"""Cycles after which measured peaks are compared with themselves."""
+
+COMMANDED = ("speed", "demand", "trim", "offset", "remaining_share", "steps_since_change")
+FELT = (
+    "mean_peak_force",
+    "std_peak_force",
+    "max_peak_force",
+    "repeat_1",
+    "repeat_2",
+    "repeat_4",
+    "impacts_per_cycle",
+    "bouncing_share",
+)
+OBSERVATION_NAMES = (*COMMANDED, *FELT)
+"""Entries of an observation, in their order."""
+
+MEANINGS = {
+    "speed": "speed of the step",
+    "demand": "speed that is asked for in the coming step",
+    "trim": "trim that holds until the next action",
+    "offset": "speed less demand",
+    "remaining_share": "share of the job still to do",
+    "steps_since_change": "steps since the demand changed, at most the shortest hold",
+    "mean_peak_force": "mean of the measured peak forces of the step, one a cycle [N]",
+    "std_peak_force": "their standard deviation [N]",
+    "max_peak_force": "the largest of them [N]",
+    "repeat_1": "mean absolute difference of successive ones [N]",
+    "repeat_2": "the same after two cycles [N]",
+    "repeat_4": "the same after four cycles [N]",
+    "impacts_per_cycle": "contacts counted in a cycle, both sides",
+    "bouncing_share": "share of the half cycle spent bouncing on one side",
+}
+"""What each entry is; speeds are in the unit of the machine."""
 
 
-def observation_names(cycles_per_step: int, wears: bool) -> tuple[str, ...]:
-    """Name every entry of the observation; the last one is the damage if the machine wears."""
-    peaks = tuple(f"peak_force_{i + 1}" for i in range(cycles_per_step))
-    return (
-        "speed",
-        "last_action",
-        "remaining_share",
-        "max_peak_force",
-        "mean_peak_force",
-        "std_peak_force",
-        "impacts_per_cycle",
-        "bouncing_share",
-        *peaks,
-        *(("damage",) if wears else ()),
-    )
-
-
-def observation_space(
-    lowest_speed: float, highest_speed: float, force_range: float, cycles_per_step: int, wears: bool
-) -> Box:
-    """Return the space of observations; forces end at ``force_range`` [N], the range of the sensor."""
-    low = [lowest_speed, -1.0] + [0.0] * (6 + cycles_per_step + wears)
-    high = [highest_speed, 1.0, 1.0] + [force_range] * 3 + [IMPACT_RANGE, 1.0] + [force_range] * cycles_per_step
-    high += [1.0] * wears
+def observation_space(task: Task) -> Box:
+    """Return the space of observations, (14,), with finite bounds."""
+    span, force = task.highest_speed - task.lowest_speed, FORCE_RANGE * task.load_rating
+    trim = span if task.action == "speed" else task.largest_trim
+    low = [task.lowest_speed, task.lowest_demand, -trim, -span, 0.0, 0.0] + [0.0] * len(FELT)
+    high = [task.highest_speed, task.highest_demand, trim, span, 1.0, float(task.shortest_hold)]
+    high += [force] * (len(FELT) - 2) + [IMPACT_RANGE, 1.0]
     return Box(np.array(low, np.float32), np.array(high, np.float32))
 
 
-def sensor_readings(peaks: Array, sensor_error: float, generators: Sequence[np.random.Generator]) -> Array:
-    """Peak forces (k, cycles) [N] as sensors with uniform error read them, each machine's by a generator of its own."""
-    share = np.empty_like(peaks)
-    for row, generator in zip(share, generators, strict=True):
-        generator.random(out=row)
-    return np.maximum(peaks + (2.0 * sensor_error * share - sensor_error), 0.0)
-
-
-def observe(
-    space: Box,
-    speed: Array,
-    action: Array,
-    remaining: Array,
-    impacts: Array,
-    bouncing: Array,
-    peaks: Array,
-    damage: Array | None = None,
-) -> Observation:
-    """Compose the observations of k machines, clipped to their space.
-
-    Parameters
-    ----------
-    space
-        From ``observation_space``.
-    speed, action, remaining : (k,)
-        Speed of the step, the action behind it, and the share of the job still to do.
-    impacts, bouncing : (k,)
-        Contacts begun in a cycle, and the share of the half cycle spent bouncing on one side.
-    peaks : (k, cycles_per_step)
-        Measured peak forces [N].
-    damage : (k,)
-        Share of its life that the worse surface has used up, on machines that wear.
+def felt(task: Task, cycles: Cycles, last: int, period: Array, generators: Generators) -> Array:
+    """What sensors report of the ``last`` cycles of k machines, of a period [s] each, by generators of their own.
 
     Returns
     -------
-    (k, 8 + cycles_per_step), or one entry more with the damage.
+    (k, 8), the entries ``FELT``.
     """
-    cycles = peaks.shape[-1]
-    mean = peaks.sum(axis=-1) / cycles
-    deviation = np.sqrt(((peaks - mean[:, None]) ** 2).sum(axis=-1) / cycles)
-    values = np.empty((len(peaks), len(space.low)), np.float32)
-    for column, entry in enumerate((speed, action, remaining, peaks.max(axis=-1), mean, deviation, impacts, bouncing)):
-        values[:, column] = entry
-    values[:, FIRST_PEAK : FIRST_PEAK + cycles] = peaks
-    if damage is not None:
-        values[:, -1] = damage
-    return np.clip(values, space.low, space.high, out=values)
+    count = len(generators)
+    errors = np.empty((count, last + 1))
+    for row, generator in zip(errors, generators, strict=True):
+        generator.random(out=row)
+    errors = 2.0 * errors - 1.0
+    peaks = np.maximum(cycles.peak_force[:, -last:, 0] + task.sensor_error * errors[:, :-1], 0.0)
+    bouncing = 2.0 * cycles.bounce_duration[:, -last:].reshape(count, -1).mean(axis=1) / period
+    impacts = cycles.impacts[:, -last:].reshape(count, -1).sum(axis=1)
+    if task.missed_impacts > 0.0:
+        counts = zip(impacts.tolist(), generators, strict=True)
+        impacts = np.array([generator.binomial(n, 1.0 - task.missed_impacts) for n, generator in counts])
+    values = np.empty((count, len(FELT)))
+    mean = peaks.sum(axis=1) / last
+    values[:, 0] = mean
+    values[:, 1] = np.sqrt(((peaks - mean[:, None]) ** 2).sum(axis=1) / last)
+    values[:, 2] = peaks.max(axis=1)
+    for column, lag in enumerate(LAGS, start=3):
+        values[:, column] = np.abs(peaks[:, lag:] - peaks[:, :-lag]).sum(axis=1) / max(1, last - lag)
+    values[:, 6] = impacts / last
+    values[:, 7] = bouncing + task.bouncing_error * errors[:, -1]
+    return values

@@ -1,22 +1,21 @@
-"""How does stable-baselines3 train on the native vector environment? Through its own kind of vector environment.
+"""The native vector environment for stable-baselines3: its own kind of vector environment.
 
-envs = SB3VecEnv("chaosgym/ImpactBeam-v0", num_envs=16)
+envs = SB3VecEnv("chaosgym/ImpactBeam-v1", num_envs=16)
 PPO("MlpPolicy", VecMonitor(envs)).learn(100_000)
 
 Gives what ``DummyVecEnv`` gives of as many single environments, with one compiled call a step.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, cast
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
-from chaosgym.control.learner_view import Memory, commanded, memory_of
+from chaosgym.envs.memory import SpeedMemory, Usual, remembered_space
 from chaosgym.envs.observation import Observation
 from chaosgym.envs.vector_env import MachineVectorEnv
 from chaosgym.errors import ParameterError
@@ -151,56 +150,39 @@ class SB3VecEnv(VecEnv):
         return [None] * self.num_envs
 
 
-class SB3LearnerView(VecEnvWrapper):
-    """What ``LearnerView`` is for one environment: a memory, and increments for actions.
+class SB3VisitedSpeeds(VecEnvWrapper):
+    """What ``VisitedSpeeds`` is for one environment.
 
     Parameters
     ----------
     envs
         A ``SB3VecEnv``.
-    memory, increments
-        As there.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such memory.
+    usual, learns
+        As for ``SpeedMemory``.
     """
 
-    def __init__(self, envs: VecEnv, memory: Memory = "belief", increments: bool = True) -> None:
-        self._space = cast(Box, envs.observation_space)
-        self._memory = memory_of(self._space, lambda name: envs.get_attr(name)[0], memory)
-        self._largest = envs.get_attr("drive")[0].slew_limit if increments else None
-        super().__init__(envs, observation_space=self._memory.space if self._memory else self._space)
+    def __init__(self, envs: VecEnv, usual: Usual | None = None, *, learns: bool = True) -> None:
+        task = envs.get_attr("task")[0]
+        self.memory = SpeedMemory(task, envs.num_envs, usual, learns=learns)
+        super().__init__(envs, observation_space=remembered_space(task))
 
     def reset(self) -> Observation:
         """Start all jobs, with nothing remembered."""
-        self._last = cast(Observation, self.venv.reset())
-        return self._memory.start(self._last, self._excluded(range(self.num_envs))) if self._memory else self._last
-
-    def _excluded(self, jobs: Iterable[int]) -> NDArray[np.int64] | None:
-        """Numbers in the training pool of the machines of some jobs; None if they are of another pool."""
-        if self.venv.get_attr("pool")[0].name != "training":
-            return None
-        return np.array([self.venv.unwrapped.reset_infos[i]["machine"] for i in jobs])
-
-    def step_async(self, actions: NDArray[np.float32]) -> None:
-        """Take the actions of the next step."""
-        actions = commanded(actions, self._last, self._memory, self._space, self._largest)
-        self.venv.step_async(actions)
+        self.memory.forget(np.ones(self.num_envs, np.bool_))
+        return self.memory.add(self.venv.reset())
 
     def step_wait(self) -> tuple[Observation, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Run the step and remember it; a job that starts anew remembers nothing of the last one."""
         given, rewards, ended, infos = self.venv.step_wait()
-        self._last = cast(Observation, given)
-        if self._memory is None:
-            return self._last, rewards, ended, infos
-        last, fresh = self._last.copy(), np.flatnonzero(ended).tolist()
+        if not ended.any():
+            return self.memory.add(given), rewards, ended, infos
+        fresh = np.flatnonzero(ended).tolist()
+        last = given.copy()
         for i in fresh:
             last[i] = infos[i]["terminal_observation"]
-        seen = self._memory.add(last)
+        seen = self.memory.add(last)
         for i in fresh:
             infos[i]["terminal_observation"] = seen[i].copy()
-        if fresh:
-            seen[ended] = self._memory.restart(ended, self._last[ended], self._excluded(fresh))
+        self.memory.forget(ended)
+        seen[ended] = self.memory.first(ended, given)
         return seen, rewards, ended, infos

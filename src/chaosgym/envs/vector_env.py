@@ -1,12 +1,12 @@
-"""How do many agents' machines run at once? All jobs step in one compiled call, on all processors.
+"""Many agents' machines at once: all jobs step in one compiled call, on all processors.
 
-envs = gym.make_vec("chaosgym/ImpactBeam-v0", num_envs=256)
+envs = gym.make_vec("chaosgym/ImpactBeam-v1", num_envs=256)
 
 Every sub-environment does what a single environment with its seed does, bit for bit, and has a generator of its own.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, cast
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -15,27 +15,16 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from chaosgym.envs.drive import checked_actions
 from chaosgym.envs.jobs import Indices, Jobs
-from chaosgym.envs.machine_env import METADATA, MachineEnv, Start, start_of
-from chaosgym.envs.observation import Observation
+from chaosgym.envs.machine_env import METADATA, Start, Workplace, start_of
+from chaosgym.envs.observation import OBSERVATION_NAMES, Observation
 from chaosgym.errors import ParameterError
-from chaosgym.simulation.batch import batch_of
 
-Actions = NDArray[np.float32]
+Actions = NDArray[Any]
 Flags = NDArray[np.bool_]
 
-SHARED = (
-    "action_space",
-    "drive",
-    "nominal",
-    "observation_names",
-    "observation_space",
-    "pool",
-    "render_mode",
-    "rules",
-    "task",
-    "tolerances",
-)
+SHARED = ("model", "nominal", "observation_names", "render_mode", "task", "workplace")
 """Attributes that all sub-environments have in common."""
 
 
@@ -51,7 +40,7 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
     autoreset_mode
         When a sub-environment that has ended is reset: in the next step, in the same step, or by the user with
         ``reset(options={"reset_mask": ...})``.
-    keywords
+    machine, keywords
         Those of the single environment, ``render_mode`` excepted.
 
     Raises
@@ -60,20 +49,21 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         If a value is out of range; names it and the allowed range.
     """
 
-    single: ClassVar[Callable[..., MachineEnv]]
-    """Makes the single environment whose jobs are run; a class for each environment sets it."""
+    observation_names = OBSERVATION_NAMES
+    render_mode = None
 
     def __init__(
         self,
         num_envs: int = 1,
         *,
+        machine: str,
         max_episode_steps: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         **keywords: Any,
     ) -> None:
-        if keywords.get("render_mode") is not None:
+        if (mode := keywords.pop("render_mode", None)) is not None:
             raise ParameterError(
-                f"render_mode = {keywords['render_mode']!r} is not one of None; pictures come from "
+                f"render_mode = {mode!r} is not one of None; pictures come from "
                 "vectorization_mode='sync'"
             )
         for name, count in (("num_envs", num_envs), ("max_episode_steps", max_episode_steps)):
@@ -82,8 +72,10 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         modes = [mode.value for mode in AutoresetMode]
         if autoreset_mode not in (*AutoresetMode, *modes):
             raise ParameterError(f"autoreset_mode = {autoreset_mode!r} is not one of {', '.join(modes)}")
-        self._single = type(self).single(**keywords)
-        self._jobs = Jobs(self._single.rules, batch_of(self._single.machine, num_envs))
+        self.workplace = Workplace(machine, **keywords)
+        self.task, self.model = self.workplace.task, self.workplace.model
+        self.nominal = self.workplace.variants.nominal
+        self.jobs = Jobs(self.workplace.rules, num_envs)
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._limit = max_episode_steps
         self._elapsed = np.zeros(num_envs, np.int64)
@@ -92,10 +84,10 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**METADATA, "render_modes": [], "autoreset_mode": self.autoreset_mode}
-        self.single_action_space = self._single.action_space
-        self.single_observation_space = self._single.observation_space
-        self.action_space = batch_space(self._single.action_space, num_envs)
-        self.observation_space = batch_space(self._single.observation_space, num_envs)
+        self.single_action_space = self.workplace.actions
+        self.single_observation_space = self.workplace.space
+        self.action_space = batch_space(self.workplace.actions, num_envs)
+        self.observation_space = batch_space(self.workplace.space, num_envs)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -118,11 +110,7 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         options = dict(options or {})
         which = self._masked(options.pop("reset_mask", None))
         seeds = self._seeds(seed)
-        start = start_of(self._single.pool, options)
-        if start.machine is not None and start.machine.shape not in ((), (self.num_envs,)):
-            raise ParameterError(
-                f"options['machine'] has shape {start.machine.shape}; allowed: one number, or ({self.num_envs},)"
-            )
+        start = start_of(self.task, options, self.num_envs)
         observation, info = self._start(which, [seeds[i] for i in which.tolist()], start)
         if not self._has_begun:
             self._last = np.zeros(cast(tuple[int, ...], self.observation_space.shape), np.float32)
@@ -138,15 +126,11 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         Raises
         ------
         ParameterError
-            If the actions are not numbers of shape (num_envs, 1).
+            If the actions are not of the action space.
         gymnasium.error.ResetNeeded
             Before the first reset, and without autoreset after the end of a job.
         """
-        actions = np.asarray(actions)
-        if actions.shape != (self.num_envs, 1):
-            raise ParameterError(
-                f"actions have shape {actions.shape}; allowed: ({self.num_envs}, 1), numbers from -1 to 1"
-            )
+        actions = checked_actions(self.task, actions, self.num_envs)
         over = np.flatnonzero(self._needs_reset)
         if not self._has_begun or (len(over) and self.autoreset_mode is not AutoresetMode.NEXT_STEP):
             raise gym.error.ResetNeeded(f"no job is running in sub-environments {over.tolist()}; call reset() first")
@@ -156,7 +140,7 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         terminated, truncated = np.zeros(self.num_envs, np.bool_), np.zeros(self.num_envs, np.bool_)
         infos: dict[str, Any] = {}
         if len(running):
-            outcome = self._jobs.step(running, actions[running], self._generators_of(running))
+            outcome = self.jobs.step(running, actions[running], self._generators_of(running))
             self._elapsed[running] += 1
             observations[running], rewards[running] = outcome.observation, outcome.reward
             terminated[running] = outcome.terminated
@@ -193,13 +177,13 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
     def _start(
         self, which: Indices, seeds: Sequence[int | None], start: Start | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start jobs, at the lowest speed and on machines drawn by default."""
+        """Start jobs, below their first demand and on machines drawn by default."""
         for i, seed in zip(which.tolist(), seeds, strict=True):
             if seed is not None or self._generators[i] is None:
                 self._generators[i] = np_random(seed)[0]
-        speed, machine = start or start_of(self._single.pool, {})
-        chosen = None if machine is None else np.broadcast_to(machine, self.num_envs)[which]
-        result = self._jobs.start(which, speed, self._generators_of(which), chosen)
+        speed, machine = start or Start(None, None)
+        numbers = None if machine is None else machine[which]
+        result = self.jobs.start(which, self._generators_of(which), numbers, speed)
         self._elapsed[which] = 0
         self._needs_reset[which] = False
         return result
@@ -239,24 +223,20 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         return seed
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Return an attribute of each sub-environment: its own (speed, machine, regimes ...) or one that all share.
+        """Return an attribute of each sub-environment: its own (speed, machine, np_random) or one that all share.
 
         Raises
         ------
         AttributeError
             If there is no such attribute; names those that there are.
         """
-        count = range(self.num_envs)
         if name in SHARED:
-            return (getattr(self._single, name),) * self.num_envs
+            return (getattr(self, name),) * self.num_envs
         own: dict[str, Callable[[int], Any]] = {
-            "speed": lambda i: float(self._jobs.speed[i]),
-            "damage": lambda i: float(self._jobs.damage[i].max()),
-            "machine": self._jobs.machine_at,
-            "regimes": self._jobs.regimes_at,
-            "nominal_regimes": self._jobs.nominal_regimes_at,
+            "speed": lambda i: float(self.jobs.speed[i]),
+            "machine": self.jobs.machine_at,
             "np_random": lambda i: self._generators[i],
         }
         if name not in own:
             raise AttributeError(f"a sub-environment has no attribute {name!r}; known: {', '.join((*own, *SHARED))}")
-        return tuple(own[name](i) for i in count)
+        return tuple(own[name](i) for i in range(self.num_envs))

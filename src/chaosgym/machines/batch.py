@@ -14,6 +14,7 @@ from chaosgym.core import status
 from chaosgym.core.batch import Motions, Settings, advance_beams, advance_rigid_beams
 from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays
+from chaosgym.core.varied import advance_varied_beams, advance_varied_rigid_beams
 from chaosgym.machines.integrators import ExactEvents
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ class CompiledBatch(ABC):
         self._settings = Settings(integrator.step_phase, integrator.event_tolerance, integrator.event_budget)
         self._machine = machine
         self._motions = Motions(np.zeros((count, machine.n_states)), np.zeros((count, 3)))
+        self._scale = np.zeros_like(self._motions.coordinates)
 
     def __len__(self) -> int:
         return len(self._motions.bouncing)
@@ -78,15 +80,33 @@ class CompiledBatch(ABC):
         """Put a machine at rest into place i."""
         self._motions.coordinates[i] = 0.0
         self._motions.bouncing[i] = 0.0
+        self._scale[i] = 0.0
         self.change(i, machine)
+
+    def motion(self, i: int) -> tuple[Array, Array]:
+        """Return copies of the coordinates and the bouncing of machine i, as in a ``MotionState``."""
+        return self._motions.coordinates[i].copy(), self._motions.bouncing[i].copy()
+
+    def kick(self, which: Indices, shares: Array) -> None:
+        """Change the velocities of the machines ``which`` (k,) by ``shares`` (k, n_states / 2) of their largest."""
+        half = self._scale.shape[1] // 2
+        np.maximum(self._scale, np.abs(self._motions.coordinates), out=self._scale)
+        self._motions.coordinates[which, half:] += shares * self._scale[which, half:]
 
     def run(self, which: Indices, cycles: int) -> Cycles:
         """Run the machines ``which`` (k,) for some cycles."""
-        one = self._machine.arrays(cycles)
-        arrays = CycleArrays(*(np.empty((len(which), *array.shape), array.dtype) for array in one))
-        outcome = np.empty(len(which), np.int64)
+        arrays, outcome = self._empty(len(which), cycles)
         with _one_call_at_a_time:
             self._advance(which, arrays, outcome)
+        return self._cycles(arrays, outcome)
+
+    def _empty(self, count: int, cycles: int) -> tuple[CycleArrays, Indices]:
+        """Arrays and outcome for a number of machines and cycles."""
+        one = self._machine.arrays(cycles)
+        arrays = CycleArrays(*(np.empty((count, *array.shape), array.dtype) for array in one))
+        return arrays, np.empty(count, np.int64)
+
+    def _cycles(self, arrays: CycleArrays, outcome: Indices) -> Cycles:
         failed = outcome != status.OK
         results = Cycles(failed, arrays.peak_force, arrays.impacts, arrays.bounce_time)
         if failed.any():
@@ -122,11 +142,19 @@ class RestitutionBatch(CompiledBatch):
     nested: tuple[str, ...] = ("regimes",)
     """Parts of the model that are models themselves."""
 
+    _varied = staticmethod(advance_varied_rigid_beams)
+
     def __init__(self, machine: "Machine", count: int) -> None:
         super().__init__(machine, count)
         model = machine.reduce()
         self._parts = [stacked([getattr(model, name)] * count) for name in self.nested]
         self._batch = stacked([self._flat(model)] * count)
+        self._deviations = np.ones((count, 1, machine.n_states))
+
+    def start(self, i: int, machine: "Machine") -> None:
+        """Put a machine at rest into place i."""
+        super().start(i, machine)
+        self._deviations[i] = np.cos(1.0 + np.arange(self._deviations.shape[2]))
 
     def _flat(self, model: Any) -> Any:
         return model._replace(**dict.fromkeys(self.nested, 0.0))
@@ -137,6 +165,21 @@ class RestitutionBatch(CompiledBatch):
         for name, part in zip(self.nested, self._parts, strict=True):
             put(part, i, getattr(model, name))
         put(self._batch, i, self._flat(model))
+
+    def run_varied(self, which: Indices, speeds: Array) -> tuple[Cycles, Array]:
+        """Run the machines ``which`` (k,) for a cycle at each of the frequencies ``speeds`` (k, cycles) [Hz].
+
+        Returns
+        -------
+        (cycles, growth)
+            ``growth`` (k, cycles) is the logarithm of what a small deviation grew by in each cycle.
+        """
+        arrays, outcome = self._empty(len(which), speeds.shape[1])
+        growth = np.zeros((*speeds.shape, 1))
+        given = (self._batch, *self._parts, which, speeds, self._motions, self._deviations, growth, arrays)
+        with _one_call_at_a_time:
+            call(self._varied, *given, self._settings, outcome)
+        return self._cycles(arrays, outcome), growth[:, :, 0]
 
     def set_speeds(self, which: Indices, speeds: Array) -> None:
         """Change the excitation frequencies [Hz]."""
@@ -159,6 +202,8 @@ class ModalImpactBatch(RestitutionBatch):
     def set_clearances(self, which: Indices, clearances: Array) -> None:
         """Change the clearances [m]."""
         self._batch.stops[which] = self._machine.stops_at(clearances)  # type: ignore[attr-defined]
+
+    _varied = staticmethod(advance_varied_beams)
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         given = (self._batch, *self._parts, which, self._motions, arrays, self._settings, outcome)

@@ -17,7 +17,7 @@ from chaosgym.errors import SimulationError
 from chaosgym.machines.batch import Cycles
 from chaosgym.machines.machine import Machine
 from chaosgym.simulation.record import CycleRecord, MotionState
-from chaosgym.simulation.run import simulate
+from chaosgym.simulation.run import rest_state, simulate
 
 __all__ = ["Batch", "Cycles", "SerialBatch", "batch_of"]
 
@@ -59,6 +59,14 @@ class Batch(Protocol):
 
     def branch(self, i: int, which: Indices) -> None:
         """Let the machines ``which`` (k,), which differ from machine i in speed alone, go on from its motion."""
+        ...
+
+    def motion(self, i: int) -> tuple[Array, Array]:
+        """Return copies of the coordinates and the bouncing of machine i, as in a ``MotionState``."""
+        ...
+
+    def kick(self, which: Indices, shares: Array) -> None:
+        """Change the velocities of the machines ``which`` (k,) by ``shares`` (k, n_states / 2) of their largest."""
         ...
 
 
@@ -117,6 +125,22 @@ class SerialBatch:
         """Let the machines ``which`` (k,), which differ from machine i in speed alone, go on from its motion."""
         for k in which.tolist():
             self._motions[k] = self._motions[i]
+
+    def motion(self, i: int) -> tuple[Array, Array]:
+        """Return copies of the coordinates and the bouncing of machine i, as in a ``MotionState``."""
+        machine = self._machines[i]
+        assert machine is not None
+        coordinates, bouncing = self._motions[i] or rest_state(machine)
+        return coordinates.copy(), bouncing.copy()
+
+    def kick(self, which: Indices, shares: Array) -> None:
+        """Change the velocities of the machines ``which`` (k,) by ``shares`` (k, n_states / 2) of their largest."""
+        for i, share in zip(which.tolist(), shares, strict=True):
+            coordinates, bouncing = self.motion(i)
+            record = self.records[i]
+            section = np.abs(coordinates) if record is None else np.abs(record.section).max(axis=0)
+            coordinates[len(share) :] += share * section[len(share) :]
+            self._motions[i] = MotionState(coordinates, bouncing)
 
 
 def batch_of(machine: Machine, count: int) -> Batch:

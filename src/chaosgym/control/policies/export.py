@@ -1,4 +1,4 @@
-"""How does a policy trained with stable-baselines3 become one that numpy plays? Its weights are read out as arrays.
+"""From a policy trained with stable-baselines3 to one that numpy plays: its weights are read out as arrays.
 
 Knows the multilayer policies of PPO and SAC and the one-layer LSTM policy of sb3-contrib's RecurrentPPO, without
 importing any of them.
@@ -7,36 +7,26 @@ importing any of them.
 from typing import Any
 
 import numpy as np
+from gymnasium.spaces import Discrete
 
-from chaosgym.control.learner_view import Memory
 from chaosgym.control.policies.network import Dense, Lstm, Network
 from chaosgym.control.policies.policy import Normalisation, TrainedPolicy
 from chaosgym.errors import ModelFileError
 
 
-def exported(
-    model: Any,
-    env: str,
-    envs: Any,
-    *,
-    normalise: Any = None,
-    memory: Memory = "none",
-    increments: bool = False,
-) -> TrainedPolicy:
+def exported(model: Any, env: str, envs: Any, *, memory: bool = False) -> TrainedPolicy:
     """Return the deterministic policy of a trained model.
 
     Parameters
     ----------
     model
-        PPO, SAC or RecurrentPPO, with continuous actions.
+        PPO, SAC or RecurrentPPO.
     env
         Id of the environment.
     envs
-        A ``SB3VecEnv`` of it, whose spaces and drive count.
-    normalise
-        The ``VecNormalize`` that it was trained in, if any.
-    memory, increments
-        Of the ``LearnerView`` that it was trained in.
+        What it was trained in: a ``VecNormalize`` or plain; with ``memory``, a ``SB3VisitedSpeeds`` in it.
+    memory
+        Whether it was trained with a memory of visited speeds.
 
     Raises
     ------
@@ -52,15 +42,19 @@ def exported(
     places = sorted(int(name.split(".")[-2]) for name in weights if name.startswith(hidden) and name.endswith("weight"))
     names = [*((f"{hidden}.{place}", activation) for place in places), (last, "none")]
     network = Network(_lstm(weights), tuple(_dense(weights, name, kind) for name, kind in names))
+    usual = None
+    if memory:
+        inner = envs
+        while not hasattr(inner, "memory"):
+            inner = inner.venv
+        usual = inner.memory.usual
     return TrainedPolicy(
-        env,
-        envs.observation_space,
-        envs.action_space,
-        network,
-        _normalisation(normalise),
-        memory,
-        envs.get_attr("drive")[0].slew_limit if increments else None,
-        bool(model.policy.squash_output),
+        env=env,
+        action="trim" if isinstance(model.action_space, Discrete) else "continuous",
+        network=network,
+        normalisation=_normalisation(envs),
+        usual=usual,
+        squashed=bool(model.policy.squash_output),
     )
 
 
@@ -80,8 +74,8 @@ def _lstm(weights: dict[str, Any]) -> Lstm | None:
     return Lstm(weights["lstm_actor.weight_ih_l0"], weights["lstm_actor.weight_hh_l0"], bias)
 
 
-def _normalisation(normalise: Any) -> Normalisation | None:
-    if normalise is None:
+def _normalisation(envs: Any) -> Normalisation | None:
+    if not hasattr(envs, "obs_rms"):
         return None
-    statistics = normalise.obs_rms
-    return Normalisation(statistics.mean, np.sqrt(statistics.var + normalise.epsilon), float(normalise.clip_obs))
+    statistics = envs.obs_rms
+    return Normalisation(statistics.mean, np.sqrt(statistics.var + envs.epsilon), float(envs.clip_obs))

@@ -1,8 +1,7 @@
-"""How does a trained policy decide? Observation in, action out, by numpy alone.
+"""A trained policy: observations in, actions out, by numpy alone.
 
-policy = load_policy("runs/ppo-beam")    # a folder with policy.json and weights.npz
-policy.reset()                           # at the start of each job
-action = policy(observation)
+policy = load_policy("runs/ppo-0")       # a folder with policy.json and weights.npz
+chaosgym.evaluate(policy, "chaosgym/ImpactBeamTolerance-v1")
 """
 
 import json
@@ -15,24 +14,29 @@ from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from chaosgym.control.learner_view import BeliefMemory, Memory, SpeedMemory, commanded, memory_of
 from chaosgym.control.policies.network import Dense, Lstm, Network, State
 from chaosgym.envs import ENVIRONMENTS
+from chaosgym.envs.drive import BACK
+from chaosgym.envs.memory import SpeedMemory, Usual
+from chaosgym.envs.observation import OBSERVATION_NAMES
+from chaosgym.envs.task import Task
 from chaosgym.errors import ModelFileError, ParameterError
 from chaosgym.files import write_atomically
 
 Array = NDArray[Any]
 
-FORMAT = 3
+FORMAT = 4
 """Version of the files."""
 
 LARGEST = 50_000_000
 """Bytes that the weights may have."""
 
 DESCRIPTION, WEIGHTS = "policy.json", "weights.npz"
+
+ACTIONS = {"trim": BACK + 1, "continuous": 2}
+"""Numbers that the network answers with, by the kind of action: the largest one decides, or they are the action."""
 
 
 class Normalisation(NamedTuple):
@@ -56,99 +60,96 @@ class TrainedPolicy:
     ----------
     env
         Id of the environment that it was trained on.
-    observation_space, action_space
-        Of that environment.
+    action
+        Kind of its actions, "trim" or "continuous".
     network
         From prepared observations to actions.
     normalisation
         Applied to the observations, memory included; None for none.
-    memory
-        What it is given of the past of a job: "none", "speeds" (``SpeedMemory``), "belief" (``BeliefMemory``) or
-        "identified" (``IdentifiedMemory``), on the tables of ``env``.
-    largest_step
-        Change of speed for an action of 1, if the network answers with increments; None for target speeds.
+    usual
+        For a policy with a ``SpeedMemory``, what is usual at each speed; None for one without a memory.
     squashed
-        Whether the network's answer goes through tanh; otherwise it is clipped.
+        Whether continuous answers go through tanh; otherwise they are clipped.
+
+    Raises
+    ------
+    ModelFileError
+        If the parts do not fit each other.
     """
 
     env: str
-    observation_space: Box
-    action_space: Box
+    action: str
     network: Network
     normalisation: Normalisation | None = None
-    memory: Memory = "none"
-    largest_step: float | None = None
+    usual: Usual | None = None
     squashed: bool = False
+    knows: str = "measurements"
     _state: State | None = field(default=None, init=False, repr=False)
-    _memory: SpeedMemory | BeliefMemory | None = field(default=None, init=False, repr=False)
-    _jobs: int = field(default=0, init=False, repr=False)
+    _memory: SpeedMemory | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        self._memory = memory_of(self.observation_space, self._attribute, self.memory)
-        space = self._memory.space if self._memory else self.observation_space
-        self.network.check(space.shape[0], self.action_space.shape[0])
+        if self.action not in ACTIONS:
+            raise ModelFileError(f"the kind of actions is {self.action!r}; known: {', '.join(ACTIONS)}")
+        size = len(OBSERVATION_NAMES) + (len(SpeedMemory.names()) if self.usual else 0)
+        self.network.check(size, ACTIONS[self.action])
         if self.normalisation:
             for name, values in (("mean", self.normalisation.mean), ("deviation", self.normalisation.deviation)):
-                if values.shape != space.shape or not np.isfinite(values).all():
-                    raise ModelFileError(f"the {name} of the normalisation is not {space.shape[0]} finite numbers")
+                if values.shape != (size,) or not np.isfinite(values).all():
+                    raise ModelFileError(f"the {name} of the normalisation is not {size} finite numbers")
             if not (self.normalisation.deviation > 0.0).all():
                 raise ModelFileError("a deviation of the normalisation is not positive")
-            _expect_scale("limit of the normalisation", self.normalisation.limit)
-        if self.largest_step is not None:
-            _expect_scale("largest step", self.largest_step)
+            if not 0.0 < self.normalisation.limit < np.inf:
+                raise ModelFileError(f"the limit of the normalisation is {self.normalisation.limit}; must be positive")
 
-    def reset(self) -> None:
-        """Forget the last job."""
-        self._state, self._jobs = None, 0
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """Keywords of the environment that it plays in."""
+        return {"action": self.action}
 
-    def __call__(self, observation: Array) -> NDArray[np.float32]:
-        """Return the action (1,) for an observation (d,), or actions (n, 1) for those of n jobs side by side (n, d).
+    def start(self, envs: Any) -> None:
+        """Begin the jobs of a vector environment that has been reset.
 
         Raises
         ------
         ModelFileError
-            If observations of another length were expected.
-        ParameterError
-            If an observation is not finite, or there are more or fewer jobs than before and no ``reset`` in between.
+            If it is of another machine, or has another kind of actions.
         """
-        observations = np.asarray(observation, np.float32)
-        if observations.shape[-1:] != self.observation_space.shape:
+        task: Task = envs.task
+        name = gym.spec(self.env).kwargs["machine"]
+        if envs.nominal.name != name or task.action != self.action:
             raise ModelFileError(
-                f"the observation has shape {observations.shape}; this policy of {self.env} expects "
-                f"{self.observation_space.shape}"
+                f"the policy was trained on {self.env} with action={self.action!r}; "
+                f"this is {envs.nominal.name} with action={task.action!r}"
             )
-        if not np.isfinite(observations).all():
-            raise ParameterError(f"the observation {observations.tolist()} is not finite")
-        last = values = np.atleast_2d(observations)
-        if (self._memory or self.network.lstm) and self._jobs not in (0, len(values)):
-            raise ParameterError(f"observations of {len(values)} jobs after {self._jobs}: call reset() between jobs")
+        self._state, self._memory = None, None
+        if self.usual:
+            if len(self.usual.count) != len(task.grid):
+                raise ModelFileError(
+                    f"the policy of {self.env} knows {len(self.usual.count)} speeds; this task has {len(task.grid)}"
+                )
+            self._memory = SpeedMemory(task, envs.num_envs, self.usual, learns=False)
+
+    def __call__(self, observations: Array) -> Array:
+        """Return the actions (n,) or (n, 2) for observations (n, 14) of as many jobs as were started.
+
+        Raises
+        ------
+        ParameterError
+            If an observation is not finite or has another length.
+        """
+        values = np.asarray(observations, np.float32)
+        if values.shape[1:] != (len(OBSERVATION_NAMES),) or not np.isfinite(values).all():
+            raise ParameterError(
+                f"observations have shape {values.shape}; allowed: (n, {len(OBSERVATION_NAMES)}), all finite"
+            )
         if self._memory:
-            values = self._memory.add(values) if self._jobs else self._memory.start(values)
-        self._jobs = len(values)
+            values = self._memory.add(values)
         if self.normalisation:
             values = self.normalisation(values)
         answer, self._state = self.network(values, self._state)
-        low, high = self.action_space.low, self.action_space.high
-        if self.squashed:
-            answer = low + 0.5 * (np.tanh(answer) + 1.0) * (high - low)
-        answer = commanded(answer, last, self._memory, self.observation_space, self.largest_step)
-        return np.clip(answer, low, high).reshape(*observations.shape[:-1], -1).astype(np.float32)
-
-    def _attribute(self, name: str) -> Any:
-        """Attribute of the environment that it was trained on."""
-        return gym.make(self.env).get_wrapper_attr(name)
-
-    def fits(self, env: gym.Env[Any, Any]) -> None:
-        """Raise a ModelFileError unless the spaces are those of an environment."""
-        for name, own, theirs in (
-            ("observation", self.observation_space, env.observation_space),
-            ("action", self.action_space, env.action_space),
-        ):
-            if own != theirs:
-                raise ModelFileError(
-                    f"the {name} space of the policy, {own}, is not that of the environment, {theirs}; "
-                    f"it was trained on {self.env}"
-                )
+        if self.action == "trim":
+            return np.asarray(answer.argmax(axis=-1))
+        return np.asarray(np.tanh(answer) if self.squashed else np.clip(answer, -1.0, 1.0), np.float32)
 
 
 def save_policy(policy: TrainedPolicy, folder: str | Path) -> None:
@@ -161,18 +162,18 @@ def save_policy(policy: TrainedPolicy, folder: str | Path) -> None:
         arrays |= {f"layer{place}.weight": layer.weight, f"layer{place}.bias": layer.bias}
     if policy.normalisation:
         arrays |= {"mean": policy.normalisation.mean, "deviation": policy.normalisation.deviation}
+    if policy.usual:
+        arrays |= {f"usual.{name}": values for name, values in vars(policy.usual).items()}
     buffer = BytesIO()
     np.savez(buffer, **arrays)  # type: ignore[arg-type]
     description = {
         "format": FORMAT,
         "env": policy.env,
-        "observation": _bounds(policy.observation_space),
-        "action": _bounds(policy.action_space),
+        "action": policy.action,
         "lstm": network.lstm is not None,
         "activations": [layer.activation for layer in network.layers],
         "normalisation_limit": policy.normalisation.limit if policy.normalisation else None,
-        "memory": policy.memory,
-        "largest_step": policy.largest_step,
+        "memory": policy.usual is not None,
         "squashed": policy.squashed,
         "sha256": sha256(buffer.getvalue()).hexdigest(),
     }
@@ -197,7 +198,7 @@ def load_policy(folder: str | Path) -> TrainedPolicy:
         description = json.loads((folder / DESCRIPTION).read_text(encoding="utf-8"))
         if description["format"] != FORMAT:
             raise ModelFileError(
-                f"{folder} has format {description['format']}; this version reads format {FORMAT}: export it again"
+                f"{folder} has format {description['format']}; this version reads format {FORMAT}: train it again"
             )
         return _policy(description, _arrays(folder / WEIGHTS, description["sha256"]))
     except (
@@ -215,7 +216,7 @@ def load_policy(folder: str | Path) -> TrainedPolicy:
 
 
 def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPolicy:
-    env, limit, step = (description[name] for name in ("env", "normalisation_limit", "largest_step"))
+    env, limit = description["env"], description["normalisation_limit"]
     if env not in ENVIRONMENTS:
         # Gymnasium would import the module of an id like "module:name"
         raise ModelFileError(f"its environment, {env!r}, is none of {', '.join(ENVIRONMENTS)}")
@@ -224,15 +225,21 @@ def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPol
         Dense(arrays[f"layer{place}.weight"], arrays[f"layer{place}.bias"], activation)
         for place, activation in enumerate(description["activations"])
     )
+    usual = None
+    if description["memory"]:
+        usual = Usual(len(arrays["usual.count"]))
+        for name, values in vars(usual).items():
+            given = arrays[f"usual.{name}"]
+            if given.shape != values.shape or not np.isfinite(given).all():
+                raise ModelFileError(f"usual.{name} has shape {given.shape}; expected: {values.shape}, all finite")
+            setattr(usual, name, given)
     return TrainedPolicy(
-        env,
-        _space(description["observation"]),
-        _space(description["action"]),
-        Network(lstm, layers),
-        None if limit is None else Normalisation(arrays["mean"], arrays["deviation"], float(limit)),
-        description["memory"],
-        None if step is None else float(step),
-        bool(description["squashed"]),
+        env=env,
+        action=description["action"],
+        network=Network(lstm, layers),
+        normalisation=None if limit is None else Normalisation(arrays["mean"], arrays["deviation"], float(limit)),
+        usual=usual,
+        squashed=bool(description["squashed"]),
     )
 
 
@@ -245,16 +252,3 @@ def _arrays(path: Path, digest: str) -> dict[str, Array]:
         raise ModelFileError(f"{WEIGHTS} is damaged: its content does not match the hash in {DESCRIPTION}")
     with np.load(BytesIO(content), allow_pickle=False) as held:
         return {name: held[name] for name in held.files}
-
-
-def _expect_scale(name: str, value: float) -> None:
-    if not 0.0 < value < np.inf:
-        raise ModelFileError(f"the {name} is {value}; expected: a positive number")
-
-
-def _bounds(space: Box) -> dict[str, list[float]]:
-    return {"low": space.low.tolist(), "high": space.high.tolist()}
-
-
-def _space(bounds: dict[str, list[float]]) -> Box:
-    return Box(np.array(bounds["low"], np.float32), np.array(bounds["high"], np.float32))

@@ -1,7 +1,6 @@
-"""Which trained policies come with chaosgym? One folder of package data for each environment that has one.
+"""The trained policies that come with chaosgym: one folder of package data for each environment that has one.
 
-A folder holds policy.json and weights.npz, config.json (how it was trained), evaluation.json (how it was judged) and
-card.md (what to know before using it).
+A folder holds policy.json and weights.npz, and card.md: how it was trained, how it scores, what to know before using it.
 """
 
 from importlib import resources
@@ -29,6 +28,6 @@ def shipped_policy(env: str) -> TrainedPolicy:
         known = sorted(path.name for path in folder.parent.glob("*/"))
         raise ModelFileError(
             f"no policy is shipped for {env}; shipped: {', '.join(known) or 'none'}. "
-            "Train one with agents/train_ppo.py and give its folder with --policy"
+            "Train one with agents/ppo.py and give its folder with --policy"
         )
     return load_policy(folder)

@@ -1,0 +1,72 @@
+"""Many machines with modal impacts at once, each cycle at a speed of its own, with a small deviation carried along."""
+
+from numba import njit, prange
+
+from chaosgym.core.batch import beam_of, episode_of, rigid_beam_of
+from chaosgym.core.cycle import CycleArrays
+from chaosgym.core.modal_impact import advance as advance_beam
+from chaosgym.core.restitution import advance_restitution
+from chaosgym.core.tangent import Tangents
+
+
+@njit(cache=True, inline="always")
+def cycle_of(arrays, k, c):
+    """Arrays of cycle c of the machine in row k."""
+    return CycleArrays(
+        arrays.section[k, c : c + 1],
+        arrays.tip[k, c : c + 1],
+        arrays.peak_force[k, c : c + 1],
+        arrays.impacts[k, c : c + 1],
+        arrays.contact_time[k, c : c + 1],
+        arrays.bounce_time[k, c : c + 1],
+        arrays.events[k, c : c + 1],
+        arrays.history[k, c : c + 1],
+        arrays.peak_instant[k, c : c + 1],
+        arrays.peak_vector[k, c : c + 1],
+        arrays.channel_peak[k, c : c + 1],
+    )
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def advance_varied_beams(batch, regimes, tables, which, speeds, motions, vectors, growth, arrays, settings, outcome):
+    """As ``advance_beams``, for a cycle at each of the excitation frequencies ``speeds`` (k, cycles).
+
+    ``vectors`` (N, 1, n_states) are deviations, advanced in place; ``growth`` (k, cycles, 1) receives the logarithm of
+    what they grew by. The batch is left at the last speeds.
+    """
+    for k in prange(which.shape[0]):
+        i = which[k]
+        for c in range(speeds.shape[1]):
+            batch.excitation_frequency[i] = speeds[k, c]
+            outcome[k] = advance_beam(
+                beam_of(batch, regimes, tables, i),
+                motions.coordinates[i],
+                episode_of(motions, i),
+                cycle_of(arrays, k, c),
+                settings.step_phase,
+                settings.event_tolerance,
+                settings.event_budget,
+                Tangents(vectors[i], growth[k, c : c + 1]),
+            )[0]
+            if outcome[k] != 0:
+                break
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def advance_varied_rigid_beams(batch, regimes, which, speeds, motions, vectors, growth, arrays, settings, outcome):
+    """As ``advance_varied_beams``, for beams whose impacts take no time."""
+    for k in prange(which.shape[0]):
+        i = which[k]
+        for c in range(speeds.shape[1]):
+            batch.excitation_frequency[i] = speeds[k, c]
+            outcome[k] = advance_restitution(
+                rigid_beam_of(batch, regimes, i),
+                motions.coordinates[i],
+                episode_of(motions, i),
+                cycle_of(arrays, k, c),
+                settings.step_phase,
+                settings.event_budget,
+                Tangents(vectors[i], growth[k, c : c + 1]),
+            )[0]
+            if outcome[k] != 0:
+                break

@@ -1,0 +1,98 @@
+"""When is a cycle Type III? The motion is judged as it runs, so that what costs is what happens.
+
+A machine whose kernel carries small deviations along is judged by their growth: the mean over some ten cycles of the
+logarithm of the growth in a cycle, an exponent of the running motion. A cycle with a positive one is Type III. What
+transient motion damps is not charged, and chaos that dies out is charged while it lasts.
+
+Other machines are judged by recurrence with an amplitude: a step is Type III if, over its last cycles, peak forces miss
+those of the cycles before, at every period up to eight, by more than 2 % of their mean. The first eight cycles after a
+change of speed are compared with nothing.
+
+Under speed ripple recurrence can't tell chaos from a motion that the ripple shakes, which is why the beam is not
+judged by it: ``python -m benchmarks judges`` measures both.
+"""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+MEMORY = 10.0
+"""Cycles over which the growth is averaged."""
+
+LARGEST_GROWTH = 3.0
+"""Growth of a cycle beyond which it counts no more, either way."""
+
+PERIODS = 8
+"""Longest period, in cycles, of a motion that repeats."""
+
+MISS = 0.02
+"""Share of the mean peak force by which a motion that repeats may miss itself."""
+
+
+class Judge(Protocol):
+    """What tells Type III of N machines."""
+
+    def start(self, which: Indices) -> None:
+        """Forget the machines ``which`` (k,)."""
+        ...
+
+    def verdict(self, which: Indices, growth: Array, peaks: Array) -> tuple[Array, Array]:
+        """Judge a step of the machines ``which`` (k,) by growth and peaks (k, cycles).
+
+        Returns
+        -------
+        (share, irregularity)
+            (k,) share of the cycles in Type III, and the number behind the last verdict.
+        """
+        ...
+
+
+class ExponentJudge:
+    """Judges by the growth of small deviations; ``irregularity`` is the exponent [1/cycle]."""
+
+    def __init__(self, count: int) -> None:
+        self._exponent = np.zeros(count)
+
+    def start(self, which: Indices) -> None:
+        """Forget the machines ``which`` (k,)."""
+        self._exponent[which] = 0.0
+
+    def verdict(self, which: Indices, growth: Array, peaks: Array) -> tuple[Array, Array]:
+        """Share of the cycles with a positive exponent, and the exponent, (k,) each."""
+        exponent = self._exponent[which]
+        wild = np.zeros(len(which))
+        for cycle in np.clip(growth, -LARGEST_GROWTH, LARGEST_GROWTH).T:
+            exponent = exponent + (cycle - exponent) / MEMORY
+            wild += exponent > 0.0
+        self._exponent[which] = exponent
+        return wild / growth.shape[1], exponent
+
+
+class RecurrenceJudge:
+    """Judges by peaks that do not repeat; ``irregularity`` is the smallest miss as a share of the mean peak."""
+
+    def start(self, which: Indices) -> None:
+        """Nothing is kept from step to step."""
+
+    def verdict(self, which: Indices, growth: Array, peaks: Array) -> tuple[Array, Array]:
+        """1 where the step does not repeat, otherwise 0, and the miss, (k,) each."""
+        miss = recurrence_miss(peaks)
+        return (miss > MISS).astype(float), miss
+
+
+def recurrence_miss(peaks: Array) -> Array:
+    """Mean miss at the period that fits best, as a share of the mean peak, (...), of peak forces (..., cycles).
+
+    The first ``PERIODS`` cycles, at most half, are only compared with.
+    """
+    cycles = peaks.shape[-1]
+    first = min(PERIODS, cycles // 2)
+    last = peaks[..., first:]
+    misses = [np.abs(last - peaks[..., first - period : cycles - period]).mean(-1) for period in range(1, first + 1)]
+    if not misses:
+        return np.zeros(peaks.shape[:-1])
+    return np.asarray(np.min(misses, axis=0) / np.maximum(last.mean(-1), 1e-9))

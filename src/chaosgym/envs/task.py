@@ -1,0 +1,172 @@
+r"""What is a job, and what does it cost? Every number of a task, in one place.
+
+A step of a job costs
+
+    - deviation_weight |speed - demand|
+    - type_iii_weight  (share of the step's cycles in Type III)
+    - damage_weight    (increase of the damage)
+    - time_weight      (duration of the step) / (duration of the whole job at top speed)
+    - failure_weight   (steps that are left)                     on fracture or a failed simulation
+
+A step not done costs more than a bad one, so giving up never pays. Damage follows the basic rating life of a bearing
+(``life_law``), p = 10/3 for line contact; the damage of a joint is that of its worse surface.
+
+References
+----------
+P. Gu, Chaotic Vibration in Machine Systems and Its Implications for Design, PhD thesis, MIT, 1994, 3.5.2 and 5.2.1.
+ISO 281:2007, Rolling bearings - Dynamic load ratings and rating life.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.design.rating_life import damage_in_a_million
+from chaosgym.errors import ParameterError
+from chaosgym.machines.machine import Machine
+from chaosgym.machines.parameters import parameter, parameters_of, validate
+
+Array = NDArray[np.float64]
+
+_number = partial(parameter, low=0.0, high=1e9, provenance="assumed")
+_count = partial(parameter, low=1, high=1e6, provenance="assumed")
+
+
+class Status(IntEnum):
+    """Where the job stands; ``info["status"]``."""
+
+    RUNNING = 0
+    JOB_DONE = 1
+    FRACTURE = 2
+    SIMULATION_FAILED = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """Drive, demand, sensors, disturbance and weights of a task; speeds are in the unit of the machine's speed field.
+
+    Raises
+    ------
+    ParameterError
+        If a value is out of range, or ranges do not fit each other.
+    """
+
+    action: str = parameter(
+        "trim", choices=("trim", "continuous", "speed"), provenance="assumed", source="kind of action"
+    )
+    steps: int = _count(120, source="steps of a job")
+    cycles_per_step: int = _count(10, source="operating cycles in a step")
+    lowest_speed: float = _number(16.0, source="lowest speed of the drive")
+    highest_speed: float = _number(30.0, source="highest speed of the drive")
+    slew_limit: float = _number(2.0, source="largest change of speed in a step")
+    speed_grid: float = _number(0.0, source="spacing of the speeds that the drive can hold, 0 for none")
+    trim_step: float = _number(0.25, source="smallest change of the trim")
+    largest_trim: float = _number(2.0, source="largest trim")
+    lowest_demand: float = _number(18.0, source="lowest demand")
+    highest_demand: float = _number(29.0, source="highest demand")
+    smallest_change: float = _number(1.0, source="smallest change of the demand")
+    largest_change: float = _number(4.0, source="largest change of the demand")
+    shortest_hold: int = _count(20, source="fewest steps for which a demand holds")
+    longest_hold: int = _count(40, source="most steps for which a demand holds")
+    start_below: float = _number(2.0, source="speed of the first demand less that of the start")
+    run_in_cycles: int = _count(30, source="cycles from rest at the speed of the start, before the first observation")
+    sensor_error: float = _number(1.0, unit="N", source="half width of the error of a measured peak force")
+    bouncing_error: float = _number(0.05, source="half width of the error of the share of bouncing")
+    missed_impacts: float = _number(0.05, high=1.0, source="share of the impacts that the counter misses")
+    speed_ripple: float = _number(0.0, high=0.1, source="standard deviation of a cycle's speed, as a share of it")
+    kick: float = _number(
+        0.0, high=0.1, source="standard deviation of the change of each velocity once a cycle, as a share of its range"
+    )
+    wear: float = _number(0.0, high=10.0, source="growth of the clearance over the job, as a share of it")
+    type_iii_weight: float = _number(1.0, source="cost of a step that is Type III throughout")
+    deviation_weight: float = _number(0.25, source="cost of a step at a speed by 1 from the demand")
+    damage_weight: float = _number(1.0, source="cost of a life of the joint")
+    time_weight: float = _number(0.0, source="cost of the time that the job takes at top speed")
+    failure_weight: float = _number(2.0, source="cost of each step that is not done")
+    load_rating: float = _number(
+        100.0, low=1e-6, unit="N", source="peak force under which a job uses up the life_share of a joint"
+    )
+    life_share: float = _number(0.5, source="share of its life that a joint loses in a job under the load_rating")
+
+    def __post_init__(self) -> None:
+        validate(self)
+        pairs = (
+            ("lowest_speed", "highest_speed"),
+            ("lowest_demand", "highest_demand"),
+            ("lowest_speed", "lowest_demand"),
+            ("highest_demand", "highest_speed"),
+            ("smallest_change", "largest_change"),
+            ("shortest_hold", "longest_hold"),
+        )
+        for low, high in pairs:
+            if getattr(self, low) > getattr(self, high):
+                raise ParameterError(
+                    f"{low} = {getattr(self, low):g} is out of range; allowed: up to {high} = {getattr(self, high):g}"
+                )
+        if self.lowest_speed == self.highest_speed or self.trim_step <= 0.0:
+            raise ParameterError("lowest_speed and highest_speed must differ, and trim_step must be positive")
+
+    @property
+    def grid(self) -> Array:
+        """Speeds from the lowest one on, a ``trim_step`` apart."""
+        return np.arange(self.lowest_speed, self.highest_speed + 1e-6 * self.trim_step, self.trim_step)
+
+    @property
+    def job_cycles(self) -> int:
+        """Operating cycles of a job."""
+        return self.steps * self.cycles_per_step
+
+    def damage(self, peak_force: Array) -> Array:
+        """Share of its life that each surface uses up, (..., sides), by peak forces (..., cycles, sides) [N]."""
+        shares: Array = damage_in_a_million(peak_force, self.load_rating).sum(axis=-2)
+        return shares * (self.life_share / self.job_cycles)
+
+    def status(self, failed: Any, steps_done: Any, damage: Any) -> Any:
+        """Where jobs stand (...), by whether their simulation failed, steps done, and damage of the joint."""
+        done = np.where(steps_done >= self.steps, int(Status.JOB_DONE), int(Status.RUNNING))
+        return np.where(failed, int(Status.SIMULATION_FAILED), np.where(damage >= 1.0, int(Status.FRACTURE), done))
+
+    def rewards(
+        self, *, deviation: Array, type_iii: Array, damage: Array, time: Array, failed: Any, steps_left: Array
+    ) -> dict[str, Array]:
+        """Terms of the reward of a step of k jobs, (k,) each, by name; their sum is the reward."""
+        return {
+            "reward_deviation": 0.0 - self.deviation_weight * deviation,
+            "reward_type_iii": 0.0 - self.type_iii_weight * type_iii,
+            "reward_damage": 0.0 - self.damage_weight * damage,
+            "reward_time": 0.0 - self.time_weight * time,
+            "reward_failure": 0.0 - self.failure_weight * steps_left * failed,
+        }
+
+
+class UnknownKeywordError(ParameterError, TypeError):
+    """A keyword that neither the task nor the machine has."""
+
+
+def split(task: Task, machine: Machine, keywords: Mapping[str, Any]) -> tuple[Task, dict[str, Any]]:
+    """Return the task with the keywords that are its own, and those that are fields of the machine.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not allowed, or a keyword is the speed.
+    UnknownKeywordError
+        If a keyword is neither; it is a ``TypeError`` too, as for any call with an unknown keyword.
+    """
+    own, theirs = parameters_of(task), parameters_of(machine)
+    for name in keywords:
+        if name == machine.speed_field:
+            raise ParameterError(f"{name} is what the agent sets; give lowest_speed and highest_speed instead")
+        if name not in own and name not in theirs and name != "fidelity":
+            from difflib import get_close_matches
+
+            near = get_close_matches(name, [*own, *theirs, "fidelity", "model_fidelity", "tolerances"], n=1)
+            hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(own)}, and the fields of {machine.name}"
+            raise UnknownKeywordError(f"there is no keyword {name!r}; {hint}")
+    mine = {name: value for name, value in keywords.items() if name in own}
+    return replace(task, **mine), {name: value for name, value in keywords.items() if name not in own}
