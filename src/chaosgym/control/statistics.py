@@ -1,13 +1,11 @@
-"""How sure is a score? Interquartile mean, bootstrap intervals, performance profile, probability of improvement, CVaR.
+"""How sure is a score? Bootstrap intervals and the performance profile.
 
 References
 ----------
 Agarwal et al., Deep Reinforcement Learning at the Edge of the Statistical Precipice, NeurIPS 2021.
-Rockafellar, Uryasev, Optimization of conditional value-at-risk, Journal of Risk 2, 2000.
 """
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,13 +15,6 @@ Array = NDArray[np.float64]
 
 RESAMPLES = 10_000
 CONFIDENCE = 0.95
-WORST_SHARE = 0.1
-"""Share of the jobs that the CVaR is the mean of."""
-
-
-def interquartile_mean(values: ArrayLike, axis: int | None = None) -> Any:
-    """Mean without the lowest and the highest quarter."""
-    return stats.trim_mean(np.asarray(values, dtype=float), 0.25, axis=axis)
 
 
 def bootstrap_interval(count: int, statistic: Callable[[NDArray[np.int64]], Array], seed: int = 0) -> Array:
@@ -58,18 +49,3 @@ def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Array:
     """Share of the scores (any shape) at or above each threshold (n,)."""
     values, levels = np.ravel(np.asarray(scores, dtype=float)), np.asarray(thresholds, dtype=float)
     return np.asarray((values[:, None] >= levels).mean(axis=0))
-
-
-def probability_of_improvement(mine: ArrayLike, others: ArrayLike) -> float:
-    """Probability that a run of mine (seeds, machines) beats one of another's (seeds', machines) on the same machine.
-
-    Ties count half.
-    """
-    ours, theirs = np.asarray(mine, dtype=float)[:, None], np.asarray(others, dtype=float)[None]
-    return float(np.mean((ours > theirs) + 0.5 * (ours == theirs)))
-
-
-def worst_mean(values: ArrayLike, share: float = WORST_SHARE) -> float:
-    """Conditional value at risk: mean of the largest ``share`` of the values, at least of one."""
-    ordered = np.sort(np.ravel(np.asarray(values, dtype=float)))
-    return float(ordered[-max(1, round(share * len(ordered))) :].mean())

@@ -27,6 +27,46 @@ def cycle_of(arrays, k, c):
     )
 
 
+# The loops over cycles stand in functions of their own: in the body of a parallel loop numba reads a machine's speed once.
+
+
+@njit(cache=True)
+def _vary_beam(batch, regimes, tables, i, speeds, motions, vectors, growth, arrays, settings, k):
+    for c in range(speeds.shape[1]):
+        batch.excitation_frequency[i] = speeds[k, c]
+        outcome = advance_beam(
+            beam_of(batch, regimes, tables, i),
+            motions.coordinates[i],
+            episode_of(motions, i),
+            cycle_of(arrays, k, c),
+            settings.step_phase,
+            settings.event_tolerance,
+            settings.event_budget,
+            Tangents(vectors[i], growth[k, c : c + 1]),
+        )[0]
+        if outcome != 0:
+            return outcome
+    return 0
+
+
+@njit(cache=True)
+def _vary_rigid_beam(batch, regimes, i, speeds, motions, vectors, growth, arrays, settings, k):
+    for c in range(speeds.shape[1]):
+        batch.excitation_frequency[i] = speeds[k, c]
+        outcome = advance_restitution(
+            rigid_beam_of(batch, regimes, i),
+            motions.coordinates[i],
+            episode_of(motions, i),
+            cycle_of(arrays, k, c),
+            settings.step_phase,
+            settings.event_budget,
+            Tangents(vectors[i], growth[k, c : c + 1]),
+        )[0]
+        if outcome != 0:
+            return outcome
+    return 0
+
+
 @njit(cache=True, nogil=True, parallel=True)
 def advance_varied_beams(batch, regimes, tables, which, speeds, motions, vectors, growth, arrays, settings, outcome):
     """As ``advance_beams``, for a cycle at each of the excitation frequencies ``speeds`` (k, cycles).
@@ -35,38 +75,11 @@ def advance_varied_beams(batch, regimes, tables, which, speeds, motions, vectors
     what they grew by. The batch is left at the last speeds.
     """
     for k in prange(which.shape[0]):
-        i = which[k]
-        for c in range(speeds.shape[1]):
-            batch.excitation_frequency[i] = speeds[k, c]
-            outcome[k] = advance_beam(
-                beam_of(batch, regimes, tables, i),
-                motions.coordinates[i],
-                episode_of(motions, i),
-                cycle_of(arrays, k, c),
-                settings.step_phase,
-                settings.event_tolerance,
-                settings.event_budget,
-                Tangents(vectors[i], growth[k, c : c + 1]),
-            )[0]
-            if outcome[k] != 0:
-                break
+        outcome[k] = _vary_beam(batch, regimes, tables, which[k], speeds, motions, vectors, growth, arrays, settings, k)
 
 
 @njit(cache=True, nogil=True, parallel=True)
 def advance_varied_rigid_beams(batch, regimes, which, speeds, motions, vectors, growth, arrays, settings, outcome):
     """As ``advance_varied_beams``, for beams whose impacts take no time."""
     for k in prange(which.shape[0]):
-        i = which[k]
-        for c in range(speeds.shape[1]):
-            batch.excitation_frequency[i] = speeds[k, c]
-            outcome[k] = advance_restitution(
-                rigid_beam_of(batch, regimes, i),
-                motions.coordinates[i],
-                episode_of(motions, i),
-                cycle_of(arrays, k, c),
-                settings.step_phase,
-                settings.event_budget,
-                Tangents(vectors[i], growth[k, c : c + 1]),
-            )[0]
-            if outcome[k] != 0:
-                break
+        outcome[k] = _vary_rigid_beam(batch, regimes, which[k], speeds, motions, vectors, growth, arrays, settings, k)

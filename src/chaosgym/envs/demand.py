@@ -18,7 +18,8 @@ def demand_of(task: Task, generator: np.random.Generator) -> Array:
     asked = np.empty(task.steps + 1)
     now, step = generator.uniform(low, high), 0
     while step <= task.steps:
-        hold = int(generator.integers(task.shortest_hold, task.longest_hold + 1))
+        # by shares, so that a job of finer steps has the same demand
+        hold = task.shortest_hold + int(generator.random() * (task.longest_hold - task.shortest_hold + 1))
         asked[step : step + hold] = now
         step += hold
         change = generator.choice((-1.0, 1.0)) * generator.uniform(task.smallest_change, task.largest_change)

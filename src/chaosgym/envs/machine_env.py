@@ -59,9 +59,7 @@ def start_of(task: Task, options: Mapping[str, Any], count: int) -> Start:
     if speed is not None and (not isinstance(speed, int | float | np.number) or not low <= speed <= high):
         raise ParameterError(f"options['speed'] = {speed!r} is out of range; allowed: {low:g} to {high:g}")
     machine = options.get("machine")
-    return Start(
-        None if speed is None else float(speed), None if machine is None else checked_numbers(machine, count)
-    )
+    return Start(None if speed is None else float(speed), None if machine is None else checked_numbers(machine, count))
 
 
 class Workplace:

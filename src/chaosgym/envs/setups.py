@@ -33,7 +33,7 @@ SETUPS = {
         model_fidelity="modes-3",
         # clearance: repeatability of the thesis' feeler gauges (3.4, printed); damping and length: assumed
         tolerances={"clearance": 0.2, "damping_ratio": 0.2, "length": 0.002},
-        task=Task(speed_ripple=0.002, load_rating=137.0),
+        task=Task(speed_ripple=0.002, load_rating=80.0),
     ),
     "slider-crank": Setup(
         # figure 4.14b; the contact damping is assumed: more of it makes Type III rare and too weak to be felt

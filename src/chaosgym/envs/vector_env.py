@@ -63,8 +63,7 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
     ) -> None:
         if (mode := keywords.pop("render_mode", None)) is not None:
             raise ParameterError(
-                f"render_mode = {mode!r} is not one of None; pictures come from "
-                "vectorization_mode='sync'"
+                f"render_mode = {mode!r} is not one of None; pictures come from vectorization_mode='sync'"
             )
         for name, count in (("num_envs", num_envs), ("max_episode_steps", max_episode_steps)):
             if count is not None and (isinstance(count, bool) or int(count) != count or count < 1):

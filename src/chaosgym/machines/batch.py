@@ -199,11 +199,11 @@ class ModalImpactBatch(RestitutionBatch):
 
     nested = ("regimes", "tables")
 
+    _varied = staticmethod(advance_varied_beams)
+
     def set_clearances(self, which: Indices, clearances: Array) -> None:
         """Change the clearances [m]."""
         self._batch.stops[which] = self._machine.stops_at(clearances)  # type: ignore[attr-defined]
-
-    _varied = staticmethod(advance_varied_beams)
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         given = (self._batch, *self._parts, which, self._motions, arrays, self._settings, outcome)

@@ -1,0 +1,332 @@
+"""Who is better, and how sure is that? Everybody plays the same machines, demands and disturbances.
+
+    score = (mean return - that of following the demand) / (that of the own map - that of following the demand)
+
+The own map is the machine's map of Type III at every speed, smoothed, with the demands to come unknown. It is no bound
+on what a job returns: scores may exceed 1. Intervals draw machines, in pairs: the scale is drawn along.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute  # noqa: F401  (pa.compute)
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from chaosgym.control.controllers import (
+    OGY,
+    BackOff,
+    Bandit,
+    Belief,
+    CommonSchedule,
+    ConstantTrim,
+    DelayedFeedback,
+    ExtremumSeeking,
+    Follow,
+    ForceFeedback,
+    HillClimbing,
+    MapFollower,
+    RecedingHorizon,
+    Schedule,
+    SkipBands,
+)
+from chaosgym.control.maps import Maps, fleet_maps, maps_of, model_keywords
+from chaosgym.control.rollout import Played, Policy, play
+from chaosgym.control.statistics import bootstrap_interval, performance_profile
+from chaosgym.envs.task import Status
+from chaosgym.errors import DatasetError, ParameterError
+from chaosgym.files import write_atomically
+
+Array = NDArray[np.float64]
+
+ZERO, ONE = "follow the demand", "own map"
+"""Contenders that are worth 0 and 1."""
+
+COLUMNS = ("contender", "knows", "seed", "machine", "job_return", "type_iii", "deviation", "damage", "largest_force")
+"""Columns of a comparison's table, one row a job."""
+
+WORN_LEVELS = 5
+"""Clearances at which a machine that wears is mapped."""
+
+CYCLE_BY_CYCLE_MACHINES = 32
+"""Machines for controllers that act in each cycle, which take long."""
+
+PROFILE_SCORES = np.linspace(-1.0, 2.0, 121)
+"""Scores of single jobs at which the performance profile is given."""
+
+
+class Contenders:
+    """The controllers of a comparison by name; maps are made when the first one needs them."""
+
+    def __init__(self, env: str, machines: Sequence[int], keywords: Mapping[str, Any], progress: bool) -> None:
+        self.env, self.machines, self.progress, self.keywords = env, machines, progress, dict(keywords)
+        self._fleet: Maps | None = None
+        self._own: list[Maps] | None = None
+
+    def makers(self) -> dict[str, Callable[[], Policy]]:
+        """What makes each contender, in the order in which they are run."""
+        return {
+            ZERO: Follow,
+            ONE: lambda: MapFollower(self.own),
+            "own map, demands known": lambda: Schedule(self.own),
+            "best constant trim": lambda: ConstantTrim(self.fleet),
+            "skip bands": lambda: SkipBands(self._nominal()),
+            "best common schedule, demands known": lambda: CommonSchedule(self.fleet),
+            "back off": partial(BackOff, remembers=False),
+            "back off, with memory": BackOff,
+            "hill climbing": HillClimbing,
+            "bandit": lambda: Bandit(self.fleet),
+            "extremum seeking": ExtremumSeeking,
+            "force feedback": ForceFeedback,
+            "belief": lambda: Belief(self.fleet),
+            "receding horizon": RecedingHorizon,
+            "delayed feedback": DelayedFeedback,
+            "OGY": OGY,
+        }
+
+    @property
+    def fleet(self) -> Maps:
+        """Maps of simulated machines within the tolerances."""
+        if self._fleet is None:
+            self._fleet = fleet_maps(self.env, progress=self._bar("maps of models"), **self.keywords)
+        return self._fleet
+
+    @property
+    def own(self) -> list[Maps]:
+        """Maps of the machines that are played; where they wear, at ``WORN_LEVELS`` clearances."""
+        if self._own is None:
+            known: Any = gym.make_vec(self.env, num_envs=1, **self.keywords).unwrapped
+            wear, nominal = known.task.wear, known.nominal
+            field, levels = nominal.clearance_field, WORN_LEVELS if wear > 0.0 else 1
+            self._own = [
+                maps_of(
+                    self.env,
+                    machines=self.machines,
+                    progress=self._bar("own maps"),
+                    **(self.keywords | {field: getattr(nominal, field) * (1.0 + wear * k / max(1, levels - 1))}),
+                )
+                for k in range(levels)
+            ]
+        return self._own
+
+    def _nominal(self) -> Maps:
+        return maps_of(self.env, seeds=[0], **(model_keywords(self.env, **self.keywords) | {"tolerances": {}}))
+
+    def _bar(self, name: str) -> str | None:
+        return name if self.progress else None
+
+
+def cycle_keywords(task: Any) -> dict[str, Any]:
+    """Keywords of the same job with an action in each cycle instead of each step."""
+    n = task.cycles_per_step
+    whole = {name: n * getattr(task, name) for name in ("steps", "shortest_hold", "longest_hold")}
+    parts = ("type_iii_weight", "deviation_weight", "failure_weight", "slew_limit")
+    return {"cycles_per_step": 1, "speed_grid": 0.0, **whole, **{name: getattr(task, name) / n for name in parts}}
+
+
+def compare(
+    env: str,
+    out: Path,
+    *,
+    machines: int = 256,
+    only: Iterable[str] | None = None,
+    policies: Mapping[str, Sequence[Policy]] | None = None,
+    progress: bool = False,
+    **keywords: Any,
+) -> pa.Table:
+    """Let everybody play, and keep a row a job in one Parquet file; what it holds already is not run again.
+
+    Parameters
+    ----------
+    env
+        Id of the environment.
+    out
+        The file; a comparison that was interrupted goes on.
+    machines
+        How many of those kept for evaluation.
+    only
+        Names of the controllers to run; all by default.
+    policies
+        Trained policies by name, one for each training seed.
+    keywords
+        Of the environment.
+
+    Raises
+    ------
+    ParameterError
+        If a controller is unknown.
+    DatasetError
+        If the file is no comparison of this environment.
+    """
+    numbers = list(range(machines))
+    contenders = Contenders(env, numbers, keywords, progress)
+    makers = contenders.makers()
+    chosen = list(makers) if only is None else list(only)
+    for name in chosen:
+        if name not in makers:
+            raise ParameterError(f"there is no controller {name!r}; known: {', '.join(makers)}")
+    table = read_comparison(out, env) if out.exists() else None
+    known: Any = gym.make_vec(env, num_envs=1, **keywords).unwrapped
+    work: list[tuple[str, int, Callable[[], Policy]]] = [(name, 0, makers[name]) for name in chosen]
+    for name, trained in (policies or {}).items():
+        work += [(name, seed, partial(lambda policy: policy, policy)) for seed, policy in enumerate(trained)]
+    for name, seed, make in work:
+        if table is not None and _has(table, name, seed):
+            continue
+        policy = make()
+        often = getattr(policy, "cycle_by_cycle", False)
+        played = play(
+            policy,
+            env,
+            numbers[:CYCLE_BY_CYCLE_MACHINES] if often else numbers,
+            progress=name if progress else None,
+            **(keywords | (cycle_keywords(known.task) if often else {})),
+        )
+        rows = job_rows(name, policy.knows, seed, played, env)
+        table = rows if table is None else pa.concat_tables([table, rows])
+        write_comparison(table, out)
+    assert table is not None
+    return table
+
+
+def _has(table: pa.Table, name: str, seed: int) -> bool:
+    pairs = zip(table["contender"].to_pylist(), table["seed"].to_pylist(), strict=True)
+    return (name, seed) in set(pairs)
+
+
+def job_rows(name: str, knows: str, seed: int, played: Played, env: str) -> pa.Table:
+    count = len(played.machines)
+    columns = {
+        "contender": pa.array([name] * count),
+        "knows": pa.array([knows] * count),
+        "seed": pa.array([seed] * count, pa.int32()),
+        "machine": pa.array(played.machines, pa.int32()),
+        "job_return": played.returns,
+        "type_iii": played.type_iii_share,
+        "deviation": played.deviation,
+        "damage": played.damage,
+        "largest_force": played.largest_force,
+        "failed": played.status != int(Status.JOB_DONE),
+    }
+    return pa.table(columns).replace_schema_metadata({"env": env})
+
+
+def write_comparison(table: pa.Table, path: Path) -> None:
+    """Write the table of a comparison."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(path, lambda file: pq.write_table(table, file, compression="zstd"))
+
+
+def read_comparison(path: Path, env: str | None = None) -> pa.Table:
+    """Read the table of a comparison.
+
+    Raises
+    ------
+    DatasetError
+        If the file can't be read, or is of another environment.
+    """
+    try:
+        table = pq.read_table(path)
+    except (OSError, pa.ArrowInvalid) as error:
+        raise DatasetError(f"{path} can't be read as a comparison: {error}") from None
+    missing = [name for name in COLUMNS if name not in table.column_names]
+    of = (table.schema.metadata or {}).get(b"env", b"").decode()
+    if missing or (env is not None and of != env):
+        raise DatasetError(f"{path} is no comparison of {env or 'an environment'}; it is of {of or 'nothing known'}")
+    return table
+
+
+def shipped_comparison(env: str) -> pa.Table | None:
+    """The comparison that comes with chaosgym for an environment, if there is one."""
+    path = Path(str(resources.files("chaosgym.control"))) / "results" / f"{env.rpartition('/')[2]}.parquet"
+    return read_comparison(path, env) if path.is_file() else None
+
+
+@dataclass(frozen=True)
+class Scores:
+    """How contenders compare: a ``table`` of a comparison and what is worth 0 and 1 in it."""
+
+    table: pa.Table
+
+    def jobs(self, name: str, column: str = "job_return") -> dict[int, Array]:
+        """One column of a contender: values (seeds,) by machine."""
+        rows = self.table.filter(pa.compute.equal(self.table["contender"], name))
+        found: dict[int, list[float]] = {}
+        for machine, value in zip(rows["machine"].to_pylist(), rows[column].to_pylist(), strict=True):
+            found.setdefault(machine, []).append(value)
+        if not found:
+            raise ParameterError(f"the comparison has no jobs of {name!r}")
+        return {machine: np.array(values) for machine, values in found.items()}
+
+    def paired(self, *names: str) -> Array:
+        """Returns of contenders, mean over seeds, on the machines that all have played, (names, machines)."""
+        found = [self.jobs(name) for name in names]
+        common = sorted(set.intersection(*(set(jobs) for jobs in found)))
+        return np.array([[jobs[machine].mean() for machine in common] for jobs in found])
+
+    def difference(self, one: str, other: str) -> tuple[float, tuple[float, float]]:
+        """Mean return of one contender less another's, and its interval of 95 % over machines."""
+        first, second = self.paired(one, other)
+        gain = first - second
+        low, high = bootstrap_interval(len(gain), lambda drawn: gain[drawn].mean(axis=-1))
+        return float(gain.mean()), (float(low), float(high))
+
+    def summary(self) -> dict[str, dict[str, Any]]:
+        """What each contender achieved, as plain values, best score last.
+
+        Raises
+        ------
+        ParameterError
+            If following the demand or the own map has not been played.
+        """
+        names = list(dict.fromkeys(self.table["contender"].to_pylist()))
+        rows = {name: self.row(name) for name in names}
+        return dict(sorted(rows.items(), key=lambda item: item[1]["score"]))
+
+    def row(self, name: str) -> dict[str, Any]:
+        mine, zero, one = self.paired(name, ZERO, ONE)
+
+        def score(drawn: NDArray[np.int64]) -> Array:
+            gained = mine[drawn].mean(axis=-1) - zero[drawn].mean(axis=-1)
+            return np.asarray(gained / (one[drawn].mean(axis=-1) - zero[drawn].mean(axis=-1)))
+
+        every = np.arange(len(mine))
+        rows = self.table.filter(pa.compute.equal(self.table["contender"], name))
+        single = (mine - zero) / (one.mean() - zero.mean())
+        return {
+            "knows": rows["knows"][0].as_py(),
+            "seeds": len(set(rows["seed"].to_pylist())),
+            "machines": len(mine),
+            "return": float(mine.mean()),
+            "score": float(score(every)),
+            "score_interval": bootstrap_interval(len(mine), score).tolist(),
+            "type_iii": float(np.mean(rows["type_iii"].to_numpy())),
+            "deviation": float(np.mean(rows["deviation"].to_numpy())),
+            "damage": float(np.mean(rows["damage"].to_numpy())),
+            "largest_force": float(np.max(rows["largest_force"].to_numpy())),
+            "failed": float(np.mean(rows["failed"].to_numpy())),
+            "better_than_following": float(np.mean(mine > zero)),
+            "profile": performance_profile(single, PROFILE_SCORES).tolist(),
+        }
+
+
+def table_lines(summary: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Lines of a Markdown table."""
+    lines = [
+        "| contender | knows | seeds | machines | return | score | 95 % | Type III | mean deviation | damage |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for name, row in summary.items():
+        low, high = row["score_interval"]
+        lines.append(
+            f"| {name} | {row['knows']} | {row['seeds']} | {row['machines']} | {row['return']:.2f} | {row['score']:.2f} "
+            f"| {low:.2f} to {high:.2f} | {row['type_iii']:.1%} | {row['deviation']:.2f} | {row['damage']:.2f} |"
+        )
+    return lines

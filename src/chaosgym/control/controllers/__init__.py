@@ -1,0 +1,27 @@
+"""Rules that set speeds without learning; ``chaosgym.control.comparison`` runs them all on the same machines."""
+
+from chaosgym.control.controllers.belief import Belief
+from chaosgym.control.controllers.chaos_control import OGY, DelayedFeedback
+from chaosgym.control.controllers.controller import Controller
+from chaosgym.control.controllers.feedback import BackOff, Bandit, ExtremumSeeking, ForceFeedback, HillClimbing
+from chaosgym.control.controllers.planned import CommonSchedule, ConstantTrim, Follow, MapFollower, Schedule, SkipBands
+from chaosgym.control.controllers.receding_horizon import RecedingHorizon
+
+__all__ = [
+    "OGY",
+    "BackOff",
+    "Bandit",
+    "Belief",
+    "CommonSchedule",
+    "ConstantTrim",
+    "Controller",
+    "DelayedFeedback",
+    "ExtremumSeeking",
+    "Follow",
+    "ForceFeedback",
+    "HillClimbing",
+    "MapFollower",
+    "RecedingHorizon",
+    "Schedule",
+    "SkipBands",
+]

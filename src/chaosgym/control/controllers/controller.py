@@ -1,0 +1,73 @@
+"""What a controller is: a rule that turns the observations of many jobs into speeds, and says what it knows.
+
+controller = Follow()
+controller.start(envs)                   # a native vector environment with action="speed", after its reset
+actions = controller(observations)       # (n, 1)
+"""
+
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.envs.memory import irregularity
+from chaosgym.envs.observation import OBSERVATION_NAMES
+from chaosgym.envs.task import Task
+
+Array = NDArray[np.float64]
+Observations = NDArray[np.float32]
+
+Knowledge = Literal["nothing", "measurements", "model", "tolerances", "machine", "machine and future"]
+"""What a controller looks at, each item beside the observation: nothing of it, the observation alone, the nominal model,
+models within tolerances, this very machine, and the demands to come as well."""
+
+_PLACE = {name: place for place, name in enumerate(OBSERVATION_NAMES)}
+
+
+class Controller:
+    """A rule for many machines side by side; a subclass has ``speeds`` and, for what it remembers, ``begin``."""
+
+    knows: str = "nothing"
+    cycle_by_cycle: ClassVar[bool] = False
+    """Whether it acts in each cycle instead of in each step."""
+
+    def __init__(self) -> None:
+        self.task: Task
+
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """Keywords of the environment that it plays in."""
+        return {"action": "speed"}
+
+    def start(self, envs: Any) -> None:
+        """Begin the jobs of a vector environment that has been reset."""
+        self.task, self.count = envs.task, envs.num_envs
+        self.begin(envs)
+
+    def begin(self, envs: Any) -> None:
+        """Forget the last jobs."""
+
+    def __call__(self, observations: Observations) -> NDArray[np.float32]:
+        """Return the actions (n, 1)."""
+        speeds = np.clip(self.speeds(observations), self.task.lowest_speed, self.task.highest_speed)
+        return speeds[:, None].astype(np.float32)
+
+    def speeds(self, observations: Observations) -> Array:
+        """Return the speeds (n,) to go to."""
+        raise NotImplementedError
+
+    def cost(self, share: Array, demand: Array, grid: Array) -> Array:
+        """What a step at each speed of a grid costs, (n, s), by its share of Type III, (s,) or (n, s)."""
+        distance = np.abs(grid - demand[:, None])
+        return np.asarray(self.task.deviation_weight * distance + self.task.type_iii_weight * share)
+
+
+def seen(observations: Observations, name: str) -> Array:
+    """One entry of the observations, (n,)."""
+    return observations[:, _PLACE[name]].astype(float)
+
+
+def irregular(observations: Observations, task: Task, threshold: float, softness: float) -> Array:
+    """Probability (n,) that the motion is irregular, by what is felt in units of the sensor's error."""
+    felt = irregularity(observations) / max(task.sensor_error, 1e-3 * task.load_rating)
+    return np.asarray(0.5 + 0.5 * np.tanh(0.5 * (felt - threshold) / softness))

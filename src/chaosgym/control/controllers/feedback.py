@@ -1,0 +1,198 @@
+"""Controllers that know measurements alone: they feel whether the peaks repeat, and try other speeds.
+
+Thresholds and rates are in units of the sensor's error. They were chosen on machines that no comparison uses.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from chaosgym.control.controllers.controller import Array, Controller, Observations, irregular, seen
+from chaosgym.control.maps import Maps
+
+
+class BackOff(Controller):
+    """At the demand; if that is irregular for two steps, at the next offset of a ladder, and anew with each demand.
+
+    Parameters
+    ----------
+    remembers
+        Whether speeds that were irregular in this job are skipped.
+    threshold
+        Felt irregularity in units of the sensor's error.
+    patience
+        Steps before it moves on.
+    spacing
+        Of the ladder, in trim steps.
+    """
+
+    knows = "measurements"
+
+    def __init__(self, *, remembers: bool = True, threshold: float = 1.17, patience: int = 2, spacing: int = 2) -> None:
+        super().__init__()
+        self.remembers, self.threshold, self.patience, self.spacing = remembers, threshold, patience, spacing
+
+    def begin(self, envs: Any) -> None:
+        """Start at the demand."""
+        task = self.task
+        sizes = np.arange(self.spacing, round(task.largest_trim / task.trim_step) + 1, self.spacing) * task.trim_step
+        self.ladder = np.array([0.0, *(sign * size for size in sizes for sign in (-1.0, 1.0))])
+        self._rung, self._wild = np.zeros(self.count, int), np.zeros(self.count, int)
+        self._demand = np.full(self.count, np.nan)
+        self._bad = np.zeros((self.count, len(task.grid)), np.bool_)
+
+    def _place(self, speeds: Array) -> Any:
+        task = self.task
+        place = np.rint((speeds - task.lowest_speed) / task.trim_step).astype(int)
+        return place.clip(0, self._bad.shape[1] - 1)
+
+    def speeds(self, observations: Observations) -> Array:
+        """The demand and the offset."""
+        demand, speed, every = seen(observations, "demand"), seen(observations, "speed"), np.arange(self.count)
+        wanted = np.clip(self._demand + self.ladder[self._rung], self.task.lowest_speed, self.task.highest_speed)
+        there = np.abs(speed - wanted) < 0.01 * self.task.trim_step
+        wild = irregular(observations, self.task, self.threshold, 1e-3) > 0.5
+        new = demand != self._demand
+        self._demand = demand
+        self._wild = np.where(there & wild & ~new, self._wild + 1, np.where(there, 0, self._wild))
+        self._rung[new], self._wild[new] = 0, 0
+        moves = self._wild >= self.patience
+        if self.remembers:
+            self._bad[every[moves], self._place(speed)[moves]] = True
+        self._rung[moves] = (self._rung[moves] + 1) % len(self.ladder)
+        self._wild[moves] = 0
+        if self.remembers:
+            for _ in self.ladder:
+                bad = self._bad[every, self._place(demand + self.ladder[self._rung])]
+                self._rung[bad] = (self._rung[bad] + 1) % len(self.ladder)
+        return demand + self.ladder[self._rung]
+
+
+class Bandit(Controller):
+    """Counts what was felt at each speed, on top of the mean map of models, and favours doubt a little.
+
+    Parameters
+    ----------
+    fleet
+        Maps of models within tolerances.
+    weight
+        Steps that the mean map counts for.
+    optimism
+        Standard deviations of the share by which doubt makes a speed look better.
+    threshold, softness
+        Felt irregularity at which a step counts half, and over which the verdict turns.
+    """
+
+    knows = "tolerances"
+
+    def __init__(
+        self,
+        fleet: Maps,
+        *,
+        weight: float = 2.0,
+        optimism: float = 0.3,
+        threshold: float = 1.0,
+        softness: float = 0.1,
+    ) -> None:
+        super().__init__()
+        self.fleet, self.weight, self.optimism = fleet, weight, optimism
+        self.threshold, self.softness = threshold, softness
+
+    def begin(self, envs: Any) -> None:
+        """Start with the mean map."""
+        prior = self.fleet.share.mean(axis=0)
+        self._wild = np.tile(self.weight * prior, (self.count, 1)) + 0.05
+        self._calm = np.tile(self.weight * (1.0 - prior), (self.count, 1)) + 0.05
+        self._speed = np.full(self.count, np.nan)
+
+    def speeds(self, observations: Observations) -> Array:
+        """The speed of least expected cost less the optimism."""
+        grid, speed = self.fleet.speeds, seen(observations, "speed")
+        held = np.abs(speed - self._speed) < 0.5 * self.task.trim_step
+        self._speed = speed
+        chance = irregular(observations, self.task, self.threshold, self.softness)
+        near = np.exp(-0.5 * ((grid - speed[:, None]) / self.task.trim_step) ** 2) * held[:, None]
+        self._wild += near * chance[:, None]
+        self._calm += near * (1.0 - chance)[:, None]
+        counted = self._wild + self._calm
+        share = self._wild / counted
+        doubt = np.sqrt(share * (1.0 - share) / (counted + 1.0))
+        return grid[self.cost(share - self.optimism * doubt, seen(observations, "demand"), grid).argmin(axis=1)]
+
+
+class HillClimbing(Controller):
+    """Perturb and observe: goes on while the felt cost falls, else turns; a step of the trim every three steps."""
+
+    knows = "measurements"
+    dwell = 3
+
+    def begin(self, envs: Any) -> None:
+        """Start at the demand."""
+        self._trim, self._sign = np.zeros(self.count), -np.ones(self.count)
+        self._best, self._sum, self._steps = np.full(self.count, np.inf), np.zeros(self.count), 0
+        self._demand = np.full(self.count, np.nan)
+
+    def speeds(self, observations: Observations) -> Array:
+        """The demand and the trim."""
+        task, demand = self.task, seen(observations, "demand")
+        cost = task.deviation_weight * np.abs(seen(observations, "offset"))
+        self._sum += cost + task.type_iii_weight * irregular(observations, task, 1.17, 0.23)
+        new = demand != self._demand
+        self._demand = demand
+        self._trim[new], self._best[new], self._sum[new] = 0.0, np.inf, 0.0
+        self._steps += 1
+        if self._steps % self.dwell == 0:
+            mean = self._sum / self.dwell
+            climbs = mean >= 0.15
+            self._sign = np.where(climbs & (mean > self._best), -self._sign, self._sign)
+            moved = self._trim + self._sign * task.trim_step
+            self._trim = np.where(climbs, np.clip(moved, -task.largest_trim, task.largest_trim), self._trim)
+            self._best, self._sum = mean, np.zeros(self.count)
+        return demand + self._trim
+
+
+class ExtremumSeeking(Controller):
+    """A slow sine on the trim, and a drift against the part of the felt cost that moves with it.
+
+    After Krstic and Wang, Stability of extremum seeking feedback for general nonlinear dynamic systems, Automatica 36
+    (2000) 595.
+    """
+
+    knows = "measurements"
+    period = 8
+    gain = 2.0
+
+    def begin(self, envs: Any) -> None:
+        """Start at the demand."""
+        self._trim, self._mean, self._step = np.zeros(self.count), np.zeros(self.count), 0
+
+    def speeds(self, observations: Observations) -> Array:
+        """The demand, the trim and the sine."""
+        task = self.task
+        cost = task.deviation_weight * np.abs(seen(observations, "offset"))
+        cost = cost + task.type_iii_weight * irregular(observations, task, 1.17, 0.23)
+        self._mean += (cost - self._mean) / self.period
+        wave = np.sin(2.0 * np.pi * self._step / self.period)
+        self._trim -= self.gain * task.trim_step * (cost - self._mean) * wave
+        self._trim = np.clip(self._trim, -task.largest_trim, task.largest_trim)
+        self._step += 1
+        ahead = np.sin(2.0 * np.pi * self._step / self.period)
+        return seen(observations, "demand") + self._trim + task.trim_step * ahead
+
+
+class ForceFeedback(Controller):
+    """Integral control of the scatter of the peak forces: slower while it is above the sensor's own, else back."""
+
+    knows = "measurements"
+    gain = 1.0
+
+    def begin(self, envs: Any) -> None:
+        """Start at the demand."""
+        self._trim = np.zeros(self.count)
+
+    def speeds(self, observations: Observations) -> Array:
+        """The demand less what the scatter asks for."""
+        task = self.task
+        scatter = seen(observations, "std_peak_force") / max(task.sensor_error, 1e-3 * task.load_rating)
+        self._trim = np.clip(self._trim - self.gain * task.trim_step * (scatter - 1.0), -task.largest_trim, 0.0)
+        return seen(observations, "demand") + self._trim

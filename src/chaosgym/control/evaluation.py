@@ -1,0 +1,178 @@
+"""How good is a policy? One line: ``chaosgym.evaluate(policy, "chaosgym/ImpactBeamTolerance-v1")``."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pyarrow as pa
+from gymnasium.spaces import Discrete
+from numpy.typing import NDArray
+
+from chaosgym.control.comparison import ONE, ZERO, Contenders, Scores, job_rows, shipped_comparison
+from chaosgym.control.policies.policy import TrainedPolicy, load_policy
+from chaosgym.control.rollout import Played, Policy, play
+from chaosgym.envs.memory import SpeedMemory
+from chaosgym.errors import ModelFileError
+
+NAME = "this policy"
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What a policy achieved.
+
+    Attributes
+    ----------
+    score
+        0 for following the demand, 1 for the machine's own map, on the same machines.
+    interval
+        Of the score, 95 % over machines.
+    mean_return, type_iii, deviation
+        Means over the jobs; the deviation in the unit of the speeds.
+    played
+        The jobs, step by step.
+    """
+
+    score: float
+    interval: tuple[float, float]
+    mean_return: float
+    type_iii: float
+    deviation: float
+    played: Played
+
+
+class _Function:
+    """A function from one observation to one action."""
+
+    knows = "measurements"
+
+    def __init__(self, function: Callable[[Any], Any], keywords: dict[str, Any]) -> None:
+        self._function, self.keywords = function, keywords
+
+    def start(self, envs: Any) -> None:
+        """Nothing is remembered."""
+
+    def __call__(self, observations: Any) -> Any:
+        """Actions, one call for each job."""
+        return np.array([self._function(observation) for observation in observations])
+
+
+class _SB3:
+    """A model of stable-baselines3 that was trained on the plain observation, or carries its ``VecNormalize``."""
+
+    knows = "measurements"
+
+    def __init__(self, model: Any) -> None:
+        self._model, self._memory = model, cast(SpeedMemory | None, None)
+        self._normalise = model.get_vec_normalize_env()
+        self.keywords = {"action": "trim" if isinstance(model.action_space, Discrete) else "continuous"}
+
+    def start(self, envs: Any) -> None:
+        """Forget the last jobs."""
+        self._state, self._first = None, np.ones(envs.num_envs, np.bool_)
+        width = self._model.observation_space.shape[0]
+        self._memory = None
+        if width != envs.single_observation_space.shape[0]:
+            inner = self._normalise
+            while inner is not None and not hasattr(inner, "memory"):
+                inner = getattr(inner, "venv", None)
+            if inner is None:
+                raise ModelFileError(
+                    f"the model wants {width} numbers, the environment gives {envs.single_observation_space.shape[0]}; "
+                    "export the policy together with its memory (chaosgym.control.policies.export)"
+                )
+            self._memory = SpeedMemory(envs.task, envs.num_envs, inner.memory.usual, learns=False)
+
+    def __call__(self, observations: NDArray[np.float32]) -> Any:
+        """Actions without exploration."""
+        seen = observations if self._memory is None else self._memory.add(observations)
+        seen = seen if self._normalise is None else self._normalise.normalize_obs(seen)
+        actions, self._state = self._model.predict(seen, self._state, self._first, deterministic=True)
+        self._first = np.zeros(len(actions), np.bool_)
+        return actions
+
+
+def policy_of(given: Any, **keywords: Any) -> Policy:
+    """Return what ``play`` runs.
+
+    Parameters
+    ----------
+    given
+        A controller or a trained policy; a folder of one; a model of stable-baselines3 or its .zip file; or a function
+        from an observation (14,) to an action.
+    keywords
+        Of the environment, for a function.
+
+    Raises
+    ------
+    ModelFileError
+        If a file is none of these.
+    """
+    if isinstance(given, str | Path):
+        path = Path(given)
+        return load_policy(path) if path.suffix != ".zip" else _SB3(_loaded(path))
+    if hasattr(given, "start") and callable(given):
+        return cast(Policy, given)
+    if hasattr(given, "predict"):
+        return _SB3(given)
+    if callable(given):
+        return _Function(given, {"action": keywords["action"]} if "action" in keywords else {})
+    raise ModelFileError(f"{given!r} is no policy; allowed: a function, a model of stable-baselines3, or a policy")
+
+
+def _loaded(path: Path) -> Any:
+    """Model of a .zip file, whichever algorithm it was trained with."""
+    if not path.is_file():
+        raise ModelFileError(f"{path} does not exist")
+    from sb3_contrib import RecurrentPPO
+    from stable_baselines3 import PPO, SAC
+
+    for kind in (PPO, SAC, RecurrentPPO):
+        try:
+            return kind.load(path, device="cpu")
+        except Exception:  # noqa: S112, BLE001  (each kind refuses the files of the others in its own way)
+            continue
+    raise ModelFileError(f"{path} is no model of PPO, SAC or RecurrentPPO")
+
+
+def evaluate(
+    policy: Any,
+    env: str = "chaosgym/ImpactBeamTolerance-v1",
+    *,
+    machines: int = 256,
+    progress: bool = False,
+    **keywords: Any,
+) -> Evaluation:
+    """Let a policy play machines that are kept for evaluation, and score it.
+
+    Parameters
+    ----------
+    policy
+        As for ``policy_of``.
+    env
+        Id of the environment.
+    machines
+        How many, from the first on.
+    progress
+        Show progress bars on standard error.
+    keywords
+        Of the environment. The scale of the default ones is shipped; that of others is computed first, in minutes.
+    """
+    runs = policy_of(policy, **keywords)
+    played = play(runs, env, range(machines), progress=NAME if progress else None, **keywords)
+    scale = None if keywords else shipped_comparison(env)
+    if scale is None:
+        makers = Contenders(env, range(machines), keywords, progress).makers()
+        scale = pa.concat_tables(
+            [job_rows(name, "", 0, play(makers[name](), env, range(machines), **keywords), env) for name in (ZERO, ONE)]
+        )
+    kept = scale.filter(pa.compute.less(scale["machine"], machines))
+    table = pa.concat_tables([kept, job_rows(NAME, runs.knows, 0, played, env)])
+    row = Scores(table).row(NAME)
+    low, high = row["score_interval"]
+    return Evaluation(row["score"], (low, high), row["return"], row["type_iii"], row["deviation"], played)
+
+
+__all__ = ["Evaluation", "TrainedPolicy", "evaluate", "policy_of"]

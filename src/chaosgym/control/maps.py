@@ -1,0 +1,93 @@
+"""What does every speed do to a machine? The share of Type III as the running motion has it, speed by speed.
+
+The machine sweeps upwards through the speeds of its task, disturbed as in a job, and is judged as in a job once it has
+settled. Such maps are for planners, of models or of the machine itself, and for references; no agent is given one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from chaosgym.envs.observation import OBSERVATION_NAMES
+
+Array = NDArray[np.float64]
+
+SETTLING_CYCLES, JUDGED_CYCLES = 30, 40
+"""Cycles at a speed before the motion is judged, and while it is."""
+
+FLEET = 160
+"""Simulated machines that a controller may know."""
+
+FLEET_SEED = 77_000_000
+"""First seed of their draws."""
+
+SMOOTHING = np.array([0.15, 0.7, 0.15])
+"""Weights of a speed and its neighbours: a plan must not trust a single speed."""
+
+
+@dataclass(frozen=True)
+class Maps:
+    """Maps of n machines: ``speeds`` (s,); ``share`` of Type III and ``mean_peak`` [N], (n, s)."""
+
+    speeds: Array
+    share: Array
+    mean_peak: Array
+
+    def smoothed(self) -> Array:
+        """Shares averaged with those of the neighbouring speeds, (n, s)."""
+        wide = np.pad(self.share, ((0, 0), (1, 1)), mode="edge")
+        return np.asarray(sum(weight * wide[:, k : k + len(self.speeds)] for k, weight in enumerate(SMOOTHING)))
+
+    def nearest(self, speeds: Array) -> NDArray[np.int64]:
+        """Places of the nearest speeds of the maps."""
+        spacing = self.speeds[1] - self.speeds[0]
+        return np.rint((speeds - self.speeds[0]) / spacing).astype(np.int64).clip(0, len(self.speeds) - 1)
+
+
+def maps_of(
+    env: str,
+    *,
+    machines: Sequence[int] | None = None,
+    seeds: Sequence[int] | None = None,
+    progress: str | None = None,
+    **keywords: Any,
+) -> Maps:
+    """Maps of machines kept for evaluation, or of those that seeds draw; ``keywords`` of the environment."""
+    count = len(machines if machines is not None else seeds or ())
+    known: Any = gym.make_vec(env, num_envs=1, **keywords).unwrapped
+    task = known.task
+    grid, cycles = task.grid, task.cycles_per_step
+    settling, judged = -(-SETTLING_CYCLES // cycles), -(-JUDGED_CYCLES // cycles)
+    span = task.highest_speed - task.lowest_speed
+    sweep = {"action": "speed", "steps": len(grid) * (settling + judged), "slew_limit": span, "wear": 0.0}
+    envs: Any = gym.make_vec(env, num_envs=count, **(keywords | sweep)).unwrapped
+    options = {"speed": float(grid[0])} | ({} if machines is None else {"machine": np.asarray(machines)})
+    envs.reset(seed=list(seeds if seeds is not None else range(count)), options=options)
+    share, peak = np.zeros((count, len(grid))), np.zeros((count, len(grid)))
+    place = OBSERVATION_NAMES.index("mean_peak_force")
+    for k, speed in enumerate(tqdm(grid, desc=progress, unit="speed", disable=progress is None, leave=False)):
+        actions = np.full((count, 1), speed, np.float32)
+        for step in range(settling + judged):
+            observations, *_, info = envs.step(actions)
+            if step >= settling:
+                share[:, k] += info["type_iii"] / judged
+                peak[:, k] += observations[:, place] / judged
+    return Maps(grid, share, peak)
+
+
+def model_keywords(env: str, **keywords: Any) -> dict[str, Any]:
+    """Keywords that make the environment's machine the model that controllers may use."""
+    known: Any = gym.make_vec(env, num_envs=1, **keywords).unwrapped
+    rung = known.model.rung
+    return keywords if rung in (None, known.nominal.rung) else keywords | {"fidelity": rung}
+
+
+def fleet_maps(env: str, *, count: int = FLEET, progress: str | None = None, **keywords: Any) -> Maps:
+    """Maps of simulated machines within the tolerances of the environment, by the model that controllers may use."""
+    seeds = [FLEET_SEED + k for k in range(count)]
+    return maps_of(env, seeds=seeds, progress=progress, **model_keywords(env, **keywords))

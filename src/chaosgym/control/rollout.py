@@ -1,0 +1,198 @@
+"""What happens when a policy runs jobs: many machines side by side, one job each, step by step as arrays.
+
+    played = play(policy, "chaosgym/ImpactBeamTolerance-v1", machines=range(64))
+
+Everybody who plays machine k meets the same machine, demand and disturbance. This is the one rollout of evaluation,
+comparison, demo and pictures.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import trange
+
+from chaosgym.envs.observation import FELT, OBSERVATION_NAMES
+from chaosgym.envs.task import Status
+from chaosgym.envs.variants import HELD_OUT_SEED
+from chaosgym.errors import ParameterError
+from chaosgym.machines.parameters import parameters_of
+
+Array = NDArray[np.float64]
+
+
+class Policy(Protocol):
+    """What sets the speeds of machines side by side: a controller or a trained policy.
+
+    ``keywords`` of the environment that it plays in, such as the kind of its actions; ``knows`` what it looks at.
+    """
+
+    knows: str
+
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """Keywords of the environment."""
+        ...
+
+    def start(self, envs: Any) -> None:
+        """Begin the jobs of a native vector environment that has been reset."""
+        ...
+
+    def __call__(self, observations: Any) -> Any:
+        """Return the actions of all jobs for their observations (n, 14)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Played:
+    """Jobs of n machines; arrays of steps end in NaN where a job ended early.
+
+    Attributes
+    ----------
+    env, unit
+        Id of the environment, unit of the speeds.
+    machines : (n,)
+        Numbers of the machines kept for evaluation; -1 for drawn ones.
+    seeds : (n,)
+        Of the jobs.
+    speed, demand, type_iii, reward : (steps, n)
+        Speeds, share of the cycles in Type III, and reward of every step.
+    felt : (steps, n, 8)
+        What the sensors reported, in the order of ``FELT``.
+    damage, largest_force : (n,)
+        Share of its life that the joint used up, and largest true force [N].
+    status : (n,)
+        How the jobs ended.
+    cycles_per_step
+        Operating cycles in a step.
+    """
+
+    env: str
+    unit: str
+    machines: NDArray[np.int64]
+    seeds: NDArray[np.int64]
+    speed: Array
+    demand: Array
+    type_iii: Array
+    reward: Array
+    felt: Array
+    damage: Array
+    largest_force: Array
+    status: NDArray[np.int64]
+    cycles_per_step: int
+
+    @property
+    def returns(self) -> Array:
+        """Sum of the rewards of each job, (n,)."""
+        return np.asarray(np.nansum(self.reward, axis=0))
+
+    @property
+    def type_iii_share(self) -> Array:
+        """Share of the cycles of each job in Type III, (n,)."""
+        return np.asarray(np.nanmean(self.type_iii, axis=0))
+
+    @property
+    def deviation(self) -> Array:
+        """Mean distance of speed and demand in each job, (n,)."""
+        return np.asarray(np.nanmean(np.abs(self.speed - self.demand), axis=0))
+
+    def column(self, name: str) -> Array:
+        """One entry of ``FELT`` at every step, (steps, n)."""
+        return np.asarray(self.felt[:, :, FELT.index(name)])
+
+    def as_dict(self) -> dict[str, Any]:
+        """What became of the first job, as plain numbers."""
+        return {
+            "env": self.env,
+            "machine": int(self.machines[0]),
+            "seed": int(self.seeds[0]),
+            "status": Status(int(self.status[0])).name.lower(),
+            "return": float(self.returns[0]),
+            "type_iii_share": float(self.type_iii_share[0]),
+            "mean_deviation": float(self.deviation[0]),
+            "damage": float(self.damage[0]),
+            "unit": self.unit,
+            "speed": _plain(self.speed),
+            "demand": _plain(self.demand),
+            "type_iii": _plain(self.type_iii),
+            "mean_peak_force_N": _plain(self.column("mean_peak_force")),
+        }
+
+
+def _plain(values: Array) -> list[float]:
+    first = values[:, 0]
+    return [float(value) for value in first[np.isfinite(first)]]
+
+
+def play(
+    policy: Policy,
+    env: str,
+    machines: Sequence[int] | None = None,
+    *,
+    seeds: Sequence[int] | None = None,
+    progress: str | None = None,
+    **keywords: Any,
+) -> Played:
+    """Run one job on each of some machines, side by side.
+
+    Parameters
+    ----------
+    policy
+        What sets the speeds.
+    env
+        Id of the environment.
+    machines
+        Numbers of machines kept for evaluation; their jobs have the published seeds unless ``seeds`` is given.
+    seeds
+        One for each job; without ``machines``, the machines are drawn by them.
+    progress
+        Name of a progress bar on standard error.
+    keywords
+        Of the environment.
+
+    Raises
+    ------
+    ParameterError
+        If neither machines nor seeds are given.
+    """
+    if machines is None and seeds is None:
+        raise ParameterError("play needs machines or seeds")
+    numbers = None if machines is None else np.asarray(machines, np.int64)
+    given = np.asarray(seeds if seeds is not None else HELD_OUT_SEED + np.asarray(machines), np.int64)
+    made: Any = gym.make_vec(env, num_envs=len(given), **(keywords | policy.keywords))
+    envs: Any = made.unwrapped
+    options = {} if numbers is None else {"machine": numbers}
+    observations, info = envs.reset(seed=given.tolist(), options=options)
+    policy.start(envs)
+    steps, count, task = envs.task.steps, len(given), envs.task
+    kept = {name: np.full((steps, count), np.nan) for name in ("speed", "demand", "type_iii", "reward")}
+    felt = np.full((steps, count, len(FELT)), np.nan)
+    damage, force, status = np.zeros(count), np.zeros(count), np.zeros(count, np.int64)
+    runs = np.ones(count, np.bool_)
+    for step in trange(steps, desc=progress, unit="step", disable=progress is None, leave=False):
+        observations, rewards, ended, _, info = envs.step(policy(observations))
+        kept["reward"][step, runs] = rewards[runs]
+        for name in ("speed", "demand", "type_iii"):
+            kept[name][step, runs] = info[name][runs]
+        felt[step, runs] = observations[runs, len(OBSERVATION_NAMES) - len(FELT) :]
+        damage[runs], status[runs] = info["damage"][runs], info["status"][runs]
+        force[runs] = np.maximum(force[runs], info["largest_force"][runs])
+        runs &= ~ended
+        if not runs.any():
+            break
+    machine: Any = envs.nominal
+    return Played(
+        env=env,
+        unit=parameters_of(machine)[machine.speed_field].unit,
+        machines=np.full(count, -1) if numbers is None else numbers,
+        seeds=given,
+        felt=felt,
+        damage=damage,
+        largest_force=force,
+        status=status,
+        cycles_per_step=task.cycles_per_step,
+        **kept,
+    )
