@@ -15,6 +15,7 @@ from chaosgym.version import __version__
 
 if TYPE_CHECKING:
     from chaosgym.classifier import MachineClassifier, ResponseClassifier, default_classifier
+    from chaosgym.control.evaluation import evaluate
     from chaosgym.diagnosis import Diagnosis, diagnose, response_map, response_type, two_step_test
     from chaosgym.diagnosis.step_check import step_check
     from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "chaosgym.classifier": ("MachineClassifier", "ResponseClassifier", "default_classifier"),
+    "chaosgym.control.evaluation": ("evaluate",),
     "chaosgym.diagnosis": ("Diagnosis", "diagnose", "response_map", "response_type", "two_step_test"),
     "chaosgym.diagnosis.step_check": ("step_check",),
     "chaosgym.errors": ("ChaosgymError", "ParameterError", "SimulationError"),
@@ -52,6 +54,7 @@ __all__ = [
     "__version__",
     "default_classifier",
     "diagnose",
+    "evaluate",
     "read_sweep",
     "response_map",
     "response_type",

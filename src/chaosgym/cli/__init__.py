@@ -25,7 +25,7 @@ COMMANDS = {
     "design": "design:design",
     "tradeoff": "fidelity:tradeoff",
     "stability": "fidelity:stability",
-    "regimes": "regimes:regimes",
+    "compare": "compare:compare",
     "run-agent": "run_agent:run_agent",
     "demo": "demo:demo",
     "info": "info:info",

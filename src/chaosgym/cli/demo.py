@@ -10,7 +10,7 @@ from chaosgym.cli.output import emit
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def demo(out: str, seed: int, as_json: bool) -> None:
-    """Simulate, label, train, and compare an agent with constant speed: a few minutes (needs the extra [learn])."""
+    """Simulate, label, train, and compare an agent with plain rules: a few minutes (needs the extra [learn])."""
     from chaosgym.demo import demo_table, run_demo
 
     result = run_demo(out, seed, say=lambda line: click.echo(line, err=True))

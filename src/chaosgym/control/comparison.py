@@ -16,7 +16,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute  # noqa: F401  (pa.compute)
+import pyarrow.compute
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
@@ -202,6 +202,7 @@ def _has(table: pa.Table, name: str, seed: int) -> bool:
 
 
 def job_rows(name: str, knows: str, seed: int, played: Played, env: str) -> pa.Table:
+    """Rows of a comparison: one for each job of a contender."""
     count = len(played.machines)
     columns = {
         "contender": pa.array([name] * count),
@@ -291,6 +292,7 @@ class Scores:
         return dict(sorted(rows.items(), key=lambda item: item[1]["score"]))
 
     def row(self, name: str) -> dict[str, Any]:
+        """What one contender achieved, as plain values."""
         mine, zero, one = self.paired(name, ZERO, ONE)
 
         def score(drawn: NDArray[np.int64]) -> Array:
@@ -326,7 +328,7 @@ def table_lines(summary: Mapping[str, Mapping[str, Any]]) -> list[str]:
     for name, row in summary.items():
         low, high = row["score_interval"]
         lines.append(
-            f"| {name} | {row['knows']} | {row['seeds']} | {row['machines']} | {row['return']:.2f} | {row['score']:.2f} "
-            f"| {low:.2f} to {high:.2f} | {row['type_iii']:.1%} | {row['deviation']:.2f} | {row['damage']:.2f} |"
+            f"| {name} | {row['knows']} | {row['seeds']} | {row['machines']} | {row['return']:.2f} "
+            f"| {row['score']:.2f} | {low:.2f} to {high:.2f} | {row['type_iii']:.1%} | {row['deviation']:.2f} | {row['damage']:.2f} |"
         )
     return lines

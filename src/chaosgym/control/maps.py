@@ -46,7 +46,8 @@ class Maps:
     def nearest(self, speeds: Array) -> NDArray[np.int64]:
         """Places of the nearest speeds of the maps."""
         spacing = self.speeds[1] - self.speeds[0]
-        return np.rint((speeds - self.speeds[0]) / spacing).astype(np.int64).clip(0, len(self.speeds) - 1)
+        place = np.rint((speeds - self.speeds[0]) / spacing).clip(0, len(self.speeds) - 1)
+        return np.asarray(place, np.int64)
 
 
 def maps_of(

@@ -41,8 +41,9 @@ class Outcome(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """Part of a step: ``speeds`` (cycles,), run from ``coordinates`` and ``bouncing`` as in a ``MotionState``."""
+    """Part of a step: a ``machine`` at ``speeds`` (cycles,), from ``coordinates`` and ``bouncing`` of a ``MotionState``."""
 
+    machine: Machine
     speeds: Array
     coordinates: Array
     bouncing: Array
@@ -164,7 +165,7 @@ class Jobs:
             damage=worse - before.max(axis=-1),
             time=task.cycles_per_step * self.rules.variants.nominal.period_at(speed) / self._job_time,
             failed=(status == int(Status.FRACTURE)) | (status == int(Status.SIMULATION_FAILED)),
-            steps_left=task.steps - now,
+            steps_left=(task.steps - now).astype(float),
         )
         info = terms | {
             "speed": speed,
@@ -233,7 +234,7 @@ class Jobs:
 
     def _trace(self, which: Indices, speeds: Array) -> None:
         if self.traced and which[0] == 0:
-            self.pieces.append(Piece(speeds[0], *self.batch.motion(0)))
+            self.pieces.append(Piece(self.machine_at(0), speeds[0], *self.batch.motion(0)))
 
     def _observe(self, which: Indices, cycles: Cycles, generators: Generators) -> Observation:
         rules, task = self.rules, self.rules.task

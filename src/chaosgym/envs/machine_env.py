@@ -222,11 +222,11 @@ class MachineEnv(gym.Env[Observation, Any]):
         for piece in self._job.pieces:
             state: MotionState | None = MotionState(piece.coordinates, piece.bouncing)
             for speed in piece.speeds.tolist():
-                record = simulate(self.machine.at(speed), 1, state, samples_per_cycle=RENDER_SAMPLES)
+                record = simulate(piece.machine.at(speed), 1, state, samples_per_cycle=RENDER_SAMPLES)
                 state = record.final_state
                 records.append(record)
         records = records[-self.task.cycles_per_step :]
-        joined = {
+        joined: dict[str, Any] = {
             name: np.concatenate([getattr(record, name) for record in records])
             for name in ("section", "displacement", "velocity", "peak_force", "impacts", "history")
         }

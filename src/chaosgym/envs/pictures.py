@@ -1,4 +1,4 @@
-"""What does each machine look like in motion? Drawn on the panel of a dashboard, its gap exaggerated.
+"""Pictures of each machine in motion, drawn on the panel of a dashboard, its gap exaggerated.
 
 A picture shows one moment of the last cycle of a step, and pale what happened in the rest of the step.
 """
@@ -227,3 +227,17 @@ PICTURES = {
     "slider-crank": Picture(draw_crank, _crank_room),
 }
 """What draws a machine, by its name."""
+
+
+def draw_displacement(panel: Any, record: CycleRecord, colour: str, moment: float, force_limit: float) -> None:
+    """Draw the displacement in the last cycle, for a machine without a picture of its own."""
+    samples = samples_of(record)
+    last = samples[-(len(samples) // len(record)) :, 0] * 1e3
+    panel.plot(np.linspace(0.0, 1.0, len(last)), last, color=colour, linewidth=1.0)
+    panel.plot(moment, last[min(len(last) - 1, int(moment * len(last)))], "o", color=INK, markersize=5)
+    panel.set_xlabel("cycle", fontsize=8, color=INK)
+    panel.set_ylabel("displacement [mm]", fontsize=8, color=INK)
+
+
+PLAIN = Picture(draw_displacement, lambda machine: float(getattr(machine, machine.clearance_field)))
+"""Picture of a machine that has none of its own."""

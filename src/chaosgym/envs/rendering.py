@@ -1,5 +1,6 @@
-"""What does a step look like? The machine in motion, its phase portrait, the contact force, and the job so far."""
+"""Pictures of a step: the machine in motion, its phase portrait, the contact force, and the job so far."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -7,15 +8,17 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chaosgym.envs.drive import SpeedDrive
-from chaosgym.envs.pictures import CALM, INK, LIMIT, PALE, PICTURES, WILD, samples_of
-from chaosgym.envs.tasks import Task
+from chaosgym.envs.observation import OBSERVATION_NAMES
+from chaosgym.envs.pictures import CALM, INK, LIMIT, PALE, PICTURES, PLAIN, WILD, samples_of
+from chaosgym.envs.task import Task
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.simulation import CycleRecord
 
 SIZE = (9.6, 6.4)
 DOTS_PER_INCH = 100
+
+MEAN_PEAK = OBSERVATION_NAMES.index("mean_peak_force")
 
 STROBE = 12
 """Each step is shown at a moment of its last cycle, this fraction of a cycle later than the step before: every step
@@ -29,15 +32,15 @@ class Dashboard:
     ----------
     machine
         For the picture of it.
-    drive, task
+    task
         For the ranges of the axes.
     window
         Show in a window of matplotlib's current backend instead of returning pictures.
     """
 
-    def __init__(self, machine: Machine, drive: SpeedDrive, task: Task, *, window: bool) -> None:
-        self._drive, self._task = drive, task
-        self._picture = PICTURES[machine.name]
+    def __init__(self, machine: Machine, task: Task, *, window: bool) -> None:
+        self._task = task
+        self._picture = PICTURES.get(machine.name, PLAIN)
         self._unit = parameters_of(machine)[machine.speed_field].unit
         if window:
             from matplotlib import pyplot
@@ -56,16 +59,18 @@ class Dashboard:
     def start(self) -> None:
         """Begin a job."""
         self._speeds: list[float] = []
-        self._peaks: list[NDArray[np.float64]] = []
+        self._demands: list[float] = []
+        self._peaks: list[float] = []
         self._wild: list[bool] = []
         self._top_velocity = self._top_force = 0.0
 
-    def add(self, record: CycleRecord, type_iii: bool) -> None:
+    def add(self, info: Mapping[str, Any], observation: NDArray[np.float32]) -> None:
         """Take in a step."""
-        self._speeds.append(_speed(record))
-        self._peaks.append(record.peak_force[:, 0])
-        self._top_force = max(self._top_force, float(record.peak_force.max()))
-        self._wild.append(type_iii)
+        self._speeds.append(info["speed"])
+        self._demands.append(info["demand"])
+        self._peaks.append(float(observation[MEAN_PEAK]))
+        self._top_force = max(self._top_force, info["largest_force"])
+        self._wild.append(info["type_iii"] > 0.5)
 
     def draw(self, record: CycleRecord) -> NDArray[np.uint8] | None:
         """Draw the last step, given with its time history; return (height, width, 3), or None for a window."""
@@ -75,7 +80,7 @@ class Dashboard:
             panel.tick_params(colors=INK, labelsize=8)
             panel.spines[["top", "right"]].set_visible(False)
         picture, portrait, force, job = self._panels
-        self._picture.draw(picture, record, colour, (len(self._speeds) % STROBE) / STROBE, self._task.force_limit)
+        self._picture.draw(picture, record, colour, (len(self._speeds) % STROBE) / STROBE, self._task.load_rating)
         self._draw_portrait(portrait, record, colour)
         self._draw_force(force, record, colour)
         self._draw_job(job)
@@ -97,10 +102,10 @@ class Dashboard:
             pyplot.close(self._figure)
 
     def _draw_title(self, record: CycleRecord, colour: str) -> None:
-        verdict = "does not repeat: counts as Type III" if colour == WILD else "repeats"
+        verdict = "Type III" if colour == WILD else "calm"
         done = len(self._speeds) * self._task.cycles_per_step
         self._figure.suptitle(
-            f"{_speed(record):.2f} {self._unit}    {done} of {self._task.job_cycles} cycles    peak force {verdict}",
+            f"{self._now(record):.2f} {self._unit}    {done} of {self._task.job_cycles} cycles    {verdict}",
             color=colour,
             fontsize=12,
             x=0.075,
@@ -123,13 +128,13 @@ class Dashboard:
         panel.set_ylabel("velocity [m/s]", fontsize=8, color=INK)
 
     def _force_range(self) -> float:
-        return 1.15 * max(self._task.force_limit, self._top_force)
+        return 1.15 * max(self._task.load_rating, self._top_force)
 
     def _draw_force(self, panel: Any, record: CycleRecord, colour: str) -> None:
         force = samples_of(record)[:, 2]
         cycles = len(record)
-        panel.axhline(self._task.force_limit, color=LIMIT, linewidth=1.0, linestyle="--")
-        panel.axhline(-self._task.force_limit, color=LIMIT, linewidth=1.0, linestyle="--")
+        panel.axhline(self._task.load_rating, color=LIMIT, linewidth=1.0, linestyle="--")
+        panel.axhline(-self._task.load_rating, color=LIMIT, linewidth=1.0, linestyle="--")
         panel.fill_between(np.arange(len(force)) * cycles / len(force), force, color=colour, linewidth=0.6)
         panel.set(xlim=(0, cycles), ylim=(-self._force_range(), self._force_range()))
         panel.set_title("Contact force in this step", fontsize=9, loc="left", color=INK)
@@ -138,23 +143,24 @@ class Dashboard:
 
     def _draw_job(self, panel: Any) -> None:
         step = self._task.cycles_per_step
-        peaks = np.concatenate([np.empty(0), *self._peaks])
-        wild = np.repeat(np.array(self._wild, dtype=bool), step)
-        cycle = np.arange(len(peaks))
+        peaks, wild = np.array(self._peaks), np.array(self._wild, dtype=bool)
+        cycle = step * np.arange(len(peaks))
         for chosen, colour in ((~wild, CALM), (wild, WILD)):
             panel.plot(cycle[chosen], peaks[chosen], ".", color=colour, markersize=3)
-        panel.axhline(self._task.force_limit, color=LIMIT, linewidth=1.0, linestyle="--")
+        panel.axhline(self._task.load_rating, color=LIMIT, linewidth=1.0, linestyle="--")
         panel.set(xlim=(0, self._task.job_cycles), ylim=(0, self._force_range()))
-        panel.set_title("Job: peak force (dots) and speed (line)", fontsize=9, loc="left", color=INK)
+        panel.set_title(
+            "Job: mean peak force (dots), speed (line) and demand (dashes)", fontsize=9, loc="left", color=INK
+        )
         panel.set_xlabel("cycle", fontsize=8, color=INK)
-        panel.set_ylabel("peak force [N]", fontsize=8, color=INK)
+        panel.set_ylabel("mean peak force [N]", fontsize=8, color=INK)
         axis = self._speed_axis
-        axis.step(np.arange(len(self._speeds)) * step, self._speeds, where="post", color=INK, linewidth=1.2)
-        margin = 0.05 * (self._drive.highest_speed - self._drive.lowest_speed)
-        axis.set_ylim(self._drive.lowest_speed - margin, self._drive.highest_speed + margin)
+        axis.step(cycle, self._speeds, where="post", color=INK, linewidth=1.2)
+        axis.step(cycle, self._demands, where="post", color=INK, linewidth=0.8, linestyle="--")
+        margin = 0.05 * (self._task.highest_speed - self._task.lowest_speed)
+        axis.set_ylim(self._task.lowest_speed - margin, self._task.highest_speed + margin)
         axis.yaxis.set_label_position("right")
         axis.set_ylabel(f"speed [{self._unit}]", fontsize=8, color=INK)
 
-
-def _speed(record: CycleRecord) -> float:
-    return float(getattr(record.machine, record.machine.speed_field))
+    def _now(self, record: CycleRecord) -> float:
+        return self._speeds[-1] if self._speeds else float(getattr(record.machine, record.machine.speed_field))

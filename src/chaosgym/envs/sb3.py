@@ -7,7 +7,7 @@ Gives what ``DummyVecEnv`` gives of as many single environments, with one compil
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -169,11 +169,12 @@ class SB3VisitedSpeeds(VecEnvWrapper):
     def reset(self) -> Observation:
         """Start all jobs, with nothing remembered."""
         self.memory.forget(np.ones(self.num_envs, np.bool_))
-        return self.memory.add(self.venv.reset())
+        return self.memory.add(cast(Observation, self.venv.reset()))
 
     def step_wait(self) -> tuple[Observation, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Run the step and remember it; a job that starts anew remembers nothing of the last one."""
-        given, rewards, ended, infos = self.venv.step_wait()
+        stepped, rewards, ended, infos = self.venv.step_wait()
+        given = cast(Observation, stepped)
         if not ended.any():
             return self.memory.add(given), rewards, ended, infos
         fresh = np.flatnonzero(ended).tolist()

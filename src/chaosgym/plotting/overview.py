@@ -8,9 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from chaosgym.classifier import MachineClassifier
+from chaosgym.control.rollout import Played
+from chaosgym.plotting.played_job import draw_speed
 from chaosgym.simulation import CycleRecord
 from chaosgym.sweeps import LabelledSweep
 
@@ -68,20 +69,11 @@ def plain_ticks(ax: Axes) -> Axes:
     return ax
 
 
-def schedules(speeds: Mapping[str, NDArray[np.float64]], ax: Axes) -> Axes:
-    """Speed [Hz] at every step of a job, by controller."""
-    for name, values in speeds.items():
-        ax.step(np.arange(len(values)), values, where="post", label=name, lw=2 if name == "agent" else 1)
-    ax.set(xlabel="step of the job", ylabel="excitation frequency [Hz]", title="Speed schedules")
-    ax.legend(fontsize=8)
-    return ax
-
-
 def overview(
     records: Mapping[str, CycleRecord],
     sweep: LabelledSweep,
     classifier: MachineClassifier,
-    speeds: Mapping[str, NDArray[np.float64]],
+    job: Played,
 ) -> Figure:
     """Four panels of ``chaosgym demo``."""
     figure = Figure(figsize=(11, 8), layout="constrained")
@@ -89,5 +81,5 @@ def overview(
     peak_history(records, axes[0, 0])
     type_map(sweep, axes[0, 1])
     classifier_map(classifier, axes[1, 0])
-    schedules(speeds, axes[1, 1])
+    draw_speed(job, axes[1, 1]).set(xlabel="step", title="The agent on a machine that it has never seen")
     return figure

@@ -1,7 +1,7 @@
-"""What did a policy do? Speed, forces and regime over a job, as a figure or as a short animation."""
+"""Pictures of jobs: demand, speed, forces and Type III, as a figure or as a short animation, jobs side by side."""
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 from tqdm import tqdm
 
-from chaosgym.control.policies.play import PlayedJob
-from chaosgym.envs.pictures import CALM, INK, LIMIT, WILD
+from chaosgym.control.rollout import Played
+from chaosgym.envs.pictures import CALM, INK, WILD
 from chaosgym.errors import ChaosgymError
 from chaosgym.files import write_atomically
 
@@ -25,62 +25,53 @@ FRAMES_PER_SECOND = 10
 
 FORMATS = (".png", ".gif", ".mp4")
 
-
-def job_figure(job: PlayedJob) -> Figure:
-    """Speed and measured peak forces of a job, in red where it is Type III."""
-    figure = Figure(figsize=(7.2, 4.8), dpi=100, layout="constrained")
-    draw_job(job, figure)
-    return figure
+Jobs = Mapping[str, Played]
+"""Jobs by the name of who played; the first machine of each is drawn."""
 
 
-def draw_job(job: PlayedJob, figure: Figure, steps: int | None = None) -> None:
-    """Draw the first ``steps`` steps of a job, all by default, on an empty figure."""
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    draw_speed(job, upper, steps)
-    draw_forces(job, lower, steps)
-    done = slice(steps)
-    figure.suptitle(
-        f"{job.env}, seed {job.seed}: return {job.reward[done].sum():.2f}, Type III in {job.type_iii[done].mean():.0%} "
-        f"of the steps, damage {job.damage[done][-1]:.2f}",
-        fontsize=10,
-        color=INK,
-    )
+def draw_jobs(jobs: Jobs, figure: Figure, steps: int | None = None) -> None:
+    """Draw the first ``steps`` steps, all by default, on an empty figure: a column for each job."""
+    axes = figure.subplots(2, len(jobs), sharex=True, sharey="row", squeeze=False)
+    for column, (name, job) in enumerate(jobs.items()):
+        draw_speed(job, axes[0, column], steps)
+        draw_forces(job, axes[1, column], steps)
+        done = slice(steps)
+        axes[0, column].set_title(
+            f"{name}: return {np.nansum(job.reward[done, 0]):.1f}, Type III {np.nanmean(job.type_iii[done, 0]):.0%}",
+            fontsize=9,
+            color=INK,
+        )
+    first = next(iter(jobs.values()))
+    figure.suptitle(f"{first.env}, machine {first.machines[0]}", fontsize=10, color=INK)
 
 
-def draw_speed(job: PlayedJob, ax: Axes, steps: int | None = None) -> Axes:
-    """Speed at every step; returns the axes."""
-    cycles = job.peak_force.shape[1]
-    shown, kinds = job.speed[:steps], job.type_iii[:steps]
-    start = np.arange(len(shown)) * cycles
-    ax.step(start, shown, where="post", color=INK, linewidth=0.8)
-    for chosen, colour, name in ((~kinds, CALM, "calm"), (kinds, WILD, "Type III")):
-        ax.plot(start[chosen] + 0.5 * cycles, shown[chosen], "s", color=colour, markersize=3, label=name)
-    margin = 0.05 * float(np.ptp(job.speed)) + 0.5
-    ax.set(ylim=(job.speed.min() - margin, job.speed.max() + margin), ylabel=f"speed [{job.unit}]")
-    ax.legend(loc="lower right", fontsize=8, frameon=False)
+def draw_speed(job: Played, ax: Axes, steps: int | None = None) -> Axes:
+    """Demand and speed at every step, in red where most cycles are Type III; returns the axes."""
+    speed, wild = job.speed[:steps, 0], job.type_iii[:steps, 0] > 0.5
+    step = np.arange(len(speed))
+    ax.step(step, job.demand[:steps, 0], where="mid", color=INK, linewidth=0.8, label="demand")
+    for chosen, colour, name in ((~wild, CALM, "calm"), (wild, WILD, "Type III")):
+        ax.plot(step[chosen], speed[chosen], "s", color=colour, markersize=3, label=name)
+    low, high = np.nanmin([job.speed, job.demand]), np.nanmax([job.speed, job.demand])
+    ax.set(ylim=(low - 0.05 * (high - low), high + 0.05 * (high - low)), ylabel=f"speed [{job.unit}]")
+    ax.legend(loc="lower right", fontsize=7, frameon=False)
     return ax
 
 
-def draw_forces(job: PlayedJob, ax: Axes, steps: int | None = None) -> Axes:
-    """Measured peak force of every cycle, and the force limit; returns the axes."""
-    cycles = job.peak_force.shape[1]
-    peaks = job.peak_force[:steps].ravel()
-    kinds = np.repeat(job.type_iii[:steps], cycles)
-    cycle = np.arange(len(peaks))
-    for chosen, colour in ((~kinds, CALM), (kinds, WILD)):
-        ax.plot(cycle[chosen], peaks[chosen], ".", color=colour, markersize=3)
-    ax.axhline(job.force_limit, color=LIMIT, linewidth=1.0, linestyle="--")
-    ax.set(
-        xlim=(0, job.peak_force.size),
-        ylim=(0.0, 1.1 * max(job.force_limit, float(job.peak_force.max()))),
-        xlabel="cycle",
-        ylabel="measured peak force [N]",
-    )
+def draw_forces(job: Played, ax: Axes, steps: int | None = None) -> Axes:
+    """Mean of the measured peak forces of every step, and two standard deviations; returns the axes."""
+    mean, spread = job.column("mean_peak_force")[:steps, 0], job.column("std_peak_force")[:steps, 0]
+    wild, step = job.type_iii[:steps, 0] > 0.5, np.arange(len(mean))
+    for chosen, colour in ((~wild, CALM), (wild, WILD)):
+        ax.errorbar(
+            step[chosen], mean[chosen], 2.0 * spread[chosen], fmt=".", color=colour, markersize=3, linewidth=0.8
+        )
+    ax.set(xlim=(0, len(job.speed)), xlabel="step", ylabel="peak force [N], mean and 2 sd")
     return ax
 
 
-def save_job(job: PlayedJob, path: Path) -> None:
-    """Write a figure (.png) or an animation (.gif, .mp4) of a job.
+def save_job(jobs: Jobs, path: Path) -> None:
+    """Write a figure (.png) or an animation (.gif, .mp4) of jobs.
 
     Raises
     ------
@@ -89,7 +80,7 @@ def save_job(job: PlayedJob, path: Path) -> None:
     """
     check_format(path)
     writers = {".png": _write_figure, ".gif": _write_gif, ".mp4": _write_film}
-    write_atomically(path, lambda file: writers[path.suffix.lower()](job, file))
+    write_atomically(path, lambda file: writers[path.suffix.lower()](jobs, file))
 
 
 def check_format(path: Path) -> None:
@@ -101,33 +92,40 @@ def check_format(path: Path) -> None:
         raise ChaosgymError(f"{path} needs the program ffmpeg, which is not installed; .gif does without it")
 
 
-def _write_figure(job: PlayedJob, file: Path) -> None:
-    job_figure(job).savefig(file, format="png")
+def _blank(jobs: Jobs) -> Figure:
+    return Figure(figsize=(4.6 * len(jobs), 4.8), dpi=100, layout="constrained")
 
 
-def _write_gif(job: PlayedJob, file: Path) -> None:
-    pictures = [_picture(figure) for figure in _frames(job)]
+def _write_figure(jobs: Jobs, file: Path) -> None:
+    figure = _blank(jobs)
+    draw_jobs(jobs, figure)
+    figure.savefig(file, format="png")
+
+
+def _write_gif(jobs: Jobs, file: Path) -> None:
+    pictures = [_picture(figure) for figure in _frames(jobs)]
     pictures[0].save(
         file, format="GIF", save_all=True, append_images=pictures[1:], duration=1000 // FRAMES_PER_SECOND, loop=0
     )
 
 
-def _write_film(job: PlayedJob, file: Path) -> None:
+def _write_film(jobs: Jobs, file: Path) -> None:
     writer = FFMpegWriter(fps=FRAMES_PER_SECOND, extra_args=["-f", "mp4"])
-    frames = _frames(job)
+    frames = _frames(jobs)
     with writer.saving(next(frames), str(file), dpi=100):
         writer.grab_frame()
         for _ in frames:
             writer.grab_frame()
 
 
-def _frames(job: PlayedJob) -> Iterator[Figure]:
+def _frames(jobs: Jobs) -> Iterator[Figure]:
     """One figure, drawn anew for each picture of an animation."""
-    figure = Figure(figsize=(7.2, 4.8), dpi=100, layout="constrained")
-    steps = np.unique(np.linspace(1, len(job.speed), FRAMES).round().astype(int)).tolist()
+    figure = _blank(jobs)
+    length = max(len(job.speed) for job in jobs.values())
+    steps = np.unique(np.linspace(1, length, FRAMES).round().astype(int)).tolist()
     for count in tqdm(steps, desc="draw", unit="picture"):
         figure.clear()
-        draw_job(job, figure, count)
+        draw_jobs(jobs, figure, count)
         yield figure
 
 

@@ -53,4 +53,4 @@ class Belief(Controller):
         self._visits[every, place] += held
         share = (weight @ self.fleet.share + self._wild) / (1.0 + self._visits)
         grid = self.fleet.speeds
-        return grid[self.cost(share, seen(observations, "demand"), grid).argmin(axis=1)]
+        return np.asarray(grid[self.cost(share, seen(observations, "demand"), grid).argmin(axis=1)])

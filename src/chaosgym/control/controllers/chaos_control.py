@@ -1,8 +1,9 @@
 """Control of chaos at the demanded speed: small corrections, once a cycle, may hold an unstable orbit.
 
-OGY, after Ott, Grebogi and Yorke: of the orbits of period 1 that the chaotic motion passes by, the least unstable one is
-found by Newton's method, and the speed is corrected by u = -K (x - x*), with x the state at the start of a cycle, x* that
-of the orbit, and K from the linear map of deviations and speed by the Riccati equation. It is told the full state.
+OGY, after Ott, Grebogi and Yorke: of the orbits of period 1 that the chaotic motion passes by, the least unstable one
+is found by Newton's method, and the speed is corrected by u = -K (x - x*), with x the state at the start of a cycle,
+x* that of the orbit, and K from the linear map of deviations and speed by the Riccati equation. It is told the full
+state.
 
 Delayed feedback, after Pyragas in its extended form: u_k = K s_k, s_k = F_k - F_(k-1) + R s_(k-1), with F the measured
 peak force of a cycle. Nothing is known of the orbit.

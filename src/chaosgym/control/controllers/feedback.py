@@ -65,7 +65,7 @@ class BackOff(Controller):
             for _ in self.ladder:
                 bad = self._bad[every, self._place(demand + self.ladder[self._rung])]
                 self._rung[bad] = (self._rung[bad] + 1) % len(self.ladder)
-        return demand + self.ladder[self._rung]
+        return np.asarray(demand + self.ladder[self._rung])
 
 
 class Bandit(Controller):
@@ -117,7 +117,8 @@ class Bandit(Controller):
         counted = self._wild + self._calm
         share = self._wild / counted
         doubt = np.sqrt(share * (1.0 - share) / (counted + 1.0))
-        return grid[self.cost(share - self.optimism * doubt, seen(observations, "demand"), grid).argmin(axis=1)]
+        cost = self.cost(share - self.optimism * doubt, seen(observations, "demand"), grid)
+        return np.asarray(grid[cost.argmin(axis=1)])
 
 
 class HillClimbing(Controller):
@@ -148,7 +149,7 @@ class HillClimbing(Controller):
             moved = self._trim + self._sign * task.trim_step
             self._trim = np.where(climbs, np.clip(moved, -task.largest_trim, task.largest_trim), self._trim)
             self._best, self._sum = mean, np.zeros(self.count)
-        return demand + self._trim
+        return np.asarray(demand + self._trim)
 
 
 class ExtremumSeeking(Controller):
@@ -177,7 +178,7 @@ class ExtremumSeeking(Controller):
         self._trim = np.clip(self._trim, -task.largest_trim, task.largest_trim)
         self._step += 1
         ahead = np.sin(2.0 * np.pi * self._step / self.period)
-        return seen(observations, "demand") + self._trim + task.trim_step * ahead
+        return np.asarray(seen(observations, "demand") + self._trim + task.trim_step * ahead)
 
 
 class ForceFeedback(Controller):
@@ -195,4 +196,4 @@ class ForceFeedback(Controller):
         task = self.task
         scatter = seen(observations, "std_peak_force") / max(task.sensor_error, 1e-3 * task.load_rating)
         self._trim = np.clip(self._trim - self.gain * task.trim_step * (scatter - 1.0), -task.largest_trim, 0.0)
-        return seen(observations, "demand") + self._trim
+        return np.asarray(seen(observations, "demand") + self._trim)

@@ -98,7 +98,7 @@ class MapFollower(Controller):
     def speeds(self, observations: Observations) -> Array:
         """The best speed of the map."""
         share = self.share_at(1.0 - float(seen(observations, "remaining_share").min()))
-        return self.grid[self.cost(share, seen(observations, "demand"), self.grid).argmin(axis=1)]
+        return np.asarray(self.grid[self.cost(share, seen(observations, "demand"), self.grid).argmin(axis=1)])
 
 
 class Schedule(MapFollower):
@@ -123,7 +123,7 @@ class Schedule(MapFollower):
     def speeds(self, observations: Observations) -> Array:
         """The next speed of the plan."""
         self._step += 1
-        return self._plan[self._step - 1]
+        return np.asarray(self._plan[self._step - 1])
 
 
 class CommonSchedule(Schedule):

@@ -50,7 +50,7 @@ class RecedingHorizon(Controller):
         if due.any():
             jobs = np.flatnonzero(due)
             self._target[jobs] = self._best(jobs, demand[jobs])
-        return self._target
+        return np.asarray(self._target)
 
     def _best(self, jobs: Any, demand: Array) -> Array:
         task, width = self.task, len(self._trims)
