@@ -1,57 +1,49 @@
-"""Write an offline dataset in Minari's format: whole jobs of one environment, by a trained policy or by wandering.
+"""Write an offline dataset in Minari's format: whole jobs of one environment, by a trained policy or at random.
 
-    python agents/export_minari.py --env chaosgym/ImpactBeam-v0 --jobs 100 --out minari
+    python agents/export_minari.py --env chaosgym/ImpactBeamTolerance-v1 --jobs 100 --out minari
 
-Wandering means speeds drawn from the whole range, each kept for 20 steps on average. Needs the extra [offline]. With
-MINARI_DATASETS_PATH=minari, `minari.load_dataset("chaosgym/ImpactBeam/wandering-v0")` loads it.
+Needs the extra [offline]. With MINARI_DATASETS_PATH=minari, `minari.load_dataset(
+"chaosgym/ImpactBeamTolerance/random-v1")` loads it.
 """
 
+import argparse
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
-import common
 import gymnasium as gym
 from tqdm import trange
-from wandering import wandering
 
 from chaosgym.control.policies import load_policy
 
 
-@dataclass(frozen=True)
-class Arguments:
-    """Everything that decides a dataset."""
-
-    env: str = "chaosgym/ImpactBeam-v0"
-    policy: str = "wandering"
-    jobs: int = 100
-    seed: int = 0
-    out: str = "minari"
-
-
 def main() -> None:
     """Play the jobs and write the dataset."""
-    arguments = common.parse(Arguments, __doc__)
-    folder = Path(arguments.out)
-    folder.mkdir(parents=True, exist_ok=True)
-    os.environ["MINARI_DATASETS_PATH"] = str(folder.resolve())
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--env", default="chaosgym/ImpactBeamTolerance-v1")
+    parser.add_argument("--policy", type=Path, default=None, help="folder of a policy; random actions by default")
+    parser.add_argument("--jobs", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, default=Path("minari"))
+    asked = parser.parse_args()
+    asked.out.mkdir(parents=True, exist_ok=True)
+    os.environ["MINARI_DATASETS_PATH"] = str(asked.out.resolve())
     from minari import DataCollector  # it looks for the folder when it is imported
 
-    behaviour = "wandering" if arguments.policy == "wandering" else Path(arguments.policy).name
-    name = f"{arguments.env.removesuffix('-v0')}/{behaviour}-v0"
-    if (folder / name).exists():
-        raise SystemExit(f"{folder / name} exists; choose another folder with --out")
-    trained, env = None if arguments.policy == "wandering" else load_policy(arguments.policy), gym.make(arguments.env)
-    if trained:
-        trained.fits(env)
+    behaviour = asked.policy.name if asked.policy else "random"
+    name = f"{asked.env.removesuffix('-v1')}/{behaviour}-v1"
+    if (asked.out / name).exists():
+        raise SystemExit(f"{asked.out / name} exists; choose another folder with --out")
+    policy = load_policy(asked.policy) if asked.policy else None
+    env = gym.make(asked.env, **(policy.keywords if policy else {}))
+    env.action_space.seed(asked.seed)
     collector = DataCollector(env)
-    for job in trange(arguments.jobs, desc=name, unit="job"):
-        if trained:
-            trained.reset()
-        act = trained or wandering(arguments.seed + job)
-        observation, ended = collector.reset(seed=arguments.seed + job)[0], False
+    for job in trange(asked.jobs, desc=name, unit="job"):
+        observation, ended = collector.reset(seed=asked.seed + job)[0], False
+        if policy:
+            policy.begin(env.unwrapped.task, 1)
         while not ended:
-            observation, _, terminated, truncated, _ = collector.step(act(observation))
+            action = policy(observation[None])[0] if policy else env.action_space.sample()
+            observation, _, terminated, truncated, _ = collector.step(action)
             ended = terminated or truncated
     collector.create_dataset(
         name,
@@ -59,10 +51,10 @@ def main() -> None:
         author="The chaosgym developers",
         requirements=["chaosgym"],
         code_permalink="agents/export_minari.py",
-        description=f"{arguments.jobs} jobs of {arguments.env} from seed {arguments.seed}, {behaviour}",
+        description=f"{asked.jobs} jobs of {asked.env} from seed {asked.seed}, {behaviour}",
     )
     collector.close()
-    print(f"{name}: {arguments.jobs} jobs in {folder}")
+    print(f"{name}: {asked.jobs} jobs in {asked.out}")
 
 
 if __name__ == "__main__":

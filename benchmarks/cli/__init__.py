@@ -1,6 +1,6 @@
 """Command line of ``python -m benchmarks``."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -10,9 +10,6 @@ from chaosgym.cli.dataset import AS_JSON, FOLDER
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import emit
 from chaosgym.envs import ENVIRONMENTS
-
-if TYPE_CHECKING:
-    from benchmarks.envs.audit import Score
 
 
 @machine_command
@@ -85,48 +82,34 @@ def cost(folder: str, points: int, seed: int, as_json: bool) -> None:
 
 @click.command()
 @click.argument("env", type=click.Choice(ENVIRONMENTS))
-@click.option("--samples", type=click.IntRange(1), default=200, show_default=True, help="Steps that are looked at.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def check_regimes(env: str, samples: int, seed: int, as_json: bool) -> None:
-    """Compare the table with a full diagnosis in steps that random jobs on held-out machines went through."""
-    from benchmarks.envs.regime_check import check_regimes as compare
+@click.option("--machines", type=click.IntRange(1, 256), default=16, show_default=True)
+@click.option("--speeds", type=click.IntRange(2), default=23, show_default=True)
+@AS_JSON
+def judges(env: str, machines: int, speeds: int, as_json: bool) -> None:
+    """Compare the judges of running motion with the diagnosis from rest, and with each other."""
+    from benchmarks.envs.judges import judges as compare
 
-    found = compare(env, samples, seed, progress=True)
-    emit(
-        found.as_dict(),
-        as_json,
-        lambda: [
-            f"{env}: {found.as_dict()['agreement']:.1%} of {found.samples} steps agree",
-            f"  counted as Type III and not periodic {found.irregular}, though periodic {found.blamed}",
-            f"  not counted and periodic {found.periodic}, though not periodic {found.missed}",
-        ],
-    )
+    found = compare(env, machines, speeds)
+    emit({"env": env, **found}, as_json, lambda: [f"{share:7.1%}  {name}" for name, share in found.items()])
 
 
 @click.command()
 @click.argument("env", type=click.Choice(ENVIRONMENTS))
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def audit(env: str, as_json: bool) -> None:
-    """Play every loophole that one could think of for a job on the nominal machine."""
-    from benchmarks.envs.audit import audit as play
+@click.option("--machines", type=click.IntRange(1, 256), default=64, show_default=True)
+@AS_JSON
+def audit(env: str, machines: int, as_json: bool) -> None:
+    """Play the loopholes that one could think of."""
+    from benchmarks.envs.audit import audit as run
 
-    scores = play(env)
-    emit({"env": env, "schedules": [score.as_dict() for score in scores]}, as_json, lambda: _audit_lines(scores))
-
-
-def _audit_lines(scores: list["Score"]) -> list[str]:
-    """The best and the worst schedule of each kind."""
-    lines = [f"{'schedule':16s} {'speeds':>15s} {'return':>8s} {'Type III':>8s} {'force':>6s} {'damage':>6s}  end"]
-    for kind in dict.fromkeys(score.plan.kind for score in scores):
-        ranked = sorted((score for score in scores if score.plan.kind == kind), key=lambda score: -score.total)
-        for score in ranked[:3] + ranked[3:][-1:]:
-            speeds = " to ".join(f"{speed:g}" for speed in score.plan.speeds)
-            lines.append(
-                f"{kind:16s} {speeds:>15s} {score.total:8.3f} {score.type_iii:8.1%} {score.force:6.1%} "
-                f"{score.damage:6.2f}  {score.status}"
-            )
-    return [*lines, f"largest reward of a step: {max(score.best_step for score in scores):.2g}"]
+    found = run(env, machines)
+    emit(
+        {"env": env, "loopholes": found},
+        as_json,
+        lambda: [
+            f"{name:20s} return {row['return']:8.2f}  Type III {row['type_iii']:6.1%}  off the demand {row['deviation']:.2f}"
+            for name, row in found.items()
+        ],
+    )
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -134,7 +117,7 @@ def app() -> None:
     """Numbers about chaosgym itself."""
 
 
-for command in (bench, agreement, check, cost, check_regimes, audit):
+for command in (bench, agreement, check, cost, judges, audit):
     app.add_command(command)
 
 

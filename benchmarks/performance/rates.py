@@ -130,7 +130,7 @@ def cycle_rate(point: tuple[Machine, Integrator, int], repeats: int) -> Rate:
 
 
 def _environments() -> list[str]:
-    names = [f"chaosgym/{machine}-v0" for machine in MACHINES]
+    names = [f"chaosgym/{machine}-v1" for machine in MACHINES.values()]
     for name in OTHER_ENVIRONMENTS:
         try:
             gym.make(name).close()

@@ -48,7 +48,7 @@ def test_every_rate_comes_out_positive(monkeypatch: pytest.MonkeyPatch) -> None:
     run = CliRunner().invoke(app, ["bench", "--repeats", "1", "--json"])
     assert run.exit_code == 0, run.output
     result = json.loads(run.stdout)
-    assert set(result["env_steps"]) >= {"chaosgym/ImpactBeam-v0", "chaosgym/SliderCrank-v0", "CartPole-v1"}
+    assert set(result["env_steps"]) >= {"chaosgym/ImpactBeam-v1", "chaosgym/SliderCrank-v1", "CartPole-v1"}
     assert set(result["vector_env_steps"]) == set(result["env_steps"])
     figures = [
         figure
@@ -73,7 +73,7 @@ def test_threads_and_wrapping_of_vector_environments(monkeypatch: pytest.MonkeyP
     assert run.exit_code == 0, run.output
     assert numba.get_num_threads() == threads
     measured = json.loads(run.stdout)["scaling"]
-    assert [each["environment"] for each in measured] == ["chaosgym/ImpactBeam-v0", "chaosgym/SliderCrank-v0"]
+    assert [each["environment"] for each in measured] == ["chaosgym/ImpactBeam-v1", "chaosgym/SliderCrank-v1"]
     for each in measured:
         assert each["wrapper"] > 0.0
         assert each["physics"] + each["wrapper"] <= 1.01 * each["one_thread"]

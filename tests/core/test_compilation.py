@@ -21,7 +21,7 @@ ONE_MACHINE = (
     "from chaosgym.core.fixed_step import advance_fixed_step as kernel" + COUNT
 )
 MANY_MACHINES = (
-    "import gymnasium as gym, chaosgym; gym.make_vec('chaosgym/ImpactBeam-v0', num_envs=2).reset(seed=0);"
+    "import gymnasium as gym, chaosgym; gym.make_vec('chaosgym/ImpactBeam-v1', num_envs=2).reset(seed=0);"
     "from chaosgym.core.batch import advance_beams as kernel" + COUNT
 )
 PEAK_FORCE = (

@@ -9,6 +9,7 @@ import pytest
 
 import chaosgym.envs
 from chaosgym.envs import ENVIRONMENTS, register_environments
+from chaosgym.errors import ParameterError
 
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)
@@ -28,16 +29,16 @@ def test_importing_the_package_loads_neither_kernels_nor_plots() -> None:
 
 def test_an_id_can_name_the_package_to_import() -> None:
     """Nothing but the id is needed in a fresh process."""
-    code = "import gymnasium; print(gymnasium.make('chaosgym:chaosgym/ImpactBeam-v0').spec.id)"
+    code = "import gymnasium; print(gymnasium.make('chaosgym:chaosgym/ImpactBeam-v1').spec.id)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "chaosgym/ImpactBeam-v0"
+    assert run.stdout.strip() == "chaosgym/ImpactBeam-v1"
 
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_the_spec_survives_json(name: str) -> None:
     """An environment made from the JSON of its spec is the same, keywords included."""
     machine = gym.make(name).unwrapped.nominal
-    env = gym.make(name, **{machine.clearance_field: 0.0635e-3}, lowest_speed=25.0, highest_speed=30.0, job_cycles=50)
+    env = gym.make(name, **{machine.clearance_field: 0.2e-3}, steps=5, tolerances={machine.clearance_field: 0.1})
     assert env.spec is not None
     again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
     first, second = (e.reset(seed=3)[0] for e in (env, again))
@@ -45,11 +46,20 @@ def test_the_spec_survives_json(name: str) -> None:
     assert again.unwrapped.nominal == env.unwrapped.nominal
 
 
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_version_0_says_what_to_use_instead(name: str) -> None:
+    """One line that names the new id, for single and vector environments."""
+    old = name.replace("-v1", "-v0")
+    for make in (lambda: gym.make(old), lambda: gym.make_vec(old, num_envs=2)):
+        with pytest.raises(ParameterError, match=f"{old} is gone.*use {name}"):
+            make()
+
+
 def test_the_time_limit_wrapper_truncates() -> None:
     """Only max_episode_steps truncates."""
-    env = gym.make("chaosgym/ImpactBeam-v0", max_episode_steps=3)
+    env = gym.make("chaosgym/ImpactBeam-v1", max_episode_steps=3)
     env.reset(seed=0)
-    flags = [env.step(np.zeros(1, np.float32))[2:4] for _ in range(3)]
+    flags = [env.step(0)[2:4] for _ in range(3)]
     assert flags == [(False, False), (False, False), (False, True)]
 
 

@@ -92,7 +92,7 @@ def test_the_reference_places_events_most_tightly():
 
 
 @pytest.mark.parametrize(
-    ("env_id", "rung"), [("chaosgym/ImpactBeam-v0", "draft"), ("chaosgym/SliderCrank-v0", "rigid")]
+    ("env_id", "rung"), [("chaosgym/ImpactBeam-v1", "draft"), ("chaosgym/SliderCrank-v1", "rigid")]
 )
 def test_environments_take_the_keyword(env_id, rung):
     """gym.make(..., fidelity=rung) runs that model; a field that it sets may not be given too."""
@@ -109,8 +109,8 @@ def test_environments_take_the_keyword(env_id, rung):
 
 def test_the_crank_environment_updates_its_matrices_every_five_degrees():
     """Its default is the rung flexible-5deg, and the interval may still be given by itself."""
-    assert gym.make("chaosgym/SliderCrank-v0").unwrapped.nominal.rung == "flexible-5deg"
-    assert gym.make("chaosgym/SliderCrank-v0", matrix_update_interval=1.0).unwrapped.nominal.rung == "flexible-1deg"
+    assert gym.make("chaosgym/SliderCrank-v1").unwrapped.nominal.rung == "flexible-5deg"
+    assert gym.make("chaosgym/SliderCrank-v1", matrix_update_interval=1.0).unwrapped.nominal.rung == "flexible-1deg"
 
 
 def test_the_command_line_takes_the_option():

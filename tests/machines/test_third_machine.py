@@ -105,7 +105,7 @@ def test_tradeoff_and_stability(tmp_path):
 def test_environments(task):
     """Every task is made, steps, and is drawn; the vector environment gives the same observations."""
     register_environments()
-    name = f"chaosgym/ImpactOscillator{task}-v0"
+    name = f"chaosgym/ImpactOscillator{task}-v1"
     env = gym.make(name, render_mode="rgb_array")
     first, _ = env.reset(seed=1)
     env.step(env.action_space.sample())

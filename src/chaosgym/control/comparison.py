@@ -329,6 +329,7 @@ def table_lines(summary: Mapping[str, Mapping[str, Any]]) -> list[str]:
         low, high = row["score_interval"]
         lines.append(
             f"| {name} | {row['knows']} | {row['seeds']} | {row['machines']} | {row['return']:.2f} "
-            f"| {row['score']:.2f} | {low:.2f} to {high:.2f} | {row['type_iii']:.1%} | {row['deviation']:.2f} | {row['damage']:.2f} |"
+            f"| {row['score']:.2f} | {low:.2f} to {high:.2f} | {row['type_iii']:.1%} | {row['deviation']:.2f} "
+            f"| {row['damage']:.2f} |"
         )
     return lines

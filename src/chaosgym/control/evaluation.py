@@ -132,7 +132,7 @@ def _loaded(path: Path) -> Any:
     for kind in (PPO, SAC, RecurrentPPO):
         try:
             return kind.load(path, device="cpu")
-        except Exception:  # noqa: S112, BLE001  (each kind refuses the files of the others in its own way)
+        except Exception:  # each kind refuses the files of the others in its own way
             continue
     raise ModelFileError(f"{path} is no model of PPO, SAC or RecurrentPPO")
 

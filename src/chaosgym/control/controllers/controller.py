@@ -5,7 +5,7 @@ controller.start(envs)                   # a native vector environment with acti
 actions = controller(observations)       # (n, 1)
 """
 
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,6 @@ from chaosgym.envs.task import Task
 Array = NDArray[np.float64]
 Observations = NDArray[np.float32]
 
-Knowledge = Literal["nothing", "measurements", "model", "tolerances", "machine", "machine and future"]
-"""What a controller looks at, each item beside the observation: nothing of it, the observation alone, the nominal model,
-models within tolerances, this very machine, and the demands to come as well."""
-
 _PLACE = {name: place for place, name in enumerate(OBSERVATION_NAMES)}
 
 
@@ -28,6 +24,8 @@ class Controller:
     """A rule for many machines side by side; a subclass has ``speeds`` and, for what it remembers, ``begin``."""
 
     knows: str = "nothing"
+    """Beside the demand: "measurements", the nominal "model", models within "tolerances", or this very "machine"; and the
+    demands to come ("future")."""
     cycle_by_cycle: ClassVar[bool] = False
     """Whether it acts in each cycle instead of in each step."""
 

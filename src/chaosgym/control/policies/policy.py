@@ -114,6 +114,98 @@ class TrainedPolicy:
         ModelFileError
             If it is of another machine, or has another kind of actions.
         """
+        name = gym.spec(self.env).kwargs["machine"]
+        if envs.nominal.name != name or envs.task.action != self.action:
+            raise ModelFileError(
+                f"the policy was trained on {self.env} with action={self.action!r}; "
+                f"this is {envs.nominal.name} with action={envs.task.action!r}"
+            )
+        self.begin(envs.task, envs.num_envs)
+
+    def begin(self, task: Task, count: int) -> None:
+        """Begin ``count`` jobs of a task side by side.
+
+        Raises
+        ------
+        ModelFileError
+            If it remembers other speeds than those of the task.
+        """
+        self._state, self._memory = None, None
+        if self.usual:
+            if len(self.usual.count) != len(task.grid):
+                raise ModelFileError(
+                    f"the policy of {self.env} knows {len(self.usual.count)} speeds; this task has {len(task.grid)}"
+                )
+            self._memory = SpeedMemory(task, count, self.usual, learns=False)
+
+    def __call__(self, observations: Array) -> Array:
+        """Return normalised observations (..., d)."""
+        values = np.clip((observations - self.mean) / self.deviation, -self.limit, self.limit)
+        return values.astype(np.float32)
+
+
+@dataclass
+class TrainedPolicy:
+    """A network with all that is needed to play it.
+
+    Attributes
+    ----------
+    env
+        Id of the environment that it was trained on.
+    action
+        Kind of its actions, "trim" or "continuous".
+    network
+        From prepared observations to actions.
+    normalisation
+        Applied to the observations, memory included; None for none.
+    usual
+        For a policy with a ``SpeedMemory``, what is usual at each speed; None for one without a memory.
+    squashed
+        Whether continuous answers go through tanh; otherwise they are clipped.
+
+    Raises
+    ------
+    ModelFileError
+        If the parts do not fit each other.
+    """
+
+    env: str
+    action: str
+    network: Network
+    normalisation: Normalisation | None = None
+    usual: Usual | None = None
+    squashed: bool = False
+    knows: str = "measurements"
+    _state: State | None = field(default=None, init=False, repr=False)
+    _memory: SpeedMemory | None = field(default=None, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.action not in ACTIONS:
+            raise ModelFileError(f"the kind of actions is {self.action!r}; known: {', '.join(ACTIONS)}")
+        size = len(OBSERVATION_NAMES) + (len(SpeedMemory.names()) if self.usual else 0)
+        self.network.check(size, ACTIONS[self.action])
+        if self.normalisation:
+            for name, values in (("mean", self.normalisation.mean), ("deviation", self.normalisation.deviation)):
+                if values.shape != (size,) or not np.isfinite(values).all():
+                    raise ModelFileError(f"the {name} of the normalisation is not {size} finite numbers")
+            if not (self.normalisation.deviation > 0.0).all():
+                raise ModelFileError("a deviation of the normalisation is not positive")
+            if not 0.0 < self.normalisation.limit < np.inf:
+                raise ModelFileError(f"the limit of the normalisation is {self.normalisation.limit}; must be positive")
+
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """Keywords of the environment that it plays in."""
+        return {"action": self.action}
+
+    def start(self, envs: Any) -> None:
+        """Begin the jobs of a vector environment that has been reset.
+
+        Raises
+        ------
+        ModelFileError
+            If it is of another machine, or has another kind of actions.
+        """
         task: Task = envs.task
         name = gym.spec(self.env).kwargs["machine"]
         if envs.nominal.name != name or task.action != self.action:

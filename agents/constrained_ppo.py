@@ -1,0 +1,260 @@
+"""PPO under a constraint: as close to the demand as possible with at most a given share of Type III.
+
+    python agents/constrained_ppo.py --env chaosgym/ImpactBeamTolerance-v1 --limit 0.05 --out runs/constrained-0
+
+The same command goes on with a run that was interrupted. The folder holds progress.csv (a row every 10,000 steps),
+checkpoint.zip and checkpoint.npz until the end, and then policy.json and weights.npz.
+
+PPO-Lagrangian of A. Ray, J. Achiam and D. Amodei, *Benchmarking Safe Exploration in Deep Reinforcement Learning*, 2019:
+a multiplier weighs the advantage of the cost, from a critic of its own, against that of the reward, and rises while the
+jobs cost more than allowed. The reward has no term for Type III; the cost is ``info["cost"]``, its share in a step.
+"""
+
+import argparse
+import csv
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor, VecNormalize
+from torch import nn
+from tqdm import tqdm
+
+from chaosgym.control.policies import save_policy
+from chaosgym.control.policies.export import exported
+from chaosgym.envs import SB3VecEnv
+from chaosgym.envs.sb3 import SB3VisitedSpeeds
+
+Array = NDArray[np.float32]
+
+HOLD_BIAS = 2.0
+"""Logit of holding the speed at the start: motion settles only at a speed that is held."""
+
+ROW = ("step", "return", "type_iii", "deviation", "processor_seconds")
+
+
+def arguments() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--env", default="chaosgym/ImpactBeamTolerance-v1")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--steps", type=int, default=300_000)
+    parser.add_argument("--out", type=Path, default=Path("runs/constrained"))
+    parser.add_argument("--envs", type=int, default=64)
+    parser.add_argument("--rollout", type=int, default=60)
+    parser.add_argument("--batch", type=int, default=960)
+    parser.add_argument("--epochs", type=int, default=6)
+    parser.add_argument("--learning-rate", type=float, default=1e-3)
+    parser.add_argument("--gamma", type=float, default=0.95)
+    parser.add_argument("--gae-lambda", type=float, default=0.9)
+    parser.add_argument("--limit", type=float, default=0.05)
+    parser.add_argument("--units", type=int, default=64)
+    return parser.parse_args()
+
+
+class CostRecorder(VecEnvWrapper):
+    """Keeps ``info["cost"]`` of every step since the last ``take``."""
+
+    def __init__(self, envs: VecEnv) -> None:
+        super().__init__(envs)
+        self._costs: list[list[float]] = []
+
+    def reset(self) -> Any:
+        """Start all jobs."""
+        return self.venv.reset()
+
+    def step_wait(self) -> Any:
+        """Run a step and keep its costs."""
+        observations, rewards, ended, infos = self.venv.step_wait()
+        self._costs.append([info["cost"] for info in infos])
+        return observations, rewards, ended, infos
+
+    def take(self) -> Array:
+        """Return the costs (steps, envs) and forget them."""
+        costs = np.array(self._costs, np.float32)
+        self._costs = []
+        return costs
+
+
+class LagrangianPPO(PPO):
+    """PPO on the advantage of the reward less a multiplier times that of the cost.
+
+    Parameters
+    ----------
+    cost_limit
+        Largest mean cost of a step.
+    multiplier_rate
+        Increase of the multiplier in one update for each unit of cost above the limit.
+    keywords
+        Those of PPO; ``env`` must contain a ``CostRecorder``.
+    """
+
+    def __init__(
+        self, *positional: Any, cost_limit: float = 0.05, multiplier_rate: float = 0.1, **keywords: Any
+    ) -> None:
+        self.cost_limit, self.multiplier_rate = cost_limit, multiplier_rate
+        super().__init__(*positional, **keywords)
+
+    def _setup_model(self) -> None:
+        super()._setup_model()
+        size = int(np.prod(self.observation_space.shape))
+        self.cost_critic = nn.Sequential(nn.Linear(size, 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh(), nn.Linear(64, 1))
+        self.cost_optimizer = torch.optim.Adam(self.cost_critic.parameters(), lr=self.lr_schedule(1.0))
+        self.multiplier = nn.Parameter(torch.zeros(1), requires_grad=False)
+
+    def _get_torch_save_params(self) -> tuple[list[str], list[str]]:
+        states, variables = super()._get_torch_save_params()
+        return [*states, "cost_critic", "cost_optimizer"], [*variables, "multiplier"]
+
+    def _excluded_save_params(self) -> list[str]:
+        return [*super()._excluded_save_params(), "cost_critic", "cost_optimizer", "multiplier"]
+
+    def train(self) -> None:
+        """Weigh the advantages, let PPO update the policy, fit the cost critic, and move the multiplier."""
+        buffer = self.rollout_buffer
+        costs = self._recorder().take()
+        observations = torch.as_tensor(buffer.observations, dtype=torch.float32).reshape(costs.size, -1)
+        with torch.no_grad():
+            values = self.cost_critic(observations).numpy().reshape(costs.shape)
+            last = self.cost_critic(torch.as_tensor(self._last_obs, dtype=torch.float32)).numpy()[:, 0]
+        begins = np.vstack([buffer.episode_starts[1:], self._last_episode_starts])
+        advantages = self._advantages(costs, values, np.vstack([values[1:], last]), begins)
+        targets = torch.as_tensor(advantages + values).reshape(-1)
+        weight = float(self.multiplier)
+        buffer.advantages = (buffer.advantages - weight * advantages) / (1.0 + weight)
+        super().train()
+        self._fit(observations, targets)
+        self.multiplier += self.multiplier_rate * (float(costs.mean()) - self.cost_limit)
+        self.multiplier.clamp_(min=0.0)
+
+    def _recorder(self) -> CostRecorder:
+        env: Any = self.env
+        while not isinstance(env, CostRecorder):
+            env = env.venv
+        return env
+
+    def _advantages(self, costs: Array, values: Array, following: Array, begins: Array) -> Array:
+        """Generalised advantages of the cost (steps, envs), as PPO has them of the reward."""
+        goes_on = 1.0 - begins
+        errors = costs + self.gamma * following * goes_on - values
+        advantages = np.zeros_like(errors)
+        later = np.zeros_like(errors[0])
+        for step in reversed(range(len(errors))):
+            later = errors[step] + self.gamma * self.gae_lambda * goes_on[step] * later
+            advantages[step] = later
+        return advantages
+
+    def _fit(self, observations: torch.Tensor, targets: torch.Tensor) -> None:
+        for _ in range(self.n_epochs):
+            for rows in torch.randperm(len(targets)).split(self.batch_size):
+                loss = nn.functional.mse_loss(self.cost_critic(observations[rows])[:, 0], targets[rows])
+                self.cost_optimizer.zero_grad()
+                loss.backward()
+                self.cost_optimizer.step()
+
+
+class Progress(BaseCallback):
+    """Writes a row and a checkpoint every 10,000 steps."""
+
+    def __init__(self, asked: argparse.Namespace, envs: VecNormalize) -> None:
+        super().__init__()
+        self.asked, self.envs = asked, envs
+        self.jobs: list[tuple[float, float, float]] = []
+        self.sums = np.zeros((3, asked.envs))
+        self.began, self.last = time.process_time(), 0
+
+    def _on_training_start(self) -> None:
+        self.last = self.num_timesteps
+        self.bar = tqdm(total=self.asked.steps, initial=self.num_timesteps, unit="step", desc=self.asked.out.name)
+
+    def _on_step(self) -> bool:
+        self.bar.update(self.num_timesteps - self.bar.n)
+        for i, info in enumerate(self.locals["infos"]):
+            self.sums[:, i] += 1.0, info["type_iii"], info["deviation"]
+            if "episode" in info:
+                steps, type_iii, deviation = self.sums[:, i]
+                self.jobs.append((info["episode"]["r"], type_iii / steps, deviation / steps))
+                self.sums[:, i] = 0.0
+        return True
+
+    def _on_rollout_end(self) -> None:
+        if self.num_timesteps - self.last < 10_000 or not self.jobs:
+            return
+        self.last = self.num_timesteps
+        row = [self.num_timesteps, *np.round(np.mean(self.jobs, axis=0), 4), round(time.process_time() - self.began)]
+        self.jobs = []
+        path = self.asked.out / "progress.csv"
+        new = not path.exists()
+        with path.open("a", newline="") as file:
+            csv.writer(file).writerows([ROW, row] if new else [row])
+        save(self.asked, self.envs, self.model)
+
+    def _on_training_end(self) -> None:
+        self.bar.close()
+
+
+def save(asked: argparse.Namespace, envs: VecNormalize, model: PPO) -> None:
+    """Write a checkpoint: what stable-baselines3 needs to go on, without pickle for the statistics."""
+    usual = envs.venv.venv.memory.usual
+    kept = {f"{kind}_{name}": getattr(rms, name) for kind, rms in statistics(envs) for name in ("mean", "var", "count")}
+    np.savez(asked.out / "checkpoint.npz", usual_count=usual.count, total=usual.total, squares=usual.squares, **kept)
+    model.save(asked.out / "checkpoint.zip")
+
+
+def load(asked: argparse.Namespace, envs: VecNormalize) -> PPO | None:
+    """Return the model of the checkpoint, if there is one, and put the statistics into the environments."""
+    if not (asked.out / "checkpoint.zip").exists():
+        return None
+    with np.load(asked.out / "checkpoint.npz") as kept:
+        for kind, rms in statistics(envs):
+            for name in ("mean", "var", "count"):
+                setattr(rms, name, kept[f"{kind}_{name}"])
+        usual = envs.venv.venv.memory.usual
+        usual.count, usual.total, usual.squares = kept["usual_count"], kept["total"], kept["squares"]
+    return LagrangianPPO.load(asked.out / "checkpoint.zip", envs, device="cpu")
+
+
+def statistics(envs: VecNormalize) -> list[tuple[str, object]]:
+    """Running means and variances of observations and returns."""
+    return [("obs", envs.obs_rms), ("ret", envs.ret_rms)]
+
+
+def main() -> None:
+    """Train, and write the policy."""
+    asked = arguments()
+    asked.out.mkdir(parents=True, exist_ok=True)
+    torch.set_num_threads(1)
+    native = VecMonitor(SB3VecEnv(asked.env, asked.envs, type_iii_weight=0.0))
+    envs = VecNormalize(CostRecorder(SB3VisitedSpeeds(native)), gamma=asked.gamma)
+    model = load(asked, envs)
+    if model is None:
+        model = LagrangianPPO(
+            "MlpPolicy",
+            envs,
+            cost_limit=asked.limit,
+            n_steps=asked.rollout,
+            batch_size=asked.batch,
+            n_epochs=asked.epochs,
+            learning_rate=lambda left: asked.learning_rate * (0.1 + 0.9 * left),
+            gamma=asked.gamma,
+            gae_lambda=asked.gae_lambda,
+            seed=asked.seed,
+            device="cpu",
+            policy_kwargs={"net_arch": [2 * asked.units, asked.units]},
+        )
+        with torch.no_grad():
+            model.policy.action_net.bias[0] += HOLD_BIAS
+    envs.seed(1_000_000 * (asked.seed + 1) + model.num_timesteps)
+    model.learn(asked.steps - model.num_timesteps, Progress(asked, envs), reset_num_timesteps=False)
+    save(asked, envs, model)
+    save_policy(exported(model, asked.env, envs, memory=True), asked.out)
+    print(f"policy in {asked.out}")
+
+
+if __name__ == "__main__":
+    main()

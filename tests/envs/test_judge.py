@@ -1,0 +1,72 @@
+"""The running motion is judged as its exponent and its recurrence say."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from chaosgym.diagnosis import diagnose
+from chaosgym.diagnosis.lyapunov import largest_lyapunov_exponent
+from chaosgym.envs.judge import MISS, ExponentJudge, recurrence_miss
+from chaosgym.simulation import simulate
+from chaosgym.simulation.batch import batch_of
+from chaosgym.simulation.run import simulate_with_deviations
+
+
+def _env(machine, speed):
+    """A machine without ripple or kicks, held at a speed."""
+    keywords = {"action": "speed", "speed_ripple": 0.0, "kick": 0.0, "tolerances": {}}
+    env = gym.make(f"chaosgym/{machine}-v1", **keywords)
+    env.reset(seed=0, options={"speed": speed})
+    for _ in range(12):
+        *_, info = env.step(np.array([speed], np.float32))
+    return env, info
+
+
+def test_side_by_side_growth_is_that_of_one_machine():
+    """Cycles at speeds of their own, with a deviation, give the bits of ``simulate_with_deviations``."""
+    beam = gym.make("chaosgym/ImpactBeam-v1").unwrapped.nominal
+    batch, speeds = batch_of(beam, 3), np.random.default_rng(0).uniform(18.0, 30.0, (3, 6))
+    for i in range(3):
+        batch.start(i, beam)
+    cycles, growth = batch.run_varied(np.arange(3), speeds)
+    for i in range(3):
+        state, deviation = None, np.cos(1.0 + np.arange(beam.n_states))[None]
+        for k, speed in enumerate(speeds[i]):
+            record, deviation, grown = simulate_with_deviations(beam.at(speed), 1, state, deviations=deviation)
+            state = record.final_state
+            assert np.array_equal(record.peak_force[0], cycles.peak_force[i, k])
+            assert grown[0, 0] == growth[i, k]
+
+
+@pytest.mark.parametrize("speed", [18.0, 20.0, 22.0, 24.0, 26.0, 28.0])
+def test_settled_beams_are_judged_as_they_are_diagnosed(speed):
+    """Without ripple the exponent of the running motion has the sign that the diagnosis from rest finds."""
+    env, info = _env("ImpactBeam", speed)
+    nature = diagnose(env.unwrapped.machine, budget=400).nature
+    assert info["type_iii"] == (0.0 if nature == "periodic" else 1.0)
+
+
+def test_the_exponent_is_the_exponent():
+    """Averaged over many cycles, the growth is the largest Lyapunov exponent."""
+    beam = gym.make("chaosgym/ImpactBeam-v1").unwrapped.nominal.at(27.0)
+    settled = simulate(beam, 300).final_state
+    *_, growth = simulate_with_deviations(beam, 3000, settled, deviations=np.ones((1, beam.n_states)))
+    expected = largest_lyapunov_exponent(beam, cycles=3000).per_cycle
+    assert growth[20:].mean() == pytest.approx(expected, abs=0.05)
+
+
+def test_a_deviation_that_is_damped_is_not_charged():
+    """One cycle of strong growth in a calm motion is an eighth of the memory's limit, and soon forgotten."""
+    judge, which = ExponentJudge(1), np.zeros(1, np.int64)
+    judge.verdict(which, np.full((1, 20), -0.5), np.zeros((1, 20)))
+    share, _ = judge.verdict(which, np.array([[3.0] + [-0.5] * 9]), np.zeros((1, 10)))
+    assert share[0] == 0.0
+
+
+@pytest.mark.parametrize("period", [1, 2, 3, 5, 8])
+def test_motion_of_a_period_up_to_eight_repeats(period):
+    """It misses itself by nothing, whatever the first cycles were; a period of nine misses itself."""
+    cycle = np.arange(20)
+    peaks = 50.0 + 10.0 * np.cos(2.0 * np.pi * cycle / period)
+    assert recurrence_miss(peaks) < 1e-12
+    assert recurrence_miss(50.0 + 10.0 * ((cycle % 9) == 0)) > MISS
