@@ -106,7 +106,8 @@ def audit(env: str, machines: int, as_json: bool) -> None:
         {"env": env, "loopholes": found},
         as_json,
         lambda: [
-            f"{name:20s} return {row['return']:8.2f}  Type III {row['type_iii']:6.1%}  off the demand {row['deviation']:.2f}"
+            f"{name:20s} return {row['return']:8.2f}  Type III {row['type_iii']:6.1%}  "
+            f"off the demand {row['deviation']:.2f}"
             for name, row in found.items()
         ],
     )

@@ -46,7 +46,12 @@ class Dither(Controller):
 
 def audit(env: str, machines: int = 64) -> dict[str, dict[str, float]]:
     """Mean return, share of Type III and deviation of each loophole, by name."""
-    players = {"follow the demand": Follow(), "stand off": StandOff(), "dither by 1": Dither(1), "dither by 4": Dither(4)}
+    players = {
+        "follow the demand": Follow(),
+        "stand off": StandOff(),
+        "dither by 1": Dither(1),
+        "dither by 4": Dither(4),
+    }
     found = {}
     for name, player in players.items():
         played = play(player, env, range(machines), progress=name)

@@ -33,7 +33,7 @@ def test_the_wheel_alone_plays_a_policy(folder, tmp_path, monkeypatch):  # noqa:
     told = _run(
         python.with_name("chaosgym"),
         "run-agent",
-        "chaosgym/ImpactBeam-v0",
+        "chaosgym/ImpactBeam-v1",
         "--policy",
         folder,
         "--out",
@@ -43,5 +43,5 @@ def test_the_wheel_alone_plays_a_policy(folder, tmp_path, monkeypatch):  # noqa:
     )
     assert json.loads(told)["status"] == "job_done"
     assert out.stat().st_size > 10_000
-    shipped = _run(python.with_name("chaosgym"), "run-agent", "chaosgym/ImpactBeamTolerance-v0", "--json", cwd=tmp_path)
+    shipped = _run(python.with_name("chaosgym"), "run-agent", "chaosgym/ImpactBeamTolerance-v1", "--json", cwd=tmp_path)
     assert json.loads(shipped)["status"] == "job_done"

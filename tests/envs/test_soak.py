@@ -32,9 +32,7 @@ def test_no_step_is_invalid_and_memory_stays(name: str, machine_steps: int) -> N
     steps = -(-machine_steps // COUNT)
     memory, jobs = 0.0, 0
     for step in range(steps):
-        observations, rewards, terminated, truncated, infos = envs.step(
-            generator.integers(0, 6, COUNT)
-        )
+        observations, rewards, terminated, truncated, infos = envs.step(generator.integers(0, 6, COUNT))
         assert observations in envs.observation_space
         assert np.all(np.isfinite(rewards))
         assert np.all(rewards <= 0.0)

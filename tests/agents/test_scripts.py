@@ -1,0 +1,54 @@
+"""Every script trains, goes on where it stopped, and leaves a policy that numpy plays."""
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from chaosgym.control.policies import load_policy
+from chaosgym.control.rollout import play
+
+AGENTS = Path(__file__).parent.parent.parent / "agents"
+BEAM = "chaosgym/ImpactBeamTolerance-v1"
+SMALL = {
+    "ppo": ("--rollout", "60", "--batch", "240"),
+    "recurrent_ppo": ("--rollout", "60", "--batch", "240"),
+    "constrained_ppo": ("--rollout", "60", "--batch", "240"),
+    "sac": ("--gradient-steps", "1"),
+}
+
+
+def _train(script, out, steps, *options):
+    command = [sys.executable, AGENTS / f"{script}.py", "--steps", steps, "--out", out, *options]
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("script", SMALL)
+def test_a_script_trains_resumes_and_exports(script, tmp_path):
+    """A row for every 10,000 steps, a second run goes on, and the policy plays a job."""
+    out = tmp_path / "run"
+    _train(script, out, 11_000, "--envs", "32", *SMALL[script])
+    rows = list(csv.DictReader((out / "progress.csv").read_text().splitlines()))
+    assert len(rows) == 1
+    assert float(rows[0]["return"]) < 0.0
+    assert 0.0 <= float(rows[0]["type_iii"]) <= 1.0
+    _train(script, out, 22_000, "--envs", "32", *SMALL[script])
+    assert len((out / "progress.csv").read_text().splitlines()) >= 3
+    assert play(load_policy(out), BEAM, range(2)).returns.max() < 0.0
+
+
+@pytest.mark.slow
+def test_minari_export_is_read_back(tmp_path, monkeypatch):
+    """As many whole jobs as were asked for."""
+    pytest.importorskip("minari")
+    command = [sys.executable, str(AGENTS / "export_minari.py"), "--jobs", "2", "--out", str(tmp_path / "minari")]
+    subprocess.run(command, check=True, capture_output=True)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "minari"))
+    code = "import minari; d = minari.load_dataset('chaosgym/ImpactBeamTolerance/random-v1'); print(d.total_steps)"
+    told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert told.stdout.split()[-1] == "240"

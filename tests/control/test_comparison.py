@@ -1,0 +1,93 @@
+"""A comparison keeps one row a job, goes on where it stopped, and scores in pairs; one line evaluates a policy."""
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from stable_baselines3 import PPO
+
+import chaosgym
+from chaosgym.control import comparison
+from chaosgym.control.comparison import ONE, ZERO, Scores, compare, read_comparison, table_lines
+from chaosgym.control.controllers import Follow
+from chaosgym.control.evaluation import policy_of
+from chaosgym.control.policies import TrainedPolicy
+from chaosgym.control.policies.network import Dense, Network
+from chaosgym.envs import SB3VecEnv
+from chaosgym.errors import DatasetError, ModelFileError, ParameterError
+
+BEAM = "chaosgym/ImpactBeamTolerance-v1"
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory):
+    """Three controllers on four machines."""
+    out = tmp_path_factory.mktemp("comparison") / "beam.parquet"
+    return compare(BEAM, out, machines=4, only=[ZERO, ONE, "back off"]), out
+
+
+def test_following_scores_0_and_the_own_map_1(table):
+    """By definition, with intervals that have no width; the others have one."""
+    summary = Scores(table[0]).summary()
+    assert summary[ZERO]["score"] == 0.0
+    assert summary[ONE]["score"] == 1.0
+    assert summary[ONE]["score_interval"] == pytest.approx([1.0, 1.0])
+    low, high = summary["back off"]["score_interval"]
+    assert low < summary["back off"]["score"] < high
+    assert len(table_lines(summary)) == 5
+
+
+def test_a_comparison_goes_on(table, monkeypatch):
+    """What the file holds is not played again; other contenders are added to it."""
+    played = []
+    monkeypatch.setattr(comparison, "play", lambda policy, *_, **__: played.append(policy) or pytest.fail("played"))
+    again = compare(BEAM, table[1], machines=4, only=[ZERO, ONE, "back off"])
+    assert played == []
+    assert again.equals(table[0])
+
+
+def test_one_file_holds_all_jobs(table):
+    """Its columns are named, its rows are those of every job, and a file of something else is refused."""
+    found = read_comparison(table[1], BEAM)
+    assert found.num_rows == 12
+    assert found["job_return"].to_numpy().max() < 0.0
+    with pytest.raises(DatasetError, match="is no comparison of chaosgym/Other"):
+        read_comparison(table[1], "chaosgym/Other-v1")
+
+
+def test_differences_are_paired():
+    """A gain that is the same on every machine has an interval without width, however the machines differ."""
+    rows = {"contender": ["a"] * 5 + ["b"] * 5, "machine": [*range(5)] * 2}
+    returns = np.array([-1.0, -20.0, -3.0, -50.0, -7.0])
+    table = pa.table({**rows, "job_return": np.concatenate([returns, returns - 2.0])})
+    gain, interval = Scores(table).difference("a", "b")
+    assert (gain, *interval) == pytest.approx((2.0, 2.0, 2.0))
+
+
+def test_an_unknown_controller_is_named(tmp_path):
+    """Together with those that there are."""
+    with pytest.raises(ParameterError, match="no controller 'nobody'; known: follow the demand"):
+        compare(BEAM, tmp_path / "x.parquet", machines=2, only=["nobody"])
+
+
+def test_evaluation_takes_whatever_acts():
+    """A function, a controller, a model and an exported policy that follow the demand all score 0."""
+    layer = Dense(np.zeros((6, 14), np.float32), np.arange(6, dtype=np.float32), "none")
+    follows = TrainedPolicy(BEAM, "trim", Network(None, (layer,)))
+    scores = [chaosgym.evaluate(policy, BEAM, machines=3).score for policy in (lambda _: 5, Follow(), follows)]
+    assert scores == [0.0, 0.0, 0.0]
+
+
+def test_evaluation_of_a_model_is_that_of_its_file(tmp_path):
+    """The .zip of a model trained on the plain observation plays as the model does."""
+    model = PPO("MlpPolicy", SB3VecEnv(BEAM, 2, steps=6), n_steps=6, batch_size=12, device="cpu", seed=0)
+    model.save(tmp_path / "model.zip")
+    first, second = (chaosgym.evaluate(given, BEAM, machines=2) for given in (model, tmp_path / "model.zip"))
+    assert first.mean_return == second.mean_return
+    assert first.interval[0] <= first.score <= first.interval[1]
+
+
+def test_what_is_no_policy_is_refused(tmp_path):
+    """A missing file and a number."""
+    for given in (tmp_path / "none.zip", 3):
+        with pytest.raises(ModelFileError):
+            policy_of(given)
