@@ -1,7 +1,7 @@
 """Does any loophole pay? Each is played on the machines of an evaluation, beside following the demand.
 
-Standing off, dithering, jitter around the demand, and backing to the demand at every step; control of chaos is among the
-contenders of ``chaosgym compare``.
+Standing off, dithering, jitter around the demand, and backing to the demand at every step; control of chaos is among
+the contenders of ``chaosgym compare``.
 """
 
 from typing import Any

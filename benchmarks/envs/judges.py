@@ -1,7 +1,7 @@
 """How far do the judges of running motion agree with the diagnosis from rest, and with each other?
 
-Machines of the Tolerance task are held at speeds from the lowest demand to the highest. Both judges see the same settled
-motion, with the disturbance of the task and without; a machine without deviations has the recurrence alone.
+Machines of the Tolerance task are held at speeds from the lowest demand to the highest. Both judges see the same
+settled motion, with the disturbance of the task and without; a machine without deviations has the recurrence alone.
 """
 
 from typing import Any

@@ -196,7 +196,7 @@ def test_an_unknown_keyword_is_a_type_error_too(name: str) -> None:
     with pytest.raises(UnknownKeywordError, match="there is no keyword 'frameskip'") as refusal:
         _make(name, frameskip=1)
     assert isinstance(refusal.value, TypeError)
-    with pytest.raises(TypeError, match="did you mean clearance|did you mean slider_clearance"):
+    with pytest.raises(TypeError, match=r"did you mean clearance|did you mean slider_clearance"):
         _make(name, clearance_=1e-3, **({"slider_clearance_": 1e-3} if "Crank" in name else {}))
 
 

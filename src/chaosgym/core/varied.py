@@ -27,7 +27,7 @@ def cycle_of(arrays, k, c):
     )
 
 
-# The loops over cycles stand in functions of their own: in the body of a parallel loop numba reads a machine's speed once.
+# Cycles are looped over in functions of their own: in the body of a parallel loop numba reads a speed once.
 
 
 @njit(cache=True)

@@ -41,7 +41,7 @@ class Outcome(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """Part of a step: a ``machine`` at ``speeds`` (cycles,), from ``coordinates`` and ``bouncing`` of a ``MotionState``."""
+    """Part of a step: a ``machine`` at ``speeds`` (cycles,), from a state as in a ``MotionState``."""
 
     machine: Machine
     speeds: Array

@@ -24,8 +24,8 @@ class Controller:
     """A rule for many machines side by side; a subclass has ``speeds`` and, for what it remembers, ``begin``."""
 
     knows: str = "nothing"
-    """Beside the demand: "measurements", the nominal "model", models within "tolerances", or this very "machine"; and the
-    demands to come ("future")."""
+    """Beside the demand: "measurements", the nominal "model", models within "tolerances", or this very "machine"; and
+    the demands to come ("future")."""
     cycle_by_cycle: ClassVar[bool] = False
     """Whether it acts in each cycle instead of in each step."""
 

@@ -1,6 +1,6 @@
 """The trained policies that come with chaosgym: one folder of package data for each environment that has one.
 
-A folder holds policy.json and weights.npz, and card.md: how it was trained, how it scores, what to know before using it.
+A folder holds policy.json and weights.npz, and card.md: how it was trained, how it scores, what to know before use.
 """
 
 from importlib import resources
