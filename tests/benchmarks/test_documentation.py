@@ -1,4 +1,4 @@
-"""The pages of the environments are what their classes say."""
+"""The pages of the environments are what their tasks say."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from chaosgym.envs import ENVIRONMENTS
 DOCS = Path(__file__).parents[2] / "docs"
 
 
-def test_the_pages_are_the_docstrings() -> None:
+def test_the_pages_are_current() -> None:
     """Every page is what the command named in docs/environments.md writes, and every environment has one."""
     written = dict(pages())
     assert len(written) == len(ENVIRONMENTS) + 1
@@ -24,9 +24,13 @@ def test_every_page_makes_its_own_environment() -> None:
 
 
 def test_defaults_are_those_of_the_id() -> None:
-    """Machines are drawn from the training pool, and wear, where the id says so."""
+    """The clearance grows, and machines have tolerances, where the id says so."""
     written = dict(pages())
-    for name, pool, wear in (("", "nominal", False), ("Tolerance", "training", False), ("Wear", "training", True)):
-        page = written[f"environments/SliderCrank{name}-v0.md"]
-        assert f"| `{pool}` " in next(line for line in page.splitlines() if line.startswith("| `pool`"))
-        assert f"| `{wear}` " in next(line for line in page.splitlines() if line.startswith("| `wear`"))
+    for name, widths, wear in (
+        ("", "none", "0"),
+        ("Tolerance", "`slider_clearance` +-10 %", "0"),
+        ("Wear", "`s", "0.1"),
+    ):
+        page = written[f"environments/SliderCrank{name}-v1.md"]
+        assert f"Tolerances, uniform: {widths}" in page
+        assert f"| `wear` | `{wear}` " in page
