@@ -24,12 +24,10 @@ KINDS = {
 """What each task adds, by the end of the id's name."""
 
 MACHINES = {
-    "impact-beam": "A steel beam on a flexure pivot is shaken in the middle, and its tip rattles in the gap "
-    "between two "
-    "force sensors: the Impact Beam System of P. Gu's thesis (*Chaotic Vibration in Machine Systems and Its "
-    "Implications for Design*, MIT, 1994, chapter 3). It is shaken twice as hard as there, and its damping "
-    "ratio is 3 % "
-    "instead of 1 %. On the thesis' own beam most speeds above 18 Hz are chaotic and no schedule helps; here calm "
+    "impact-beam": "A steel beam on a flexure pivot is shaken in the middle, and its tip rattles in the gap between "
+    "two force sensors: the Impact Beam System of P. Gu's thesis (*Chaotic Vibration in Machine Systems and Its "
+    "Implications for Design*, MIT, 1994, chapter 3). It is shaken twice as hard as there, and its damping ratio is "
+    "3 % instead of 1 %. On the thesis' own beam most speeds above 18 Hz are chaotic and no schedule helps; here calm "
     "speeds lie between, and where they lie is mostly a matter of the clearance, which the mean peak force tells.",
     "slider-crank": "A motor turns a crank, a slender steel rod drives a slider along a straight guide, and the slider "
     "rattles in its clearance across the guide: the Spatial Slider Crank of P. Gu's thesis (*Chaotic Vibration in "
@@ -38,13 +36,11 @@ MACHINES = {
 }
 
 JUDGES = {
-    True: "The motion is judged as it runs. A small deviation travels with it, exactly, through every contact; "
-    "the mean "
-    "over some ten cycles of the logarithm of its growth in a cycle is an exponent, and a cycle in which that is "
+    True: "The motion is judged as it runs. A small deviation travels with it, exactly, through every contact; the "
+    "mean over some ten cycles of the logarithm of its growth in a cycle is an exponent, and a cycle in which that is "
     "positive is Type III. What transient motion damps is not charged.",
-    False: "The motion is judged as it runs: a step is Type III if the peak forces of its last cycles miss "
-    "those of the "
-    "cycles before, at every period up to eight, by more than 2 % of their mean.",
+    False: "The motion is judged as it runs: a step is Type III if the peak forces of its last cycles miss those of "
+    "the cycles before, at every period up to eight, by more than 2 % of their mean.",
 }
 
 TEXT = (Path(__file__).parent / "page.md").read_text(encoding="utf-8")

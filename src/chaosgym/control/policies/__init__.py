@@ -1,6 +1,6 @@
 """Trained policies: loaded without pickle, played by numpy alone.
 
-policy = shipped_policy("chaosgym/ImpactBeamTolerance-v0")
+policy = shipped_policy("chaosgym/ImpactBeamTolerance-v1")
 """
 
 from chaosgym.control.policies.policy import TrainedPolicy, load_policy, save_policy
