@@ -46,6 +46,7 @@ def test_the_spec_survives_json(name: str) -> None:
     assert again.unwrapped.nominal == env.unwrapped.nominal
 
 
+@pytest.mark.filterwarnings("ignore:.*is out of date:DeprecationWarning")
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_version_0_says_what_to_use_instead(name: str) -> None:
     """One line that names the new id, for single and vector environments."""
