@@ -86,6 +86,7 @@ class Contenders:
             "extremum seeking": ExtremumSeeking,
             "force feedback": ForceFeedback,
             "belief": lambda: Belief(self.fleet),
+            "belief, exact model": lambda: Belief(self._exact_fleet()),
             "receding horizon": RecedingHorizon,
             "delayed feedback": DelayedFeedback,
             "OGY": OGY,
@@ -115,6 +116,12 @@ class Contenders:
                 for k in range(levels)
             ]
         return self._own
+
+    def _exact_fleet(self) -> Maps:
+        """As ``fleet``, of models as fine as the machine: what the belief is worth if the model is right."""
+        known: Any = gym.make_vec(self.env, num_envs=1, **self.keywords).unwrapped
+        exact = self.keywords | {"model_fidelity": known.nominal.rung}
+        return fleet_maps(self.env, progress=self._bar("maps of exact models"), **exact)
 
     def _nominal(self) -> Maps:
         return maps_of(self.env, seeds=[0], **(model_keywords(self.env, **self.keywords) | {"tolerances": {}}))
