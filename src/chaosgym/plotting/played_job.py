@@ -32,6 +32,9 @@ Jobs = Mapping[str, Played]
 def draw_jobs(jobs: Jobs, figure: Figure, steps: int | None = None) -> None:
     """Draw the first ``steps`` steps, all by default, on an empty figure: a column for each job."""
     axes = figure.subplots(2, len(jobs), sharex=True, sharey="row", squeeze=False)
+    every = np.concatenate([values.ravel() for job in jobs.values() for values in (job.speed[:, 0], job.demand[:, 0])])
+    low, high = np.nanmin(every), np.nanmax(every)
+    margin = 0.05 * (high - low)
     for column, (name, job) in enumerate(jobs.items()):
         draw_speed(job, axes[0, column], steps)
         draw_forces(job, axes[1, column], steps)
@@ -41,6 +44,7 @@ def draw_jobs(jobs: Jobs, figure: Figure, steps: int | None = None) -> None:
             fontsize=9,
             color=INK,
         )
+    axes[0, 0].set_ylim(low - margin, high + margin)
     first = next(iter(jobs.values()))
     figure.suptitle(f"{first.env}, machine {first.machines[0]}", fontsize=10, color=INK)
 
@@ -52,8 +56,7 @@ def draw_speed(job: Played, ax: Axes, steps: int | None = None) -> Axes:
     ax.step(step, job.demand[:steps, 0], where="mid", color=INK, linewidth=0.8, label="demand")
     for chosen, colour, name in ((~wild, CALM, "calm"), (wild, WILD, "Type III")):
         ax.plot(step[chosen], speed[chosen], "s", color=colour, markersize=3, label=name)
-    low, high = np.nanmin([job.speed, job.demand]), np.nanmax([job.speed, job.demand])
-    ax.set(ylim=(low - 0.05 * (high - low), high + 0.05 * (high - low)), ylabel=f"speed [{job.unit}]")
+    ax.set_ylabel(f"speed [{job.unit}]")
     ax.legend(loc="lower right", fontsize=7, frameon=False)
     return ax
 
