@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from chaosgym.diagnosis import two_step_test
 from chaosgym.diagnosis.stroboscopic import find_recurrence, scales
 from chaosgym.machines import ImpactBeam, Machine
+from chaosgym.machines.impact_beam.modes import modal_analysis
 from chaosgym.simulation import CycleRecord, simulate
 from thesis.scorecard.observation import DOT, READING_ERROR, plotted_peaks
 
@@ -54,14 +55,15 @@ def follow_modes(record: CycleRecord) -> tuple[Array, Array, Array]:
     beam = record.machine
     assert isinstance(beam, ImpactBeam)
     assert record.history is not None
-    model, n, time = beam.reduce(), beam.n_modes, record.time
+    modes, time = modal_analysis(beam), record.time
+    n = len(modes.tip_shape)
     shaker = beam.force_amplitude * np.sin(2.0 * math.pi * beam.excitation_frequency * time)
-    system = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(model.stiffness), -model.damping]])
+    system = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(modes.angular_frequency**2), -modes.damping]])
     load = np.zeros((2 * n, 2))
-    load[n:] = np.column_stack([model.force_shape, -model.tip_shape])
+    load[n:] = np.column_stack([modes.force_shape, -modes.tip_shape])
     output = np.zeros((3, 2 * n))
-    output[0, :n] = output[1, n:] = model.force_shape
-    output[2, :n] = model.tip_shape
+    output[0, :n] = output[1, n:] = modes.force_shape
+    output[2, :n] = modes.tip_shape
     forces = np.column_stack([shaker, record.history[:, :, 2].ravel()])
     _, motion, _ = scipy.signal.lsim((system, load, output, np.zeros((3, 2))), forces, time, record.section[0])
     displacement, velocity, tip = np.ascontiguousarray(motion.T)
