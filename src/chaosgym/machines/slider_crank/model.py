@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from chaosgym.machines.slider_crank.equations import Equations, equations, rod_of
 from chaosgym.machines.slider_crank.joints import Channels, channels_of, display_of, gaps_of, hertz_constants, joints_of
-from chaosgym.machines.slider_crank.kernels.exact import PIECES, SliderCrankModel
-from chaosgym.machines.slider_crank.kernels.propagator import FORCING_TERMS, SQUARINGS, propagator_table, series_order
+from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
+from chaosgym.machines.slider_crank.kernels.lanes import padded
+from chaosgym.machines.slider_crank.kernels.propagator import FORCING_TERMS, TICKS, series_order, tables
 from chaosgym.machines.slider_crank.kernels.stepped import HERTZ, LINEAR, SteppedCrankModel
 from chaosgym.machines.slider_crank.kinematics import slider_rate
 from chaosgym.machines.slider_crank.spatial_equations import spatial_equations, spatial_loads
@@ -31,14 +32,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-MAX_PHASE = 8.0
-"""Longest step times largest eigenvalue that a Taylor series sums without loss of digits."""
-
 STABLE_PHASE = 2.0
 """Longest Runge-Kutta step times largest eigenvalue; the method is stable up to 2.7."""
 
-STEP_PHASE = 1.0
-"""Angle [rad] by which a closed contact turns in a piece of a step, by default."""
+STEP_PHASE = 0.5
+"""Angle [rad] by which the fastest motion turns in the shortest step, by default."""
 
 MAX_SETS = 32
 """Contact sets for which propagators are made; a machine with more is left to the stepper."""
@@ -49,7 +47,7 @@ KEPT = 128
 KEPT_STRUCTURES = 1024
 """Machines whose models are looked up by speed alone."""
 
-TABLES = ("acceleration", "curvature", "propagator")
+TABLES = ("acceleration", "propagator", "bound")
 """Large arrays of a model."""
 
 KEPT_BYTES = 256_000_000
@@ -122,12 +120,12 @@ def _models_by_speed(step_phase: float, *structure: Any) -> ModelsBySpeed:
 
 
 def models_by_speed(machine: "SliderCrank", step_phase: float = STEP_PHASE) -> ModelsBySpeed:
-    """Models of a machine that ``has_propagators``; a contact turns by ``step_phase`` [rad] in a piece of a step."""
+    """Models of a machine that ``has_propagators``; the fastest motion turns by ``step_phase`` [rad] in a tick."""
     return _models_by_speed(step_phase, *_key(machine))
 
 
 def exact_model(machine: "SliderCrank", step_phase: float) -> SliderCrankModel:
-    """Model of a machine that ``has_propagators``; a contact turns by ``step_phase`` [rad] in a piece of a step."""
+    """Model of a machine that ``has_propagators``; the fastest motion turns by ``step_phase`` [rad] in a tick."""
     return models_by_speed(machine, step_phase).at(machine.crank_speed).model._replace(gap=gaps_of(machine))
 
 
@@ -237,9 +235,11 @@ def fastest_rate(machine: "SliderCrank", model: SteppedCrankModel) -> float:
 class _Structure(NamedTuple):
     """Accelerations of all bins by powers of the crank rate, whatever the speed and the clearance.
 
-    ``free`` (3, bins, 2n, n) per unit p and p'; ``forcing`` (2, bins, 4, n) of gravity and of squared crank rate;
-    ``push`` (sets, bins, 2n + m, n) what closed contacts add per unit p, p' and clearance; ``contact`` [rad/s] angular
-    frequency of the masses next to the closed contacts; ``spectrum`` [1/s] largest modulus of an eigenvalue.
+    ``free`` (3, bins, 2n, lanes) per unit p and p'; ``forcing`` (2, bins, 4, lanes) of gravity and of squared crank
+    rate; ``push`` (sets, bins, 2n + m, lanes) what closed contacts add per unit p, p' and clearance; lanes as in
+    ``SliderCrankModel.acceleration``. ``lag`` (sets, m) [s] damping over stiffness of the closed channels; ``anchor``
+    as in the model; ``contact`` [rad/s] angular frequency of the masses next to the closed contacts; ``spectrum``
+    [1/s] largest modulus of an eigenvalue.
     """
 
     channels: Channels
@@ -248,6 +248,8 @@ class _Structure(NamedTuple):
     free: Array
     forcing: Array
     push: Array
+    lag: Array
+    anchor: Array
     contact: float
     spectrum: float
 
@@ -301,7 +303,29 @@ def _structure(kind: type, *structure: Any) -> _Structure:
     push = _push(inverse_mass, channels, radix, friction)
     some = [0, len(inverse_mass) // 4]
     contact, spectrum = _rates(free[0, some], push[-1, some, : 2 * n], channels.row)
-    return _Structure(channels, radix, display_of(machine), free, forcing, push, contact, spectrum)
+    free, forcing, push = (_with_channels(part, channels.row) for part in (free, forcing, push))
+    lag, anchor = _closed(channels, radix)
+    return _Structure(channels, radix, display_of(machine), free, forcing, push, lag, anchor, contact, spectrum)
+
+
+def _with_channels(accelerations: Array, row: Array) -> Array:
+    """Accelerations (..., n) followed by those of the channels' displacements and by what fills up the lanes."""
+    m, n = row.shape
+    lanes = np.zeros((*accelerations.shape[:-1], padded(n + m)))
+    lanes[..., :n] = accelerations
+    lanes[..., n : n + m] = accelerations @ row.T
+    return lanes
+
+
+def _closed(channels: Channels, radix: int) -> tuple[Array, Array]:
+    """(lag, anchor) of ``_Structure``."""
+    m, n = channels.row.shape
+    lag, anchor = np.zeros((radix**m, m)), np.zeros((radix**m, n, m))
+    for chosen in range(radix**m):
+        closed = [j for j in range(m) if chosen // radix**j % radix]
+        lag[chosen, closed] = channels.damping[closed] / channels.stiffness[closed]
+        anchor[chosen][:, closed] = np.linalg.pinv(channels.row[closed])
+    return lag, anchor
 
 
 def _friction(machine: "SliderCrank", crank_angle: Array) -> Array:
@@ -312,22 +336,24 @@ def _friction(machine: "SliderCrank", crank_angle: Array) -> Array:
 
 
 def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> SliderCrankModel:
-    m = len(parts.channels.row)
-    sets, bins, _, n = parts.push.shape
+    m, n = parts.channels.row.shape
+    sets, bins, _, lanes = parts.push.shape
     rate = crank_speed * math.pi / 30.0
     duration = 2.0 * math.pi / (bins * rate)
-    columns = np.zeros((sets, bins, 2 * n + FORCING_TERMS + m, n))
-    columns[:, :, : 2 * n + FORCING_TERMS] = _free_motion(parts.free, parts.forcing, rate)
-    columns[:, :, : 2 * n] += parts.push[:, :, : 2 * n]
-    columns[:, :, 2 * n + FORCING_TERMS :] = parts.push[:, :, 2 * n :]
-    acceleration = np.ascontiguousarray(np.swapaxes(columns, -1, -2))
-    steps = max(1, math.ceil(duration * max(parts.contact / (PIECES * step_phase), parts.spectrum / MAX_PHASE)))
+    moving, size = 2 * n, 2 * n + FORCING_TERMS + m
+    acceleration = np.zeros((sets, bins, size + size % 2, lanes))
+    acceleration[:, :, : moving + FORCING_TERMS] = _free_motion(parts.free, parts.forcing, rate)
+    acceleration[:, :, :moving] += parts.push[:, :, :moving]
+    acceleration[:, :, moving + FORCING_TERMS : size] = parts.push[:, :, moving:]
+    steps = max(1, math.ceil(duration * parts.spectrum / (TICKS * step_phase)))
     step = duration / steps
+    order = series_order(parts.spectrum * step / TICKS)
+    propagator, bound = tables(acceleration, parts.channels.row, parts.lag, parts.anchor, duration, step, order)
     return SliderCrankModel(
         bin_duration=duration,
         steps=steps,
         contact_rate=parts.contact,
-        order=series_order(parts.spectrum * step),
+        order=order,
         spectrum=parts.spectrum,
         row=parts.channels.row,
         gap=np.zeros(m),
@@ -338,7 +364,8 @@ def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> Slide
         reading=parts.channels.reading,
         reach=np.linalg.norm(parts.channels.reading, axis=1),
         display=parts.display,
+        anchor=parts.anchor,
         acceleration=acceleration,
-        curvature=np.ascontiguousarray(parts.channels.row @ acceleration),
-        propagator=propagator_table(acceleration, duration, step, series_order(parts.spectrum * step / 2**SQUARINGS)),
+        propagator=propagator,
+        bound=bound,
     )

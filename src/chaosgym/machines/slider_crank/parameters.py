@@ -349,13 +349,13 @@ class SliderCrank(Machine):
         return self.motor_angle > 0.0
 
     def reduce(self, step_phase: float = STEP_PHASE) -> SliderCrankModel | SteppedCrankModel:
-        """Return the model in whose steps changes of contact are searched for every ``step_phase`` [rad] of a contact.
+        """Return the model in whose shortest steps the fastest motion turns by ``step_phase`` [rad].
 
         With exact propagators if contact is linear and does not turn with the ball, for the Runge-Kutta stepper
         otherwise. Machines that differ in clearance alone share all of it; those that differ in speed
         share the assembly.
         """
-        return exact_model(self, step_phase) if has_propagators(self) else stepped_model(self, step_phase)
+        return exact_model(self, step_phase) if has_propagators(self) else stepped_model(self, 2.0 * step_phase)
 
     @property
     def n_states(self) -> int:

@@ -34,8 +34,7 @@ def run(
     """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
     motion = (coordinates, Episode(side=bouncing[:1], touch=bouncing[1:]), arrays)
     if isinstance(integrator, ExactEvents):
-        # its peaks and events are refined on the exact motion, so its steps may be twice as long as the beam's
-        model = crank.reduce(2.0 * integrator.step_phase)
+        model = crank.reduce(integrator.step_phase)
         kernel = advance_stepped if isinstance(model, SteppedCrankModel) else advance
         tolerance = integrator.event_tolerance / model.contact_rate
         outcome = call(kernel, model, *motion, tolerance, integrator.event_budget)

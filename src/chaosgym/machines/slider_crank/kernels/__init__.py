@@ -10,6 +10,7 @@ with cached_by_content(Path(__file__).parent):
         contact,
         exact,
         fixed_step,
+        lanes,
         propagator,
         record,
         stepped,

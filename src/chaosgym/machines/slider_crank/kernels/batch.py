@@ -12,7 +12,8 @@ from numba.extending import intrinsic
 from chaosgym.core.batch import episode_of, rows_of
 from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
 from chaosgym.machines.slider_crank.kernels.exact import advance as advance_crank
-from chaosgym.machines.slider_crank.kernels.propagator import FORCING_TERMS
+from chaosgym.machines.slider_crank.kernels.lanes import padded
+from chaosgym.machines.slider_crank.kernels.propagator import FORCING_TERMS, RUNGS
 from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
 from chaosgym.machines.slider_crank.kernels.stepped import advance as advance_stepped_crank
 
@@ -31,7 +32,8 @@ def pointer(typing_context, address):
 def crank_of(batch, bins, i):
     """Model of machine i of a batch that holds the addresses of the tables."""
     m, n = batch.row.shape[1:]
-    size = 2 * n + FORCING_TERMS + m
+    columns = 2 * n + FORCING_TERMS + m
+    columns += columns % 2
     sets = batch.radix[i] ** m
     return SliderCrankModel(
         batch.bin_duration[i],
@@ -48,9 +50,10 @@ def crank_of(batch, bins, i):
         batch.reading[i],
         batch.reach[i],
         batch.display[i],
-        carray(pointer(batch.acceleration[i]), (sets, bins, n, size), np.float64),
-        carray(pointer(batch.curvature[i]), (sets, bins, m, size), np.float64),
-        carray(pointer(batch.propagator[i]), (sets, bins, size, 2 * n), np.float64),
+        batch.anchor[i],
+        carray(pointer(batch.acceleration[i]), (sets, bins, columns, padded(n + m)), np.float64),
+        carray(pointer(batch.propagator[i]), (sets, bins, RUNGS, columns, padded(2 * (n + m))), np.float64),
+        carray(pointer(batch.bound[i]), (sets, bins, m, columns), np.float64),
     )
 
 

@@ -1,8 +1,17 @@
 r"""Contacts of the slider crank: when they begin and end.
 
-A channel's margin is positive as long as it keeps its contact state. Whether it may have fallen to zero within a step
-is judged by the cubic through both ends; when it did is found on the Taylor series of the motion. The cubic is off by
-(w h)^4 / 384 of the motion's amplitude for a mode of angular frequency w and a step h; shorter touches can escape.
+A channel has displacement y and velocity v. On side s = +-1 its depth is s y - c beyond the clearance c, and it presses
+with k times the pressure s (y + lag v) - c, lag = d / k. A closed channel opens when its pressure falls to zero, an
+open one closes when depth and pressure are both positive. Either is a reading e = y + lag v, or y, with the slope e'.
+
+Nothing is taken for granted between two instants h apart: the cubic through both ends lies within the hull of its
+Bezier points e0, e0 + h e0' / 3, e1 - h e1' / 3, e1, and the motion within h^4 / 384 times the largest fourth
+derivative of that cubic. Its slope lies likewise within e0', 3 (e1 - e0) / h - e0' - e1', e1', but for sqrt(3) / 216
+h^3 times the same. A reading that is neither sure to keep its sign nor to cross zero once is looked at in two halves.
+
+References
+----------
+G. Birkhoff, A. Priver, Hermite interpolation errors for derivatives, J. Math. and Phys. 46 (1967) 440-447.
 """
 
 import math
@@ -10,14 +19,23 @@ import math
 import numpy as np
 from numba import njit
 
-from chaosgym.core.cubic import cubic, cubic_extremum
+from chaosgym.core.cubic import cubic
 from chaosgym.core.kernel import leaf
 
-GAP, STIFFNESS, DAMPING, TWO_SIDED, ALONG, UP, SIDEWAYS, REACH = range(8)
+GAP, STIFFNESS, LAG, TWO_SIDED, ALONG, UP, SIDEWAYS, REACH = range(8)
 """Columns of ``surfaces``."""
+
+VALUE_DOUBT, SLOPE_DOUBT = 1.0 / 384.0, math.sqrt(3.0) / 216.0
+"""What h^4 and h^3 times the fourth derivative are multiplied by to bound the error of the cubic and of its slope."""
+
+ROUNDING = 1e-12
+"""Share of a reading that is rounding: a contact that has just changed is at zero within it."""
 
 POLISH = 60
 """Iterations to locate one event; safeguarded Newton needs two to four, bisection about fifty."""
+
+KEEPS, CROSSES, UNSURE = range(3)
+"""What a reading does between two instants: not reach zero, cross it once, or what can't be told."""
 
 
 @njit(cache=True)
@@ -25,7 +43,8 @@ def surfaces(model):
     """All that is known of the m channels of a model, (m, 8): fewer arrays to hand on make a faster kernel."""
     surface = np.empty((model.gap.shape[0], 8))
     for j in range(surface.shape[0]):
-        surface[j, GAP], surface[j, STIFFNESS], surface[j, DAMPING] = model.gap[j], model.stiffness[j], model.damping[j]
+        surface[j, GAP], surface[j, STIFFNESS] = model.gap[j], model.stiffness[j]
+        surface[j, LAG] = model.damping[j] / model.stiffness[j]
         surface[j, TWO_SIDED] = 1.0 if model.two_sided[j] else 0.0
         surface[j, ALONG:REACH] = model.reading[j]
         surface[j, REACH] = model.reach[j]
@@ -36,14 +55,18 @@ def surfaces(model):
 def closes(surface, j, side, y, v):
     """True if channel j at displacement y and velocity v presses on ``side``."""
     depth = side * y - surface[j, GAP]
-    return depth > 0.0 and surface[j, STIFFNESS] * depth + surface[j, DAMPING] * side * v > 0.0
+    return depth > 0.0 and depth + surface[j, LAG] * side * v > 0.0
 
 
 @leaf
-def find_sides(surface, reading, side):
-    """Write which side of every channel is closed, from displacements and velocities ``reading`` (3, m)."""
-    for j in range(side.shape[0]):
-        y, v = reading[0, j], reading[1, j]
+def find_sides(surface, row, z, side):
+    """Write which side of every channel is closed in the state z."""
+    m, n = row.shape
+    for j in range(m):
+        y, v = 0.0, 0.0
+        for i in range(n):
+            y += row[j, i] * z[i]
+            v += row[j, i] * z[n + i]
         side[j] = 0.0
         if closes(surface, j, 1.0, y, v):
             side[j] = 1.0
@@ -52,119 +75,176 @@ def find_sides(surface, reading, side):
 
 
 @leaf
-def polynomial(series, column, last, t):
-    """Value, first and second derivative at t of a column of Taylor coefficients up to order ``last``."""
-    value, slope, bend = series[last, column], 0.0, 0.0
+def hull(h, e0, d0, e1, d1):
+    """(Lowest, highest) Bezier point of the cubic with values e0, e1 and slopes d0, d1 at both ends of h."""
+    first, second = e0 + h / 3.0 * d0, e1 - h / 3.0 * d1
+    return min(min(e0, e1), min(first, second)), max(max(e0, e1), max(first, second))
+
+
+@leaf
+def trend(h, e0, d0, e1, d1, fourth):
+    """1 if a reading rises all through h, -1 if it falls, 0 if that is not sure."""
+    middle = 3.0 * (e1 - e0) / h - d0 - d1
+    doubt = SLOPE_DOUBT * h * h * h * fourth
+    if min(min(d0, d1), middle) > doubt:
+        return 1
+    if max(max(d0, d1), middle) < -doubt:
+        return -1
+    return 0
+
+
+@leaf
+def fourth_of(series, column, last, lag, h):
+    """Bound of the fourth derivative of y + lag y' over h, by the Taylor coefficients of y."""
+    total, power = 0.0, 1.0
+    for k in range(4, last + 1):
+        size = abs(series[k, column]) * (k * (k - 1) * (k - 2) * (k - 3))
+        total += power * size
+        if lag != 0.0 and k > 4:
+            total += lag * (k - 4) * size * power / h
+        power *= h
+    return total
+
+
+@leaf
+def judge(h, e0, d0, e1, d1, fourth):
+    """What a reading that is positive, or at zero by rounding, does over h: KEEPS, CROSSES or UNSURE."""
+    if hull(h, e0, d0, e1, d1)[0] - VALUE_DOUBT * h * h * h * h * fourth > 0.0:
+        return KEEPS
+    way = trend(h, e0, d0, e1, d1, fourth)
+    if way > 0:
+        return KEEPS
+    if way < 0 and e1 <= 0.0:
+        return CROSSES
+    # it falls, and still is above zero at the end
+    return KEEPS if way < 0 else UNSURE
+
+
+@leaf
+def reading_at(series, column, last, t):
+    """Value and first three derivatives at t of a column of Taylor coefficients up to order ``last``."""
+    value, slope, bend, third = series[last, column], 0.0, 0.0, 0.0
     for k in range(last - 1, -1, -1):
+        third = third * t + bend
         bend = bend * t + slope
         slope = slope * t + value
         value = value * t + series[k, column]
-    return value, slope, 2.0 * bend
+    return value, slope, 2.0 * bend, 6.0 * third
 
 
 @leaf
-def margin(surface, j, side, closed, series, column, last, t):
-    """(value, slope) of what is positive as long as a channel keeps its contact state on ``side``.
+def crossing(series, column, last, side, gap, lag, low, high, tolerance):
+    """Instant in [low, high] at which side (y + lag y') - gap, which changes its sign there once, is zero.
 
-    Closed: the contact force. Open: how much is missing until the surface pushes, a penetration without force
-    included.
+    Halley's method from the root of the cubic through both ends, kept inside by bisection.
     """
-    y, v, a = polynomial(series, column, last, t)
-    k, d = surface[j, STIFFNESS], surface[j, DAMPING]
-    spring, damper = k * (side * y - surface[j, GAP]), d * side * v
-    if closed:
-        return spring + damper, side * (k * v + d * a)
-    if damper < 0.0:
-        return -spring - damper, -side * (k * v + d * a)
-    return -spring, -side * k * v
-
-
-@leaf
-def locate(surface, j, side, closed, series, column, last, low, until, tolerance):
-    """Instant in [low, until] at which the margin of channel j has fallen to zero, or inf if it has not."""
-    high = until
-    value, slope = margin(surface, j, side, closed, series, column, last, until)
-    if value > 0.0:
-        return math.inf
-    t = until
+    y, v, a, _ = reading_at(series, column, last, low)
+    e0, d0 = side * (y + lag * v) - gap, side * (v + lag * a)
+    y, v, a, _ = reading_at(series, column, last, high)
+    e1, d1 = side * (y + lag * v) - gap, side * (v + lag * a)
+    h, begin = high - low, low
+    t = h * e0 / (e0 - e1) if e0 != e1 else 0.5 * h
+    for _ in range(3):
+        value, slope = cubic(e0, d0, e1, d1, h, t)
+        if slope != 0.0:
+            t = min(max(t - value / slope, 0.0), h)
+    t += begin
     for _ in range(POLISH):
-        guess = t - value / slope if slope < 0.0 else math.inf
-        change = guess - t
-        if not low <= guess <= high:
-            guess = 0.5 * (low + high)
-            change = high - low
-        t = guess
-        if abs(change) <= tolerance:
-            break
-        value, slope = margin(surface, j, side, closed, series, column, last, t)
-        if value > 0.0:
-            low = t
-        else:
+        y, v, a, third = reading_at(series, column, last, t)
+        value, slope, bend = side * (y + lag * v) - gap, side * (v + lag * a), side * (a + lag * third)
+        if (value > 0.0) == (e1 > 0.0):
             high = t
+        else:
+            low = t
+        divisor = 2.0 * slope * slope - value * bend
+        change = -2.0 * value * slope / divisor if divisor != 0.0 else math.inf
+        if abs(change) <= tolerance:
+            return min(max(t + change, low), high)
+        t = t + change if low < t + change < high else 0.5 * (low + high)
     return t
 
 
 @leaf
-def suspect_closed(surface, j, side, h, start, end):
-    """Instant in (0, h] until which a closed channel may have lost its force, or -1."""
-    k, d, c = surface[j, STIFFNESS], surface[j, DAMPING], surface[j, GAP]
-    f1 = k * (side * end[0, j] - c) + d * side * end[1, j]
-    if f1 <= 0.0:
-        return h
-    r0, r1 = side * (k * start[1, j] + d * start[2, j]), side * (k * end[1, j] + d * end[2, j])
-    if r0 >= 0.0 or r1 <= 0.0:
-        return -1.0
-    f0 = k * (side * start[0, j] - c) + d * side * start[1, j]
-    dip = cubic_extremum(f0, r0, f1, r1, h, 1.0)
-    return dip if dip > 0.0 and cubic(f0, r0, f1, r1, h, dip)[0] <= 0.0 else -1.0
+def settled(surface, j, side, start, end, h, fourth):
+    """What channel j does over h by what it reads at both ends: (KEEPS, CROSSES or UNSURE, side of a crossing)."""
+    gap = surface[j, GAP]
+    if side != 0.0:
+        return judge(
+            h, side * start[0, j] - gap, side * start[1, j], side * end[0, j] - gap, side * end[1, j], fourth
+        ), 0.0
+    if gap - start[0, j] < 0.0:
+        return UNSURE, 1.0
+    verdict = judge(h, gap - start[0, j], -start[1, j], gap - end[0, j], -end[1, j], fourth)
+    if verdict != KEEPS or surface[j, TWO_SIDED] == 0.0:
+        return verdict, 1.0
+    if gap + start[0, j] < 0.0:
+        return UNSURE, -1.0
+    return judge(h, gap + start[0, j], start[1, j], gap + end[0, j], end[1, j], fourth), -1.0
 
 
 @leaf
-def suspect_open(surface, j, side, h, start, end):
-    """Instant in (0, h] until which an open channel may have begun to push on ``side``, or -1."""
-    if closes(surface, j, side, end[0, j], end[1, j]):
-        return h
-    v0, v1 = side * start[1, j], side * end[1, j]
-    if v0 <= 0.0 or v1 >= 0.0:
-        return -1.0
-    depth0, depth1 = side * start[0, j] - surface[j, GAP], side * end[0, j] - surface[j, GAP]
-    top = cubic_extremum(depth0, v0, depth1, v1, h, -1.0)
-    return top if top > 0.0 and cubic(depth0, v0, depth1, v1, h, top)[0] > 0.0 else -1.0
+def opening(surface, j, side, series, column, last, h, tolerance):
+    """First instant in [0, h] at which closed channel j opens, or inf."""
+    if h <= 0.0:
+        return math.inf
+    gap, lag = surface[j, GAP], surface[j, LAG]
+    fourth = fourth_of(series, column, last, lag, h)
+    y, v, a, _ = reading_at(series, column, last, 0.0)
+    low, length = 0.0, h
+    e0, d0 = side * (y + lag * v) - gap, side * (v + lag * a)
+    while low < h:
+        high = min(low + length, h)
+        y, v, a, _ = reading_at(series, column, last, high)
+        e1, d1 = side * (y + lag * v) - gap, side * (v + lag * a)
+        verdict = judge(high - low, e0, d0, e1, d1, fourth)
+        if verdict == CROSSES:
+            return crossing(series, column, last, side, gap, lag, low, high, tolerance)
+        if verdict == UNSURE:
+            if length > tolerance:
+                length *= 0.5
+                continue
+            if e1 <= 0.0:
+                return high
+        length *= 2.0
+        low, e0, d0 = high, e1, d1
+    return math.inf
 
 
 @leaf
-def find_suspects(surface, side, h, start, end, until, towards):
-    """How many channels may have changed their contact in a step; writes until when (or -1) and on which side."""
-    count = 0
-    for j in range(side.shape[0]):
-        if side[j] != 0.0:
-            towards[j] = side[j]
-            until[j] = suspect_closed(surface, j, side[j], h, start, end)
-        else:
-            towards[j] = 1.0
-            until[j] = suspect_open(surface, j, 1.0, h, start, end)
-            if until[j] < 0.0 and surface[j, TWO_SIDED] != 0.0:
-                towards[j] = -1.0
-                until[j] = suspect_open(surface, j, -1.0, h, start, end)
-        if until[j] >= 0.0:
-            count += 1
-    return count
+def closing(surface, j, side, series, column, last, h, tolerance):
+    """First instant in [0, h] at which open channel j closes on ``side``, or inf.
 
-
-@leaf
-def first_change(surface, side, series, last, low, until, towards, tolerance):
-    """(Channel or -1, instant) of the first change among the suspects.
-
-    The last columns of ``series`` are the channels' Taylor coefficients up to order ``last``; ``until`` counts from
-    ``low``.
+    Depth and pressure count from below here: what must become positive is looked at with its sign changed.
     """
-    first, instant = -1, math.inf
-    column = series.shape[1] - side.shape[0]
-    for j in range(side.shape[0]):
-        if until[j] >= 0.0:
-            found = locate(
-                surface, j, towards[j], side[j] != 0.0, series, column + j, last, low, low + until[j], tolerance
-            )
-            if found < instant:
-                first, instant = j, found
-    return first, instant
+    if h <= 0.0:
+        return math.inf
+    gap, lag = surface[j, GAP], surface[j, LAG]
+    place_fourth = fourth_of(series, column, last, 0.0, h)
+    fourth = fourth_of(series, column, last, lag, h)
+    y, v, a, _ = reading_at(series, column, last, 0.0)
+    low, length = 0.0, h
+    p0, q0, e0, d0 = gap - side * y, -side * v, gap - side * (y + lag * v), -side * (v + lag * a)
+    while low < h:
+        high = min(low + length, h)
+        y, v, a, _ = reading_at(series, column, last, high)
+        p1, q1, e1, d1 = gap - side * y, -side * v, gap - side * (y + lag * v), -side * (v + lag * a)
+        # outside, or inside without pressure: within rounding where the contact has just opened
+        slack = ROUNDING * (gap + abs(y) + lag * abs(v))
+        span = high - low
+        place = judge(span, p0, q0, p1, q1, place_fourth) if p0 >= -slack else UNSURE
+        if place == CROSSES:
+            return crossing(series, column, last, side, gap, 0.0, low, high, tolerance)
+        force = KEEPS
+        if place != KEEPS:
+            force = judge(span, e0, d0, e1, d1, fourth) if e0 >= -slack else UNSURE
+        if force == CROSSES and p0 < 0.0 and p1 < 0.0 and trend(span, p0, q0, p1, q1, place_fourth) != 0:
+            return crossing(series, column, last, side, gap, lag, low, high, tolerance)
+        if force != KEEPS:
+            if length > tolerance:
+                length *= 0.5
+                continue
+            if p1 < 0.0 and e1 < 0.0:
+                return high
+        length *= 2.0
+        low, p0, q0, e0, d0 = high, p1, q1, e1, d1
+    return math.inf

@@ -9,7 +9,9 @@ channel j, closed on side s_j = +-1 with clearance c_j. With z = (p, p', 1, x, x
 p'' = A z, and the Taylor series of p follows from A alone. Summed to round-off at any time it gives the state there,
 with no other error.
 
-The propagator of a fixed step is the series of an eighth of it, for all columns of z at once, squared three times.
+Steps are halves of halves of a bin. The propagator of the shortest, a tick, is the series for all columns of z at
+once; squared again and again it is that of longer steps, of which every second is kept: a ladder of ``RUNGS`` steps,
+each four times as long as the next.
 """
 
 import math
@@ -18,21 +20,28 @@ import numpy as np
 from numba import njit
 
 from chaosgym.core.kernel import leaf
+from chaosgym.machines.slider_crank.kernels.lanes import combine, next_term, padded
 
 FORCING_TERMS = 4
 """Coefficients of the forcing polynomial: a cubic."""
 
-SQUARINGS = 3
-"""Doublings that lead from the series to the propagator of a step."""
+RUNGS = 3
+"""Lengths of step for which there are propagators."""
 
-LANES = 8
-"""Numbers that a processor handles at once; tables are worked on in rows of whole multiples."""
+TICKS = 4 ** (RUNGS - 1)
+"""Ticks in the longest step."""
 
 SERIES_PHASE = np.array(
-    [0.0] * 3 + [math.exp((math.lgamma(order - 1.0) + math.log(1e-18)) / (order - 2)) for order in range(3, 65)]
+    [0.0] * 3 + [math.exp((math.lgamma(order) + math.log(1e-17)) / (order - 1)) for order in range(3, 65)]
 )
 """Largest w t, by order, at which the Taylor series of a motion with angular frequency w over a time t is summed to
-round-off: (w t)^k / k! < 1e-18 for k = order - 2."""
+round-off, and so are those of its velocity and acceleration: (w t)^k / k! < 1e-17 for k = order - 1."""
+
+SHARES = np.array([1.0 / ((k + 1) * (k + 2)) for k in range(len(SERIES_PHASE))])
+"""Factorial of k over that of k + 2."""
+
+BOUND_TERMS = 16
+"""Terms of the series that bounds a propagator over an eighth of the longest step."""
 
 
 def series_order(phase: float) -> int:
@@ -50,85 +59,87 @@ def order_for(phase, most):
 
 
 @leaf
-def expand(a, row, z, duration, last, series):
+def expand(a, n, z, duration, last, factors, series):
     """Taylor coefficients about the instant of z, in seconds, up to the order ``last``.
 
-    ``series[k, :n]`` is p^(k) / k!, the rest row . p^(k) / k! for the channels. ``a`` is the acceleration matrix
-    (n, 2n + 4 + channels) of one bin and contact set.
+    ``series[k]`` holds p^(k) / k! of the n coordinates, then that of the channels' displacements, whose first two rows
+    the caller writes. ``a`` (columns, lanes) is the acceleration of one bin and contact set; ``factors`` (columns,) is
+    work space.
     """
-    n, size = a.shape
     for i in range(n):
         series[0, i] = z[i]
         series[1, i] = z[n + i]
+    forcing = a[2 * n :]
     scale = 1.0
     for k in range(last - 1):
-        share = 1.0 / ((k + 1) * (k + 2))
-        for i in range(n):
-            by_place, by_velocity = 0.0, 0.0
-            for j in range(n):
-                by_place += a[i, j] * series[k, j]
-                by_velocity += a[i, n + j] * series[k + 1, j]
-            series[k + 2, i] = share * (by_place + (k + 1) * by_velocity)
+        new = series[k + 2]
         if k < FORCING_TERMS:
             # coefficient of t^k of sum_j F_j (x + t / duration)^j
-            for i in range(n):
-                total = 0.0
-                binomial = scale
-                for j in range(k, FORCING_TERMS):
-                    total += a[i, 2 * n + j] * binomial * z[2 * n + j - k]
-                    binomial *= (j + 1.0) / (j + 1 - k)
-                if k == 0:
-                    for j in range(2 * n + FORCING_TERMS, size):
-                        total += a[i, j] * z[j]
-                series[k + 2, i] += share * total
-        scale /= duration
-    for j in range(row.shape[0]):
-        for k in range(last + 1):
-            total = 0.0
-            for i in range(n):
-                total += row[j, i] * series[k, i]
-            series[k, n + j] = total
+            for c in range(FORCING_TERMS, forcing.shape[0]):
+                factors[c] = z[2 * n + c]
+            binomial = scale
+            for j in range(k, FORCING_TERMS):
+                factors[j] = binomial * z[2 * n + j - k]
+                binomial *= (j + 1.0) / (j + 1 - k)
+            if k == 0:
+                combine(forcing, forcing.shape[0], factors, new)
+            else:
+                combine(forcing[k:], FORCING_TERMS - k, factors[k:], new)
+            scale /= duration
+        else:
+            for i in range(new.shape[0]):
+                new[i] = 0.0
+        next_term(a, n, series[k], series[k + 1], k + 1.0, SHARES[k], new)
 
 
 @leaf
-def evaluate(series, n, last, time, z):
-    """Write p and p' of n coordinates at ``time`` after the instant of expansion into the head of z."""
-    for i in range(n):
-        x, v = series[last, i], 0.0
-        for k in range(last - 1, -1, -1):
-            v = v * time + x
-            x = x * time + series[k, i]
-        z[i] = x
-        z[n + i] = v
+def evaluate(series, last, time, powers, values):
+    """Write value and first two derivatives at ``time`` of all columns of a series into ``values`` (3, lanes)."""
+    power = 1.0
+    for k in range(last + 1):
+        powers[0, k] = power
+        powers[1, k] = (k + 1.0) * power
+        powers[2, k] = (k + 2.0) * (k + 1.0) * power
+        power *= time
+    combine(series, last + 1, powers[0], values[0])
+    combine(series[1:], last, powers[1], values[1])
+    combine(series[2:], last - 1, powers[2], values[2])
 
 
 @leaf
-def _next_term(a, older, old, by_place, by_velocity, new):
+def put_time(z, n, x):
+    """Write the forcing columns of z for time x as a share of the bin."""
+    z[2 * n] = 1.0
+    for k in range(1, FORCING_TERMS):
+        z[2 * n + k] = z[2 * n + k - 1] * x
+
+
+@leaf
+def _next_term(a, n, older, old, by_place, by_velocity, new):
     """Write by_place A_p older + by_velocity A_v old, two rows at a time: sums are then stored half as often."""
-    n, width = new.shape
+    width = new.shape[1]
     for i in range(n):
-        x0, v0 = by_place * a[i, 0], by_velocity * a[i, n]
+        x0, v0 = by_place * a[0, i], by_velocity * a[n, i]
         if n % 2 == 1:
             for c in range(width):
                 new[i, c] = x0 * older[0, c] + v0 * old[0, c]
         else:
-            x1, v1 = by_place * a[i, 1], by_velocity * a[i, n + 1]
+            x1, v1 = by_place * a[1, i], by_velocity * a[n + 1, i]
             for c in range(width):
                 new[i, c] = (x0 * older[0, c] + v0 * old[0, c]) + (x1 * older[1, c] + v1 * old[1, c])
         for j in range(2 - n % 2, n, 2):
-            x0, v0 = by_place * a[i, j], by_velocity * a[i, n + j]
-            x1, v1 = by_place * a[i, j + 1], by_velocity * a[i, n + j + 1]
+            x0, v0 = by_place * a[j, i], by_velocity * a[n + j, i]
+            x1, v1 = by_place * a[j + 1, i], by_velocity * a[n + j + 1, i]
             for c in range(width):
                 new[i, c] += (x0 * older[j, c] + v0 * old[j, c]) + (x1 * older[j + 1, c] + v1 * old[j + 1, c])
 
 
 @leaf
-def _short_propagator(a, duration, time, order, terms, table):
+def _short_propagator(a, n, size, duration, time, order, terms, table):
     """Propagator (2n, width), by rows, over a time for which ``order`` terms of the series suffice.
 
-    ``terms`` (3, n, width) is work space for three successive terms; the width is 2n + 4 + channels or more.
+    ``terms`` (3, n, width) is work space for three successive terms; ``size`` is 2n + 4 + channels.
     """
-    n, size = a.shape
     width = table.shape[1]
     for i in range(n):
         for c in range(width):
@@ -140,22 +151,37 @@ def _short_propagator(a, duration, time, order, terms, table):
     for k in range(order - 1):
         new = terms[(k + 2) % 3]
         by_place = time * time / ((k + 1) * (k + 2))
-        _next_term(a, terms[k % 3], terms[(k + 1) % 3], by_place, time / (k + 2), new)
+        _next_term(a, n, terms[k % 3], terms[(k + 1) % 3], by_place, time / (k + 2), new)
         if k < FORCING_TERMS:
             for i in range(n):
                 binomial = by_place * scale
                 for j in range(k, FORCING_TERMS):
-                    new[i, 2 * n + j - k] += binomial * a[i, 2 * n + j]
+                    new[i, 2 * n + j - k] += binomial * a[2 * n + j, i]
                     binomial *= (j + 1.0) / (j + 1 - k)
                 if k == 0:
                     for c in range(2 * n + FORCING_TERMS, size):
-                        new[i, c] += by_place * a[i, c]
+                        new[i, c] += by_place * a[c, i]
         slope = (k + 2) / time
         for i in range(n):
             for c in range(width):
                 table[i, c] += new[i, c]
                 table[n + i, c] += slope * new[i, c]
         scale *= time / duration
+
+
+@leaf
+def _shift(row, states, size, share, answer):
+    """Add to ``answer`` what a row over z one step earlier gives for the columns that go on without a propagator.
+
+    The powers of x become those of x + share; the clearances stay.
+    """
+    for k in range(FORCING_TERMS):
+        binomial = row[states + k]
+        for c in range(k, -1, -1):
+            answer[states + c] += binomial
+            binomial *= share * c / (k - c + 1)
+    for c in range(states + FORCING_TERMS, size):
+        answer[c] += row[c]
 
 
 @leaf
@@ -170,53 +196,179 @@ def _square(table, share, size, twice):
             first, second = table[i, j], table[i, j + 1]
             for c in range(width):
                 twice[i, c] += first * table[j, c] + second * table[j + 1, c]
-        # the powers of x go on: x^k becomes (x + share)^k
-        for k in range(FORCING_TERMS):
-            binomial = table[i, states + k]
-            for c in range(k, -1, -1):
-                twice[i, states + c] += binomial
-                binomial *= share * c / (k - c + 1)
-        for c in range(states + FORCING_TERMS, size):
-            twice[i, c] += table[i, c]
-
-
-@njit(cache=True, nogil=True)
-def propagator_table(acceleration, duration, step, order):
-    """Propagators of one step for every contact set and bin: (sets, bins, 2n + 4 + channels, 2n), by columns.
-
-    ``order`` is that of the series over ``step`` / 2^SQUARINGS.
-    """
-    sets, bins, n, size = acceleration.shape
-    answer = np.empty((sets, bins, size, 2 * n))
-    width = size + (-size) % LANES
-    terms, table, twice = np.empty((3, n, width)), np.empty((2 * n, width)), np.empty((2 * n, width))
-    for s in range(sets):
-        for b in range(bins):
-            time = step / 2**SQUARINGS
-            _short_propagator(acceleration[s, b], duration, time, order, terms, table)
-            for _ in range(SQUARINGS):
-                _square(table, time / duration, size, twice)
-                table, twice = twice, table
-                time *= 2.0
-            for c in range(size):
-                for i in range(2 * n):
-                    answer[s, b, c, i] = table[i, c]
-    return answer
+        _shift(table[i], states, size, share, twice[i])
 
 
 @leaf
-def propagate(table, z, moved):
-    """Write p and p' one step later into the head of ``moved``; ``table`` is the propagator of one bin and set."""
-    size, states = table.shape
+def _store(table, a, n, m, size, lag, row, share, spare, answer):
+    """Write a propagator by columns, and below the states what the channels read: see ``SliderCrankModel``."""
+    for j in range(m):
+        for c in range(size):
+            place, speed, bend = 0.0, 0.0, 0.0
+            for i in range(n):
+                place += row[j, i] * table[i, c]
+                speed += row[j, i] * table[n + i, c]
+            if lag[j] != 0.0:
+                for i in range(2 * n):
+                    bend += a[i, n + j] * table[i, c]
+            answer[c, 2 * n + 2 * j] = place + lag[j] * speed
+            answer[c, 2 * n + 2 * j + 1] = speed + lag[j] * bend
+        if lag[j] != 0.0:
+            for c in range(size):
+                spare[0, c] = a[c, n + j]
+                spare[1, c] = 0.0
+            _shift(spare[0], 2 * n, size, share, spare[1])
+            for c in range(2 * n, size):
+                answer[c, 2 * n + 2 * j + 1] += lag[j] * spare[1, c]
+    for c in range(size):
+        for i in range(2 * n):
+            answer[c, i] = table[i, c]
+
+
+@leaf
+def _derivative(a, n, size, duration, row, answer):
+    """Write the time derivative of a row over z: row B, with z' = B z."""
+    for c in range(size):
+        total = 0.0
+        for i in range(n):
+            total += row[n + i] * a[c, i]
+        answer[c] = total
+    for i in range(n):
+        answer[n + i] += row[i]
+    for k in range(1, FORCING_TERMS):
+        answer[2 * n + k - 1] += row[2 * n + k] * k / duration
+
+
+@leaf
+def _through(row, table, size, share, answer):
+    """Write a row over z one step earlier: row P."""
+    states = table.shape[0]
+    for c in range(size):
+        answer[c] = 0.0
     for i in range(states):
-        moved[i] = table[0, i] * z[0] + table[1, i] * z[1]
-    c = 2
-    while c + 4 <= size:
-        z0, z1, z2, z3 = z[c], z[c + 1], z[c + 2], z[c + 3]
-        for i in range(states):
-            moved[i] += (table[c, i] * z0 + table[c + 1, i] * z1) + (table[c + 2, i] * z2 + table[c + 3, i] * z3)
-        c += 4
-    while c < size:
-        for i in range(states):
-            moved[i] += table[c, i] * z[c]
-        c += 1
+        for c in range(size):
+            answer[c] += row[i] * table[i, c]
+    _shift(row, states, size, share, answer)
+
+
+@leaf
+def _bound(a, n, m, size, duration, lag, row, anchor, quarter, step, held, shifted, rows, answer):
+    """Bounds (m, columns) of the fourth derivative of what the channels read, over the longest step, per unit |z|.
+
+    With z' = B z and the row e of a reading, the derivative is e B^4 exp(B t) z. Its row is computed at the ends of
+    the four quarters of the step, and between them differs from the nearer of them by exp(B t), |t| up to an eighth,
+    whose elements those of exp(|B| t) bound. Closed channels pull the state to where they just touch: places count
+    from ``anchor`` (n, m), per unit of clearance, so that what cancels does not count.
+    """
+    share = 0.25 * step / duration
+    for c in range(size):
+        for i in range(n):
+            held[c, i] = a[c, i]
+            shifted[i, c], shifted[n + i, c] = quarter[i, c], quarter[n + i, c]
+    for j in range(m):
+        c = 2 * n + FORCING_TERMS + j
+        for i in range(n):
+            for k in range(n):
+                held[c, i] += a[k, i] * anchor[k, j]
+                shifted[i, c] += quarter[i, k] * anchor[k, j]
+                shifted[n + i, c] += quarter[n + i, k] * anchor[k, j]
+            shifted[i, c] -= anchor[i, j]
+    for j in range(m):
+        now, then, largest = rows[0], rows[1], rows[2]
+        for c in range(size):
+            now[c] = 0.0
+        for i in range(n):
+            now[i], now[n + i] = row[j, i], lag[j] * row[j, i]
+        for _ in range(4):
+            _derivative(held, n, size, duration, now, then)
+            now, then = then, now
+        for c in range(size):
+            largest[c] = abs(now[c])
+        for _ in range(4):
+            _through(now, shifted, size, share, then)
+            now, then = then, now
+            for c in range(size):
+                largest[c] = max(largest[c], abs(now[c]))
+        for c in range(size):
+            now[c] = largest[c]
+        for k in range(1, BOUND_TERMS):
+            for c in range(size):
+                total = 0.0
+                for i in range(n):
+                    total += now[n + i] * abs(held[c, i])
+                then[c] = total
+            for i in range(n):
+                then[n + i] += now[i]
+            for q in range(1, FORCING_TERMS):
+                then[2 * n + q - 1] += now[2 * n + q] * q / duration
+            for c in range(size):
+                then[c] *= 0.125 * step / k
+                largest[c] += then[c]
+            now, then = then, now
+        # the terms left out shrink at least by half each
+        for c in range(size):
+            answer[j, c] = largest[c] + now[c]
+
+
+@njit(cache=True, nogil=True)
+def tables(acceleration, row, lag, anchor, duration, step, order):
+    """Propagators and bounds for every contact set and bin.
+
+    Parameters
+    ----------
+    acceleration : (sets, bins, columns, lanes)
+        See ``SliderCrankModel``.
+    row : (m, n)
+        Displacement of each channel per unit coordinate.
+    lag : (sets, m)
+        Damping over stiffness [s] of the channels that are closed, 0 for the others.
+    anchor : (sets, n, m)
+        Places per unit of clearance at which the closed channels just touch.
+    duration, step
+        Of a bin, and of the longest step [s].
+    order
+        Of the series over a tick.
+
+    Returns
+    -------
+    (propagator, bound) : (sets, bins, RUNGS, columns, 2n + 2m or more) and (sets, bins, m, columns)
+    """
+    sets, bins, columns, _ = acceleration.shape
+    m, n = row.shape
+    size = 2 * n + FORCING_TERMS + m
+    propagator = np.zeros((sets, bins, RUNGS, columns, padded(2 * (n + m))))
+    bound = np.zeros((sets, bins, m, columns))
+    width = size + (-size) % 8
+    terms, table, twice = np.empty((3, n, width)), np.empty((2 * n, width)), np.empty((2 * n, width))
+    held, shifted, rows = np.empty((size, n)), np.empty((2 * n, size)), np.empty((3, size))
+    for s in range(sets):
+        for b in range(bins):
+            a = acceleration[s, b]
+            time = step / TICKS
+            _short_propagator(a, n, size, duration, time, order, terms, table)
+            for rung in range(RUNGS - 1, -1, -1):
+                share = time / duration
+                _store(table, a, n, m, size, lag[s], row, share, rows, propagator[s, b, rung])
+                if rung == 1:
+                    _bound(
+                        a,
+                        n,
+                        m,
+                        size,
+                        duration,
+                        lag[s],
+                        row,
+                        anchor[s],
+                        table,
+                        step,
+                        held,
+                        shifted,
+                        rows,
+                        bound[s, b],
+                    )
+                if rung > 0:
+                    for _ in range(2):
+                        _square(table, time / duration, size, twice)
+                        table, twice = twice, table
+                        time *= 2.0
+    return propagator, bound

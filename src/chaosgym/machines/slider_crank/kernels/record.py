@@ -9,7 +9,7 @@ import math
 from chaosgym.core.cubic import cubic, cubic_extremum
 from chaosgym.core.cycle import LOWER, UPPER
 from chaosgym.core.kernel import leaf
-from chaosgym.machines.slider_crank.kernels.contact import ALONG, DAMPING, GAP, REACH, SIDEWAYS, STIFFNESS, UP
+from chaosgym.machines.slider_crank.kernels.contact import ALONG, GAP, REACH, SIDEWAYS, STIFFNESS, UP
 
 
 @leaf
@@ -63,10 +63,9 @@ def write_peaks(peak, arrays, cycle):
 
 @leaf
 def channel_force(surface, s, reading, j):
-    """Force of channel j, closed on side s, and its rate."""
-    k, d = surface[j, STIFFNESS], surface[j, DAMPING]
-    force = k * (s * reading[0, j] - surface[j, GAP]) + d * s * reading[1, j]
-    return force, s * (k * reading[1, j] + d * reading[2, j])
+    """Force of channel j, closed on side s, and its rate, from what it reads (2, m)."""
+    stiffness = surface[j, STIFFNESS]
+    return stiffness * (s * reading[0, j] - surface[j, GAP]), stiffness * s * reading[1, j]
 
 
 @leaf
@@ -95,9 +94,8 @@ def joint_force(surface, side, reading):
     fx, fy, fz, rx, ry, rz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(side.shape[0]):
         if side[j] != 0.0:
-            k, d = surface[j, STIFFNESS], surface[j, DAMPING]
-            force = k * (reading[0, j] - side[j] * surface[j, GAP]) + d * reading[1, j]
-            rate = k * reading[1, j] + d * reading[2, j]
+            force = surface[j, STIFFNESS] * (reading[0, j] - side[j] * surface[j, GAP])
+            rate = surface[j, STIFFNESS] * reading[1, j]
             fx += surface[j, ALONG] * force
             fy += surface[j, UP] * force
             fz += surface[j, SIDEWAYS] * force
