@@ -6,13 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chaosgym.core.cubic import cubic
 from chaosgym.core.cycle import Episode, cycle_arrays
+from chaosgym.core.tangent import Tangents
 from chaosgym.errors import SimulationError
 from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.machines.slider_crank.equations import equations
+from chaosgym.machines.slider_crank.kernels.contact import KEEPS, UNSURE, judge
 from chaosgym.machines.slider_crank.kernels.exact import advance
 from chaosgym.machines.slider_crank.kernels.propagator import TICKS, series_order, tables
-from chaosgym.simulation import ExactEvents, simulate
+from chaosgym.simulation import ExactEvents, simulate, simulate_with_deviations
 from tests.machines.crank_twin import continuous_twin, rigid_twin
 
 CRANK = THESIS_SLIDER_CRANK
@@ -95,7 +98,8 @@ def test_energy_is_conserved_without_damping():
     state = np.zeros(2 * n)
     state[n : 2 * n] = [0.02, 0.1, 0.01, 0.0, 0.0]
     arrays = cycle_arrays(cycles, 2 * n, travels=True)
-    outcome, _ = advance(model, state, Episode(np.zeros(1), np.zeros(2)), arrays, 1e-13, 10_000)
+    none = Tangents(np.empty((0, 2 * n)), np.empty((cycles, 0)))
+    outcome, _ = advance(model, state, Episode(np.zeros(1), np.zeros(2)), arrays, 1e-13, 10_000, none)
     assert outcome == 0
     assert arrays.impacts.sum() > 500
     p, v = arrays.section[:, :n], arrays.section[:, n:]
@@ -174,3 +178,55 @@ def test_an_exhausted_event_budget_is_an_error():
     """A revolution with more contact events than allowed names the machine instead of returning numbers."""
     with pytest.raises(SimulationError, match="slider_clearance"):
         simulate(CRANK, 1, integrator=ExactEvents(event_budget=2))
+
+
+def test_a_cubic_that_dips_between_slopes_of_one_sign_is_not_taken_for_quiet():
+    """A reading that is positive and falls at both ends of a step, but negative in between, is never said to keep."""
+    ends = (1.0, 0.01, -1.0, 0.05, -1.0)
+    e0, d0, e1, d1 = ends[1:]
+    assert min(cubic(e0, d0, e1, d1, 1.0, t)[0] for t in np.linspace(0.0, 1.0, 11)) < 0.0
+    assert judge(*ends, 0.0) == UNSURE
+    # nor is one that is positive all along, if its fourth derivative may bend it below zero
+    assert judge(1.0, 0.01, 0.0, 0.01, 0.0, 0.0) == KEEPS
+    assert judge(1.0, 0.01, 0.0, 0.01, 0.0, 0.01 * 385.0) == UNSURE
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"crank_speed": 250.0, "slider_clearance": 0.032e-3},
+        {"friction_coefficient": 0.1},
+        {"motor_angle": 15.0, "gravity": 9.81},
+    ],
+)
+def test_deviations_are_the_derivative_of_a_revolution(change):
+    """Deviations carried through every contact equal central differences to 1e-5, and leave the motion as it is."""
+    machine = replace(CRANK, **change)
+    assert machine.carries_deviations
+    integrator = ExactEvents(event_tolerance=1e-13)
+    state = simulate(machine, 1, transient=5).final_state.coordinates
+    n = len(state)
+    record, vectors, _ = simulate_with_deviations(
+        machine, 1, state, deviations=np.eye(n), orthonormal=False, integrator=integrator
+    )
+    assert record.impacts.sum() > 5
+    alone = simulate(machine, 1, state, integrator=integrator)
+    assert np.array_equal(record.final_state.coordinates, alone.final_state.coordinates)
+    differences = np.empty((n, n))
+    for i, step in enumerate([1e-10] * (n // 2) + [1e-8] * (n // 2)):
+        ends = [
+            simulate(machine, 1, state + sign * step * np.eye(n)[i], integrator=integrator).final_state.coordinates
+            for sign in (1.0, -1.0)
+        ]
+        differences[:, i] = (ends[0] - ends[1]) / (2.0 * step)
+    # places in metres, velocities over the contact's frequency
+    scale = np.r_[np.full(n // 2, machine.reduce().contact_rate), np.ones(n // 2)]
+    found, expected = (scale[:, None] * matrix / scale for matrix in (vectors.T, differences))
+    assert np.linalg.norm(found - expected) < 1e-5 * np.linalg.norm(expected)
+
+
+def test_a_revolution_of_too_many_steps_is_refused_at_once():
+    """Fast structural damping that asks for 1e7 steps ends in an error that says what to change."""
+    machine = replace(CRANK, slider_joint="ideal", ball_joint="spherical", n_modes=6, damping_ratio=100.0)
+    with pytest.raises(SimulationError, match="more steps than its budget allows"):
+        simulate(machine, 1)

@@ -266,3 +266,11 @@ def test_a_scene_with_many_contact_sets_is_left_to_the_stepper():
     record = simulate(machine, 2)
     assert record.impacts.sum() > 0
     assert np.all(np.isfinite(record.section))
+
+
+def test_many_modes_in_space():
+    """A motor at an angle takes as many modes as one that stands straight: six give nearly the force of five."""
+    five, six = (
+        simulate(replace(THESIS_SLIDER_CRANK, motor_angle=10.0, n_modes=n), 1).peak_force.max() for n in (5, 6)
+    )
+    assert six == pytest.approx(five, rel=0.05)

@@ -9,6 +9,7 @@ STEP_BUDGET = 4
 MESSAGES = {
     DIVERGED: "the motion grew beyond every bound",
     EVENT_BUDGET: "one cycle needed more contact events than its budget allows",
-    STEP_BUDGET: "one cycle needed more steps than its budget allows",
+    STEP_BUDGET: "one cycle needs more steps than its budget allows (less stiffness, less damping, fewer modes "
+    "or a higher speed need fewer)",
     STEP_TOO_COARSE: "the step is too coarse for the fastest mode in contact",
 }

@@ -2,7 +2,7 @@ r"""Lyapunov exponents, per cycle and per second: do neighbouring motions part o
 
     value = lim  1/N  log |w(N)| / |w(0)|         w: a small deviation of the state, N cycles
 
-Beam: w is carried exactly, through contacts by saltation matrices (``core.tangent``). Any other machine or map: a
+A machine that ``carries_deviations``: w is carried exactly, through contacts by saltation matrices. Any other, or a map: a
 second trajectory at a small distance, brought back to that distance each cycle (Benettin). A measured series: mean
 divergence of nearest neighbours (Rosenstein), which needs a few thousand cycles and sees neither weak chaos nor decay.
 

@@ -138,7 +138,7 @@ def _weights(machine: Machine, state: Array) -> Array:
 
 def _period_map(machine: Machine, state: Array, period: int, weight: Array) -> tuple[Array, Array]:
     """State after one period, and its derivative."""
-    if isinstance(machine, ImpactBeam):
+    if machine.carries_deviations:
         record, vectors, _ = simulate_with_deviations(
             machine, period, state, deviations=np.eye(len(state)), orthonormal=False, integrator=PRECISE
         )

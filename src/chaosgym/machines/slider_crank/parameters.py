@@ -380,7 +380,12 @@ class SliderCrank(Machine):
         tangents: Tangents | None = None,
     ) -> tuple[int, int]:
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
-        return running.run(self, coordinates, bouncing, arrays, integrator)
+        return running.run(self, coordinates, bouncing, arrays, integrator, tangents)
+
+    @property
+    def carries_deviations(self) -> bool:
+        """True where motion between two changes of contact is linear: deviations take the motion's propagators."""
+        return has_propagators(self)
 
     def further_results(self, arrays: CycleArrays) -> dict[str, Any]:
         """Phase and components of each peak force, and the peaks of the sensors."""

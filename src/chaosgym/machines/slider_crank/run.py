@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.core import status
 from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays, Episode, cycle_arrays
+from chaosgym.core.tangent import Tangents
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.slider_crank.joints import gaps_of, sensor_peaks
 from chaosgym.machines.slider_crank.kernels.exact import advance
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+STEPS_AT_ONCE = 200_000
+"""Steps without events in one call of a kernel: some tenths of a second of processor time."""
+
 
 def arrays_of(crank: "SliderCrank", cycles: int, samples: int) -> CycleArrays:
     """Arrays for the cycles of a crank: contact travels along the bearing, and sensors have channels."""
@@ -29,21 +34,39 @@ def arrays_of(crank: "SliderCrank", cycles: int, samples: int) -> CycleArrays:
 
 
 def run(
-    crank: "SliderCrank", coordinates: Array, bouncing: Array, arrays: CycleArrays, integrator: Integrator
+    crank: "SliderCrank",
+    coordinates: Array,
+    bouncing: Array,
+    arrays: CycleArrays,
+    integrator: Integrator,
+    tangents: Tangents | None = None,
 ) -> tuple[int, int]:
     """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
-    motion = (coordinates, Episode(side=bouncing[:1], touch=bouncing[1:]), arrays)
+    episode = Episode(side=bouncing[:1], touch=bouncing[1:])
+    settings: tuple[Any, ...]
     if isinstance(integrator, ExactEvents):
         model = crank.reduce(integrator.step_phase)
         kernel = advance_stepped if isinstance(model, SteppedCrankModel) else advance
-        tolerance = integrator.event_tolerance / model.contact_rate
-        outcome = call(kernel, model, *motion, tolerance, integrator.event_budget)
+        steps = model.steps * round(360.0 / crank.matrix_update_interval)
+        settings = (integrator.event_tolerance / model.contact_rate, integrator.event_budget)
     else:
-        stepped = stepped_model(crank, STEP_PHASE)
-        fastest = fastest_rate(crank, stepped)
-        outcome = call(advance_crank_fixed_step, stepped, *motion, integrator.steps_per_cycle, fastest)
-    status, done = outcome
-    return status, done
+        model = stepped_model(crank, STEP_PHASE)
+        kernel, steps = advance_crank_fixed_step, integrator.steps_per_cycle
+        settings = (steps, fastest_rate(crank, model))
+    # a kernel can't be interrupted: many revolutions take many calls
+    cycles, at_once, done = len(arrays.section), max(1, STEPS_AT_ONCE // steps), 0
+    while done < cycles:
+        part = CycleArrays(*(values[done : done + at_once] for values in arrays))
+        if kernel is advance:
+            vectors, log_growth = tangents or Tangents(np.empty((0, len(coordinates))), np.empty((cycles, 0)))
+            part_settings = (*settings, Tangents(vectors, log_growth[done : done + at_once]))
+        else:
+            part_settings = settings
+        outcome, finished = call(kernel, model, coordinates, episode, part, *part_settings)
+        done += finished
+        if outcome != status.OK:
+            return outcome, done
+    return status.OK, done
 
 
 def further_results(crank: "SliderCrank", arrays: CycleArrays) -> dict[str, Any]:

@@ -97,7 +97,7 @@ def rods_of(machine: "SliderCrank") -> Rods:
     still = EndBody(machine.yoke_mass, 0.0, 0.0, 0.0)
     housing = EndBody(machine.housing_mass, machine.housing_inertia, machine.housing_offset_along, 0.0)
     modes = len(swing.mode_frequency)
-    return Rods(swing, connecting_rod(bar_of(machine), housing, still, modes, ELEMENTS))
+    return Rods(swing, connecting_rod(bar_of(machine), housing, still, modes, max(ELEMENTS, 2 * modes)))
 
 
 def frame_at(machine: "SliderCrank", angle: Array) -> Frame:

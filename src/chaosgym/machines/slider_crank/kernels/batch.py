@@ -10,6 +10,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from chaosgym.core.batch import episode_of, rows_of
+from chaosgym.core.tangent import Tangents
 from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
 from chaosgym.machines.slider_crank.kernels.exact import advance as advance_crank
 from chaosgym.machines.slider_crank.kernels.lanes import padded
@@ -69,6 +70,7 @@ def advance_cranks(batch, bins, which, motions, arrays, settings, outcome):
             rows_of(arrays, k),
             settings.event_tolerance / batch.contact_rate[i],
             settings.event_budget,
+            Tangents(np.empty((0, motions.coordinates.shape[1])), np.empty((0, 0))),
         )[0]
 
 

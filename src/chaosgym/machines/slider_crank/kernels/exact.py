@@ -22,6 +22,7 @@ from numba import njit
 from chaosgym.core import status
 from chaosgym.core.cycle import LOWER, UPPER, note_touch
 from chaosgym.core.kernel import leaf
+from chaosgym.core.tangent import orthonormalise
 from chaosgym.machines.slider_crank.kernels.contact import (
     CROSSES,
     GAP,
@@ -67,6 +68,9 @@ from chaosgym.machines.slider_crank.kernels.record import (
 
 RUNAWAY = 1e3
 """Coordinate [m] that counts as divergence."""
+
+STEP_BUDGET = 5_000_000
+"""Steps without events that a revolution may have: some seconds of processor time."""
 
 SWING = 3.0
 """Longest step of a closed contact that is worth a trial, as an angle [rad] of its motion."""
@@ -499,7 +503,43 @@ def change_side(surface, side, changed, towards, now, episode, impacts, bounce_t
 
 
 @leaf
-def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
+def carry(table, n, vectors, moved):
+    """Advance deviations (k, 2n) by a step whose propagator is ``table``."""
+    for k in range(vectors.shape[0]):
+        combine(table, 2 * n, vectors[k], moved)
+        for i in range(2 * n):
+            vectors[k, i] = moved[i]
+
+
+@leaf
+def carry_expanded(a, n, duration, last, h, motion, vectors):
+    """Advance deviations (k, 2n) by h, of which they are expanded as the motion was."""
+    z, values = motion.sampled, motion.values
+    for k in range(vectors.shape[0]):
+        z[:] = 0.0
+        for i in range(2 * n):
+            z[i] = vectors[k, i]
+        expand(a, n, z, duration, last, motion.factors, motion.series)
+        evaluate(motion.series, last, h, motion.powers, values)
+        for i in range(n):
+            vectors[k, i], vectors[k, n + i] = values[0, i], values[1, i]
+
+
+@leaf
+def jump(before, after, n, vectors):
+    """Saltation of deviations (k, 2n) where a surface is touched: the damper acts at once, for each at its own time.
+
+    ``before`` and ``after`` are the accelerations on either side of the event. Where a contact ends its force is zero,
+    and nothing jumps.
+    """
+    for k in range(vectors.shape[0]):
+        for i in range(n):
+            for j in range(n):
+                vectors[k, n + i] += (after[n + j, i] - before[n + j, i]) * vectors[k, j]
+
+
+@leaf
+def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget, vectors):
     """Move through one revolution; how many changes of contact it had.
 
     Steps begin and end at ticks; what is left of one after a change of contact is a careful step.
@@ -515,7 +555,7 @@ def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
     duration, most = model.bin_duration, model.steps * TICKS
     tick = duration / most
     spacing = bins * duration / max(history.shape[0], 1)
-    events, sample, changed = 0, 0, -1
+    events, sample, changed, carries = 0, 0, -1, vectors.shape[0] > 0
     chosen = contact_set(side, model.radix)
     put_time(z, n, 0.0)
     read_state(surface, side, row, accelerations[chosen, 0], z, motion.values, start)
@@ -556,6 +596,8 @@ def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
                     note_step(surface, side, begin + time, h, start, end, judged, peak, channel_peak, contact_time)
                 for i in range(2 * n):
                     z[i] = moved[i]
+                if carries:
+                    carry(propagators[chosen, b, rung], n, vectors, moved)
                 done += width
                 rung = max(rung - 1, 0)
             else:
@@ -573,6 +615,8 @@ def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
                     sample = write_expanded(
                         model, surface, motion, last, begin + time, length, spacing, sample, history
                     )
+                if carries:
+                    carry_expanded(a, n, duration, last, length, motion, vectors)
                 if changed >= 0:
                     events += 1
                     if events > budget:
@@ -581,6 +625,8 @@ def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
                     change_side(surface, side, changed, towards, begin + time, episode, impacts, bounce_time)
                     put_sides(surface, side, n, z)
                     chosen = contact_set(side, model.radix)
+                    if carries and towards * end[1, changed] > 0.0:
+                        jump(a, accelerations[chosen, b], n, vectors)
                     a = accelerations[chosen, b]
                     put_time(z, n, time / duration)
                     read_state(surface, side, row, a, z, motion.values, start)
@@ -598,31 +644,41 @@ def turn(model, surface, motion, episode, arrays, cycle, tolerance, budget):
 
 
 @njit(cache=True, nogil=True)
-def advance(model, state, episode, arrays, event_tolerance, event_budget):
+def advance(model, state, episode, arrays, event_tolerance, event_budget, tangents):
     """Advance ``state`` (2n,) and ``episode`` in place by whole revolutions, one for each row of ``arrays``.
 
     Every revolution starts at crank angle zero. ``event_tolerance`` is the error [s] of an event's instant.
+    ``tangents`` are ``core.tangent.Tangents``, of no vectors if none are wanted.
 
     Returns
     -------
     (status, cycle) : the cycle is the first one not finished.
     """
+    if model.steps * model.acceleration.shape[1] > STEP_BUDGET:
+        return status.STEP_BUDGET, 0
     period = model.acceleration.shape[1] * model.bin_duration
     n = model.row.shape[1]
     motion, surface = motion_of(model), surfaces(model)
+    metric = np.full(n, model.contact_rate**2)
     for cycle in range(arrays.section.shape[0]):
         begin_cycle(model, state, arrays, cycle)
         for i in range(state.shape[0]):
             motion.z[i] = state[i]
         find_sides(surface, model.row, motion.z, motion.side)
         put_sides(surface, motion.side, n, motion.z)
-        arrays.events[cycle] = turn(model, surface, motion, episode, arrays, cycle, event_tolerance, event_budget)
+        arrays.events[cycle] = turn(
+            model, surface, motion, episode, arrays, cycle, event_tolerance, event_budget, tangents.vectors
+        )
         if arrays.events[cycle] > event_budget:
             return status.EVENT_BUDGET, cycle
         for i in range(state.shape[0]):
             state[i] = motion.z[i]
             if not abs(state[i]) < RUNAWAY:
                 return status.DIVERGED, cycle
+        if tangents.log_growth.shape[1] > 0:
+            growth = tangents.log_growth[cycle]
+            growth[:] = 0.0
+            orthonormalise(metric, tangents.vectors, growth)
         episode.touch[0] -= period
         episode.touch[1] -= period
     return status.OK, arrays.section.shape[0]

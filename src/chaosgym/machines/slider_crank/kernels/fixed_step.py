@@ -11,7 +11,7 @@ from numba import njit
 from chaosgym.core import status
 from chaosgym.core.cycle import LOWER, UPPER, note_touch
 from chaosgym.core.fixed_step import STABILITY_LIMIT
-from chaosgym.machines.slider_crank.kernels.exact import RUNAWAY
+from chaosgym.machines.slider_crank.kernels.exact import RUNAWAY, STEP_BUDGET
 from chaosgym.machines.slider_crank.kernels.record import begin_cycle, note_peak, note_share, write_peaks, write_sample
 from chaosgym.machines.slider_crank.kernels.stepped import joint_force, margin, measure, push_of, slope
 
@@ -70,6 +70,8 @@ def advance_crank_fixed_step(model, state, episode, arrays, steps, fastest):
     h = period / steps
     if h * fastest > STABILITY_LIMIT:
         return status.STEP_TOO_COARSE, 0
+    if steps > STEP_BUDGET:
+        return status.STEP_BUDGET, 0
     samples = arrays.history.shape[1]
     k, inner = np.empty((4, n2)), np.empty(n2)
     closed, before = np.zeros(joints, dtype=np.bool_), np.zeros(joints, dtype=np.bool_)

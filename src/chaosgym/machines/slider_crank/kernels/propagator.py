@@ -187,52 +187,57 @@ def _shift(row, states, size, share, answer):
 @leaf
 def _square(table, share, size, twice):
     """Write the propagator of twice the time; ``share`` is the time over the duration of the bin."""
-    states, width = table.shape
+    states = table.shape[0]
     for i in range(states):
-        first, second = table[i, 0], table[i, 1]
-        for c in range(width):
-            twice[i, c] = first * table[0, c] + second * table[1, c]
-        for j in range(2, states, 2):
-            first, second = table[i, j], table[i, j + 1]
-            for c in range(width):
-                twice[i, c] += first * table[j, c] + second * table[j + 1, c]
+        combine(table, states, table[i], twice[i])
         _shift(table[i], states, size, share, twice[i])
 
 
 @leaf
-def _store(table, a, n, m, size, lag, row, share, spare, answer):
-    """Write a propagator by columns, and below the states what the channels read: see ``SliderCrankModel``."""
-    for j in range(m):
-        for c in range(size):
-            place, speed, bend = 0.0, 0.0, 0.0
-            for i in range(n):
-                place += row[j, i] * table[i, c]
-                speed += row[j, i] * table[n + i, c]
-            if lag[j] != 0.0:
-                for i in range(2 * n):
-                    bend += a[i, n + j] * table[i, c]
-            answer[c, 2 * n + 2 * j] = place + lag[j] * speed
-            answer[c, 2 * n + 2 * j + 1] = speed + lag[j] * bend
-        if lag[j] != 0.0:
-            for c in range(size):
-                spare[0, c] = a[c, n + j]
-                spare[1, c] = 0.0
-            _shift(spare[0], 2 * n, size, share, spare[1])
-            for c in range(2 * n, size):
-                answer[c, 2 * n + 2 * j + 1] += lag[j] * spare[1, c]
+def _add(factor, row, size, answer):
+    """Add ``factor`` times a row to another."""
     for c in range(size):
-        for i in range(2 * n):
-            answer[c, i] = table[i, c]
+        answer[c] += factor * row[c]
 
 
 @leaf
-def _derivative(a, n, size, duration, row, answer):
-    """Write the time derivative of a row over z: row B, with z' = B z."""
+def _store(table, held, n, m, size, lag, row, share, rows, answer):
+    """Write a propagator by columns, and below the states what the channels read: see ``SliderCrankModel``.
+
+    ``held`` (n, size) is the acceleration by rows, ``rows`` (4, size) work space.
+    """
     for c in range(size):
-        total = 0.0
+        for i in range(2 * n):
+            answer[c, i] = table[i, c]
+    for j in range(m):
+        reading, slope, bend, here = rows[0], rows[1], rows[2], rows[3]
+        for c in range(size):
+            reading[c], slope[c] = 0.0, 0.0
         for i in range(n):
-            total += row[n + i] * a[c, i]
-        answer[c] = total
+            if row[j, i] != 0.0:
+                _add(row[j, i], table[i], size, reading)
+                _add(row[j, i], table[n + i], size, slope)
+        if lag[j] != 0.0:
+            _add(lag[j], slope, size, reading)
+            for c in range(size):
+                here[c] = 0.0
+            for i in range(n):
+                if row[j, i] != 0.0:
+                    _add(row[j, i], held[i], size, here)
+            _through(here, table, size, share, bend)
+            _add(lag[j], bend, size, slope)
+        for c in range(size):
+            answer[c, 2 * n + 2 * j] = reading[c]
+            answer[c, 2 * n + 2 * j + 1] = slope[c]
+
+
+@leaf
+def _derivative(held, n, size, duration, row, answer):
+    """Write the time derivative of a row over z: row B, with z' = B z; ``held`` (n, size) is the acceleration."""
+    for c in range(size):
+        answer[c] = 0.0
+    for i in range(n):
+        _add(row[n + i], held[i], size, answer)
     for i in range(n):
         answer[n + i] += row[i]
     for k in range(1, FORCING_TERMS):
@@ -246,33 +251,32 @@ def _through(row, table, size, share, answer):
     for c in range(size):
         answer[c] = 0.0
     for i in range(states):
-        for c in range(size):
-            answer[c] += row[i] * table[i, c]
+        _add(row[i], table[i], size, answer)
     _shift(row, states, size, share, answer)
 
 
 @leaf
-def _bound(a, n, m, size, duration, lag, row, anchor, quarter, step, held, shifted, rows, answer):
+def _bound(held, n, m, size, duration, lag, row, anchor, quarter, step, rows, answer):
     """Bounds (m, columns) of the fourth derivative of what the channels read, over the longest step, per unit |z|.
 
     With z' = B z and the row e of a reading, the derivative is e B^4 exp(B t) z. Its row is computed at the ends of
     the four quarters of the step, and between them differs from the nearer of them by exp(B t), |t| up to an eighth,
     whose elements those of exp(|B| t) bound. Closed channels pull the state to where they just touch: places count
     from ``anchor`` (n, m), per unit of clearance, so that what cancels does not count.
+
+    ``held`` (n, size) and ``quarter`` (2n, size or more), the acceleration and the propagator of a quarter, are
+    overwritten.
     """
     share = 0.25 * step / duration
-    for c in range(size):
-        for i in range(n):
-            held[c, i] = a[c, i]
-            shifted[i, c], shifted[n + i, c] = quarter[i, c], quarter[n + i, c]
     for j in range(m):
         c = 2 * n + FORCING_TERMS + j
         for i in range(n):
             for k in range(n):
-                held[c, i] += a[k, i] * anchor[k, j]
-                shifted[i, c] += quarter[i, k] * anchor[k, j]
-                shifted[n + i, c] += quarter[n + i, k] * anchor[k, j]
-            shifted[i, c] -= anchor[i, j]
+                if anchor[k, j] != 0.0:
+                    held[i, c] += held[i, k] * anchor[k, j]
+                    quarter[i, c] += quarter[i, k] * anchor[k, j]
+                    quarter[n + i, c] += quarter[n + i, k] * anchor[k, j]
+            quarter[i, c] -= anchor[i, j]
     for j in range(m):
         now, then, largest = rows[0], rows[1], rows[2]
         for c in range(size):
@@ -285,29 +289,28 @@ def _bound(a, n, m, size, duration, lag, row, anchor, quarter, step, held, shift
         for c in range(size):
             largest[c] = abs(now[c])
         for _ in range(4):
-            _through(now, shifted, size, share, then)
+            _through(now, quarter, size, share, then)
             now, then = then, now
             for c in range(size):
                 largest[c] = max(largest[c], abs(now[c]))
         for c in range(size):
-            now[c] = largest[c]
+            answer[j, c] = largest[c]
+    for i in range(n):
+        for c in range(size):
+            held[i, c] = abs(held[i, c])
+    for j in range(m):
+        now, then = rows[0], rows[1]
+        for c in range(size):
+            now[c] = answer[j, c]
         for k in range(1, BOUND_TERMS):
-            for c in range(size):
-                total = 0.0
-                for i in range(n):
-                    total += now[n + i] * abs(held[c, i])
-                then[c] = total
-            for i in range(n):
-                then[n + i] += now[i]
-            for q in range(1, FORCING_TERMS):
-                then[2 * n + q - 1] += now[2 * n + q] * q / duration
+            _derivative(held, n, size, duration, now, then)
             for c in range(size):
                 then[c] *= 0.125 * step / k
-                largest[c] += then[c]
+                answer[j, c] += then[c]
             now, then = then, now
         # the terms left out shrink at least by half each
         for c in range(size):
-            answer[j, c] = largest[c] + now[c]
+            answer[j, c] += now[c]
 
 
 @njit(cache=True, nogil=True)
@@ -340,35 +343,25 @@ def tables(acceleration, row, lag, anchor, duration, step, order):
     bound = np.zeros((sets, bins, m, columns))
     width = size + (-size) % 8
     terms, table, twice = np.empty((3, n, width)), np.empty((2 * n, width)), np.empty((2 * n, width))
-    held, shifted, rows = np.empty((size, n)), np.empty((2 * n, size)), np.empty((3, size))
+    held, spare, rows = np.empty((n, size)), np.empty((2 * n, width)), np.empty((4, size))
     for s in range(sets):
         for b in range(bins):
             a = acceleration[s, b]
+            for i in range(n):
+                for c in range(size):
+                    held[i, c] = a[c, i]
             time = step / TICKS
             _short_propagator(a, n, size, duration, time, order, terms, table)
             for rung in range(RUNGS - 1, -1, -1):
-                share = time / duration
-                _store(table, a, n, m, size, lag[s], row, share, rows, propagator[s, b, rung])
+                _store(table, held, n, m, size, lag[s], row, time / duration, rows, propagator[s, b, rung])
                 if rung == 1:
-                    _bound(
-                        a,
-                        n,
-                        m,
-                        size,
-                        duration,
-                        lag[s],
-                        row,
-                        anchor[s],
-                        table,
-                        step,
-                        held,
-                        shifted,
-                        rows,
-                        bound[s, b],
-                    )
+                    for i in range(2 * n):
+                        for c in range(size):
+                            spare[i, c] = table[i, c]
                 if rung > 0:
                     for _ in range(2):
                         _square(table, time / duration, size, twice)
                         table, twice = twice, table
                         time *= 2.0
+            _bound(held, n, m, size, duration, lag[s], row, anchor[s], spare, step, rows, bound[s, b])
     return propagator, bound

@@ -21,7 +21,7 @@ from numba import njit
 from chaosgym.core import status
 from chaosgym.core.cubic import cubic, cubic_extremum
 from chaosgym.core.cycle import LOWER, UPPER, note_touch
-from chaosgym.machines.slider_crank.kernels.exact import RUNAWAY
+from chaosgym.machines.slider_crank.kernels.exact import RUNAWAY, STEP_BUDGET
 from chaosgym.machines.slider_crank.kernels.record import (
     begin_cycle,
     channel_crest,
@@ -321,6 +321,8 @@ def grazes(model, h, closed, direction, z, moved):
 def advance(model, state, episode, arrays, event_tolerance, event_budget):
     """Advance ``state`` (2n,) and ``episode`` in place by whole revolutions; see ``slider_crank.advance``."""
     bins, n, _ = model.acceleration.shape
+    if model.steps * bins > STEP_BUDGET:
+        return status.STEP_BUDGET, 0
     joints, n2 = model.gap.shape[0], 2 * n
     duration = model.bin_duration
     step = duration / model.steps
