@@ -20,7 +20,7 @@ def test_demo_computes_every_number_and_draws_the_figure(tmp_path, monkeypatch):
     assert [row["nature"] for row in result["points"].values()] == ["periodic", "periodic", "chaotic"]
     assert result["points"]["III"]["type_in_sweep"] == "III"
     assert result["sweep"]["points"] == 120
-    assert 0.0 <= result["classifier"]["parameters"]["response_type"]["classifier"]["accuracy"][0] <= 1.0
+    assert 0.0 <= result["classifier"]["stages"]["parameters"]["accuracy"][0] <= 1.0
     assert result["agent"]["agent"]["return"] < 0.0
     assert (tmp_path / "demo" / "overview.png").stat().st_size > 20_000
     assert len(said) == 5

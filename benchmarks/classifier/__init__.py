@@ -1,1 +1,1 @@
-"""The contest of classifiers on held-out machines."""
+"""What the classifier's answers cost and are worth, and what a monitor misses."""

@@ -113,12 +113,42 @@ def audit(env: str, machines: int, as_json: bool) -> None:
     )
 
 
+@machine_command
+@click.option("--crosses", type=click.IntRange(1, 10**6), default=300, show_default=True, help="Fresh machines.")
+@click.option("--seed", type=click.IntRange(0), default=1000, show_default=True, help="Not one of the training data.")
+@click.option("--model", type=click.Path(exists=True, dir_okay=False), help="Classifier file; default: the shipped.")
+def classifier(machine: Any, crosses: int, seed: int, model: str | None, as_json: bool) -> None:
+    """Microseconds against accuracy on fresh machines: parameters, each stage, the cascade, the full diagnosis."""
+    from benchmarks.classifier.pareto import pareto, pareto_table
+    from chaosgym.classifier import MachineClassifier, default_classifier
+
+    judge = MachineClassifier.load(model) if model else default_classifier(machine.name)
+    found = pareto(judge, crosses, seed=seed, progress=True)
+    emit(found, as_json, lambda: pareto_table(found))
+
+
+@machine_command
+@click.option("--changes", type=click.IntRange(4, 10**6), default=60, show_default=True, help="Traces of each kind.")
+@click.option("--seed", type=click.IntRange(0), default=1000, show_default=True)
+@click.option("--model", type=click.Path(exists=True, dir_okay=False), help="Classifier file; default: the shipped.")
+def monitors(machine: Any, changes: int, seed: int, model: str | None, as_json: bool) -> None:
+    """False alarms, delays and harmless alarms of the monitor and its rivals, on changes inside one run."""
+    from benchmarks.classifier.changes import traces
+    from benchmarks.classifier.monitors import compare_monitors, monitor_table
+    from chaosgym.classifier import MachineClassifier, default_classifier
+
+    judge = MachineClassifier.load(model) if model else default_classifier(machine.name)
+    found = traces(judge.machine, judge.card["data"]["axes"], changes, seed, progress=True)
+    scores = compare_monitors(judge, found)
+    emit({"machine": machine.name, "monitors": scores}, as_json, lambda: monitor_table(machine.name, scores))
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 def app() -> None:
     """Numbers about chaosgym itself."""
 
 
-for command in (bench, agreement, check, cost, judges, audit):
+for command in (bench, agreement, check, cost, judges, audit, classifier, monitors):
     app.add_command(command)
 
 

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from chaosgym.classifier.report import report_table
-from chaosgym.classifier.train import train_classifier
+from chaosgym.classifier.train import report_table, train_classifier
 from chaosgym.control.controllers import BackOff, Follow
 from chaosgym.control.policies import TrainedPolicy, save_policy
 from chaosgym.control.policies.export import exported
@@ -76,7 +75,7 @@ def run_demo(folder: str | Path, seed: int = 0, say: Callable[[str], None] = pri
     say(f"2/5 label a sweep of {len(plan)} points")
     sweep = run_sweep(plan, folder / "sweep", progress=True)
     say("3/5 train and test the classifier")
-    trained = train_classifier(sweep, seed, curve=False, progress=True)
+    trained = train_classifier(sweep, seed, progress=True)
     trained.classifier.save(folder / "classifier.npz")
     say(f"4/5 train an agent for {TRAINING_STEPS} steps")
     policy = _train_agent(seed)

@@ -14,5 +14,5 @@ def sweep():
 
 @pytest.fixture(scope="session")
 def trained(sweep):
-    """Trained once, with the learning curve."""
+    """Trained once."""
     return train_classifier(sweep, seed=3)

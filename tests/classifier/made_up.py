@@ -25,14 +25,13 @@ def settled(rate, cycles=CYCLES):
 
 
 def made_up_sweep(seed=0):
-    """Speed and clearance decide the type by a straight border; Type III is chaotic, I and II periodic."""
+    """Speed and clearance decide the nature by a straight border; the records of a period are 1 or 2."""
     generator = np.random.default_rng(seed)
     machine = np.repeat(np.arange(MACHINES), 12)
     speed = np.exp(generator.uniform(np.log(4.0), np.log(30.0), len(machine)))
     clearance = np.exp(generator.uniform(np.log(2e-5), np.log(2e-4), len(machine)))
     level = np.log(speed / 11.0) + 0.5 * np.log(clearance / 6e-5)
-    types = np.where(level < -0.4, "I", np.where(level < 0.3, "II", "III"))
-    rates = np.where(types == "I", 2.6, np.where(types == "II", 3.2, 3.9)) + 0.05 * generator.random(len(machine))
+    rates = np.where(level < -0.4, 2.6, np.where(level < 0.3, 3.2, 3.9)) + 0.05 * generator.random(len(machine))
     start = np.stack([logistic(rate, generator.uniform(0.2, 0.8), CYCLES) for rate in rates])
     late = np.stack([settled(rate) for rate in rates])
     columns = {
@@ -40,18 +39,15 @@ def made_up_sweep(seed=0):
         "clearance": clearance,
         "machine": machine,
         "split": np.array(["test", "validation", "train", "train", "train"])[machine % 5],
-        "response_type": types,
-        "nature": np.where(types == "III", "chaotic", "periodic"),
-        "period": pa.array([{"I": 1, "II": 2}.get(kind) for kind in types], pa.int32()),
-        "exponent": np.where(types == "III", 0.5, -0.5),
-        "peak_force_min": late.min(axis=1),
-        "peak_force_max": late.max(axis=1),
+        "nature": np.where(level < 0.3, "periodic", "chaotic"),
     }
-    kind = pa.list_(pa.float32(), CYCLES)
-    for name, peaks in (("start", start), ("settled", late)):
-        columns[f"{name}_peak_force"] = pa.array(peaks.astype(np.float32).tolist(), kind)
-        columns[f"{name}_displacement"] = pa.array((1e-5 * peaks).astype(np.float32).tolist(), kind)
-        columns[f"{name}_velocity"] = pa.array((1e-3 * peaks).astype(np.float32).tolist(), kind)
+    kind = pa.list_(pa.float32())
+    columns["settled_peak_force"] = pa.array(late.astype(np.float32).tolist(), kind)
+    for name, factor in (("peak_force", 1.0), ("displacement", 1e-5), ("velocity", 1e-3)):
+        columns[f"start_{name}"] = pa.array((factor * start).astype(np.float32).tolist(), kind)
     base = {name: getattr(THESIS_IMPACT_BEAM, name) for name in parameters_of(ImpactBeam)}
-    axes = [{"field": "excitation_frequency"}, {"field": "clearance"}]
+    axes = [
+        {"field": "excitation_frequency", "low": 4.0, "high": 30.0},
+        {"field": "clearance", "low": 2e-5, "high": 2e-4},
+    ]
     return LabelledSweep(pa.table(columns), {"machine": "impact-beam", "base": base, "axes": axes})

@@ -3,8 +3,16 @@
 import numpy as np
 import pytest
 
-from chaosgym.classifier.features import MAX_CYCLES, RECORD_FEATURES, record_features, repeat_residual
-from chaosgym.classifier.period import repeat_period
+from chaosgym.classifier.features import (
+    MAX_CYCLES,
+    RECORD_FEATURES,
+    as_records,
+    least_scatter,
+    record_amplitude,
+    record_features,
+    repeat_period,
+)
+from chaosgym.diagnosis.stroboscopic import noisy_class_residuals
 from chaosgym.errors import DiagnosisError
 from tests.classifier.made_up import settled
 
@@ -18,15 +26,40 @@ def test_figures_have_no_unit_but_the_level():
     """Newton or pounds: every figure but the level of the force is the same."""
     record = settled(3.9, 50)
     change = record_features([record], sensor_error=1.0) - record_features([record / 4.448], sensor_error=1.0 / 4.448)
-    moved = [name for name, gap in zip(RECORD_FEATURES, change[0], strict=True) if abs(gap) > 1e-9]
+    moved = [name for name, gap in zip(RECORD_FEATURES, change[0], strict=True) if abs(gap) > 1e-3]
     assert moved == ["level"]
 
 
 def test_period_four_repeats_after_four_cycles():
     """A period-4 record of the logistic map has a residual of zero at 4 cycles; chaos has none near it."""
     assert figure(settled(3.5), "repeat period") == 4
-    assert repeat_residual([settled(3.5)])[0] < 1e-6
-    assert repeat_residual([settled(3.9)])[0] > 0.05
+    assert figure(settled(3.5), "repeat residual") < -5.0
+    assert figure(settled(3.9), "repeat residual") > np.log10(0.05)
+
+
+def test_rounding_to_single_precision_is_no_figure():
+    """A record in double precision has the figures of the same record in single precision, as signals are kept."""
+    for rate in (2.6, 3.2, 3.9):
+        record = settled(rate, 50)
+        np.testing.assert_array_equal(record_features([record]), record_features([record.astype(np.float32)]))
+
+
+def test_amplitude_is_the_half_range_of_an_even_scatter():
+    """Noise of +-2 N on a period of 2 has an amplitude of 2 N; the rule never sees more in it than there is."""
+    generator = np.random.default_rng(1)
+    records = settled(3.2, 64) + generator.uniform(-2.0, 2.0, (200, 64))
+    assert np.median(record_amplitude(as_records(records)[0])) == pytest.approx(2.0, rel=0.1)
+    assert np.mean([least_scatter(record) > 2.0 for record in records]) < 0.02
+    assert least_scatter(settled(3.9, 64)) > 5.0
+
+
+def test_the_compiled_rule_is_that_of_the_diagnosis():
+    """``least_scatter`` equals the residual that the Two-Step Test compares with a sensor's error."""
+    for rate in (2.6, 3.2, 3.9):
+        record = settled(rate, 50)
+        assert least_scatter(record) == pytest.approx(
+            noisy_class_residuals(record[:, None], 12).min(), rel=1e-12, abs=1e-12
+        )
 
 
 def test_exponential_approach_gives_its_rate():

@@ -17,13 +17,15 @@ from chaosgym.simulation import simulate
 from tests.classifier.made_up import settled
 
 KEYS = {
-    "response_type",
-    "probabilities",
+    "irregular",
+    "irregular_probability",
+    "amplitude",
     "nature",
     "nature_probabilities",
-    "confidence",
+    "period",
     "abstained",
     "reason",
+    "warning",
 }
 
 
@@ -34,7 +36,7 @@ def model(tmp_path_factory):
     from tests.classifier.made_up import made_up_sweep
 
     folder = tmp_path_factory.mktemp("model")
-    train_classifier(made_up_sweep(), seed=1, curve=False).save(folder)
+    train_classifier(made_up_sweep(), seed=1).save(folder)
     return str(folder / "classifier.npz")
 
 
@@ -59,14 +61,14 @@ def lines_of(record):
 
 def test_one_run_from_standard_input(model):
     """A chaotic record is called chaotic, with every key of the answer, and probabilities that sum to one."""
-    code, out, err = run("--peaks", "-", "--model", model, "--json", stdin=lines_of(settled(3.9, 40)))
+    options = ("--peaks", "-", "--sensor-error", "1", "--model", model, "--json")
+    code, out, err = run(*options, stdin=lines_of(settled(3.9, 40)))
     assert (code, err) == (0, "")
     answer = json.loads(out)
     assert set(answer) >= KEYS
     assert answer["learned_nature"] == "chaotic"
-    assert set(answer["probabilities"]) == {"I", "II", "III"}
-    for name in ("probabilities", "nature_probabilities"):
-        assert sum(answer[name].values()) == pytest.approx(1.0)
+    assert answer["irregular"] is True
+    assert sum(answer["nature_probabilities"].values()) == pytest.approx(1.0)
 
 
 def test_one_run_a_column(model, tmp_path):
@@ -85,29 +87,59 @@ def test_one_run_a_column(model, tmp_path):
 
 def test_a_fresh_process_answers_as_compiled_kernels_do(model):
     """One question to a new process, which compiles nothing, has the answer of the compiled kernels."""
-    for arguments, stdin in ((("--frequency-hz", "20"), ""), (("--peaks", "-"), lines_of(settled(3.9, 40)))):
+    for arguments, stdin in ((("--budget-us", "0"), ""), (("--peaks", "-"), lines_of(settled(3.9, 40)))):
         options = (*arguments, "--model", model, "--json")
         command = [sys.executable, "-m", "chaosgym", "classify", "impact-beam", *options]
         alone = subprocess.run(command, input=stdin, capture_output=True, text=True, check=True)
         here, there = json.loads(run(*options, stdin=stdin)[1]), json.loads(alone.stdout)
-        assert here["response_type"] == there["response_type"]
-        assert here["confidence"] == pytest.approx(there["confidence"], rel=1e-4)
+        assert here["nature_probabilities"].keys() == there["nature_probabilities"].keys()
+        for name, chance in here["nature_probabilities"].items():
+            assert chance == pytest.approx(there["nature_probabilities"][name], rel=1e-4)
 
 
-def test_monitor_prints_a_verdict_each_cycle(model):
-    """One line a cycle: waiting up to the seventh, verdicts from the eighth on."""
-    code, out, _ = run("--follow", "--model", model, "--json", stdin=lines_of(settled(3.9, 12)))
-    answers = [json.loads(line) for line in out.splitlines()]
+def test_a_machine_is_answered_with_its_proof():
+    """The thesis' periodic point: which stage spoke, that it is proven, its period and the time that it took."""
+    code, out, err = run("--frequency-hz", "19", "--clearance-mm", "0.127", "--json")
+    assert (code, err) == (0, "")
+    answer = json.loads(out)
+    assert (answer["nature"], answer["proven"], answer["stage"], answer["period"]) == (
+        "periodic",
+        True,
+        "certificate",
+        1,
+    )
+    assert answer["microseconds"] >= answer["nature_microseconds"] > 0.0
+    assert answer["response_type"] in ("I", "II")
+    _, text, _ = run("--frequency-hz", "19", "--clearance-mm", "0.127", "--nature-only")
+    assert "proven by certificate" in text
+    assert "Type" not in text
+
+
+def test_a_budget_of_nothing_is_an_answer_from_parameters():
+    """Nothing is simulated, so there is a nature and no type."""
+    answer = json.loads(run("--budget-us", "0", "--frequency-hz", "5", "--json")[1])
+    assert (answer["stage"], answer["cycles"], answer["response_type"]) == ("parameters", 0, None)
+    assert answer["nature"] == "periodic"
+
+
+def test_monitor_prints_a_line_each_cycle_and_logs_its_events(tmp_path):
+    """Regular at first, an alarm soon after chaos begins, and the event in the log."""
+    peaks = np.concatenate([settled(3.2, 40), settled(3.9, 20)])
+    log = tmp_path / "events.csv"
+    code, out, _ = run("--follow", "--sensor-error", "1", "--log", log, "--json", stdin=lines_of(peaks))
+    seen = [json.loads(line) for line in out.splitlines()]
     assert code == 0
-    assert [answer["cycle"] for answer in answers] == list(range(1, 13))
-    assert all(answer["abstained"] for answer in answers[:7])
-    assert "1 more cycle" in answers[6]["reason"]
-    assert answers[-1]["nature"] == "chaotic"
+    assert [one["cycle"] for one in seen] == list(range(1, 61))
+    assert [one["alarm"] for one in seen[16:40]] == [False] * 24
+    assert seen[-1]["alarm"]
+    (alarm,) = [one["cycle"] for one in seen if one["event"] == "alarm"]
+    assert 41 <= alarm <= 50
+    assert f"{alarm},alarm," in log.read_text()
 
 
-def test_monitor_answers_before_the_next_peak_comes(model):
+def test_monitor_answers_before_the_next_peak_comes():
     """The verdict of a cycle is printed while standard input is still open."""
-    command = [sys.executable, "-m", "chaosgym", "classify", "impact-beam", "--follow", "--model", model]
+    command = [sys.executable, "-m", "chaosgym", "classify", "impact-beam", "--follow", "--sensor-error", "1"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         for cycle, peak in enumerate(settled(3.2, 9), start=1):
             process.stdin.write(f"{peak}\n")
@@ -116,17 +148,33 @@ def test_monitor_answers_before_the_next_peak_comes(model):
         process.stdin.close()
 
 
-def test_batch_keeps_the_columns_and_adds_the_answers(model, tmp_path):
-    """Every row of a Parquet file gets its answer; a row outside the range has none."""
-    table = pa.table({"name": ["a", "b", "c"], "excitation_frequency": [8.0, 29.0, 300.0], "clearance": [5e-5] * 3})
+def test_batch_keeps_the_columns_and_adds_the_answers(tmp_path):
+    """Every row of a Parquet file gets the answer of its machine; one that can't be built gets the reason."""
+    speeds = [10.0, 30.0, 1e9]
+    table = pa.table({"name": ["a", "b", "c"], "excitation_frequency": speeds, "clearance": [1.27e-4] * 3})
+    for field in ("length", "damping_ratio", "contact_damping"):
+        table = table.append_column(field, pa.array([getattr(THESIS_IMPACT_BEAM, field)] * 3))
     pq.write_table(table, tmp_path / "in.parquet")
-    code, out, _ = run("--batch", tmp_path / "in.parquet", "--out", tmp_path / "out.parquet", "--model", model)
+    code, out, _ = run("--batch", tmp_path / "in.parquet", "--out", tmp_path / "out.parquet")
     assert code == 0
     answers = pq.read_table(tmp_path / "out.parquet")
     assert answers.column("name").to_pylist() == ["a", "b", "c"]
+    assert answers.column("nature").to_pylist() == ["periodic", "chaotic", None]
+    assert answers.column("proven").to_pylist() == [True, False, None]
     assert answers.column("response_type").to_pylist()[1:] == ["III", None]
-    assert answers.column("abstained").to_pylist()[2]
-    assert "3 rows judged" in out
+    assert "excitation_frequency = 1e+09" in answers.column("reason").to_pylist()[2]
+    assert "3 rows judged, 1 of them without an answer" in out
+
+
+def test_batch_from_parameters_alone(model, tmp_path):
+    """A budget of nothing judges all rows at once; a row outside the range has no answer."""
+    table = pa.table({"excitation_frequency": [8.0, 29.0, 300.0], "clearance": [5e-5, 1.5e-4, 5e-5]})
+    pq.write_table(table, tmp_path / "in.parquet")
+    files = ("--batch", tmp_path / "in.parquet", "--out", tmp_path / "out.parquet")
+    assert run(*files, "--budget-us", "0", "--model", model)[0] == 0
+    answers = pq.read_table(tmp_path / "out.parquet")
+    assert answers.column("nature").to_pylist() == ["periodic", "chaotic", None]
+    assert answers.column("abstained").to_pylist() == [False, False, True]
 
 
 def test_batch_of_records(model, tmp_path):
@@ -169,6 +217,9 @@ def test_bad_options_end_in_one_line(model, tmp_path):
         (("--batch", tmp_path / "in.parquet", *out), "no column excitation_frequency"),
         (("--batch", tmp_path / "words.parquet", *out), "can't be read as Parquet"),
         (("--sensor-error", "3"), "belongs to --peaks, --series or --follow"),
+        (("--follow",), "needs --sensor-error"),
+        (("--peaks", "-", "--budget-us", "9"), "belong to a machine"),
+        (("--log", "events.csv"), "belongs to --follow"),
     ):
         code, shown, err = run(*arguments)
         assert (code, shown) == (2, "")
@@ -182,14 +233,17 @@ def test_wrong_units_are_suspected(model):
     answer = json.loads(out)
     assert code == 0
     assert answer["abstained"]
-    assert answer["response_type"] is answer["learned_nature"] is None
+    assert answer["irregular"] is answer["learned_nature"] is None
     assert "wrong units suspected" in answer["reason"]
 
 
 def test_shipped_classifier_judges_a_simulated_record():
-    """Peaks of the thesis' chaotic point, read by a 3 N sensor, are chaotic to the shipped classifier."""
-    peaks = simulate(THESIS_IMPACT_BEAM, 50, transient=200).peak_force[:, 0]
-    noisy = peaks + np.random.default_rng(0).uniform(-3.0, 3.0, 50)
-    code, out, _ = run("--peaks", "-", "--sensor-error", "3", "--json", stdin=lines_of(noisy))
-    assert code == 0
-    assert json.loads(out)["nature"] == "chaotic"
+    """To a 3 N sensor the thesis' chaotic point is irregular beyond its error, and the one at 19 Hz is not."""
+    for frequency, irregular in ((30.0, True), (19.0, False)):
+        peaks = simulate(THESIS_IMPACT_BEAM.at(frequency), 50, transient=200).peak_force[:, 0]
+        noisy = peaks + np.random.default_rng(0).uniform(-3.0, 3.0, 50)
+        code, out, _ = run("--peaks", "-", "--sensor-error", "3", "--json", stdin=lines_of(noisy))
+        assert code == 0
+        answer = json.loads(out)
+        assert answer["irregular"] is irregular
+        assert answer["nature"] == ("chaotic" if irregular else "periodic")

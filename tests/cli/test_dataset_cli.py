@@ -12,12 +12,12 @@ SWEEP = (
     "impact-beam",
     "--axis",
     "damping_ratio=0.01:0.05:log",
-    "--machines",
-    "6",
-    "--patch",
-    "excitation_frequency=18:30:3",
-    "--patch",
-    "clearance=1e-4:1.4e-4:3:log",
+    "--axis",
+    "excitation_frequency=18:30",
+    "--axis",
+    "clearance=1e-4:1.4e-4:log",
+    "--crosses",
+    "10",
     "--budget",
     "100",
     "--full-types",
@@ -27,7 +27,7 @@ SWEEP = (
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A small lattice dataset, made by the command line."""
+    """A small dataset of crosses, made by the command line."""
     path = tmp_path_factory.mktemp("dataset") / "beam"
     assert run(*SWEEP, "--out", str(path))[0] == 0
     return path
@@ -36,15 +36,14 @@ def folder(tmp_path_factory):
 def test_info_tells_rows_classes_settings_and_faults(folder):
     """JSON for programs, lines for people."""
     info = run_json("dataset", "info", str(folder))
-    assert info["rows"] == {"finished": 54, "planned": 54}
-    assert sum(info["classes"]["nature"].values()) == 54
-    assert sum(sum(part.values()) for part in info["classes"]["nature_by_split"].values()) == 54
-    assert info["faults"]["without_all_neighbours"] == 6 * 8
+    assert info["rows"] == {"finished": 50, "planned": 50}
+    assert sum(info["classes"]["nature"].values()) == 50
+    assert sum(sum(part.values()) for part in info["classes"]["nature_by_split"].values()) == 50
     assert info["faults"]["failed"] == 0
-    assert info["types"]["points"] == 6
-    assert info["settings"]["type_reach"] == {"excitation_frequency": 1, "clearance": 1}
+    assert info["types"]["points"] == 10
+    assert sum(info["classes"]["response_type"].values()) == 10
     _, out, _ = run("dataset", "info", str(folder))
-    assert "54 of 54 points, complete" in out
+    assert "50 of 50 points, complete" in out
 
 
 def test_an_unfinished_folder_says_how_far_it_is(folder, tmp_path):
@@ -66,7 +65,7 @@ def test_card_holds_the_command_that_makes_the_dataset_again(folder, tmp_path):
     command = next(line for line in card.splitlines() if line.startswith("    chaosgym sweep"))
     code, out, _ = run(*command.split()[1:])
     assert code == 0
-    assert "complete, 54 points" in out
+    assert "complete, 50 points" in out
     for heading in ("How it was made", "Class balance", "How far to trust", "Label noise", "Split", "Licence"):
         assert f"## {heading}" in card
     (tmp_path / "keep").mkdir()
@@ -83,13 +82,13 @@ def test_cost_is_measured_against_every_axis(folder):
     assert 1e-4 < cost["seconds"] < 10.0
     assert set(cost["by"]) == {"nature", "damping_ratio", "excitation_frequency", "clearance"}
     assert cost["hours"]["1e+09"]["64"] == pytest.approx(1e9 * cost["seconds"] / 64 / 3600)
-    code, _, err = run("sweep-cost", str(folder), "--points", "55", module="benchmarks")
+    code, _, err = run("sweep-cost", str(folder), "--points", "51", module="benchmarks")
     assert code == 2
-    assert "3 to 54" in err
+    assert "3 to 50" in err
 
 
 def test_map_is_drawn(folder, tmp_path):
-    """A lattice and a grid give a picture; an unknown kind of picture is refused."""
+    """Crosses and a grid give a picture; an unknown kind of picture is refused."""
     assert run("dataset", "map", str(folder), "--out", str(tmp_path / "m.png"))[0] == 0
     assert (tmp_path / "m.png").read_bytes().startswith(b"\x89PNG")
     grid = ("sweep", "impact-beam", "--axis", "excitation_frequency=18:30:3", "--axis", "clearance=1e-4:1.4e-4:2")
@@ -104,8 +103,11 @@ def test_map_is_drawn(folder, tmp_path):
         (("dataset", "info", "nowhere"), "'nowhere' does not exist"),
         (("dataset", "info", "."), "holds no sweep"),
         (("dataset", "card", "."), "holds no finished sweep"),
-        (("sweep", "impact-beam", "--machines", "3", "--out", "o"), "belong together"),
-        (("sweep", "impact-beam", "--patch", "clearance=1e-4:2e-4:3", "--out", "o"), "belong together"),
+        (("sweep", "impact-beam", "--crosses", "3", "--random", "3", "--out", "o"), "exclude each other"),
+        (
+            ("sweep", "impact-beam", "--crosses", "3", "--axis", "length=0.27:0.28", "--out", "o"),
+            "crosses need an axis",
+        ),
         (("sweep", "impact-beam", "--random", "3", "--axis", "lenth=0.27:0.28", "--out", "o"), "'lenth' is no field"),
         (("sweep", "impact-beam", "--random", "3", "--signals", "2", "--out", "o"), "signals = 2 is out of range"),
     ],
@@ -126,4 +128,4 @@ def test_check_labels_rows_again(folder):
     assert (found["points"], found["identical"], found["sound"]) == (5, 5, True)
     code, _, error = run("check-sweep", str(folder), "--points", "60", module="benchmarks")
     assert code == 2
-    assert "allowed: 1 to 54" in error
+    assert "allowed: 1 to 50" in error

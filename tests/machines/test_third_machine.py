@@ -71,10 +71,12 @@ def test_a_classifier_is_missing_until_it_is_trained(sweep, tmp_path):
     missing = run("classify", NAME)
     assert isinstance(missing.exception, ChaosgymError)
     assert "train-classifier" in str(missing.exception)
-    trained = run("train-classifier", "--data", sweep, "--out", tmp_path / "model", "--no-curve", "--json")
+    trained = run("train-classifier", "--data", sweep, "--out", tmp_path / "model", "--json")
     assert trained.exit_code == 0, trained.output
     model = next((tmp_path / "model").glob("*.npz"))
-    assert sum(answer("classify", NAME, "--model", model)["probabilities"].values()) == pytest.approx(1.0)
+    told = answer("classify", NAME, "--model", model)
+    assert sum(told["nature_probabilities"].values()) == pytest.approx(1.0)
+    assert told["response_type"] in ("I", "II", "III", None)
 
 
 def test_dataset(sweep, tmp_path):

@@ -7,7 +7,8 @@ import pytest
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines import THESIS_IMPACT_BEAM
-from chaosgym.sweeps import Axis, Patch, SweepPlan
+from chaosgym.machines.parameters import parameters_of
+from chaosgym.sweeps import Axis, SweepPlan
 from chaosgym.sweeps.plan import default_axes
 
 SPEED = Axis("excitation_frequency", 4.0, 16.0, 3, "log")
@@ -41,16 +42,15 @@ def test_drawn_points_fill_the_range_and_depend_on_the_seed_alone(sampling):
         assert high - 0.2 * (high - low) < first[name].max() <= high
 
 
-@pytest.mark.parametrize("sampling", ["grid", "random", "sobol", "lattice"])
+@pytest.mark.parametrize("sampling", ["grid", "random", "sobol", "crosses"])
 def test_any_rows_can_be_computed_by_themselves(sampling):
     """Chunks of points together are the whole plan, bit for bit."""
-    grid, lattice = sampling == "grid", sampling == "lattice"
+    grid = sampling == "grid"
     axes = (
-        Axis("damping_ratio", 0.01, 0.05, 30 if grid else None, "log"),
-        Axis("length", 0.27, 0.28, 40 if grid else None),
+        Axis("clearance", 1e-5, 3e-5, 30 if grid else None, "log"),
+        Axis("excitation_frequency", 4.0, 16.0, 40 if grid else None),
     )
-    patches = (Patch("excitation_frequency", 4.0, 16.0, 5), Patch("clearance", 1e-5, 3e-5, 3, scale="log"))
-    plan = SweepPlan(THESIS_IMPACT_BEAM, axes, sampling, 0 if grid else 100, 1, patches if lattice else ())
+    plan = SweepPlan(THESIS_IMPACT_BEAM, axes, sampling, 0 if grid else 300, 1)
     whole = plan.points()
     for rows in plan.chunks():
         for name, column in plan.points(rows).items():
@@ -58,32 +58,52 @@ def test_any_rows_can_be_computed_by_themselves(sampling):
     assert sum(len(rows) for rows in plan.chunks()) == len(plan)
 
 
-def test_lattice_neighbours_lie_one_tolerance_apart():
-    """2 % of speed and 5 % of clearance in every patch, all inside the ranges; machines differ."""
-    patches = (Patch("excitation_frequency", 1.0, 40.0, 25), Patch("clearance", 1e-5, 3e-4, 10, scale="log"))
-    plan = SweepPlan(THESIS_IMPACT_BEAM, (Axis("length", 0.265, 0.293),), "lattice", 16, 2, patches)
-    points = {name: column.reshape(16, 25, 10) for name, column in plan.points().items()}
+HIGHEST = parameters_of(THESIS_IMPACT_BEAM)["excitation_frequency"].high
+CROSS_AXES = (Axis("length", 0.265, 0.293), Axis("excitation_frequency", 1.0, 40.0), Axis("clearance", 1e-5, 3e-4))
+
+
+def test_arms_of_a_cross_are_one_tolerance_long():
+    """2 % of speed and 5 % of clearance around every centre; centres fill the ranges, and nothing else differs."""
+    plan = SweepPlan(THESIS_IMPACT_BEAM, CROSS_AXES, "crosses", 256, 2)
+    points = {name: column.reshape(256, 5) for name, column in plan.points().items()}
     speed, clearance = points["excitation_frequency"], points["clearance"]
-    np.testing.assert_allclose(speed[:, 1:] / speed[:, :-1], 1.02)
-    np.testing.assert_allclose(clearance[..., 1:] / clearance[..., :-1], 1.05)
-    assert speed.min() >= 1.0
-    assert speed.max() <= 40.0
-    assert clearance.max() <= 3e-4 * (1.0 + 1e-12)
-    assert len(np.unique(points["length"])) == 16
-    assert plan.type_reach() == {"excitation_frequency": 1, "clearance": 1}
-    counted = plan.type_neighbours(range(250)).reshape(25, 10)
-    assert (counted[0, 0], counted[0, 4], counted[12, 4]) == (2, 3, 4)
+    np.testing.assert_allclose(speed / speed[:, :1], np.tile([1.0, 1 / 1.02, 1.02, 1.0, 1.0], (256, 1)))
+    np.testing.assert_allclose(clearance / clearance[:, :1], np.tile([1.0, 1.0, 1.0, 1 / 1.05, 1.05], (256, 1)))
+    assert np.ptp(points["length"], axis=1).max() == 0.0
+    assert np.histogram(speed[:, 0], bins=8, range=(1.0, 40.0))[0].min() > 24
+    assert plan.type_neighbours(range(6)).tolist() == [4, 0, 0, 0, 0, 4]
+
+
+def test_the_split_of_a_machine_does_not_depend_on_how_many_there_are():
+    """A larger dataset of the same seed keeps the machines of the smaller one, and the part of each."""
+    small, large = (SweepPlan(THESIS_IMPACT_BEAM, CROSS_AXES, "crosses", size, 2) for size in (64, 512))
+    rows = range(5 * 64)
+    assert small.splits(rows) == large.splits(rows)
+    for name, column in small.points(rows).items():
+        np.testing.assert_array_equal(column, large.points(rows)[name])
+    parts = large.splits(range(len(large)))
+    assert 0.6 < parts.count("train") / len(parts) < 0.8
+
+
+@pytest.mark.parametrize(
+    ("axes", "message"),
+    [
+        (CROSS_AXES[:2], "crosses need an axis of clearance"),
+        ((Axis("excitation_frequency", 1.0, HIGHEST), CROSS_AXES[2]), "excitation_frequency = "),
+    ],
+)
+def test_crosses_lie_in_speed_and_clearance(axes, message):
+    """Both must be axes, and the arms must stay inside what the machine allows."""
+    with pytest.raises(ParameterError, match=message):
+        SweepPlan(THESIS_IMPACT_BEAM, axes, "crosses", 8)
 
 
 def test_plans_survive_their_settings():
-    """Settings, as JSON keeps them, give the plan again."""
-    patches = (Patch.parse("excitation_frequency=4:16:5:1%"), Patch.parse("clearance=1e-5:3e-5:3:log"))
-    plan = SweepPlan(THESIS_IMPACT_BEAM, (Axis("length", 0.265, 0.293),), "lattice", 7, 3, patches, 200, 0.2, 0.1)
+    """Settings, as JSON keeps them, give the plan again; those of another kind of sampling are refused."""
+    plan = SweepPlan(THESIS_IMPACT_BEAM, CROSS_AXES, "crosses", 7, 3, 200, 0.2, 0.1)
     assert SweepPlan.from_settings(json.loads(json.dumps(plan.settings()))) == plan
-    assert [str(patch) for patch in plan.patches] == [
-        "excitation_frequency=4:16:5:1%",
-        "clearance=1e-05:3e-05:3:5%:log",
-    ]
+    with pytest.raises(ParameterError, match="sampling = 'lattice' is unknown; allowed: grid, random, sobol, crosses"):
+        SweepPlan.from_settings(plan.settings() | {"sampling": "lattice"})
 
 
 def test_whole_numbers_stay_whole():
@@ -92,23 +112,6 @@ def test_whole_numbers_stay_whole():
     modes = plan.points()["n_modes"]
     assert set(modes) <= set(range(1, 9))
     assert plan.machine_at({"n_modes": modes[0]}).n_modes == modes[0]
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("clearance=1e-5:3e-5", "not of the form"),
-        ("clearance=1e-5:3e-5:3:x", "not of the form"),
-        ("clearance=3e-5:1e-5:3", "empty or reversed"),
-        ("clearance=1e-5:3e-5:0", "0 points; allowed: 1 to 10000"),
-        ("clearance=1e-5:3e-5:3:0%", "the step 0; allowed: above 0"),
-        ("clearance=1e-5:3e-5:99:5%", "too narrow for 99 points 5% apart"),
-    ],
-)
-def test_bad_patches_are_refused(text, message):
-    """A bad patch names itself and what is allowed."""
-    with pytest.raises(ParameterError, match=message):
-        Patch.parse(text)
 
 
 def test_default_axes_are_speed_and_clearance():
@@ -154,9 +157,7 @@ def test_bad_axes_are_refused(text, message):
         ((Axis("damping_family", 0.0, 1.0, 2),), {}, "is a choice"),
         ((CLEARANCE,), {"budget": 50}, "budget = 50 cycles"),
         ((CLEARANCE,), {"signals": 1.5}, r"signals = 1.5 is out of range"),
-        ((), {"sampling": "lattice", "size": 2}, "axes .none."),
-        ((Axis("length", 0.27, 0.28),), {"sampling": "lattice", "size": 2}, "belong together"),
-        ((), {"sampling": "lattice", "size": 2, "patches": (Patch("width", 0.01, 0.02, 3),)}, "needs a STEP"),
+        ((), {"sampling": "crosses", "size": 2}, "axes .none."),
     ],
 )
 def test_bad_plans_are_refused(axes, options, message):

@@ -1,7 +1,14 @@
-"""The learned classifier: the response type of a machine in microseconds, from its parameters or a short record."""
+"""The learned classifier: the response type of a machine as fast as its certainty allows, and what a record shows."""
 
-from chaosgym.classifier.answer import Classification
+from chaosgym.classifier.answer import Classification, NatureAnswer, RecordAnswer
 from chaosgym.classifier.estimator import ResponseClassifier
-from chaosgym.classifier.shipped import MachineClassifier, default_classifier
+from chaosgym.classifier.machine_classifier import MachineClassifier, default_classifier
 
-__all__ = ["Classification", "MachineClassifier", "ResponseClassifier", "default_classifier"]
+__all__ = [
+    "Classification",
+    "MachineClassifier",
+    "NatureAnswer",
+    "RecordAnswer",
+    "ResponseClassifier",
+    "default_classifier",
+]

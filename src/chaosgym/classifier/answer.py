@@ -1,4 +1,4 @@
-"""What does the classifier say of one response? A type and a nature with their probabilities, or why it says none."""
+"""What the classifier says: of a machine, its type and nature; of a record, whether it is irregular, and its nature."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -6,38 +6,149 @@ from typing import Any
 
 
 @dataclass(frozen=True, kw_only=True)
-class Classification:
-    """Answer for one machine or one record.
+class NatureAnswer:
+    """Nature of one machine, as far as it was followed.
 
     Attributes
     ----------
-    response_type, nature
-        Most probable type (I, II, III) and nature; None if the classifier abstained.
-    probabilities, nature_probabilities
-        Of every type and nature; they sum to 1 in any case.
-    confidence
-        Probability of the most probable type.
-    abstained, reason
-        Whether the classifier refused to answer, and why; or how the answer came about.
+    nature
+        "periodic" or "chaotic"; None if the classifier abstained.
+    probabilities
+        Of every nature; they sum to 1. A proven nature has the probability 1.
+    proven
+        Whether Newton's method proved a periodic orbit that the motion nears.
+    stage
+        What spoke: "parameters", "8 cycles" ... "64 cycles" from rest, "certificate", or "nothing" of an abstention.
+    cycles
+        Simulated cycles.
     period
-        Cycles after which a periodic response repeats; None if it is not periodic or not known.
-    plausible_types
-        Types that hold the truth with 90 % coverage.
-    peak_force
-        Predicted quantiles of the peak force of a settled cycle [N], by "5 %", "50 %", "95 %"; empty if not trained.
+        Of a proven orbit; None otherwise.
+    largest_peak
+        Of the proven orbit, or of the last half of the simulated cycles, both sides [N]; None without any.
+    plausible
+        Natures that hold the truth with 90 % coverage, whichever it is.
+    reason
+        Why there is no answer, or how it came about.
+    microseconds
+        Processor time that it took.
+    """
+
+    nature: str | None
+    probabilities: Mapping[str, float]
+    proven: bool
+    stage: str
+    cycles: int
+    period: int | None
+    largest_peak: float | None
+    plausible: tuple[str, ...]
+    reason: str
+    microseconds: float
+
+    @property
+    def probability(self) -> float:
+        """Of the most probable nature."""
+        return max(self.probabilities.values(), default=0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Classification:
+    """Answer for one machine.
+
+    Attributes
+    ----------
+    response_type
+        "I", "II" or "III" by the printed rule from centre and neighbours; None if that is too close to call, or was
+        not asked for or not within the budget: ``type_reason``.
+    type_probabilities
+        From the natures' probabilities of the five points; empty without a type.
+    type_proven
+        Whether every nature that the type rests on is proven.
+    centre
+        Nature of the machine itself.
+    neighbours
+        Natures one tolerance below and above in speed, and in clearance; empty where the centre decides alone.
+    microseconds
+        Processor time of the whole answer.
     """
 
     response_type: str | None
+    type_probabilities: Mapping[str, float]
+    type_proven: bool
+    type_reason: str
+    centre: NatureAnswer
+    neighbours: tuple[NatureAnswer, ...]
+    microseconds: float
+
+    @property
+    def nature(self) -> str | None:
+        """Nature of the centre."""
+        return self.centre.nature
+
+    @property
+    def abstained(self) -> bool:
+        """Whether not even the nature is answered."""
+        return self.centre.nature is None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON; those of the centre stand beside those of the type."""
+        centre = asdict(self.centre)
+        centre["nature_probabilities"] = centre.pop("probabilities")
+        return {
+            **centre,
+            "plausible": list(self.centre.plausible),
+            "probability": self.centre.probability,
+            "abstained": self.abstained,
+            "response_type": self.response_type,
+            "type_probabilities": dict(self.type_probabilities),
+            "type_proven": self.type_proven,
+            "type_reason": self.type_reason,
+            "nature_microseconds": self.centre.microseconds,
+            "microseconds": self.microseconds,
+            "neighbours": [
+                {"nature": point.nature, "probability": point.probability, "proven": point.proven, "stage": point.stage}
+                for point in self.neighbours
+            ],
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordAnswer:
+    """Answer for one record of peak forces.
+
+    Attributes
+    ----------
+    irregular
+        Whether the settled response scatters by more than the sensor's error, whatever its period up to 16 cycles:
+        what a sensor can know. None if the error is not stated, or it is too close to call.
+    irregular_probability
+        None if the error is not stated.
+    amplitude
+        By how much the record does not repeat [N]: scatter within the classes of the best period, as the half range of
+        an even spread; the sensor's error is part of it.
+    nature, nature_probabilities
+        The exact nature, which a sensor can see only where the irregularity exceeds its error; None if too close to
+        call.
+    period
+        Cycles after which a regular record repeats; None otherwise.
+    plausible
+        Natures that hold the truth with 90 % coverage, whichever it is.
+    abstained, reason
+        Whether neither question is answered, and why.
+    warning
+        What the record contradicts, such as the stated error; empty if nothing.
+    """
+
+    irregular: bool | None
+    irregular_probability: float | None
+    amplitude: float | None
     nature: str | None
-    probabilities: Mapping[str, float]
     nature_probabilities: Mapping[str, float]
-    confidence: float
+    period: int | None
+    plausible: tuple[str, ...]
     abstained: bool
     reason: str
-    period: int | None = None
-    plausible_types: tuple[str, ...] = ()
-    peak_force: Mapping[str, float] | None = None
+    warning: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        return {**asdict(self), "plausible_types": list(self.plausible_types)}
+        return {**asdict(self), "plausible": list(self.plausible)}

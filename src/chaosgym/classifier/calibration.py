@@ -1,13 +1,14 @@
-"""How sure may a classifier call itself? One temperature, a conformal threshold, and the error that remains.
+"""Probabilities that mean what they say: one temperature, sets of plausible classes, and the error that remains.
 
-Temperature scaling: C. Guo et al., On calibration of modern neural networks, ICML 2017. Split conformal sets with the
-score 1 - p (LAC): M. Sadinle et al., J. Am. Stat. Assoc. 114 (2019).
+Temperature scaling: C. Guo et al., On calibration of modern neural networks, ICML 2017. Class-conditional split
+conformal sets: M. Sadinle et al., J. Am. Stat. Assoc. 114 (2019).
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Labels = NDArray[np.int64]
 
 BINS = 15
 """Bins of equal mass for the expected calibration error."""
@@ -20,7 +21,7 @@ def softmax(scores: Array) -> Array:
     return np.asarray(powers)
 
 
-def best_temperature(scores: Array, labels: NDArray[np.int64]) -> float:
+def best_temperature(scores: Array, labels: Labels) -> float:
     """Divisor of the scores (n, classes) under which the class numbers (n,) are most likely."""
     from scipy.optimize import minimize_scalar
 
@@ -31,11 +32,14 @@ def best_temperature(scores: Array, labels: NDArray[np.int64]) -> float:
     return float(np.exp(minimize_scalar(surprise, bounds=(-1.5, 2.5), method="bounded").x))
 
 
-def conformal_threshold(chances: Array, labels: NDArray[np.int64], coverage: float) -> float:
-    """Probability from which on a class belongs to the set that holds the truth with a given coverage."""
-    truth = np.sort(chances[np.arange(len(labels)), labels])
-    rank = int(np.floor((1.0 - coverage) * (len(truth) + 1))) - 1
-    return float(truth[rank]) if rank >= 0 else 0.0
+def conformal_thresholds(chances: Array, labels: Labels, coverage: float) -> Array:
+    """Probability of each class (classes,) from which on it is plausible: true classes are, with a given coverage."""
+    found = np.zeros(chances.shape[1])
+    for kind in range(len(found)):
+        truth = np.sort(chances[labels == kind, kind])
+        rank = int(np.floor((1.0 - coverage) * (len(truth) + 1))) - 1
+        found[kind] = truth[rank] if rank >= 0 else 0.0
+    return found
 
 
 def calibration_error(confidence: Array, correct: NDArray[np.bool_], bins: int = BINS) -> float:

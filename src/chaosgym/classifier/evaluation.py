@@ -1,18 +1,27 @@
-"""How good is a classifier on machines that it has not seen? Shares with bootstrap intervals over machines."""
+"""Scores on machines that a classifier has not seen: shares with bootstrap intervals over machines."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.classifier.calibration import calibration_error
+from chaosgym.classifier.data import Examples
+from chaosgym.classifier.estimator import ResponseClassifier
+from chaosgym.classifier.features import least_scatter
+from chaosgym.classifier.machine_classifier import IRREGULAR, NATURE
+from chaosgym.diagnosis.stroboscopic import irregularity
 
 Array = NDArray[np.float64]
 
 RESAMPLES = 1000
 LEVEL = 0.95
-SURE_SHARE = 0.9
-"""Share of the rows, the most confident ones, whose accuracy is given beside that of all."""
+SENSOR = 3.0
+"""Largest error of a peak [N] of the sensor whose records are judged (thesis 3.6)."""
+
+LENGTHS = (8, 16, 32, 64)
+"""Cycles of the records that are judged."""
 
 
 class Estimate(NamedTuple):
@@ -48,17 +57,60 @@ def _estimate(values: Array) -> Estimate:
 def probability_scores(
     classes: NDArray[Any], chances: Array, truth: NDArray[Any], groups: NDArray[Any]
 ) -> dict[str, Any]:
-    """Scores of probabilities (n, classes): both accuracies, calibration error, accuracy where most confident."""
+    """Scores of probabilities (n, classes): both accuracies, calibration error, share of the majority."""
     guess = classes[chances.argmax(axis=1)]
-    confidence, right = chances.max(axis=1), guess == truth
-    sure = np.argsort(-confidence, kind="stable")[: int(np.ceil(SURE_SHARE * len(truth)))]
     return {
         **bootstrap_scores(truth, guess, groups),
-        "calibration_error": calibration_error(confidence, right),
-        "accuracy_on_most_confident": float(right[sure].mean()),
+        "calibration_error": calibration_error(chances.max(axis=1), guess == truth),
+        "majority": float(max(np.mean(truth == kind) for kind in classes)),
     }
 
 
-def confusion_matrix(truth: NDArray[Any], guess: NDArray[Any], classes: NDArray[Any]) -> list[list[int]]:
-    """Number of rows of each true class (rows) by guess (columns)."""
-    return [[int(np.sum((truth == true) & (guess == told))) for told in classes] for true in classes]
+def score_stages(stages: Mapping[int, ResponseClassifier], examples: Examples) -> dict[str, Any]:
+    """Scores of natures on the held-out rows, by stage."""
+    found = {}
+    for cycles, model in stages.items():
+        rows = examples.test & (examples.has_signals if cycles else True)
+        more = {"cycles": examples.start[rows, :cycles]} if cycles else {}
+        chances = model.predict_proba(examples.values[rows], **more)
+        name = f"{cycles} cycles" if cycles else "parameters"
+        truth, groups = examples.nature[rows], examples.groups[rows]
+        found[name] = {
+            **probability_scores(model.classes_, chances, truth, groups),
+            "coverage": {
+                str(kind): float(np.mean(chances[truth == kind, place] >= model.plausible_[place]))
+                for place, kind in enumerate(model.classes_)
+                if np.any(truth == kind)
+            },
+        }
+    return found
+
+
+def score_records(models: Mapping[str, ResponseClassifier], examples: Examples, seed: int) -> dict[str, Any]:
+    """Scores of both questions on settled held-out records of a 3 N sensor, by length, beside the plain rule.
+
+    The rule: irregular, or chaotic, if ``least_scatter`` exceeds the sensor's error.
+    """
+    rows = np.flatnonzero(examples.test & examples.has_signals & (examples.settled.max(axis=1) > 0.0))
+    generator = np.random.default_rng(seed + 1)
+    clean, groups = examples.settled[rows], examples.groups[rows]
+    truth = {NATURE: examples.nature[rows], IRREGULAR: np.array([irregularity(peaks) > SENSOR for peaks in clean])}
+    error = np.full(len(rows), SENSOR)
+    found = {}
+    for cycles in LENGTHS:
+        peaks = clean[:, :cycles] + SENSOR * generator.uniform(-1.0, 1.0, (len(rows), cycles))
+        peaks = np.maximum(peaks, 0.0)
+        rule = np.array([least_scatter(record) for record in peaks]) > SENSOR
+        scores = {
+            name: probability_scores(
+                models[name].classes_, models[name].predict_proba(peaks, sensor_error=error), label, groups
+            )
+            for name, label in truth.items()
+        }
+        found[f"{cycles} peaks, {SENSOR:g} N sensor"] = {
+            "irregular": scores[IRREGULAR],
+            "irregular_rule": float(np.mean(rule == truth[IRREGULAR])),
+            "nature": scores[NATURE],
+            "nature_rule": float(np.mean(rule == (truth[NATURE] == "chaotic"))),
+        }
+    return found

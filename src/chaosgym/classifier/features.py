@@ -1,6 +1,7 @@
-r"""Which numbers sum up a short record of peak forces, one a cycle, so that its nature shows through noise?
+r"""Figures of a response: of a machine's parameters, of its first cycles, of measured peak forces.
 
-Every figure but the level of the force is free of units: forces are divided by their mean.
+``response_features`` joins those of the parameters (``parameter_features``) and those of the cycles. Of the latter,
+all but the level of the force are free of units: forces are divided by their mean.
 
     repetition   root mean square and largest difference of cycles k apart; scatter within the k interleaved classes
     settling     straight line through the logarithm of the distances to the class means; drift of level and spread
@@ -9,19 +10,28 @@ Every figure but the level of the force is free of units: forces are divided by 
     sensor       spread and scatter in units of the sensor's error, where that is stated
     section      the same repetition and forecast figures for the stroboscopic displacement and velocity, where given
 
+Cycles are rounded to single precision, in which signals are kept, so that its rounding error is no figure.
 Figures that a record does not allow (too short, no sensor error, no section) are NaN, which trees handle as such.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.classifier.kernels.records import CLASSES, LAGS, fill_features, repeat, true_length
+from chaosgym.classifier.kernels import records as kernels
+from chaosgym.classifier.kernels.records import CLASSES, LAGS, class_scatter, fill_features, true_length
+from chaosgym.classifier.parameter_features import ParameterScaling, parameter_features
 from chaosgym.errors import DiagnosisError
 
 Array = NDArray[np.float64]
 
 MIN_CYCLES, MAX_CYCLES = 8, 64
 """Cycles that a record may have; of a longer one the last count."""
+
+IMPROVEMENT = 0.5
+"""A longer period counts if its classes scatter less than this share of any shorter one's: noise gains little."""
+
+REPEATS = 4
+"""How often a period must be seen."""
 
 MAX_PLAUSIBLE = 1e5
 """Peak force [N] beyond which wrong units are suspected: the machines of the thesis stay below 3000 N."""
@@ -61,6 +71,8 @@ RECORD_FEATURES: tuple[str, ...] = (
     "distinct at 5 %",
     "lowest",
     "highest",
+    "least scatter",
+    "least scatter over sensor error",
     "section scatter",
     "section approach",
     "section forecast error",
@@ -125,18 +137,61 @@ def as_records(
     return np.ascontiguousarray(forces), np.ascontiguousarray(states), errors
 
 
+def response_features(
+    scaling: ParameterScaling | None,
+    values: Array | None,
+    peaks: Array | None = None,
+    section: Array | None = None,
+    sensor_error: Array | None = None,
+) -> Array:
+    """Features (n, n_features) of parameter values (n, n_fields), of cycles as of ``as_records``, or of both."""
+    parts = [] if scaling is None or values is None else [parameter_features(scaling, values)]
+    if peaks is not None:
+        states = np.empty((len(peaks), 0, 2)) if section is None else section
+        errors = np.full(len(peaks), np.nan) if sensor_error is None else sensor_error
+        features = np.full((len(peaks), _COUNT), np.nan)
+        single = (np.ascontiguousarray(part.astype(np.float32).astype(float)) for part in (peaks, states))
+        fill_features(*single, errors, features)
+        parts.append(features)
+    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
+
+
 def record_features(peaks: ArrayLike, section: ArrayLike | None = None, sensor_error: ArrayLike | None = None) -> Array:
     """Figures of records, (n_records, n_features); see ``as_records`` for the arguments and errors."""
     forces, states, errors = as_records(peaks, section, sensor_error)
-    features = np.full((len(forces), _COUNT), np.nan)
-    fill_features(forces, states, errors, features)
-    return features
+    return response_features(None, None, forces, states, errors)
 
 
-def repeat_residual(peaks: ArrayLike, max_period: int = CLASSES) -> Array:
-    """One-threshold repeatability of records, (n_records,): see ``repeat``; periods up to a quarter of the record."""
-    forces, _, _ = as_records(peaks)
-    residuals = np.empty(len(forces))
-    for index, row in enumerate(forces):
-        residuals[index] = repeat(row[: true_length(row)], max_period)[0]
-    return residuals
+def record_amplitude(peaks: Array) -> Array:
+    """By how much records, as ``as_records`` returns them, do not repeat [N], (n_records,).
+
+    Scatter within the classes of the best period, given as the half range of an even spread.
+    """
+    out = np.empty(len(peaks))
+    for index, row in enumerate(peaks):
+        record = row[: true_length(row)]
+        periods = range(1, min(CLASSES, len(record) // REPEATS) + 1)
+        out[index] = np.sqrt(3.0) * min(class_scatter(record, period) for period in periods)
+    return out
+
+
+def least_scatter(peaks: Array) -> float:
+    """Amplitude [N] that the scatter of one record (cycles,) has at least, its sampling allowed for.
+
+    The plain rule: a response is irregular to a sensor whose largest error is smaller.
+    """
+    record = peaks[: true_length(peaks)]
+    return float(kernels.least_scatter(record, min(CLASSES, len(record) // REPEATS)))
+
+
+def repeat_period(peaks: ArrayLike) -> int:
+    """Smallest period of one record (cycles,) whose classes scatter clearly less than those of every shorter period."""
+    record = as_records(peaks)[0][0]
+    record = record[~np.isnan(record)]
+    best, period = np.inf, 1
+    for candidate in range(1, min(CLASSES, len(record) // REPEATS) + 1):
+        scatter = class_scatter(record, candidate)
+        if scatter < IMPROVEMENT * best - 1e-9 * abs(record).max():
+            best, period = scatter, candidate
+        best = min(best, scatter)
+    return period

@@ -1,4 +1,4 @@
-"""How is a trained classifier kept? As plain arrays in one .npz with a JSON description; nothing in it is executed.
+"""Model files: plain arrays in one .npz with a JSON description; nothing in it is executed.
 
 The hash covers the arrays and the description, model card included.
 """
@@ -14,26 +14,18 @@ from typing import Any
 import numpy as np
 
 from chaosgym.classifier.beam_swing import SwingTable
-from chaosgym.classifier.expectations import Expectations
-from chaosgym.classifier.linear import Linear
-from chaosgym.classifier.network import Network
-from chaosgym.classifier.novelty import Neighbourhood
-from chaosgym.classifier.pairs import Pairs
 from chaosgym.classifier.parameter_features import ParameterScaling
 from chaosgym.classifier.trees import Forest
 from chaosgym.errors import ModelFileError
 from chaosgym.files import write_atomically
 
-FORMAT = 3
+FORMAT = 4
 """Version of the model file."""
 
 LARGEST = 50_000_000
 """Bytes that a model file may have."""
 
-_KINDS: Mapping[str, Any] = {
-    kind.__name__: kind
-    for kind in (Expectations, Forest, Linear, Network, Neighbourhood, Pairs, ParameterScaling, SwingTable)
-}
+_KINDS: Mapping[str, Any] = {kind.__name__: kind for kind in (Forest, ParameterScaling, SwingTable)}
 """Values that a file may hold beside arrays, numbers, words, tuples and None."""
 
 

@@ -1,7 +1,6 @@
-"""How are boosted trees evaluated without scikit-learn? As plain arrays, walked level by level, many rows at a time.
+"""Boosted trees as plain arrays: trained by scikit-learn, evaluated without it.
 
-The nodes of all trees stand in a row, children side by side. A leaf is its own child and lets everything pass to the
-left, so that all rows of a tree take the same number of steps and none needs a branch. Missing values go where training
+The nodes of all trees stand in a row, children side by side. A leaf is its own child. Missing values go where training
 sent them. Each tree adds to one score.
 """
 
@@ -10,21 +9,21 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.classifier.kernels.trees import walk_blocks, walk_rows
+from chaosgym.classifier.kernels.trees import walk_rows
 
 Array = NDArray[np.float64]
 
-FEW_ROWS = 8
-"""Rows below which each goes its own way, and stops at its leaf."""
+L2 = 5.0
+"""Regularisation of the leaves."""
 
 
 class Forest(NamedTuple):
     """Trees of a boosted model: scores = baseline + sum of the leaves.
 
-    ``feature`` (n_nodes,) to look at; ``threshold`` (n_nodes,) above which a row goes right, infinite at a leaf;
-    ``missing_right`` (n_nodes,) whether a missing value does; ``child`` (n_nodes,) number of the left child, the right
-    one follows it; ``value`` (n_nodes,) of a leaf; ``roots``, ``depths`` (n_trees,); ``score`` (n_trees,) which score a
-    tree adds to; ``baseline`` (n_scores,).
+    ``feature`` (n_nodes,) to look at; ``threshold`` (n_nodes,) above which a row goes right; ``missing_right``
+    (n_nodes,) whether a missing value does; ``child`` (n_nodes,) number of the left child, the right one follows it, a
+    leaf's own number; ``value`` (n_nodes,) of a leaf; ``roots`` (n_trees,); ``score`` (n_trees,) which score a tree
+    adds to; ``baseline`` (n_scores,).
     """
 
     feature: NDArray[np.int32]
@@ -33,9 +32,34 @@ class Forest(NamedTuple):
     child: NDArray[np.int32]
     value: Array
     roots: NDArray[np.int32]
-    depths: NDArray[np.int32]
     score: NDArray[np.int32]
     baseline: Array
+
+
+def train_forest(
+    features: Array,
+    labels: NDArray[np.int64],
+    *,
+    rounds: int,
+    leaves: int = 15,
+    learning_rate: float = 0.08,
+    least_rows: int = 20,
+    seed: int = 0,
+) -> Forest:
+    """Train a boosted classifier of class numbers (n,) on features (n, n_features); needs scikit-learn."""
+    from sklearn.ensemble import HistGradientBoostingClassifier
+
+    model = HistGradientBoostingClassifier(
+        max_iter=rounds,
+        max_leaf_nodes=leaves,
+        learning_rate=learning_rate,
+        l2_regularization=L2,
+        min_samples_leaf=min(least_rows, max(1, len(labels) // 20)),
+        early_stopping=False,
+        random_state=seed,
+    )
+    # scikit-learn can't bin a column without numbers
+    return forest_of(model.fit(np.where(np.isnan(features).all(axis=0), 0.0, features), labels))
 
 
 def forest_of(model: Any) -> Forest:
@@ -54,7 +78,6 @@ def forest_of(model: Any) -> Forest:
         child=child.astype(np.int32),
         value=value.astype(float),
         roots=np.array(roots, dtype=np.int32),
-        depths=np.array([nodes["depth"].max() for _, nodes in trees], dtype=np.int32),
         score=np.array([score for score, _ in trees], dtype=np.int32),
         baseline=np.ascontiguousarray(model._baseline_prediction, dtype=float).ravel(),
     )
@@ -75,39 +98,15 @@ def _side_by_side(nodes: Any, start: int) -> tuple[Any, ...]:
     leaf = nodes["is_leaf"].astype(bool)
     return (
         np.where(leaf, 0, nodes["feature_idx"].astype(np.int64)),
-        np.where(leaf, np.inf, nodes["num_threshold"]),
+        np.where(leaf, 0.0, nodes["num_threshold"]),
         ~leaf & ~nodes["missing_go_to_left"].astype(bool),
         start + np.where(leaf, np.arange(len(nodes)), place[nodes["left"].astype(np.int64)]),
-        nodes["value"],
+        np.where(leaf, nodes["value"], 0.0),
     )
-
-
-def constant_forest(baseline: Array) -> Forest:
-    """A forest without trees: the same scores (n_scores,) for every row."""
-    none, numbers, truths = np.zeros(0, dtype=np.int32), np.zeros(0), np.zeros(0, dtype=np.bool_)
-    return Forest(none, numbers, truths, none, numbers, none, none, none, baseline)
-
-
-def joined(forests: tuple[Forest, ...]) -> Forest:
-    """One forest whose scores are those of several, in their order."""
-    nodes = np.cumsum([0, *(len(forest.feature) for forest in forests)])
-    counts = np.cumsum([0, *(len(forest.baseline) for forest in forests)])
-    moved = [
-        forest._replace(child=forest.child + start, roots=forest.roots + start, score=forest.score + first)
-        for forest, start, first in zip(forests, nodes[:-1].astype(np.int32), counts[:-1].astype(np.int32), strict=True)
-    ]
-    return Forest(*(np.concatenate(column) for column in zip(*moved, strict=True)))
-
-
-def forest_scores(forest: Forest, features: Array) -> Array:
-    """Scores (n_rows, n_scores) of features (n_rows, n_features)."""
-    out = np.empty((len(features), len(forest.baseline)))
-    walk = walk_blocks if len(features) >= FEW_ROWS else walk_rows
-    walk(*forest, features, out)
-    return out
 
 
 def class_scores(forest: Forest, features: Array) -> Array:
     """Scores (n_rows, n_classes); of two classes, for which boosting has one score, the first has zero."""
-    found = forest_scores(forest, features)
+    found = np.empty((len(features), len(forest.baseline)))
+    walk_rows(*forest, features, found)
     return np.concatenate([np.zeros_like(found), found], axis=1) if found.shape[1] == 1 else found

@@ -1,4 +1,4 @@
-"""What does the learned classifier say of a machine, of measured records, of many at once, or live? ``classify``."""
+"""What the classifier says of a machine, of measured records, of many at once, or live: ``classify``."""
 
 import os
 import sys
@@ -12,15 +12,29 @@ from chaosgym.cli.measured_options import Measured, measured_options, measured_r
 from chaosgym.cli.output import emit
 from chaosgym.machines.registry import MACHINES
 
+KERNELS = ("--follow", "--batch")
+"""Options under which the machine code of the kernels is worth its loading."""
+
 
 def _quick_start(arguments: list[str]) -> None:
-    """Run the Python source of the kernels for one question: loading their machine code would take longer."""
-    if not ({"--follow", "--batch"} & set(arguments) or "numba" in sys.modules):
+    """Run the Python source of the kernels for one record, or parameters alone: loading machine code takes longer."""
+    learned = {"--peaks", "--series"} & {*arguments} or any(
+        text == "--budget-us=0" or pair == ("--budget-us", "0")
+        for text, pair in zip(arguments, zip(arguments, [*arguments[1:], ""], strict=True), strict=True)
+    )
+    if learned and not ({*KERNELS} & {*arguments} or "numba" in sys.modules):
         os.environ["NUMBA_DISABLE_JIT"] = "1"
 
 
 @machine_command(required=False, before=_quick_start)
-@click.option("--follow", is_flag=True, help="Judge peaks from standard input as they come, one a line: a monitor.")
+@click.option(
+    "--budget-us",
+    type=click.FloatRange(0.0),
+    help="Processor time [us] for the answer; 0: from parameters alone. Default: what it takes to be sure.",
+)
+@click.option("--nature-only", is_flag=True, help="Don't judge the type, which needs the four neighbours.")
+@click.option("--follow", is_flag=True, help="Watch peaks from standard input, one a line: a monitor with an alarm.")
+@click.option("--log", type=click.Path(dir_okay=False), help="CSV file to which --follow appends its events.")
 @click.option("--batch", type=click.Path(exists=True, dir_okay=False), help="Judge every row of a Parquet file.")
 @click.option("--out", type=click.Path(dir_okay=False), help="Parquet file for the answers of --batch.")
 @measured_options
@@ -30,13 +44,16 @@ def _quick_start(arguments: list[str]) -> None:
 def classify(
     machine: Any,
     measured: Measured,
+    budget_us: float | None,
+    nature_only: bool,
     follow: bool,
+    log: str | None,
     batch: str | None,
     out: str | None,
     model: str | None,
     as_json: bool,
 ) -> None:
-    """Tell the response type (I, II, III) and the nature by the learned classifier, without simulating."""
+    """Tell response type (I, II, III) and nature by as few cycles as it takes, with proof where periodic."""
     if machine is None:
         raise click.UsageError(f"give a machine: {', '.join(MACHINES)}")
     if sum(map(bool, (measured, follow, batch))) > 1:
@@ -44,37 +61,49 @@ def classify(
     if bool(batch) != bool(out):
         raise click.UsageError("--batch FILE and --out FILE belong together: give both or neither")
     half_width = _half_width(measured, follow)
+    if (budget_us is not None or nature_only) and (measured or follow):
+        raise click.UsageError("--budget-us and --nature-only belong to a machine or --batch, not to records")
+    if log and not follow:
+        raise click.UsageError("--log belongs to --follow")
+    if follow:
+        return _follow(sys.stdin, half_width, log, as_json)
     from chaosgym.classifier import MachineClassifier, default_classifier
 
     classifier = MachineClassifier.load(model) if model else default_classifier(machine.name)
     if classifier.machine.name != machine.name:
         raise click.UsageError(f"--model {model} knows {classifier.machine.name}, not {machine.name}")
-    if follow:
-        _follow(classifier, sys.stdin, half_width, as_json)
-    elif measured:
+    if measured:
         _classify_measured(classifier, measured, half_width, as_json)
     elif batch and out:
-        _classify_batch(classifier, batch, out, as_json)
+        _classify_batch(classifier, batch, out, budget_us, not nature_only, as_json)
     else:
-        answer = classifier.classify(machine)
-        emit({"machine": machine.name, **answer.as_dict()}, as_json, lambda: _lines(machine.name, answer))
+        answer = classifier.classify(machine, budget_us=budget_us, types=not nature_only)
+        emit({"machine": machine.name, **answer.as_dict()}, as_json, lambda: _machine_lines(machine.name, answer))
+    return None
 
 
-def _lines(subject: str, answer: Any) -> list[str]:
+def _machine_lines(name: str, answer: Any) -> list[str]:
+    centre = answer.centre
     if answer.abstained:
-        head = f"{subject}: no answer: {answer.reason}"
+        head = f"{name}: no answer: {centre.reason}"
     else:
-        period = f", period {answer.period}" if answer.period else ""
-        head = f"{subject}: Type {answer.response_type}, {answer.nature}{period}"
-    bars = [
-        f"  {name:12s} {'#' * round(40 * chance):40s} {chance:.3f}"
-        for name, chance in (
-            *((f"Type {kind}", chance) for kind, chance in answer.probabilities.items()),
-            *answer.nature_probabilities.items(),
-        )
+        period = f", period {centre.period}" if centre.period else ""
+        kind = f"Type {answer.response_type}, " if answer.response_type else ""
+        proven = "proven" if centre.proven else f"probability {centre.probability:.3f}"
+        head = f"{name}: {kind}{centre.nature}{period}; {proven} by {centre.stage} ({centre.cycles} cycles simulated)"
+    lines = [
+        head,
+        *_bars({**{f"Type {key}": p for key, p in answer.type_probabilities.items()}, **centre.probabilities}),
     ]
-    forces = ", ".join(f"{name}: {force:.1f}" for name, force in (answer.peak_force or {}).items())
-    return [head, *bars, *([f"  peak force of a settled cycle [N], quantiles {forces}"] if forces else [])]
+    if answer.type_reason:
+        lines.append(f"  type: {answer.type_reason}{'; every nature proven' if answer.type_proven else ''}")
+    if centre.largest_peak is not None:
+        lines.append(f"  largest peak force {centre.largest_peak:.1f} N")
+    return [*lines, f"  {answer.microseconds / 1e3:.2f} ms, the nature {centre.microseconds / 1e3:.2f} ms"]
+
+
+def _bars(chances: dict[str, float]) -> list[str]:
+    return [f"  {name:12s} {'#' * round(40 * chance):40s} {chance:.3f}" for name, chance in chances.items()]
 
 
 def _half_width(measured: Measured, follow: bool) -> float | None:
@@ -85,6 +114,17 @@ def _half_width(measured: Measured, follow: bool) -> float | None:
     if told is not None and not (measured or follow):
         raise click.UsageError("--sensor-error belongs to --peaks, --series or --follow")
     return None if told is None else told.half_width
+
+
+def _learned_lines(answer: Any) -> list[str]:
+    if answer.abstained:
+        return [f"  learned: no answer: {answer.reason}"]
+    told = {True: "irregular beyond the sensor's error", False: "regular to the sensor", None: "irregularity unknown"}
+    nature = answer.nature or "too close to call"
+    chances = {} if answer.irregular_probability is None else {"irregular": answer.irregular_probability}
+    head = f"  learned: {told[answer.irregular]}, amplitude {answer.amplitude:.3g} N; exact nature: {nature}"
+    warning = [f"  warning: {answer.warning}"] if answer.warning else []
+    return [head, *_bars({**chances, **answer.nature_probabilities}), *warning]
 
 
 def _classify_measured(classifier: Any, measured: Measured, half_width: float | None, as_json: bool) -> None:
@@ -108,58 +148,47 @@ def _classify_measured(classifier: Any, measured: Measured, half_width: float | 
             "verdict": run_as_dict(run),
         }
         lines += verdict_lines(f"{machine}, measured" if len(runs) == 1 else run.name, run)
-        lines += [
-            f"  learned {line.strip()}" if not place else line for place, line in enumerate(_lines(machine, learned))
-        ]
+        lines += _learned_lines(learned)
     (only,) = results.values() if len(results) == 1 else (None,)
     result = {"machine": machine, **only} if only else {"machine": machine, "runs": results}
     emit(result, as_json, lambda: lines)
 
 
-def _classify_batch(classifier: Any, source: str, out: str, as_json: bool) -> None:
+def _classify_batch(
+    classifier: Any, source: str, out: str, budget_us: float | None, types: bool, as_json: bool
+) -> None:
     from chaosgym.classifier.batch import classify_file
 
-    summary = classify_file(classifier, source, out)
+    summary = classify_file(classifier, source, out, budget_us=budget_us, types=types, progress=True)
     emit(
         summary,
         as_json,
         lambda: [
             f"{summary['rows']} rows judged, {summary['abstained']} of them without an answer; written to {out}",
             *(f"  Type {name:4s} {count}" for name, count in summary["response_types"].items()),
+            *(f"  {name:9s} {count}" for name, count in summary["natures"].items()),
         ],
     )
 
 
-def _follow(classifier: Any, lines: Iterable[str], sensor_error: float | None, as_json: bool) -> None:
-    """Print a verdict each cycle; the last 64 cycles count."""
-    from chaosgym.classifier.features import MIN_CYCLES
+def _follow(lines: Iterable[str], sensor_error: float | None, log: str | None, as_json: bool) -> None:
+    """Print a verdict each cycle, and a line for every event."""
+    from chaosgym.monitor import EventLog, Monitor
     from chaosgym.signals.read import parse_reading
 
-    record: list[float] = []
-    for number, line in enumerate(lines, start=1):
-        peak = parse_reading(line, number, first=not record)
-        if peak is None:
-            continue
-        if peak < 0.0:
-            raise click.UsageError(
-                f"standard input, line {number}: {peak:g} N is a negative force; allowed: 0 and more"
-            )
-        record.append(peak)
-        missing = MIN_CYCLES - len(record)
-        answer = classifier.classify_record(record, sensor_error=sensor_error) if missing <= 0 else None
-        _emit_cycle(len(record), peak, answer, missing, as_json)
-    if not record:
+    if sensor_error is None:
+        raise click.UsageError(
+            "--follow needs --sensor-error N, the largest error of a peak: what is noise, what is not"
+        )
+    monitor = Monitor(sensor_error)
+    with EventLog(log) as events:
+        for number, line in enumerate(lines, start=1):
+            peak = parse_reading(line, number, first=monitor.cycle == 0)
+            if peak is None:
+                continue
+            seen = monitor.update(peak)
+            events.note(seen)
+            emit(seen.as_dict(), as_json, lambda: [str(seen)])  # noqa: B023
+            sys.stdout.flush()
+    if monitor.cycle == 0:
         raise click.UsageError("--follow found no peak on standard input")
-
-
-def _emit_cycle(cycle: int, peak: float, answer: Any, missing: int, as_json: bool) -> None:
-    if answer is None:
-        verdict = f"waiting for {missing} more cycle{'s' if missing > 1 else ''}"
-        result = {"cycle": cycle, "response_type": None, "nature": None, "abstained": True, "reason": verdict}
-    else:
-        period = f", period {answer.period}" if answer.period else ""
-        told = f"Type {answer.response_type}, {answer.nature}{period} ({answer.confidence:.2f})"
-        verdict = answer.reason if answer.abstained else told
-        result = {"cycle": cycle, **answer.as_dict()}
-    emit(result, as_json, lambda: [f"{cycle:6d}  {peak:9.2f} N  {verdict}"])
-    sys.stdout.flush()

@@ -21,18 +21,11 @@ from chaosgym.cli.quantity import millimetres_meant
 @click.option("--random", "random_size", type=click.IntRange(1), metavar="N", help="N random points.")
 @click.option("--sobol", "sobol_size", type=click.IntRange(1), metavar="N", help="N points of a Sobol sequence.")
 @click.option(
-    "--machines",
-    "machine_count",
+    "--crosses",
+    "cross_count",
     type=click.IntRange(1),
     metavar="N",
-    help="N machines of a Sobol sequence over the axes, each on a small lattice of its own (--patch).",
-)
-@click.option(
-    "--patch",
-    "patches",
-    multiple=True,
-    metavar="FIELD=LOW:HIGH:COUNT[:STEP][:lin|log]",
-    help="A dimension of the lattice, at a random place of the range; STEP 2% or 10, default one tolerance.",
+    help="N random machines, each with its neighbours one tolerance away in speed and clearance.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.option(
@@ -50,8 +43,7 @@ def sweep(
     sampling: str,
     random_size: int | None,
     sobol_size: int | None,
-    machine_count: int | None,
-    patches: tuple[str, ...],
+    cross_count: int | None,
     seed: int,
     budget: int,
     signals: float,
@@ -66,22 +58,18 @@ def sweep(
     from collections import Counter
 
     from chaosgym.machines.parameters import parameters_of
-    from chaosgym.sweeps import Axis, Patch, SweepPlan, run_sweep
+    from chaosgym.sweeps import Axis, SweepPlan, run_sweep
     from chaosgym.sweeps.plan import default_axes
 
-    sizes = {"random": random_size, "sobol": sobol_size, "lattice": machine_count}
+    sizes = {"random": random_size, "sobol": sobol_size, "crosses": cross_count}
     given = [name for name, size in sizes.items() if size]
     if len(given) > 1:
-        raise click.UsageError("--random, --sobol and --machines exclude each other")
-    if bool(patches) != bool(machine_count):
-        raise click.UsageError("--machines N and --patch belong together: give both or neither")
+        raise click.UsageError("--random, --sobol and --crosses exclude each other")
     kind: Any = given[0] if given else sampling
-    described = parameters_of(machine)
-    units = {name: about.unit for name, about in described.items()}
-    lattice = tuple(Patch.parse(text, units) for text in patches)
-    chosen = tuple(Axis.parse(text, units) for text in axes) or (() if lattice else default_axes(machine, kind))
-    plan = SweepPlan(machine, chosen, kind, sizes.get(kind) or 0, seed, lattice, budget, signals, full_types)
-    for text in (*axes, *patches):
+    units = {name: about.unit for name, about in parameters_of(machine).items()}
+    chosen = tuple(Axis.parse(text, units) for text in axes) or default_axes(machine, kind)
+    plan = SweepPlan(machine, chosen, kind, sizes.get(kind) or 0, seed, budget, signals, full_types)
+    for text in axes:
         _note_millimetres(machine, text)
     labelled = run_sweep(plan, out, workers=workers, scheduler=scheduler, repair=repair, progress=True)
     counts = {
@@ -133,6 +121,6 @@ def _warnings(plan: Any, labelled: Any) -> list[str]:
         found.append(
             "no response types of periodic points: they compare points one tolerance apart, and the "
             "steps of this grid are wider; use a "
-            "finer grid, --machines with --patch, or --full-types 1"
+            "finer grid, --crosses, or --full-types 1"
         )
     return found

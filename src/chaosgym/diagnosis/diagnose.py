@@ -170,8 +170,8 @@ def _stage(machine: Machine, record: CycleRecord, growth: Array, searched: int) 
         for period in _candidates(record, verdict):
             found = find_periodic_orbit(machine, record.final_state, period)
             spent += 8 * period
-            if found is not None and found.certified and _approaches(machine, record, found):
-                orbit = _primitive(machine, found)
+            if found is not None and found.certified and approaches(machine, record, found):
+                orbit = primitive(machine, found)
                 spent += 6 * period
                 break
     return _Stage(record, growth, verdict, exponent, orbit, len(record) + searched + spent)
@@ -188,7 +188,7 @@ def _candidates(record: CycleRecord, verdict: Diagnosis) -> tuple[int, ...]:
     return (int(np.argmax(gaps <= 1.5 * gaps.min())) + 1,)
 
 
-def _primitive(machine: Machine, orbit: PeriodicOrbit) -> PeriodicOrbit:
+def primitive(machine: Machine, orbit: PeriodicOrbit) -> PeriodicOrbit:
     """The orbit with its smallest period: a multiple of it closes too."""
     states = simulate(machine, orbit.period, orbit.state).section
     size = np.maximum(np.abs(orbit.state), 1e-9 * np.max(np.abs(orbit.state)))
@@ -200,7 +200,7 @@ def _primitive(machine: Machine, orbit: PeriodicOrbit) -> PeriodicOrbit:
     return orbit
 
 
-def _approaches(machine: Machine, record: CycleRecord, orbit: PeriodicOrbit) -> bool:
+def approaches(machine: Machine, record: CycleRecord, orbit: PeriodicOrbit) -> bool:
     """True if the motion is near the orbit, and nearer four periods later unless it is there already."""
     if orbit.distance > NEAR:
         return False

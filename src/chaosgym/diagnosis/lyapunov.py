@@ -22,7 +22,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import cKDTree
 
 from chaosgym.core.restitution import RestitutionModel
 from chaosgym.diagnosis.stroboscopic import as_samples
@@ -293,6 +292,8 @@ def exponent_from_series(
         raise DiagnosisError("the series is constant; allowed: a series that varies")
     points = np.lib.stride_tricks.sliding_window_view(x / spread, dimension)
     usable = len(points) - steps
+    from scipy.spatial import cKDTree
+
     distances, partners = cKDTree(points[:usable]).query(points[:usable], k=12)
     apart = np.abs(partners - np.arange(usable)[:, None]) > dimension
     apart &= distances > 1e-12

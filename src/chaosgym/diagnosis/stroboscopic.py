@@ -97,6 +97,15 @@ def class_residuals(samples: Array, max_period: int) -> Array:
     return residuals
 
 
+def irregularity(peaks: ArrayLike, max_period: int = MAX_DECAY_PERIOD) -> float:
+    """Amplitude [N] by which peak forces (cycles,) do not repeat: half range of the worst class of the best period.
+
+    A sensor whose largest error is smaller can tell the response from a periodic one; to any other it repeats.
+    """
+    samples = as_samples(peaks, minimum=MIN_REPEATS)
+    return float(class_residuals(samples, min(max_period, len(samples) // MIN_REPEATS)).min())
+
+
 def noisy_class_residuals(samples: Array, max_period: int) -> Array:
     """The same for samples with errors that are evenly spread over +-1 (or normal with three deviations of 1).
 

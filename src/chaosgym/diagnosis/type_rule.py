@@ -22,6 +22,10 @@ FORCE_CHANGE = 0.10
 """Change of the largest peak force that matters: a quarter of the fatigue life (thesis 5.5.2)."""
 
 
+CROSS = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
+"""The smallest neighbourhood: a point and, in tolerances of speed and of clearance, the four beside it."""
+
+
 class Neighbour(NamedTuple):
     """One point of the neighbourhood: along which parameter, on which side (-1 or +1), and what it does."""
 
@@ -66,6 +70,20 @@ def judge_type(
             side = "above" if point.side > 0 else "below"
             return "II", f"peak force {more:.0%} higher {side} the nominal {point.parameter}"
     return "I", "periodic throughout the neighbourhood, peak force less than 10 % higher"
+
+
+def type_of_cross(
+    natures: Sequence[str] | NDArray[np.str_],
+    largest_peaks: ArrayLike,
+    fields: tuple[str, str] = ("speed", "clearance"),
+) -> tuple[Type, str]:
+    """Type and its reason of the centre of a cross, from natures and largest peaks (5,) in the order of ``CROSS``."""
+    peaks = np.asarray(largest_peaks, dtype=float).tolist()
+    around = [
+        Neighbour(fields[0] if speed else fields[1], speed or clearance, cast(Nature, nature), peak)
+        for (speed, clearance), nature, peak in list(zip(CROSS, natures, peaks, strict=True))[1:]
+    ]
+    return judge_type(cast(Nature, natures[0]), peaks[0], around)
 
 
 def types_on_grid(

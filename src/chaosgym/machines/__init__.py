@@ -2,11 +2,11 @@
 
 from typing import TYPE_CHECKING, Any
 
-from chaosgym.machines.machine import Machine
 from chaosgym.machines.registry import MACHINES, register_machine
 
 if TYPE_CHECKING:
     from chaosgym.machines.impact_beam import THESIS_IMPACT_BEAM, ImpactBeam
+    from chaosgym.machines.machine import Machine
     from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK, SliderCrank
 
 __all__ = [
@@ -29,4 +29,8 @@ def __getattr__(name: str) -> Any:
         from chaosgym.machines import slider_crank
 
         return getattr(slider_crank, name)
+    if name == "Machine":
+        from chaosgym.machines.machine import Machine
+
+        return Machine
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

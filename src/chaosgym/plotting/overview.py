@@ -18,6 +18,9 @@ from chaosgym.sweeps import LabelledSweep
 TYPE_COLOURS = {"I": "#3b7dd8", "II": "#f2a93b", "III": "#d1495b", "undetermined": "#bbbbbb"}
 """One colour a response type, told apart by colour-blind readers too."""
 
+NATURE_COLOURS = {"periodic": TYPE_COLOURS["I"], "chaotic": TYPE_COLOURS["III"]}
+"""One colour a nature."""
+
 
 def peak_history(records: Mapping[str, CycleRecord], ax: Axes) -> Axes:
     """Peak force of every cycle for each response type; ``records`` by type, from the first cycle on."""
@@ -43,15 +46,15 @@ def type_map(sweep: LabelledSweep, ax: Axes) -> Axes:
 
 
 def classifier_map(classifier: MachineClassifier, ax: Axes) -> Axes:
-    """Most probable types over the two trained parameters, paler where the classifier is less sure."""
+    """Most probable natures over the two trained parameters, from parameters alone; paler where less sure."""
     ranges: dict[str, tuple[float, float]] = classifier.card["ranges"]
     speed, clearance = np.meshgrid(*[np.geomspace(*ranges[field], 200) for field in classifier.fields], indexing="ij")
     chances = classifier.parameters.predict_proba(np.column_stack([speed.ravel(), clearance.ravel()]))
     index = chances.argmax(axis=1).reshape(speed.shape)
-    sure = np.clip((chances.max(axis=1).reshape(speed.shape) - 1 / 3) * 1.5, 0.05, 1.0)
-    colours = ListedColormap([TYPE_COLOURS[kind] for kind in classifier.parameters.classes_])
-    ax.pcolormesh(speed, 1e3 * clearance, index, cmap=colours, vmin=-0.5, vmax=2.5, alpha=sure)
-    return _plane(ax, "Classifier: paler where less sure")
+    sure = np.clip(2.0 * chances.max(axis=1).reshape(speed.shape) - 1.0, 0.05, 1.0)
+    colours = ListedColormap([NATURE_COLOURS[kind] for kind in classifier.parameters.classes_])
+    ax.pcolormesh(speed, 1e3 * clearance, index, cmap=colours, vmin=-0.5, vmax=1.5, alpha=sure)
+    return _plane(ax, "Classifier: calm or chaotic, paler where less sure")
 
 
 def _plane(ax: Axes, title: str) -> Axes:

@@ -1,14 +1,13 @@
-"""Axes of a sweep: ranges of parameters, and patches of a lattice with a fixed step."""
+"""Axes of a sweep: ranges of parameters."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import ParameterError
 from chaosgym.machines.units import parse_option
 
@@ -18,7 +17,6 @@ Scale = Literal["lin", "log"]
 NO_UNITS: Mapping[str, str] = MappingProxyType({})
 
 AXIS_FORM = "FIELD=LOW:HIGH[:COUNT][:lin|log]"
-PATCH_FORM = "FIELD=LOW:HIGH:COUNT[:STEP][:lin|log]"
 
 
 @dataclass(frozen=True)
@@ -53,91 +51,13 @@ class Axis:
             raise ParameterError(f"axis {text!r} is not of the form {AXIS_FORM}") from None
 
     def __str__(self) -> str:
-        return _written(self, "")
+        count = "" if self.count is None else f":{self.count}"
+        scale = "" if self.scale == "lin" else f":{self.scale}"
+        return f"{self.field}={self.low:.12g}:{self.high:.12g}{count}{scale}"
 
     def at(self, share: Array) -> Array:
         """Values at shares 0 to 1 of the range."""
         return _between(self.low, self.high, self.scale, share)
-
-
-@dataclass(frozen=True)
-class Patch:
-    """One dimension of a small lattice of neighbours that is put at a random place of a range.
-
-    Attributes
-    ----------
-    field
-        The parameter.
-    low, high
-        Range in which the whole patch lies.
-    count
-        Number of points.
-    step
-        From each point to the next: a ratio if ``relative``, as all relative tolerances. None until the plan puts the
-        default tolerance of the field there.
-    scale
-        Whether the places are uniform in the value or in its logarithm.
-    """
-
-    field: str
-    low: float
-    high: float
-    count: int
-    step: Tolerance | None = None
-    scale: Scale = "lin"
-
-    def __post_init__(self) -> None:
-        shown = f"patch {self.field} = {self.low:g}:{self.high:g}"
-        _check_range(shown, self.low, self.high, self.scale)
-        if not 1 <= self.count <= 10**4:
-            raise ParameterError(f"{shown} has {self.count} points; allowed: 1 to 10000")
-        if self.step is not None:
-            if not (np.isfinite(self.step.value) and self.step.value > 0.0):
-                raise ParameterError(f"{shown} has the step {self.step.value:g}; allowed: above 0")
-            if not self.low <= self.highest_start:
-                raise ParameterError(f"{shown} is too narrow for {self.count} points {self.shown_step} apart")
-
-    @classmethod
-    def parse(cls, text: str, units: Mapping[str, str] = NO_UNITS) -> "Patch":
-        """Read ``FIELD=LOW:HIGH:COUNT[:STEP][:lin|log]``; a STEP such as 2% is a ratio, a plain number a difference."""
-        try:
-            field, parts, scale = _split(text, (3, 4))
-            step = None
-            if len(parts) == 4:
-                relative = parts[3].endswith("%")
-                amount = float(parts[3][:-1]) / 100.0 if relative else _value(field, parts[3], units)
-                step = Tolerance(amount, relative)
-            return cls(field, *_ends(field, parts, units), int(parts[2]), step, scale)
-        except ParameterError:
-            raise
-        except ValueError:
-            raise ParameterError(f"patch {text!r} is not of the form {PATCH_FORM}") from None
-
-    def __str__(self) -> str:
-        return _written(self, f":{self.shown_step}" if self.step else "")
-
-    @property
-    def shown_step(self) -> str:
-        """The step as it is written on the command line."""
-        step = self._known_step
-        return f"{100.0 * step.value:.10g}%" if step.relative else f"{step.value:.10g}"
-
-    @property
-    def highest_start(self) -> float:
-        """Largest value at which a patch can begin."""
-        step = self._known_step
-        return step.at(self.high, 1.0 - self.count) if step.relative else self.high - (self.count - 1) * step.value
-
-    @property
-    def _known_step(self) -> Tolerance:
-        if self.step is None:
-            raise ParameterError(f"patch {self.field} has no step yet; allowed: a plan gives it one")
-        return self.step
-
-    def at(self, place: Array, index: Array) -> Array:
-        """Values of points ``index`` of patches at places 0 to 1 of the range."""
-        start, step = _between(self.low, self.highest_start, self.scale, place), self._known_step
-        return start * (1.0 + step.value) ** index if step.relative else start + index * step.value
 
 
 def _check_range(shown: str, low: float, high: float, scale: str) -> None:
@@ -171,12 +91,6 @@ def _value(field: str, text: str, units: Mapping[str, str]) -> float:
 
 def _ends(field: str, parts: Sequence[str], units: Mapping[str, str]) -> tuple[float, float]:
     return _value(field, parts[0], units), _value(field, parts[1], units)
-
-
-def _written(span: Any, step: str) -> str:
-    count = "" if span.count is None else f":{span.count}"
-    scale = "" if span.scale == "lin" else f":{span.scale}"
-    return f"{span.field}={span.low:.12g}:{span.high:.12g}{count}{step}{scale}"
 
 
 def _between(low: float, high: float, scale: Scale, share: Array) -> Array:

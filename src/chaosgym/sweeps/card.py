@@ -6,9 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chaosgym.diagnosis import TYPES, default_tolerances
 from chaosgym.errors import DatasetError
 from chaosgym.files import write_atomically
@@ -31,11 +28,9 @@ def sweep_command(plan: SweepPlan, folder: str) -> str:
             words += ["--set", f"{name}={value}"]
     for axis in plan.axes:
         words += ["--axis", str(axis)]
-    options = {"random": "--random", "sobol": "--sobol", "lattice": "--machines"}
+    options = {"random": "--random", "sobol": "--sobol", "crosses": "--crosses"}
     if plan.sampling in options:
         words += [options[plan.sampling], str(plan.size)]
-    for patch in plan.patches:
-        words += ["--patch", str(patch)]
     words += ["--seed", str(plan.seed), "--budget", str(plan.budget)]
     for option, share in (("--signals", plan.signals), ("--full-types", plan.full_types)):
         words += [option, f"{share:g}"] if share else []
@@ -67,7 +62,7 @@ def dataset_card(sweep: LabelledSweep, folder: Path) -> str:
         _balance(info["classes"]),
         _trust(plan, info),
         _noise(folder),
-        _split(sweep, plan),
+        _split(plan),
         _provenance(info),
         "## Licence\n\nMIT, as chaosgym itself.",
     ]
@@ -77,25 +72,22 @@ def dataset_card(sweep: LabelledSweep, folder: Path) -> str:
 def _how_made(plan: SweepPlan, info: Mapping[str, Any], folder: Path) -> str:
     described = parameters_of(plan.machine)
     ranges = [
-        f"| `{span.field}` | {span.low:.6g} to {span.high:.6g} | {described[span.field].unit} | {about} |"
-        for spans, about in ((plan.axes, "per machine"), (plan.patches, "lattice"))
-        for span in spans
+        f"| `{axis.field}` | {axis.low:.6g} to {axis.high:.6g} | {described[axis.field].unit} | {axis.scale} |"
+        for axis in plan.axes
     ]
-    lattice = ""
-    if plan.patches:
-        steps = " and ".join(
-            f"{patch.count} values of `{patch.field}` {patch.shown_step} apart" for patch in plan.patches
-        )
-        lattice = (
-            f"{plan.size} machines from a scrambled Sobol sequence, each on a lattice of {steps}, at a place of its "
-            "own. Neighbours lie one tolerance apart, so response types come from the rows themselves.\n\n"
+    crosses = ""
+    if plan.sampling == "crosses":
+        crosses = (
+            f"{plan.size} independent machines, drawn at random. Each is a cross of five rows: the "
+            "centre, and one tolerance below and above it in speed and in clearance. The response type of the centre "
+            "follows from the five.\n\n"
         )
     return (
         f"## How it was made\n\n    {sweep_command(plan, str(folder))}\n\n"
-        f"{lattice}Every point is run from rest and diagnosed in stages of 100, 200, ... cycles, {plan.budget} at the "
+        f"{crosses}Every point is run from rest and diagnosed in stages of 100, 200, ... cycles, {plan.budget} at the "
         "most; one that is undetermined may take eight times as many. The other parameters are those of the base "
         "machine in the file's metadata.\n\n"
-        "| field | range | unit | varied |\n|---|---|---|---|\n" + "\n".join(ranges)
+        "| field | range | unit | uniform in |\n|---|---|---|---|\n" + "\n".join(ranges)
     )
 
 
@@ -133,7 +125,7 @@ def _trust(plan: SweepPlan, info: Mapping[str, Any]) -> str:
     ]
     if "without_all_neighbours" in faults:
         lines.append(
-            f"- {faults['without_all_neighbours']:,} rows at borders of the lattice lack some neighbours "
+            f"- {faults['without_all_neighbours']:,} rows at borders of the grid lack some neighbours "
             "(`type_neighbours`), so their type may be too low."
         )
     if types:
@@ -186,42 +178,20 @@ def _noise(folder: Path) -> str:
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise _damaged_noise(folder, error) from error
     return (
-        f"## Label noise\n\n`chaosgym dataset noise {folder} {options}`. No model can agree with the labels better "
-        "than they agree with themselves; what another initial state changes are coexisting attractors.\n\n"
+        f"## Label noise\n\n`chaosgym dataset noise {folder} {options}`. What another initial state changes are "
+        "coexisting attractors.\n\n"
         "| change | nature differs | still periodic, largest peak more than 10 % away |\n|---|---|---|\n"
         + "\n".join(rows)
     )
 
 
-def _split(sweep: LabelledSweep, plan: SweepPlan) -> str:
-    if plan.sampling != "lattice":
+def _split(plan: SweepPlan) -> str:
+    if plan.sampling != "crosses":
         return ""
-    gap, near = nearest_machines(sweep, plan)
-    fields = ", ".join(axis.field for axis in plan.axes)
     return (
-        "## Split\n\n`split` divides whole machines, drawn by the seed. Every test machine differs from every machine "
-        f"of the other parts by {gap:.2g} tolerances or more in one of {fields} at least "
-        f"(median of the nearest {near:.2g})."
+        "## Split\n\n`split` divides whole machines. It depends on the seed and the number of the machine alone, so "
+        "that a larger dataset of the same seed keeps it."
     )
-
-
-def nearest_machines(sweep: LabelledSweep, plan: SweepPlan) -> tuple[float, float]:
-    """Distance of test machines from the nearest of another part, largest difference in tolerances: (least, median)."""
-    rows = np.arange(0, len(plan), len(plan) // plan.size)
-    test = sweep.column("split")[rows] == "test"
-    allowed = default_tolerances(plan.machine)
-    units: list[NDArray[np.float64]] = []
-    for axis in plan.axes:
-        values = sweep.column(axis.field)[rows]
-        if axis.field in allowed and allowed[axis.field].relative:
-            units.append(np.log(values) / np.log1p(allowed[axis.field].value))
-        else:
-            units.append(values / (allowed[axis.field].value if axis.field in allowed else 0.1 * np.ptp(values)))
-    places = np.column_stack(units)
-    if not test.any() or test.all():
-        return np.inf, np.inf
-    apart = np.abs(places[test][:, None] - places[~test][None]).max(axis=2).min(axis=1)
-    return float(apart.min()), float(np.median(apart))
 
 
 def _provenance(info: Mapping[str, Any]) -> str:

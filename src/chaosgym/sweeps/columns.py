@@ -15,8 +15,14 @@ WINDOW = 64
 WINDOWS: Mapping[str, int] = {"start": 0, "settled": 200}
 """First cycle of each signal, counted from rest."""
 
-SIGNALS: Mapping[str, str] = {"peak_force": "N", "displacement": "m", "velocity": "m/s"}
+SIGNALS: Mapping[str, Mapping[str, str]] = {
+    "start": {"peak_force": "N", "displacement": "m", "velocity": "m/s"},
+    "settled": {"peak_force": "N"},
+}
 """What is kept of each cycle: peak force of the first side; stroboscopic displacement and velocity of the joint."""
+
+SENSOR_ERROR = 3.0
+"""Largest error [N] of the sensor to which ``resolvable`` refers (thesis 3.6)."""
 
 
 class Column(NamedTuple):
@@ -37,8 +43,8 @@ def _figure(unit: str, meaning: str) -> Column:
     return Column(pa.float32(), unit, meaning)
 
 
-LATTICE_COLUMNS: Mapping[str, Column] = {
-    "machine": Column(pa.int32(), "-", "rows of one machine differ in the fields of the patches only"),
+CROSS_COLUMNS: Mapping[str, Column] = {
+    "machine": Column(pa.int32(), "-", "the five rows of one cross: centre, speed below and above, clearance likewise"),
     "split": Column(pa.string(), "-", "train, validation or test; whole machines"),
 }
 
@@ -52,6 +58,15 @@ LABELS: Mapping[str, Column] = {
     ),
     "status": Column(pa.string(), "-", STATUS_MEANING),
     "margin": _figure("-", "distance of the verdict from its threshold: 0 on it, 1 without doubt"),
+    "irregularity": _figure(
+        "N",
+        "half range of the peak force within the classes of the best period up to 16, largest class, of the settled "
+        "signal or, where that is not kept, of the last 64 judged cycles: what a sensor must resolve to see that the "
+        "response does not repeat",
+    ),
+    "resolvable": Column(
+        pa.bool_(), "-", f"irregularity above {SENSOR_ERROR:g} N: irregular to the sensor of the thesis"
+    ),
     "exponent": _figure("1/cycle", "largest Lyapunov exponent; of the orbit itself where certified"),
     "exponent_error": _figure("1/cycle", "standard error of the exponent; 0 where certified"),
     "peak_force_min": _figure("N", "smallest peak force of a judged cycle, first side of the joint"),
@@ -70,16 +85,20 @@ LABELS: Mapping[str, Column] = {
 """Labels and their evidence."""
 
 _NEIGHBOURS = "I, II, III or undetermined over the neighbours in {fields} up to one tolerance away, one initial state"
+_CROSS = "I, II, III or undetermined over the other four points of the cross, one initial state; of centres only"
 _FULL = "as full_response_type, since the sweep has no neighbours one tolerance away; on a grid III where not periodic"
 
 
 def signal_columns() -> dict[str, Column]:
-    """Columns of the signals, one row of ``WINDOW`` cycles each; null where they are not kept."""
-    kind = pa.list_(pa.float32(), WINDOW)
+    """Columns of the signals, lists of ``WINDOW`` cycles each; null where they are not kept.
+
+    Lists without a fixed size: some readers fail on those with one among which there are nulls.
+    """
+    kind = pa.list_(pa.float32())
     return {
         f"{window}_{name}": Column(kind, unit, f"{name} of cycles {first} to {first + WINDOW - 1} from rest")
         for window, first in WINDOWS.items()
-        for name, unit in SIGNALS.items()
+        for name, unit in SIGNALS[window].items()
     }
 
 
@@ -99,11 +118,12 @@ def schema(plan: SweepPlan, settings: Mapping[str, Any]) -> pa.Schema:
     for name, value in fixed_fields(plan).items():
         kind = pa.string() if isinstance(value, str) else pa.float64()
         columns[name] = Column(kind, described[name].unit, f"{FIXED}: {described[name].source}")
-    if plan.sampling == "lattice":
-        columns |= LATTICE_COLUMNS
+    if plan.sampling == "crosses":
+        columns |= CROSS_COLUMNS
     columns |= LABELS
     reach = plan.type_reach()
     about_type = _NEIGHBOURS.format(fields=" and ".join(reach)) if reach else _FULL
+    about_type = _CROSS if plan.sampling == "crosses" else about_type
     columns["response_type"] = LABELS["response_type"]._replace(meaning=about_type)
     if plan.signals:
         columns |= signal_columns()

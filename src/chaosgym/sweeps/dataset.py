@@ -55,11 +55,18 @@ class LabelledSweep:
 
 @contextmanager
 def parquet_writer(path: Path, schema: pa.Schema) -> Iterator[pq.ParquetWriter]:
-    """Open a Parquet file with checksums and zstandard compression; numbers that hardly repeat are split by byte."""
+    """Open a Parquet file with checksums and zstandard compression; signals are split by byte."""
+    lists = [field.name for field in schema if pa.types.is_list(field.type)]
     numbers = [field.name for field in schema if pa.types.is_floating(field.type)]
-    words = [field.name for field in schema if field.name not in numbers]
+    words = [field.name for field in schema if field.name not in (*numbers, *lists)]
     with pq.ParquetWriter(
-        path, schema, compression="zstd", compression_level=9, write_page_checksum=True, use_dictionary=words
+        path,
+        schema,
+        compression="zstd",
+        compression_level=9,
+        write_page_checksum=True,
+        use_dictionary=words,
+        use_byte_stream_split=[f"{name}.list.element" for name in lists],
     ) as writer:
         yield writer
 

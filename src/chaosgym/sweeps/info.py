@@ -78,11 +78,11 @@ def _counts(values: Any) -> dict[str, int]:
 def _faults(sweep: LabelledSweep) -> dict[str, int]:
     """Rows that a reader may want to leave out."""
     status, nature, neighbours = (sweep.column(name) for name in ("status", "nature", "type_neighbours"))
-    reach = sweep.plan.type_reach()
+    wanted_neighbours = sweep.plan.all_neighbours
     faults = {name: int(np.sum(status == name)) for name in ("failed", "disputed", "unresolved", "transient")}
     faults["undetermined"] = int(np.sum(nature == "undetermined"))
-    if reach:
-        faults["without_all_neighbours"] = int(np.sum(neighbours != 2 * sum(reach.values())))
+    if sweep.plan.sampling == "grid" and wanted_neighbours:
+        faults["without_all_neighbours"] = int(np.sum(neighbours != wanted_neighbours))
     if sweep.plan.signals:
         wanted = sweep.plan.with_signals(range(len(sweep.table)))
         faults["without_promised_signals"] = int(wanted.sum()) - (
@@ -95,7 +95,7 @@ def compare_types(sweep: LabelledSweep) -> dict[str, Any] | None:
     """Types from neighbours against types over the full window, where both stand; None if nowhere."""
     shared, full = sweep.column("response_type"), sweep.column("full_response_type")
     both = np.array([a is not None and b is not None for a, b in zip(shared, full, strict=True)])
-    if not sweep.plan.type_reach() or not both.any():
+    if not sweep.plan.all_neighbours or not both.any():
         return None
     pairs = Counter((str(a), str(b)) for a, b in zip(shared[both], full[both], strict=True))
     return {

@@ -7,10 +7,11 @@ import pyarrow as pa
 
 from chaosgym.diagnosis import bounce_fraction, response_type
 from chaosgym.diagnosis.diagnose import diagnosed_run
+from chaosgym.diagnosis.stroboscopic import irregularity
 from chaosgym.errors import DiagnosisError, ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, simulate
-from chaosgym.sweeps.columns import SIGNALS, WINDOW, WINDOWS, fixed_fields, schema
+from chaosgym.sweeps.columns import SENSOR_ERROR, SIGNALS, WINDOW, WINDOWS, fixed_fields, schema
 from chaosgym.sweeps.plan import SweepPlan
 from chaosgym.sweeps.provenance import provenance
 
@@ -49,7 +50,10 @@ def label_point(machine: Machine, budget: int, *, signals: bool = False) -> dict
         "cycles_used": verdict.evidence["cycles_used"],
         "reason": verdict.reason,
     }
-    return label | _signals(machine, record) if signals else label
+    kept = _signals(machine, record) if signals else {}
+    settled = kept.get("settled_peak_force", record.peak_force[-WINDOW:, 0])
+    scatter = irregularity(settled)
+    return {**label, **kept, "irregularity": scatter, "resolvable": scatter > SENSOR_ERROR}
 
 
 def _signals(machine: Machine, record: CycleRecord) -> dict[str, Any]:
@@ -64,7 +68,7 @@ def _signals(machine: Machine, record: CycleRecord) -> dict[str, Any]:
     return {
         f"{window}_{name}": series[name][first : first + WINDOW].astype(np.float32)
         for window, first in WINDOWS.items()
-        for name in SIGNALS
+        for name in SIGNALS[window]
     }
 
 
@@ -91,7 +95,7 @@ def label_rows(plan: SweepPlan, rows: range) -> pa.Table:
         if with_full_type[index]:
             label["full_response_type"] = _full_type(machine, plan.budget)
         lines.append(fixed | point | label)
-    if plan.sampling == "lattice":
+    if plan.sampling == "crosses":
         for line, number, part in zip(lines, plan.machine_numbers(rows), plan.splits(rows), strict=True):
             line |= {"machine": int(number), "split": part}
     described = schema(plan, {"rows": [rows.start, rows.stop], "provenance": provenance()})

@@ -3,29 +3,30 @@
     grid      all combinations of the axes
     random    points uniform in the axes' scales
     sobol     a scrambled Sobol sequence over the axes
-    lattice   machines from a Sobol sequence over the axes; each is run on a small lattice of speeds and clearances (its
-              patches), put at a place of its own, whose neighbours lie one tolerance apart
+    crosses   independent machines, uniform over the axes, which hold speed and clearance; each is five points: the
+              centre, and one tolerance below and above it in speed and in clearance: what its response type rests on
 
-On a grid or a lattice the neighbourhoods of response types share their points, so that a type costs about one run
-instead of nine. Points are computed by the row, never all at once: a plan may have a billion.
+On a grid the neighbourhoods of response types share their points. Points are computed by the row, never all at once: a
+plan may have a billion.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from chaosgym.diagnosis import Tolerance, default_tolerances
+from chaosgym.diagnosis import default_tolerances
+from chaosgym.diagnosis.type_rule import CROSS
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES, Machine
 from chaosgym.machines.parameters import check_parameter, parameters_of, with_settings
-from chaosgym.sweeps.axes import AXIS_FORM, Axis, Patch
+from chaosgym.sweeps.axes import AXIS_FORM, Axis
 
 Array = NDArray[np.float64]
-Sampling = Literal["grid", "random", "sobol", "lattice"]
+Sampling = Literal["grid", "random", "sobol", "crosses"]
 
 DEFAULT_COUNTS = (27, 10)
 """Points of a grid over speed and clearance if no axis is given."""
@@ -34,13 +35,13 @@ DEFAULT_BUDGET = 400
 """Cycles that the diagnosis of a point may take."""
 
 CHUNK_SIZE = 256
-"""Points that are computed and kept together; on a lattice as many whole machines."""
+"""Points that are computed and kept together; of crosses the whole ones among them."""
 
 LEAST_STEPS = 0.9
 """Steps that a tolerance must hold at least, so that neighbours on the grid are neighbours of a response type."""
 
 SPLIT = (("train", 0.70), ("validation", 0.15), ("test", 0.15))
-"""Shares of the machines of a lattice."""
+"""Shares of the machines of crosses."""
 
 GOLDEN, SILVER = 0.6180339887498949, 0.41421356237309515
 """Multiples of an irrational number spread evenly: which rows have signals, and which a type over the full window."""
@@ -57,20 +58,18 @@ class SweepPlan:
     axes : tuple of Axis
         The first axis varies slowest on a grid.
     sampling
-        "grid", "random", "sobol" or "lattice"; see the module.
+        "grid", "random", "sobol" or "crosses"; see the module.
     size
-        Number of random or Sobol points, or of the machines of a lattice; ignored on a grid.
+        Number of random or Sobol points, or of crosses; ignored on a grid.
     seed
-        Of the random or Sobol points, and of the split of a lattice.
-    patches : tuple of Patch
-        Of a lattice; the first varies slowest.
+        Of the random or Sobol points, and of the split of crosses.
     budget
         Cycles from rest that the diagnosis of a point may take.
     signals
         Share of the points whose signals are kept (``label.WINDOWS``).
     full_types
-        Share of the points whose response type is judged over all tolerances too, by runs of its own; on a grid or a
-        lattice only points with all their neighbours.
+        Share of the points whose response type is judged over all tolerances too, by runs of its own; only points with
+        all their neighbours where these are points of the sweep.
     """
 
     machine: Machine
@@ -78,21 +77,20 @@ class SweepPlan:
     sampling: Sampling = "grid"
     size: int = 0
     seed: int = 0
-    patches: tuple[Patch, ...] = ()
     budget: int = DEFAULT_BUDGET
     signals: float = 0.0
     full_types: float = 0.0
 
     def __post_init__(self) -> None:
-        tolerances = default_tolerances(self.machine)
-        object.__setattr__(self, "patches", tuple(_with_step(patch, tolerances) for patch in self.patches))
         self._check_fields()
+        if self.sampling not in get_args(Sampling):
+            raise ParameterError(f"sampling = {self.sampling!r} is unknown; allowed: {', '.join(get_args(Sampling))}")
         for axis in self.axes:
             if (self.sampling == "grid") == (axis.count is None):
                 rule = "needs a COUNT on a grid" if axis.count is None else "takes no COUNT unless on a grid"
                 raise ParameterError(f"axis {axis.field} {rule}: {AXIS_FORM}")
-        if (self.sampling == "lattice") != bool(self.patches):
-            raise ParameterError("patches and machines belong together; allowed: a lattice with one patch or more")
+        if self.sampling == "crosses":
+            self._check_crosses()
         if self.sampling != "grid" and not 1 <= self.size <= 10**9:
             raise ParameterError(f"size = {self.size} is out of range; allowed: 1 to 1e9 points")
         if self.budget < 100:
@@ -106,14 +104,23 @@ class SweepPlan:
         names = self.fields
         if not names or len(set(names)) != len(names):
             raise ParameterError(f"axes {', '.join(names) or '(none)'}: give at least one, each field once")
-        spans: tuple[Axis | Patch, ...] = (*self.axes, *self.patches)
-        for span in spans:
-            if span.field not in known:
-                raise ParameterError(f"axis {span.field!r} is no field; known fields: {', '.join(known)}")
-            if known[span.field].choices:
-                raise ParameterError(f"axis {span.field!r} is a choice and can't be swept; use --set")
-            for end in (span.low, span.high):
-                check_parameter(self.machine, span.field, int(end) if self._is_whole(span.field) else end)
+        for axis in self.axes:
+            if axis.field not in known:
+                raise ParameterError(f"axis {axis.field!r} is no field; known fields: {', '.join(known)}")
+            if known[axis.field].choices:
+                raise ParameterError(f"axis {axis.field!r} is a choice and can't be swept; use --set")
+            for end in (axis.low, axis.high):
+                check_parameter(self.machine, axis.field, int(end) if self._is_whole(axis.field) else end)
+
+    def _check_crosses(self) -> None:
+        """Refuse crosses without speed and clearance, or whose arms leave what is allowed."""
+        tolerances = default_tolerances(self.machine)
+        for field in self._cross_fields:
+            ends = {axis.field: (axis.low, axis.high) for axis in self.axes}.get(field)
+            if ends is None:
+                raise ParameterError(f"crosses need an axis of {field}; they lie in speed and clearance")
+            for end, side in zip(ends, (-1.0, 1.0), strict=True):
+                check_parameter(self.machine, field, tolerances[field].at(end, side))
 
     def __len__(self) -> int:
         return int(np.prod(self.shape))
@@ -121,20 +128,24 @@ class SweepPlan:
     @property
     def fields(self) -> tuple[str, ...]:
         """Every field that is varied."""
-        return tuple(axis.field for axis in self.axes) + tuple(patch.field for patch in self.patches)
+        return tuple(axis.field for axis in self.axes)
+
+    @property
+    def _cross_fields(self) -> tuple[str, str]:
+        return self.machine.speed_field, self.machine.clearance_field
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of the grid, (size,), or (machines, points of each patch)."""
+        """Shape of the grid, (size,), or (crosses, their points)."""
         if self.sampling == "grid":
             return tuple(axis.count or 0 for axis in self.axes)
-        return (self.size, *(patch.count for patch in self.patches))
+        return (self.size, len(CROSS)) if self.sampling == "crosses" else (self.size,)
 
     @property
     def chunk_size(self) -> int:
         """Points that are computed and kept together."""
-        patch = int(np.prod(self.shape[1:])) if self.sampling == "lattice" else 1
-        return max(1, CHUNK_SIZE // patch) * patch
+        together = len(CROSS) if self.sampling == "crosses" else 1
+        return CHUNK_SIZE // together * together
 
     def chunks(self) -> list[range]:
         """Rows of every chunk."""
@@ -149,13 +160,15 @@ class SweepPlan:
             at = np.unravel_index(index, self.shape)
             shares = [np.linspace(0.0, 1.0, axis.count or 0)[i] for axis, i in zip(self.axes, at, strict=True)]
             columns = self._axis_values(shares)
-        elif self.sampling == "lattice":
-            machine, *inside = np.unravel_index(index, self.shape)
+        elif self.sampling == "crosses":
+            machine, place = np.divmod(index, len(CROSS))
             first, last = int(machine.min(initial=0)), int(machine.max(initial=-1))
-            drawn = self._drawn(first, last + 1)[machine - first]
-            columns = self._axis_values(list(drawn.T[: len(self.axes)]))
-            for patch, place, i in zip(self.patches, drawn.T[len(self.axes) :], inside, strict=True):
-                columns[patch.field] = patch.at(place, i.astype(float))
+            columns = self._axis_values(list(self._drawn(first, last + 1)[machine - first].T))
+            tolerances = default_tolerances(self.machine)
+            for field, share in zip(self._cross_fields, np.array(CROSS, dtype=float)[place].T, strict=True):
+                columns[field] = np.array(
+                    [tolerances[field].at(*pair) for pair in zip(columns[field], share, strict=True)]
+                )
         else:
             columns = self._axis_values(list(self._drawn(rows.start, rows.stop).T))
         return {name: np.round(column) if self._is_whole(name) else column for name, column in columns.items()}
@@ -167,9 +180,9 @@ class SweepPlan:
         return isinstance(getattr(self.machine, name), int)
 
     def _drawn(self, start: int, stop: int) -> Array:
-        """Points ``start`` to ``stop`` of the sequence over axes and places of patches, (n, dimensions) in 0 to 1."""
-        dimensions, generator = len(self.axes) + len(self.patches), np.random.default_rng(self.seed)
-        if self.sampling == "random":
+        """Points ``start`` to ``stop`` of the sequence over the axes, (n, dimensions) in 0 to 1."""
+        dimensions, generator = len(self.axes), np.random.default_rng(self.seed)
+        if self.sampling in ("random", "crosses"):
             bits: Any = generator.bit_generator
             bits.advance(start * dimensions)
             return generator.random((stop - start, dimensions))
@@ -185,14 +198,13 @@ class SweepPlan:
         )
 
     def machine_numbers(self, rows: range) -> NDArray[np.int64]:
-        """Which machine of the lattice each row belongs to, (n_rows,)."""
-        return np.arange(rows.start, rows.stop) // int(np.prod(self.shape[1:]))
+        """Which cross each row belongs to, (n_rows,)."""
+        return np.arange(rows.start, rows.stop) // len(CROSS)
 
     def splits(self, rows: range) -> list[str]:
-        """Part of the split that each row of a lattice belongs to: whole machines, drawn by the seed."""
-        order = np.random.default_rng([self.seed, 1]).permutation(self.size)
-        ends = np.cumsum([share for _, share in SPLIT]) * self.size
-        parts = np.searchsorted(np.round(ends), order, side="right").clip(max=len(SPLIT) - 1)
+        """Part of the split that each row of crosses belongs to: whole machines, by seed and number alone."""
+        drawn = np.random.default_rng([self.seed, 1]).random(self.size)
+        parts = np.searchsorted(np.cumsum([share for _, share in SPLIT]), drawn, side="right").clip(max=len(SPLIT) - 1)
         return [SPLIT[part][0] for part in parts[self.machine_numbers(rows)]]
 
     def with_signals(self, rows: range) -> NDArray[np.bool_]:
@@ -202,11 +214,12 @@ class SweepPlan:
     def with_full_type(self, rows: range) -> NDArray[np.bool_]:
         """Which rows are typed over the full window too, (n_rows,)."""
         chosen = np.arange(rows.start, rows.stop) * SILVER % 1.0 < self.full_types
-        reach = self.type_reach()
-        return np.asarray(chosen & (self.type_neighbours(rows) == 2 * sum(reach.values())))
+        return np.asarray(chosen & (self.type_neighbours(rows) == self.all_neighbours))
 
     def type_neighbours(self, rows: range) -> NDArray[np.int64]:
         """How many of the neighbours that a response type rests on are points of the sweep, (n_rows,)."""
+        if self.sampling == "crosses":
+            return np.where(np.arange(rows.start, rows.stop) % len(CROSS) == 0, len(CROSS) - 1, 0)
         at = np.unravel_index(np.arange(rows.start, rows.stop), self.shape)
         found = np.zeros(len(rows), dtype=np.int64)
         for axis, far in self.type_axes().items():
@@ -215,31 +228,29 @@ class SweepPlan:
 
     def type_axes(self) -> dict[int, int]:
         """``type_reach`` by the index of the axis in ``shape``."""
-        names = [axis.field for axis in self.axes] if self.sampling == "grid" else ["", *self.fields[len(self.axes) :]]
-        return {names.index(name): far for name, far in self.type_reach().items()}
+        return {self.fields.index(name): far for name, far in self.type_reach().items()}
+
+    @property
+    def all_neighbours(self) -> int:
+        """Neighbours of a point that has all that its response type rests on; 0 where none are points of the sweep."""
+        return len(CROSS) - 1 if self.sampling == "crosses" else 2 * sum(self.type_reach().values())
 
     def type_reach(self) -> dict[str, int]:
         """Over which neighbours of a point its response type is judged: {field: steps}.
 
         Along speed and clearance, as many steps as the default tolerance of the field holds. Empty where the steps of
         one of them are wider than its tolerance, because a type compares points one tolerance apart; and unless on a
-        grid or a lattice.
+        grid.
         """
         tolerances = default_tolerances(self.machine)
-        spans: tuple[Axis | Patch, ...] = self.axes if self.sampling == "grid" else self.patches
         reach = {}
-        for span in spans:
-            if span.field not in (self.machine.speed_field, self.machine.clearance_field) or span.count == 1:
-                continue
-            if isinstance(span, Patch):
-                middle, following = span.at(np.array([0.5, 0.5]), np.array([0.0, 1.0]))
-            else:
-                middle, following = span.at(np.array([0.5, 0.5 + 1.0 / ((span.count or 0) - 1)]))
-            width = tolerances[span.field].at(float(middle), 1.0) - float(middle)
-            steps = width / float(following - middle)
-            if steps < LEAST_STEPS:
-                return {}
-            reach[span.field] = round(steps)
+        for axis in self.axes if self.sampling == "grid" else ():
+            if axis.field in self._cross_fields:
+                middle, following = axis.at(np.array([0.5, 0.5 + 1.0 / ((axis.count or 0) - 1)]))
+                steps = (tolerances[axis.field].at(float(middle), 1.0) - float(middle)) / float(following - middle)
+                if steps < LEAST_STEPS:
+                    return {}
+                reach[axis.field] = round(steps)
         return reach
 
     def settings(self) -> dict[str, Any]:
@@ -250,32 +261,21 @@ class SweepPlan:
         described["machine"] = self.machine.name
         described["base"] = {name: getattr(self.machine, name) for name in parameters_of(self.machine)}
         described["axes"] = [asdict(axis) for axis in self.axes]
-        described["patches"] = [{**asdict(patch), "step": list(patch.step or ())} for patch in self.patches]
         described["type_reach"] = self.type_reach()
         return described
 
     @classmethod
     def from_settings(cls, settings: dict[str, Any]) -> "SweepPlan":
         """Return the plan whose ``settings`` these are."""
-        patches = tuple(Patch(**{**patch, "step": Tolerance(*patch["step"])}) for patch in settings["patches"])
         machine: Any = MACHINES[settings["machine"]]
         return cls(
             machine(**settings["base"]),
             tuple(Axis(**axis) for axis in settings["axes"]),
-            patches=patches,
             **{name: settings[name] for name in _PLAIN_FIELDS},
         )
 
 
 _PLAIN_FIELDS = ("sampling", "size", "seed", "budget", "signals", "full_types")
-
-
-def _with_step(patch: Patch, tolerances: dict[str, Tolerance]) -> Patch:
-    if patch.step is not None:
-        return patch
-    if patch.field not in tolerances:
-        raise ParameterError(f"patch {patch.field} needs a STEP, since the field has no default tolerance")
-    return replace(patch, step=tolerances[patch.field])
 
 
 def default_axes(machine: Machine, sampling: Sampling) -> tuple[Axis, ...]:

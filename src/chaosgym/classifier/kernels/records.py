@@ -86,6 +86,33 @@ def _least_scatter(x: Array, max_period: int) -> tuple[float, int]:
 
 
 @njit(cache=True, nogil=True)
+def least_scatter(x: Array, max_period: int) -> float:
+    """Least half range of an even scatter that explains a record, whatever its period, its sampling allowed for.
+
+    Of the period that fits best: sqrt(3) standard deviations within its classes less two standard errors, or two thirds
+    of the widest class's half range if that is more; as ``diagnosis.stroboscopic.noisy_class_residuals``.
+    """
+    least = np.inf
+    for period in range(1, max_period + 1):
+        repeats = len(x) // period
+        first = len(x) - repeats * period
+        total, widest = 0.0, 0.0
+        for kind in range(first, first + period):
+            mean, low, high = 0.0, np.inf, -np.inf
+            for i in range(kind, len(x), period):
+                mean += x[i]
+                low, high = min(low, x[i]), max(high, x[i])
+            mean /= repeats
+            for i in range(kind, len(x), period):
+                total += (x[i] - mean) ** 2
+            widest = max(widest, 0.5 * (high - low))
+        freedom = (repeats - 1) * period
+        scatter = np.sqrt(3.0 * total / freedom) / (1.0 + np.sqrt(2.0 / freedom))
+        least = min(least, max(scatter, widest / 1.5))
+    return float(least)
+
+
+@njit(cache=True, nogil=True)
 def _approach(x: Array, period: int) -> tuple[float, float]:
     """Slope per cycle and squared correlation of log |x(i + k) - x(i)| against i."""
     count = len(x) - period
@@ -252,6 +279,7 @@ def _features(x: Array, sensor_error: float, out: Array) -> None:
     early_deviation = np.std(z[: n // 2])
     forecast, distance = _forecast(z[:-1], z[1:], 2)
     ordered = np.sort(half)
+    least = least_scatter(z, max(1, min(CLASSES, n // 4)))
     turning = 0
     for i in range(n - 2):
         turning += (z[i + 1] - z[i]) * (z[i + 2] - z[i + 1]) < 0.0
@@ -281,6 +309,8 @@ def _features(x: Array, sensor_error: float, out: Array) -> None:
         _distinct(ordered, 0.05),
         _log(np.min(z)),
         _log(np.max(z)),
+        _log(least),
+        _log(least / error) if error > 0.0 else np.nan,
     )
     for i in range(len(rest)):
         out[at + i] = rest[i]

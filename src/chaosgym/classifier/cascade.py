@@ -1,0 +1,229 @@
+"""The nature of one machine for as little time as it takes: a learned guess, a few cycles, a proof.
+
+    parameters      boosted trees on dimensionless groups of the parameters
+    8, 16, 32, 64   as many cycles from rest, and boosted trees on the parameters and the figures of these cycles
+    certificate     after each of these, where the response may be periodic: Newton's method for the orbit that the
+                    motion nears, and its Floquet multipliers
+
+It stops at a proof, where it is sure, or where the next step exceeds the budget. Each stage is calibrated on its own.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from time import thread_time
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.classifier.answer import NatureAnswer
+from chaosgym.classifier.estimator import ResponseClassifier
+from chaosgym.classifier.features import response_features
+from chaosgym.diagnosis.diagnose import approaches, primitive
+from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
+from chaosgym.errors import SimulationError
+from chaosgym.machines import MACHINES, Machine
+from chaosgym.simulation import CycleRecord, simulate
+
+Array = NDArray[np.float64]
+
+STAGES = (8, 16, 32, 64)
+"""Cycles from rest after which the cascade judges."""
+
+SURE = 0.99
+"""Probability that is an answer before the last stage."""
+
+CLEAR = 0.6
+"""Probability that is an answer at all."""
+
+HOPE = 0.3
+"""Probability of a periodic response from which on a proof is tried."""
+
+LONGEST_PERIOD, SEEN = 16, 2
+"""Longest period that a proof is tried for, and last cycles that must come back after it."""
+
+BACK = 1e-6
+"""Distance, relative to the size of the motion, at which a state has come back."""
+
+MILLION = 1e6
+
+
+class Costs(NamedTuple):
+    """Processor time [µs] of one cycle, and of one proof of a period-1 orbit."""
+
+    cycle: float
+    proof: float
+
+
+@lru_cache
+def costs_of(machine_name: str) -> Costs:
+    """Measured once in a process, on the machine's default: what the next step of a budget is taken to cost."""
+    machine: Machine = MACHINES[machine_name]()
+    record = simulate(machine, STAGES[-1])
+    find_periodic_orbit(machine, record.final_state, 1)
+    began = thread_time()
+    record = simulate(machine, STAGES[-1])
+    ran = thread_time()
+    find_periodic_orbit(machine, record.final_state, 1)
+    return Costs(MILLION * (ran - began) / STAGES[-1], MILLION * (thread_time() - ran))
+
+
+@dataclass
+class _Progress:
+    """What is known so far."""
+
+    probabilities: dict[str, float]
+    plausible: tuple[str, ...]
+    stage: str
+    record: CycleRecord | None = None
+    orbit: PeriodicOrbit | None = None
+
+    @property
+    def cycles(self) -> int:
+        return 0 if self.record is None else len(self.record)
+
+
+def judge_nature(
+    stages: Mapping[int, ResponseClassifier],
+    machine: Machine,
+    values: Array | None,
+    *,
+    budget_us: float | None = None,
+    prove: bool = True,
+    least_cycles: int = 0,
+    foreign: str = "",
+) -> NatureAnswer:
+    """Nature of a machine.
+
+    Parameters
+    ----------
+    stages
+        Classifiers by the number of cycles that they see, 0 for parameters alone.
+    machine, values
+        The machine, and its field values (1, n_fields) in the order of the classifiers; None where they don't know it.
+    budget_us
+        Processor time [µs] that may be spent; None spends what it takes to be sure. Learning alone (some 50 µs) is
+        always spent, and so is the reduction of a machine to its modes.
+    prove
+        Look for a proof where the response may be periodic, although the stages are sure.
+    least_cycles
+        Cycles to simulate although the answer is sure without, for the largest peak.
+    foreign
+        Why the classifiers don't know the machine; then only a proof is an answer.
+    """
+    began = thread_time()
+    now = _Progress({}, (), "nothing")
+    if values is not None and 0 in stages:
+        _judge(now, stages[0], values, None, "parameters")
+    try:
+        for cycles in STAGES:
+            sure = _is_sure(now)
+            if sure and now.cycles >= least_cycles and not (prove and now.cycles == 0 and _hopeful(now)):
+                break
+            if not _affordable(machine, began, budget_us, cycles - now.cycles, 0):
+                break
+            record = _go_on(now, machine, cycles)
+            if values is not None and cycles in stages:
+                _judge(now, stages[cycles], values, record, f"{cycles} cycles")
+            if prove and _hopeful(now):
+                now.orbit = _proof(machine, record, began, budget_us)
+                if now.orbit is not None:
+                    break
+    except SimulationError as error:
+        return _answer(now, machine, f"the motion can't be followed: {error}", began)
+    return _answer(now, machine, foreign, began)
+
+
+def _judge(now: _Progress, model: ResponseClassifier, values: Array, record: CycleRecord | None, stage: str) -> None:
+    """Let one stage speak."""
+    if record is None:
+        features = response_features(model.scaling_, values)
+    else:
+        section = np.column_stack([record.displacement, record.velocity])[None]
+        features = response_features(model.scaling_, values, record.peak_force[None, :, 0], section)
+    chances = model.chances(features)[0].tolist()
+    names = model.classes_.tolist()
+    now.probabilities, now.stage = dict(zip(names, chances, strict=True)), stage
+    limits = model.plausible_.tolist()
+    now.plausible = tuple(name for name, chance, least in zip(names, chances, limits, strict=True) if chance >= least)
+
+
+def _is_sure(now: _Progress) -> bool:
+    return max(now.probabilities.values(), default=0.0) >= SURE
+
+
+def _hopeful(now: _Progress) -> bool:
+    return now.probabilities.get("periodic", 1.0) >= HOPE
+
+
+def _affordable(machine: Machine, began: float, budget_us: float | None, cycles: int, proofs: int) -> bool:
+    if budget_us is None:
+        return True
+    left = budget_us - MILLION * (thread_time() - began)
+    if left <= 0.0:
+        return False
+    costs = costs_of(machine.name)
+    return cycles * costs.cycle + proofs * costs.proof <= left
+
+
+def _go_on(now: _Progress, machine: Machine, cycles: int) -> CycleRecord:
+    """Run from rest up to a number of cycles; all of them."""
+    if now.record is None:
+        now.record = simulate(machine, cycles)
+    else:
+        now.record = now.record.followed_by(simulate(machine, cycles - now.cycles, now.record.final_state))
+    return now.record
+
+
+def _proof(machine: Machine, record: CycleRecord, began: float, budget_us: float | None) -> PeriodicOrbit | None:
+    """The periodic orbit that the run nears, if the budget holds Newton's method and it proves one."""
+    period = returning_period(record.section)
+    if not _affordable(machine, began, budget_us, 0, period):
+        return None
+    orbit = find_periodic_orbit(machine, record.final_state, period)
+    if orbit is None or not (orbit.certified and approaches(machine, record, orbit)):
+        return None
+    return primitive(machine, orbit) if orbit.period > 1 else orbit
+
+
+def returning_period(section: Array) -> int:
+    """Period after which the last states of a section (cycles, n_states) come back best."""
+    states = section / np.ptp(section, axis=0).clip(1e-300)
+    last = states[-SEEN:]
+    longest = min(LONGEST_PERIOD, len(states) // 2)
+    gaps = np.array([np.linalg.norm(last - states[-SEEN - k : -k]) for k in range(1, longest + 1)])
+    return int(np.argmax(gaps <= max(1.5 * float(gaps.min()), BACK))) + 1
+
+
+def _answer(now: _Progress, machine: Machine, foreign: str, began: float) -> NatureAnswer:
+    """The nature, or why there is none."""
+    orbit, record = now.orbit, now.record
+    peak = None if record is None else float(record.peak_force[len(record) // 2 :].max())
+    probabilities, plausible, stage, reason = now.probabilities, now.plausible, now.stage, foreign
+    nature: str | None = None
+    if orbit is not None:
+        probabilities = {**dict.fromkeys(probabilities, 0.0), "periodic": 1.0}
+        nature, plausible, stage = "periodic", ("periodic",), "certificate"
+        peak = float(simulate(machine, orbit.period, orbit.state).peak_force.max())
+        reason = f"period {orbit.period} proven: miss {orbit.residual:.0e}, multiplier {orbit.largest_multiplier:.3g}"
+    elif not reason and not probabilities:
+        reason = "no classifier knows this machine, and no periodic orbit was proven"
+    elif not reason:
+        likely = max(probabilities, key=probabilities.__getitem__)
+        if probabilities[likely] >= CLEAR:
+            nature, reason = likely, f"learned, from {'the ' * (stage == 'parameters')}{stage}"
+        else:
+            reason = f"too close to call: {likely} has a probability of {probabilities[likely]:.2f} after {stage}"
+    return NatureAnswer(
+        nature=nature,
+        probabilities=probabilities,
+        proven=orbit is not None,
+        stage=stage,
+        cycles=now.cycles,
+        period=orbit.period if orbit is not None else None,
+        largest_peak=peak,
+        plausible=plausible,
+        reason=reason,
+        microseconds=MILLION * (thread_time() - began),
+    )

@@ -1,0 +1,104 @@
+"""The monitor: quiet while peaks repeat, an alarm soon after they do not, and quiet again."""
+
+import numpy as np
+import pytest
+
+from chaosgym.errors import ChaosgymError, DiagnosisError
+from chaosgym.monitor import LAGS, EventLog, Monitor
+from tests.classifier.made_up import settled
+
+ERROR = 1.0
+
+
+def noisy(record, seed):
+    """A record as a sensor of +-1 N reads it."""
+    return record + np.random.default_rng(seed).uniform(-ERROR, ERROR, len(record))
+
+
+def events(peaks):
+    """(cycle, event) of everything that happens."""
+    return [(seen.cycle, seen.event) for seen in Monitor(ERROR).watch(peaks) if seen.event]
+
+
+@pytest.mark.parametrize("rate", [2.6, 3.2, 3.5, 3.55])
+def test_repeating_peaks_raise_no_alarm(rate):
+    """Periods of 1, 2, 4 and 8 cycles through noise, 5,000 cycles each."""
+    assert events(noisy(settled(rate, 5000), 1)) == []
+
+
+def test_chaos_is_seen_within_a_few_cycles():
+    """From a period of 2 into chaos: an alarm within 8 cycles in nine runs of ten."""
+    delays = []
+    for seed in range(40):
+        peaks = np.concatenate([settled(3.2, 60), settled(3.9, 60 + seed)[seed:]])
+        alarms = [cycle for cycle, event in events(noisy(peaks, seed)) if event == "alarm"]
+        delays.append(alarms[0] - 60 if alarms else 99)
+    assert min(delays) >= 1
+    assert np.percentile(delays, 90) <= 8
+
+
+def test_a_jump_between_two_regular_regimes_is_a_change_and_no_alarm():
+    """A level that moves by 20 N is noted in the cycle of the jump."""
+    found = events(noisy(np.concatenate([np.full(60, 40.0), np.full(60, 60.0)]), 3))
+    assert found == [(61, "change")]
+
+
+def test_the_alarm_ends_when_the_peaks_repeat_again():
+    """Back from chaos it is all clear within two dozen cycles, once, without flicker."""
+    peaks = noisy(np.concatenate([settled(3.2, 60), settled(3.9, 60), settled(3.2, 120)]), 4)
+    kinds = [event for _, event in events(peaks) if event != "change"]
+    assert kinds == ["alarm", "all clear"]
+    clear = next(cycle for cycle, event in events(peaks) if event == "all clear")
+    assert 120 < clear <= 120 + 24 + LAGS
+
+
+def test_scatter_within_the_sensor_error_is_regular():
+    """Chaos of +-0.8 N is noise to a sensor of 3 N, and an alarm to one of 0.1 N."""
+    weak = 40.0 + 0.04 * (settled(3.9, 400) - 40.0)
+    assert not any(seen.alarm for seen in Monitor(3.0).watch(weak))
+    assert sum(bool(seen.alarm) for seen in Monitor(0.1).watch(weak)) > 350
+
+
+def test_the_first_cycles_wait():
+    """Until every period could repeat there is no verdict."""
+    seen = list(Monitor(ERROR).watch(settled(3.9, 40)))
+    assert [one.alarm for one in seen[: 2 * LAGS]] == [None] * 2 * LAGS
+    assert seen[-1].alarm
+    assert "waiting" in str(seen[0])
+    assert "IRREGULAR" in str(seen[-1])
+
+
+def test_amplitude_counts_from_the_last_change():
+    """After a jump between levels the amplitude is that of the new regime, not of the jump."""
+    peaks = np.concatenate([np.full(60, 40.0), np.full(60, 60.0)])
+    assert list(Monitor(ERROR).watch(noisy(peaks, 5)))[-1].amplitude < 1.2
+
+
+@pytest.mark.parametrize("peak", [-1.0, np.nan, np.inf])
+def test_bad_peaks_are_named_and_not_counted(peak):
+    """A reading that is no force raises; the monitor goes on as if it had not come."""
+    monitor = Monitor(ERROR)
+    monitor.update(40.0)
+    with pytest.raises(DiagnosisError, match="cycle 2: peak"):
+        monitor.update(peak)
+    assert monitor.update(40.0).cycle == 2
+
+
+def test_the_sensor_error_must_be_stated():
+    """A perfect sensor has no scale by which to judge."""
+    with pytest.raises(DiagnosisError, match="allowed: above 0"):
+        Monitor(0.0)
+
+
+def test_the_log_holds_every_event(tmp_path):
+    """One line an event, appended; a file that can't be written is named."""
+    peaks = noisy(np.concatenate([settled(3.2, 60), settled(3.9, 60)]), 6)
+    for _ in range(2):
+        with EventLog(tmp_path / "log.csv") as log:
+            for seen in Monitor(ERROR).watch(peaks):
+                log.note(seen)
+    lines = (tmp_path / "log.csv").read_text().splitlines()
+    assert lines[0] == "cycle,event,peak_N,amplitude_N"
+    assert sum("alarm" in line for line in lines) >= 2
+    with pytest.raises(ChaosgymError, match="can't be written"):
+        EventLog(tmp_path / "no" / "log.csv")
