@@ -58,6 +58,7 @@ try:
         restitution,
         status,
         tangent,
+        varied,
     )
 finally:
     config.CACHE_DIR = _previous_cache_folder
