@@ -12,6 +12,7 @@ import gymnasium as gym
 
 from chaosgym.envs import ENVIRONMENTS
 from chaosgym.envs.drive import MOVES
+from chaosgym.envs.judge import ExponentJudge
 from chaosgym.envs.observation import MEANINGS
 from chaosgym.envs.setups import setup_of
 from chaosgym.machines.parameters import parameters_of
@@ -99,7 +100,7 @@ def page(name: str) -> str:
         bouncing=task.bouncing_error,
         missed=task.missed_impacts,
         observations=_table("Num | Observation | Min | Max", _observations(env)),
-        judge=JUDGES[nominal.carries_deviations],
+        judge=JUDGES[isinstance(env._job.judge, ExponentJudge)],
         rating=task.load_rating,
         life=task.life_share,
         start=task.start_below,
