@@ -676,9 +676,8 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget, tangen
             if not abs(state[i]) < RUNAWAY:
                 return status.DIVERGED, cycle
         if tangents.log_growth.shape[1] > 0:
-            growth = tangents.log_growth[cycle]
-            growth[:] = 0.0
-            orthonormalise(metric, tangents.vectors, growth)
+            tangents.log_growth[cycle] = 0.0
+            orthonormalise(metric, tangents, cycle)
         episode.touch[0] -= period
         episode.touch[1] -= period
     return status.OK, arrays.section.shape[0]
