@@ -109,7 +109,7 @@ def page(name: str) -> str:
         cycles=task.cycles_per_step,
         tolerances="none" if kind == "" else ", ".join(f"`{field}` {width}" for field, width in widths.items()),
         disturbance=" ".join(noise),
-        rung=nominal.rung,
+        rung=nominal.rung or "none",
         model=env.model.rung,
         arguments="\n".join(_arguments(task)),
         **{

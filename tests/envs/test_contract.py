@@ -250,8 +250,9 @@ def test_the_model_is_not_the_machine(name: str) -> None:
     """Controllers may use a model one rung below that of the machine, and either can be chosen."""
     env = _make(name)
     rungs = list(type(env.nominal).fidelity_ladder)
-    assert env.model.rung == rungs[rungs.index(env.nominal.rung) - 1]
-    same = _make(name, model_fidelity=env.nominal.rung)
+    assert env.model.rung == rungs[0]
+    assert env.model != env.nominal
+    same = _make(name, fidelity=rungs[1], model_fidelity=rungs[1])
     assert same.model == same.nominal
     assert _make(name, fidelity=rungs[1]).nominal.rung == rungs[1]
 

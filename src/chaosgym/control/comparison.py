@@ -37,7 +37,7 @@ from chaosgym.control.controllers import (
     Schedule,
     SkipBands,
 )
-from chaosgym.control.maps import Maps, fleet_maps, maps_of, model_keywords
+from chaosgym.control.maps import FLEET, FLEET_SEED, Maps, fleet_maps, maps_of, model_keywords
 from chaosgym.control.rollout import Played, Policy, play
 from chaosgym.control.statistics import bootstrap_interval, performance_profile
 from chaosgym.envs.task import Status
@@ -119,9 +119,8 @@ class Contenders:
 
     def _exact_fleet(self) -> Maps:
         """As ``fleet``, of models as fine as the machine: what the belief is worth if the model is right."""
-        known: Any = gym.make_vec(self.env, num_envs=1, **self.keywords).unwrapped
-        exact = self.keywords | {"model_fidelity": known.nominal.rung}
-        return fleet_maps(self.env, progress=self._bar("maps of exact models"), **exact)
+        seeds = [FLEET_SEED + k for k in range(FLEET)]
+        return maps_of(self.env, seeds=seeds, progress=self._bar("maps of exact models"), **self.keywords)
 
     def _nominal(self) -> Maps:
         return maps_of(self.env, seeds=[0], **(model_keywords(self.env, **self.keywords) | {"tolerances": {}}))
