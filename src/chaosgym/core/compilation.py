@@ -12,7 +12,7 @@ import logging
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -47,7 +47,14 @@ def prepare(kernel: Any, *arguments: Any) -> None:
         cached = is_cached(kernel)
         if not cached:
             logger.warning("compiling %s: %s", name_of(kernel), _how_often())
-        kernel.compile(signature)
+        try:
+            kernel.compile(signature)
+        except numba.core.errors.NumbaError:
+            raise
+        except Exception as error:  # whatever reading a damaged pickle raises
+            logger.warning("machine code of %s can't be read (%s) and is made anew", name_of(kernel), error)
+            _remove(_all_files(kernel))
+            kernel.compile(signature)
         if not cached or any(kernel.stats.cache_misses.values()):
             _keep_checksums(kernel)
 
@@ -113,10 +120,14 @@ def _keep_checksums(kernel: Any) -> None:
 
 
 def _is_sound(path: Path) -> bool:
+    """True unless a file differs from its checksum. An index may be newer than that: numba adds to it."""
+    checksum = _checksum_file(path)
     try:
-        return _checksum_file(path).read_text() == _checksum(path)
-    except (OSError, ValueError):
-        return False
+        if path.suffix == ".nbi" and path.stat().st_mtime > checksum.stat().st_mtime:
+            return True
+        return checksum.read_text() == _checksum(path)
+    except FileNotFoundError:
+        return True
 
 
 def _discard_damaged(kernel: Any) -> None:
@@ -124,11 +135,16 @@ def _discard_damaged(kernel: Any) -> None:
     files = _files_of(kernel)
     if not files or not all(map(_is_sound, files)):
         files = _all_files(kernel)
+    damaged = [path for path in files if not _is_sound(path)]
+    for path in damaged:
+        logger.warning("%s is damaged and made anew", path)
+    _remove(damaged)
+
+
+def _remove(files: Iterable[Path]) -> None:
     for path in files:
-        if not _is_sound(path):
-            if _checksum_file(path).exists():
-                logger.warning("%s is damaged and made anew", path)
-            path.unlink()
+        path.unlink(missing_ok=True)
+        _checksum_file(path).unlink(missing_ok=True)
 
 
 def _remove_temporary_cache() -> None:

@@ -190,7 +190,7 @@ def flexible_model(
         # (K + k p p') q = k c p at rest, so the tip rests at x with x - c = -c / (1 + k p' K^-1 p)
         penetration.append(-1.0 / (1.0 + stop.stiffness * compliance))
     of_regime = np.array([0.0, *(stop.stiffness for stop in stops)]), np.array([0.0, *(s.damping for s in stops)])
-    shortest = shortest_intervals(regimes, step_phase, 0.0)
+    shortest = call(shortest_intervals, regimes, step_phase, 0.0)
     both = [stops[0], stops[-1]]
     unit_sine = np.zeros((2, 1, 2, n))
     unit_sine[0, 0, 1] = modes.force_shape

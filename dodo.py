@@ -1,0 +1,109 @@
+"""Every file that is computed and committed: what it is computed from, and the command that makes it.
+
+`doit list --all --status` shows what is stale (R), `doit NAME` makes it anew. What depends on the kernels depends on
+the golden set, which holds their results to the last bit. Long computations go on where they were stopped (``runs/``).
+"""
+
+import hashlib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+DOIT_CONFIG = {"backend": "json", "dep_file": "artefacts.json", "default_tasks": [], "verbosity": 2}
+
+GOLDEN = "tests/golden/golden.json"
+RUNS = "runs/" + hashlib.sha256(Path(GOLDEN).read_bytes()).hexdigest()[:8]
+"""Folder of unfinished work; another one when the kernels' results change."""
+
+SHIPPED = Path("src/chaosgym/control/policies/shipped")
+
+SWEEPS = {
+    "impact-beam": "--axis length=0.26505:0.29295 --axis damping_ratio=0.005:0.08:log --axis contact_damping=10:40:log "
+    "--axis excitation_frequency=1:40 --axis clearance=1e-05:0.0003:log --crosses 860 --seed 10 --budget 400",
+    "slider-crank": "--axis rod_length=0.22325:0.24675 --axis contact_damping_ratio=0.01:0.08:log "
+    "--axis friction_coefficient=0:0.1 --axis crank_speed=50:300 --axis slider_clearance=1.6e-05:0.0003:log "
+    "--crosses 320 --seed 1 --budget 200",
+}
+POLICIES = {
+    "ImpactBeamTolerance-v1": "python agents/ppo.py --env chaosgym/ImpactBeamTolerance-v1 --seed 0 --steps 900000 "
+    "--units 128 --batch 1920 --rollout 120",
+}
+LADDER_OPTIONS = "--points 60 --cycles 200 --transient 100 --budget 4 --workers 1"
+
+
+def sources(*folders: str) -> list[str]:
+    """Python files in some folders and below."""
+    return [str(path) for folder in folders for path in sorted(Path(folder).rglob("*.py"))]
+
+
+def task(name: str, uses: Iterable[str], makes: Iterable[str], *commands: str) -> dict[str, Any]:
+    """A subtask of doit."""
+    return {"name": name, "file_dep": [GOLDEN, *uses], "targets": [*makes], "actions": [*commands]}
+
+
+def task_dataset():
+    """Labelled crosses of independent machines."""
+    for machine, options in SWEEPS.items():
+        made = [f"datasets/{machine}/{name}" for name in ("sweep.parquet", "plan.json", "CARD.md")]
+        run = f"{RUNS}/{machine}"
+        sweep = f"chaosgym sweep {machine} {options} --signals 1 --out {run}"
+        copies = [f"cp {run}/{Path(file).name} {file}" for file in made]
+        yield task(machine, [], made, sweep, f"chaosgym dataset card {run}", *copies)
+
+
+def task_classifier():
+    """The classifier of each machine, from its dataset."""
+    for machine in SWEEPS:
+        used = [f"datasets/{machine}/sweep.parquet", *sources("src/chaosgym/classifier")]
+        made, run = f"src/chaosgym/weights/{machine}.npz", f"{RUNS}/classifier-{machine}"
+        train = f"chaosgym train-classifier --data datasets/{machine} --out {run}"
+        yield task(machine, used, [made], f"rm -rf {run}", train, f"cp {run}/*.npz {made}")
+
+
+def task_policy():
+    """Shipped policies; each command goes on where it was stopped."""
+    for name, command in POLICIES.items():
+        folder, run = SHIPPED / name, f"{RUNS}/{name}"
+        made = [f"{folder}/{file}" for file in ("policy.json", "weights.npz", "progress.csv")]
+        copies = [f"cp {run}/{Path(file).name} {file}" for file in made]
+        yield task(name, ["src/chaosgym/envs/setups.py"], made, f"{command} --out {run}", *copies)
+
+
+def task_scores():
+    """Jobs of controllers and policies on the machines kept for evaluation."""
+    for name in POLICIES:
+        made, run = f"src/chaosgym/control/results/{name}.parquet", f"{RUNS}/{name}.parquet"
+        used = [f"{SHIPPED}/{name}/weights.npz", *sources("src/chaosgym/control/controllers")]
+        compare = f"chaosgym compare chaosgym/{name} --policy ppo={SHIPPED}/{name} --out {run}"
+        yield task(name, used, [made], f"mkdir -p {RUNS}", compare, f"cp {run} {made}")
+
+
+def task_page():
+    """Pages of the documentation that a command writes."""
+    pages = [str(path) for path in Path("docs/environments").glob("*.md")]
+    made = "python -m benchmarks.envs.documentation docs"
+    yield task("environments", sources("src/chaosgym/envs"), pages, made)
+    statements = [str(path) for path in Path("thesis/statements").iterdir() if path.suffix in (".csv", ".toml")]
+    write = "python -m thesis scorecard --markdown > docs/scorecard.md"
+    yield task("scorecard", [*statements, *sources("thesis/scorecard")], ["docs/scorecard.md"], write)
+    options = f"--out docs/figures --gallery docs/figures.md --overwrite --results {RUNS}/figures"
+    draw = f"python -m thesis figures all {options}"
+    yield task("figures", sources("thesis/figures"), ["docs/figures.md"], draw)
+
+
+def task_picture():
+    """Pictures of the trade-off and of the extremes."""
+    for machine in SWEEPS:
+        for kind, options in (("tradeoff", LADDER_OPTIONS), ("stability", "")):
+            made, run = f"docs/{kind}-{machine}.png", f"{RUNS}/{kind}-{machine}"
+            measure = f"chaosgym {kind} {machine} {options} --out {run}"
+            copy = f"cp {run}/{kind}.png {made}"
+            yield task(f"{kind}-{machine}", sources("src/chaosgym/fidelity"), [made], f"mkdir -p {run}", measure, copy)
+
+
+def task_sample():
+    """The recording that the documentation judges."""
+    point = "--frequency-hz '30 Hz' --clearance-mm '0.127 mm' --cycles 1000 --transient 200"
+    made = "docs/data/peaks.csv"
+    run = f"chaosgym simulate impact-beam {point} --out {made}"
+    yield task("peaks", [], [made], f"rm -f {made}", run)
