@@ -53,8 +53,8 @@ def test_diagnose_can_check_the_step():
 def test_classify_answers_with_probabilities():
     """A type, and three probabilities that sum to one; 30 Hz at +-0.127 mm is Type III in the thesis."""
     result = run_json("classify", "impact-beam", "--frequency-hz", "30", "--clearance-mm", "0.127")
-    assert set(result["probabilities"]) == {"I", "II", "III"}
-    assert sum(result["probabilities"].values()) == pytest.approx(1.0)
+    assert set(result["type_probabilities"]) == {"I", "II", "III"}
+    assert sum(result["type_probabilities"].values()) == pytest.approx(1.0)
     assert result["response_type"] == "III"
 
 

@@ -75,7 +75,7 @@ def test_classify_knows_the_crank():
     """190 rpm and +-0.254 mm are Type III in the thesis (figure 4.14 b)."""
     result = run_json("classify", *CRANK)
     assert result["response_type"] == "III"
-    assert sum(result["probabilities"].values()) == pytest.approx(1.0)
+    assert sum(result["type_probabilities"].values()) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(

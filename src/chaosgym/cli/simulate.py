@@ -28,11 +28,13 @@ def simulate(
     as_json: bool,
 ) -> None:
     """Run a machine from rest; print the last peak forces, and write those of every cycle to a file."""
-    from chaosgym.signals.write import check_target, write_table
     from chaosgym.simulation import simulate as run
 
-    for path in filter(None, (out, series_out)):
-        check_target(path, overwrite)
+    if out or series_out:
+        from chaosgym.signals.write import check_target, write_table
+
+        for path in filter(None, (out, series_out)):
+            check_target(path, overwrite)
     run(machine, 1)  # compiles, or loads what is compiled
     start = time.process_time()
     record = run(machine, cycles, transient=transient, samples_per_cycle=samples if series_out else 0)

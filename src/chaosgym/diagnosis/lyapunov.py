@@ -16,7 +16,6 @@ G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9-30.
 M. T. Rosenstein, J. J. Collins, C. J. De Luca, Physica D 65 (1993) 117-134.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -24,10 +23,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.core.restitution import RestitutionModel
 from chaosgym.diagnosis.stroboscopic import as_samples
 from chaosgym.errors import DiagnosisError
-from chaosgym.machines import ImpactBeam, Machine
+from chaosgym.machines import Machine
+from chaosgym.machines.modal_impact import ModalImpactMachine
 from chaosgym.simulation import (
     CycleRecord,
     ExactEvents,
@@ -202,27 +201,21 @@ def largest_lyapunov_exponent(
 
 
 def lyapunov_spectrum(
-    machine: ImpactBeam,
+    machine: ModalImpactMachine,
     cycles: int = 200,
     *,
     transient: int = 200,
     initial_state: MotionState | ArrayLike | None = None,
 ) -> tuple[Array, float]:
-    """All exponents of an impact beam per cycle, descending, (n_states,), and the sum that the trace demands.
+    """All exponents of a machine of modes per cycle, descending, (n_states,), and the sum that its damping demands.
 
-    The sum is -tr(D) T - d |phi_t|^2 t_contact: damping of structure and shaker, and of the contact while it lasts.
-    Where impacts take no time, 2 log(e) each stands for the contact; rest on a surface forgets, which no sum shows.
+    Where impacts take no time, rest on a surface forgets, which no sum shows.
     """
     states = len(rest_state(machine).coordinates)
     first, vectors, _ = simulate_with_deviations(machine, max(1, transient), initial_state, deviations=np.eye(states))
     record, _, growth = simulate_with_deviations(machine, cycles, first.final_state, deviations=vectors)
-    model = machine.reduce()
     contact_time = record.contact_fraction.mean(axis=0) * machine.cycle_period
-    trace = -float(np.trace(model.damping)) * machine.cycle_period
-    if isinstance(model, RestitutionModel):
-        trace += 2.0 * math.log(model.restitution) * float(record.impacts.sum(axis=1).mean())
-    else:
-        trace -= float(model.contact_damping @ contact_time) * float(np.sum(model.tip_shape**2))
+    trace = machine.contraction(contact_time, float(record.impacts.sum(axis=1).mean()))
     return np.asarray(growth.mean(axis=0)), trace
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.errors import SimulationError
-from chaosgym.machines import ImpactBeam, Machine
+from chaosgym.machines import Machine
 from chaosgym.simulation import ExactEvents, MotionState, simulate, simulate_with_deviations
 
 Array = NDArray[np.float64]
@@ -99,7 +99,7 @@ def find_periodic_orbit(
     """
     origin = np.array(start.coordinates if isinstance(start, MotionState) else start, dtype=float)
     state = origin.copy()
-    weight = _weights(machine, origin)
+    weight = machine.state_weights(origin)
     best: tuple[float, Array, Array] | None = None
     try:
         for _ in range(iterations):
@@ -125,15 +125,6 @@ def find_periodic_orbit(
         derivative=monodromy,
         distance=float(np.linalg.norm(weight * (state - origin)) / np.linalg.norm(weight * origin)),
     )
-
-
-def _weights(machine: Machine, state: Array) -> Array:
-    """Weights that make the squared norm of a state its energy (beam), or each coordinate count alike."""
-    if isinstance(machine, ImpactBeam):
-        stiffness = machine.reduce().stiffness
-        return np.concatenate([np.sqrt(stiffness), np.ones(len(stiffness))])
-    size = np.abs(state)
-    return np.asarray(1.0 / np.where(size > 1e-6 * size.max(), size, max(size.max(), 1e-300)))
 
 
 def _period_map(machine: Machine, state: Array, period: int, weight: Array) -> tuple[Array, Array]:

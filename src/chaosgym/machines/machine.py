@@ -149,6 +149,11 @@ class Machine(FidelityLadder, ABC):
         """True if ``run`` takes ``tangents``, so that Lyapunov exponents and derivatives of orbits are exact."""
         return False
 
+    def state_weights(self, state: Array) -> Array:
+        """Weights (n_states,) by which deviations of a state are measured; by default each coordinate counts alike."""
+        size = np.abs(state)
+        return np.asarray(1.0 / np.where(size > 1e-6 * size.max(), size, max(size.max(), 1e-300)))
+
     @property
     def runs_fixed_steps(self) -> bool:
         """True if ``run`` takes ``RungeKutta4``."""

@@ -303,6 +303,23 @@ class ModalImpactMachine(Machine):
         """Always: deviations cross every contact exactly."""
         return True
 
+    def state_weights(self, state: Array) -> Array:
+        """Weights (n_states,) by which the squared norm of a deviation is its energy."""
+        stiffness = self.structure.stiffness
+        return np.concatenate([np.sqrt(stiffness), np.ones(len(stiffness))])
+
+    def contraction(self, contact_time: Array, impacts: float) -> float:
+        """Sum of all Lyapunov exponents of a cycle with so much contact on each side [s] and so many impacts.
+
+        It is -tr(D) T - d |phi_t|^2 t_contact: damping of the structure, and of the contact while it lasts. Where
+        impacts take no time, 2 log(e) each stands for the contact.
+        """
+        model = self.reduce()
+        structure = -float(np.trace(model.damping)) * self.cycle_period
+        if isinstance(model, RestitutionModel):
+            return structure + 2.0 * math.log(model.restitution) * impacts
+        return structure - float(model.contact_damping @ contact_time) * float(np.sum(model.tip_shape**2))
+
     @property
     def runs_fixed_steps(self) -> bool:
         """True unless impacts take no time."""
