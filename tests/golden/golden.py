@@ -14,6 +14,7 @@ import numpy as np
 
 import chaosgym
 from chaosgym import ImpactBeam, SliderCrank
+from chaosgym.envs import ENVIRONMENTS
 
 STORED = Path(__file__).with_name("golden.json")
 
@@ -108,7 +109,7 @@ def labels() -> dict[str, Any]:
 def observations() -> dict[str, Any]:
     """Observations, rewards and what is said of the nominal and of drawn machines under random actions."""
     result = {}
-    for name in sorted(name for name in gym.registry if name.startswith("chaosgym/")):
+    for name in ENVIRONMENTS:
         env = gym.make(name)
         env.action_space.seed(5)
         steps: list[Any] = [env.reset(seed=5)[0]]
