@@ -24,9 +24,9 @@ P. Gu, *Chaotic Vibration in Machine Systems and Its Implications for Design*, P
 figures are not available; axes and ranges follow the text, and everything that the text prints about a figure is drawn
 over it in one colour and compared with the machine here. Written by
 
-    chaosgym figures all --out FOLDER --gallery docs/figures.md
+    python -m thesis figures all --out FOLDER --gallery docs/figures.md
 
-which draws every figure (`chaosgym figures --list` names them) and keeps what it computed in `FOLDER/results`. Numbers
+which draws every figure (`python -m thesis figures --list` names them) and keeps what it computed in `FOLDER/results`. Numbers
 agree within the tolerances of the [scorecard](scorecard.md): a force within 15 % or 3 N, a range if both its ends do, a
 nature if it is the same word. What the scorecard judges is judged by the same runs here, those of the thesis' machine.
 Forces and natures are those of the plotted dots, one a cycle: of the beam on one side of the bearing, of the crank the
