@@ -76,16 +76,13 @@ def test_an_edit_in_a_helper_reaches_the_kernels_of_other_files(tmp_path):
     assert peak() > 1.1 * before
 
 
-SIMULATE_RIGID = "from chaosgym import *; print(simulate(ImpactBeam(n_modes=1), 1).peak_force.max())"
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("ending", "damage"), [("nbi", "empty"), ("nbi", "half"), ("nbc", "bit")])
 def test_damaged_machine_code_is_compiled_anew(tmp_path, ending, damage):
     """An index that is empty or cut, or code with one bit flipped, is named in a line, and the answer is right."""
 
     def answer():
-        out, err = _in_a_process(SIMULATE_RIGID, NUMBA_CACHE_DIR=str(tmp_path)).communicate()
+        out, err = _in_a_process(PEAK_FORCE, NUMBA_CACHE_DIR=str(tmp_path)).communicate()
         return float(out), err.decode()
 
     right, _ = answer()
@@ -105,7 +102,7 @@ def test_a_cache_that_cannot_be_written_is_replaced(tmp_path):
     """Where the cache folder is a file, kernels are compiled into a temporary folder, which a line says."""
     wall = tmp_path / "wall"
     wall.write_text("")
-    process = _in_a_process(SIMULATE_RIGID, NUMBA_CACHE_DIR=str(wall / "cache"), TMPDIR=str(tmp_path))
+    process = _in_a_process(PEAK_FORCE, NUMBA_CACHE_DIR=str(wall / "cache"), TMPDIR=str(tmp_path))
     out, err = process.communicate()
     assert float(out) > 0.0
     assert "can't be written to; NUMBA_CACHE_DIR names another" in err.decode()
