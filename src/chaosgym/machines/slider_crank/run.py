@@ -81,10 +81,12 @@ def further_results(crank: "SliderCrank", arrays: CycleArrays) -> dict[str, Any]
 def force_bound(crank: "SliderCrank") -> float:
     """Force [N] of an impact of all moving masses at ten times the speed of the crank pin.
 
-    The motor may give any power, so that there is no bound of energy.
+    The motor may give any power, so that there is no bound of energy. What turns with the rod counts as the mass at its
+    end that has the same inertia.
     """
     rod = crank.density * crank.rod_length * math.pi / 4.0 * crank.rod_diameter**2
-    mass = crank.slider_mass + crank.yoke_mass + crank.housing_mass + rod
+    turning = (crank.yoke_inertia + crank.housing_inertia) / crank.rod_length**2
+    mass = crank.slider_mass + crank.yoke_mass + crank.housing_mass + rod + turning
     speed = 10.0 * (crank.crank_radius * crank.crank_rate + math.sqrt(crank.gravity * crank.rod_length))
     damping = crank.contact_damping * math.sqrt(mass / (crank.slider_mass + crank.yoke_mass))
     bound = (math.sqrt(crank.contact_stiffness * mass) + damping) * speed
