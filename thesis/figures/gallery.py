@@ -27,7 +27,8 @@ over it in one colour and compared with the machine here. Written by
     python -m thesis figures all --out FOLDER --gallery docs/figures.md
 
 which draws every figure (`python -m thesis figures --list` names them) and keeps what it computed in `FOLDER/results`.
-Numbers agree within the tolerances of the [scorecard](scorecard.md): a force within 15 % or 3 N, a range if both its ends do, a
+Numbers
+agree within the tolerances of the [scorecard](scorecard.md): a force within 15 % or 3 N, a range if both its ends do, a
 nature if it is the same word. What the scorecard judges is judged by the same runs here, those of the thesis' machine.
 Forces and natures are those of the plotted dots, one a cycle: of the beam on one side of the bearing, of the crank the
 larger of both sides. Dots within 0.5 N are one, as for the scorecard.
