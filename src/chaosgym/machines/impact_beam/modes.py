@@ -69,7 +69,10 @@ def modal_analysis(beam: BeamParameters, elements: int | None = None) -> Modes:
     shapes = shapes * np.where(shapes[tip] < 0.0, -1.0, 1.0)
     reference, ends = angular[1], np.stack([shapes[tip], shapes[at_force]])
     if beam.fitted_modes:
-        others = fitted_modes(angular[beam.n_modes :], ends[:, beam.n_modes :], beam.fitted_modes)
+        try:
+            others = fitted_modes(angular[beam.n_modes :], ends[:, beam.n_modes :], beam.fitted_modes)
+        except np.linalg.LinAlgError as error:
+            raise _inseparable(beam) from error
         angular, ends = (
             np.concatenate([own[..., : beam.n_modes], other], axis=-1)
             for own, other in zip((angular, ends), others, strict=True)
@@ -100,28 +103,44 @@ def fitted_modes(angular: Array, shapes: Array, count: int) -> tuple[Array, Arra
     count
         Number of modes that replace them.
 
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When fewer than ``count`` independent deflections are left above rounding.
+
     References
     ----------
     G. H. Golub, G. Meurant, Matrices, Moments and Quadrature with Applications, Princeton 2010, chapter 6.
     """
+    if len(angular) < count:
+        raise np.linalg.LinAlgError(f"{len(angular)} modes can't be replaced by {count}")
+    slowest = angular[0]
+    flexibility = (slowest / angular) ** 2
     basis = np.empty((len(angular), count))
-    column = shapes[0] / angular
+    column = shapes[0] * slowest / angular
+    least = 1e-14 * float(np.linalg.norm(column))
     for k in range(count):
         for _ in range(2):
             column = column - basis[:, :k] @ (basis[:, :k].T @ column)
-        basis[:, k] = column / np.linalg.norm(column)
-        column = basis[:, k] / angular**2
-    inverse_squares, turn = np.linalg.eigh(basis.T @ (basis / angular[:, None] ** 2))
-    fitted = 1.0 / np.sqrt(inverse_squares[::-1])
+        size = np.linalg.norm(column)
+        if size <= least:
+            raise np.linalg.LinAlgError(f"only {k} of {count} fitted modes are independent")
+        basis[:, k], least = column / size, 1e-14
+        column = basis[:, k] * flexibility
+    inverse_squares, turn = np.linalg.eigh(basis.T @ (basis * flexibility[:, None]))
+    if inverse_squares[0] <= 1e-14 * inverse_squares[-1]:
+        raise np.linalg.LinAlgError("rounding hides the fastest of the fitted modes")
+    fitted = slowest / np.sqrt(inverse_squares[::-1])
     ends = (shapes / angular) @ (basis @ turn[:, ::-1]) * fitted
     return fitted, ends * np.where(ends[0] < 0.0, -1.0, 1.0)
 
 
 def _inseparable(beam: BeamParameters) -> ParameterError:
     return ParameterError(
-        f"n_modes = {beam.n_modes} of a beam with length = {beam.length:g} m, height = {beam.height:g} m, "
+        f"n_modes = {beam.n_modes} and fitted_modes = {beam.fitted_modes} of a beam with "
+        f"length = {beam.length:g} m, height = {beam.height:g} m, "
         f"pivot_rotational_stiffness = {beam.pivot_rotational_stiffness:g} N m/rad and shaker_stiffness = "
-        f"{beam.shaker_stiffness:g} N/m differ so much in frequency that rounding hides the slowest; "
+        f"{beam.shaker_stiffness:g} N/m differ so much in frequency that rounding hides some; "
         "allowed: fewer modes, or stiffer springs"
     )
 
