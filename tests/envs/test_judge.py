@@ -68,5 +68,5 @@ def test_motion_of_a_period_up_to_eight_repeats(period):
     """It misses itself by nothing, whatever the first cycles were; a period of nine misses itself."""
     cycle = np.arange(20)
     peaks = 50.0 + 10.0 * np.cos(2.0 * np.pi * cycle / period)
-    assert recurrence_miss(peaks) < 1e-12
-    assert recurrence_miss(50.0 + 10.0 * ((cycle % 9) == 0)) > MISS
+    assert recurrence_miss(peaks[None])[0] < 1e-12
+    assert recurrence_miss(50.0 + 10.0 * (cycle[None] % 9 == 0))[0] > MISS

@@ -17,6 +17,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.core.compilation import call
+from chaosgym.envs.kernels.steps import recurrence_misses, running_exponents
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
@@ -25,9 +28,6 @@ MEMORY = 10.0
 
 LARGEST_GROWTH = 3.0
 """Growth of a cycle beyond which it counts no more, either way."""
-
-PERIODS = 8
-"""Longest period, in cycles, of a motion that repeats."""
 
 MISS = 0.02
 """Share of the mean peak force by which a motion that repeats may miss itself."""
@@ -63,13 +63,10 @@ class ExponentJudge:
 
     def verdict(self, which: Indices, growth: Array, peaks: Array) -> tuple[Array, Array]:
         """Share of the cycles with a positive exponent, and the exponent, (k,) each."""
-        exponent = self._exponent[which]
-        wild = np.zeros(len(which))
-        for cycle in np.clip(growth, -LARGEST_GROWTH, LARGEST_GROWTH).T:
-            exponent = exponent + (cycle - exponent) / MEMORY
-            wild += exponent > 0.0
-        self._exponent[which] = exponent
-        return wild / growth.shape[1], exponent
+        exponents, shares = self._exponent[which], np.empty(len(which))
+        call(running_exponents, growth, exponents, MEMORY, LARGEST_GROWTH, shares)
+        self._exponent[which] = exponents
+        return shares, exponents
 
 
 class RecurrenceJudge:
@@ -85,14 +82,10 @@ class RecurrenceJudge:
 
 
 def recurrence_miss(peaks: Array) -> Array:
-    """Mean miss at the period that fits best, as a share of the mean peak, (...), of peak forces (..., cycles).
+    """Mean miss at the period that fits best, as a share of the mean peak, (k,), of peak forces (k, cycles).
 
-    The first ``PERIODS`` cycles, at most half, are only compared with.
+    The first eight cycles, at most half, are only compared with.
     """
-    cycles = peaks.shape[-1]
-    first = min(PERIODS, cycles // 2)
-    last = peaks[..., first:]
-    misses = [np.abs(last - peaks[..., first - period : cycles - period]).mean(-1) for period in range(1, first + 1)]
-    if not misses:
-        return np.zeros(peaks.shape[:-1])
-    return np.asarray(np.min(misses, axis=0) / np.maximum(last.mean(-1), 1e-9))
+    misses = np.empty(len(peaks))
+    call(recurrence_misses, peaks, misses)
+    return misses

@@ -6,6 +6,8 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from chaosgym.core.compilation import call
+from chaosgym.envs.kernels.steps import sensed
 from chaosgym.envs.task import Task
 from chaosgym.machines.batch import Cycles
 
@@ -18,9 +20,6 @@ FORCE_RANGE = 5.0
 
 IMPACT_RANGE = 200.0
 """Impacts a cycle at which the counter saturates."""
-
-LAGS = (1, 2, 4)
-"""Cycles after which measured peaks are compared with themselves."""
 
 COMMANDED = ("speed", "demand", "trim", "offset", "remaining_share", "steps_since_change")
 FELT = (
@@ -76,20 +75,11 @@ def felt(task: Task, cycles: Cycles, last: int, period: Array, generators: Gener
     errors = np.empty((count, last + 1))
     for row, generator in zip(errors, generators, strict=True):
         generator.random(out=row)
-    errors = 2.0 * errors - 1.0
-    peaks = np.maximum(cycles.peak_force[:, -last:, 0] + task.sensor_error * errors[:, :-1], 0.0)
-    bouncing = 2.0 * cycles.bounce_duration[:, -last:].reshape(count, -1).mean(axis=1) / period
-    impacts = cycles.impacts[:, -last:].reshape(count, -1).sum(axis=1)
-    if task.missed_impacts > 0.0:
-        counts = zip(impacts.tolist(), generators, strict=True)
-        impacts = np.array([generator.binomial(n, 1.0 - task.missed_impacts) for n, generator in counts])
+    errors = (2.0 * errors - 1.0) * ([task.sensor_error] * last + [task.bouncing_error])
     values = np.empty((count, len(FELT)))
-    mean = peaks.sum(axis=1) / last
-    values[:, 0] = mean
-    values[:, 1] = np.sqrt(((peaks - mean[:, None]) ** 2).sum(axis=1) / last)
-    values[:, 2] = peaks.max(axis=1)
-    for column, lag in enumerate(LAGS, start=3):
-        values[:, column] = np.abs(peaks[:, lag:] - peaks[:, :-lag]).sum(axis=1) / max(1, last - lag)
-    values[:, 6] = impacts / last
-    values[:, 7] = bouncing + task.bouncing_error * errors[:, -1]
+    call(sensed, *cycles[1:], period, errors, values)
+    if task.missed_impacts > 0.0:
+        for row, generator in zip(values, generators, strict=True):
+            row[6] = generator.binomial(int(row[6]), 1.0 - task.missed_impacts)
+    values[:, 6] /= last
     return values

@@ -1,0 +1,8 @@
+"""Compiled bookkeeping of a step, cached by the content of these sources."""
+
+from pathlib import Path
+
+from chaosgym.core.compilation import cached_by_content
+
+with cached_by_content(Path(__file__).parent):
+    from chaosgym.envs.kernels import steps  # noqa: F401
