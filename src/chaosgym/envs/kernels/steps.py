@@ -15,7 +15,7 @@ PERIODS = 8
 
 @njit(cache=True, nogil=True)
 def running_exponents(growth: Array, exponents: Array, memory: float, largest: float, shares: Array) -> None:
-    """Carry ``exponents`` (k,) through ``growth`` (k, cycles); ``shares`` (k,) of the cycles in which they are positive."""
+    """Carry ``exponents`` (k,) through ``growth`` (k, cycles); ``shares`` (k,) of the cycles with a positive one."""
     count, cycles = growth.shape
     for i in range(count):
         exponent, wild = exponents[i], 0
@@ -50,7 +50,7 @@ def sensed(
 ) -> None:
     """What sensors report of the last cycles of k machines, ``features`` (k, 8) as in ``observation.FELT``.
 
-    ``peak_force``, ``impacts`` and ``bounce_duration`` are (k, cycles, sides), ``period`` (k,). ``errors`` (k, last + 1)
+    ``peak_force``, ``impacts`` and ``bounce_duration`` (k, cycles, sides), ``period`` (k,). ``errors`` (k, last + 1)
     are those of the peak forces of the first side, and of the share of bouncing. Impacts are the number of all.
     """
     count, last = errors.shape[0], errors.shape[1] - 1
