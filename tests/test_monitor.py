@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import ChaosgymError, DiagnosisError
-from chaosgym.monitor import LAGS, EventLog, Monitor
+from chaosgym.monitor import LAGS, EventLog, Monitor, RepeatSums
 from tests.classifier.made_up import settled
 
 ERROR = 1.0
@@ -102,3 +102,16 @@ def test_the_log_holds_every_event(tmp_path):
     assert sum("alarm" in line for line in lines) >= 2
     with pytest.raises(ChaosgymError, match="can't be written"):
         EventLog(tmp_path / "no" / "log.csv")
+
+
+def test_monitors_side_by_side_are_monitors():
+    """The sums of three sensors, one of which starts anew on the way, are those of a monitor each, bit for bit."""
+    peaks = 50.0 + np.random.default_rng(0).uniform(-4.0, 4.0, (40, 3))
+    sums, monitors = RepeatSums(3), [Monitor(3.0) for _ in range(3)]
+    for cycle, row in enumerate(peaks):
+        if cycle == 15:
+            sums.forget(np.array([1]))
+            monitors[1].reset()
+        sums.add(np.arange(3), row, 3.0)
+        levels = [monitor.update(float(peak)).level for monitor, peak in zip(monitors, row, strict=True)]
+        assert np.array_equal(sums.level(np.arange(3)), levels)

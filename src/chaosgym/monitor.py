@@ -19,10 +19,13 @@ from pathlib import Path
 from typing import Any, Literal, TextIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chaosgym.diagnosis.stroboscopic import irregularity
 from chaosgym.errors import ChaosgymError, DiagnosisError
 
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 Event = Literal["", "change", "alarm", "all clear"]
 
 LAGS = 8
@@ -40,8 +43,44 @@ HIGHEST = LIMIT + 2.0
 NO_REPEAT = 1.1
 """Difference that no error explains: if it is seen at every lag at once, the regime has changed."""
 
+THE_ONE = np.zeros(1, np.int64)
+"""Number of the one sensor of a monitor."""
+
 WINDOW, LEAST = 64, 3
 """Cycles since the last change, at most and at least, from which the amplitude is taken."""
+
+
+class RepeatSums:
+    """The cumulative sums of N sensors side by side.
+
+    Attributes
+    ----------
+    cycles : (N,)
+        Peaks seen of each.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.cycles = np.zeros(count, np.int64)
+        self._sums = np.zeros((count, LAGS))
+        self._last = np.full((count, LAGS), np.nan)
+
+    def forget(self, which: Indices) -> None:
+        """Forget what the sensors ``which`` (k,) have seen."""
+        self.cycles[which], self._sums[which], self._last[which] = 0, 0.0, np.nan
+
+    def add(self, which: Indices, peaks: Array, sensor_error: float) -> Array:
+        """Add a peak (k,) [N] of each; return its differences (k, 8) from the last eight, in twice the error."""
+        last = self._last[which]
+        gaps: Array = np.abs(peaks[:, None] - last) / (2.0 * sensor_error)
+        added = np.where(np.isnan(gaps), 0.0, np.minimum(gaps, CAP) - DRIFT)
+        self._sums[which] = np.minimum(np.maximum(self._sums[which] + added, 0.0), HIGHEST)
+        self._last[which] = np.concatenate([peaks[:, None], last[:, :-1]], axis=1)
+        self.cycles[which] += 1
+        return gaps
+
+    def level(self, which: Indices) -> Array:
+        """Least sum over its limit, (k,); 0 during the first 16 cycles."""
+        return np.asarray(np.where(self.cycles[which] > 2 * LAGS, self._sums[which].min(axis=1) / LIMIT, 0.0))
 
 
 @dataclass(frozen=True)
@@ -108,8 +147,7 @@ class Monitor:
     def reset(self) -> None:
         """Forget what was seen."""
         self.cycle, self.alarm = 0, False
-        self._sums = np.zeros(LAGS)
-        self._last: deque[float] = deque(maxlen=LAGS)
+        self._sums = RepeatSums(1)
         self._since: deque[float] = deque(maxlen=WINDOW)
 
     def update(self, peak: float) -> Watch:
@@ -122,23 +160,21 @@ class Monitor:
         """
         if not (math.isfinite(peak) and peak >= 0.0):
             raise DiagnosisError(f"cycle {self.cycle + 1}: peak = {peak:g} N; allowed: finite forces of 0 N and more")
-        gaps = np.abs(peak - np.array(self._last)[::-1]) / (2.0 * self.sensor_error)
-        known = len(gaps)
-        self._sums[:known] = (self._sums[:known] + np.minimum(gaps, CAP) - DRIFT).clip(0.0, HIGHEST)
-        changed = known == LAGS and bool(gaps.min() > NO_REPEAT) and not self.alarm
+        gaps = self._sums.add(THE_ONE, np.array([float(peak)]), self.sensor_error)
+        # a gap to a peak that is not known yet is NaN, and larger than nothing
+        changed = bool((gaps > NO_REPEAT).all()) and not self.alarm
         if changed:
             self._since.clear()
-        self._last.append(peak)
         self._since.append(peak)
         self.cycle += 1
         ready = self.cycle > 2 * LAGS
-        level = float(self._sums.min()) if ready else 0.0
-        before, self.alarm = self.alarm, level > (CLEAR if self.alarm else LIMIT)
+        level = float(self._sums.level(THE_ONE)[0])
+        before, self.alarm = self.alarm, level > (CLEAR / LIMIT if self.alarm else 1.0)
         event: Event = "change" if changed and ready else ""
         if self.alarm != before:
             event = "alarm" if self.alarm else "all clear"
         amplitude = irregularity(np.array(self._since), 2 * LAGS) if len(self._since) >= LEAST else None
-        return Watch(self.cycle, float(peak), self.alarm if ready else None, level / LIMIT, amplitude, event)
+        return Watch(self.cycle, float(peak), self.alarm if ready else None, level, amplitude, event)
 
     def watch(self, peaks: Any) -> Iterator[Watch]:
         """Update with every peak of a series, one after the other."""

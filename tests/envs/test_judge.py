@@ -70,3 +70,16 @@ def test_motion_of_a_period_up_to_eight_repeats(period):
     peaks = 50.0 + 10.0 * np.cos(2.0 * np.pi * cycle / period)
     assert recurrence_miss(peaks[None])[0] < 1e-12
     assert recurrence_miss(50.0 + 10.0 * (cycle[None] % 9 == 0))[0] > MISS
+
+
+@pytest.mark.parametrize(("speed", "alarms"), [(19.0, False), (26.0, True)])
+def test_the_monitor_tells_what_the_judge_tells(speed, alarms):
+    """With ``monitor="on"`` the last entry is the monitor's level: above 1 on a chaotic beam, below on a periodic."""
+    env = gym.make("chaosgym/ImpactBeam-v1", action="speed", speed_ripple=0.0, tolerances={}, monitor="on")
+    observation, _ = env.reset(seed=0, options={"speed": speed})
+    for _ in range(12):
+        observation, *_, info = env.step(np.array([speed], np.float32))
+    assert env.unwrapped.observation_names[-1] == "monitor_level"
+    assert env.observation_space.contains(observation)
+    assert (info["type_iii"] > 0.5) == alarms
+    assert (observation[-1] > 1.0) == alarms

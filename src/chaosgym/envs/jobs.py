@@ -10,17 +10,22 @@ from numpy.typing import NDArray
 from chaosgym.envs.demand import demand_of
 from chaosgym.envs.drive import approached, trimmed
 from chaosgym.envs.judge import ExponentJudge, Judge, RecurrenceJudge
-from chaosgym.envs.observation import COMMANDED, OBSERVATION_NAMES, Observation, felt
+from chaosgym.envs.observation import COMMANDED, OBSERVATION_NAMES, Observation, felt, observation_names
 from chaosgym.envs.task import Status, Task
 from chaosgym.envs.variants import DRAWN, Variants
 from chaosgym.errors import SimulationError
 from chaosgym.machines.batch import Cycles
 from chaosgym.machines.machine import Machine
+from chaosgym.monitor import RepeatSums
 from chaosgym.simulation.batch import batch_of
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Generators = Sequence[np.random.Generator]
+
+
+LEAST_ERROR = 1e-6
+"""Error [N] that the monitor of ideal sensors reckons with."""
 
 
 class Rules(NamedTuple):
@@ -74,6 +79,7 @@ class Jobs:
         task, nominal = rules.task, rules.variants.nominal
         self.rules, self.batch = rules, batch_of(nominal, count)
         self.judge: Judge = ExponentJudge(count) if hasattr(self.batch, "run_varied") else RecurrenceJudge()
+        self._monitor = RepeatSums(count) if task.monitor == "on" else None
         self.machines: list[Machine] = [nominal] * count
         self.number = np.full(count, DRAWN)
         self.speed, self.trim = np.full(count, task.lowest_speed), np.zeros(count)
@@ -121,6 +127,8 @@ class Jobs:
         self.speed[which], self.trim[which] = speeds, 0.0
         self.damage[which], self.done[which], self._changed[which] = 0.0, 0, 0
         self.judge.start(which)
+        if self._monitor is not None:
+            self._monitor.forget(which)
         for i in which.tolist():
             self.batch.start(i, self.machines[i].at(float(self.speed[i])))
         count = max(task.run_in_cycles, task.cycles_per_step)
@@ -238,7 +246,7 @@ class Jobs:
 
     def _observe(self, which: Indices, cycles: Cycles, generators: Generators) -> Observation:
         rules, task = self.rules, self.rules.task
-        values = np.empty((len(which), len(OBSERVATION_NAMES)), np.float32)
+        values = np.empty((len(which), len(observation_names(task))), np.float32)
         speed, done = self.speed[which], self.done[which]
         demand = self.demand[which, done]
         age = np.minimum(done - self._changed[which], task.shortest_hold)
@@ -246,5 +254,10 @@ class Jobs:
         for column, entry in enumerate(entries):
             values[:, column] = entry
         period = rules.variants.nominal.period_at(speed)
-        values[:, len(COMMANDED) :] = felt(task, cycles, task.cycles_per_step, period, generators)
+        features, peaks = felt(task, cycles, task.cycles_per_step, period, generators)
+        values[:, len(COMMANDED) : len(OBSERVATION_NAMES)] = features
+        if self._monitor is not None:
+            for column in peaks.T:
+                self._monitor.add(which, column, max(task.sensor_error, LEAST_ERROR))
+            values[:, -1] = self._monitor.level(which)
         return np.clip(values, rules.space.low, rules.space.high, out=values)

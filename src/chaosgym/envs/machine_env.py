@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from chaosgym.envs.drive import action_space, checked_actions
 from chaosgym.envs.jobs import Indices, Jobs, Rules
-from chaosgym.envs.observation import OBSERVATION_NAMES, Observation, observation_space
+from chaosgym.envs.observation import Observation, observation_names, observation_space
 from chaosgym.envs.setups import setup_of
 from chaosgym.envs.task import Status, Task, split
 from chaosgym.envs.variants import Variants, checked_numbers
@@ -137,7 +137,6 @@ class MachineEnv(gym.Env[Observation, Any]):
     """
 
     metadata = METADATA
-    observation_names = OBSERVATION_NAMES
 
     def __init__(self, machine: str, *, render_mode: str | None = None, **keywords: Any) -> None:
         if render_mode is not None and render_mode not in METADATA["render_modes"]:
@@ -146,6 +145,7 @@ class MachineEnv(gym.Env[Observation, Any]):
         self.workplace = Workplace(machine, **keywords)
         self.task, self.model = self.workplace.task, self.workplace.model
         self.nominal = self.workplace.variants.nominal
+        self.observation_names = observation_names(self.task)
         self.observation_space = cast(Space[Observation], self.workplace.space)
         self.action_space = cast(Space[Any], self.workplace.actions)
         self._job = Jobs(self.workplace.rules, 1)

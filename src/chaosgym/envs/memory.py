@@ -180,7 +180,7 @@ class VisitedSpeeds(gym.Wrapper[Observation, Any, Observation, Any]):
         task: Task = env.get_wrapper_attr("task")
         self.memory = SpeedMemory(task, 1, usual, learns=learns)
         self.observation_space = cast(Any, remembered_space(task))
-        self.observation_names = (*OBSERVATION_NAMES, *SpeedMemory.names())
+        self.observation_names = (*env.get_wrapper_attr("observation_names"), *SpeedMemory.names())
 
     def reset(self, **keywords: Any) -> tuple[Observation, dict[str, Any]]:
         """Start a job with nothing remembered."""

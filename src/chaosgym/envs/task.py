@@ -78,6 +78,9 @@ class Task:
     sensor_error: float = _number(1.0, unit="N", source="half width of the error of a measured peak force")
     bouncing_error: float = _number(0.05, source="half width of the error of the share of bouncing")
     missed_impacts: float = _number(0.05, high=1.0, source="share of the impacts that the counter misses")
+    monitor: str = parameter(
+        "off", choices=("off", "on"), provenance="assumed", source="whether the monitor's level is observed too"
+    )
     speed_ripple: float = _number(0.0, high=0.1, source="standard deviation of a cycle's speed, as a share of it")
     kick: float = _number(
         0.0, high=0.1, source="standard deviation of the change of each velocity once a cycle, as a share of its range"

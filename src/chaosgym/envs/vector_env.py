@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from chaosgym.envs.drive import checked_actions
 from chaosgym.envs.jobs import Indices, Jobs
 from chaosgym.envs.machine_env import METADATA, Start, Workplace, start_of
-from chaosgym.envs.observation import OBSERVATION_NAMES, Observation
+from chaosgym.envs.observation import Observation, observation_names
 from chaosgym.errors import ParameterError
 
 Actions = NDArray[Any]
@@ -49,7 +49,6 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         If a value is out of range; names it and the allowed range.
     """
 
-    observation_names = OBSERVATION_NAMES
     render_mode = None
 
     def __init__(
@@ -74,6 +73,7 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         self.workplace = Workplace(machine, **keywords)
         self.task, self.model = self.workplace.task, self.workplace.model
         self.nominal = self.workplace.variants.nominal
+        self.observation_names = observation_names(self.task)
         self.jobs = Jobs(self.workplace.rules, num_envs)
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._limit = max_episode_steps

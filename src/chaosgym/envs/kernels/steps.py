@@ -46,33 +46,39 @@ def recurrence_misses(peaks: Array, misses: Array) -> None:
 
 @njit(cache=True, nogil=True)
 def sensed(
-    peak_force: Array, impacts: NDArray[np.int64], bounce_duration: Array, period: Array, errors: Array, features: Array
+    peak_force: Array,
+    impacts: NDArray[np.int64],
+    bounce_duration: Array,
+    period: Array,
+    errors: Array,
+    measured: Array,
+    features: Array,
 ) -> None:
-    """What sensors report of the last cycles of k machines, ``features`` (k, 8) as in ``observation.FELT``.
+    """What sensors report of the last cycles of k machines: peaks ``measured`` (k, last) and ``features`` (k, 8).
 
     ``peak_force``, ``impacts`` and ``bounce_duration`` (k, cycles, sides), ``period`` (k,). ``errors`` (k, last + 1)
-    are those of the peak forces of the first side, and of the share of bouncing. Impacts are the number of all.
+    are those of the peak forces of the first side, and of the share of bouncing. Features are ``observation.FELT``, but
+    with the number of all impacts.
     """
     count, last = errors.shape[0], errors.shape[1] - 1
     first, sides = peak_force.shape[1] - last, peak_force.shape[2]
-    measured = np.empty(last)
     for i in range(count):
         total, largest, bouncing, contacts = 0.0, 0.0, 0.0, 0
         for k in range(last):
-            measured[k] = max(peak_force[i, first + k, 0] + errors[i, k], 0.0)
-            total += measured[k]
-            largest = max(largest, measured[k])
+            measured[i, k] = max(peak_force[i, first + k, 0] + errors[i, k], 0.0)
+            total += measured[i, k]
+            largest = max(largest, measured[i, k])
             for side in range(sides):
                 bouncing += bounce_duration[i, first + k, side]
                 contacts += impacts[i, first + k, side]
         mean, squares = total / last, 0.0
         for k in range(last):
-            squares += (measured[k] - mean) ** 2
+            squares += (measured[i, k] - mean) ** 2
         features[i, 0], features[i, 1], features[i, 2] = mean, np.sqrt(squares / last), largest
         for column, lag in enumerate(LAGS):
             missed = 0.0
             for k in range(lag, last):
-                missed += abs(measured[k] - measured[k - lag])
+                missed += abs(measured[i, k] - measured[i, k - lag])
             features[i, 3 + column] = missed / max(1, last - lag)
         features[i, 6] = contacts
         features[i, 7] = 2.0 * bouncing / (last * sides * period[i]) + errors[i, last]
