@@ -7,6 +7,7 @@ import pytest
 
 from chaosgym.machines import MACHINES
 from chaosgym.machines.parameters import markdown_table
+from thesis.machines import MACHINES as THESIS_MACHINES
 from thesis.scorecard.observation import THOROUGH
 from thesis.scorecard.page import row
 from thesis.scorecard.scorecard import evaluate
@@ -58,7 +59,7 @@ def test_scorecard_page_shows_what_the_machines_do():
         "SSC-111",
     )
     chosen = [one for one in read_comparisons().compared if one.id in cheap]
-    judged = evaluate(chosen, {name: MACHINES[name]() for name in PACKAGED}, efforts=THOROUGH)
+    judged = evaluate(chosen, THESIS_MACHINES, efforts=THOROUGH)
     assert [row(one) for one in judged if row(one) not in page] == []
 
 

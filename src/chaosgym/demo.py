@@ -6,7 +6,6 @@ it with following the demand and with backing off. Every number is computed here
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from chaosgym.control.policies.export import exported
 from chaosgym.control.rollout import Played, Policy, play
 from chaosgym.diagnosis import two_step_test
 from chaosgym.errors import ChaosgymError, DatasetError
-from chaosgym.machines import THESIS_IMPACT_BEAM
+from chaosgym.machines import ImpactBeam
 from chaosgym.simulation import CycleRecord, simulate
 from chaosgym.sweeps import Axis, LabelledSweep, SweepPlan, run_sweep
 
@@ -71,7 +70,7 @@ def run_demo(folder: str | Path, seed: int = 0, say: Callable[[str], None] = pri
 
     say("1/5 simulate three points")
     records = {kind: _run_point(*point) for kind, point in POINTS.items()}
-    plan = SweepPlan(THESIS_IMPACT_BEAM, AXES)
+    plan = SweepPlan(ImpactBeam(), AXES)
     say(f"2/5 label a sweep of {len(plan)} points")
     sweep = run_sweep(plan, folder / "sweep", progress=True)
     say("3/5 train and test the classifier")
@@ -99,7 +98,7 @@ def run_demo(folder: str | Path, seed: int = 0, say: Callable[[str], None] = pri
 
 
 def _run_point(frequency: float, clearance: float) -> CycleRecord:
-    return simulate(replace(THESIS_IMPACT_BEAM, excitation_frequency=frequency, clearance=clearance), 400)
+    return simulate(ImpactBeam(excitation_frequency=frequency, clearance=clearance), 400)
 
 
 def _point_row(kind: str, record: CycleRecord, sweep: LabelledSweep) -> dict[str, Any]:

@@ -53,7 +53,7 @@ def test_carrying_deviations_does_not_touch_the_motion():
     """The run with deviations is the run without, to the last bit."""
     beam = ImpactBeam()
     plain = simulate(beam, 50)
-    record, _, _ = simulate_with_deviations(beam, 50, deviations=np.eye(10)[:2])
+    record, _, _ = simulate_with_deviations(beam, 50, deviations=np.eye(beam.n_states)[:2])
     assert np.array_equal(plain.section, record.section)
     assert np.array_equal(plain.peak_force, record.peak_force)
     assert np.array_equal(plain.final_state.coordinates, record.final_state.coordinates)
@@ -62,13 +62,13 @@ def test_carrying_deviations_does_not_touch_the_motion():
 def test_growth_does_not_depend_on_how_the_run_is_cut():
     """One deviation over 20 cycles equals two times 10 cycles."""
     beam = ImpactBeam()
-    whole = simulate_with_deviations(beam, 20, deviations=np.ones((1, 10)))
-    first = simulate_with_deviations(beam, 10, deviations=np.ones((1, 10)))
+    whole = simulate_with_deviations(beam, 20, deviations=np.ones((1, beam.n_states)))
+    first = simulate_with_deviations(beam, 10, deviations=np.ones((1, beam.n_states)))
     second = simulate_with_deviations(beam, 10, first[0].final_state, deviations=first[1])
     assert np.array_equal(whole[2], np.concatenate([first[2], second[2]]))
 
 
 def test_deviations_of_a_wrong_shape_are_refused():
     """The error names the shape."""
-    with pytest.raises(ParameterError, match=r"\(m, 10\)"):
+    with pytest.raises(ParameterError, match=r"\(m, 12\)"):
         simulate_with_deviations(ImpactBeam(), 1, deviations=np.eye(3))

@@ -1,5 +1,6 @@
 """The ladder of models: what a rung sets, what contradicts it, and that finer models come nearer to the finest."""
 
+import json
 import pickle
 from dataclasses import replace
 from itertools import pairwise
@@ -15,6 +16,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import CycleRecord, simulate
+from thesis.machines import MACHINES
 
 
 @pytest.mark.parametrize("machine", [ImpactBeam, SliderCrank])
@@ -38,8 +40,16 @@ def test_a_machine_keeps_its_rung_when_other_fields_change():
     [
         (ImpactBeam, {"fidelity": "fine", "n_modes": 5}, "'fine' sets n_modes = 6, and n_modes = 5 is given too"),
         (ImpactBeam, {"fidelity": "fine", "n_modes": 6}, "'fine' sets n_modes = 6, and n_modes = 6 is given too"),
-        (SliderCrank, {"fidelity": "rigid", "rod": "flexible"}, "'rigid' sets rod = 'rigid', and rod = 'flexible'"),
+        (SliderCrank, {"fidelity": "draft", "rod": "rigid"}, "'draft' sets rod = 'flexible', and rod = 'rigid'"),
         (ImpactBeam, {"fidelity": "flexible-1deg"}, "'flexible-1deg' is not one of draft, standard, fine, reference"),
+        (SliderCrank, {"fidelity": "finest"}, "'finest' is not one of draft, standard, fine, reference"),
+        (SliderCrank, {"fidelity": "rigid"}, "'rigid' is no rung any more; allowed: rod='rigid'"),
+        (SliderCrank, {"fidelity": "flexible-5deg"}, "'flexible-5deg' is no rung any more; allowed: fidelity='draft'"),
+        (
+            SliderCrank,
+            {"fidelity": "flexible-1deg"},
+            "'flexible-1deg' is no rung any more; allowed: fidelity='standard'",
+        ),
         (ImpactBeam, {"fidelity": "modes-8"}, "'modes-8' is no rung any more; allowed: fidelity='fine'"),
         (ImpactBeam, {"fidelity": "rigid"}, "'rigid' is no rung any more; allowed: n_modes=1, fitted_modes=0"),
     ],
@@ -61,7 +71,7 @@ def test_every_rung_answers_with_the_same_record(machine):
         assert record.history.shape == (2, 8, 3)
         assert np.all(record.peak_force > 0.0)
     assert simulate(ImpactBeam(fidelity="standard"), 1).section.shape == (1, 12)
-    assert simulate(SliderCrank(fidelity="rigid"), 1).section.shape == (1, 2)
+    assert simulate(SliderCrank(fidelity="draft"), 1).section.shape == (1, 10)
 
 
 def test_finer_models_come_nearer_to_the_reference():
@@ -84,6 +94,28 @@ def test_finer_models_come_nearer_to_the_reference():
     assert errors[3] < np.sqrt(np.mean((motion(n_modes=8, fitted_modes=0) - reference) ** 2))
 
 
+def test_the_reference_does_not_move_with_twice_as_many_modes():
+    """The zero of the beam's ladder: peak forces at periodic points and the path from rest, to a millionth."""
+    for frequency, clearance in ((19.0, 0.127e-3), (10.0, 0.1e-3), (6.0, 0.05e-3)):
+        reference = ImpactBeam(fidelity="reference", excitation_frequency=frequency, clearance=clearance)
+        _agree(reference, replace(reference, n_modes=40), 100, peaks=3e-6, path=3e-6)
+
+
+@pytest.mark.slow
+def test_the_reference_of_the_crank_does_not_move_with_twice_as_many_modes():
+    """The zero of the crank's ladder: at a periodic point to some hundred-thousandths, a tenth of ``fine``'s error."""
+    reference = SliderCrank(fidelity="reference", crank_speed=270.0, slider_clearance=0.032e-3)
+    _agree(reference, replace(reference, n_modes=10), 30, peaks=5e-5, path=5e-5)
+
+
+def _agree(one, other, transient, *, peaks, path):
+    """Mean peak forces of settled cycles, and the path over a cycle from rest, by their relative difference."""
+    means = [simulate(machine, 10, transient=transient).peak_force.mean() for machine in (one, other)]
+    assert means[0] == pytest.approx(means[1], rel=peaks)
+    paths = [simulate(machine, 1, samples_per_cycle=500).history[0, :, 0] for machine in (one, other)]
+    assert np.sqrt(np.mean((paths[0] - paths[1]) ** 2)) < path * np.sqrt(np.mean(paths[1] ** 2))
+
+
 def test_the_reference_places_events_most_tightly():
     """Without an integrator the reference runs at an event tolerance of 1e-13, all others at 1e-9."""
     assert ImpactBeam(fidelity="reference").default_integrator.event_tolerance == 1e-13
@@ -91,9 +123,7 @@ def test_the_reference_places_events_most_tightly():
     assert SliderCrank(fidelity="reference").default_integrator.event_tolerance == 1e-9
 
 
-@pytest.mark.parametrize(
-    ("env_id", "rung"), [("chaosgym/ImpactBeam-v1", "draft"), ("chaosgym/SliderCrank-v1", "rigid")]
-)
+@pytest.mark.parametrize(("env_id", "rung"), [("chaosgym/ImpactBeam-v1", "draft"), ("chaosgym/SliderCrank-v1", "fine")])
 def test_environments_take_the_keyword(env_id, rung):
     """gym.make(..., fidelity=rung) runs that model; a field that it sets may not be given too."""
     assert chaosgym.__version__
@@ -107,10 +137,15 @@ def test_environments_take_the_keyword(env_id, rung):
     env.close()
 
 
-def test_the_crank_environment_updates_its_matrices_every_five_degrees():
-    """Its default is the rung flexible-5deg, and the interval may still be given by itself."""
-    assert gym.make("chaosgym/SliderCrank-v1").unwrapped.nominal.rung == "flexible-5deg"
-    assert gym.make("chaosgym/SliderCrank-v1", matrix_update_interval=1.0).unwrapped.nominal.rung == "flexible-1deg"
+@pytest.mark.parametrize("machine", [ImpactBeam, SliderCrank])
+def test_the_rung_standard_is_the_default(machine):
+    """Of a machine, an environment and the command line; the thesis' own models stand beside the ladder."""
+    assert machine().rung == "standard"
+    assert gym.make(f"chaosgym/{machine.__name__}-v1").unwrapped.nominal.rung == "standard"
+    shown = CliRunner().invoke(app, ["show", machine.name, "--json"])
+    settings = json.loads(shown.output)["parameters"]
+    assert settings.items() >= machine.fidelity_ladder["standard"].items()
+    assert MACHINES[machine.name].rung is None
 
 
 def test_the_command_line_takes_the_option():

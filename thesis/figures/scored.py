@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chaosgym.machines import MACHINES, Machine
+from chaosgym.machines import Machine
 from thesis.cache import default_folder
 from thesis.figures.computations import Computation, Data
 from thesis.figures.figure import Finding, Parts
 from thesis.figures.printed import comparison
+from thesis.machines import MACHINES
 from thesis.scorecard.observation import THOROUGH
 from thesis.scorecard.scorecard import evaluate
 from thesis.statements import Comparison
@@ -39,7 +40,7 @@ class Scored:
 def scored(*targets: str) -> Mapping[str, Computation]:
     """Parts of a figure: some statements, each under its name."""
     compared = {target: comparison(target) for target in targets}
-    return {target: Scored(comparison=one, machine=MACHINES[one.machine]()) for target, one in compared.items()}
+    return {target: Scored(comparison=one, machine=MACHINES[one.machine]) for target, one in compared.items()}
 
 
 def agrees(parts: Parts, *targets: str) -> bool:

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from chaosgym.machines import MACHINES, Machine
+from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.version import __version__
+from thesis.machines import MACHINES
 from thesis.scorecard.jobs import Job, run_jobs
 from thesis.scorecard.observation import THOROUGH, Effort
 from thesis.scorecard.quantities import QUANTITIES
@@ -92,7 +93,7 @@ def scorecard(
     """
     wanted = set(MACHINES) if machines is None else set(machines)
     comparisons = [one for one in read_comparisons().compared if one.machine in wanted]
-    made = {name: (bases or {}).get(name) or MACHINES[name]() for name in wanted}
+    made = {name: (bases or {}).get(name) or MACHINES[name] for name in wanted}
     return Scorecard(
         evaluate(
             comparisons,

@@ -1,4 +1,4 @@
-"""The trade of speed for accuracy: every rung, integrator and step of a machine against the reference.
+"""The trade of speed for accuracy: every rung of a machine, and fixed steps on the default one, against the reference.
 
 Cost is processor time per operating cycle. Accuracy is measured three ways, at a fixed sample of operating points over
 the range that the machine usually runs in:
@@ -50,8 +50,8 @@ CHAOTIC_SHARE = 3
 MAX_DRAWS = 20
 """Candidates that are judged for each point of the sample at most."""
 
-EXACT_STEPS = (0.5,)
-"""Exact steps: angles [rad] by which the fastest mode turns in the shortest interval. Their errors are equal."""
+EXACT_STEP = 0.5
+"""Angle [rad] by which the fastest mode turns in the shortest exact interval; the errors of others are equal."""
 
 FIXED_STEPS = (1.0, 0.3, 0.1)
 """Steps of Runge-Kutta's method, likewise."""
@@ -204,7 +204,7 @@ def tradeoff(
 
     bar = "tradeoff" if progress else None
     found = dict(zip(chosen, parallel_map(measure, chosen, workers=workers, progress=bar), strict=True))
-    reference = found[Setting(REFERENCE, "exact", EXACT_STEPS[0])]
+    reference = found[Setting(REFERENCE, "exact", EXACT_STEP)]
     if isinstance(reference, ChaosgymError):
         raise reference
     rows = [_row(setting, result, reference) for setting, result in found.items() if isinstance(result, _Measured)]
@@ -227,11 +227,12 @@ def tradeoff(
 
 
 def settings_of(machine: Machine) -> list[Setting]:
-    """Every rung with every integrator that runs it and every step."""
+    """Every rung by exact events, and the default rung by Runge-Kutta's method at every step."""
     rungs = list(machine.fidelity_ladder)
-    fixed = [rung for rung in rungs if with_settings(machine, {"fidelity": rung}).runs_fixed_steps]
-    return [Setting(rung, "exact", step) for rung in rungs for step in EXACT_STEPS] + [
-        Setting(rung, "Runge-Kutta 4", step) for rung in fixed for step in FIXED_STEPS
+    default = type(machine)().rung or REFERENCE
+    fixed = with_settings(machine, {"fidelity": default}).runs_fixed_steps
+    return [Setting(rung, "exact", EXACT_STEP) for rung in rungs] + [
+        Setting(default, "Runge-Kutta 4", step) for step in FIXED_STEPS if fixed
     ]
 
 

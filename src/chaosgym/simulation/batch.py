@@ -1,6 +1,6 @@
 """Many machines side by side: each goes on from where it is, at a speed of its own.
 
-batch = batch_of(THESIS_IMPACT_BEAM, 256)
+batch = batch_of(ImpactBeam(), 256)
 batch.start(0, machine)                  # from rest; the same for 1, 2, ...
 batch.set_speeds(which, speeds)
 cycles = batch.run(which, 5)             # one compiled call on all processors

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.beam_element import bending_matrices, graded_mesh
+from chaosgym.machines.fitted_modes import fitted_modes
 from chaosgym.machines.impact_beam.parameters import BeamParameters
 from chaosgym.machines.modal_impact import Modes
 
@@ -70,13 +71,12 @@ def modal_analysis(beam: BeamParameters, elements: int | None = None) -> Modes:
     reference, ends = angular[1], np.stack([shapes[tip], shapes[at_force]])
     if beam.fitted_modes:
         try:
-            others = fitted_modes(angular[beam.n_modes :], ends[:, beam.n_modes :], beam.fitted_modes)
+            fitted, mix = fitted_modes(angular[beam.n_modes :], ends[0, beam.n_modes :], beam.fitted_modes)
         except np.linalg.LinAlgError as error:
             raise _inseparable(beam) from error
-        angular, ends = (
-            np.concatenate([own[..., : beam.n_modes], other], axis=-1)
-            for own, other in zip((angular, ends), others, strict=True)
-        )
+        at_ends = ends[:, beam.n_modes :] @ mix
+        angular = np.concatenate([angular[: beam.n_modes], fitted])
+        ends = np.hstack([ends[:, : beam.n_modes], at_ends * np.where(at_ends[0] < 0.0, -1.0, 1.0)])
     else:
         angular, ends = angular[: beam.n_modes], ends[:, : beam.n_modes]
     if beam.damping_family == "uniform":
@@ -85,54 +85,6 @@ def modal_analysis(beam: BeamParameters, elements: int | None = None) -> Modes:
         ratio = beam.damping_ratio * angular / reference
     damping = np.diag(2.0 * ratio * angular) + beam.shaker_damping * np.outer(ends[1], ends[1])
     return Modes(angular, damping, ends[0].copy(), ends[1].copy())
-
-
-def fitted_modes(angular: Array, shapes: Array, count: int) -> tuple[Array, Array]:
-    """A few modes that deflect the tip as many do.
-
-    They are the Ritz vectors of the Krylov space of the tip's static deflection, by Lanczos: the nodes 1 / w^2 and
-    weights phi^2 / w^2 of the Gauss quadrature of sum phi_i^2 / w_i^2 over 1 / w_i^2, which match the first 2 count
-    moments of the tip's response to a slow force on it, its compliance first.
-
-    Parameters
-    ----------
-    angular : (m,)
-        Angular frequencies [rad/s] of the modes that are replaced.
-    shapes : (2, m)
-        Their mass-normalised shapes [kg^-1/2] at the tip and at a second place.
-    count
-        Number of modes that replace them.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        When fewer than ``count`` independent deflections are left above rounding.
-
-    References
-    ----------
-    G. H. Golub, G. Meurant, Matrices, Moments and Quadrature with Applications, Princeton 2010, chapter 6.
-    """
-    if len(angular) < count:
-        raise np.linalg.LinAlgError(f"{len(angular)} modes can't be replaced by {count}")
-    slowest = angular[0]
-    flexibility = (slowest / angular) ** 2
-    basis = np.empty((len(angular), count))
-    column = shapes[0] * slowest / angular
-    least = 1e-14 * float(np.linalg.norm(column))
-    for k in range(count):
-        for _ in range(2):
-            column = column - basis[:, :k] @ (basis[:, :k].T @ column)
-        size = np.linalg.norm(column)
-        if size <= least:
-            raise np.linalg.LinAlgError(f"only {k} of {count} fitted modes are independent")
-        basis[:, k], least = column / size, 1e-14
-        column = basis[:, k] * flexibility
-    inverse_squares, turn = np.linalg.eigh(basis.T @ (basis * flexibility[:, None]))
-    if inverse_squares[0] <= 1e-14 * inverse_squares[-1]:
-        raise np.linalg.LinAlgError("rounding hides the fastest of the fitted modes")
-    fitted = slowest / np.sqrt(inverse_squares[::-1])
-    ends = (shapes / angular) @ (basis @ turn[:, ::-1]) * fitted
-    return fitted, ends * np.where(ends[0] < 0.0, -1.0, 1.0)
 
 
 def _inseparable(beam: BeamParameters) -> ParameterError:

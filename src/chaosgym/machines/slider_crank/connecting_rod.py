@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.machines.beam_element import bending_matrices, interpolation
+from chaosgym.machines.fitted_modes import fitted_modes
 
 Array = NDArray[np.float64]
 
@@ -110,8 +111,10 @@ def _symmetric(matrix: Array) -> Array:
     return 0.5 * (matrix + np.swapaxes(matrix, -1, -2))
 
 
-def connecting_rod(bar: Bar, housing: EndBody, yoke: EndBody, n_modes: int, elements: int) -> ConnectingRod:
-    """Assemble the finite elements and keep the ends' translations and ``n_modes`` modes.
+def connecting_rod(
+    bar: Bar, housing: EndBody, yoke: EndBody, n_modes: int, elements: int, fitted: int = 0
+) -> ConnectingRod:
+    """Assemble the finite elements and keep the ends' translations, ``n_modes`` modes and those fitted to all others.
 
     Parameters
     ----------
@@ -123,6 +126,8 @@ def connecting_rod(bar: Bar, housing: EndBody, yoke: EndBody, n_modes: int, elem
         Number of bending modes; 0 for a rod that stays straight.
     elements
         Number of finite elements, at least two.
+    fitted
+        Number of modes that stand for those left out, as inertia that the slider's end feels.
     """
     area = math.pi * bar.diameter**2 / 4.0
     line_mass = bar.density * area
@@ -180,7 +185,7 @@ def connecting_rod(bar: Bar, housing: EndBody, yoke: EndBody, n_modes: int, elem
     mass = translating + inertia
 
     inner = [i for i in range(3, size) if i != size - 2]
-    basis = np.zeros((size, 4 + n_modes))
+    basis = np.zeros((size, 4 + n_modes + fitted))
     node = np.linspace(0.0, 1.0, elements + 1)
     basis[0, ALONG_A] = basis[1, ALONG_B] = 1.0
     basis[2::2, ACROSS_A], basis[2::2, ACROSS_B] = 1.0 - node, node
@@ -190,9 +195,15 @@ def connecting_rod(bar: Bar, housing: EndBody, yoke: EndBody, n_modes: int, elem
         from scipy.linalg import eigh
 
         at = np.ix_(inner, inner)
-        squares, shapes = eigh(stiffness[at], mass[at], subset_by_index=[0, n_modes - 1])
-        basis[inner, MODES:] = shapes * np.where(shapes[0] < 0.0, -1.0, 1.0)
+        last = len(inner) if fitted else n_modes
+        squares, shapes = eigh(stiffness[at], mass[at], subset_by_index=[0, last - 1])
         frequency = np.sqrt(squares)
+        if fitted:
+            driven = shapes.T @ (mass @ basis[:, ACROSS_B])[inner]
+            replaced, mix = fitted_modes(frequency[n_modes:], driven[n_modes:], fitted)
+            frequency = np.concatenate([frequency[:n_modes], replaced])
+            shapes = np.hstack([shapes[:, :n_modes], shapes[:, n_modes:] @ mix])
+        basis[inner, MODES:] = shapes * np.where(shapes[0] < 0.0, -1.0, 1.0)
 
     def reduced(matrix: Array) -> Array:
         return np.asarray(basis.T @ matrix @ basis)

@@ -81,8 +81,9 @@ def degrees_of_freedom(machine: "SliderCrank", spatial: bool = False) -> tuple[s
     if machine.slider_joint == "instrumented":
         names += SLIDER_TURNS if spatial else (SLIDER_PITCH,)
     if machine.rod == "flexible":
-        names += [f"rod mode {i + 1}" for i in range(machine.n_modes)]
-        names += [f"sideways rod mode {i + 1}" for i in range(machine.n_modes)] if spatial else []
+        modes = range(1, 1 + machine.n_modes + machine.fitted_modes)
+        names += [f"rod mode {i}" for i in modes]
+        names += [f"sideways rod mode {i}" for i in modes] if spatial else []
     return tuple(names)
 
 
@@ -131,8 +132,14 @@ def rod_of(machine: "SliderCrank") -> ConnectingRod:
         machine.housing_mass, machine.housing_inertia, machine.housing_offset_along, machine.housing_offset_across
     )
     yoke = EndBody(machine.yoke_mass, machine.yoke_inertia, machine.yoke_offset_along, machine.yoke_offset_across)
-    modes = machine.n_modes if machine.rod == "flexible" else 0
-    return connecting_rod(bar_of(machine), housing, yoke, modes, max(ELEMENTS, 2 * modes))
+    return connecting_rod(bar_of(machine), housing, yoke, *modes_of(machine))
+
+
+def modes_of(machine: "SliderCrank") -> tuple[int, int, int]:
+    """Modes of the rod that are kept, its finite elements, and the modes that are fitted."""
+    if machine.rod == "rigid":
+        return 0, ELEMENTS, 0
+    return machine.n_modes, max(ELEMENTS, 2 * machine.n_modes), machine.fitted_modes
 
 
 def mode_damping(machine: "SliderCrank", rod: ConnectingRod) -> tuple[Array, Array]:

@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 from chaosgym.machines.slider_crank.connecting_rod import ConnectingRod, EndBody, connecting_rod
 from chaosgym.machines.slider_crank.equations import (
     BALL_DIRECTIONS,
-    ELEMENTS,
     ROD_STRETCH,
     SLIDER_ACROSS,
     SLIDER_LATERAL,
     SLIDER_TURNS,
     bar_of,
     degrees_of_freedom,
+    modes_of,
     rod_of,
 )
 from chaosgym.machines.slider_crank.kinematics import crank_pin, slider_position
@@ -96,8 +96,7 @@ def rods_of(machine: "SliderCrank") -> Rods:
     swing = rod_of(machine)
     still = EndBody(machine.yoke_mass, 0.0, 0.0, 0.0)
     housing = EndBody(machine.housing_mass, machine.housing_inertia, machine.housing_offset_along, 0.0)
-    modes = len(swing.mode_frequency)
-    return Rods(swing, connecting_rod(bar_of(machine), housing, still, modes, max(ELEMENTS, 2 * modes)))
+    return Rods(swing, connecting_rod(bar_of(machine), housing, still, *modes_of(machine)))
 
 
 def frame_at(machine: "SliderCrank", angle: Array) -> Frame:
