@@ -62,11 +62,12 @@ def task_classifier():
 
 def task_policy():
     """Shipped policies; each command goes on where it was stopped."""
+    work = sorted(map(str, Path("src/chaosgym/machines").glob("*/work.py")))
     for name, command in POLICIES.items():
         folder, run = SHIPPED / name, f"{RUNS}/{name}"
         made = [f"{folder}/{file}" for file in ("policy.json", "weights.npz", "progress.csv")]
         copies = [f"cp {run}/{Path(file).name} {file}" for file in made]
-        yield task(name, ["src/chaosgym/envs/setups.py"], made, f"{command} --out {run}", *copies)
+        yield task(name, ["src/chaosgym/envs/setups.py", *work], made, f"{command} --out {run}", *copies)
 
 
 def task_scores():

@@ -72,7 +72,7 @@ def page(name: str) -> str:
     env: Any = gym.make(name).unwrapped
     task, nominal = env.task, env.nominal
     unit = parameters_of(nominal)[nominal.speed_field].unit
-    widths = {parameter: f"+-{100 * width:g} %" for parameter, width in setup_of(type(nominal)).tolerances.items()}
+    widths = {parameter: f"+-{100 * width:g} %" for parameter, width in setup_of(nominal).tolerances.items()}
     kind = kind_of(name)
     moves = [f"{task.trim_step * move:+g} {unit} of trim" if move else "hold" for move in MOVES]
     noise = []

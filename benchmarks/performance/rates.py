@@ -18,8 +18,8 @@ from tqdm import tqdm
 
 from benchmarks.performance.timing import Rate, rate
 from chaosgym.classifier import default_classifier
-from chaosgym.envs import MACHINES
 from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, Machine
+from chaosgym.machines.registry import MACHINES
 from chaosgym.simulation import ExactEvents, Integrator, RungeKutta4, simulate
 from chaosgym.sweeps import SweepPlan, run_sweep
 from chaosgym.sweeps.plan import default_axes
@@ -130,7 +130,7 @@ def cycle_rate(point: tuple[Machine, Integrator, int], repeats: int) -> Rate:
 
 
 def _environments() -> list[str]:
-    names = [f"chaosgym/{machine}-v1" for machine in MACHINES.values()]
+    names = [f"chaosgym/{MACHINES.class_name(name)}-v1" for name in MACHINES]
     for name in OTHER_ENVIRONMENTS:
         try:
             gym.make(name).close()

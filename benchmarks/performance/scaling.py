@@ -15,8 +15,8 @@ import numba
 import numpy as np
 
 from benchmarks.performance.rates import SUB_ENVIRONMENTS
-from chaosgym.envs import MACHINES
 from chaosgym.envs.jobs import Indices
+from chaosgym.machines.registry import MACHINES
 from chaosgym.simulation.batch import Batch, Cycles
 
 WARM_UP_STEPS = 12
@@ -77,7 +77,7 @@ def vector_scaling(repeats: int = 5) -> list[Scaling]:
 
     A first run, in which kernels are loaded and the crank meets its speeds, is not counted.
     """
-    return [_scaling_of(f"chaosgym/{machine}-v1", repeats) for machine in MACHINES.values()]
+    return [_scaling_of(f"chaosgym/{MACHINES.class_name(name)}-v1", repeats) for name in MACHINES]
 
 
 def _scaling_of(name: str, repeats: int) -> Scaling:

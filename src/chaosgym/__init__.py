@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from chaosgym.diagnosis.step_check import step_check
     from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
     from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, ImpactBeam, SliderCrank
+    from chaosgym.machines.modal_machine import Drive, ModalMachine, Structure, read_machine
     from chaosgym.simulation import CycleRecord, ExactEvents, RungeKutta4, simulate, simulate_many
     from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
 
@@ -30,6 +31,7 @@ _HOME = {
     "chaosgym.diagnosis.step_check": ("step_check",),
     "chaosgym.errors": ("ChaosgymError", "ParameterError", "SimulationError"),
     "chaosgym.machines": ("THESIS_IMPACT_BEAM", "THESIS_SLIDER_CRANK", "ImpactBeam", "SliderCrank"),
+    "chaosgym.machines.modal_machine": ("Drive", "ModalMachine", "Structure", "read_machine"),
     "chaosgym.simulation": ("CycleRecord", "ExactEvents", "RungeKutta4", "simulate", "simulate_many"),
     "chaosgym.sweeps": ("Axis", "SweepPlan", "read_sweep", "run_sweep"),
 }
@@ -42,19 +44,23 @@ __all__ = [
     "ChaosgymError",
     "CycleRecord",
     "Diagnosis",
+    "Drive",
     "ExactEvents",
     "ImpactBeam",
     "MachineClassifier",
+    "ModalMachine",
     "ParameterError",
     "ResponseClassifier",
     "RungeKutta4",
     "SimulationError",
     "SliderCrank",
+    "Structure",
     "SweepPlan",
     "__version__",
     "default_classifier",
     "diagnose",
     "evaluate",
+    "read_machine",
     "read_sweep",
     "response_map",
     "response_type",

@@ -17,6 +17,7 @@ from chaosgym.version import __version__
 COMMANDS = {
     "simulate": "simulate:simulate",
     "show": "simulate:show",
+    "new-machine": "new_machine:new_machine",
     "diagnose": "diagnose:diagnose",
     "classify": "classify:classify",
     "sweep": "sweep:sweep",

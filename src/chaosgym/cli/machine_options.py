@@ -13,23 +13,24 @@ import click
 from chaosgym.cli.quantity import Quantity, millimetres_meant
 from chaosgym.errors import ParameterError
 from chaosgym.machines.options import Choice, Number, Option
-from chaosgym.machines.registry import MACHINES
+from chaosgym.machines.registry import FILE_ENDING, MACHINES
 
 
 class MachineName(click.ParamType):  # type: ignore[type-arg]
-    """Name of a machine that is registered when the command runs."""
+    """Name of a machine that is registered when the command runs, or the file of one's own."""
 
     name = "machine"
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
         """Return the known names, as ``click.Choice`` shows them."""
-        names = "|".join(sorted(MACHINES))
+        names = "|".join([*sorted(MACHINES), f"FILE{FILE_ENDING}"])
         return f"{{{names}}}" if param.required else f"[{names}]"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Return the name, or say which there are."""
         if value not in MACHINES:
-            self.fail(f"{value!r} is not one of {', '.join(repr(name) for name in sorted(MACHINES))}.", param, ctx)
+            names = ", ".join(repr(name) for name in sorted(MACHINES))
+            self.fail(f"{value!r} is not one of {names}, nor a file that ends in {FILE_ENDING}.", param, ctx)
         return str(value)
 
 

@@ -14,6 +14,7 @@ from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError
 from chaosgym.machines import MACHINES, Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
+from chaosgym.machines.registry import FILE_ENDING
 from chaosgym.machines.units import parse_quantity
 
 REQUIRED_CRITERIA = ("load_rating", "life", "reliability")
@@ -70,6 +71,9 @@ def read_brief(path: str | Path) -> DesignBrief:
         raise DesignError(f"{path} can't be read: {error.strerror}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise DesignError(f"{path} is not valid TOML: {error}") from None
+    beside = Path(path).parent / str(values.get("machine"))
+    if beside.suffix == FILE_ENDING and beside.is_file():
+        values["machine"] = str(beside)
     return brief_from(values)
 
 
@@ -102,9 +106,7 @@ def brief_from(values: Mapping[str, Any]) -> DesignBrief:
 
 def _machine(name: Any) -> Any:
     if name not in MACHINES:
-        near = get_close_matches(str(name), MACHINES, n=1)
-        hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(sorted(MACHINES))}"
-        raise DesignError(f"machine = {name!r} does not exist; {hint}")
+        raise DesignError(f"machine = {name!r} does not exist; {MACHINES.listed(name)}")
     return MACHINES[name]()
 
 
@@ -196,7 +198,7 @@ def template(name: str) -> str:
         f'machine = "{name}"',
         f"series = {SERIES_SIZE}  # machines built at random within the tolerances",
         "",
-        "[parameters]  # any field of the machine; those left out keep the value of the thesis",
+        "[parameters]  # any field of the machine; those left out keep its own value",
         f"{speed} = {_quantity(machine, speed)}",
         f"{clearance} = {_quantity(machine, clearance)}  # half the gap",
         "",

@@ -45,7 +45,7 @@ def default_tolerances(machine: Machine) -> dict[str, Tolerance]:
     """Tolerances of a machine's speed, clearance, length and dampings.
 
     Speed +-2 % of a frequency, +-10 rpm of a rotation (thesis 5.5.2); clearance +-5 %; lengths +-0.1 %; every damping
-    +-10 %.
+    +-10 %. A machine that states tolerances has these instead; of speed and clearance where it states none.
     """
     known = parameters_of(machine)
     rotates = known[machine.speed_field].unit == "rpm"
@@ -53,6 +53,8 @@ def default_tolerances(machine: Machine) -> dict[str, Tolerance]:
         machine.speed_field: Tolerance(10.0, relative=False) if rotates else Tolerance(0.02),
         machine.clearance_field: Tolerance(0.05),
     }
+    if machine.tolerances:
+        return tolerances | {name: Tolerance(*stated) for name, stated in machine.tolerances.items()}
     for name in known:
         if name in ("length", "rod_length"):
             tolerances[name] = Tolerance(0.001)

@@ -8,8 +8,7 @@ from typing import Any
 
 from gymnasium.envs.registration import register, registry
 
-MACHINES = {"impact-beam": "ImpactBeam", "slider-crank": "SliderCrank"}
-"""Names of chaosgym's own machines on the command line, and in ids."""
+from chaosgym.machines.registry import MACHINES
 
 TASKS: dict[str, dict[str, Any]] = {
     "": {"tolerances": {}},
@@ -18,7 +17,7 @@ TASKS: dict[str, dict[str, Any]] = {
 }
 """Keywords of each task: the nominal machine, one drawn within tolerances, one whose clearance grows too."""
 
-ENVIRONMENTS = tuple(f"chaosgym/{machine}{task}-v1" for machine in MACHINES.values() for task in TASKS)
+ENVIRONMENTS = tuple(f"chaosgym/{MACHINES.class_name(name)}{task}-v1" for name in MACHINES for task in TASKS)
 """Ids of chaosgym's own machines."""
 
 _LATER = {"SB3VecEnv": "chaosgym.envs.sb3", "VisitedSpeeds": "chaosgym.envs.memory"}
@@ -32,26 +31,26 @@ def __getattr__(name: str) -> Any:
 
 def register_environments() -> None:
     """Make the environments of every registered machine known to ``gymnasium.make``; again does nothing new."""
-    from chaosgym.machines.registry import MACHINES as EVERY
-
-    _register({machine: EVERY.class_name(machine) for machine in EVERY})
-
-
-def _register(machines: dict[str, str]) -> None:
-    for machine, name in machines.items():
+    for machine in MACHINES:
         for task, keywords in TASKS.items():
-            new, old = f"chaosgym/{name}{task}-v1", f"chaosgym/{name}{task}-v0"
-            if new in registry:
-                continue
-            register(
-                id=new,
-                entry_point="chaosgym.envs.machine_env:MachineEnv",
-                vector_entry_point="chaosgym.envs.vector_env:MachineVectorEnv",
-                kwargs={"machine": machine, **keywords},
-            )
-            if new in ENVIRONMENTS:
-                gone = "chaosgym.envs.gone:refuse"
-                register(id=old, entry_point=gone, vector_entry_point=gone, kwargs={"successor": new})
+            _register(f"chaosgym/{MACHINES.class_name(machine)}{task}-v1", {"machine": machine, **keywords})
+    for task, keywords in TASKS.items():
+        _register(f"chaosgym/Machine{task}-v0", keywords)
 
 
-_register(MACHINES)
+def _register(name: str, keywords: dict[str, Any]) -> None:
+    if name in registry:
+        return
+    register(
+        id=name,
+        entry_point="chaosgym.envs.machine_env:MachineEnv",
+        vector_entry_point="chaosgym.envs.vector_env:MachineVectorEnv",
+        kwargs=keywords,
+    )
+    if name in ENVIRONMENTS:
+        gone = "chaosgym.envs.gone:refuse"
+        old = name.replace("-v1", "-v0")
+        register(id=old, entry_point=gone, vector_entry_point=gone, kwargs={"successor": name})
+
+
+register_environments()

@@ -68,7 +68,7 @@ class Workplace:
     Parameters
     ----------
     machine
-        Name of the machine on the command line, such as "impact-beam".
+        Name of the machine on the command line, such as "impact-beam", or the file of your own, "my-machine.toml".
     tolerances
         Half width of each field that varies, as a share of its nominal value; {} for the nominal machine alone.
     fidelity, model_fidelity
@@ -94,19 +94,20 @@ class Workplace:
         **keywords: Any,
     ) -> None:
         if machine not in MACHINES:
-            raise ParameterError(f"machine = {machine!r} is not one of {', '.join(MACHINES)}")
+            raise ParameterError(f"machine = {machine!r} does not exist; {MACHINES.listed(machine)}")
         kind = MACHINES[machine]
-        setup = setup_of(kind)
-        self.task, fields = split(setup.task, kind(), keywords)
-        base = {name: value for name, value in setup.fields.items() if name not in fields}
+        usual: Machine = kind()
+        setup, work = setup_of(usual), usual.work
+        self.task, fields = split(setup.task, usual, keywords)
+        base = {name: value for name, value in work.fields.items() if name not in fields}
         if fidelity is not None:
             base = {name: value for name, value in base.items() if name not in kind.fidelity_ladder.get(fidelity, {})}
             fields["fidelity"] = fidelity
-        nominal: Machine = with_settings(kind(), base | fields)
+        nominal: Machine = with_settings(usual, base | fields)
         for speed in (self.task.lowest_speed, self.task.highest_speed):
             nominal.at(speed)
         self.variants = Variants(nominal, setup.tolerances if tolerances is None else tolerances)
-        rung = model_fidelity or setup.model_fidelity
+        rung = model_fidelity or work.model_fidelity
         self.model = nominal if rung is None else with_settings(nominal, {"fidelity": rung})
         self.space = observation_space(self.task)
         self.actions = action_space(self.task)

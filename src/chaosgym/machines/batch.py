@@ -201,9 +201,19 @@ class ModalImpactBatch(RestitutionBatch):
 
     _varied = staticmethod(advance_varied_beams)
 
+    def __init__(self, machine: "Machine", count: int) -> None:
+        super().__init__(machine, count)
+        self._machines: list[Any] = [machine] * count
+
+    def change(self, i: int, machine: "Machine") -> None:
+        """Put another machine into place i, whose motion goes on."""
+        super().change(i, machine)
+        self._machines[i] = machine
+
     def set_clearances(self, which: Indices, clearances: Array) -> None:
         """Change the clearances [m]."""
-        self._batch.stops[which] = self._machine.stops_at(clearances)  # type: ignore[attr-defined]
+        for i, clearance in zip(which.tolist(), clearances.tolist(), strict=True):
+            self._batch.stops[i] = self._machines[i].stops_at(clearance)
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         given = (self._batch, *self._parts, which, self._motions, arrays, self._settings, outcome)

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,27 @@ if TYPE_CHECKING:
     from chaosgym.machines.batch import CompiledBatch
 
 Array = NDArray[np.float64]
+
+
+class Work(NamedTuple):
+    """The machine at work, as the environments know it.
+
+    Attributes
+    ----------
+    fields
+        Of the nominal machine that differ from the machine's own defaults.
+    model_fidelity
+        Rung of the model that controllers may use; None for the machine's own.
+    tolerances
+        Half widths as shares of the nominal value; None for those of the machine.
+    task
+        Numbers of the task that differ from what follows from the usual ranges.
+    """
+
+    fields: Mapping[str, Any] = {}
+    model_fidelity: str | None = None
+    tolerances: Mapping[str, float] | None = None
+    task: Mapping[str, float] = {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +72,11 @@ class Machine(FidelityLadder, ABC):
     """Scenes whose cost the trade-off shows: the fields in which they differ from the default."""
     extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
     """Ends of what is admissible, by the fields that they set, at which the stability map runs the machine."""
+
+    tolerances: ClassVar[Mapping[str, tuple[float, bool]]] = {}
+    """Half width of each field within which machines are built, and whether it is a share; usual ones if empty."""
+    work: ClassVar[Work] = Work()
+    """What environments start from, where the usual does not serve."""
 
     def __post_init__(self, fidelity: str | None) -> None:
         super().__post_init__(fidelity)

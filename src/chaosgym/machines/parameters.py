@@ -5,7 +5,7 @@ live there and nowhere else; validation, the command line and the documentation 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from types import MappingProxyType
@@ -14,8 +14,9 @@ from typing import Any, Literal, TypeVar
 from chaosgym.errors import ParameterError
 from chaosgym.machines.fidelity import expand_fidelity
 
-Provenance = Literal["printed", "derived", "calibrated", "assumed"]
-"""printed: in the thesis; derived: follows from printed numbers; calibrated: fitted to printed results; assumed."""
+Provenance = Literal["printed", "derived", "calibrated", "assumed", "stated"]
+"""printed: in the thesis; derived: follows from printed numbers; calibrated: fitted to printed results; assumed;
+stated: in the machine's own file."""
 
 M = TypeVar("M")
 
@@ -58,7 +59,8 @@ def _class_of(machine: Any) -> type:
 
 @cache
 def _parameters_of(machine: type) -> Mapping[str, Parameter]:
-    return MappingProxyType({f.name: f.metadata["parameter"] for f in fields(machine)})
+    described = {f.name: f.metadata.get("parameter") for f in fields(machine)}
+    return MappingProxyType({name: about for name, about in described.items() if about is not None})
 
 
 def _is_real(value: Any) -> bool:
@@ -95,6 +97,14 @@ def validate(machine: Any) -> None:
         object.__setattr__(machine, name, check_parameter(machine, name, getattr(machine, name)))
 
 
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """End of a message about an unknown name: the nearest known one, or all of them."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, list(known), n=1)
+    return f"; did you mean {near[0]}?" if near else f"; known: {', '.join(known)}"
+
+
 def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
     """Return the machine with some fields replaced, or with those of a rung of ``fidelity``.
 
@@ -108,11 +118,7 @@ def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
     settings = expand_fidelity(machine, settings)
     for name in settings:
         if name not in known:
-            from difflib import get_close_matches
-
-            near = get_close_matches(name, known, n=1)
-            hint = f"; did you mean {near[0]}?" if near else f"; known fields: {', '.join(known)}"
-            raise ParameterError(f"{type(machine).__name__} has no field {name!r}{hint}")
+            raise ParameterError(f"{type(machine).__name__} has no field {name!r}{suggestion(name, known)}")
     return replace(machine, **settings)  # type: ignore[type-var]
 
 

@@ -8,16 +8,24 @@ if TYPE_CHECKING:
     from chaosgym.machines.machine import Machine
 
 
+FILE_ENDING = ".toml"
+
+
 class MachineRegistry(Mapping[str, "type[Machine]"]):
     """Machine classes by name.
 
-    ``entry_points`` says where each is: module and class, as in ``"package.module:Class"``.
+    ``entry_points`` says where each is: module and class, as in ``"package.module:Class"``. A name that ends in
+    ``.toml`` is the file of a machine, and stands for the class that it describes.
     """
 
     def __init__(self, entry_points: Mapping[str, str]) -> None:
         self.entry_points = dict(entry_points)
 
     def __getitem__(self, name: str) -> "type[Machine]":
+        if str(name).endswith(FILE_ENDING):
+            from chaosgym.machines.modal_machine.file import machine_class
+
+            return machine_class(name)
         module, _, kind = self.entry_points[name].partition(":")
         found: type[Machine] = getattr(import_module(module), kind)
         return found
@@ -27,6 +35,13 @@ class MachineRegistry(Mapping[str, "type[Machine]"]):
 
     def __len__(self) -> int:
         return len(self.entry_points)
+
+    def listed(self, name: object) -> str:
+        """End of a message about a name that is not known: the nearest one, or all, and that a file does too."""
+        from difflib import get_close_matches
+
+        near = get_close_matches(str(name), self, n=1)
+        return f"did you mean {near[0]}?" if near else f"known: {', '.join(sorted(self))}, or a file my-machine.toml"
 
     def class_name(self, name: str) -> str:
         """Name of a machine's class, such as ``ImpactBeam``, without importing it."""

@@ -4,6 +4,7 @@ Each unit of a field has its alternatives and what one of them is in the field's
 rotation differ by 60, never by 2 pi. Units that are not listed are written as the field states them. µ is u.
 """
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,6 +17,11 @@ ALTERNATIVES: Mapping[str, Mapping[str, float]] = {
     "N": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "lbf": 4.4482216152605},
     "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "ksi": 6894757.293168},
     "kg": {"kg": 1.0, "g": 1e-3},
+    "N/m": {"N/m": 1.0, "kN/m": 1e3, "N/mm": 1e3, "kN/mm": 1e6, "N/um": 1e6},
+    "N s/m": {"N s/m": 1.0, "N s/mm": 1e3},
+    "m/N": {"m/N": 1.0, "mm/N": 1e-3, "um/N": 1e-6},
+    "kg m": {"kg m": 1.0, "kg mm": 1e-3, "g mm": 1e-6},
+    "m/s^2": {"m/s^2": 1.0, "g": 9.80665},
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
     "Mcycles": {"Mcycles": 1.0, "cycles": 1e-6},
     "deg": {"deg": 1.0},
@@ -66,6 +72,27 @@ def parse_quantity(name: str, given: Any, unit: str) -> float:
         what = f"has the unknown unit {written!r}" if written else "has no unit"
         raise ParameterError(f"{name} = {given!r} {what} (allowed: {listed})")
     return value * allowed[written]
+
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_ROW = re.compile(rf"\s*({_NUMBER}(?:(?:\s*[,;]\s*|\s+to\s+|\s+){_NUMBER})*)\s*(.*)", re.DOTALL)
+
+
+def parse_row(name: str, given: Any, unit: str) -> list[float]:
+    """Values in the field's own unit: of a text such as ``"9.1, 61 Hz"`` or ``"4 to 30 Hz"``, or of a list of texts.
+
+    Raises
+    ------
+    ParameterError
+        As ``parse_quantity``.
+    """
+    if isinstance(given, list):
+        return [value for one in given for value in parse_row(name, one, unit)]
+    found = _ROW.fullmatch(given) if isinstance(given, str) else None
+    if found is None:
+        return [parse_quantity(name, given, unit)]
+    numbers = re.findall(_NUMBER, found[1])
+    return [parse_quantity(name, f"{number} {found[2]}", unit) for number in numbers]
 
 
 def parse_option(name: str, text: str, unit: str, bare: str) -> float:

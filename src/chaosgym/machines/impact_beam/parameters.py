@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from chaosgym.errors import ParameterError
+from chaosgym.machines.impact_beam.work import WORK
+from chaosgym.machines.machine import Work
 from chaosgym.machines.modal_impact import ModalImpactMachine
 from chaosgym.machines.options import Number, Option
 from chaosgym.machines.parameters import parameter
@@ -82,6 +84,8 @@ class BeamParameters(ModalImpactMachine):
         "force 0": {"force_amplitude": 0.0},
         "force 1e6 N": {"force_amplitude": 1e6},
     }
+
+    work: ClassVar[Work] = WORK
 
     excitation_frequency: float = parameter(
         30.0, unit="Hz", low=1e-3, high=1e4, provenance="printed", source="thesis figure 3.7"

@@ -31,7 +31,7 @@ from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.batch import CompiledBatch
 from chaosgym.machines.integrators import Integrator
-from chaosgym.machines.machine import Machine
+from chaosgym.machines.machine import Machine, Work
 from chaosgym.machines.options import Option
 from chaosgym.machines.parameters import parameter
 from chaosgym.machines.slider_crank import run as running
@@ -44,6 +44,7 @@ from chaosgym.machines.slider_crank.kinematics import slider_position
 from chaosgym.machines.slider_crank.model import STEP_PHASE, exact_model, fastest_rate, has_propagators, stepped_model
 from chaosgym.machines.slider_crank.scenes import EXTREMES, OPTIONS, SCENES
 from chaosgym.machines.slider_crank.spatial_equations import spatial_equations
+from chaosgym.machines.slider_crank.work import WORK
 
 Array = NDArray[np.float64]
 
@@ -86,6 +87,7 @@ class SliderCrank(Machine):
     options: ClassVar[Mapping[str, Option]] = OPTIONS
     scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = SCENES
     extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = EXTREMES
+    work: ClassVar[Work] = WORK
     sides: ClassVar[tuple[str, ...]] = ("upper", "lower")
     """Surfaces whose force points up and down: on the slider, or on the housing if the ball joint is monitored."""
 

@@ -1,0 +1,27 @@
+"""The impact beam at work in the environments, where there is something to feel and something to win."""
+
+from chaosgym.machines.machine import Work
+
+WORK = Work(
+    # twice the thesis' force at its gap, and three times its damping (assumed): on its own beam most speeds above
+    # 18 Hz are chaotic, and no schedule helps
+    fields={"force_amplitude": 17.8, "clearance": 0.127e-3, "damping_ratio": 0.03},
+    model_fidelity="draft",
+    # clearance: repeatability of the thesis' feeler gauges (3.4, printed); damping and length: assumed
+    tolerances={"clearance": 0.2, "damping_ratio": 0.2, "length": 0.002},
+    task={
+        "lowest_speed": 16.0,
+        "highest_speed": 30.0,
+        "slew_limit": 2.0,
+        "trim_step": 0.25,
+        "largest_trim": 2.0,
+        "lowest_demand": 18.0,
+        "highest_demand": 29.0,
+        "smallest_change": 1.0,
+        "largest_change": 4.0,
+        "start_below": 2.0,
+        "deviation_weight": 0.25,
+        "speed_ripple": 0.002,
+        "load_rating": 80.0,
+    },
+)

@@ -1,0 +1,92 @@
+"""The periodic drive of a machine: forces, unbalances and motions of the base as harmonics of the operating cycle."""
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.modal_machine.structure import BASE, Structure
+
+Array = NDArray[np.float64]
+
+KINDS = {"force": "N", "unbalance": "kg m", "displacement": "m", "acceleration": "m/s^2"}
+"""What a drive prescribes, and its unit: a force; mass times eccentricity, whose force grows with the square of the
+harmonic's frequency; a motion of the base, with which the stops move."""
+
+MOST_HARMONICS = 64
+
+
+class Drive(NamedTuple):
+    """A drive at one point.
+
+    ``kind`` of ``KINDS``; ``harmonics`` (order, cosine, sine) with amplitudes in the kind's unit; ``mean`` what is
+    constant [N].
+    """
+
+    kind: str
+    at: str
+    harmonics: tuple[tuple[int, float, float], ...]
+    mean: float = 0.0
+
+    @classmethod
+    def sine(cls, kind: str, at: str, amplitude: float, harmonic: int = 1, angle: float = 0.0) -> "Drive":
+        """Drive amplitude sin(harmonic w t + angle), the angle in rad."""
+        return cls(kind, at, ((harmonic, amplitude * math.sin(angle), amplitude * math.cos(angle)),))
+
+    @classmethod
+    def sampled(cls, kind: str, at: str, values: ArrayLike, harmonics: int) -> "Drive":
+        """Drive of values at equal intervals over one cycle, the first at its beginning; its first harmonics.
+
+        Raises
+        ------
+        ParameterError
+            If there are too few values for so many harmonics.
+        """
+        cycle = np.asarray(values, dtype=float)
+        if cycle.ndim != 1 or len(cycle) < 2 * harmonics + 1:
+            raise ParameterError(f"{harmonics} harmonics need {2 * harmonics + 1} samples of a cycle, not {cycle.size}")
+        parts = np.fft.rfft(cycle) / len(cycle)
+        rows = tuple((k, 2.0 * float(parts[k].real), -2.0 * float(parts[k].imag)) for k in range(1, harmonics + 1))
+        return cls(kind, at, rows, float(parts[0].real))
+
+
+def checked(drive: Drive) -> Drive:
+    """Return the drive.
+
+    Raises
+    ------
+    ParameterError
+        If its kind, point or a harmonic is not allowed.
+    """
+    if drive.kind not in KINDS:
+        raise ParameterError(f"a drive has no kind {drive.kind!r}; allowed: {', '.join(KINDS)}")
+    if (drive.kind in ("displacement", "acceleration")) != (drive.at == BASE):
+        rule = f"'{BASE}'" if drive.at != BASE else f"a point other than '{BASE}'"
+        raise ParameterError(f"{drive.kind} at {drive.at!r}: allowed: at {rule}")
+    for order, *amplitudes in drive.harmonics:
+        if not 1 <= order <= MOST_HARMONICS or not np.all(np.isfinite(amplitudes)):
+            raise ParameterError(f"harmonic {order} is out of range; allowed: 1 to {MOST_HARMONICS}, finite amplitudes")
+    if drive.mean and drive.kind != "force":
+        raise ParameterError(f"the mean of {drive.kind} at {drive.at!r} is not 0; allowed: for a force only")
+    return drive
+
+
+def modal_drive(structure: Structure, drives: Iterable[Drive]) -> tuple[Array, Array]:
+    """Modal forces of harmonics, (2, H, 2, n) as in ``ModalImpactModel.drive``, and the constant one, (n,)."""
+    drives = list(drives)
+    n, highest = len(structure.angular_frequency), max((h[0] for d in drives for h in d.harmonics), default=1)
+    forces, static = np.zeros((2, highest, 2, n)), np.zeros(n)
+    for drive in drives:
+        shape = structure.shape(drive.at)
+        static += drive.mean * shape
+        if not shape.any():
+            raise ParameterError(f"the drive at {drive.at!r} moves no mode: every shape is 0 there")
+        grows = int(drive.kind in ("unbalance", "displacement"))
+        for order, *amplitudes in drive.harmonics:
+            factor = float(order**2) if grows else -1.0 if drive.kind == "acceleration" else 1.0
+            for part, amplitude in enumerate(amplitudes):
+                forces[grows, order - 1, part] += factor * amplitude * shape
+    return forces, static

@@ -1,0 +1,295 @@
+"""The file of a machine: TOML with units in, a class of machines out, whose defaults are what the file states."""
+
+import hashlib
+import json
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.machine import Work
+from chaosgym.machines.modal_machine.drive import KINDS, Drive
+from chaosgym.machines.modal_machine.keys import REQUIRED, TABLES, checked_table, schema
+from chaosgym.machines.modal_machine.machine import ModalMachine
+from chaosgym.machines.modal_machine.structure import BASE, Structure
+from chaosgym.machines.parameters import Parameter, check_parameter, parameter, parameters_of, suggestion
+from chaosgym.machines.units import parse_quantity
+
+FIELDS = {"stiffness": "contact_stiffness", "damping": "contact_damping"}
+"""Fields of the machine by key of [joint], where they have other names."""
+
+MOST_SAMPLED = 16
+"""Harmonics of a sampled cycle by default, at most."""
+
+_classes: dict[str, type[ModalMachine]] = {}
+
+
+def machine_class(path: str | Path) -> type[ModalMachine]:
+    """Class of the machines that a file describes; calling it without arguments gives the one that is stated.
+
+    Raises
+    ------
+    ParameterError
+        If the file can't be read, a key is unknown, a unit missing, or a value not allowed; one line that says where.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+        values = tomllib.loads(text)
+    except OSError as error:
+        raise ParameterError(f"{path} can't be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ParameterError(f"{path} is not valid TOML: {error}") from None
+    try:
+        data, folder = _tables(values), Path(path).parent
+        digest = hashlib.sha256(text.encode())
+        for name in ("matrices", "mass", "stiffness", "damping", "universal_file"):
+            if name in data["structure"]:
+                digest.update(_bytes(folder / data["structure"][name]))
+        key = f"{path} {digest.hexdigest()}"
+        if key not in _classes:
+            _classes[key] = _built(str(path), digest.hexdigest()[:16], data, folder)
+        return _classes[key]
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from None
+
+
+def read_machine(path: str | Path) -> ModalMachine:
+    """Machine that a file describes, at the speed and clearance that it states.
+
+    Raises
+    ------
+    ParameterError
+        As ``machine_class``.
+    """
+    return machine_class(path)()
+
+
+def template() -> str:
+    """Commented file of an example, ready to edit."""
+    return (resources.files(__package__) / "template.toml").read_text(encoding="utf-8")
+
+
+def schema_text() -> str:
+    """JSON schema of such files, as text."""
+    return json.dumps(schema(), indent=1) + "\n"
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ParameterError(f"{path} can't be read: {error.strerror}") from None
+
+
+def _tables(values: Mapping[str, Any]) -> dict[str, Any]:
+    """All tables by their path, values in SI."""
+    data: dict[str, Any] = {}
+    for name in REQUIRED:
+        if name not in values:
+            raise ParameterError(f"[[{name}]] is missing" if name == "drive" else f"[{name}] is missing")
+    for path in TABLES:
+        outer, _, inner = path.rpartition(".")
+        given = values.get(outer, {}).get(inner, {}) if outer else values.get(path, {}) if path else values
+        if path == "drive":
+            rows = given if isinstance(given, list) else [given]
+            data[path] = [checked_table(path, row) for row in rows]
+        else:
+            data[path] = checked_table(path, given)
+    return data
+
+
+def _needed(table: str, values: Mapping[str, Any], *names: str) -> list[Any]:
+    for name in names:
+        if name not in values:
+            raise ParameterError(f"[{table}] lacks {name}")
+    return [values[name] for name in names]
+
+
+def _built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type[ModalMachine]:
+    """Make the class: its fields have the file's values as defaults, and one more names the file's content."""
+    structure = structure_of(data, folder)
+    joint, operation = dict(data["joint"]), data["operation"]
+    at, clearance, stiffness, damping = _needed("joint", joint, "at", "clearance", "stiffness", "damping")
+    speed, *ranges = _needed("operation", operation, "speed", "speed_range", "clearance_range")
+    stated = {FIELDS.get(name, name): value for name, value in joint.items() if name != "at"} | {"speed": speed}
+    for name, upper in (("stiffness", stiffness), ("damping", damping)):
+        lower = data["joint.lower"].get(name, upper)
+        if lower != upper:
+            if not upper > 0.0:
+                raise ParameterError(f"joint.lower.{name} needs joint.{name} above 0")
+            stated[f"lower_{name}_factor"] = lower / upper
+    if not clearance >= 0.0:
+        raise ParameterError(f"joint.clearance = {clearance:g} m is a gap of negative width; allowed: 0 or more")
+    drives = tuple(_drive(row) for row in data["drive"])
+    fields: dict[str, Any] = {
+        "modes": structure,
+        "joint": at,
+        "drives": drives,
+        "definition": parameter(digest, choices=(digest,), provenance="stated", source=path),
+    }
+    known = parameters_of(ModalMachine)
+    for name, value in stated.items():
+        checked = check_parameter(ModalMachine, name, value)
+        fields[name] = _stated(checked, known[name], path)
+    usual = dict(zip(("speed", "clearance"), map(_range, ("speed_range", "clearance_range"), ranges), strict=True))
+    annotations = {name: Any for name in fields}
+    types: dict[str, Any] = {"name": path, "title": data[""].get("title", path), "usual_ranges": usual}
+    annotations |= {name: ClassVar[Any] for name in types}
+    namespace = {"__module__": __name__, "__doc__": f"The machine of {path}.", "__annotations__": annotations}
+    made: type[ModalMachine] = dataclass(frozen=True, kw_only=True)(
+        type("ModalMachine", (ModalMachine,), {**namespace, **fields, **types})
+    )
+    made.tolerances = _tolerances(data["tolerances"], made())
+    made.work = Work(task=data["job"])
+    return made
+
+
+def _stated(value: Any, about: Parameter, path: str) -> Any:
+    return parameter(
+        value,
+        unit=about.unit,
+        low=about.low,
+        high=about.high,
+        choices=about.choices,
+        provenance="stated",
+        source=path,
+    )
+
+
+def _range(name: str, values: Any) -> tuple[float, float]:
+    if len(values) != 2 or not values[0] < values[1]:
+        raise ParameterError(f"operation.{name} is no range; allowed: a text such as '4 to 30 Hz', the lower one first")
+    return float(values[0]), float(values[1])
+
+
+def _tolerances(given: Mapping[str, Any], machine: ModalMachine) -> dict[str, tuple[float, bool]]:
+    """Half widths by field, and whether they are shares of the value."""
+    known = {name: about for name, about in parameters_of(machine).items() if not about.choices}
+    found = {}
+    for name, text in given.items():
+        if name not in known:
+            raise ParameterError(f"[tolerances] has no key {name!r}{suggestion(name, known)}")
+        relative = isinstance(text, str) and text.strip().endswith("%")
+        value = parse_quantity(f"tolerances.{name}", text, "-" if relative else known[name].unit)
+        if not value > 0.0 or (relative and getattr(machine, name) == 0.0):
+            raise ParameterError(f"tolerances.{name} = {text!r} is out of range; allowed: above 0, no share of 0")
+        found[name] = (value, relative)
+    return found
+
+
+def _drive(row: Mapping[str, Any]) -> Drive:
+    kinds = [kind for kind in KINDS if kind in row]
+    if len(kinds) != 1:
+        raise ParameterError(
+            f"a [[drive]] has {' and '.join(kinds) or 'no strength'}; allowed: one of {', '.join(KINDS)}"
+        )
+    (kind,) = kinds
+    at = row.get("at") or (BASE if kind in ("displacement", "acceleration") else "")
+    if not at:
+        raise ParameterError(f"a [[drive]] of a {kind} lacks at, the point where it acts")
+    values = row[kind]
+    if len(values) == 1:
+        return Drive.sine(kind, at, float(values[0]), row.get("harmonic", 1), math.radians(row.get("angle", 0.0)))
+    return Drive.sampled(kind, at, values, row.get("harmonics", min(MOST_SAMPLED, (len(values) - 1) // 2)))
+
+
+def structure_of(data: Mapping[str, Any], folder: Path) -> Structure:
+    """Modes by one of the three ways that [structure] offers."""
+    table = data["structure"]
+    ways = [name for name in ("frequencies", "matrices", "mass", "universal_file") if name in table]
+    if len(ways) != 1:
+        raise ParameterError(
+            f"[structure] has {' and '.join(ways) or 'no modes'}; allowed: one of frequencies, matrices (.npz), mass "
+            "with stiffness, universal_file"
+        )
+    if ways == ["frequencies"]:
+        return _of_modes(table, data["structure.shapes"], data["structure.residual"])
+    if ways == ["universal_file"]:
+        from chaosgym.machines.modal_machine.universal import read_modes
+
+        modes = read_modes(folder / table["universal_file"], data["structure.points"])
+        ratios = table.get("damping_ratios", modes.damping_ratios)
+        given = {**table, "frequencies": modes.frequencies, "damping_ratios": ratios, "modal_masses": modes.masses}
+        return _of_modes(given, modes.shapes, data["structure.residual"])
+    return _of_matrices(table, data, folder)
+
+
+def _ratios(table: Mapping[str, Any]) -> Any:
+    if "modal_damping" in table:
+        return table["modal_damping"]
+    (ratios,) = _needed("structure", table, "damping_ratios")
+    return ratios[0] if len(ratios) == 1 else ratios
+
+
+def _of_modes(table: Mapping[str, Any], shapes: Mapping[str, Any], residual: Mapping[str, Any]) -> Structure:
+    rest = None
+    if residual:
+        at, compliance = _needed("structure.residual", residual, "at", "compliance")
+        rest = (at, compliance, residual.get("frequency", 2.0 * float(np.max(table["frequencies"]))))
+    if not shapes:
+        raise ParameterError("[structure.shapes] is missing: the shape of each mode at each named point")
+    masses = table.get("modal_masses")
+    return Structure.of_modes(table["frequencies"], _ratios(table), shapes, modal_masses=masses, residual=rest)
+
+
+def _of_matrices(table: Mapping[str, Any], data: Mapping[str, Any], folder: Path) -> Structure:
+    matrices, points = _matrices(table, folder), dict(data["structure.degrees_of_freedom"])
+    for place, name in enumerate(matrices.pop("names", ())):
+        points.setdefault(str(name), place)
+    if not points:
+        raise ParameterError("[structure.degrees_of_freedom] is missing: the row of each named point, counted from 0")
+    base = matrices.pop("base", None)
+    if "base" in table:
+        base = np.zeros(matrices["M"].shape[0])
+        for name in table["base"]:
+            if name not in points:
+                raise ParameterError(f"structure.base names no degree of freedom {name!r}{suggestion(name, points)}")
+            base[points[name]] = 1.0
+    joint = str(data["joint"].get("at", "")).lstrip("-+ ")
+    (modes,) = _needed("structure", table, "modes")
+    return Structure.of_matrices(
+        matrices["M"],
+        matrices["K"],
+        matrices.get("C") if "C" in matrices else _ratios(table),
+        points,
+        modes=modes,
+        base=base,
+        residual_at=joint if table.get("residual_mode", True) and joint in points else None,
+        scale=1e3 if table.get("units") == "t mm N" else 1.0,
+    )
+
+
+def _matrices(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Matrices M, K and, if they are there, C, base and names."""
+    if "matrices" in table:
+        return _archive(folder / table["matrices"])
+    mass, stiffness = _needed("structure", table, "mass", "stiffness")
+    files = {"M": mass, "K": stiffness, **({"C": table["damping"]} if "damping" in table else {})}
+    return {name: _one_matrix(folder / file) for name, file in files.items()}
+
+
+def _archive(path: Path) -> dict[str, Any]:
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            found = {name: archive[name] for name in archive.files}
+    except (OSError, ValueError, AttributeError, TypeError) as error:
+        raise ParameterError(f"{path} can't be read as .npz: {str(error).splitlines()[0]}") from None
+    for name in ("M", "K"):
+        if name not in found:
+            raise ParameterError(f"{path} holds no array {name}; it has {', '.join(found) or 'none'}")
+    return {name: found[name] for name in ("M", "K", "C", "base", "names") if name in found}
+
+
+def _one_matrix(path: Path) -> Any:
+    from scipy.io import mmread
+
+    try:
+        return np.load(path, allow_pickle=False) if path.suffix == ".npy" else mmread(path)
+    except (OSError, ValueError) as error:
+        raise ParameterError(f"{path} can't be read as a matrix: {str(error).splitlines()[0]}") from None

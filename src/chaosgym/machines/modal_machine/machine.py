@@ -1,0 +1,149 @@
+"""Your own machine: the modes of a structure, a joint with one or two stops, and a periodic drive.
+
+structure = Structure.of_modes([9.0, 61.0], 0.01, {"tip": [2.1, -1.9], "shaker": [1.2, 0.8]})
+machine = ModalMachine(structure=structure, joint="tip", drives=(Drive.sine("force", "shaker", 8.9),), speed=19.0)
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.core.modal_model import ModalImpactModel
+from chaosgym.errors import ParameterError
+from chaosgym.machines.modal_impact import ModalImpactMachine, Modes, Stop, flexible_model
+from chaosgym.machines.modal_machine.drive import Drive, checked, modal_drive
+from chaosgym.machines.modal_machine.structure import Structure
+from chaosgym.machines.options import Number, Option
+from chaosgym.machines.parameters import parameter
+
+Array = NDArray[np.float64]
+
+
+def _assumed(default: Any, unit: str, low: float, high: float) -> Any:
+    return parameter(default, unit=unit, low=low, high=high, provenance="assumed", source="default")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModalMachine(ModalImpactMachine):
+    """A structure of a few modes with one joint that has a gap, and a periodic drive.
+
+    Attributes
+    ----------
+    modes
+        Of the structure between the stops.
+    joint
+        Point that moves in the gap, such as "tip", "-tip" or "pinion - wheel"; the upper stop lies where it grows.
+    drives
+        What drives it, by harmonics of the speed.
+
+    Raises
+    ------
+    ParameterError
+        On construction, if a field is outside its range or a point does not exist; names it and what is allowed.
+    """
+
+    name: ClassVar[str] = "modal-machine"
+    speed_field: ClassVar[str] = "speed"
+    clearance_field: ClassVar[str] = "clearance"
+    usual_ranges: ClassVar[Mapping[str, tuple[float, float]]] = {"speed": (4.0, 30.0), "clearance": (2e-5, 2e-4)}
+    options: ClassVar[Mapping[str, Option]] = {
+        "--speed-hz": Number("speed", "Hz"),
+        "--clearance-mm": Number("clearance", "mm", 1e-3),
+    }
+    extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "clearance 0": {"clearance": 0.0},
+        "clearance 1 m": {"clearance": 1.0},
+        "no damping at all": {"damping_factor": 0.0, "contact_damping": 0.0},
+        "100 times the damping": {"damping_factor": 100.0},
+        "no drive": {"drive_level": 0.0},
+        "1000 times the drive": {"drive_level": 1e3},
+    }
+
+    modes: Structure
+    joint: str
+    drives: tuple[Drive, ...] = field(default=())
+    speed: float = _assumed(30.0, "Hz", 1e-3, 1e5)
+    """Operating cycles a second [Hz]."""
+    clearance: float = _assumed(0.1e-3, "m", 0.0, 10.0)
+    """Half the gap; with one stop its distance from the middle [m]."""
+    offset: float = _assumed(0.0, "m", -10.0, 10.0)
+    """Middle of the gap, from where the joint rests without any load [m]."""
+    stops: str = parameter("two", choices=("two", "one"), provenance="assumed", source="default")
+    """"two", or "one" on the upper side."""
+    contact_stiffness: float = _assumed(1e7, "N/m", 1e-3, 1e13)
+    """Spring of the upper stop [N/m]."""
+    contact_damping: float = _assumed(20.0, "N s/m", 0.0, 1e9)
+    """Damper of the upper stop [N s/m]."""
+    lower_stiffness_factor: float = _assumed(1.0, "-", 1e-9, 1e9)
+    """Spring of the lower stop over that of the upper one."""
+    lower_damping_factor: float = _assumed(1.0, "-", 0.0, 1e9)
+    """Damper of the lower stop over that of the upper one."""
+    preload: float = _assumed(0.0, "N", -1e9, 1e9)
+    """Constant force on the joint, towards the upper stop [N]."""
+    drive_level: float = _assumed(1.0, "-", 0.0, 1e6)
+    """Factor of all harmonics of the drive."""
+    damping_factor: float = _assumed(1.0, "-", 0.0, 1e6)
+    """Factor of the structure's damping."""
+    frequency_factor: float = _assumed(1.0, "-", 1e-3, 1e3)
+    """Factor of all natural frequencies."""
+
+    def __post_init__(self, fidelity: str | None) -> None:
+        super().__post_init__(fidelity)
+        if not self.modes.shape(self.joint).any():
+            raise ParameterError(f"joint = {self.joint!r} never moves: every shape is 0 there")
+        modal_drive(self.modes, map(checked, self.drives))
+
+    @property
+    def n_states(self) -> int:
+        """Displacement and velocity of every mode."""
+        return 2 * len(self.modes.angular_frequency)
+
+    @property
+    def structure(self) -> ModalImpactModel:
+        """Model at no speed and no gap; machines that differ in these and in the level of the drive share it."""
+        return _structure(self._with_unchecked(speed=1.0, clearance=0.0, offset=0.0, drive_level=1.0))
+
+    def stops_at(self, clearance: Any) -> Array:
+        """Positions of the upper and the lower stop [m] at a clearance, (2,), or at many, (k, 2)."""
+        gap = np.asarray(clearance, dtype=float)
+        lower = self.offset - gap if self.stops == "two" else np.full_like(gap, -math.inf)
+        return np.stack([self.offset + gap, lower], axis=-1)
+
+    def reduce(self) -> ModalImpactModel:
+        """Return the modal model."""
+        model = self.structure
+        return model._replace(
+            excitation_frequency=self.speed, drive=self.drive_level * model.drive, stops=self.stops_at(self.clearance)
+        )
+
+    def share_of_bound(self, states: Array, peak_force: Array) -> float:
+        """Share of the bound of passivity: only the drive gives energy, and what a preload or offset has stored."""
+        model, n = self.reduce(), self.n_states // 2
+        energy = np.sum(states[:, n:] ** 2 + model.stiffness * states[:, :n] ** 2, axis=1)
+        omega = 2.0 * math.pi * self.speed
+        amplitudes = model.drive[0] + omega**2 * model.drive[1]
+        load = float(np.sum(np.linalg.norm(amplitudes, axis=(1, 2)))) + float(np.linalg.norm(model.static_force))
+        inside = np.maximum([-model.stops[0], model.stops[1]], 0.0)
+        stored = math.sqrt(float(model.contact_stiffness @ inside**2))
+        speed = stored + load * np.arange(1, len(states)) * self.cycle_period
+        if not speed.any():
+            return 0.0 if not energy.any() and not peak_force.any() else math.inf
+        stiffest, damper = float(np.max(model.contact_stiffness)), float(np.max(model.contact_damping))
+        force = (math.sqrt(stiffest) + damper * float(np.linalg.norm(model.tip_shape))) * speed
+        return max(float(np.max(np.sqrt(energy[1:]) / speed)), float(np.max(peak_force.max(axis=1) / force)))
+
+
+@lru_cache(maxsize=256)
+def _structure(machine: ModalMachine) -> ModalImpactModel:
+    joint, (harmonics, static) = machine.modes.shape(machine.joint), modal_drive(machine.modes, machine.drives)
+    rates, damping = machine.modes.angular_frequency, machine.modes.damping
+    modes = Modes(machine.frequency_factor * rates, machine.damping_factor * damping, joint, np.zeros_like(joint))
+    upper = Stop(machine.contact_stiffness, machine.contact_damping)
+    lower = Stop(machine.lower_stiffness_factor * upper.stiffness, machine.lower_damping_factor * upper.damping)
+    load = static + machine.preload * joint
+    return flexible_model(modes, *upper, lower=lower, static_force=load)._replace(drive=harmonics)

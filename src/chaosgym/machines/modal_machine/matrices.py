@@ -1,0 +1,119 @@
+"""Matrices of a finite element model: what is wrong with them, their slowest modes, and a static deflection."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.errors import ParameterError
+
+Array = NDArray[np.float64]
+
+RIGID = 1e-12
+"""Energy of a motion of the rigid body, against the sum of its terms without their signs: what rounding leaves."""
+
+SHIFT = 100.0
+"""Square of an angular frequency [1/s^2] by which large matrices are shifted, so that rigid bodies can be solved."""
+
+SYMMETRIC = 1e-9
+"""Largest difference of a matrix from its transpose, against its largest entry."""
+
+DENSE = 600
+"""Degrees of freedom up to which all modes are computed at once."""
+
+
+def symmetric(name: str, matrix: Any) -> Any:
+    """Matrix in a form that multiplies, refused unless it is square, finite, symmetric and not negative."""
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+        raise ParameterError(f"{name} has shape {matrix.shape}; allowed: square")
+    values = matrix.data if hasattr(matrix, "tocsc") else matrix
+    if not np.all(np.isfinite(values)):
+        raise ParameterError(f"{name} holds entries that are not finite numbers")
+    largest, apart = float(abs(matrix).max()), abs(matrix - matrix.T)
+    if float(apart.max()) > SYMMETRIC * largest:
+        from scipy.sparse import coo_matrix
+
+        sparse = coo_matrix(apart)
+        worst = int(np.argmax(sparse.data))
+        row, column = sparse.row[worst], sparse.col[worst]
+        raise ParameterError(
+            f"{name} is not symmetric: entries ({row}, {column}) and ({column}, {row}) differ by "
+            f"{float(apart.max()):g}, of at most {largest:g}"
+        )
+    if matrix.shape[0] <= DENSE:
+        lowest = float(np.linalg.eigvalsh(_full(matrix))[0])
+        if lowest < -1e-9 * largest or (name == "mass" and lowest <= 0.0):
+            raise ParameterError(
+                f"{name} is not positive {'definite' if name == 'mass' else 'semidefinite'}: its lowest eigenvalue is "
+                f"{lowest:.3g}"
+            )
+    return matrix
+
+
+def _full(matrix: Any) -> Array:
+    return np.asarray(matrix.toarray() if hasattr(matrix, "toarray") else matrix, dtype=float)
+
+
+def slowest_modes(mass: Any, stiffness: Any, count: int) -> tuple[Array, Array]:
+    """Angular frequencies (count,) and mass-normalised shapes (N, count) of the slowest modes."""
+    size = mass.shape[0]
+    if size <= DENSE or count > size // 3:
+        squares, vectors = _slowest_dense(_full(mass), _full(stiffness), count)
+    else:
+        from scipy.sparse import csc_matrix
+        from scipy.sparse.linalg import eigsh
+
+        start = np.cos(1.0 + np.arange(size))
+        found = eigsh(csc_matrix(stiffness), count, csc_matrix(mass), sigma=-SHIFT, v0=start)
+        order = np.argsort(found[0])
+        squares, vectors = found[0][order], found[1][:, order]
+    energy = np.einsum("ij,ij->j", vectors, stiffness @ vectors)
+    cancelled = np.einsum("ij,ij->j", np.abs(vectors), abs(stiffness) @ np.abs(vectors))
+    if np.any(energy < -1e-9 * cancelled):
+        raise ParameterError(f"stiffness is not positive semidefinite: w^2 = {energy.min():.3g} 1/s^2 of a mode")
+    squares = np.where(energy <= RIGID * cancelled, 0.0, np.maximum(squares, 0.0))
+    flip = vectors[np.argmax(np.abs(vectors), axis=0), np.arange(count)] < 0.0
+    return np.sqrt(squares), vectors * np.where(flip, -1.0, 1.0)
+
+
+def _slowest_dense(mass: Array, stiffness: Array, count: int) -> tuple[Array, Array]:
+    """Squares (count,) and shapes, by the inverse problem M s = K s / w^2 where nothing moves freely: it keeps slow
+    modes exact on fine meshes."""
+    from scipy.linalg import eigh
+
+    size = len(mass)
+    if np.all(np.diag(stiffness) > 0.0):
+        scale = 1.0 / np.sqrt(np.diag(stiffness))
+        both = np.outer(scale, scale)
+        try:
+            inverse, shapes = eigh(mass * both, stiffness * both, subset_by_index=[size - count, size - 1])
+        except np.linalg.LinAlgError:
+            pass
+        else:
+            inverse, shapes = inverse[::-1], shapes[:, ::-1]
+            if inverse[-1] > 1e-12 * inverse[0]:
+                return 1.0 / inverse, scale[:, None] * shapes / np.sqrt(inverse)
+    squares, vectors = eigh(stiffness, mass, subset_by_index=[0, count - 1])
+    return squares, vectors
+
+
+def with_deflection(mass: Any, stiffness: Any, rates: Array, vectors: Array, row: int) -> tuple[Array, Array]:
+    """Modes with one more: the static deflection by a force at a degree of freedom, less what the modes deflect."""
+    from scipy.sparse import csc_matrix
+    from scipy.sparse.linalg import splu
+
+    load = np.zeros(len(vectors))
+    load[row] = 1.0
+    held = csc_matrix(stiffness)
+    if rates[0] == 0.0:
+        held = held + SHIFT * csc_matrix(mass)
+    deflection = splu(held).solve(load)
+    for _ in range(2):
+        deflection = deflection - vectors @ (vectors.T @ (mass @ deflection))
+    size = math.sqrt(deflection @ (mass @ deflection))
+    if not size > 0.0:
+        return rates, vectors
+    shape = deflection / size
+    rate = math.sqrt(shape @ (stiffness @ shape))
+    return np.append(rates, rate), np.column_stack([vectors, shape])

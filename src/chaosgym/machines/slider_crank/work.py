@@ -1,0 +1,28 @@
+"""The slider crank at work in the environments."""
+
+from chaosgym.machines.machine import Work
+
+WORK = Work(
+    # figure 4.14b; the contact damping is assumed: more of it makes Type III rare and too weak to be felt
+    fields={"slider_clearance": 0.254e-3, "contact_damping_ratio": 0.13},
+    model_fidelity="draft",
+    tolerances={"slider_clearance": 0.1, "contact_damping_ratio": 0.1, "rod_length": 0.002},
+    task={
+        "cycles_per_step": 20,
+        "lowest_speed": 120.0,
+        "highest_speed": 300.0,
+        "slew_limit": 40.0,
+        "speed_grid": 5.0,
+        "trim_step": 5.0,
+        "largest_trim": 40.0,
+        "lowest_demand": 150.0,
+        "highest_demand": 290.0,
+        "smallest_change": 20.0,
+        "largest_change": 80.0,
+        "start_below": 40.0,
+        "kick": 3e-4,
+        "speed_ripple": 0.0,
+        "deviation_weight": 0.0125,
+        "load_rating": 141.3,
+    },
+)
