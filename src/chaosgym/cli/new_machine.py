@@ -22,8 +22,7 @@ def new_machine(out: Path | None, schema: bool, as_json: bool) -> None:
             raise click.UsageError(f"--out {out} exists already; choose another name")
         write_atomically(out, lambda path: path.write_text(text, encoding="utf-8"))
     result = {"out": None if out is None else str(out), "text": text}
-    emit(
-        result,
-        as_json,
-        lambda: [text.rstrip()] if out is None else [f"written to {out}; next: chaosgym diagnose {out}"],
+    told = (
+        text.rstrip() if out is None else f"written to {out}" + ("" if schema else f"; next: chaosgym diagnose {out}")
     )
+    emit(result, as_json, lambda: [told])

@@ -88,11 +88,15 @@ def parse_row(name: str, given: Any, unit: str) -> list[float]:
     """
     if isinstance(given, list):
         return [value for one in given for value in parse_row(name, one, unit)]
-    found = _ROW.fullmatch(given) if isinstance(given, str) else None
+    if not isinstance(given, str):
+        return [parse_quantity(name, given, unit)]
+    text = given.strip()
+    # a unit that begins with a digit, 1/s, is no number of the row
+    written = max((each for each in units_of(unit) if each and text.endswith(f" {each}")), key=len, default="")
+    found = _ROW.fullmatch(text.removesuffix(written))
     if found is None:
         return [parse_quantity(name, given, unit)]
-    numbers = re.findall(_NUMBER, found[1])
-    return [parse_quantity(name, f"{number} {found[2]}", unit) for number in numbers]
+    return [parse_quantity(name, f"{number} {written or found[2]}", unit) for number in re.findall(_NUMBER, found[1])]
 
 
 def parse_option(name: str, text: str, unit: str, bare: str) -> float:
