@@ -19,6 +19,7 @@ COMMANDS = {
     "show": "simulate:show",
     "new-machine": "new_machine:new_machine",
     "diagnose": "diagnose:diagnose",
+    "overlay": "overlay:overlay",
     "classify": "classify:classify",
     "sweep": "sweep:sweep",
     "dataset": "dataset:dataset",
