@@ -13,8 +13,11 @@ from matplotlib.patches import Patch
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.design.statistics import Histogram
-from chaosgym.plotting.design import ACCENT, INK, MUTED, NATURE_COLOURS
-from chaosgym.plotting.overview import TYPE_COLOURS
+from chaosgym.plotting.response import curve as curve
+from chaosgym.plotting.response import force_points as force_points
+from chaosgym.plotting.response import phase_plane as phase_plane
+from chaosgym.plotting.response import section_points as section_points
+from chaosgym.plotting.style import ACCENT, INK, MUTED, NATURE_COLOURS, TYPE_COLOURS
 
 Array = NDArray[np.float64]
 
@@ -40,31 +43,6 @@ class TypeBand(NamedTuple):
     high: float
 
 
-def curve(x: ArrayLike, y: ArrayLike, ax: Axes, *, label: str | None = None, color: str = ACCENT) -> Axes:
-    """A time history, or any other line."""
-    ax.plot(x, y, lw=0.9, color=color, label=label)
-    ax.margins(x=0.0)
-    return ax
-
-
-def phase_plane(displacement: ArrayLike, velocity: ArrayLike, ax: Axes) -> Axes:
-    """Velocity [m/s] against displacement [m], the latter shown in mm."""
-    ax.plot(1e3 * np.asarray(displacement), velocity, lw=0.5, color=ACCENT)
-    return _plane_labels(ax)
-
-
-def section_points(displacement: ArrayLike, velocity: ArrayLike, ax: Axes) -> Axes:
-    """Displacement [m] and velocity [m/s] once a cycle (Poincaré section), the former shown in mm."""
-    ax.plot(1e3 * np.asarray(displacement), velocity, ".", ms=3, color=ACCENT)
-    ax.locator_params(nbins=5)
-    return _plane_labels(ax)
-
-
-def _plane_labels(ax: Axes) -> Axes:
-    ax.set(xlabel="displacement [mm]", ylabel="velocity [m/s]")
-    return ax
-
-
 def line_spectrum(frequency: Array, power: Array, cycle_frequency: float, ax: Axes) -> Axes:
     """Spectrum of a motion in dB of its largest line; triangles stand at multiples of the cycle's frequency [Hz]."""
     level = 10.0 * np.log10(np.maximum(power / np.max(power), 1e-12))
@@ -72,23 +50,6 @@ def line_spectrum(frequency: Array, power: Array, cycle_frequency: float, ax: Ax
     multiples = np.arange(cycle_frequency, frequency[-1] + 1e-9, cycle_frequency)
     ax.plot(multiples, np.full(len(multiples), 5.0), "v", ms=3, color=MUTED)
     ax.set(xlabel="frequency [Hz]", ylabel="power [dB of the largest]", ylim=(-100.0, 10.0), xlim=(0.0, frequency[-1]))
-    return ax
-
-
-def force_points(values: Array, peaks: Array, nature: Sequence[str] | NDArray[Any], ax: Axes) -> Axes:
-    """Peak forces (values, cycles) [N] against a parameter (values,), coloured by the nature of each response."""
-    for kind, colour in NATURE_COLOURS.items():
-        of_kind = np.asarray(nature) == kind
-        if np.any(of_kind):
-            shown = peaks[of_kind]
-            across = np.repeat(values[of_kind], shown.shape[1])
-            size = 3.0 if kind == "chaotic" else 4.5
-            ax.plot(across, shown.ravel(), ".", ms=size, mew=0.0, color=colour, rasterized=True)
-            ax.plot([], [], ".", ms=8.0, mew=0.0, color=colour, label=kind)
-    middle = np.nanmean(peaks, axis=1)
-    ax.plot(values, middle, lw=0.6, color=MUTED, zorder=1)
-    ax.set_ylabel("peak impact force [N]")
-    ax.margins(x=0.02)
     return ax
 
 

@@ -35,7 +35,8 @@ def test_a_job_is_played_and_animated(folder, tmp_path):
     with Image.open(out) as animation:
         assert animation.n_frames == 50
     again = run_json("run-agent", ENV, "--policy", str(folder), "--machine", "4")
-    assert {**told, "out": None} == again
+    assert told.pop("plot") == str(out)
+    assert told == again
 
 
 def test_a_figure_is_drawn_beside_a_table(folder, tmp_path):
@@ -45,7 +46,7 @@ def test_a_figure_is_drawn_beside_a_table(folder, tmp_path):
     assert code == 0
     assert len(text.splitlines()) == 1 + 12 + 2 + 1
     with Image.open(out) as figure:
-        assert figure.size == (920, 480)
+        assert figure.size == (1440, 840)
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg")
@@ -61,7 +62,7 @@ def test_a_film_is_written(folder, tmp_path):
     [
         (("chaosgym/ImpactBeam-v0",), "ENV chaosgym/ImpactBeam-v0 is unknown; known: chaosgym/ImpactBeam-v1"),
         ((ENV, "--policy", "nowhere"), "nowhere holds no policy.json"),
-        ((ENV, "--out", "job.pdf"), "job.pdf ends in .pdf; allowed: .png, .gif, .mp4"),
+        ((ENV, "--plot", "job.tex"), "job.tex is no name of a picture; allowed: names that end in .png, .svg, .pdf, .gif, .mp4"),
     ],
 )
 def test_wrong_input_ends_in_one_line(arguments, complaint):

@@ -17,7 +17,7 @@ from chaosgym.design.measured import evaluate_peaks
 from chaosgym.design.study import study
 from chaosgym.errors import DesignError
 from chaosgym.plotting.design_report import design_report, measured_report, write_report
-from tests.design.browser import CHROMIUM, Browser
+from tests.browser import CHROMIUM, Browser
 
 DOCUMENTATION = Path(__file__).parents[2] / "docs"
 
@@ -72,7 +72,7 @@ def run(monkeypatch, capsys):
 def check_page(browser, path, pictures):
     """Nothing is requested but the file itself, nothing complains, and every figure is there and fits."""
     for width in (1200, 420):
-        seen = browser.visit(path, width=width)
+        seen = browser.visit(path.as_uri(), width=width)
         assert [url for url in seen.requests if not url.startswith("data:image/svg+xml;base64,")] == [path.as_uri()]
         assert seen.complaints == []
         assert len(seen.pictures) == pictures

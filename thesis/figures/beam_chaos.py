@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from chaosgym.design.statistics import histogram
-from chaosgym.plotting.design import ACCENT, NATURE_COLOURS
+from chaosgym.plotting.style import ACCENT, NATURE_COLOURS
 from thesis import plotting as thesis
 from thesis.figures.beam import BEAM, DAMPING, LARGE, SMALL, TRANSIENT, runs, sweep
 from thesis.figures.computations import Computation, Data, History

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from chaosgym.machines.impact_beam.modes import pinned_pinned_frequency
-from chaosgym.plotting.design import ACCENT, MUTED
+from chaosgym.plotting.style import ACCENT, MUTED
 from thesis import plotting as thesis
 from thesis.figures.beam import BEAM, LENGTHS, TINY, sweep
 from thesis.figures.computations import Computation

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from chaosgym.diagnosis.criteria import criterion_rate
 from chaosgym.diagnosis.type_rule import types_on_grid
-from chaosgym.plotting.design import INK
+from chaosgym.plotting.style import INK
 from thesis import plotting as thesis
 from thesis.figures.computations import Computation, Data
 from thesis.figures.crank import HIGH_DAMPING, LARGE, MIDDLE, SMALL, WIDE, ball, runs, slider, sweep

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from chaosgym.machines.slider_crank.parameters import SUPERHARMONIC_SLIDER_CRANK
-from chaosgym.plotting.design import ACCENT, MUTED, NATURE_COLOURS
+from chaosgym.plotting.style import ACCENT, MUTED, NATURE_COLOURS
 from thesis import plotting as thesis
 from thesis.figures.computations import Computation, Data
 from thesis.figures.crank import WIDE, slider, sweep

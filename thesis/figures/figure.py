@@ -10,7 +10,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from chaosgym.plotting.design import STYLE
+from chaosgym.plotting.style import STYLE
 from thesis.figures.computations import Computation, Data
 
 Parts = Mapping[str, Data]

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from chaosgym.design.peak_impacts import PeakImpactDiagram
 from chaosgym.design.statistics import histogram
 from chaosgym.diagnosis import power_spectrum
-from chaosgym.plotting.design import ACCENT, BAD, impact_diagram
+from chaosgym.plotting.design import impact_diagram
+from chaosgym.plotting.style import ACCENT, BAD
 from thesis import plotting as thesis
 from thesis.figures.computations import Data
 from thesis.figures.figure import Finding, Panel, Parts

@@ -20,6 +20,7 @@ COMMANDS = {
     "new-machine": "new_machine:new_machine",
     "diagnose": "diagnose:diagnose",
     "overlay": "overlay:overlay",
+    "explore": "explore:explore",
     "classify": "classify:classify",
     "sweep": "sweep:sweep",
     "dataset": "dataset:dataset",

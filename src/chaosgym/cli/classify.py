@@ -10,6 +10,7 @@ import click
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, verdict_lines
 from chaosgym.cli.output import emit
+from chaosgym.cli.plot_option import draw, picture_path, plot_option
 from chaosgym.machines.registry import MACHINES
 
 KERNELS = ("--follow", "--batch")
@@ -41,6 +42,7 @@ def _quick_start(arguments: list[str]) -> None:
 @click.option(
     "--model", type=click.Path(exists=True, dir_okay=False), help="Classifier file; default: the shipped one."
 )
+@plot_option()
 def classify(
     machine: Any,
     measured: Measured,
@@ -51,6 +53,7 @@ def classify(
     batch: str | None,
     out: str | None,
     model: str | None,
+    plot: str | None,
     as_json: bool,
 ) -> None:
     """Tell response type (I, II, III) and nature by as few cycles as it takes, with proof where periodic."""
@@ -65,6 +68,8 @@ def classify(
         raise click.UsageError("--budget-us and --nature-only belong to a machine or --batch, not to records")
     if log and not follow:
         raise click.UsageError("--log belongs to --follow")
+    if plot and not measured:
+        raise click.UsageError("--plot goes with --peaks or --series; `chaosgym diagnose` draws a machine")
     if follow:
         return _follow(sys.stdin, half_width, log, as_json)
     from chaosgym.classifier import MachineClassifier, default_classifier
@@ -73,7 +78,7 @@ def classify(
     if classifier.machine.name != machine.name:
         raise click.UsageError(f"--model {model} knows {classifier.machine.name}, not {machine.name}")
     if measured:
-        _classify_measured(classifier, measured, half_width, as_json)
+        _classify_measured(classifier, measured, half_width, plot, as_json)
     elif batch and out:
         _classify_batch(classifier, batch, out, budget_us, not nature_only, as_json)
     else:
@@ -121,18 +126,20 @@ def _learned_lines(answer: Any) -> list[str]:
         return [f"  learned: no answer: {answer.reason}"]
     told = {True: "irregular beyond the sensor's error", False: "regular to the sensor", None: "irregularity unknown"}
     nature = answer.nature or "too close to call"
-    chances = {} if answer.irregular_probability is None else {"irregular": answer.irregular_probability}
     head = f"  learned: {told[answer.irregular]}, amplitude {answer.amplitude:.3g} N; exact nature: {nature}"
     warning = [f"  warning: {answer.warning}"] if answer.warning else []
-    return [head, *_bars({**chances, **answer.nature_probabilities}), *warning]
+    return [head, *_bars(_chances(answer)), *warning]
 
 
-def _classify_measured(classifier: Any, measured: Measured, half_width: float | None, as_json: bool) -> None:
+def _classify_measured(
+    classifier: Any, measured: Measured, half_width: float | None, plot: str | None, as_json: bool
+) -> None:
     """Print the one verdict on each run, and the classifier's chances as further evidence."""
     from chaosgym.errors import DiagnosisError
 
     machine = classifier.machine.name
-    results, lines = {}, []
+    picture = picture_path(plot, f"classify-{machine}")
+    results, lines, drawn = {}, [], []
     runs = measured_runs(measured, several=True)
     for run in runs:
         try:
@@ -149,9 +156,23 @@ def _classify_measured(classifier: Any, measured: Measured, half_width: float | 
         }
         lines += verdict_lines(f"{machine}, measured" if len(runs) == 1 else run.name, run)
         lines += _learned_lines(learned)
+        drawn.append((run.name, run.peaks, verdict, _chances(learned)))
     (only,) = results.values() if len(results) == 1 else (None,)
     result = {"machine": machine, **only} if only else {"machine": machine, "runs": results}
+    draw(picture, lambda: _figure(drawn), result, lines)
     emit(result, as_json, lambda: lines)
+
+
+def _chances(answer: Any) -> dict[str, float]:
+    """Probabilities that the classifier gives for a record."""
+    irregular = {} if answer.irregular_probability is None else {"irregular": answer.irregular_probability}
+    return {**irregular, **answer.nature_probabilities}
+
+
+def _figure(runs: Any) -> Any:
+    from chaosgym.plotting.commands import classified_figure
+
+    return classified_figure(runs)
 
 
 def _classify_batch(

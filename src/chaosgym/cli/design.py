@@ -1,11 +1,13 @@
 """May a designer rely on the machine? ``design``."""
 
 import datetime
+from typing import Any
 
 import click
 
 from chaosgym.cli.measured_options import Measured, measured_options, measured_runs
 from chaosgym.cli.output import emit
+from chaosgym.cli.plot_option import draw, picture_path, plot_option
 from chaosgym.cli.quantity import Quantity
 
 
@@ -18,6 +20,7 @@ from chaosgym.cli.quantity import Quantity
 )
 @click.option("--out", type=click.Path(dir_okay=False), help="HTML report to write, with a JSON file beside it.")
 @click.option("--overwrite", is_flag=True, help="Replace the report if it exists.")
+@plot_option()
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the machines in tolerance.")
 @click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -28,6 +31,7 @@ def design(
     load_rating: float | None,
     out: str | None,
     overwrite: bool,
+    plot: str | None,
     seed: int,
     workers: int | None,
     as_json: bool,
@@ -43,6 +47,9 @@ def design(
         return click.echo(briefs.template(template), nl=False)
     if (brief is None) == (load_rating is None or not measured):
         raise click.UsageError("give a brief (see --template), or --peaks FILE.csv with --load-rating")
+    if plot and not measured:
+        raise click.UsageError("--plot goes with --peaks or --series; a brief is drawn in its report, --out FILE.html")
+    picture = picture_path(plot, "design-measured")
     if out is not None:
         report.report_paths(out, overwrite)
     asked = briefs.read_brief(brief) if brief is not None else None
@@ -59,6 +66,7 @@ def design(
         stated = asked.stated if asked is not None else ("load_rating",)
         found = evaluate_peaks(run.peaks, criteria, verdict=run.verdict, stated=stated, source=source)
         page, result, lines = report.measured_report(found), found.as_dict(), [*found.lines(), *run.notes]
+        draw(picture, lambda: _figure(found), result, lines)
     elif asked is not None:
         answer = study(asked, seed=seed, workers=workers, progress=True)
         page, result, lines = (
@@ -70,3 +78,9 @@ def design(
         report.write_report(page, result, out, overwrite)
         lines.append(f"report: {out}")
     emit(result, as_json, lambda: lines)
+
+
+def _figure(found: Any) -> Any:
+    from chaosgym.plotting.commands import peaks_figure
+
+    return peaks_figure(found)

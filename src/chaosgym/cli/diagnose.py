@@ -1,6 +1,7 @@
 """The command ``diagnose``: is a response periodic or chaotic?"""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import click
@@ -8,6 +9,7 @@ import click
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, verdict_lines
 from chaosgym.cli.output import emit
+from chaosgym.cli.plot_option import draw, picture_path, plot_option
 from chaosgym.machines.registry import MACHINES
 
 
@@ -23,6 +25,7 @@ from chaosgym.machines.registry import MACHINES
 @click.option("--types", is_flag=True, help="Also tell the response type (I, II, III) over the tolerances.")
 @click.option("--step-check", is_flag=True, help="Repeat with a finer step and say whether the verdict stays.")
 @measured_options
+@plot_option()
 def diagnose(
     machine: Any,
     test: str,
@@ -30,22 +33,27 @@ def diagnose(
     types: bool,
     step_check: bool,
     measured: Measured,
+    plot: str | None,
     as_json: bool,
 ) -> None:
     """Tell periodic from chaotic: a machine by simulation, or a measured signal."""
+    picture = picture_path(plot, f"diagnose-{machine.name if machine else 'measured'}")
     if measured:
         if machine or types or step_check:
             raise click.UsageError("--peaks and --series go without a machine, --types and --step-check")
         (run,) = measured_runs(measured)
         result, lines = run_as_dict(run), verdict_lines(run.source, run)
+        draw(picture, lambda: _figure_of_run(run), result, lines)
     elif machine is None:
         raise click.UsageError(f"give a machine ({', '.join(MACHINES)}), --peaks FILE or --series FILE")
     elif test == "mut":
-        result, lines = _matrix_update(machine)
+        result, lines, verdict = _matrix_update(machine)
+        draw(picture, lambda: _figure(verdict), result, lines)
     else:
         if measured.sensor_sigma is not None:
             raise click.UsageError("--sensor-sigma belongs to --peaks or --series")
-        result, lines = _diagnose_machine(machine, budget, types, step_check, measured.sensor_error or 0.0)
+        result, lines, verdict = _diagnose_machine(machine, budget, types, step_check, measured.sensor_error or 0.0)
+        draw(picture, lambda: _figure(verdict), result, lines)
     emit(result, as_json, lambda: lines)
 
 
@@ -60,19 +68,31 @@ def _verdict_lines(subject: str, verdict: Any, summary: Mapping[str, float], uni
     ]
 
 
-def _matrix_update(machine: Any) -> tuple[dict[str, Any], list[str]]:
+def _figure(verdict: Any) -> Any:
+    from chaosgym.plotting.commands import diagnosis_figure
+
+    return diagnosis_figure(verdict)
+
+
+def _figure_of_run(run: Any) -> Any:
+    from chaosgym.plotting.commands import measured_figure
+
+    return measured_figure(run.peaks, run.verdict.diagnosis, f"{Path(run.source).name}, {run.name}")
+
+
+def _matrix_update(machine: Any) -> tuple[dict[str, Any], list[str], Any]:
     from chaosgym.design.statistics import summary as summarize
     from chaosgym.diagnosis import matrix_update_test
 
     verdict = matrix_update_test(machine)
     summary = summarize(verdict.judged.peak_force[:, 0])
     result = {"machine": machine.name, **verdict.as_dict(), "peak_force_summary_N": summary, "warnings": []}
-    return result, _verdict_lines(f"{machine.name}, Matrix Update Test", verdict, summary, " N")
+    return result, _verdict_lines(f"{machine.name}, Matrix Update Test", verdict, summary, " N"), verdict
 
 
 def _diagnose_machine(
     machine: Any, budget: int, types: bool, check: bool, sensor_error: float
-) -> tuple[dict[str, Any], list[str]]:
+) -> tuple[dict[str, Any], list[str], Any]:
     from chaosgym.design.statistics import summary as summarize
     from chaosgym.diagnosis import diagnose, response_type
     from chaosgym.diagnosis.step_check import step_check
@@ -103,4 +123,4 @@ def _diagnose_machine(
         compared = step_check(machine, verdict, budget=budget, sensor_error=sensor_error)
         result["step_check"] = compared.as_dict()
         lines.append(f"  {compared.summary}")
-    return result, lines
+    return result, lines, verdict

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from chaosgym.cli.output import emit
+from chaosgym.cli.plot_option import picture_path, plot_option
 
 if TYPE_CHECKING:
     from chaosgym.control.rollout import Played
@@ -20,23 +21,15 @@ if TYPE_CHECKING:
     help="Folder with policy.json and weights.npz; default: the shipped policy of ENV.",
 )
 @click.option("--machine", type=click.IntRange(0, 255), default=0, show_default=True, help="Of those kept for this.")
-@click.option(
-    "--out",
-    type=click.Path(dir_okay=False, path_type=Path),
-    default=None,
-    help="Figure (.png) or animation (.gif, .mp4) of demand, speed and forces, beside following the demand.",
-)
+@plot_option("--out", formats="figure .png, .svg, .pdf or animation .gif, .mp4")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def run_agent(env: str, policy: Path | None, machine: int, out: Path | None, as_json: bool) -> None:
+def run_agent(env: str, policy: Path | None, machine: int, plot: str | None, as_json: bool) -> None:
     """Let a trained agent run one job of ENV, such as chaosgym/ImpactBeamTolerance-v1, beside following the demand."""
     from chaosgym.envs import ENVIRONMENTS
 
     if env not in ENVIRONMENTS:
         raise click.UsageError(f"ENV {env} is unknown; known: {', '.join(ENVIRONMENTS)}")
-    if out is not None:
-        from chaosgym.plotting.played_job import check_format
-
-        check_format(out)
+    out = _picture(plot, env)
     from chaosgym.control.controllers import Follow
     from chaosgym.control.policies import load_policy, shipped_policy
     from chaosgym.control.rollout import play
@@ -47,8 +40,20 @@ def run_agent(env: str, policy: Path | None, machine: int, out: Path | None, as_
         from chaosgym.plotting.played_job import save_job
 
         save_job({"agent": job, "follow the demand": follow}, out)
-    result = {**job.as_dict(), "follow": follow.as_dict(), "out": str(out) if out else None}
+    result = {**job.as_dict(), "follow": follow.as_dict(), **({"plot": str(out)} if out else {})}
     emit(result, as_json, lambda: _lines(job, follow, out))
+
+
+def _picture(plot: str | None, env: str) -> Path | None:
+    """Path of the figure or animation, checked before a job is played."""
+    if plot is None:
+        return None
+    from chaosgym.plotting.played_job import FORMATS, check_format
+
+    out = picture_path(plot, f"run-agent-{env.rpartition('/')[2]}", FORMATS)
+    if out is not None:
+        check_format(out)
+    return out
 
 
 def _lines(job: "Played", follow: "Played", out: Path | None) -> list[str]:
@@ -62,4 +67,4 @@ def _lines(job: "Played", follow: "Played", out: Path | None) -> list[str]:
             f"{name}: {played['status'].replace('_', ' ')}, return {played['return']:.2f}, Type III in "
             f"{played['type_iii_share']:.1%} of the cycles, {played['mean_deviation']:.2f} {job.unit} off the demand"
         )
-    return [*lines, *([f"written to {out}"] if out else [])]
+    return [*lines, *([f"picture: {out}"] if out else [])]

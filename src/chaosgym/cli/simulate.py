@@ -8,6 +8,7 @@ import numpy as np
 
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import emit
+from chaosgym.cli.plot_option import draw, picture_path, plot_option
 
 
 @machine_command
@@ -17,6 +18,7 @@ from chaosgym.cli.output import emit
 @click.option("--series-out", type=click.Path(dir_okay=False), help="Force and motion over time: CSV or Parquet.")
 @click.option("--samples", type=click.IntRange(8, 10**5), default=256, show_default=True, help="A cycle, --series-out.")
 @click.option("--overwrite", is_flag=True, help="Replace these files if they exist.")
+@plot_option()
 def simulate(
     machine: Any,
     cycles: int,
@@ -25,11 +27,13 @@ def simulate(
     series_out: str | None,
     samples: int,
     overwrite: bool,
+    plot: str | None,
     as_json: bool,
 ) -> None:
     """Run a machine from rest; print the last peak forces, and write those of every cycle to a file."""
     from chaosgym.simulation import simulate as run
 
+    picture = picture_path(plot, f"simulate-{machine.name}")
     if out or series_out:
         from chaosgym.signals.write import check_target, write_table
 
@@ -60,22 +64,25 @@ def simulate(
     sensors = dict(zip(machine.sensors, _largest(record.sensor_peak), strict=True))
     if sensors:
         result["largest_sensor_force_N"] = sensors
-    emit(
-        result,
-        as_json,
-        lambda: [
-            f"{machine.name}: {cycles} cycles after {transient}",
-            f"peak force, {machine.sides[0]} side   {peaks.min():.2f} to {peaks.max():.2f} N, "
-            f"mean {peaks.mean():.2f} N",
-            f"last peaks                {' '.join(f'{peak:.2f}' for peak in peaks[-8:])}",
-            f"impacts per cycle         {record.impacts.sum(axis=1).mean():.1f}",
-            f"share in contact          {record.contact_fraction.sum(axis=1).mean():.2f}",
-            *(f"largest force, {name:16s} {force:.2f} N" for name, force in sensors.items()),
-            *result["warnings"],
-            *(f"written to {path}" for path in result["files"]),
-            f"computing time            {1e6 * seconds_per_cycle:.0f} us per cycle",
-        ],
-    )
+    lines = [
+        f"{machine.name}: {cycles} cycles after {transient}",
+        f"peak force, {machine.sides[0]} side   {peaks.min():.2f} to {peaks.max():.2f} N, mean {peaks.mean():.2f} N",
+        f"last peaks                {' '.join(f'{peak:.2f}' for peak in peaks[-8:])}",
+        f"impacts per cycle         {record.impacts.sum(axis=1).mean():.1f}",
+        f"share in contact          {record.contact_fraction.sum(axis=1).mean():.2f}",
+        *(f"largest force, {name:16s} {force:.2f} N" for name, force in sensors.items()),
+        *result["warnings"],
+        *(f"written to {path}" for path in result["files"]),
+        f"computing time            {1e6 * seconds_per_cycle:.0f} us per cycle",
+    ]
+    draw(picture, lambda: _figure(record, transient), result, lines)
+    emit(result, as_json, lambda: lines)
+
+
+def _figure(record: Any, transient: int) -> Any:
+    from chaosgym.plotting.commands import simulation_figure
+
+    return simulation_figure(record, transient)
 
 
 def _largest(sensor_peak: Any) -> list[float]:

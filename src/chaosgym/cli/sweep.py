@@ -6,6 +6,7 @@ import click
 
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import emit
+from chaosgym.cli.plot_option import draw, picture_path, plot_option
 from chaosgym.cli.quantity import millimetres_meant
 
 
@@ -37,6 +38,7 @@ from chaosgym.cli.quantity import millimetres_meant
 @click.option("--scheduler", metavar="tcp://HOST:PORT", help="Compute on a Dask cluster (extra [cluster]).")
 @click.option("--repair", is_flag=True, help="Compute damaged chunks again.")
 @click.option("--out", type=click.Path(file_okay=False), required=True, help="Folder for the labelled points.")
+@plot_option()
 def sweep(
     machine: Any,
     axes: tuple[str, ...],
@@ -52,6 +54,7 @@ def sweep(
     scheduler: str | None,
     repair: bool,
     out: str,
+    plot: str | None,
     as_json: bool,
 ) -> None:
     """Label many machines and keep them as Parquet; the same command again resumes."""
@@ -61,6 +64,7 @@ def sweep(
     from chaosgym.sweeps import Axis, SweepPlan, run_sweep
     from chaosgym.sweeps.plan import default_axes
 
+    picture = picture_path(plot, f"sweep-{machine.name}")
     sizes = {"random": random_size, "sobol": sobol_size, "crosses": cross_count}
     given = [name for name, size in sizes.items() if size]
     if len(given) > 1:
@@ -85,18 +89,22 @@ def sweep(
         **counts,
         "warnings": warnings,
     }
-    emit(
-        result,
-        as_json,
-        lambda: [
-            f"{machine.name}: complete, {len(labelled.table)} points in {out}",
-            *(
-                f"  {name:14s}" + ", ".join(f"{key} {count}" for key, count in sorted(counts[name].items()))
-                for name in counts
-            ),
-            *(f"  {warning}" for warning in warnings),
-        ],
-    )
+    lines = [
+        f"{machine.name}: complete, {len(labelled.table)} points in {out}",
+        *(
+            f"  {name:14s}" + ", ".join(f"{key} {count}" for key, count in sorted(counts[name].items()))
+            for name in counts
+        ),
+        *(f"  {warning}" for warning in warnings),
+    ]
+    draw(picture, lambda: _figure(labelled), result, lines)
+    emit(result, as_json, lambda: lines)
+
+
+def _figure(labelled: Any) -> Any:
+    from chaosgym.plotting.dataset import sweep_map
+
+    return sweep_map(labelled)
 
 
 def _note_millimetres(machine: Any, text: str) -> None:

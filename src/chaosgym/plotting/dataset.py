@@ -1,42 +1,62 @@
-"""Maps of a sweep over speed and clearance, as thesis figures 3.9 and 4.15."""
+"""Pictures of a sweep: maps over speed and clearance, as thesis figures 3.9 and 4.15, and forces along one field."""
 
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from chaosgym.errors import DatasetError
-from chaosgym.machines.parameters import parameters_of
-from chaosgym.plotting.overview import TYPE_COLOURS
+from chaosgym.plotting.design import axis_label
+from chaosgym.plotting.response import force_spans
+from chaosgym.plotting.style import STYLE, TYPE_COLOURS, figure_of
 from chaosgym.sweeps import LabelledSweep, SweepPlan
+
+Array = NDArray[np.float64]
 
 BINS = 24
 """Bins along speed and along clearance."""
 
 
 def sweep_map(sweep: LabelledSweep) -> Figure:
-    """Natures and types of a grid over speed and clearance, or shares over all machines of any other sweep."""
+    """Natures and types of a grid over two fields, forces along one, or shares over all machines of any other sweep."""
     plan = sweep.plan
-    figure = Figure(figsize=(7.2, 5.0) if plan.sampling == "grid" else (10.5, 4.6), layout="constrained")
-    if plan.sampling == "grid":
-        nature_map(sweep, figure.subplots())
-    else:
-        left, right = figure.subplots(1, 2, sharey=True)
-        share_map(sweep, "nature", "chaotic", left)
-        share_map(sweep, "response_type", "I", right)
+    with matplotlib.rc_context(STYLE):
+        figure = figure_of(*((6.2, 3.6) if len(plan.fields) == 1 else (6.2, 4.8)))
+        if len(plan.fields) == 1:
+            force_diagram(sweep, figure.subplots())
+        elif plan.sampling == "grid" and len(plan.fields) == 2:
+            nature_map(sweep, figure.subplots())
+        else:
+            figure.set_size_inches(9.5, 4.4)
+            left, right = figure.subplots(1, 2, sharey=True)
+            share_map(sweep, "nature", "chaotic", left)
+            share_map(sweep, "response_type", "I", right)
     return figure
+
+
+def force_diagram(sweep: LabelledSweep, ax: Axes) -> Axes:
+    """Smallest to largest peak force along the one field that varies, by nature."""
+    machine, (field,) = sweep.plan.machine, sweep.plan.fields
+    label, factor = axis_label(machine, field)
+    known = np.array([nature is not None for nature in sweep.column("nature")])
+    at, low, high = (sweep.column(name)[known] for name in (field, "peak_force_min", "peak_force_max"))
+    force_spans(factor * at, low, high, sweep.column("nature")[known], ax)
+    ax.set(xlabel=label, title=f"{machine.name}: forces of {len(at)} points")
+    return ax
 
 
 def nature_map(sweep: LabelledSweep, ax: Axes) -> Axes:
     """Open circles: periodic; black dots: chaotic; crosses: undetermined. Shading: response type."""
     plan = sweep.plan
-    speed_field, clearance_field = _plane(plan)
-    if set(plan.fields) != {speed_field, clearance_field}:
-        raise DatasetError(f"a map needs a grid over {speed_field} and {clearance_field} alone")
-    speed, clearance = sweep.column(speed_field), 1e3 * sweep.column(clearance_field)
+    if len(plan.fields) != 2:
+        raise DatasetError(f"a map needs a grid over two fields; this one varies {', '.join(plan.fields)}")
+    across, up = _plane(plan)
+    speed, clearance = _shown(sweep, across), _shown(sweep, up)
     order = np.lexsort((clearance, speed))
     shape = (len(np.unique(speed)), len(np.unique(clearance)))
     grids = [values[order].reshape(shape) for values in (speed, clearance)]
@@ -65,9 +85,11 @@ def nature_map(sweep: LabelledSweep, ax: Axes) -> Axes:
 def share_map(sweep: LabelledSweep, column: str, label: str, ax: Axes) -> Axes:
     """Share of the rows with a label in bins of speed and clearance, over all machines."""
     plan = sweep.plan
-    speed_field, clearance_field = _plane(plan)
-    speed, clearance = sweep.column(speed_field), 1e3 * sweep.column(clearance_field)
-    edges = [np.linspace(speed.min(), speed.max(), BINS + 1), np.geomspace(clearance.min(), clearance.max(), BINS + 1)]
+    across, up = _plane(plan)
+    speed, clearance = _shown(sweep, across), _shown(sweep, up)
+    logarithmic = bool(clearance.min() > 0.0)
+    spaced = np.geomspace if logarithmic else np.linspace
+    edges = [np.linspace(speed.min(), speed.max(), BINS + 1), spaced(clearance.min(), clearance.max(), BINS + 1)]
     known = np.array([value is not None for value in sweep.column(column)])
     chosen = sweep.column(column) == label
     hits, _, _ = np.histogram2d(speed[chosen], clearance[chosen], edges)
@@ -75,16 +97,23 @@ def share_map(sweep: LabelledSweep, column: str, label: str, ax: Axes) -> Axes:
     share = np.divide(hits, total, out=np.full_like(hits, np.nan), where=total > 0)
     mesh = ax.pcolormesh(edges[0], edges[1], share.T, vmin=0.0, vmax=1.0, cmap="cividis")
     ax.figure.colorbar(mesh, ax=ax, label=f"share {label}")
-    ax.set_yscale("log")
+    if logarithmic:
+        ax.set_yscale("log")
     return _label(plan, ax, f"{plan.machine.name}: {column.replace('_', ' ')} {label}")
 
 
 def _plane(plan: SweepPlan) -> tuple[str, str]:
-    return plan.machine.speed_field, plan.machine.clearance_field
+    """The two fields of a map: speed and clearance where both vary, else the first two."""
+    usual = plan.machine.speed_field, plan.machine.clearance_field
+    return usual if {*usual} <= {*plan.fields} or plan.sampling == "crosses" else (plan.fields[0], plan.fields[1])
+
+
+def _shown(sweep: LabelledSweep, field: str) -> Array:
+    """A field of every row, lengths in mm."""
+    return np.asarray(axis_label(sweep.plan.machine, field)[1] * sweep.column(field))
 
 
 def _label(plan: SweepPlan, ax: Axes, title: str) -> Axes:
-    speed = plan.machine.speed_field
-    unit = parameters_of(plan.machine)[speed].unit
-    ax.set(xlabel=f"{speed.replace('_', ' ')} [{unit}]", ylabel="clearance [mm]", title=title)
+    across, up = (axis_label(plan.machine, field)[0] for field in _plane(plan))
+    ax.set(xlabel=across, ylabel=up, title=title)
     return ax

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from numpy.typing import NDArray
@@ -20,33 +19,7 @@ from chaosgym.design.trends import LifeTrend
 from chaosgym.diagnosis import ResponseMap
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
-from chaosgym.plotting.overview import TYPE_COLOURS
-
-INK, ACCENT, BAD, MUTED = "#22303c", "#1f6f8b", "#b3392f", "#8a97a3"
-NATURE_COLOURS = {"periodic": ACCENT, "quasiperiodic": "#8e5ea2", "chaotic": "#d1495b", "undetermined": MUTED}
-
-STYLE: Any = {
-    "font.size": 9.5,
-    "axes.edgecolor": MUTED,
-    "axes.labelcolor": INK,
-    "axes.titlesize": 10.5,
-    "axes.titlelocation": "left",
-    "axes.titleweight": "bold",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e6eaee",
-    "grid.linewidth": 0.7,
-    "axes.axisbelow": True,
-    "text.color": INK,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "svg.hashsalt": "chaosgym",
-    "svg.fonttype": "path",
-}
-"""Settings for ``matplotlib.rc_context`` around these figures."""
+from chaosgym.plotting.style import ACCENT, BAD, INK, MUTED, NATURE_COLOURS, TYPE_COLOURS
 
 PLACES = {
     "m": ("place on the guide, from the crank's axis [mm]", 1e3, 4.0),
@@ -245,8 +218,3 @@ def impact_diagram(diagram: PeakImpactDiagram, ax: Axes) -> Axes:
         middle = 0.5 * (np.min(place) + np.max(place))
         ax.set_xlim(middle - 0.5 * least, middle + 0.5 * least)
     return ax
-
-
-def figure_of(width: float = 6.2, height: float = 3.7) -> Figure:
-    """Empty figure of a report."""
-    return Figure(figsize=(width, height), layout="constrained")

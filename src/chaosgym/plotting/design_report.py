@@ -25,7 +25,7 @@ from chaosgym.errors import DesignError
 from chaosgym.files import write_atomically
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.plotting import design as figures
-from chaosgym.plotting.overview import TYPE_COLOURS
+from chaosgym.plotting.style import STYLE, TYPE_COLOURS, figure_of
 from chaosgym.version import __version__
 
 CONVERGENCE = (
@@ -208,30 +208,30 @@ def _pictures(study: DesignStudy) -> list[Picture]:
 
 
 def _drawn(draw: Callable[[Axes], object]) -> Figure:
-    with matplotlib.rc_context(figures.STYLE):
-        figure = figures.figure_of()
+    with matplotlib.rc_context(STYLE):
+        figure = figure_of()
         draw(figure.add_subplot())
     return figure
 
 
 def _figure_of_peaks(peaks: figures.Array, exponent: float) -> Figure:
-    with matplotlib.rc_context(figures.STYLE):
-        figure = figures.figure_of(12.6, 3.5)
+    with matplotlib.rc_context(STYLE):
+        figure = figure_of(12.6, 3.5)
         left, right = figure.subplots(1, 2, width_ratios=(3, 1))
         figures.peak_record(peaks, exponent, left, right)
     return figure
 
 
 def _figure_of_convergence(peaks: figures.Array, cycles: int) -> Figure:
-    with matplotlib.rc_context(figures.STYLE):
-        figure = figures.figure_of()
+    with matplotlib.rc_context(STYLE):
+        figure = figure_of()
         figures.running_convergence(peaks, cycles, *figure.subplots(2, 1, sharex=True))
     return figure
 
 
 def _picture(figure: Figure, caption: str, wide: bool = False) -> Picture:
     buffer = io.BytesIO()
-    with matplotlib.rc_context(figures.STYLE):
+    with matplotlib.rc_context(STYLE):
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     return Picture(base64.b64encode(buffer.getvalue()).decode("ascii"), caption, wide)
 

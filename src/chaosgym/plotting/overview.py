@@ -12,14 +12,9 @@ from matplotlib.patches import Patch
 from chaosgym.classifier import MachineClassifier
 from chaosgym.control.rollout import Played
 from chaosgym.plotting.played_job import draw_speed
+from chaosgym.plotting.style import NATURE_COLOURS, TYPE_COLOURS
 from chaosgym.simulation import CycleRecord
 from chaosgym.sweeps import LabelledSweep
-
-TYPE_COLOURS = {"I": "#3b7dd8", "II": "#f2a93b", "III": "#d1495b", "undetermined": "#bbbbbb"}
-"""One colour a response type, told apart by colour-blind readers too."""
-
-NATURE_COLOURS = {"periodic": TYPE_COLOURS["I"], "chaotic": TYPE_COLOURS["III"]}
-"""One colour a nature."""
 
 
 def peak_history(records: Mapping[str, CycleRecord], ax: Axes) -> Axes:

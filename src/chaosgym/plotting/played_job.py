@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.animation import FFMpegWriter
 from matplotlib.axes import Axes
@@ -17,13 +18,16 @@ from chaosgym.control.rollout import Played
 from chaosgym.envs.pictures import CALM, INK, WILD
 from chaosgym.errors import ChaosgymError
 from chaosgym.files import write_atomically
+from chaosgym.plotting.picture_file import FORMATS as STILL
+from chaosgym.plotting.picture_file import check_picture, save_picture
+from chaosgym.plotting.style import STYLE
 
 FRAMES = 50
 """Pictures of an animation."""
 
 FRAMES_PER_SECOND = 10
 
-FORMATS = (".png", ".gif", ".mp4")
+FORMATS = (*STILL, ".gif", ".mp4")
 
 Jobs = Mapping[str, Played]
 """Jobs by the name of who played; the first machine of each is drawn."""
@@ -41,12 +45,12 @@ def draw_jobs(jobs: Jobs, figure: Figure, steps: int | None = None) -> None:
         done = slice(steps)
         axes[0, column].set_title(
             f"{name}: return {np.nansum(job.reward[done, 0]):.1f}, Type III {np.nanmean(job.type_iii[done, 0]):.0%}",
-            fontsize=9,
+            fontsize=9.5,
             color=INK,
         )
-    axes[0, 0].set_ylim(low - margin, high + margin)
+    axes[0, 0].set_ylim(low - margin, high + 5.0 * margin)
     first = next(iter(jobs.values()))
-    figure.suptitle(f"{first.env}, machine {first.machines[0]}", fontsize=10, color=INK)
+    figure.suptitle(f"{first.env}, machine {first.machines[0]}", x=0.02, ha="left", fontsize=10, color=INK)
 
 
 def draw_speed(job: Played, ax: Axes, steps: int | None = None) -> Axes:
@@ -55,9 +59,10 @@ def draw_speed(job: Played, ax: Axes, steps: int | None = None) -> Axes:
     step = np.arange(len(speed))
     ax.step(step, job.demand[:steps, 0], where="mid", color=INK, linewidth=0.8, label="demand")
     for chosen, colour, name in ((~wild, CALM, "calm"), (wild, WILD, "Type III")):
-        ax.plot(step[chosen], speed[chosen], "s", color=colour, markersize=3, label=name)
+        mark = "s" if name == "calm" else "D"
+        ax.plot(step[chosen], speed[chosen], mark, color=colour, markersize=3, label=name)
     ax.set_ylabel(f"speed [{job.unit}]")
-    ax.legend(loc="lower right", fontsize=7, frameon=False)
+    ax.legend(loc="upper right", fontsize=8, ncols=3, handletextpad=0.2, columnspacing=0.8)
     return ax
 
 
@@ -69,12 +74,12 @@ def draw_forces(job: Played, ax: Axes, steps: int | None = None) -> Axes:
         ax.errorbar(
             step[chosen], mean[chosen], 2.0 * spread[chosen], fmt=".", color=colour, markersize=3, linewidth=0.8
         )
-    ax.set(xlim=(0, len(job.speed)), xlabel="step", ylabel="peak force [N], mean and 2 sd")
+    ax.set(xlim=(0, len(job.speed)), xlabel="step", ylabel="peak force [N], mean ± 2 SD")
     return ax
 
 
 def save_job(jobs: Jobs, path: Path) -> None:
-    """Write a figure (.png) or an animation (.gif, .mp4) of jobs.
+    """Write a figure (.png, .svg, .pdf) or an animation (.gif, .mp4) of jobs.
 
     Raises
     ------
@@ -82,27 +87,26 @@ def save_job(jobs: Jobs, path: Path) -> None:
         If the file name ends in something else, or there is no ffmpeg for .mp4.
     """
     check_format(path)
-    writers = {".png": _write_figure, ".gif": _write_gif, ".mp4": _write_film}
-    write_atomically(path, lambda file: writers[path.suffix.lower()](jobs, file))
+    kind = path.suffix.lower()
+    with matplotlib.rc_context(STYLE):
+        if kind in STILL:
+            figure = _blank(jobs)
+            draw_jobs(jobs, figure)
+            save_picture(figure, path)
+        else:
+            write = _write_gif if kind == ".gif" else _write_film
+            write_atomically(path, lambda file: write(jobs, file))
 
 
 def check_format(path: Path) -> None:
     """Raise a ChaosgymError unless ``save_job`` can write a file of this name."""
-    kind = path.suffix.lower()
-    if kind not in FORMATS:
-        raise ChaosgymError(f"{path} ends in {kind or 'nothing'}; allowed: {', '.join(FORMATS)}")
-    if kind == ".mp4" and shutil.which("ffmpeg") is None:
+    check_picture(path, FORMATS)
+    if path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise ChaosgymError(f"{path} needs the program ffmpeg, which is not installed; .gif does without it")
 
 
 def _blank(jobs: Jobs) -> Figure:
-    return Figure(figsize=(4.6 * len(jobs), 4.8), dpi=100, layout="constrained")
-
-
-def _write_figure(jobs: Jobs, file: Path) -> None:
-    figure = _blank(jobs)
-    draw_jobs(jobs, figure)
-    figure.savefig(file, format="png")
+    return Figure(figsize=(3.6 * len(jobs), 4.2), dpi=100, layout="constrained")
 
 
 def _write_gif(jobs: Jobs, file: Path) -> None:

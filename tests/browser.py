@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import subprocess
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ FLAGS = (
     "--disable-component-update",
     "--disable-sync",
     "--no-first-run",
-    "--host-resolver-rules=MAP * ~NOTFOUND",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE localhost",
     "--remote-debugging-pipe",
 )
 
@@ -69,35 +70,68 @@ class Browser:
         os.close(self._to)
         os.close(self._from)
 
-    def visit(self, page: Path, screenshot: Path | None = None, width: int = 1200) -> Visit:
+    def visit(self, address: str, screenshot: Path | None = None, width: int = 1200) -> Visit:
         """Open a page and wait until it has loaded."""
         self.events.clear()
         self._call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
-        self._call("Page.navigate", url=page.as_uri())
+        self._call("Page.navigate", url=address)
         while not any(event["method"] == "Page.loadEventFired" for event in self.events):
             self.events.append(self._message())
+        seen = self.seen()
+        if screenshot is not None:
+            self.picture(screenshot)
+        return seen
+
+    def seen(self) -> Visit:
+        """What has happened on the page until now."""
         seen = Visit()
         for event in self.events:
             given = event.get("params", {})
             if event["method"] == "Network.requestWillBeSent":
                 seen.requests.append(given["request"]["url"])
             elif event["method"] == "Runtime.exceptionThrown":
-                seen.complaints.append(given["exceptionDetails"]["text"])
+                seen.complaints.append(str(given["exceptionDetails"]))
             elif event["method"] == "Log.entryAdded":
-                seen.complaints.append(given["entry"]["text"])
-        seen.pictures = self._value("Array.from(document.images, i => [i.naturalWidth, i.naturalHeight])")
-        seen.width = self._value("[document.documentElement.scrollWidth, document.documentElement.clientWidth]")
-        seen.title = self._value("document.title")
-        if screenshot is not None:
-            picture = self._call("Page.captureScreenshot", captureBeyondViewport=True, clip=self._whole_page())
-            screenshot.write_bytes(base64.b64decode(picture["data"]))
+                seen.complaints.append(str(given["entry"]))
+        seen.pictures = self.value("Array.from(document.images, i => [i.naturalWidth, i.naturalHeight])")
+        seen.width = self.value("[document.documentElement.scrollWidth, document.documentElement.clientWidth]")
+        seen.title = self.value("document.title")
         return seen
+
+    def picture(self, path: Path) -> None:
+        """Save the whole page as PNG."""
+        taken = self._call("Page.captureScreenshot", captureBeyondViewport=True, clip=self._whole_page())
+        path.write_bytes(base64.b64decode(taken["data"]))
+
+    def wait(self, expression: str, seconds: float = 60.0) -> Any:
+        """Value of a JavaScript expression as soon as it is true."""
+        end = time.monotonic() + seconds
+        while not (value := self.value(expression)):
+            assert time.monotonic() < end, f"waited {seconds:g} s for {expression}"
+            time.sleep(0.05)
+        return value
+
+    def drag(self, place: tuple[float, float], across: float, steps: int = 8) -> None:
+        """Press the mouse at a place of the window, move it across, and release it."""
+        x, y = place
+        self._mouse("mousePressed", x, y)
+        for step in range(1, steps + 1):
+            self._mouse("mouseMoved", x + across * step / steps, y)
+        self._mouse("mouseReleased", x + across, y)
+
+    def click(self, place: tuple[float, float]) -> None:
+        """Click at a place of the window."""
+        self.drag(place, 0.0, 0)
+
+    def _mouse(self, kind: str, x: float, y: float) -> None:
+        self._call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     def _whole_page(self) -> dict[str, float]:
         size = self._call("Page.getLayoutMetrics")["cssContentSize"]
         return {"x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1}
 
-    def _value(self, expression: str) -> Any:
+    def value(self, expression: str) -> Any:
+        """Value of a JavaScript expression."""
         return self._call("Runtime.evaluate", expression=expression, returnByValue=True)["result"]["value"]
 
     def _call(self, method: str, **parameters: Any) -> dict[str, Any]:

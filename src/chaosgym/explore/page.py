@@ -1,0 +1,226 @@
+"""The page: sliders, five pictures that follow them, the verdict, and the point as link, Python and command."""
+
+from html import escape
+from typing import Any
+
+import numpy as np
+from bokeh.document import Document
+from bokeh.layouts import column, row
+from bokeh.models import BoxAnnotation, Button, ColumnDataSource, CustomJS, Div, Select, Span, TextAreaInput
+from bokeh.models import Slider as Widget
+from bokeh.plotting import figure
+
+from chaosgym.errors import ChaosgymError
+from chaosgym.explore.playback import Playback
+from chaosgym.explore.point import (
+    View,
+    command_of,
+    link_of,
+    machine_from,
+    orbit_diagram,
+    python_of,
+    sliders_of,
+    view_of,
+)
+from chaosgym.machines import Machine
+from chaosgym.machines.parameters import with_settings
+from chaosgym.machines.registry import MACHINES
+from chaosgym.plotting.style import ACCENT, BAD, INK, MUTED, NATURE_COLOURS, PALE
+
+PAUSE = 15
+"""Milliseconds for which movements of a slider are gathered before the page follows."""
+
+AT_ONCE = 4
+"""Speeds of the orbit diagram that are computed between two looks at the sliders."""
+
+TOOLS = "pan,wheel_zoom,box_zoom,reset,save"
+
+NUMBERS = 400
+"""Steps of a slider."""
+
+
+class Page:
+    """The state behind one opened page.
+
+    Parameters
+    ----------
+    document
+        Bokeh's document of the session.
+    machine
+        What it shows first; a deep link overrides it.
+    """
+
+    def __init__(self, document: Document, machine: Machine) -> None:
+        self._document, self.machine = document, machine
+        self._waits = self._draws = False
+        self._sources = {
+            "motion": ColumnDataSource({"time": [], "x": [], "v": [], "f": []}),
+            "section": ColumnDataSource({"x": [], "v": []}),
+            "peaks": ColumnDataSource({"n": [], "peak": []}),
+            "orbit": ColumnDataSource({"speed": [], "peak": []}),
+        }
+        self._stops = [BoxAnnotation(fill_color=MUTED, fill_alpha=0.25) for _ in range(4)]
+        self._here = Span(dimension="height", line_color=BAD, line_width=2)
+        self._verdict = Div(css_classes=["verdict"], sizing_mode="stretch_width")
+        self._link = Div(visible=False, name="link")
+        self._python = TextAreaInput(title="This point as Python", rows=5, sizing_mode="stretch_width", name="python")
+        self._command = TextAreaInput(title="and as a command", rows=2, sizing_mode="stretch_width", name="command")
+        self._choice = Select(title="machine", value=machine.name, options=list(MACHINES))
+        self._choice.on_change("value", lambda name, old, new: self.show(MACHINES[new]()))
+        self._panel = column(width=340)
+        self._playback = Playback(document, self.show)
+        document.title = "chaosgym explore"
+        document.add_root(self._layout())
+        self.show(machine)
+
+    def show(self, machine: Machine) -> None:
+        """Go to a machine: its sliders, and everything that follows from them."""
+        self.machine = machine
+        self._choice.update(value=machine.name)
+        self._sliders = sliders_of(machine)
+        self._widgets = [self._widget(place) for place in range(len(self._sliders))]
+        self._panel.children = [self._choice, *self._widgets, self._playback.panel(machine), self._verdict]
+        self._follow()
+        self._start_diagram()
+
+    def _widget(self, place: int) -> Widget:
+        slider = self._sliders[place]
+        low, high = slider.factor * slider.low, slider.factor * slider.high
+        widget = Widget(
+            title=slider.label,
+            start=low,
+            end=high,
+            step=(high - low) / NUMBERS,
+            value=slider.factor * float(getattr(self.machine, slider.field)),
+            format="0.0000" if high < 1.0 else "0.00",
+            sizing_mode="stretch_width",
+            name=slider.field,
+        )
+        widget.on_change("value", lambda name, old, new: self._moved(place, new))
+        return widget
+
+    def _moved(self, place: int, value: float) -> None:
+        slider = self._sliders[place]
+        self.machine = with_settings(self.machine, {slider.field: value / slider.factor})
+        if not self._waits:
+            self._waits = True
+            self._document.add_timeout_callback(self._follow, PAUSE)
+        if place > 0:
+            self._start_diagram()
+
+    def _follow(self) -> None:
+        """Let everything but the orbit diagram follow the machine."""
+        self._waits = False
+        view = view_of(self.machine)
+        self._draw(view)
+        colour = NATURE_COLOURS[view.nature]
+        lines = "".join(f"<p>{escape(line)}</p>" for line in view.lines)
+        self._verdict.text = f'<h2 style="color:{colour}">{escape(view.headline)}</h2>{lines}'
+        self._link.text = link_of(self.machine)
+        self._python.value, self._command.value = python_of(self.machine), command_of(self.machine)
+        self._here.location = float(getattr(self.machine, self.machine.speed_field))
+
+    def _draw(self, view: View) -> None:
+        millimetres = 1e3 * view.displacement
+        self._sources["motion"].data = {
+            "time": 1e3 * view.time,
+            "x": millimetres,
+            "v": view.velocity,
+            "f": view.force,
+        }
+        self._sources["section"].data = {"x": 1e3 * view.section[:, 0], "v": view.section[:, 1]}
+        self._sources["peaks"].data = {"n": np.arange(1, len(view.peaks) + 1), "peak": view.peaks}
+        for box, (field, sign) in zip(
+            self._stops, (("bottom", 1.0), ("top", -1.0), ("left", 1.0), ("right", -1.0)), strict=True
+        ):
+            box.update(**{field: sign * 1e3 * view.room})
+
+    def _start_diagram(self) -> None:
+        """Begin the orbit diagram anew; it fills while the page stays alive to the sliders."""
+        self._orbit = orbit_diagram(self.machine, self._sliders[0])
+        self._sources["orbit"].data = {"speed": [], "peak": []}
+        self._speed_axis.axis_label = self._sliders[0].label
+        if not self._draws:
+            self._draws = True
+            self._document.add_next_tick_callback(self._more_diagram)
+
+    def _more_diagram(self) -> None:
+        speeds, peaks = [], []
+        for _, (speed, found) in zip(range(AT_ONCE), self._orbit, strict=False):
+            speeds += [speed] * len(found)
+            peaks += found.tolist()
+        self._draws = bool(speeds)
+        if speeds:
+            self._sources["orbit"].stream({"speed": speeds, "peak": peaks})
+            self._document.add_timeout_callback(self._more_diagram, 1)
+
+    def _figure(self, title: str, across: str, up: str, **options: Any) -> Any:
+        made = figure(
+            title=title, x_axis_label=across, y_axis_label=up, height=250, tools=TOOLS, active_drag=None, **options
+        )
+        made.toolbar.logo = None
+        made.toolbar.autohide = True
+        made.sizing_mode = "stretch_width"
+        made.grid.grid_line_color = PALE
+        made.outline_line_color = None
+        made.title.text_color = INK
+        return made
+
+    def _layout(self) -> Any:
+        motion, section, peaks, orbit = self._sources.values()
+        moves = self._figure("Motion between the stops", "time [ms]", "displacement [mm]")
+        moves.line("time", "x", source=motion, color=ACCENT)
+        force = self._figure("Contact force", "time [ms]", "force [N]", x_range=moves.x_range)
+        force.line("time", "f", source=motion, color=ACCENT)
+        portrait = self._figure("Phase portrait", "displacement [mm]", "velocity [m/s]")
+        portrait.line("x", "v", source=motion, color=ACCENT)
+        strobe = self._figure("Once a cycle: stroboscopic section", "displacement [mm]", "velocity [m/s]")
+        strobe.scatter("x", "v", source=section, size=4, color=NATURE_COLOURS["chaotic"])
+        record = self._figure("Peak force of every settled cycle", "cycle", "peak force [N]")
+        record.scatter("n", "peak", source=peaks, size=3, color=ACCENT)
+        record.y_range.start = 0
+        diagram = self._figure("Orbit diagram: peak forces over speed", "speed", "peak force [N]")
+        diagram.scatter("speed", "peak", source=orbit, size=2, color=INK, alpha=0.6)
+        diagram.add_layout(self._here)
+        self._speed_axis = diagram.xaxis[0]
+        for box in self._stops[:2]:
+            moves.add_layout(box)
+        for box in self._stops[2:]:
+            portrait.add_layout(box)
+        keep_link = CustomJS(args={"link": self._link}, code="history.replaceState(null, '', '?' + link.text)")
+        self._link.js_on_change("text", keep_link)
+        pictures = column(
+            row(moves, force, sizing_mode="stretch_width"),
+            row(portrait, strobe, sizing_mode="stretch_width"),
+            row(diagram, record, sizing_mode="stretch_width"),
+            row(self._python, column(self._command, self._copies(), sizing_mode="stretch_width")),
+            sizing_mode="stretch_width",
+        )
+        return column(row(self._panel, pictures, sizing_mode="stretch_width"), self._link, sizing_mode="stretch_width")
+
+    def _copies(self) -> Any:
+        """Buttons that copy Python, command and link."""
+        buttons = []
+        for label, source, code in (
+            ("Copy Python", self._python, "text.value"),
+            ("Copy command", self._command, "text.value"),
+            ("Copy link", self._link, "location.href"),
+        ):
+            button = Button(label=label, width=120)
+            button.js_on_click(CustomJS(args={"text": source}, code=f"navigator.clipboard.writeText({code})"))
+            buttons.append(button)
+        return row(*buttons)
+
+
+def open_page(document: Document, machine: Machine) -> None:
+    """Fill a document with the page; the request's query, if there is one, says which machine."""
+    context: Any = document.session_context
+    given = {} if context is None else context.request.arguments
+    asked = {name: values[0].decode() for name, values in given.items() if not name.startswith("bokeh")}
+    if "machine" in asked:
+        try:
+            machine = machine_from(asked.pop("machine"), asked)
+        except ChaosgymError as error:
+            document.add_root(Div(text=f"<h2>This link can't be shown</h2><p>{escape(str(error))}</p>"))
+            return
+    Page(document, machine)

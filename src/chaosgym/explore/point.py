@@ -1,0 +1,217 @@
+"""One point of the exploration: a machine, and everything that is shown of it, as plain numbers and lines."""
+
+import shlex
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.classifier import default_classifier
+from chaosgym.diagnosis import Diagnosis, diagnose
+from chaosgym.envs.pictures import PICTURES, PLAIN
+from chaosgym.errors import ChaosgymError, ModelFileError, ParameterError, SimulationError
+from chaosgym.machines import Machine
+from chaosgym.machines.parameters import parameters_of, with_settings
+from chaosgym.machines.registry import MACHINES
+from chaosgym.monitor import Monitor
+from chaosgym.simulation import simulate
+
+Array = NDArray[np.float64]
+
+BUDGET = 400
+"""Cycles of the diagnosis: what is sure after some hundredths of a second."""
+
+SHOWN_CYCLES, SAMPLES = 6, 300
+"""Cycles of the time history and of the phase portrait, and samples of each."""
+
+DIAGRAM_POINTS, DIAGRAM_CYCLES, DIAGRAM_TRANSIENT = 140, 30, 60
+"""Speeds of the orbit diagram, cycles shown of each, and cycles before them."""
+
+SENSOR_ERROR = 3.0
+"""Largest error [N] of the monitor's sensor (thesis 3.6)."""
+
+
+class Slider(NamedTuple):
+    """A field that a slider moves, with its range; lengths are shown in mm (``factor`` 1000)."""
+
+    field: str
+    label: str
+    low: float
+    high: float
+    factor: float
+
+
+@dataclass(frozen=True)
+class View:
+    """What a point looks like.
+
+    Attributes
+    ----------
+    time, displacement, velocity, force
+        Of the last ``SHOWN_CYCLES`` cycles [s, m, m/s, N].
+    section : (cycles, 2)
+        Displacement [m] and velocity [m/s] once a cycle, settled motion.
+    peaks : (cycles,)
+        Peak forces [N] of the settled cycles, first side.
+    room
+        How far [m] the gap lets the displacement go.
+    nature
+        Of the verdict; "undetermined" where the motion could not be followed.
+    headline, lines
+        Verdict and its evidence; the classifier; the monitor.
+    """
+
+    time: Array
+    displacement: Array
+    velocity: Array
+    force: Array
+    section: Array
+    peaks: Array
+    room: float
+    nature: str
+    headline: str
+    lines: tuple[str, ...]
+
+
+def sliders_of(machine: Machine) -> list[Slider]:
+    """Speed, clearance and damping of a machine; the damping is its first field of that name."""
+    damping = [name for name in parameters_of(machine) if "damping" in name and not parameters_of(machine)[name].choices]
+    fields = [machine.speed_field, machine.clearance_field, *damping[:1]]
+    return [_slider(machine, field) for field in fields]
+
+
+def _slider(machine: Machine, field: str) -> Slider:
+    about, value = parameters_of(machine)[field], float(getattr(machine, field))
+    usual = machine.usual_ranges.get(field, (0.2 * value, 5.0 * value if value else 1.0))
+    low, high = max(min(usual[0], value), about.low), min(max(usual[1], value), about.high)
+    unit, factor = ("mm", 1e3) if about.unit == "m" else (about.unit, 1.0)
+    return Slider(field, field.replace("_", " ") + ("" if unit == "-" else f" [{unit}]"), low, high, factor)
+
+
+def machine_from(name: str, settings: Mapping[str, str]) -> Machine:
+    """Machine of a deep link: fields in SI by name; what is not given is as in the registry.
+
+    Raises
+    ------
+    ParameterError
+        If the machine, a field or a value is unknown; names it.
+    """
+    if name not in MACHINES:
+        raise ParameterError(f"machine = {name!r} is not one of {', '.join(MACHINES)}")
+    described = parameters_of(MACHINES[name])
+    values: dict[str, Any] = {}
+    for field, text in settings.items():
+        chosen = field in described and described[field].choices
+        try:
+            values[field] = text if chosen else float(text)
+        except ValueError:
+            raise ParameterError(f"{field} = {text!r} is no number") from None
+    return with_settings(MACHINES[name](), values)
+
+
+def changes_of(machine: Machine) -> dict[str, Any]:
+    """Fields in which a machine differs from the default of its kind."""
+    default = type(machine)()
+    return {
+        name: getattr(machine, name)
+        for name in parameters_of(machine)
+        if getattr(machine, name) != getattr(default, name)
+    }
+
+
+def link_of(machine: Machine) -> str:
+    """Query of the deep link of a machine."""
+    from urllib.parse import urlencode
+
+    return urlencode({"machine": machine.name, **changes_of(machine)})
+
+
+def python_of(machine: Machine) -> str:
+    """Lines of Python that diagnose a machine."""
+    kind = type(machine)
+    fields = ", ".join(f"{name}={value!r}" for name, value in changes_of(machine).items())
+    home = "chaosgym" if kind.__module__.startswith("chaosgym.") else kind.__module__
+    return (
+        f"import chaosgym\nfrom {home} import {kind.__name__}\n\n"
+        f"machine = {kind.__name__}({fields})\nprint(chaosgym.diagnose(machine))"
+    )
+
+
+def command_of(machine: Machine) -> str:
+    """Command line that diagnoses a machine."""
+    settings = [part for name, value in changes_of(machine).items() for part in ("--set", f"{name}={value}")]
+    return shlex.join(["chaosgym", "diagnose", machine.name, *settings])
+
+
+def view_of(machine: Machine) -> View:
+    """Everything that is shown of a point; a motion that can't be followed is told, not raised."""
+    room = PICTURES.get(machine.name, PLAIN).room(machine)
+    try:
+        verdict = diagnose(machine, budget=BUDGET)
+    except (SimulationError, ParameterError) as error:
+        nothing = np.zeros(0)
+        shown = (nothing,) * 4
+        return View(*shown, np.zeros((0, 2)), nothing, room, "undetermined", "can't be followed", (str(error),))
+    judged = verdict.judged
+    cycles = min(SHOWN_CYCLES, len(judged))
+    last = simulate(machine, cycles, judged.section[-cycles], samples_per_cycle=SAMPLES)
+    assert last.history is not None
+    motion = last.history.reshape(-1, 3)
+    return View(
+        time=last.time,
+        displacement=motion[:, 0],
+        velocity=motion[:, 1],
+        force=motion[:, 2],
+        section=np.column_stack([judged.displacement, judged.velocity]),
+        peaks=judged.peak_force[:, 0],
+        room=room,
+        nature=verdict.nature,
+        headline=_headline(verdict),
+        lines=(verdict.reason, _votes(verdict), _classified(machine), _watched(judged.peak_force[:, 0])),
+    )
+
+
+def _headline(verdict: Diagnosis) -> str:
+    period = f", period {verdict.period}" if verdict.period else ""
+    return f"{verdict.nature}{period} ({verdict.status})"
+
+
+def _votes(verdict: Diagnosis) -> str:
+    peaks = verdict.judged.peak_force
+    if not peaks.any():
+        return "no contact at all: the gap is never closed"
+    votes = ", ".join(f"{test.replace('_', ' ')} {vote}" for test, vote in verdict.votes.items())
+    return f"peak forces {peaks[:, 0].min():.1f} to {peaks[:, 0].max():.1f} N; votes: {votes}"
+
+
+def _classified(machine: Machine) -> str:
+    try:
+        answer = default_classifier(machine.name).classify(machine, types=False)
+    except ModelFileError:
+        return "classifier: none is trained for this machine"
+    except ChaosgymError as error:
+        return f"classifier: {error}"
+    centre = answer.centre
+    if centre.nature is None:
+        return f"classifier: no answer: {centre.reason}"
+    how = "proven" if centre.proven else f"probability {centre.probability:.2f}"
+    return f"classifier: {centre.nature}, {how} by {centre.stage}"
+
+
+def _watched(peaks: Array) -> str:
+    seen = list(Monitor(SENSOR_ERROR).watch(peaks))
+    last = seen[-1]
+    state = {None: "waiting", False: "regular", True: "ALARM: irregular"}[last.alarm]
+    return f"monitor with a ±{SENSOR_ERROR:g} N sensor: {state}, level {last.level:.2f}"
+
+
+def orbit_diagram(machine: Machine, slider: Slider) -> Iterator[tuple[float, Array]]:
+    """Peak forces [N] of settled cycles at one speed after the other; (speed, (cycles,)) each."""
+    for speed in np.linspace(slider.low, slider.high, DIAGRAM_POINTS).tolist():
+        try:
+            record = simulate(machine.at(speed), DIAGRAM_CYCLES, transient=DIAGRAM_TRANSIENT)
+        except SimulationError:
+            continue
+        yield speed, np.unique(np.round(record.peak_force[:, 0], 3))

@@ -1,0 +1,174 @@
+"""The one picture of each command: ``--plot``. Each function takes a result and returns a figure.
+
+Figures are as wide as a column of a journal takes at 80 % (4.4 in), so that their letters stay above 7 points there.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from chaosgym.design.measured import MeasuredPeaks
+from chaosgym.diagnosis import Diagnosis
+from chaosgym.envs.pictures import PICTURES, PLAIN
+from chaosgym.machines import Machine
+from chaosgym.plotting import response
+from chaosgym.plotting.design import axis_label, peak_record
+from chaosgym.plotting.style import ACCENT, INK, NATURE_COLOURS, STYLE, figure_of
+from chaosgym.simulation import CycleRecord, simulate
+
+Array = NDArray[np.float64]
+
+WIDTH = 4.4
+"""Of a figure [in]."""
+
+SHOWN_CYCLES = 4
+"""Cycles of a time history."""
+
+PORTRAIT_CYCLES = 40
+"""Cycles of the phase portrait of a response that does not repeat."""
+
+SAMPLES = 500, 4000
+"""Least and most samples of a time history in a cycle."""
+
+
+def _styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
+    @wraps(draw)
+    def drawn(*arguments: Any, **keywords: Any) -> Figure:
+        with matplotlib.rc_context(STYLE):
+            return draw(*arguments, **keywords)
+
+    return drawn
+
+
+def room_of(machine: Machine) -> float:
+    """How far [m] the gap lets the displacement of the monitored joint go to either side."""
+    return PICTURES.get(machine.name, PLAIN).room(machine)
+
+
+def point_of(machine: Machine) -> str:
+    """Name and operating point of a machine, for a title."""
+    shown = []
+    for name in (machine.speed_field, machine.clearance_field):
+        label, factor = axis_label(machine, name)
+        sign = "±" if name == machine.clearance_field else ""
+        shown.append(f"{sign}{factor * getattr(machine, name):.4g} {label.rpartition('[')[2].rstrip(']')}")
+    return f"{machine.name}, {', '.join(shown)}"
+
+
+def _followed(record: CycleRecord, cycles: int) -> CycleRecord:
+    """The last cycles of a record once more, with their time history."""
+    cycles = min(cycles, len(record))
+    samples = min(max(SAMPLES[0], SAMPLES[1] // cycles), SAMPLES[1])
+    return simulate(record.machine, cycles, record.section[-cycles], samples_per_cycle=samples)
+
+
+@_styled
+def simulation_figure(record: CycleRecord, transient: int = 0) -> Figure:
+    """Peak force of every cycle, and the motion in its gap with the contact force over the last ones."""
+    machine, last = record.machine, _followed(record, SHOWN_CYCLES)
+    assert last.history is not None
+    motion = last.history.reshape(-1, 3)
+    unit, factor = ("s", 1.0) if last.time[-1] > 2.0 else ("ms", 1e3)
+    figure = figure_of(WIDTH, 5.2)
+    peaks, moves, force = figure.subplots(3, 1)
+    moves.sharex(force)
+    colours = (ACCENT, NATURE_COLOURS["chaotic"])
+    for side, (name, colour) in enumerate(zip(machine.sides, colours, strict=False)):
+        response.cycle_points(record.peak_force[:, side], peaks, first=transient + 1, color=colour, label=name)
+    peaks.set_ylim(0.0, 1.3 * float(record.peak_force.max()) or 1.0)
+    peaks.legend(loc="upper right", ncols=2, borderpad=0.1, markerscale=2.0)
+    response.curve(factor * last.time, 1e3 * motion[:, 0], moves)
+    response.stops(room_of(machine), moves, vertical=True)
+    moves.set_ylabel("displacement [mm]")
+    moves.tick_params(labelbottom=False)
+    response.curve(factor * last.time, motion[:, 2], force)
+    shown = f"the last {len(last)} cycles" if len(last) > 1 else "the last cycle"
+    force.set(xlabel=f"time over {shown} [{unit}]", ylabel=f"force, {machine.sides[0]} + [N]")
+    figure.suptitle(point_of(machine), x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    figure.align_ylabels()
+    return figure
+
+
+@_styled
+def diagnosis_figure(verdict: Diagnosis) -> Figure:
+    """Phase portrait with its stops and the stroboscopic section of the settled motion, and the peak forces."""
+    judged = verdict.judged
+    machine, colour = judged.machine, NATURE_COLOURS[verdict.nature]
+    repeats = verdict.period if verdict.nature == "periodic" else None
+    last = _followed(judged, repeats or PORTRAIT_CYCLES)
+    assert last.history is not None
+    figure = figure_of(WIDTH, 5.4)
+    portrait, peaks = figure.subplots(2, 1, height_ratios=(3, 2))
+    motion = last.history.reshape(-1, 3)
+    response.phase_plane(motion[:, 0], motion[:, 1], portrait, pale=repeats is None)
+    response.section_points(judged.displacement, judged.velocity, portrait, color=INK if repeats else colour)
+    response.stops(room_of(machine), portrait)
+    portrait.set_title("Motion between the stops; dots: once a cycle", fontweight="normal", fontsize=9.5)
+    first = (verdict.horizon or len(judged)) - len(judged) + 1
+    response.cycle_points(judged.peak_force[:, 0], peaks, first=first, color=colour)
+    peaks.set_ylabel(f"peak force, {machine.sides[0]} [N]")
+    figure.suptitle(
+        f"{point_of(machine)}\n{_told(verdict)}", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK
+    )
+    return figure
+
+
+def _told(verdict: Diagnosis) -> str:
+    """Nature, period and the exponent or the certificate, in one line."""
+    period = f", period {verdict.period}" if verdict.period else ""
+    if verdict.status == "certified":
+        return f"{verdict.nature}{period}: proven"
+    exponent = verdict.evidence.get("largest_lyapunov_exponent_per_cycle")
+    if exponent is None:
+        return f"{verdict.nature}{period} (margin {verdict.margin:.2f})"
+    return (
+        f"{verdict.nature}{period} ({verdict.status}): exponent {exponent['value']:.2f} "
+        f"± {exponent['standard_error']:.2f} per cycle"
+    )
+
+
+@_styled
+def measured_figure(peaks: Array, verdict: Diagnosis, title: str) -> Figure:
+    """Measured peak forces over the cycles, and their return map."""
+    colour = NATURE_COLOURS[verdict.nature]
+    figure = figure_of(WIDTH, 5.6)
+    over, mapped = figure.subplots(2, 1, height_ratios=(2, 3))
+    response.cycle_points(peaks, over, color=colour)
+    response.next_peak(peaks, mapped, color=colour)
+    figure.suptitle(f"{title}\n{_told(verdict)}", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    return figure
+
+
+@_styled
+def classified_figure(runs: Sequence[tuple[str, Array, Diagnosis, dict[str, float]]]) -> Figure:
+    """Peak forces of each run and the classifier's probabilities beside them; (name, peaks, verdict, chances) each."""
+    figure = figure_of(1.45 * WIDTH, 0.6 + 1.9 * len(runs))
+    rows = figure.subplots(len(runs), 2, squeeze=False, width_ratios=(2, 1))
+    for (left, right), (name, peaks, verdict, chances) in zip(rows, runs, strict=True):
+        response.cycle_points(peaks, left, color=NATURE_COLOURS[verdict.nature])
+        left.set_title(f"{name}: {_told(verdict)}", fontsize=9.5)
+        if chances:
+            response.chance_bars(chances, right)
+            right.set_title("classifier", fontsize=9.5)
+        else:
+            right.set_axis_off()
+            right.text(0.0, 0.5, "the classifier gives no answer", transform=right.transAxes, fontsize=8.5)
+    return figure
+
+
+@_styled
+def peaks_figure(measured: MeasuredPeaks) -> Figure:
+    """Peak forces and how often each occurs, with the equivalent force and the life that follows."""
+    figure = figure_of(1.45 * WIDTH, 3.0)
+    left, right = figure.subplots(1, 2, width_ratios=(5, 2))
+    peak_record(measured.peaks, measured.criteria.life_exponent, left, right)
+    found = measured.evaluation
+    left.set_title(
+        f"Life {found.life:.3g} million cycles ({found.life_interval.low:.3g} to {found.life_interval.high:.3g})"
+    )
+    return figure

@@ -1,0 +1,86 @@
+"""The page in a real browser: it opens, a slider moves, the verdict follows, and nothing leaves this computer."""
+
+import json
+import signal
+import subprocess
+import sys
+from urllib.parse import urlparse
+
+import pytest
+
+pytest.importorskip("bokeh")
+
+from tests.browser import CHROMIUM, Browser
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
+
+DEEP = """
+const all = (root, want) => [...root.querySelectorAll('*')].flatMap(
+    node => [...(node.matches(want) ? [node] : []), ...(node.shadowRoot ? all(node.shadowRoot, want) : [])]);
+const middle = node => { const box = node.getBoundingClientRect(); return [box.x + box.width / 2, box.y + box.height / 2] };
+"""
+"""Elements inside of shadow roots, and where they are."""
+
+
+def deep(expression):
+    """A JavaScript expression that may look into shadow roots."""
+    return f"(() => {{ {DEEP} return {expression} }})()"
+
+
+HEADLINE = deep("all(document, 'h2').map(node => node.textContent).join()")
+
+
+@pytest.fixture(scope="module")
+def address():
+    """Address of a page at 19 Hz that the command serves."""
+    command = [sys.executable, "-m", "chaosgym", "explore", "impact-beam", "--frequency-hz", "19", "--port", "0"]
+    server = subprocess.Popen([*command, "--no-browser", "--json"], stdout=subprocess.PIPE, text=True)
+    assert server.stdout is not None
+    yield json.loads(server.stdout.readline())["address"]
+    server.send_signal(signal.SIGINT)
+    assert server.wait(60) == 130
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    """One browser for all pages."""
+    with Browser(tmp_path_factory.mktemp("profile")) as opened:
+        yield opened
+
+
+def test_a_slider_is_dragged_and_the_verdict_follows(address, browser):
+    """At 19 Hz the beam is periodic; dragged to the right end, 30 Hz, it is chaotic, and so says the address."""
+    browser.visit(address, width=1400)
+    assert browser.wait(f"{HEADLINE}.includes('periodic, period 1 (certified)')")
+    frequency = "Bokeh.documents[0].get_model_by_name('excitation_frequency').value"
+    assert browser.value(frequency) == 19.0
+    browser.drag(browser.value(deep("middle(all(document, '.noUi-handle')[0])")), 400.0)
+    assert browser.wait(f"{HEADLINE}.includes('chaotic')")
+    assert browser.value(frequency) == 30.0
+    assert browser.wait("location.search.includes('machine=impact-beam')")
+    assert "excitation_frequency" not in browser.value("location.search"), "30 Hz is the default of the beam"
+    assert "ImpactBeam()" in browser.value("Bokeh.documents[0].get_model_by_name('python').value")
+    check(browser.seen())
+
+
+def test_an_agent_plays_its_job(address, browser):
+    """The button shows the machine at work: the speed moves by itself, and the page says where the job stands."""
+    browser.visit(address, width=1400)
+    browser.wait(f"{HEADLINE}.includes('periodic')")
+    browser.click(browser.value(deep("middle(all(document, 'button').find(b => b.textContent.includes('agent')))")))
+    told = deep("all(document, 'div').map(node => node.textContent).find(text => /^step [3-9] of 120/.test(text))")
+    assert "Hz" in browser.wait(told, 240.0)
+    check(browser.seen())
+
+
+def test_a_link_that_says_nonsense_is_answered_in_words(address, browser):
+    """No error page: the reason."""
+    browser.visit(address.partition("?")[0] + "?machine=engine")
+    assert browser.wait(f"{HEADLINE}.includes('can\\'t be shown')")
+
+
+def check(seen):
+    """Nothing is asked of another computer, and no script complains."""
+    hosts = {urlparse(url).hostname for url in seen.requests if not url.startswith(("data:", "blob:"))}
+    assert hosts == {"localhost"}
+    assert seen.complaints == []
