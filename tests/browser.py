@@ -131,8 +131,8 @@ class Browser:
         return {"x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1}
 
     def value(self, expression: str) -> Any:
-        """Value of a JavaScript expression."""
-        return self._call("Runtime.evaluate", expression=expression, returnByValue=True)["result"]["value"]
+        """Value of a JavaScript expression; None if it has none."""
+        return self._call("Runtime.evaluate", expression=expression, returnByValue=True)["result"].get("value")
 
     def _call(self, method: str, **parameters: Any) -> dict[str, Any]:
         self._number += 1

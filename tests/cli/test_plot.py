@@ -67,7 +67,9 @@ def test_a_picture_is_drawn_into_a_new_file(command, peaks):
     assert Path(first).read_bytes() == held == Path(second).read_bytes(), "the same result gives the same bytes"
 
 
-@pytest.mark.parametrize("axes", [("clearance=1e-4:1.3e-4:3",), ("excitation_frequency=18:30:3", "clearance=1e-4:1.3e-4:2")])
+@pytest.mark.parametrize(
+    "axes", [("clearance=1e-4:1.3e-4:3",), ("excitation_frequency=18:30:3", "clearance=1e-4:1.3e-4:2")]
+)
 def test_a_sweep_is_drawn_along_one_field_or_over_two(axes):
     """Forces along one field, a map over two; the file that was named is written."""
     given = [word for axis in axes for word in ("--axis", axis)]

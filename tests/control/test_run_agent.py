@@ -62,7 +62,10 @@ def test_a_film_is_written(folder, tmp_path):
     [
         (("chaosgym/ImpactBeam-v0",), "ENV chaosgym/ImpactBeam-v0 is unknown; known: chaosgym/ImpactBeam-v1"),
         ((ENV, "--policy", "nowhere"), "nowhere holds no policy.json"),
-        ((ENV, "--plot", "job.tex"), "job.tex is no name of a picture; allowed: names that end in .png, .svg, .pdf, .gif, .mp4"),
+        (
+            (ENV, "--plot", "job.tex"),
+            "job.tex is no name of a picture; allowed: names that end in .png, .svg, .pdf, .gif, .mp4",
+        ),
     ],
 )
 def test_wrong_input_ends_in_one_line(arguments, complaint):

@@ -34,11 +34,11 @@ HEADLINE = deep("all(document, 'h2').map(node => node.textContent).join()")
 def address():
     """Address of a page at 19 Hz that the command serves."""
     command = [sys.executable, "-m", "chaosgym", "explore", "impact-beam", "--frequency-hz", "19", "--port", "0"]
-    server = subprocess.Popen([*command, "--no-browser", "--json"], stdout=subprocess.PIPE, text=True)
-    assert server.stdout is not None
-    yield json.loads(server.stdout.readline())["address"]
-    server.send_signal(signal.SIGINT)
-    assert server.wait(60) == 130
+    with subprocess.Popen([*command, "--no-browser", "--json"], stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        yield json.loads(server.stdout.readline())["address"]
+        server.send_signal(signal.SIGINT)
+        assert server.wait(60) == 130
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,9 @@ UNNAMED = "-"
 """Stands for a file that the user did not name."""
 
 
-def plot_option(*names: str, formats: str = ".png, .svg or .pdf") -> Callable[[Callable[..., None]], Callable[..., None]]:
+def plot_option(
+    *names: str, formats: str = ".png, .svg or .pdf"
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """``--plot``; the function receives ``plot``: what was written, ``UNNAMED``, or None."""
     return click.option(
         "--plot",

@@ -61,7 +61,7 @@ class Page:
         }
         self._stops = [BoxAnnotation(fill_color=MUTED, fill_alpha=0.25) for _ in range(4)]
         self._here = Span(dimension="height", line_color=BAD, line_width=2)
-        self._verdict = Div(css_classes=["verdict"], sizing_mode="stretch_width")
+        self._verdict = Div(sizing_mode="stretch_width")
         self._link = Div(visible=False, name="link")
         self._python = TextAreaInput(title="This point as Python", rows=5, sizing_mode="stretch_width", name="python")
         self._command = TextAreaInput(title="and as a command", rows=2, sizing_mode="stretch_width", name="command")
@@ -114,8 +114,8 @@ class Page:
         view = view_of(self.machine)
         self._draw(view)
         colour = NATURE_COLOURS[view.nature]
-        lines = "".join(f"<p>{escape(line)}</p>" for line in view.lines)
-        self._verdict.text = f'<h2 style="color:{colour}">{escape(view.headline)}</h2>{lines}'
+        lines = "".join(f'<p style="margin:0 0 8px">{escape(line)}</p>' for line in view.lines)
+        self._verdict.text = f'<h2 style="color:{colour};margin:4px 0 8px">{escape(view.headline)}</h2>{lines}'
         self._link.text = link_of(self.machine)
         self._python.value, self._command.value = python_of(self.machine), command_of(self.machine)
         self._here.location = float(getattr(self.machine, self.machine.speed_field))
@@ -193,7 +193,11 @@ class Page:
             row(moves, force, sizing_mode="stretch_width"),
             row(portrait, strobe, sizing_mode="stretch_width"),
             row(diagram, record, sizing_mode="stretch_width"),
-            row(self._python, column(self._command, self._copies(), sizing_mode="stretch_width")),
+            row(
+                self._python,
+                column(self._command, self._copies(), sizing_mode="stretch_width"),
+                sizing_mode="stretch_width",
+            ),
             sizing_mode="stretch_width",
         )
         return column(row(self._panel, pictures, sizing_mode="stretch_width"), self._link, sizing_mode="stretch_width")

@@ -76,8 +76,10 @@ class View:
 
 
 def sliders_of(machine: Machine) -> list[Slider]:
-    """Speed, clearance and damping of a machine; the damping is its first field of that name."""
-    damping = [name for name in parameters_of(machine) if "damping" in name and not parameters_of(machine)[name].choices]
+    """Speed, clearance and damping of a machine: its first damping ratio, or its first damping of another kind."""
+    described = parameters_of(machine)
+    damping = [name for name in described if "damping" in name and not described[name].choices]
+    damping.sort(key=lambda name: not name.endswith("damping_ratio"))
     fields = [machine.speed_field, machine.clearance_field, *damping[:1]]
     return [_slider(machine, field) for field in fields]
 
