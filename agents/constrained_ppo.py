@@ -2,16 +2,12 @@
 
     python agents/constrained_ppo.py --env chaosgym/ImpactBeamTolerance-v1 --limit 0.05 --out runs/constrained-0
 
-The same command goes on with a run that was interrupted. The folder holds progress.csv (a row every 10,000 steps),
-checkpoint.zip and checkpoint.npz until the end, and then policy.json and weights.npz.
-
-PPO-Lagrangian of A. Ray, J. Achiam and D. Amodei, *Benchmarking Safe Exploration in Deep Reinforcement Learning*, 2019:
-a multiplier weighs the advantage of the cost, from a critic of its own, against that of the reward, and rises while the
-jobs cost more than allowed. The reward has no term for Type III; the cost is ``info["cost"]``, its share in a step.
+The same command goes on with a run that was interrupted, and ends as if it had not been. The folder holds progress.csv
+(a row every 10,000 steps), checkpoint.bin, which only who wrote it can load, and then policy.json and weights.npz.
 """
 
 import argparse
-import csv
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -26,9 +22,12 @@ from torch import nn
 from tqdm import tqdm
 
 from chaosgym.control.policies import save_policy
+from chaosgym.control.policies.checkpoint import load_checkpoint, save_checkpoint
 from chaosgym.control.policies.export import exported
 from chaosgym.envs import SB3VecEnv
 from chaosgym.envs.sb3 import SB3VisitedSpeeds
+from chaosgym.errors import ChaosgymError
+from chaosgym.files import held, write_atomically
 
 Array = NDArray[np.float32]
 
@@ -46,6 +45,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--steps", type=int, default=300_000)
     parser.add_argument("--out", type=Path, default=Path("runs/constrained"))
     parser.add_argument("--envs", type=int, default=64)
+    parser.add_argument("--every", type=int, default=10_000, help="Steps between rows and checkpoints.")
     parser.add_argument("--rollout", type=int, default=60)
     parser.add_argument("--batch", type=int, default=960)
     parser.add_argument("--epochs", type=int, default=6)
@@ -159,79 +159,69 @@ class LagrangianPPO(PPO):
 
 
 class Progress(BaseCallback):
-    """Writes a row and a checkpoint every 10,000 steps."""
+    """Writes a row and a checkpoint every so many steps, when the model has learned from all that was collected."""
 
-    def __init__(self, asked: argparse.Namespace, envs: VecNormalize) -> None:
+    def __init__(self, asked: argparse.Namespace, kept: dict[str, Any] | None) -> None:
         super().__init__()
-        self.asked, self.envs = asked, envs
-        self.jobs: list[tuple[float, float, float]] = []
-        self.sums = np.zeros((3, asked.envs))
-        self.began, self.last = time.process_time(), 0
+        self.asked = asked
+        self.kept = kept or {"rows": [ROW], "jobs": [], "sums": np.zeros((3, asked.envs)), "last": 0, "seconds": 0.0}
+        self.began = time.process_time() - self.kept["seconds"]
 
     def _on_training_start(self) -> None:
-        self.last = self.num_timesteps
-        self.bar = tqdm(total=self.asked.steps, initial=self.num_timesteps, unit="step", desc=self.asked.out.name)
+        self._write_rows()
+        steps = self.model.num_timesteps
+        self.bar = tqdm(total=self.asked.steps, initial=steps, unit="step", desc=self.asked.out.name)
 
     def _on_step(self) -> bool:
         self.bar.update(self.num_timesteps - self.bar.n)
+        sums = self.kept["sums"]
         for i, info in enumerate(self.locals["infos"]):
-            self.sums[:, i] += 1.0, info["type_iii"], info["deviation"]
+            sums[:, i] += 1.0, info["type_iii"], info["deviation"]
             if "episode" in info:
-                steps, type_iii, deviation = self.sums[:, i]
-                self.jobs.append((info["episode"]["r"], type_iii / steps, deviation / steps))
-                self.sums[:, i] = 0.0
+                steps, type_iii, deviation = sums[:, i]
+                self.kept["jobs"].append((info["episode"]["r"], type_iii / steps, deviation / steps))
+                sums[:, i] = 0.0
         return True
 
-    def _on_rollout_end(self) -> None:
-        if self.num_timesteps - self.last < 10_000 or not self.jobs:
-            return
-        self.last = self.num_timesteps
-        row = [self.num_timesteps, *np.round(np.mean(self.jobs, axis=0), 4), round(time.process_time() - self.began)]
-        self.jobs = []
-        path = self.asked.out / "progress.csv"
-        new = not path.exists()
-        with path.open("a", newline="") as file:
-            csv.writer(file).writerows([ROW, row] if new else [row])
-        save(self.asked, self.envs, self.model)
+    def _on_rollout_start(self) -> None:
+        if self.model.num_timesteps - self.kept["last"] >= self.asked.every:
+            self._save()
 
     def _on_training_end(self) -> None:
         self.bar.close()
+        self._save()
 
+    def _save(self) -> None:
+        self.kept |= {"last": self.model.num_timesteps, "seconds": time.process_time() - self.began}
+        if self.kept["jobs"]:
+            means = np.round(np.mean(self.kept["jobs"], axis=0), 4)
+            self.kept["rows"].append((self.kept["last"], *means.tolist(), round(self.kept["seconds"])))
+            self.kept["jobs"] = []
+        save_checkpoint(self.asked.out, self.model, self.kept)
+        self._write_rows()
 
-def save(asked: argparse.Namespace, envs: VecNormalize, model: PPO) -> None:
-    """Write a checkpoint: what stable-baselines3 needs to go on, without pickle for the statistics."""
-    usual = envs.venv.venv.memory.usual
-    kept = {f"{kind}_{name}": getattr(rms, name) for kind, rms in statistics(envs) for name in ("mean", "var", "count")}
-    np.savez(asked.out / "checkpoint.npz", usual_count=usual.count, total=usual.total, squares=usual.squares, **kept)
-    model.save(asked.out / "checkpoint.zip")
-
-
-def load(asked: argparse.Namespace, envs: VecNormalize) -> PPO | None:
-    """Return the model of the checkpoint, if there is one, and put the statistics into the environments."""
-    if not (asked.out / "checkpoint.zip").exists():
-        return None
-    with np.load(asked.out / "checkpoint.npz") as kept:
-        for kind, rms in statistics(envs):
-            for name in ("mean", "var", "count"):
-                setattr(rms, name, kept[f"{kind}_{name}"])
-        usual = envs.venv.venv.memory.usual
-        usual.count, usual.total, usual.squares = kept["usual_count"], kept["total"], kept["squares"]
-    return LagrangianPPO.load(asked.out / "checkpoint.zip", envs, device="cpu")
-
-
-def statistics(envs: VecNormalize) -> list[tuple[str, object]]:
-    """Running means and variances of observations and returns."""
-    return [("obs", envs.obs_rms), ("ret", envs.ret_rms)]
+    def _write_rows(self) -> None:
+        lines = [",".join(map(str, row)) + "\n" for row in self.kept["rows"]]
+        write_atomically(self.asked.out / "progress.csv", lambda path: path.write_text("".join(lines)))
 
 
 def main() -> None:
-    """Train, and write the policy."""
+    """Train, and write the policy; say in one line what stops that."""
     asked = arguments()
-    asked.out.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
+    try:
+        with held(asked.out):
+            train(asked)
+    except ChaosgymError as error:
+        print(f"Error: {error}", file=sys.stderr)
+        sys.exit(2)
+
+
+def train(asked: argparse.Namespace) -> None:
+    """Train, or go on, until the steps are done."""
     native = VecMonitor(SB3VecEnv(asked.env, asked.envs, type_iii_weight=0.0))
     envs = VecNormalize(CostRecorder(SB3VisitedSpeeds(native)), gamma=asked.gamma)
-    model = load(asked, envs)
+    model, kept = load_checkpoint(asked.out, LagrangianPPO, envs) or (None, None)
     if model is None:
         model = LagrangianPPO(
             "MlpPolicy",
@@ -249,9 +239,8 @@ def main() -> None:
         )
         with torch.no_grad():
             model.policy.action_net.bias[0] += HOLD_BIAS
-    envs.seed(1_000_000 * (asked.seed + 1) + model.num_timesteps)
-    model.learn(asked.steps - model.num_timesteps, Progress(asked, envs), reset_num_timesteps=False)
-    save(asked, envs, model)
+        envs.seed(1_000_000 * (asked.seed + 1))
+    model.learn(asked.steps - model.num_timesteps, Progress(asked, kept), reset_num_timesteps=False)
     save_policy(exported(model, asked.env, envs, memory=True), asked.out)
     print(f"policy in {asked.out}")
 

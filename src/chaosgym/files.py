@@ -1,10 +1,17 @@
-"""Files that are either whole or not there, also after a crash, and folders that one process at a time writes into."""
+"""Files that are either whole or not there, also after a crash, and folders that one process at a time writes into.
 
+Archives of arrays are read without pickle, and only as far as a bound on their unpacked size allows.
+"""
+
+import io
 import os
+import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from filelock import FileLock, Timeout
 
 from chaosgym.errors import UnfinishedError
@@ -60,3 +67,34 @@ def held(folder: Path) -> Iterator[None]:
 def is_empty(folder: Path) -> bool:
     """True if a folder holds nothing but a lock and temporary files."""
     return all(path.name == LOCK_FILE or path.match(TEMPORARY) for path in folder.iterdir())
+
+
+def unpacked(archive: bytes, largest: int) -> dict[str, Any]:
+    """Arrays of a ``.npz`` file, by name; a small file may not unpack to a large one.
+
+    Parameters
+    ----------
+    archive
+        Bytes of the file.
+    largest
+        Bytes that all its members may have together, unpacked.
+
+    Raises
+    ------
+    ValueError
+        If they have more, an array claims more than its member holds, or holds Python objects.
+    zipfile.BadZipFile, EOFError
+        If the file is damaged.
+    """
+    with zipfile.ZipFile(io.BytesIO(archive)) as members:
+        size = sum(member.file_size for member in members.infolist())
+        if size > largest:
+            raise ValueError(f"unpacked it has {size} bytes; allowed: up to {largest}")
+        return {member.filename.removesuffix(".npy"): _array(members.read(member)) for member in members.infolist()}
+
+
+def _array(member: bytes) -> Any:
+    try:
+        return np.load(io.BytesIO(member), allow_pickle=False)
+    except MemoryError:
+        raise ValueError("an array claims more bytes than the computer has") from None

@@ -7,6 +7,7 @@ import hashlib
 import io
 import json
 import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,13 +18,13 @@ from chaosgym.classifier.beam_swing import SwingTable
 from chaosgym.classifier.parameter_features import ParameterScaling
 from chaosgym.classifier.trees import Forest
 from chaosgym.errors import ModelFileError
-from chaosgym.files import write_atomically
+from chaosgym.files import unpacked, write_atomically
 
 FORMAT = 4
 """Version of the model file."""
 
 LARGEST = 50_000_000
-"""Bytes that a model file may have."""
+"""Bytes that a model file may have, unpacked."""
 
 _KINDS: Mapping[str, Any] = {kind.__name__: kind for kind in (Forest, ParameterScaling, SwingTable)}
 """Values that a file may hold beside arrays, numbers, words, tuples and None."""
@@ -56,9 +57,9 @@ def read_model(path: str | Path) -> tuple[dict[str, Any], dict[str, dict[str, An
         content = Path(path).read_bytes()
         if len(content) > LARGEST:
             raise ModelFileError(f"{path} has {len(content)} bytes; allowed: up to {LARGEST}")
-        with np.load(io.BytesIO(content), allow_pickle=False) as held:
-            arrays = {name: held[name] for name in held.files if name not in ("head", "card")}
-            head = json.loads(held["head" if "head" in held.files else "card"].tobytes())
+        arrays = unpacked(content, LARGEST)
+        card = arrays.pop("card", None)
+        head = json.loads((arrays.pop("head") if "head" in arrays else card).tobytes())
         if head["format"] != FORMAT:
             raise ModelFileError(
                 f"{path} has format {head['format']}; this version reads format {FORMAT}: "
@@ -77,7 +78,9 @@ def read_model(path: str | Path) -> tuple[dict[str, Any], dict[str, dict[str, An
         TypeError,
         IndexError,
         AttributeError,
+        RecursionError,
         zipfile.BadZipFile,
+        zlib.error,
         EOFError,
     ) as error:
         if isinstance(error, ModelFileError):

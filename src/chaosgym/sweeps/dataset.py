@@ -19,7 +19,7 @@ from chaosgym.sweeps.plan import SweepPlan
 
 DATA_FILE = "sweep.parquet"
 
-DAMAGE = (pa.ArrowException, KeyError, TypeError, ValueError, OSError)
+DAMAGE = (pa.ArrowException, AttributeError, KeyError, RecursionError, TypeError, ValueError, OSError)
 """What a damaged file raises."""
 
 
@@ -86,7 +86,24 @@ def read_sweep(folder: str | Path, columns: list[str] | None = None) -> Labelled
         )
     try:
         table = pq.read_table(path, columns=columns, page_checksum_verification=True)
-        settings = json.loads(table.schema.metadata[b"chaosgym"])
+        return _understood(table)
     except DAMAGE as error:
-        raise DatasetError(f"{path} can't be read as a chaosgym sweep: {error}") from error
-    return LabelledSweep(table, settings)
+        why, _, _ = str(error).partition("\n")
+        raise DatasetError(f"{path} can't be read as a chaosgym sweep: {why}") from error
+
+
+def _understood(table: pa.Table) -> LabelledSweep:
+    """Sweep of a table, all of whose metadata can be read: pages have checksums, the footer has none."""
+    metadata = table.schema.metadata
+    sweep = LabelledSweep(table, json.loads(metadata[b"chaosgym"]))
+    for values, kind in (
+        (sweep.plan, SweepPlan),
+        (sweep.provenance, list),
+        (json.loads(metadata[b"definitions"]), dict),
+    ):
+        if not isinstance(values, kind):
+            raise TypeError(f"its metadata hold a {type(values).__name__} for a {kind.__name__}")
+    for field in table.schema:
+        for key in (b"unit", b"meaning"):
+            field.metadata[key].decode()
+    return sweep

@@ -214,7 +214,7 @@ def read_plan_file(path: Path) -> dict[str, Any]:
     """
     try:
         held = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
+    except (OSError, RecursionError, ValueError) as error:
         raise DatasetError(f"{path} is damaged: {error}; choose another folder") from error
     if not isinstance(held, dict):
         raise DatasetError(f"{path} is damaged: no settings; choose another folder")

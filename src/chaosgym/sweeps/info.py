@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from chaosgym.errors import DatasetError
-from chaosgym.sweeps.dataset import DATA_FILE, LabelledSweep, read_sweep
+from chaosgym.sweeps.dataset import DAMAGE, DATA_FILE, LabelledSweep, read_sweep
 from chaosgym.sweeps.folder import CHUNK_FOLDER, PLAN_FILE, read_plan_file
 from chaosgym.sweeps.plan import SweepPlan
 
@@ -36,7 +36,10 @@ def dataset_info(folder: str | Path) -> dict[str, Any]:
     if not (folder / PLAN_FILE).is_file():
         raise DatasetError(f"{folder} holds no sweep: neither {DATA_FILE} nor {PLAN_FILE}")
     settings = read_plan_file(folder / PLAN_FILE)
-    plan = SweepPlan.from_settings(settings)
+    try:
+        plan = SweepPlan.from_settings(settings)
+    except DAMAGE as error:
+        raise DatasetError(f"{folder / PLAN_FILE} is damaged: {type(error).__name__}: {error}") from error
     kept = {path.name for path in (folder / CHUNK_FOLDER).glob("*.parquet")}
     rows = sum(len(chunk) for chunk in plan.chunks() if f"{chunk.start:012d}.parquet" in kept)
     return {

@@ -6,6 +6,7 @@ chaosgym.evaluate(policy, "chaosgym/ImpactBeamTolerance-v1")
 
 import json
 import zipfile
+import zlib
 from dataclasses import dataclass, field
 from hashlib import sha256
 from io import BytesIO
@@ -23,7 +24,7 @@ from chaosgym.envs.memory import SpeedMemory, Usual
 from chaosgym.envs.observation import OBSERVATION_NAMES
 from chaosgym.envs.task import Task
 from chaosgym.errors import ModelFileError, ParameterError
-from chaosgym.files import write_atomically
+from chaosgym.files import unpacked, write_atomically
 
 Array = NDArray[Any]
 
@@ -31,7 +32,7 @@ FORMAT = 4
 """Version of the files."""
 
 LARGEST = 50_000_000
-"""Bytes that the weights may have."""
+"""Bytes that the weights may have, unpacked."""
 
 DESCRIPTION, WEIGHTS = "policy.json", "weights.npz"
 
@@ -218,7 +219,9 @@ def load_policy(folder: str | Path) -> TrainedPolicy:
         IndexError,
         AttributeError,
         EOFError,
+        RecursionError,
         zipfile.BadZipFile,
+        zlib.error,
     ) as error:
         told = error if isinstance(error, ModelFileError) else f"{type(error).__name__}: {error}"
         raise ModelFileError(f"{folder} can't be read as a policy: {told}") from error
@@ -259,5 +262,4 @@ def _arrays(path: Path, digest: str) -> dict[str, Array]:
     content = path.read_bytes()
     if sha256(content).hexdigest() != digest:
         raise ModelFileError(f"{WEIGHTS} is damaged: its content does not match the hash in {DESCRIPTION}")
-    with np.load(BytesIO(content), allow_pickle=False) as held:
-        return {name: held[name] for name in held.files}
+    return unpacked(content, LARGEST)

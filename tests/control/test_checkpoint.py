@@ -1,0 +1,93 @@
+"""A checkpoint is read by who wrote it, and by nobody else."""
+
+import io
+import os
+import pickle
+import random
+
+
+import pytest
+
+from chaosgym.control.policies.checkpoint import CHECKPOINT, load_checkpoint, save_checkpoint
+from chaosgym.errors import ModelFileError
+
+pytest.importorskip("torch")
+
+
+class Env:
+    """Environments with a state."""
+
+    def __init__(self, venv=None):
+        self.venv, self.state = venv, 0
+
+
+class Model:
+    """A model that saves one number."""
+
+    def __init__(self, env, weight=0):
+        self.env, self.weight, self.replay_buffer = env, weight, [weight]
+
+    def save(self, file):
+        """Write the number."""
+        file.write(bytes([self.weight]))
+
+    @classmethod
+    def load(cls, file, envs, **_):
+        """Read the number."""
+        model = cls(envs, file.read()[0])
+        model.replay_buffer = None
+        return model
+
+
+class Evil:
+    """An object whose pickle makes a folder when it is read."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return os.mkdir, (str(self.path),)
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path, monkeypatch):
+    """A user with a key of their own."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "me"))
+
+
+def _written(folder):
+    model = Model(Env(Env()), 7)
+    model.env.state, model.env.venv.state = 1, 2
+    random.seed(5)
+    save_checkpoint(folder, model, {"rows": 3})
+    return random.random()
+
+
+def test_a_run_goes_on_where_it_was(tmp_path):
+    """Model, what it does not save itself, all layers of environments and the random numbers are as they were."""
+    assert load_checkpoint(tmp_path, Model, Env()) is None
+    following = _written(tmp_path)
+    model, kept = load_checkpoint(tmp_path, Model, Env(Env()))
+    assert (model.weight, model.replay_buffer, model.env.state, model.env.venv.state) == (7, [7], 1, 2)
+    assert kept == {"rows": 3}
+    assert random.random() == following
+    assert (tmp_path / "me" / "chaosgym" / "checkpoint.key").stat().st_mode & 0o077 == 0
+
+
+def test_the_pickle_of_others_is_not_read(tmp_path, monkeypatch):
+    """Another user's file, one without a key, a cut one and one with a bit flipped are refused before they are read."""
+    _written(tmp_path)
+    path, mark = tmp_path / CHECKPOINT, tmp_path / "mark"
+    sound = path.read_bytes()
+    file = io.BytesIO()
+    pickle.dump(Evil(mark), file)
+    flipped = sound[:-9] + bytes([sound[-9] ^ 1]) + sound[-8:]
+    for content in (file.getvalue(), sound[:32] + file.getvalue(), b"", sound[:20], sound[:-1], flipped):
+        path.write_bytes(content)
+        with pytest.raises(ModelFileError, match="was not written by this user"):
+            load_checkpoint(tmp_path, Model, Env(Env()))
+    assert not mark.exists()
+    path.write_bytes(sound)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "somebody else"))
+    with pytest.raises(ModelFileError, match="choose another folder"):
+        load_checkpoint(tmp_path, Model, Env(Env()))
