@@ -5,7 +5,6 @@ import os
 import pickle
 import random
 
-
 import pytest
 
 from chaosgym.control.policies.checkpoint import CHECKPOINT, load_checkpoint, save_checkpoint
