@@ -108,3 +108,8 @@ def task_sample():
     made = "docs/data/peaks.csv"
     run = f"chaosgym simulate impact-beam {point} --out {made}"
     yield task("peaks", [], [made], f"rm -f {made}", run)
+
+
+def task_mutate():
+    """Share of changes of chosen modules that their tests notice; many minutes, never part of another task."""
+    return {"actions": ["rm -rf mutants", "mutmut run", "mutmut results"], "uptodate": [False]}

@@ -40,6 +40,27 @@ def test_plain_trees_equal_scikit_learn(classes):
     np.testing.assert_allclose(chances, model.predict_proba(features), atol=1e-12)
 
 
+@pytest.mark.parametrize(("coverage", "rank"), [(0.9, 1), (0.8, 2), (0.5, 5), (0.95, 0)])
+def test_the_rank_of_a_conformal_threshold_is_exact(coverage, rank):
+    """Of nine true chances the floor((1 - coverage) 10)-th smallest; without one, every class is plausible."""
+    chances = np.array([0.11, 0.32, 0.23, 0.44, 0.55, 0.97, 0.66, 0.88, 0.79])
+    table, labels = np.column_stack([1.0 - chances, chances]), np.ones(9, dtype=np.int64)
+    expected = np.sort(chances)[rank - 1] if rank else 0.0
+    np.testing.assert_array_equal(conformal_thresholds(table, labels, coverage - 1e-12), [0.0, expected])
+
+
+def test_softmax_of_large_scores_is_finite():
+    """Only differences of scores count."""
+    scores = np.array([[1000.0, 1000.0 + np.log(3.0)], [-1000.0, -1000.0]])
+    np.testing.assert_allclose(softmax(scores), [[0.25, 0.75], [0.5, 0.5]], rtol=1e-12)
+
+
+def test_calibration_error_is_the_mean_gap_over_bins_of_equal_mass():
+    """Two bins of two: 0.6 and 0.8 said, half and all right."""
+    confidence, right = np.array([0.8, 0.6, 0.8, 0.6]), np.array([True, False, True, True])
+    assert calibration_error(confidence, right, bins=2) == pytest.approx(0.5 * (0.1 + 0.2))
+
+
 def test_temperature_and_conformal_sets_keep_their_promise():
     """Scores that were doubled are brought back, and sets at 90 % hold nine of ten rows of every class."""
     generator = np.random.default_rng(3)

@@ -96,6 +96,20 @@ def test_history_of_single_impacts_gives_the_force_of_their_peaks():
     assert equivalent_force_of_history(history, 4) == pytest.approx(equivalent_force(peaks), rel=1e-12)
 
 
+def test_the_shortest_history_is_one_impact():
+    """Three samples of one cycle: its range is the force."""
+    assert equivalent_force_of_history([0.0, 60.0, 0.0], 1) == pytest.approx(60.0)
+
+
+def test_the_load_rating_for_a_life_is_the_rating_under_which_it_lasts():
+    """Eq. 5.3 inverts eq. 5.2, for both exponents and on both sides of a million cycles."""
+    for life in (0.2, 1.0, 40.0):
+        for exponent in (3.0, 10.0 / 3.0):
+            rating = required_load_rating(50.0, life, exponent)
+            assert rating_life(50.0, rating, exponent) == pytest.approx(life)
+    assert required_load_rating(50.0, 8.0, 3.0) == pytest.approx(100.0)
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -104,6 +118,14 @@ def test_history_of_single_impacts_gives_the_force_of_their_peaks():
         (lambda: equivalent_force([10.0, -1.0]), "-1 N in cycle 2"),
         (lambda: equivalent_force([10.0, 20.0], probabilities=[0.5, 0.6]), "add up to 1.1"),
         (lambda: required_load_rating(10.0, 0.0), "life = 0"),
+        (lambda: required_load_rating(10.0, 1.0, 0.0), "exponent = 0"),
+        (lambda: rating_life(10.0, 5.0, 0.0), "exponent = 0"),
+        (lambda: rating_life(10.0, math.inf), "load_rating = inf"),
+        (lambda: equivalent_force([10.0], -1.0), "exponent = -1"),
+        (lambda: equivalent_force([10.0, 20.0], probabilities=[1.2, -0.2]), "allowed: 0 or more"),
+        (lambda: equivalent_force([10.0, 20.0], probabilities=[1.0]), "one a force"),
+        (lambda: rainflow_cycles([0.0, 1.0]), r"shape \(2,\)"),
+        (lambda: rainflow_cycles([0.0, math.nan, 1.0]), "finite"),
         (lambda: equivalent_force_of_history([0.0, 1.0, 0.0], 0), "cycles = 0"),
     ],
 )

@@ -15,6 +15,7 @@ from chaosgym.design.reliability import (
     safety_factor,
     time_blocks,
 )
+from chaosgym.errors import DesignError
 
 
 @pytest.mark.parametrize("distance", [-1.0, 0.0, 1.5, 4.0])
@@ -41,9 +42,19 @@ def test_two_peaks_are_seen_by_the_integral_and_lost_by_the_normal_fit():
 
 def test_strength_without_scatter_is_the_classical_criterion():
     """With a single strength the reliability is the share of stresses below it."""
-    assert reliability([1.0, 2.0, 3.0, 4.0], Strength(2.5, 0.0)) == 0.5
+    assert reliability([1.0, 2.0, 3.0, 4.0], Strength(3.5, 0.0)) == 0.75
+    assert reliability([3.0], Strength(3.0, 0.0)) == 0.0, "a stress that equals the strength is not below it"
     assert safety_factor(2.0, 5.0, 1.25) == 2.0
-    assert normal_reliability(1.0, 0.0, 2.0, 0.0) == 1.0
+    assert math.isinf(safety_factor(0.0, 5.0))
+    assert [normal_reliability(stress, 0.0, 2.0, 0.0) for stress in (1.0, 2.0, 3.0)] == [1.0, 0.0, 0.0]
+    assert normal_reliability(1.0, 0.0, 2.0, 0.5) == pytest.approx(stats.norm.cdf(2.0))
+
+
+@pytest.mark.parametrize(("radius", "modulus"), [(0.0, 1e11), (-1e-3, 1e11), (8e-3, 0.0), (math.nan, 1e11)])
+def test_a_ball_of_no_size_or_no_stiffness_is_refused(radius, modulus):
+    """Radius and contact modulus must be positive."""
+    with pytest.raises(DesignError, match="above 0"):
+        hertz_pressure(60.0, radius, modulus)
 
 
 def test_hertz_pressure_of_a_sphere_on_a_flat():

@@ -47,6 +47,54 @@ def test_tori_are_quasiperiodic_and_only_long_records_say_so(series):
     assert two_step_test(series[:100]).nature == "undetermined"
 
 
+@pytest.mark.parametrize(
+    ("series", "least"),
+    [(logistic(4.0, 1000), "diffuses"), (logistic(3.6, 1000), "diffuses"), (logistic(3.8, 100)[:60], "broad")],
+)
+def test_the_margin_of_chaos_is_its_weakest_proof(series, least):
+    """Spectral floor, growth of the 0-1 walk and misfit each keep a distance from a threshold; the least one counts."""
+    verdict = two_step_test(series)
+    assert verdict.nature == "chaotic"
+    evidence = verdict.evidence
+    threshold = 1e-2 if len(series) >= 200 else 1e-1
+    distances = {
+        "broad": min(1.0, np.log10(evidence["spectral_floor"] / threshold)),
+        "diffuses": (evidence["zero_one"] - 0.5) / 0.5,
+        "misfit": min(1.0, np.log10(evidence["residual"] / evidence["residual_allowed"]) / 2.0),
+    }
+    assert min(distances, key=distances.get) == least
+    assert verdict.margin == pytest.approx(distances[least], rel=1e-12)
+    assert 0.0 < verdict.margin < 1.0
+
+
+@pytest.mark.parametrize(("phase", "decided"), [(0.60667, "slack"), (0.6069, "slack")])
+def test_the_margin_of_a_torus_is_its_weakest_proof(phase, decided):
+    """The 0-1 walk must stay below 0.2 and the floor below 1e-3; undetermined verdicts have no margin."""
+    verdict = two_step_test(circle(0.99 if phase == 0.60667 else 0.9, phase, 1000))
+    evidence = verdict.evidence
+    distances = {
+        "slack": (0.2 - evidence["zero_one"]) / 0.2,
+        "floor": min(1.0, np.log10(1e-3 / evidence["spectral_floor"])),
+    }
+    assert min(distances, key=distances.get) == decided
+    assert verdict.margin == pytest.approx(distances[decided], rel=1e-12)
+    assert two_step_test(circle(0.3, GOLDEN, 1000)).margin == 1.0, "never above 1"
+    for unsure in (two_step_test(circle(0.3, GOLDEN, 100)), two_step_test(logistic(3.0, 1000))):
+        assert (unsure.nature, unsure.margin) == ("undetermined", 0.0)
+
+
+def test_the_margin_of_a_period_counts_decades_to_what_is_allowed():
+    """A misfit of a tenth of what is allowed is one decade of two; none at all is 1."""
+    verdict = two_step_test(logistic(3.2, 200))
+    misfit, allowed = verdict.evidence["residual"], verdict.evidence["residual_allowed"]
+    assert verdict.margin == pytest.approx(min(1.0, np.log10(allowed / max(misfit, 1e-300)) / 2.0))
+    noise = np.random.default_rng(0).uniform(-1.0, 1.0, 300)
+    rough = two_step_test(np.tile([50.0, 57.0, 66.0], 100) + noise, sensor_error=3.0)
+    distance = np.log10(rough.evidence["residual_allowed"] / rough.evidence["residual"]) / 2.0
+    assert 0.0 < distance < 1.0
+    assert rough.margin == pytest.approx(distance, rel=1e-12)
+
+
 def test_a_locked_circle_map_is_periodic():
     """In the middle of the Arnold tongue of 1/2 the circle map repeats every two cycles."""
     verdict = two_step_test(circle(0.95, 0.5, 200))
