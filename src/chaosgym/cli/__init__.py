@@ -11,6 +11,7 @@ from typing import NoReturn
 
 import click
 
+from chaosgym.cli.interrupt import ABORTED, heard_at_once
 from chaosgym.errors import ChaosgymError, SimulationError, UnfinishedError
 from chaosgym.version import __version__
 
@@ -69,12 +70,13 @@ def main() -> None:
 def run_command(command: click.Command) -> None:
     """Run a command line: one clear line instead of a traceback for every error that chaosgym raises on purpose."""
     try:
-        command(standalone_mode=False)
+        with heard_at_once():
+            command(standalone_mode=False)
     except click.exceptions.Abort as stop:
         if isinstance(stop.__cause__, EOFError):  # click takes the end of a damaged file for that of a person's input
             _end(f"a file ended too early: {stop.__cause__}", 1)
         click.echo("Aborted.", err=True)
-        sys.exit(130)
+        sys.exit(ABORTED)
     except click.ClickException as error:
         _end(error.format_message(), error.exit_code)
     except (SimulationError, UnfinishedError) as error:

@@ -1,0 +1,90 @@
+"""Ctrl-C ends every command at once, whatever it computes."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from chaosgym.cli.interrupt import ABORTED, GRACE_SECONDS, heard_at_once
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processor time is read from /proc")
+
+DEAF = "hashlib.pbkdf2_hmac('sha256', b'', b'', 2**31 - 1)"
+"""Minutes in compiled code that lets other threads run and looks at no signal, as a kernel does."""
+
+PATIENT = """try:
+        time.sleep(100)
+    except KeyboardInterrupt:
+        print('put away')
+        raise SystemExit(7)"""
+"""What Python can end by itself, in its own way."""
+
+REVOLUTION = ("slider-crank", "--set", "n_modes=20", "--clearance-joint", "ball-spherical")
+"""A crank that takes 4,494,600 steps a revolution, just within its budget: some seconds in one call of a kernel."""
+
+COMMANDS = {
+    "revolutions of a million steps": ("simulate", "slider-crank", "--set", "n_modes=20", "--cycles", "1000"),
+    "revolutions of four million steps": ("simulate", *REVOLUTION, "--cycles", "100"),
+    "a diagnosis": ("diagnose", *REVOLUTION),
+    "a sweep": ("sweep", "impact-beam", "--sobol", "100000", "--budget", "100000", "--workers", "2", "--out", "OUT"),
+}
+
+
+def _processor_seconds(process):
+    fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+@pytest.mark.parametrize(("work", "code", "says"), [(DEAF, ABORTED, "Aborted."), (PATIENT, 7, "put away")])
+def test_compiled_code_is_left_and_python_ends_by_itself(work, code, says):
+    """A call that looks at no signal ends half a second later; what Python can end goes its own way before."""
+    program = (
+        "import hashlib, time\nfrom chaosgym.cli.interrupt import heard_at_once\n"
+        f"with heard_at_once():\n    print('on', flush=True)\n    {work}\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as process:
+        assert process.stdout.readline() == "on\n"
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        assert says in process.communicate(timeout=60)[0]
+        assert process.returncode == code
+
+
+def test_the_watch_ends_with_the_command():
+    """Afterwards signals are nobody's but the program's."""
+    with heard_at_once():
+        watched = signal.set_wakeup_fd(-1)
+        signal.set_wakeup_fd(watched)
+        assert watched >= 0
+    assert signal.set_wakeup_fd(-1) == -1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", COMMANDS)
+def test_ctrl_c_ends_a_command_that_computes(command, tmp_path):
+    """SIGINT after twelve seconds of processor time: exit 130 within a few more, one line, no traceback."""
+    arguments = [str(tmp_path / "out") if word == "OUT" else word for word in COMMANDS[command]]
+    with subprocess.Popen(
+        [sys.executable, "-m", "chaosgym", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        while process.poll() is None and _processor_seconds(process) < 12.0:
+            time.sleep(0.05)
+        assert process.poll() is None, process.stderr.read()
+        before = _processor_seconds(process)
+        process.send_signal(signal.SIGINT)
+        sent = time.monotonic()
+        spent = before
+        while process.poll() is None and time.monotonic() - sent < 60.0:
+            spent = _processor_seconds(process) or spent
+            time.sleep(0.02)
+        _, told = process.communicate(timeout=10)
+    assert process.returncode == ABORTED
+    assert "Traceback" not in told
+    assert told.rstrip().endswith("Aborted.")
+    assert spent - before < 2 * (os.cpu_count() or 1) * GRACE_SECONDS + 1.0
