@@ -194,7 +194,7 @@ def _field(low, high):
     return st.one_of(st.sampled_from([low, high]), inner)
 
 
-def _box(machine):
+def box(machine):
     """Any machine of the admissible box: each field as it is, or anywhere in its range."""
     box = {name: about.choices or (about.low, about.high) for name, about in parameters_of(machine).items()}
     whole = {name for name in box if isinstance(getattr(machine, name), int)}
@@ -222,7 +222,7 @@ RIGID = {
 @settings(max_examples=80, deadline=None)
 @example(fields=RIGID | {"fitted_modes": 1})
 @example(fields=RIGID | {"fitted_modes": 4, "height": 0.6065306597126334})
-@given(fields=_box(ImpactBeam))
+@given(fields=box(ImpactBeam))
 def test_anywhere_in_the_admissible_box_of_the_beam(fields):
     """Whatever is admissible ends in an answer within its bound, or in an error of this package."""
     try:
@@ -234,7 +234,7 @@ def test_anywhere_in_the_admissible_box_of_the_beam(fields):
 
 @pytest.mark.slow
 @settings(max_examples=40, deadline=None)
-@given(fields=_box(SliderCrank))
+@given(fields=box(SliderCrank))
 def test_anywhere_in_the_admissible_box_of_the_crank(fields):
     """Whatever is admissible ends in an answer within its bound, or in an error of this package."""
     coarse = {"matrix_update_interval": 30.0} | {name: v for name, v in fields.items() if name != "n_modes"}

@@ -16,7 +16,7 @@ import numpy as np
 from tqdm import tqdm
 
 from chaosgym.errors import ChaosgymError, DatasetError, ParameterError
-from chaosgym.files import write_atomically
+from chaosgym.files import is_empty, write_atomically
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.version import __version__
@@ -188,11 +188,14 @@ def _open(folder: Path, plan: dict[str, Any], space: SearchSpace) -> Any:
     optuna = _optuna()
     plan_file = folder / PLAN_FILE
     if plan_file.is_file():
-        held = json.loads(plan_file.read_text())
+        try:
+            held = dict(json.loads(plan_file.read_text()))
+        except (OSError, RecursionError, TypeError, ValueError) as error:
+            raise DatasetError(f"{plan_file} is damaged: {error}; choose another folder") from error
         differing = sorted(key for key in plan.keys() | held.keys() if plan.get(key) != held.get(key))
         if differing:
             raise DatasetError(f"{folder} holds another calibration (it differs in {', '.join(differing)})")
-    elif folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    elif folder.exists() and (not folder.is_dir() or not is_empty(folder)):
         raise DatasetError(f"{folder} exists and is no calibration; choose another folder")
     folder.mkdir(parents=True, exist_ok=True)
     begun = plan_file.is_file()
@@ -204,9 +207,8 @@ def _open(folder: Path, plan: dict[str, Any], space: SearchSpace) -> Any:
     for trial in running:
         study.tell(trial.number, state=optuna.trial.TrialState.FAIL)
         study.enqueue_trial(trial.params)
-    if not study.trials:
-        for start in space.starts:
-            study.enqueue_trial(dict(start))
+    for start in space.starts[len(study.trials) :]:
+        study.enqueue_trial(dict(start))
     return study
 
 

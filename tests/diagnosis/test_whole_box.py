@@ -1,0 +1,124 @@
+"""Anywhere in the admissible box: a diagnosis and a response type, or an error of this package."""
+
+import json
+import math
+
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from chaosgym.diagnosis import diagnose, response_type
+from chaosgym.errors import ChaosgymError
+from chaosgym.fidelity.stability import runs_of
+from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam, SliderCrank
+from tests.fidelity.test_stability import box
+
+BUDGET = 100
+
+LONGEST_REVOLUTION = 20_000
+"""Steps of a revolution beyond which a crank is left to the tests of budgets: a diagnosis takes hundreds."""
+
+SLOW = {"excitation_frequency": 0.1}
+OVERDAMPED = {"excitation_frequency": 2.0, "damping_ratio": 1.0}
+STILL = {"force_amplitude": 0.0}
+LAST = {"length": 0.01, "force_position": 0.005, "damping_ratio": 100.0, "excitation_frequency": 1e4}
+
+
+def _judged(machine):
+    """Diagnosis of a machine; None for a named error."""
+    try:
+        verdict = diagnose(machine, budget=BUDGET)
+    except ChaosgymError:
+        return None
+    json.dumps(verdict.as_dict(), allow_nan=False)
+    assert verdict.nature in ("periodic", "quasiperiodic", "chaotic", "undetermined")
+    assert 0.0 <= verdict.margin <= 1.0
+    assert (verdict.period is None) == (verdict.nature != "periodic") or verdict.transient
+    return verdict
+
+
+def _typed(machine):
+    try:
+        found = response_type(machine, budget=BUDGET, workers=1)
+    except ChaosgymError:
+        return
+    assert found.type in ("I", "II", "III", "undetermined")
+    assert found.reason
+
+
+@pytest.mark.parametrize("fields", [SLOW, OVERDAMPED, {**OVERDAMPED, "excitation_frequency": 0.05}])
+def test_what_dies_within_a_cycle_is_a_certified_period(fields):
+    """Slow and overdamped beams: deviations vanish within a cycle, so the motion repeats every cycle, proven."""
+    verdict = _judged(ImpactBeam(**fields))
+    assert (verdict.nature, verdict.period, verdict.status) == ("periodic", 1, "certified")
+    exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]["value"]
+    assert exponent is None or (math.isfinite(exponent) and exponent < 0.0)
+
+
+@settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
+@example(fields=STILL)
+@example(fields=LAST)
+@given(fields=box(ImpactBeam))
+def test_a_diagnosis_anywhere_in_the_box_of_the_beam(fields):
+    """Every value that JSON can hold, or a named error; never a bare exception."""
+    try:
+        beam = ImpactBeam(**fields)
+    except ChaosgymError:
+        return
+    _judged(beam)
+
+
+@pytest.mark.slow
+@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+@given(fields=box(ImpactBeam))
+def test_many_diagnoses_anywhere_in_the_box_of_the_beam(fields):
+    """The same, many times."""
+    try:
+        beam = ImpactBeam(**fields)
+    except ChaosgymError:
+        return
+    _judged(beam)
+
+
+@pytest.mark.slow
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@example(fields=LAST)
+@example(fields=SLOW)
+@given(fields=box(ImpactBeam))
+def test_a_type_anywhere_in_the_box_of_the_beam(fields):
+    """Tolerances that leave the box are cut off at its end or refused by name."""
+    try:
+        beam = ImpactBeam(**fields)
+    except ChaosgymError:
+        return
+    _typed(beam)
+
+
+@pytest.mark.slow
+@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@given(fields=box(SliderCrank), typed=st.booleans())
+def test_a_verdict_anywhere_in_the_box_of_the_crank(fields, typed):
+    """Cranks whose revolution takes few steps, up to eight modes and both joints."""
+    fields = {"matrix_update_interval": 30.0} | fields | {"n_modes": 1 + fields.get("n_modes", 2) % 8}
+    try:
+        crank = SliderCrank(**fields)
+        model = crank.reduce(crank.default_integrator.step_phase)
+    except ChaosgymError:
+        return
+    if model.steps * round(360.0 / crank.matrix_update_interval) > LONGEST_REVOLUTION:
+        return
+    (_typed if typed else _judged)(crank)
+
+
+@pytest.mark.slow
+def test_every_extreme_of_the_stability_map_is_judged():
+    """All rungs of the beam at all extremes, by their default integrator: a verdict or a named error."""
+    judged = 0
+    for run in runs_of(THESIS_IMPACT_BEAM):
+        if run.integrator is None:
+            try:
+                machine = run.machine()
+            except ChaosgymError:
+                continue
+            judged += _judged(machine) is not None
+    assert judged > 100
