@@ -76,6 +76,45 @@ def test_damping_families():
     np.testing.assert_allclose(np.diag(uniform.damping), 2.0 * 0.01 * frequency, rtol=1e-9)
 
 
+def test_damping_of_the_beam_alone_leaves_its_springs_undamped():
+    """1 % of critical at the pinned-pinned frequency for a shape that bends, nothing for the rocking of a stiff beam.
+
+    With all modes the damping is the bending stiffness times 2 zeta / w: of a free reduction and of one that keeps the
+    interfaces alike.
+    """
+    beam = replace(THESIS_IMPACT_BEAM, shaker_damping=0.0, damping_family="beam")
+    stiff = replace(beam, youngs_modulus=1e13, density=beam.density)
+    assert abs(modal_analysis(stiff).damping[0, 0]) < 1e-3 * modal_analysis(beam).angular_frequency[0]
+    rate = 2.0 * 0.01 / (2.0 * math.pi * pinned_pinned_frequency(beam, beam.length))
+    full = modal_analysis(replace(beam, n_modes=20))
+    springs = np.diag(full.angular_frequency**2) - full.damping / rate
+    values = np.linalg.eigvalsh(springs)
+    assert np.all(values > -1e-9 * values[-1])
+    assert np.sum(values > 1e-9 * values[-1]) <= 3
+
+
+def test_the_reduction_by_interfaces_keeps_the_static_deflection():
+    """Unit deflections at pivot, shaker and tip carry static loads exactly, whatever the number of modes.
+
+    Five degrees of freedom give the tip the compliance of forty free modes, which five free modes do not; the rocking
+    and the first bending frequency agree.
+    """
+    kept = modal_analysis(replace(THESIS_IMPACT_BEAM, reduction="interfaces"))
+    free, all_modes = modal_analysis(THESIS_IMPACT_BEAM), modal_analysis(replace(THESIS_IMPACT_BEAM, n_modes=40))
+    kept_at, free_at, all_at = (
+        float(np.sum(one.tip_shape**2 / one.angular_frequency**2)) for one in (kept, free, all_modes)
+    )
+    assert abs(kept_at / all_at - 1.0) < 0.2 * abs(free_at / all_at - 1.0)
+    np.testing.assert_allclose(kept.angular_frequency[:2], all_modes.angular_frequency[:2], rtol=2e-3)
+
+
+def test_a_shaker_at_the_tip_is_one_interface_with_it():
+    """The force point and the tip are then the same place, and one more mode takes the freedom left."""
+    model = modal_analysis(replace(THESIS_IMPACT_BEAM, reduction="interfaces", force_position=0.279))
+    assert len(model.tip_shape) == 5
+    np.testing.assert_allclose(model.tip_shape, model.force_shape, rtol=1e-12)
+
+
 def test_beam_is_a_frozen_machine_with_described_parameters():
     """Every field carries unit, range, provenance and source."""
     assert isinstance(THESIS_IMPACT_BEAM, Machine)
@@ -96,6 +135,7 @@ def test_beam_is_a_frozen_machine_with_described_parameters():
         ({"n_modes": 2.5}, r"n_modes = 2\.5 is not a whole number"),
         ({"n_modes": True}, r"n_modes = True is out of range"),
         ({"damping_family": "viscous"}, r"damping_family = 'viscous' is not one of uniform, stiffness"),
+        ({"reduction": "interfaces", "n_modes": 3}, r"n_modes = 3 .* allowed: 4 or more and 0"),
         ({"force_position": 0.3}, r"force_position = 0\.3 m lies beyond the tip"),
         ({"pivot_rotational_stiffness": 0, "shaker_stiffness": 0}, r"without a position of rest"),
         ({"clearence": 1e-4}, r"no field 'clearence'; did you mean clearance\?"),

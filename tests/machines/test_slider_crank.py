@@ -10,7 +10,8 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.machines.slider_crank.connecting_rod import Bar, EndBody, connecting_rod
-from chaosgym.machines.slider_crank.equations import ELEMENTS, equations
+from chaosgym.machines.slider_crank.equations import ELEMENTS, equations, mode_damping, rod_of
+from chaosgym.machines.slider_crank.joints import joints_of
 from chaosgym.machines.slider_crank.kinematics import planar_motion, slider_position, stroke
 from chaosgym.machines.slider_crank.parameters import (
     SUPERHARMONIC_SLIDER_CRANK,
@@ -231,3 +232,22 @@ def test_the_clearance_that_varies_is_that_of_the_monitored_joint():
     assert SliderCrank().clearance_field == "slider_clearance"
     assert SliderCrank(slider_joint="ideal", ball_joint="spherical").clearance_field == "ball_clearance"
     assert SliderCrank(ball_joint="spherical").clearance_field == "slider_clearance"
+
+
+def test_structural_damping_grows_with_a_power_of_the_frequency():
+    """An exponent of 1 is damping in proportion to stiffness, of 0 the same ratio in every mode."""
+    rod = rod_of(CRANK)
+    for family, exponent in (("stiffness", 1.0), ("uniform", 0.0)):
+        power = mode_damping(replace(CRANK, damping_family="power", damping_exponent=exponent), rod)[1]
+        np.testing.assert_allclose(power, mode_damping(replace(CRANK, damping_family=family), rod)[1], rtol=1e-12)
+
+
+def test_contact_damping_is_related_to_a_mass():
+    """d = 2 zeta sqrt(k m): m is that of slider and yoke unless one is given; the ball joint may have another."""
+    moving = CRANK.slider_mass + CRANK.yoke_mass
+    assert replace(CRANK, contact_damping_mass=moving).contact_damping == CRANK.contact_damping
+    heavy = replace(CRANK, contact_damping_mass=4.0 * moving)
+    assert heavy.contact_damping == pytest.approx(2.0 * CRANK.contact_damping)
+    both = replace(heavy, ball_joint="instrumented", ball_damping_mass=moving)
+    damping = [joint.damping * both.contact_damping / joint.scale for joint in joints_of(both)]
+    assert damping == pytest.approx([2.0 * CRANK.contact_damping] + 3 * [CRANK.contact_damping])

@@ -44,9 +44,35 @@ def modal_analysis(beam: BeamParameters, elements: int | None = None) -> Modes:
     elements
         Number of finite elements; at least 24 and three a mode by default.
     """
+    mass, stiffness, at_force, tip = _assembled(beam, elements or max(MIN_ELEMENTS, 3 * beam.n_modes))
+    basis = None
+    if beam.reduction == "interfaces":
+        basis = _interface_basis(mass, stiffness, tuple(dict.fromkeys((0, 1, at_force, tip))), beam.n_modes)
+        mass, stiffness = basis.T @ mass @ basis, basis.T @ stiffness @ basis
+    angular, shapes = _natural_modes(beam, mass, stiffness)
+    places = [tip, at_force, 0, 1]
+    ends = shapes[places] if basis is None else basis[places] @ shapes
+    ends = ends * np.where(ends[0] < 0.0, -1.0, 1.0)
+    reference = angular[1]
+    if beam.fitted_modes:
+        try:
+            fitted, mix = fitted_modes(angular[beam.n_modes :], ends[0, beam.n_modes :], beam.fitted_modes)
+        except np.linalg.LinAlgError as error:
+            raise _inseparable(beam) from error
+        at_ends = ends[:, beam.n_modes :] @ mix
+        angular = np.concatenate([angular[: beam.n_modes], fitted])
+        ends = np.hstack([ends[:, : beam.n_modes], at_ends * np.where(at_ends[0] < 0.0, -1.0, 1.0)])
+    else:
+        angular, ends = angular[: beam.n_modes], ends[:, : beam.n_modes]
+    damping = _structural_damping(beam, angular, ends, reference)
+    damping = damping + beam.shaker_damping * np.outer(ends[1], ends[1])
+    return Modes(angular, damping, ends[0].copy(), ends[1].copy())
+
+
+def _natural_modes(beam: BeamParameters, mass: Array, stiffness: Array) -> tuple[Array, Array]:
+    """Angular frequencies [rad/s] and mass-normalised shapes, slowest first: all, or as many as are needed."""
     from scipy.linalg import eigh
 
-    mass, stiffness, at_force, tip = _assembled(beam, elements or max(MIN_ELEMENTS, 3 * beam.n_modes))
     size = len(mass)
     wanted = size if beam.fitted_modes else max(beam.n_modes, 2)
     # the inverse problem, M s = K s / w^2, keeps the slow rocking mode exact on fine meshes
@@ -65,26 +91,38 @@ def modal_analysis(beam: BeamParameters, elements: int | None = None) -> Modes:
         raise _inseparable(beam)
     # what rounding leaves of the fastest modes of the mesh bends no tip
     kept = inverse_squares > 1e-14 * slowest
-    angular = 1.0 / np.sqrt(inverse_squares[kept])
-    shapes = scale[:, None] * shapes[:, kept] / np.sqrt(inverse_squares[kept])
-    shapes = shapes * np.where(shapes[tip] < 0.0, -1.0, 1.0)
-    reference, ends = angular[1], np.stack([shapes[tip], shapes[at_force]])
-    if beam.fitted_modes:
-        try:
-            fitted, mix = fitted_modes(angular[beam.n_modes :], ends[0, beam.n_modes :], beam.fitted_modes)
-        except np.linalg.LinAlgError as error:
-            raise _inseparable(beam) from error
-        at_ends = ends[:, beam.n_modes :] @ mix
-        angular = np.concatenate([angular[: beam.n_modes], fitted])
-        ends = np.hstack([ends[:, : beam.n_modes], at_ends * np.where(at_ends[0] < 0.0, -1.0, 1.0)])
-    else:
-        angular, ends = angular[: beam.n_modes], ends[:, : beam.n_modes]
+    return 1.0 / np.sqrt(inverse_squares[kept]), scale[:, None] * shapes[:, kept] / np.sqrt(inverse_squares[kept])
+
+
+def _interface_basis(mass: Array, stiffness: Array, kept: tuple[int, ...], count: int) -> Array:
+    """Basis (size, count) of component mode synthesis: unit deflections of kept ones, then fixed-interface modes.
+
+    References
+    ----------
+    Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA Journal 6 (1968); thesis 2.2.1.
+    """
+    from scipy.linalg import eigh
+
+    inner = [i for i in range(len(mass)) if i not in kept]
+    at = np.ix_(inner, inner)
+    basis = np.zeros((len(mass), count))
+    basis[kept, range(len(kept))] = 1.0
+    basis[inner, : len(kept)] = -np.linalg.solve(stiffness[at], stiffness[np.ix_(inner, kept)])
+    if count > len(kept):
+        basis[inner, len(kept) :] = eigh(stiffness[at], mass[at], subset_by_index=[0, count - len(kept) - 1])[1]
+    return basis
+
+
+def _structural_damping(beam: BeamParameters, angular: Array, ends: Array, reference: float) -> Array:
+    """Modal damping (n, n) [1/s] without the shaker's damper; ``ends`` are the shapes at tip, shaker and pivot."""
     if beam.damping_family == "uniform":
-        ratio = np.full(len(angular), beam.damping_ratio)
-    else:
+        return np.diag(2.0 * np.full(len(angular), beam.damping_ratio) * angular)
+    if beam.damping_family == "stiffness":
         ratio = beam.damping_ratio * angular / reference
-    damping = np.diag(2.0 * ratio * angular) + beam.shaker_damping * np.outer(ends[1], ends[1])
-    return Modes(angular, damping, ends[0].copy(), ends[1].copy())
+        return np.diag(2.0 * ratio * angular)
+    springs = (beam.shaker_stiffness, beam.pivot_translational_stiffness, beam.pivot_rotational_stiffness)
+    own = np.diag(angular**2) - sum(spring * np.outer(end, end) for spring, end in zip(springs, ends[1:], strict=True))
+    return np.asarray(beam.damping_ratio / (math.pi * pinned_pinned_frequency(beam, beam.length)) * own)
 
 
 def _inseparable(beam: BeamParameters) -> ParameterError:

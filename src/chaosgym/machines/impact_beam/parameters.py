@@ -22,6 +22,9 @@ from chaosgym.machines.parameters import parameter
 
 _FIT = "five-mode fit to the printed natures and forces of figures 3.8 to 3.12"
 
+INTERFACES = 4
+"""Deflection and slope at the pivot, deflections at shaker and tip: kept by the reduction "interfaces"."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class BeamParameters(ModalImpactMachine):
@@ -34,7 +37,13 @@ class BeamParameters(ModalImpactMachine):
     """
 
     fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        rung: {"contact_law": "linear", "n_modes": modes, "fitted_modes": fitted, "event_accuracy": accuracy}
+        rung: {
+            "contact_law": "linear",
+            "reduction": "free",
+            "n_modes": modes,
+            "fitted_modes": fitted,
+            "event_accuracy": accuracy,
+        }
         for rung, modes, fitted, accuracy in (
             ("draft", 4, 1, "standard"),
             ("standard", 4, 2, "standard"),
@@ -137,8 +146,12 @@ class BeamParameters(ModalImpactMachine):
     """Moving mass of the shaker and its push rod [kg]."""
     damping_ratio: float = parameter(0.01, low=0.0, high=100.0, provenance="printed", source="thesis 3.5.1 and 5.3.1")
     """Structural damping ratio of the first bending mode."""
-    damping_family: str = parameter("stiffness", choices=("uniform", "stiffness"), provenance="calibrated", source=_FIT)
-    """"uniform": the same ratio in every mode; "stiffness": proportional to the mode's frequency."""
+    damping_family: str = parameter(
+        "stiffness", choices=("uniform", "stiffness", "beam"), provenance="calibrated", source=_FIT
+    )
+    """"uniform": the same ratio in every mode; "stiffness": proportional to the mode's frequency; "beam": proportional
+    to the stiffness of the beam alone, pivot and shaker springs left out, with the ratio at its first pinned-pinned
+    frequency."""
     contact_stiffness: float = parameter(
         1.5e7, unit="N/m", low=1e3, high=1e12, provenance="printed", source="thesis 3.3"
     )
@@ -152,8 +165,15 @@ class BeamParameters(ModalImpactMachine):
         "standard", choices=("standard", "tightest"), provenance="assumed", source="a matter of computing"
     )
     """How closely contact events are placed where no integrator is given."""
+    reduction: str = parameter(
+        "free", choices=("free", "interfaces"), provenance="assumed", source="interfaces kept in thesis 2.2.1"
+    )
+    """"free": natural modes of the beam between the sensors; "interfaces": deflection and slope at the pivot and
+    deflections at shaker and tip, with fixed-interface modes for the rest (component mode synthesis)."""
     n_modes: int = parameter(4, low=1, high=40, provenance="assumed", source="a matter of computing")
-    """Modes kept, the rocking mode included; the thesis has five and none fitted (5.2.3)."""
+    """Modes kept, the rocking mode included; the thesis has five and none fitted (5.2.3).
+
+    With "interfaces" the degrees of freedom, those of the interfaces too."""
     fitted_modes: int = parameter(2, low=0, high=6, provenance="assumed", source="a matter of computing")
     """Modes added that stand for all that are left out: they give the tip its compliance."""
 
@@ -163,6 +183,11 @@ class BeamParameters(ModalImpactMachine):
             raise ParameterError(
                 f"n_modes = {self.n_modes} and fitted_modes = {self.fitted_modes} are out of range; allowed: 1 and 0 "
                 "with contact_law = 'restitution', whose beam is rigid"
+            )
+        if self.reduction == "interfaces" and (self.n_modes < INTERFACES or self.fitted_modes):
+            raise ParameterError(
+                f"n_modes = {self.n_modes} and fitted_modes = {self.fitted_modes} are out of range; allowed: "
+                f"{INTERFACES} or more and 0 with reduction = 'interfaces'"
             )
         if self.force_position > self.length:
             raise ParameterError(

@@ -150,7 +150,10 @@ def mode_damping(machine: "SliderCrank", rod: ConnectingRod) -> tuple[Array, Arr
         return stiffness, np.asarray(stiffness * 2.0 * machine.damping_ratio / rod.mode_frequency[0])
     moving = machine.slider_mass + machine.yoke_mass + rod.line_mass * machine.rod_length / 3.0
     inertia = np.concatenate([[moving], np.ones(len(rod.mode_frequency))])
-    return stiffness, np.asarray(2.0 * machine.damping_ratio * np.sqrt(stiffness * inertia))
+    ratio: float | Array = machine.damping_ratio
+    if machine.damping_family == "power":
+        ratio = ratio * (np.sqrt(stiffness / inertia) / rod.mode_frequency[0]) ** machine.damping_exponent
+    return stiffness, np.asarray(2.0 * ratio * np.sqrt(stiffness * inertia))
 
 
 def _structural_damping(machine: "SliderCrank", rod: ConnectingRod) -> Array:

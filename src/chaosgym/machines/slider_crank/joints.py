@@ -241,11 +241,12 @@ def ball_joint_of(machine: "SliderCrank") -> JointModel:
 
 
 class Joint(NamedTuple):
-    """A contact of the stepper; see ``SteppedCrankModel``. ``scale`` multiplies stiffness and damping."""
+    """A contact of the stepper; see ``SteppedCrankModel``. ``scale`` and ``damping`` multiply stiffness and damping."""
 
     row: Array
     gap: float
     scale: float
+    damping: float
     two_sided: bool
     reading: Array
     slides: bool
@@ -255,15 +256,17 @@ def joints_of(machine: "SliderCrank") -> list[Joint]:
     """All contacts of a machine: those of the slider joint, then those of the ball joint."""
     names = machine.degrees_of_freedom
     joints = []
-    for model, clearance, recorded in (
-        (slider_joint_of(machine), machine.slider_clearance, machine.monitored_joint == "slider"),
-        (ball_joint_of(machine), machine.ball_clearance, machine.monitored_joint == "ball"),
+    ball = math.sqrt(machine.ball_damping_mass / machine.damped_mass) if machine.ball_damping_mass else 1.0
+    for model, clearance, recorded, damping in (
+        (slider_joint_of(machine), machine.slider_clearance, machine.monitored_joint == "slider", 1.0),
+        (ball_joint_of(machine), machine.ball_clearance, machine.monitored_joint == "ball", ball),
     ):
         for contact in _contacts(model):
             none = np.zeros(len(contact.force))
             row = np.stack([contact.motion.get(name, none) for name in names], axis=1)
             reading = contact.force * recorded
-            joints.append(Joint(row, clearance, contact.share, contact.two_sided, reading, contact.slides))
+            share = contact.share
+            joints.append(Joint(row, clearance, share, share * damping, contact.two_sided, reading, contact.slides))
     return joints
 
 
@@ -285,7 +288,7 @@ def channels_of(machine: "SliderCrank") -> Channels:
     return Channels(
         row=np.concatenate([joint.row for joint in joints]),
         stiffness=machine.contact_stiffness * scale,
-        damping=machine.contact_damping * scale,
+        damping=machine.contact_damping * np.array([joint.damping for joint in joints]),
         two_sided=np.array([joint.two_sided for joint in joints]),
         reading=np.concatenate([joint.reading for joint in joints]),
         slides=np.array([joint.slides for joint in joints]),
@@ -332,9 +335,11 @@ def hertz_constants(machine: "SliderCrank") -> tuple[float, float]:
     Half a swing of the linear law leaves e = exp(-pi zeta / sqrt(1 - zeta^2)) of the speed v at which slider and yoke
     strike; Hunt and Crossley's law leaves about 1 - (2/3) chi v.
     """
-    force, linear, zeta = machine.hertz_reference_force, machine.contact_stiffness, machine.contact_damping_ratio
+    force, linear = machine.hertz_reference_force, machine.contact_stiffness
+    struck = machine.slider_mass + machine.yoke_mass
+    zeta = machine.contact_damping_ratio * math.sqrt(machine.damped_mass / struck)
     depth = force / linear
     stiffness = force / depth**1.5
-    speed = math.sqrt(0.8 * stiffness * depth**2.5 / (machine.slider_mass + machine.yoke_mass))
+    speed = math.sqrt(0.8 * stiffness * depth**2.5 / struck)
     restitution = math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta**2)) if zeta < 1.0 else 0.0
     return stiffness, 1.5 * (1.0 - restitution) / speed

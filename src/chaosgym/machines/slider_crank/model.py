@@ -212,7 +212,7 @@ def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankMode
         friction=np.stack([slide * joint.slides for joint in joints], axis=1),
         gap=np.array([joint.gap for joint in joints]),
         stiffness=stiffness * scale,
-        damping=damping * scale if linear else np.full(len(joints), damping),
+        damping=damping * np.array([joint.damping for joint in joints]) if linear else np.full(len(joints), damping),
         law=LINEAR if linear else HERTZ,
         two_sided=np.array([joint.two_sided for joint in joints]),
         reading=np.concatenate([joint.reading for joint in joints]),

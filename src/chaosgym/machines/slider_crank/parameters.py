@@ -117,8 +117,15 @@ class SliderCrank(Machine):
     """Modes added that stand for all that are left out: they give the slider the rod's inertia."""
     damping_ratio: float = parameter(0.027, low=0.0, high=100.0, provenance="calibrated", source=_FIT)
     """Structural damping ratio of the rod's first mode."""
-    damping_family: str = parameter("stiffness", choices=("uniform", "stiffness"), provenance="calibrated", source=_FIT)
-    """"uniform": the same ratio in every mode; "stiffness": proportional to the mode's frequency."""
+    damping_family: str = parameter(
+        "stiffness", choices=("uniform", "stiffness", "power"), provenance="calibrated", source=_FIT
+    )
+    """"uniform": the same ratio in every mode; "stiffness": proportional to the mode's frequency; "power": to that
+    power of it that ``damping_exponent`` names."""
+    damping_exponent: float = parameter(
+        1.0, low=-2.0, high=4.0, provenance="assumed", source="proportional to stiffness"
+    )
+    """Exponent of the frequency in the structural damping ratio of a mode, with damping_family = "power"."""
     geometric_stiffness: str = parameter(
         "off", choices=("off", "on"), provenance="calibrated", source="figure 4.18: 2500 N only without it"
     )
@@ -224,13 +231,21 @@ class SliderCrank(Machine):
     )
     """Force [N] at which the Hertzian law has the linear law's secant stiffness and restitution."""
     contact_stiffness: float = parameter(
-        1.5e7, unit="N/m", low=1e3, high=1e12, provenance="printed", source="thesis 3.3"
+        1.5e7, unit="N/m", low=1e3, high=1e12, provenance="assumed", source="that of the beam's sensors, thesis 3.3"
     )
     """Linearised Hertzian stiffness of a joint [N/m]; the stations of an instrumented slider joint share it."""
     contact_damping_ratio: float = parameter(
         0.05, low=0.0, high=100.0, provenance="printed", source="thesis 4.5.4: 2.5 % and 5 %"
     )
-    """Damping ratio of a joint in contact, related to the mass of slider and yoke."""
+    """Damping ratio of a joint in contact, related to ``contact_damping_mass``."""
+    contact_damping_mass: float = parameter(
+        0.0, unit="kg", low=0.0, high=1e3, provenance="assumed", source="slider and yoke; no mass is in print (3.3)"
+    )
+    """Mass to which the contact damping ratio is related [kg]; 0: that of slider and yoke."""
+    ball_damping_mass: float = parameter(
+        0.0, unit="kg", low=0.0, high=1e3, provenance="assumed", source="as for the slider joint"
+    )
+    """The same for the ball joint [kg]; 0: that of the slider joint."""
     friction_coefficient: float = parameter(
         0.0, low=0.0, high=0.5, provenance="printed", source="thesis 4.5.3: 0 and 0.1"
     )
@@ -293,9 +308,13 @@ class SliderCrank(Machine):
 
     @property
     def contact_damping(self) -> float:
-        """Damping constant [N s/m] of a joint in contact: 2 zeta sqrt(k m), m the mass of slider and yoke."""
-        mass = self.slider_mass + self.yoke_mass
-        return 2.0 * self.contact_damping_ratio * math.sqrt(self.contact_stiffness * mass)
+        """Damping constant [N s/m] of the slider joint in contact: 2 zeta sqrt(k m), m the contact damping mass."""
+        return 2.0 * self.contact_damping_ratio * math.sqrt(self.contact_stiffness * self.damped_mass)
+
+    @property
+    def damped_mass(self) -> float:
+        """Mass [kg] to which the contact damping ratio is related: by default that of slider and yoke."""
+        return self.contact_damping_mass or self.slider_mass + self.yoke_mass
 
     @property
     def monitored_joint(self) -> str:
