@@ -85,6 +85,7 @@ def task_page():
     made = "python -m benchmarks.envs.documentation docs"
     yield task("environments", sources("src/chaosgym/envs"), pages, made)
     statements = [str(path) for path in Path("thesis/statements").iterdir() if path.suffix in (".csv", ".toml")]
+    statements.append("thesis/scorecard/firmness.json")
     write = "python -m thesis scorecard --markdown > docs/scorecard.md"
     yield task("scorecard", [*statements, *sources("thesis/scorecard")], ["docs/scorecard.md"], write)
     options = f"--out docs/figures --gallery docs/figures.md --overwrite --results {RUNS}/figures"

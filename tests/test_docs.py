@@ -7,10 +7,12 @@ import pytest
 
 from chaosgym.machines import MACHINES
 from chaosgym.machines.parameters import markdown_table
-from thesis.machines import MACHINES as THESIS_MACHINES
+from thesis.machines import THESIS_MACHINES
+from thesis.scorecard.evaluation import evaluate
+from thesis.scorecard.firmness import firmness_of
 from thesis.scorecard.observation import THOROUGH
 from thesis.scorecard.page import row
-from thesis.scorecard.scorecard import evaluate
+from thesis.scorecard.scorecard import Scorecard
 from thesis.statements import read_comparisons
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -31,12 +33,11 @@ def test_parameter_table_is_current(name):
 def test_scorecard_page_lists_every_statement():
     """Each comparison has its row and each statement left out its reason."""
     page = (DOCS / "scorecard.md").read_text()
-    compared, out = read_comparisons()
-    for one in compared:
-        row = re.search(rf"^\| {one.id} \|.*$", page, re.MULTILINE)
-        assert row is not None, one.id
-        assert f"| {'fit' if one.part == 'calibration' else 'held out'} |" in row[0]
-    for name, reason in out.items():
+    known = read_comparisons()
+    for one in known.compared:
+        assert re.search(rf"^\| {one.id} \|.*$", page, re.MULTILINE) is not None, one.id
+        assert not one.reading or f"| {one.id} | {one.reading} |" in page
+    for name, reason in known.out.items():
         assert f"| {name} | {reason} |" in page
 
 
@@ -60,7 +61,9 @@ def test_scorecard_page_shows_what_the_machines_do():
     )
     chosen = [one for one in read_comparisons().compared if one.id in cheap]
     judged = evaluate(chosen, THESIS_MACHINES, efforts=THOROUGH)
-    assert [row(one) for one in judged if row(one) not in page] == []
+    known = {name: firmness_of(machine) for name, machine in THESIS_MACHINES.items()}
+    card = Scorecard(judged, {name: one for name, one in known.items() if one})
+    assert [row(card, one) for one in judged if row(card, one) not in page] == []
 
 
 def test_hits_are_those_of_the_rows():
@@ -68,7 +71,7 @@ def test_hits_are_those_of_the_rows():
     page, readme = (DOCS / "scorecard.md").read_text(), (DOCS.parent / "README.md").read_text()
     told = []
     for name, letters in (("impact-beam", "IBS"), ("slider-crank", "SSC")):
-        verdicts = re.findall(rf"^\| {letters}-\d+ \|(?:[^|]*\|){{4}} (\S+) \| (?:fit|held out) \|", page, re.MULTILINE)
+        verdicts = re.findall(rf"^\| {letters}-\d+ \|(?:[^|]*\|){{4}} (\S+) \| (?:-|\d+%) \|", page, re.MULTILINE)
         hits, counted = verdicts.count("hit"), len(verdicts) - verdicts.count("contradictory")
         assert f"## {name}\n\nHits: {hits} of {counted} (" in page
         told.append(f"{hits} of {counted}")

@@ -16,7 +16,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import CycleRecord, simulate
-from thesis.machines import MACHINES
+from thesis.machines import THESIS_MACHINES
 
 
 @pytest.mark.parametrize("machine", [ImpactBeam, SliderCrank])
@@ -145,7 +145,7 @@ def test_the_rung_standard_is_the_default(machine):
     shown = CliRunner().invoke(app, ["show", machine.name, "--json"])
     settings = json.loads(shown.output)["parameters"]
     assert settings.items() >= machine.fidelity_ladder["standard"].items()
-    assert MACHINES[machine.name].rung is None
+    assert THESIS_MACHINES[machine.name].rung is None
 
 
 def test_the_command_line_takes_the_option():

@@ -17,8 +17,8 @@ from thesis.figures.findings import compare_response
 from thesis.figures.gallery import gallery
 from thesis.figures.printed import comparison
 from thesis.figures.produce import computed
+from thesis.scorecard.evaluation import evaluate
 from thesis.scorecard.observation import THOROUGH
-from thesis.scorecard.scorecard import evaluate
 
 SIMULATED = [
     *(f"3.{number}" for number in (*range(6, 14), 17, 18)),

@@ -6,7 +6,7 @@ from chaosgym.errors import DatasetError
 from chaosgym.machines import MACHINES
 from chaosgym.machines.parameters import with_settings
 from thesis.scorecard.quantities import QUANTITIES
-from thesis.statements import read_comparisons, read_statements
+from thesis.statements import conditions, read_comparisons, read_statements
 from thesis.statements.comparisons import parse_comparisons
 from thesis.statements.statements import COLUMNS, parse_statements
 
@@ -42,32 +42,23 @@ def test_a_damaged_table_of_statements_is_refused(table, complaint):
 
 def test_every_simulated_statement_is_compared_or_left_out_with_a_reason():
     """None is forgotten, none is in both lists, and the conditions are fields of the machine that they name."""
-    compared, out = read_comparisons()
+    compared, out, unprinted = read_comparisons()
+    known = {name: one.value for name, one in unprinted.items()}
     simulated = {name for name, one in read_statements().items() if {"simulation", "criterion"} & set(one.kinds)}
     assert {one.id for one in compared} | set(out) == simulated
     assert len({one.id for one in compared}) == len(compared)
     assert all(out.values())
     for one in compared:
         assert one.quantity in QUANTITIES
-        for conditions in one.at:
-            machine = with_settings(MACHINES[one.machine](), conditions)
+        for at in one.at:
+            machine = with_settings(MACHINES[one.machine](), conditions(at, known))
             for axis in (one.along, one.across):
                 if axis is not None:
                     with_settings(machine, {axis.field: axis.low})
                     with_settings(machine, {axis.field: axis.high})
 
 
-def test_held_out_statements_share_no_figure_with_those_that_a_calibration_sees():
-    """The split is by figure, so that one drawing is not on both sides."""
-    figures = {"calibration": set(), "held-out": set()}
-    for one in read_comparisons().compared:
-        if not one.contradictory:
-            drawings = {figure.rstrip("abcde") for figure in one.statement.figure.split(";") if figure}
-            figures[one.part] |= {(one.machine, drawing) for drawing in drawings}
-    assert not figures["calibration"] & figures["held-out"]
-
-
-ENTRY = '[IBS-013]\ngroup = "nature"\npart = "calibration"\nquantity = "nature"\ntolerance = "nature"\nat = [{}]\n'
+ENTRY = '[IBS-013]\ngroup = "nature"\nquantity = "nature"\ntolerance = "nature"\nat = [{}]\n'
 NATURE = '[tolerances.nature]\nreason = "equal or not"\n'
 
 
@@ -77,7 +68,7 @@ NATURE = '[tolerances.nature]\nreason = "equal or not"\n'
         ("[IBS-013", "damaged"),
         (NATURE + ENTRY.replace("IBS-013", "IBS-999"), "IBS-999 is no statement"),
         (NATURE + ENTRY.replace('group = "nature"\n', ""), r"missing \['group'\]"),
-        (NATURE + ENTRY.replace('"calibration"', '"both"'), "part = 'both'"),
+        (NATURE + ENTRY.replace("[{}]", '[{ clearance = { unprinted = "x" } }]'), "unprinted = 'x' is not one of"),
         (ENTRY, "tolerance = 'nature' is not one of"),
         (NATURE.replace("equal or not", ""), "needs a reason"),
         (NATURE, "IBS-013 must be either compared or left out"),

@@ -63,7 +63,7 @@ def test_a_grid_is_finer_than_what_it_is_compared_with():
         if one.quantity == "map_clearance":
             assert one.across.step / one.across.unit <= 0.2501 * one.printed, one.id
         if one.quantity == "resonance_speed":
-            assert one.along.step / one.along.unit <= one.tolerance.relative * one.printed, one.id
+            assert one.along.step / one.along.unit <= allowed(one), one.id
 
 
 def test_totals_count_every_statement_once():
@@ -72,22 +72,21 @@ def test_totals_count_every_statement_once():
     judged = [judge(one, [Finding(one.printed)] if one.group != "force" else []) for one in COMPARED.values()]
     card = Scorecard(tuple(judged))
     for machine, groups in card.totals().items():
-        whole = groups["all"]
+        whole, groups = groups["all"], groups["groups"]
         assert list(whole) == ["hit", "near", "miss", "contradictory", "total"]
         for verdict in whole:
-            assert whole[verdict] == sum(count[verdict] for name, count in groups.items() if name != "all")
+            assert whole[verdict] == sum(count[verdict] for count in groups.values())
         assert whole["total"] == sum(one.comparison.machine == machine for one in judged)
         hits, counted = card.hit_rate(machine)
         assert counted == whole["total"] - whole["contradictory"]
         assert hits == whole["hit"] < counted
-        parts = [card.hit_rate(machine, part) for part in ("calibration", "held-out")]
-        assert (sum(part[0] for part in parts), sum(part[1] for part in parts)) == (hits, counted)
 
 
 def test_json_of_a_statement_is_complete():
-    """The nine keys, plain values, and the reason of a contradiction first."""
+    """The ten keys, plain values, and the reason of a contradiction first."""
     told = judge(COMPARED["IBS-029"], [Finding((36.2, 70.1), note="chaotic")]).as_dict()
-    assert list(told) == ["id", "machine", "group", "printed", "value", "unit", "tolerance", "verdict", "reason"]
+    keys = "id machine group printed value unit tolerance verdict reason reading"
+    assert list(told) == keys.split()
     assert told["printed"] == [30.0, 85.0]
     assert told["value"] == [36.2, 70.1]
     assert told["reason"].startswith("30 to 85 N here")

@@ -5,6 +5,7 @@ import click
 from chaosgym.cli import run_command
 from thesis.cli.calibrate import calibrate
 from thesis.cli.figures import figures
+from thesis.cli.firmness import firmness
 from thesis.cli.scorecard import scorecard
 
 
@@ -13,7 +14,7 @@ def app() -> None:
     """The statements and figures of the thesis, computed on the machines of chaosgym."""
 
 
-for command in (scorecard, figures, calibrate):
+for command in (scorecard, figures, calibrate, firmness):
     app.add_command(command)
 
 

@@ -27,22 +27,39 @@ def scorecard(machine: tuple[str, ...], workers: int | None, markdown: bool, as_
 
 def _lines(result: dict[str, Any]) -> list[str]:
     lines = []
-    for machine, groups in result["totals"].items():
+    for machine, totals in result["totals"].items():
         lines.append(f"{machine}")
         lines += [_target(one) for one in result["targets"] if one["machine"] == machine]
-        for group, count in groups.items():
-            counted = count["total"] - count["contradictory"]
-            lines.append(
-                f"  {group:12s} {count['hit']:3d} of {counted:3d} hit, {count['near']} near, {count['miss']} missed; "
-                f"{count['contradictory']} contradictory"
-            )
+        lines += [_count(group, count) for group, count in totals["groups"].items()]
+        lines += [_count("all", totals["all"]), *_firm(totals)]
     return lines
+
+
+def _count(group: str, count: dict[str, int]) -> str:
+    return (
+        f"  {group:12s} {count['hit']:3d} of {count['total'] - count['contradictory']:3d} hit, {count['near']} near, "
+        f"{count['miss']} missed; {count['contradictory']} contradictory"
+    )
+
+
+def _firm(totals: dict[str, Any]) -> list[str]:
+    """The headline's other numbers, as far as they are known."""
+    left_out, expected, pairs = totals["left_out"], totals["expected"], totals["exclusive"]
+    unknown = "not known for these constants: python -m thesis firmness"
+    said = f"{left_out['hit']} of {left_out['total']} hit" if left_out["total"] else unknown
+    return [
+        f"  {'left out':12s} {said}",
+        f"  {'expected':12s} {unknown if expected is None else f'{expected:.1f} hits of a neighbour'}",
+        f"  {'exclusive':12s} {', '.join(' x '.join(pair) for pair in pairs) or '-'}",
+    ]
 
 
 def _target(one: dict[str, Any]) -> str:
     unit = "" if one["unit"] == "-" else f" {one['unit']}"
     printed, value = _shown(one["printed"]), _shown(one["value"])
-    return f"  {one['verdict']:13s} {one['id']}  {printed:>14s}  {value:>22s}{unit:8s} {one['reason'].split(' | ')[0]}"
+    share = "   -" if one["neighbours"] is None else f"{one['neighbours']:4.0%}"
+    reason = one["reason"].split(" | ")[0]
+    return f"  {one['verdict']:13s} {share} {one['id']}  {printed:>14s}  {value:>22s}{unit:8s} {reason}"
 
 
 def _shown(value: Any) -> str:

@@ -3,16 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam
+from chaosgym.machines import ImpactBeam
 from thesis.figures.computations import Runs
 from thesis.figures.panels import ParameterAxis
 from thesis.scorecard.observation import THOROUGH
 
-BEAM = THESIS_IMPACT_BEAM
 TINY, SMALL, LARGE = 0.015e-3, 0.03175e-3, 0.127e-3
 """Clearances [m] of figures 3.10, 3.8a and 3.8b."""
 
-TRANSIENT, CYCLES, _ = THOROUGH["impact-beam"]
+TRANSIENT, CYCLES, *_ = THOROUGH["impact-beam"]
 """Cycles in which a response settles, and those shown of it (3.5.1): as for the scorecard."""
 
 LENGTHS = (0.279, 0.2815, 0.284)

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from chaosgym.design.statistics import histogram
 from chaosgym.plotting.style import ACCENT, NATURE_COLOURS
 from thesis import plotting as thesis
-from thesis.figures.beam import BEAM, DAMPING, LARGE, SMALL, TRANSIENT, runs, sweep
+from thesis.figures.beam import DAMPING, LARGE, SMALL, TRANSIENT, runs, sweep
 from thesis.figures.computations import Computation, Data, History
 from thesis.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
 from thesis.figures.panels import cycles_panel, force_panel, histogram_panel
 from thesis.figures.printed import printed
 from thesis.figures.scored import agrees, scored, scored_finding
+from thesis.machines import BEAM
 
 Array = NDArray[np.float64]
 

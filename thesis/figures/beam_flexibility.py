@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chaosgym.machines.impact_beam.modes import pinned_pinned_frequency
 from chaosgym.plotting.style import ACCENT, MUTED
 from thesis import plotting as thesis
-from thesis.figures.beam import BEAM, LENGTHS, TINY, sweep
+from thesis.figures.beam import LENGTHS, TINY, sweep
 from thesis.figures.computations import Computation
 from thesis.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
 from thesis.figures.panels import (
@@ -19,6 +19,7 @@ from thesis.figures.panels import (
 )
 from thesis.figures.printed import printed
 from thesis.figures.scored import scored, scored_finding
+from thesis.machines import BEAM
 
 Array = NDArray[np.float64]
 
@@ -28,7 +29,11 @@ def flexibility(resolution: float) -> Mapping[str, Computation]:
     values = steps(1.0, 30.0, 0.15 / resolution)
     curves = {
         f"{1e3 * length:g}": sweep(
-            replace(BEAM, clearance=TINY, length=length), "excitation_frequency", values, cycles=50, transient=150
+            replace(BEAM, clearance=TINY, length=length),
+            "excitation_frequency",
+            values,
+            cycles=50,
+            transient=150,
         )
         for length in LENGTHS
     }

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from thesis.figures.beam import BEAM, DAMPING, LARGE, LENGTH, SMALL, sweep
+from thesis.figures.beam import DAMPING, LARGE, LENGTH, SMALL, sweep
 from thesis.figures.computations import Computation
 from thesis.figures.figure import Finding, Parts, ThesisFigure, steps
 from thesis.figures.findings import describe_forces
@@ -19,6 +19,7 @@ from thesis.figures.panels import (
 )
 from thesis.figures.printed import printed
 from thesis.figures.scored import agrees, scored, scored_finding
+from thesis.machines import BEAM
 
 Array = NDArray[np.float64]
 

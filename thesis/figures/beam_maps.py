@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from chaosgym.diagnosis.criteria import criterion_rate
 from chaosgym.machines.impact_beam.modes import static_tip_deflection
 from thesis import plotting as thesis
-from thesis.figures.beam import BEAM, LARGE
+from thesis.figures.beam import LARGE
 from thesis.figures.computations import Computation, Types
 from thesis.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
 from thesis.figures.panels import FREQUENCY
 from thesis.figures.printed import printed
 from thesis.figures.scored import scored, scored_finding
+from thesis.machines import BEAM
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,9 @@ def beam_map(resolution: float) -> Mapping[str, Computation]:
     shares = steps(0.005, 0.05, 0.005 / resolution)
     return {
         "map": Types(
-            machine=BEAM, speeds=steps(2.0, 30.0, 2.0 / resolution), clearances=tuple(unit * share for share in shares)
+            machine=BEAM,
+            speeds=steps(2.0, 30.0, 2.0 / resolution),
+            clearances=tuple(unit * share for share in shares),
         ),
         **scored("IBS-030", "IBS-031"),
     }

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from thesis import plotting as thesis
-from thesis.figures.beam import BEAM, LARGE, TRANSIENT, runs
+from thesis.figures.beam import LARGE, TRANSIENT, runs
 from thesis.figures.computations import Computation, ForcePointHistory, History
 from thesis.figures.figure import Finding, Panel, Parts, ThesisFigure
 from thesis.figures.findings import compare_nature, words
@@ -22,6 +22,7 @@ from thesis.figures.panels import (
 )
 from thesis.figures.printed import printed, within
 from thesis.figures.scored import scored, scored_finding
+from thesis.machines import BEAM
 
 Array = NDArray[np.float64]
 

@@ -117,7 +117,7 @@ class Runs:
         peaks = plotted_peaks(record)
         nature, period, settle = "undetermined", 0, -1
         if self.cycles >= 16:
-            read = read_dots(machine, peaks, THOROUGH[machine.name].budget)
+            read = read_dots(peaks)
             nature, period = read.nature, read.period or 0
             repeats = two_step_test(peaks, sensor_error=READING_ERROR).settle_cycle
             settle = -1 if repeats is None else repeats
@@ -156,7 +156,7 @@ class Types:
             for at in found.speed
             for gap in found.clearance
         ]
-        effort = THOROUGH[self.machine.name]
+        effort = THOROUGH[self.machine.name]._replace(budget=0)
         seen = parallel_map(lambda machine: observe(machine, effort).nature, machines, workers=workers)
         nature = np.array(seen).reshape(found.nature.shape)
         return {"speed": found.speed, "clearance": found.clearance, "nature": nature, "type": found.type}

@@ -18,7 +18,7 @@ SMALL, MIDDLE, WIDE, LARGE = 0.03175e-3, 0.0635e-3, 0.127e-3, 0.254e-3
 LOW_DAMPING, HIGH_DAMPING = 0.025, 0.05
 """Contact damping ratios (4.5.4)."""
 
-TRANSIENT, CYCLES, _ = THOROUGH["slider-crank"]
+TRANSIENT, CYCLES, *_ = THOROUGH["slider-crank"]
 """Revolutions in which a response settles, and those shown of it (4.4.1): as for the scorecard."""
 
 ROD_LENGTH = ParameterAxis("rod_length", "connecting rod length [m]", 1.0, "m")

@@ -10,9 +10,9 @@ from thesis.cache import default_folder
 from thesis.figures.computations import Computation, Data
 from thesis.figures.figure import Finding, Parts
 from thesis.figures.printed import comparison
-from thesis.machines import MACHINES
+from thesis.machines import THESIS_MACHINES
+from thesis.scorecard.evaluation import evaluate
 from thesis.scorecard.observation import THOROUGH
-from thesis.scorecard.scorecard import evaluate
 from thesis.statements import Comparison
 
 
@@ -40,7 +40,7 @@ class Scored:
 def scored(*targets: str) -> Mapping[str, Computation]:
     """Parts of a figure: some statements, each under its name."""
     compared = {target: comparison(target) for target in targets}
-    return {target: Scored(comparison=one, machine=MACHINES[one.machine]) for target, one in compared.items()}
+    return {target: Scored(comparison=one, machine=THESIS_MACHINES[one.machine]) for target, one in compared.items()}
 
 
 def agrees(parts: Parts, *targets: str) -> bool:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from chaosgym.machines import ImpactBeam, Machine
 from chaosgym.machines.impact_beam.modes import pinned_pinned_frequency
+from chaosgym.machines.parameters import with_settings
 from thesis.scorecard import beam_runs
 from thesis.scorecard.findings import Finding, Quantity, Results, no_jobs
 from thesis.scorecard.jobs import Job
@@ -38,6 +39,34 @@ def _chaotic_cycles(machine: Machine, comparison: Comparison, results: Results) 
     return _irregular_cycles(machine, comparison, results)._replace(agrees=nature == "chaotic", note=nature)
 
 
+SHORT = 500
+"""Cycles within which a response is followed until it is steady: more than three times the printed 150 (5.2.3)."""
+
+
+def _settling_jobs(machine: Machine, comparison: Comparison, effort: Effort) -> list[Job]:
+    axes = [axis for axis in (comparison.across, comparison.along) if axis is not None]
+    machines = [machine]
+    for axis in axes:
+        machines = [with_settings(one, {axis.field: value}) for one in machines for value in axis.values]
+    return [Job(beam_runs.long_run, one, (SHORT,)) for one in machines]
+
+
+def _irregular_settling(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """Cycles before the last of those responses that become periodic repeats, however irregular it is till then."""
+    cycles = [result["irregular_cycles"] for result in results if result["period"]]
+    if not cycles:
+        return Finding(None, False, "none becomes periodic")
+    return Finding(float(max(cycles)), True, f"{len(cycles)} of {len(results)} responses become periodic")
+
+
+def _bouncing_jobs(machine: Machine, comparison: Comparison, effort: Effort) -> list[Job]:
+    return [Job(beam_runs.longest_bouncing, machine, (200,))]
+
+
+def _longest_bouncing(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    return Finding(results[0]["share"])
+
+
 def _final_period(machine: Machine, comparison: Comparison, results: Results) -> Finding:
     period = results[0]["period"]
     cycles = results[0]["irregular_cycles"]
@@ -45,7 +74,7 @@ def _final_period(machine: Machine, comparison: Comparison, results: Results) ->
 
 
 def _moving(machine: Machine, comparison: Comparison, effort: Effort) -> list[Job]:
-    return [Job(beam_runs.force_point_motion, machine, (200,))]
+    return [Job(beam_runs.force_point_motion, machine, (60, 6) if effort.hasty else (200, 50))]
 
 
 def _motion(which: str, unit: float) -> Callable[[Machine, Comparison, Results], Finding]:
@@ -59,6 +88,8 @@ def _motion(which: str, unit: float) -> Callable[[Machine, Comparison, Results],
 BEAM_QUANTITIES = {
     "irregular_cycles": Quantity(_long(LONG), _irregular_cycles),
     "chaotic_cycles": Quantity(_long(LONG), _chaotic_cycles),
+    "irregular_settling": Quantity(_settling_jobs, _irregular_settling),
+    "longest_bouncing": Quantity(_bouncing_jobs, _longest_bouncing),
     "final_period": Quantity(_long(LONG), _final_period),
     "force_point_displacement": Quantity(_moving, _motion("displacement", 1e-3)),
     "force_point_velocity": Quantity(_moving, _motion("velocity", 1.0)),

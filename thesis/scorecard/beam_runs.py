@@ -17,7 +17,7 @@ from thesis.scorecard.observation import DOT, READING_ERROR, plotted_peaks
 Array = NDArray[np.float64]
 
 MOTION_CYCLES, MOTION_SAMPLES = 50, 4000
-"""Cycles of the motion of the force point, and samples in each."""
+"""Cycles of a long history, and samples in each."""
 
 
 def long_run(machine: Machine, cycles: int) -> dict[str, Any]:
@@ -70,9 +70,9 @@ def follow_modes(record: CycleRecord) -> tuple[Array, Array, Array]:
     return displacement, velocity, tip
 
 
-def force_point_motion(beam: ImpactBeam, transient: int) -> dict[str, Any]:
+def force_point_motion(beam: ImpactBeam, transient: int, cycles: int) -> dict[str, Any]:
     """Range of displacement [m] and velocity [m/s] of the point where the shaker pushes a beam."""
-    record = simulate(beam, MOTION_CYCLES, transient=transient, samples_per_cycle=MOTION_SAMPLES)
+    record = simulate(beam, cycles, transient=transient, samples_per_cycle=MOTION_SAMPLES)
     displacement, velocity, tip = follow_modes(record)
     assert record.history is not None
     return {
@@ -80,3 +80,22 @@ def force_point_motion(beam: ImpactBeam, transient: int) -> dict[str, Any]:
         "velocity": [float(velocity.min()), float(velocity.max())],
         "tip_error": float(np.max(np.abs(tip - record.history[:, :, 0].ravel()))),
     }
+
+
+def longest_bouncing(beam: ImpactBeam, transient: int) -> dict[str, float]:
+    """Largest share of a stay on a sensor, from the first touch to the last release, that is bouncing: ``share``.
+
+    Bouncing lasts from the first to the last touch of the stay; a stay ends where the other sensor is touched.
+    """
+    record = simulate(beam, MOTION_CYCLES, transient=transient, samples_per_cycle=MOTION_SAMPLES)
+    assert record.history is not None
+    return {"share": float(np.max(bouncing_shares(record.history[:, :, 2].ravel()), initial=0.0))}
+
+
+def bouncing_shares(force: Array) -> Array:
+    """Share of each whole stay on a sensor that is bouncing, from the contact force (samples,) [N], upward positive."""
+    side = np.sign(force)
+    begins = np.flatnonzero(np.diff(side, prepend=0.0) * side != 0.0)
+    ends = np.flatnonzero(np.diff(side, append=0.0) * side != 0.0) + 1
+    stays = np.split(np.arange(len(begins)), np.flatnonzero(np.diff(side[begins])) + 1)
+    return np.array([(begins[s[-1]] - begins[s[0]]) / (ends[s[-1]] - begins[s[0]]) for s in stays[1:-1]])

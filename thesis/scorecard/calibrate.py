@@ -1,16 +1,22 @@
 """The calibration: values of the parameters that are not in print which bring a machine closest to the thesis.
 
-A tree-structured Parzen estimator (Optuna) proposes candidates; those that the single runs rule out are given up before
-the curves. The journal in the folder is written after every trial, and every trial draws from its own seed, so that a
-stopped search goes on as if it had not been stopped. The best candidates of the quick runs are judged by thorough ones.
+The covariance matrix adaptation evolution strategy (CMA-ES) searches several basins: structures of the machine, each
+with its own start. Every basin gets some generations; then the worse half of them gets no more, until two are left.
+Candidates that the single runs rule out are given up before the curves. The journal in the folder has a line for every
+candidate, and every generation draws from its own seed, so that a stopped search goes on as if it had not been stopped.
+The best candidates of the quick runs are judged by thorough ones, and the one with the most hits wins.
+
+References
+----------
+N. Hansen, A. Ostermeier, Completely derandomized self-adaptation in evolution strategies, Evol. Comput. 9 (2001).
 """
 
 import json
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -21,31 +27,43 @@ from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.version import __version__
 from thesis.cache import default_folder
-from thesis.scorecard.determination import Determination, determine
-from thesis.scorecard.objective import calibration_statements, objective, staged_objective
+from thesis.scorecard.evaluation import evaluate
+from thesis.scorecard.objective import Stages, searched_statements, staged_costs, statements_of
 from thesis.scorecard.observation import THOROUGH
-from thesis.scorecard.scorecard import Scorecard, evaluate, scorecard
-from thesis.scorecard.search_space import SEARCH_SPACES, Dimension, Real, SearchSpace, Whole
+from thesis.scorecard.scorecard import Scorecard, scorecard
+from thesis.scorecard.search_space import SEARCH_SPACES, Basin, SearchSpace
 
-PLAN_FILE, JOURNAL_FILE, RESULT_FILE = "plan.json", "journal.log", "result.json"
+PLAN_FILE, JOURNAL_FILE, RESULT_FILE = "plan.json", "journal.jsonl", "result.json"
 
-PROMISING, EARLIEST = 0.15, 10
-"""A candidate is given up unless its first stage is among this share of the earlier ones, once there are so many."""
+WIDTH = 0.08
+"""Standard deviation of the first generation, as a share of the searched ranges."""
 
-FINALISTS = 6
+WIDE = 0.25
+"""The same for a search that begins in the middle of the ranges."""
+
+TRIED = 4
+"""Generations that every basin gets before some get no more."""
+
+FINALISTS = 5
 """Candidates of the quick search that are judged by thorough runs."""
+
+APART = 0.02
+"""Distance of two finalists, as a share of the ranges: closer ones are one."""
+
+NEAR_BEST = 0.03
+"""Objective above the best one up to which a candidate counts as near-best."""
 
 
 @dataclass(frozen=True)
 class Budget:
-    """How long a search goes on: trials in all, or minutes of this call."""
+    """How long a search goes on: candidates in all, or minutes of this call."""
 
-    trials: int | None = None
+    candidates: int | None = None
     minutes: float | None = None
 
     @classmethod
     def parse(cls, text: str) -> "Budget":
-        """Read ``20min`` or ``400`` (trials).
+        """Read ``20min`` or ``400`` (candidates).
 
         Raises
         ------
@@ -58,10 +76,26 @@ class Budget:
                 if 0.0 < minutes <= 1e5:
                     return cls(minutes=minutes)
             elif 1 <= int(text) <= 10**6:
-                return cls(trials=int(text))
+                return cls(candidates=int(text))
         except ValueError:
             pass
-        raise ParameterError(f"budget = {text!r} is out of range; allowed: 1 to 1000000 trials, or minutes as in 20min")
+        raise ParameterError(
+            f"budget = {text!r} is out of range; allowed: 1 to 1000000 candidates, or minutes as in 20min"
+        )
+
+
+class Candidate(NamedTuple):
+    """One line of the journal.
+
+    ``basin`` and ``generation`` it belongs to, ``shares`` of the searched ranges, objective ``value``, and ``costs`` of
+    the statements that it was run for.
+    """
+
+    basin: int
+    generation: int
+    shares: tuple[float, ...]
+    value: float
+    costs: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -70,51 +104,68 @@ class Calibration:
 
     Attributes
     ----------
-    machine : Machine
-        The best candidate by thorough runs, or the present constants if none is better.
-    values
-        Its values of the searched parameters.
-    objective, present_objective
-        Its objective and that of the present constants, by thorough runs.
-    trials
-        Candidates tried, the earlier calls on the folder included.
+    space : SearchSpace
+        What was searched.
+    best : Candidate
+        The finalist with the most hits.
     card, present_card
         Every statement judged on it and on the present constants.
-    determination
-        How well each parameter is determined.
+    candidates
+        All of the journal.
+    left_out
+        Names of statements that the search did not see.
     """
 
-    machine: Machine
-    values: Mapping[str, Any]
-    objective: float
-    present_objective: float
-    trials: int
+    space: SearchSpace
+    best: Candidate
     card: Scorecard
     present_card: Scorecard
-    determination: tuple[Determination, ...]
+    candidates: Sequence[Candidate]
+    left_out: frozenset[str] = frozenset()
+
+    @property
+    def machine(self) -> Machine:
+        """Machine of the best candidate."""
+        return self.space.machine(self.basin, self.best.shares)
+
+    @property
+    def basin(self) -> Basin:
+        """Basin of the best candidate."""
+        return self.space.basins[self.best.basin]
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         name = self.machine.name
-        rates = {
-            which: {part: list(card.hit_rate(name, part)) for part in ("calibration", "held-out")}
-            for which, card in (("best", self.card), ("present", self.present_card))
-        }
+        cards = {"best": self.card, "present": self.present_card}
         return {
             "version": __version__,
             "machine": name,
-            "trials": self.trials,
-            "objective": self.objective,
-            "present_objective": self.present_objective,
-            "searched": dict(self.values),
+            "candidates": len(self.candidates),
+            "basin": self.basin.name,
+            "objective": self.best.value,
+            "objective_of_basins": {
+                basin.name: min((one.value for one in self.candidates if one.basin == k), default=None)
+                for k, basin in enumerate(self.space.basins)
+            },
+            "searched": self.basin.values(self.best.shares),
             "parameters": {field: getattr(self.machine, field) for field in parameters_of(self.machine)},
-            "hits_of": rates,
-            "determination": [one.as_dict() for one in self.determination],
+            "unprinted": self.space.conditions(self.basin, self.best.shares),
+            "hits_of": {which: list(card.hit_rate(name)) for which, card in cards.items()},
+            "left_out": sorted(self.left_out),
+            "near_best": _near_best(self),
             "residuals": [
-                {**one.as_dict(), "part": one.comparison.part, "error_in_tolerances": _finite(one.error)}
+                {**one.as_dict(), "error_in_tolerances": one.error if np.isfinite(one.error) else None}
                 for one in self.card.judged
             ],
         }
+
+
+def _near_best(found: Calibration) -> dict[str, list[float]]:
+    """Smallest and largest value of each searched number among near-best candidates of the same basin."""
+    limit = found.best.value + NEAR_BEST
+    near = [one for one in found.candidates if one.basin == found.best.basin and one.value <= limit]
+    values = [found.basin.values(one.shares) for one in (*near, found.best)]
+    return {name: [min(one[name] for one in values), max(one[name] for one in values)] for name in values[0]}
 
 
 def calibrate(
@@ -123,6 +174,7 @@ def calibrate(
     folder: Path,
     *,
     seed: int = 0,
+    left_out: frozenset[str] = frozenset(),
     workers: int | None = None,
     cache: Path | None = None,
     progress: bool = False,
@@ -134,11 +186,14 @@ def calibrate(
     name
         Machine.
     budget
-        Trials in all, or minutes of this call.
+        Candidates in all, or minutes of this call.
     folder
         New, empty, or holding a search of the same machine, seed and version, which goes on.
     seed
         Of the search.
+    left_out
+        Figures whose statements the search does not see; it then begins in the middle of the ranges, since the starts
+        come from fits to all statements.
     workers
         Number of threads; all processors by default.
     cache
@@ -153,39 +208,21 @@ def calibrate(
     ChaosgymError
         If the optimiser is not installed.
     """
-    space = SEARCH_SPACES[name]
-    study = _open(folder, {"machine": name, "seed": seed, "version": __version__, "space": _described(space)}, space)
-    finished = _search(study, space, budget, seed, workers, progress)
-    cache = cache or default_folder()
-    values, best, present = _final(space, finished, workers, cache, progress)
-    machine = space.machine(values)
-    result = Calibration(
-        machine=machine,
-        values=values,
-        objective=best,
-        present_objective=present,
-        trials=len(finished),
-        card=scorecard([name], bases={name: machine}, folder=cache, workers=workers, progress=progress),
-        present_card=scorecard([name], bases={name: space.base}, folder=cache, workers=workers, progress=progress),
-        determination=determine(space, values, _complete(finished), workers=workers, progress=progress),
-    )
+    space = SEARCH_SPACES[name].from_the_middle() if left_out else SEARCH_SPACES[name]
+    stages = searched_statements(name, space.joint)
+    stages = stages.without(frozenset(one.id for stage in stages for one in stage if one.statement.figure in left_out))
+    plan = {"machine": name, "seed": seed, "version": __version__, "statements": list(stages.ids)}
+    found = open_journal(folder, {**plan, "basins": [one.name for one in space.basins]})
+    width = WIDE if left_out else WIDTH
+    search(found, space, stages, budget, seed, folder / JOURNAL_FILE, workers, progress, width=width)
+    result = _judged(space, found, left_out, cache or default_folder(), workers, progress)
     text = json.dumps(result.as_dict(), indent=2, allow_nan=False) + "\n"
     write_atomically(folder / RESULT_FILE, lambda temporary: temporary.write_text(text))
     return result
 
 
-def _optuna() -> Any:
-    try:
-        import optuna
-    except ImportError as error:
-        raise ChaosgymError("calibration needs the extra [calibrate]: pip install 'chaosgym[calibrate]'") from error
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
-    return optuna
-
-
-def _open(folder: Path, plan: dict[str, Any], space: SearchSpace) -> Any:
-    """The search in a folder, begun or gone on with."""
-    optuna = _optuna()
+def open_journal(folder: Path, plan: dict[str, Any]) -> list[Candidate]:
+    """Candidates of a search in a folder, which is begun if it is new."""
     plan_file = folder / PLAN_FILE
     if plan_file.is_file():
         try:
@@ -198,127 +235,183 @@ def _open(folder: Path, plan: dict[str, Any], space: SearchSpace) -> Any:
     elif folder.exists() and (not folder.is_dir() or not is_empty(folder)):
         raise DatasetError(f"{folder} exists and is no calibration; choose another folder")
     folder.mkdir(parents=True, exist_ok=True)
-    begun = plan_file.is_file()
-    if not begun:
+    if not plan_file.is_file():
         write_atomically(plan_file, lambda temporary: temporary.write_text(json.dumps(plan, indent=2) + "\n"))
-    storage = optuna.storages.JournalStorage(optuna.storages.journal.JournalFileBackend(str(folder / JOURNAL_FILE)))
-    study = optuna.create_study(storage=storage, study_name="calibration", load_if_exists=True)
-    running = [trial for trial in study.trials if trial.state == optuna.trial.TrialState.RUNNING]
-    for trial in running:
-        study.tell(trial.number, state=optuna.trial.TrialState.FAIL)
-        study.enqueue_trial(trial.params)
-    for start in space.starts[len(study.trials) :]:
-        study.enqueue_trial(dict(start))
-    return study
+    journal = folder / JOURNAL_FILE
+    lines = journal.read_text().splitlines() if journal.is_file() else []
+    found = []
+    for line in lines:
+        try:
+            basin, generation, shares, value, costs = json.loads(line)
+        except ValueError:  # the line that was being written when the search was stopped
+            break
+        found.append(Candidate(basin, generation, tuple(shares), value, costs))
+    if len(found) < len(lines):
+        text = "".join(json.dumps(one) + "\n" for one in found)
+        write_atomically(journal, lambda temporary: temporary.write_text(text))
+    return found
 
 
-def _search(
-    study: Any, space: SearchSpace, budget: Budget, seed: int, workers: int | None, progress: bool
-) -> list[Any]:
-    """Try candidates until the budget is spent; returns all finished trials."""
-    optuna = _optuna()
-    states = optuna.trial.TrialState
-    finished = study.get_trials(deepcopy=False, states=(states.COMPLETE, states.PRUNED))
-    began = time.monotonic()
-    with tqdm(total=_total(budget), desc="calibrate", disable=not progress, unit=_unit(budget)) as bar:
-        bar.update(len(finished) if budget.trials else 0)
-        while _goes_on(budget, len(finished), began):
-            study.sampler = optuna.samplers.TPESampler(
-                seed=int(np.random.SeedSequence([seed, len(finished)]).generate_state(1)[0]),
-                multivariate=True,
-                n_startup_trials=space.random_trials,
-            )
-            trial = study.ask()
-            threshold = _threshold(finished)
-            try:
-                value, complete = _try(trial, space, threshold, workers)
-            except ParameterError:
-                value, complete = 1.0, False
-            if complete:
-                study.tell(trial, value)
-            else:
-                study.tell(trial, state=states.PRUNED)
-            finished = study.get_trials(deepcopy=False, states=(states.COMPLETE, states.PRUNED))
-            bar.update(1 if budget.trials else round((time.monotonic() - began) / 60.0 - bar.n, 2))
-            bar.set_postfix(trials=len(finished), best=min((t.value for t in _complete(finished)), default=1.0))
-    return list(finished)
+def _evolution(basin: Basin, seed: Sequence[int], width: float) -> Any:
+    try:
+        from cmaes import CMA
+    except ImportError as error:
+        raise ChaosgymError("calibration needs the extra [calibrate]: pip install 'chaosgym[calibrate]'") from error
+    size = len(basin.dimensions)
+    first = int(np.random.SeedSequence(seed).generate_state(1)[0])
+    bounds = np.tile([0.0, 1.0], (size, 1))
+    return CMA(np.clip(basin.shares(), 0.02, 0.98), width, bounds=bounds, seed=first)
 
 
-def _try(trial: Any, space: SearchSpace, threshold: float, workers: int | None) -> tuple[float, bool]:
-    machine = space.machine({one.name: _suggest(trial, one) for one in space.dimensions})
-    stages = staged_objective(machine, workers=workers)
-    first = next(stages)
-    trial.report(first, 0)
-    if first > threshold:
-        return first, False
-    return _last(stages), True
+def search(
+    found: list[Candidate],
+    space: SearchSpace,
+    stages: Stages,
+    budget: Budget,
+    seed: int,
+    journal: Path,
+    workers: int | None,
+    progress: bool,
+    *,
+    width: float = WIDTH,
+) -> None:
+    """Try candidates until the budget is spent; they are added to those found and to the journal.
+
+    ``width`` is the standard deviation of the first generation, as a share of the ranges.
+    """
+    evolutions = [_evolution(basin, (seed, k), width) for k, basin in enumerate(space.basins)]
+    replayed, began = list(found), time.monotonic()
+    found.clear()
+    total = float(budget.candidates or budget.minutes or 0.0)
+    with tqdm(
+        total=total, desc="calibrate", disable=not progress, unit="candidate" if budget.candidates else "min"
+    ) as bar:
+        while True:
+            k = _next_basin(found, len(space.basins), [one.population_size for one in evolutions])
+            evolution, basin = evolutions[k], space.basins[k]
+            generation = sum(one.basin == k for one in found) // evolution.population_size
+            told = []
+            for place in range(evolution.population_size):
+                shares = evolution.ask()
+                if not generation and not place:
+                    shares = np.array(basin.shares())
+                if replayed:
+                    one = replayed.pop(0)
+                elif _spent(budget, len(found), began):
+                    return
+                else:
+                    value, costs = _tried(space, basin, shares, stages, _recent(found, k), workers)
+                    one = Candidate(k, generation, tuple(float(share) for share in shares), value, costs)
+                    with journal.open("a") as file:
+                        file.write(json.dumps(one) + "\n")
+                found.append(one)
+                told.append((np.array(one.shares), one.value))
+                bar.update(1 if budget.candidates else round((time.monotonic() - began) / 60.0 - bar.n, 3))
+                bar.set_postfix_str(f"{len(found)} tried, best {_best(found, space)}")
+            evolution.tell(told)
 
 
-def _last(values: Iterator[float]) -> float:
-    return list(values)[-1]
+def _best(found: Sequence[Candidate], space: SearchSpace) -> str:
+    best = min(found, key=lambda one: one.value)
+    return f"{best.value:.4f} ({space.basins[best.basin].name})"
 
 
-def _suggest(trial: Any, dimension: Dimension) -> Any:
-    if isinstance(dimension, Real):
-        return trial.suggest_float(dimension.name, dimension.low, dimension.high, log=dimension.log)
-    if isinstance(dimension, Whole):
-        return trial.suggest_int(dimension.name, dimension.low, dimension.high)
-    return trial.suggest_categorical(dimension.name, dimension.choices)
+def _next_basin(found: Sequence[Candidate], count: int, sizes: Sequence[int]) -> int:
+    """Basin of the next generation: of those still in the race, the one that has had the fewest."""
+    had = [sum(one.basin == k for one in found) // sizes[k] for k in range(count)]
+    best = [min((one.value for one in found if one.basin == k), default=0.0) for k in range(count)]
+    racing, rounds = list(range(count)), TRIED
+    while len(racing) > 2 and min(had[k] for k in racing) >= rounds:
+        racing = sorted(racing, key=lambda k: best[k])[: max(2, (len(racing) + 1) // 2)]
+        rounds += TRIED
+    return min(racing, key=lambda k: (had[k], k))
 
 
-def _threshold(finished: list[Any]) -> float:
-    """What the first stage of a new candidate must not exceed."""
-    firsts = [trial.intermediate_values[0] for trial in finished if 0 in trial.intermediate_values]
-    return float(np.quantile(firsts, PROMISING)) if len(firsts) >= EARLIEST else np.inf
+def _recent(found: Sequence[Candidate], basin: int) -> Sequence[Candidate]:
+    """Candidates of a basin to which a new one is compared."""
+    return [one for one in found if one.basin == basin][-20:]
 
 
-def _complete(finished: list[Any]) -> list[Any]:
-    return [trial for trial in finished if trial.state.name == "COMPLETE"]
+def _tried(
+    space: SearchSpace,
+    basin: Basin,
+    shares: Sequence[float],
+    stages: Stages,
+    recent: Sequence[Candidate],
+    workers: int | None,
+) -> tuple[float, dict[str, float]]:
+    """Objective and costs; a candidate whose first statements are worse than most recent ones' is given up."""
+    count, costs = len(stages.ids), dict[str, float]()
+    try:
+        machine = space.machine(basin, shares)
+        for part in staged_costs(machine, stages, space.conditions(basin, shares), workers=workers):
+            costs.update(part)
+            others = [sum(one.costs[name] for name in costs) for one in recent if costs.keys() <= one.costs.keys()]
+            if len(others) >= 5 and sum(costs.values()) > float(np.median(others)):
+                break
+    except ParameterError:
+        return 1.0, {}
+    return (sum(costs.values()) + count - len(costs)) / count, costs
 
 
-def _goes_on(budget: Budget, trials: int, began: float) -> bool:
-    if budget.trials is not None:
-        return trials < budget.trials
-    return time.monotonic() - began < 60.0 * (budget.minutes or 0.0)
+def _spent(budget: Budget, candidates: int, began: float) -> bool:
+    if budget.candidates is not None:
+        return candidates >= budget.candidates
+    return time.monotonic() - began >= 60.0 * (budget.minutes or 0.0)
 
 
-def _total(budget: Budget) -> float:
-    return float(budget.trials or budget.minutes or 0.0)
+def _judged(
+    space: SearchSpace,
+    found: Sequence[Candidate],
+    left_out: frozenset[str],
+    cache: Path,
+    workers: int | None,
+    progress: bool,
+) -> Calibration:
+    """Judge the finalists by thorough runs; what is left out has no say in which of them wins."""
+    finalists: list[Candidate] = []
+    for one in sorted(found, key=lambda one: one.value):
+        close = [
+            o for o in finalists if o.basin == one.basin and np.max(np.abs(np.subtract(o.shares, one.shares))) < APART
+        ]
+        if not close and len(finalists) < FINALISTS:
+            finalists.append(one)
+    name = space.base.name
+    asked = statements_of(name, space.joint)
+    unseen = frozenset(one.id for one in asked if one.statement.figure in left_out)
+
+    def hits(one: Candidate) -> int:
+        basin = space.basins[one.basin]
+        bases, unprinted = {name: space.machine(basin, one.shares)}, space.conditions(basin, one.shares)
+        judged = evaluate(asked, bases, efforts=THOROUGH, folder=cache, workers=workers, unprinted=unprinted)
+        return sum(each.verdict == "hit" and each.comparison.id not in unseen for each in judged)
+
+    bar = tqdm(finalists, desc="finalists", disable=not progress, unit="candidate")
+    reached = [(hits(one), -one.value) for one in bar]
+    best = finalists[max(range(len(finalists)), key=lambda k: reached[k])]
+    basin = space.basins[best.basin]
+    card = scorecard(
+        [name],
+        bases={name: space.machine(basin, best.shares)},
+        folder=cache,
+        workers=workers,
+        progress=progress,
+        unprinted=space.conditions(basin, best.shares),
+    )
+    present = scorecard([name], bases={name: space.base}, folder=cache, workers=workers, progress=progress)
+    return Calibration(space, best, card, present, found, unseen)
 
 
-def _unit(budget: Budget) -> str:
-    return "trial" if budget.trials else "min"
+def complete_costs(folder: Path) -> list[Mapping[str, float]]:
+    """Costs of those candidates of a search in a folder that were judged on every statement that it saw.
 
-
-def _final(
-    space: SearchSpace, finished: list[Any], workers: int | None, cache: Path, progress: bool
-) -> tuple[Mapping[str, Any], float, float]:
-    """Values of the best candidate by thorough runs, its objective, and that of the present constants."""
-    statements = [one for stage in calibration_statements(space.base.name) for one in stage]
-
-    def thorough(machine: Machine) -> float:
-        return objective(evaluate(statements, {machine.name: machine}, efforts=THOROUGH, folder=cache, workers=workers))
-
-    present = thorough(space.base)
-    best: tuple[float, Mapping[str, Any]] = (present, space.starts[0])
-    finalists = sorted(_complete(finished), key=_value)[:FINALISTS]
-    for trial in tqdm(finalists, desc="finalists", disable=not progress, unit="candidate"):
-        reached = thorough(space.machine(trial.params))
-        if reached < best[0]:
-            best = (reached, trial.params)
-    return best[1], best[0], present
-
-
-def _value(trial: Any) -> float:
-    return float(trial.value)
-
-
-def _described(space: SearchSpace) -> list[dict[str, Any]]:
-    return [
-        {"name": one.name, "range": [one.low, one.high] if isinstance(one, Real | Whole) else list(one.choices)}
-        for one in space.dimensions
-    ]
-
-
-def _finite(error: float) -> float | None:
-    return error if np.isfinite(error) else None
+    Raises
+    ------
+    DatasetError
+        If the folder holds no search.
+    """
+    try:
+        plan = json.loads((folder / PLAN_FILE).read_text())
+    except (OSError, ValueError) as error:
+        raise DatasetError(f"{folder} holds no calibration") from error
+    return [one.costs for one in open_journal(folder, plan) if len(one.costs) == len(plan["statements"])]

@@ -59,11 +59,27 @@ def _impacts(machine: Machine, comparison: Comparison, results: Results) -> Find
     return Finding(word, word == comparison.printed, f"contact lost in {lost} of {len(results)} runs")
 
 
+def _impact_bound(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+    """Speeds at which contact is lost at some clearance, as far as the printed range lets them lie: a bound."""
+    assert isinstance(comparison.printed, tuple)
+    speeds = _speeds_with_impacts(comparison, results)
+    if not speeds:
+        return Finding(None, False, "contact is never lost")
+    low, high = comparison.printed
+    beyond = min(low, speeds[0]), max(high, speeds[-1])
+    return Finding(beyond, True, f"contact lost at {', '.join(f'{speed:g}' for speed in speeds)} rpm")
+
+
+def _speeds_with_impacts(comparison: Comparison, results: Results) -> list[float]:
+    assert comparison.along is not None
+    lost = np.array([result["lost"] > LOST for result in results]).reshape(-1, len(comparison.along.values))
+    return [comparison.along.values[place] for place in np.flatnonzero(lost.any(axis=0))]
+
+
 def _impact_range(machine: Machine, comparison: Comparison, results: Results) -> Finding:
     """First stretch of speeds at which contact is lost at some clearance."""
     assert comparison.along is not None
-    lost = np.array([result["lost"] > LOST for result in results]).reshape(-1, len(comparison.along.values))
-    speeds = [comparison.along.values[place] for place in np.flatnonzero(lost.any(axis=0))]
+    speeds = _speeds_with_impacts(comparison, results)
     if not speeds:
         return Finding(None, False, "contact is never lost")
     last = speeds[0]
@@ -134,6 +150,7 @@ CRANK_QUANTITIES = {
     "impulse_angles": _angles("impulse_down", "impulse_up"),
     "impacts": Quantity(_impact_jobs, _impacts),
     "impact_range": Quantity(_impact_jobs, _impact_range),
+    "impact_bound": Quantity(_impact_jobs, _impact_bound),
     "update_transient": Quantity(_updated, _update_transient),
     "update_test": Quantity(_tested, _update_test),
     "statistics_cycles": Quantity(lambda machine, *_: [Job(crank_runs.statistics, machine)], _statistics),

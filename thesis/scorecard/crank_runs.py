@@ -16,7 +16,7 @@ from thesis.scorecard.observation import THOROUGH, plotted_peaks
 ANGLE_SAMPLES, ANGLE_CYCLES = 3600, 10
 """Samples of crank angle in a revolution, and revolutions of which the median is taken."""
 
-TRANSIENT, SHOWN, _ = THOROUGH["slider-crank"]
+TRANSIENT, SHOWN, *_ = THOROUGH["slider-crank"]
 """Revolutions in which a response settles, and those shown of it (4.4.1)."""
 
 CLOUD_CYCLES = 100
@@ -24,13 +24,14 @@ CLOUD_CYCLES = 100
 
 
 def crank_angles(crank: SliderCrank, transient: int) -> dict[str, float | None]:
-    """At which crank angles [deg] of the first half revolution is contact lost and resumed?
+    """At which crank angles [deg] of a revolution is contact lost and resumed?
 
     Returns
     -------
     dict
-        ``loss`` and ``resumption``: ends of the longest gap in the contact force; ``settled``: end of the last gap;
-        ``impact``: largest force after the loss. Medians over the revolutions that have a gap, as the thesis shows one
+        ``loss`` and ``resumption``: ends of the longest gap in the contact force that begins in the first half
+        revolution; ``settled``: end of the last gap that begins there; ``impact``: largest force within a quarter of
+        a revolution after the loss. Medians over the revolutions that have a gap, as the thesis shows one
         "during which an impact occurs" (4.4.1, 4.4.2); None if none has. ``impulse_down`` and ``impulse_up``: largest
         force of either half revolution, medians over all.
     """
@@ -54,8 +55,11 @@ def revolution_angles(force: NDArray[np.float64]) -> dict[str, Any]:
         "impulse_down": degree * int(np.argmax(force[:half])),
         "impulse_up": degree * (half + int(np.argmax(force[half:]))),
     }
-    free = np.concatenate([[False], force[:half] == 0.0, [False]])
-    begins, ends = np.flatnonzero(free[1:] & ~free[:-1]), np.flatnonzero(free[:-1] & ~free[1:])
+    # a gap that is open at 0 deg began in the half before and is none of this one
+    free = np.concatenate([[True], force == 0.0, [False]])
+    begins = np.flatnonzero(free[1:] & ~free[:-1])
+    ends = np.flatnonzero(free[:-1] & ~free[1:])[-len(begins) :] if len(begins) else begins
+    begins, ends = begins[begins < half], ends[: np.count_nonzero(begins < half)]
     if not len(begins):
         return {"loss": None, "resumption": None, "settled": None, "impact": None, **impulses}
     longest = int(np.argmax(ends - begins))
@@ -64,7 +68,7 @@ def revolution_angles(force: NDArray[np.float64]) -> dict[str, Any]:
         "loss": degree * loss,
         "resumption": degree * int(ends[longest]),
         "settled": degree * int(ends[-1]),
-        "impact": degree * (loss + int(np.argmax(force[loss:half]))),
+        "impact": degree * (loss + int(np.argmax(force[loss : loss + half // 2]))),
         **impulses,
     }
 

@@ -1,35 +1,110 @@
-r"""The distance of a candidate from the thesis: one number over the statements that a calibration may see.
+r"""The distance of a candidate from the thesis: one number over all statements about its machine.
 
 A statement that is e tolerances off costs e / (1 + e): half at the edge of a hit, less than one however wild the miss,
 so that no single statement rules the search. A wrong nature adds to it: 1 - (1 - e/(1+e)) (1 - d), with d how far the
 natures are from the printed ones. The objective is the mean, between 0 and 1.
 
-Statements of single runs come first; a candidate that they rule out is not run over whole curves.
+Statements of single runs come first; a candidate that they rule out is not run over curves, and counts what it is not
+run for as wholly missed. Curves and maps are thinned: a boundary is sought near where it is printed.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
+from thesis.scorecard.evaluation import evaluate
 from thesis.scorecard.findings import Finding
 from thesis.scorecard.observation import QUICK
-from thesis.scorecard.scorecard import evaluate
 from thesis.scorecard.verdicts import Judged, error_of
 from thesis.statements import Comparison, read_comparisons
+from thesis.statements.comparisons import Axis
+
+WITHOUT_A_SLOPE = frozenset(
+    (
+        "irregular_cycles",
+        "chaotic_cycles",
+        "final_period",
+        "settling",
+        "irregular_settling",
+        "update_transient",
+        "update_test",
+        "statistics_cycles",
+        "longest_bouncing",
+    )
+)
+"""Quantities that one trajectory decides, so that no search can follow them; the scorecard judges them all the same."""
+
+BEYOND = 2.0
+"""Steps beyond a printed boundary up to which a quick run looks for it."""
+
+FULL_CURVES = frozenset(("smooth_end", "chaos_begin", "periodic_end", "chaos_run", "chaos_present"))
+"""Quantities whose whole curve decides; many of them share one."""
+
+HASTENED: Mapping[str, Mapping[str, Any]] = {"slider-crank": {"matrix_update_interval": 5.0}}
+"""Fields by which quick runs differ from thorough ones, by machine: the thesis itself updates every 5 deg (5.2.2)."""
 
 
-def calibration_statements(machine: str) -> tuple[tuple[Comparison, ...], ...]:
-    """Statements that a calibration may see, in stages: single runs, then curves; contradictory ones left out."""
-    seen = [
+class Stages(NamedTuple):
+    """Statements of a search: single runs, full curves, then maps and other sweeps."""
+
+    points: tuple[Comparison, ...]
+    curves: tuple[Comparison, ...]
+    maps: tuple[Comparison, ...]
+
+    def without(self, ids: frozenset[str]) -> "Stages":
+        """Return the stages without some statements."""
+        return Stages(*(tuple(one for one in stage if one.id not in ids) for stage in self))
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Names of all statements."""
+        return tuple(one.id for stage in self for one in stage)
+
+
+def searched_statements(machine: str, joint: str | None = None) -> Stages:
+    """Statements that a search of a machine follows; of those with clearance in one ``joint`` if it is named."""
+    seen = [_thinned(one) for one in statements_of(machine, joint) if one.quantity not in WITHOUT_A_SLOPE]
+    points = tuple(one for one in seen if one.along is None)
+    curves = tuple(one for one in seen if one.along is not None and one.quantity in FULL_CURVES)
+    return Stages(points, curves, tuple(one for one in seen if one not in points and one not in curves))
+
+
+def statements_of(machine: str, joint: str | None = None) -> tuple[Comparison, ...]:
+    """All statements about a machine but contradictory ones; those with clearance in one ``joint`` if it is named."""
+    return tuple(
         one
         for one in read_comparisons().compared
-        if one.machine == machine and one.part == "calibration" and not one.contradictory
-    ]
-    return tuple(one for one in seen if one.along is None), tuple(one for one in seen if one.along is not None)
+        if one.machine == machine
+        and not one.contradictory
+        and joint in (None, "ball" if "ball_joint" in one.at[0] else "slider")
+    )
+
+
+def _thinned(one: Comparison) -> Comparison:
+    """The statement on shorter or coarser axes, where that leaves what is asked."""
+    if one.quantity == "map_clearance" and one.across is not None and one.along is not None:
+        return replace(one, across=_cut(one.across, one.printed), along=_coarse(one.along, 2))
+    if one.quantity == "map_speed" and one.along is not None:
+        return replace(one, along=_cut(one.along, one.printed))
+    if one.quantity == "spread_trend" and one.along is not None:
+        return replace(one, along=_coarse(one.along, 4))
+    if one.quantity in ("resonance_speed", "largest_force") and one.along is not None:
+        return replace(one, along=_coarse(one.along, 3))
+    return one
+
+
+def _cut(axis: Axis, printed: Any) -> Axis:
+    return axis._replace(high=min(axis.high, printed * axis.unit + BEYOND * axis.step))
+
+
+def _coarse(axis: Axis, times: int) -> Axis:
+    count = round((axis.high - axis.low) / axis.step) // times
+    return axis._replace(step=(axis.high - axis.low) / count)
 
 
 def cost(judged: Judged) -> float:
@@ -50,17 +125,11 @@ def objective(judged: Sequence[Judged]) -> float:
     return float(np.mean([cost(one) for one in judged]))
 
 
-HASTENED: Mapping[str, Mapping[str, Any]] = {"slider-crank": {"matrix_update_interval": 5.0}}
-"""Fields by which quick runs differ from thorough ones, by machine: the thesis itself updates every 5 deg (5.2.2)."""
-
-
-def staged_objective(machine: Machine, *, workers: int | None = None) -> Iterator[float]:
-    """Lower bounds of the objective of quick runs, one after each stage; the last one is the objective itself."""
+def staged_costs(
+    machine: Machine, stages: Stages, unprinted: Mapping[str, float], *, workers: int | None = None
+) -> Iterator[dict[str, float]]:
+    """Costs of the statements of one stage after the other, by quick runs."""
     machine = with_settings(machine, HASTENED.get(machine.name, {}))
-    stages = calibration_statements(machine.name)
-    count = sum(len(stage) for stage in stages)
-    total = 0.0
     for stage in stages:
-        judged = evaluate(stage, {machine.name: machine}, efforts=QUICK, workers=workers)
-        total += sum(cost(one) for one in judged)
-        yield total / count
+        judged = evaluate(stage, {machine.name: machine}, efforts=QUICK, workers=workers, unprinted=unprinted)
+        yield {one.comparison.id: cost(one) for one in judged}

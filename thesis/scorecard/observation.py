@@ -1,9 +1,9 @@
 """What a reader of the thesis' figures sees of a run: its nature and the peak forces of 100 cycles.
 
-The thesis judges a response by the dots of its figures, one a cycle (``plotted_peaks``): one dot is periodic, a few are
-a subharmonic, a distribution is chaos (3.5.1). Two dots closer than the width of a dot are one; ``READING_ERROR`` is
-that width, for every figure. Dots that do not repeat are judged by the whole diagnosis. What the exact test says of the
-same cycles, state and both surfaces, is kept beside it.
+The thesis judges a response by the dots of its figures, one a cycle (``plotted_peaks``): "the nature of the response -
+periodic, subharmonic or chaotic - is indicated by the distribution of dots" (4.5.1; likewise 3.5.1). One dot is
+periodic, a few are a subharmonic, a distribution is chaos. Two dots closer than the width of a dot are one;
+``READING_ERROR`` is half that width, for every figure. What our own diagnosis says of the machine stands beside it.
 """
 
 from collections.abc import Mapping
@@ -14,31 +14,44 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.diagnosis import Diagnosis, diagnose, two_step_test
+from chaosgym.diagnosis.stroboscopic import irregularity
 from chaosgym.errors import SimulationError
 from chaosgym.machines import ImpactBeam, Machine
-from chaosgym.simulation import CycleRecord, simulate
+from chaosgym.simulation import CycleRecord, MotionState, simulate
 
 Array = NDArray[np.float64]
 
 READING_ERROR = 0.5
 """Half the width of a dot [N]: half a per cent of a force axis of 100 N."""
 
+BLOCK, REPEATING, CLOSE = 20, 12, 0.02
+"""Cycles after which a hasty run looks whether its dots repeat, those it looks at, and how close [N] they must lie."""
+
+FEW = 6
+"""Dots that are still a few: the longest period of a response whose irregularity is small."""
+
 DOT = 2.0 * READING_ERROR
 """Width of a dot [N]."""
 
 
 class Effort(NamedTuple):
-    """How long a run is: cycles skipped, cycles recorded, and the budget of the diagnosis (0: Two-Step Test alone)."""
+    """How long a run is: cycles skipped, cycles recorded, and those of the diagnosis beside it (0: none).
+
+    A ``hasty`` run ends as soon as its dots repeat closely. ``start`` cycles at a speed 5 % higher give the initial
+    state, which is rest in the middle after none.
+    """
 
     transient: int
     cycles: int
     budget: int
+    hasty: int = 0
+    start: int = 0
 
 
 THOROUGH: Mapping[str, Effort] = {"impact-beam": Effort(200, 100, 800), "slider-crank": Effort(60, 50, 200)}
 """For the scorecard, by machine: 100 and 50 cycles recorded, as in the thesis (3.5.1, 4.4.1)."""
 
-QUICK: Mapping[str, Effort] = {"impact-beam": Effort(60, 48, 0), "slider-crank": Effort(30, 32, 0)}
+QUICK: Mapping[str, Effort] = {"impact-beam": Effort(120, 48, 0, 1), "slider-crank": Effort(30, 32, 0, 1)}
 """For a calibration, which makes many thousand runs."""
 
 
@@ -49,28 +62,29 @@ class Observation:
     Attributes
     ----------
     nature
-        As read from a figure: "periodic", "quasiperiodic", "chaotic" or "undetermined"; "failed" if the run could not
-        be finished.
+        As read from a figure: "periodic" or "chaotic"; "failed" if the run could not be finished.
     period
         Cycles after which it repeats; None if it does not.
-    exact_nature
-        By the Two-Step Test without a reading error; with a budget of 0, ``nature`` again.
+    certificate
+        Nature by the diagnosis, which may also be "quasiperiodic" or "undetermined"; empty if none was asked for.
+    irregularity
+        Amplitude by which the plotted peak forces do not repeat [N], with any period up to six.
     low, mean, high
         Smallest, mean and largest of the plotted peak forces [N].
-    bounce_share, longest_bounce_share
-        Median and largest duration of bouncing, as a share of half the cycle.
+    bounce_share
+        Median duration of bouncing, as a share of half the cycle.
     settle_cycle
         Cycle from which on the run from rest repeats within the reading error; None if it does not.
     """
 
     nature: str
     period: int | None = None
-    exact_nature: str = "failed"
+    certificate: str = ""
+    irregularity: float = 0.0
     low: float = 0.0
     mean: float = 0.0
     high: float = 0.0
     bounce_share: float = 0.0
-    longest_bounce_share: float = 0.0
     settle_cycle: int | None = None
 
     @property
@@ -80,7 +94,7 @@ class Observation:
 
     @property
     def is_chaotic(self) -> bool:
-        """True if the dots are distributed, and the diagnosis calls them chaos."""
+        """True if the dots are distributed."""
         return self.nature == "chaotic"
 
     def as_dict(self) -> dict[str, Any]:
@@ -98,42 +112,67 @@ def plotted_peaks(record: CycleRecord) -> Array:
     return np.asarray(forces[:, 0] if isinstance(record.machine, ImpactBeam) else forces.max(axis=1))
 
 
-def read_dots(machine: Machine, peaks: Array, budget: int) -> Diagnosis:
-    """Judge the plotted peaks (cycles,) [N] of a machine; dots that do not repeat by a diagnosis of ``budget`` cycles.
+def read_dots(peaks: Array) -> Diagnosis:
+    """Judge plotted peaks (cycles,) [N] as a reader does: one dot or a few are periodic, a distribution is chaos.
 
-    With a budget of 0 all of them are chaos (3.5.1). Chaotic dots stay so if the machine turns periodic after the
-    plotted cycles: that is transient chaos, which counts as chaotic (5.2.3).
+    Chaos that ends after the plotted cycles counts as chaos, as in the thesis (5.2.3).
     """
     read = two_step_test(peaks, sensor_error=READING_ERROR)
-    if read.nature == "periodic":
-        return read
-    if not budget:
-        return replace(read, nature="chaotic")
-    found = diagnose(machine, budget=budget, sensor_error=READING_ERROR)
-    later = found.period is not None and np.any(np.abs(peaks[found.period :] - peaks[: -found.period]) > DOT)
-    return read if later and read.nature == "chaotic" else found
+    return read if read.nature == "periodic" else replace(read, nature="chaotic")
 
 
 def observe(machine: Machine, effort: Effort) -> Observation:
-    """Run a machine from rest and read its peak forces as from a figure of the thesis."""
+    """Run a machine and read its peak forces as from a figure of the thesis."""
+    if effort.hasty:
+        return _glance(machine, effort)
     try:
-        record = simulate(machine, effort.transient + effort.cycles)
-        settled, plotted = record.after(effort.transient), plotted_peaks(record)
-        peaks = plotted[effort.transient :]
-        read = read_dots(machine, peaks, effort.budget)
+        record = simulate(machine, effort.transient + effort.cycles, _initial(machine, effort.start))
+        certificate = diagnose(machine, budget=effort.budget).nature if effort.budget else ""
     except SimulationError:
         return Observation("failed")
-    exact = two_step_test(settled) if effort.budget else read
-    settle = two_step_test(plotted, sensor_error=READING_ERROR).settle_cycle if effort.budget else None
+    settled, plotted = record.after(effort.transient), plotted_peaks(record)
+    peaks = plotted[effort.transient :]
+    read = read_dots(peaks)
     shares = settled.bounce_duration[settled.bounce_duration > 0.0] / (0.5 * machine.cycle_period)
     return Observation(
         nature=read.nature,
         period=read.period,
-        exact_nature=exact.nature,
+        certificate=certificate,
+        irregularity=irregularity(peaks, FEW),
         low=float(peaks.min()),
         mean=float(peaks.mean()),
         high=float(peaks.max()),
         bounce_share=float(np.median(shares)) if len(shares) else 0.0,
-        longest_bounce_share=float(shares.max()) if len(shares) else 0.0,
-        settle_cycle=settle if read.nature == "periodic" else None,
+        settle_cycle=two_step_test(plotted, sensor_error=READING_ERROR).settle_cycle if read.period else None,
+    )
+
+
+def _initial(machine: Machine, cycles: int) -> MotionState | None:
+    """State after some cycles at a speed 5 % higher; None, which is rest, after none."""
+    if not cycles:
+        return None
+    return simulate(machine.at(1.05 * getattr(machine, machine.speed_field)), cycles).final_state
+
+
+def _glance(machine: Machine, effort: Effort) -> Observation:
+    """What a hasty run shows: no longer than needed where the response settles soon; nature and forces alone."""
+    peaks, least = np.empty(0), np.inf
+    try:
+        state = _initial(machine, effort.start)
+        while least > CLOSE and len(peaks) < effort.transient + effort.cycles:
+            record = simulate(machine, BLOCK, state)
+            state, peaks = record.final_state, np.concatenate([peaks, plotted_peaks(record)])
+            least = irregularity(peaks[-REPEATING:], 3)
+    except SimulationError:
+        return Observation("failed")
+    peaks = peaks[-REPEATING:] if least <= CLOSE else peaks[-effort.cycles :]
+    spread = irregularity(peaks, FEW)
+    shares = record.bounce_duration[record.bounce_duration > 0.0] / (0.5 * machine.cycle_period)
+    return Observation(
+        nature="periodic" if spread <= READING_ERROR else "chaotic",
+        irregularity=spread,
+        low=float(peaks.min()),
+        mean=float(peaks.mean()),
+        high=float(peaks.max()),
+        bounce_share=float(np.median(shares)) if len(shares) else 0.0,
     )

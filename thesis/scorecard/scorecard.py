@@ -5,20 +5,19 @@ left out of the ratio.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import with_settings
 from chaosgym.version import __version__
-from thesis.machines import MACHINES
-from thesis.scorecard.jobs import Job, run_jobs
+from thesis.machines import THESIS_MACHINES
+from thesis.scorecard.evaluation import evaluate
+from thesis.scorecard.firmness import Firmness, firmness_of
 from thesis.scorecard.observation import THOROUGH, Effort
-from thesis.scorecard.quantities import QUANTITIES
-from thesis.scorecard.verdicts import COUNTED, Judged, judge
-from thesis.statements import Comparison, read_comparisons
+from thesis.scorecard.verdicts import COUNTED, Judged
+from thesis.statements import read_comparisons
 
 
 @dataclass(frozen=True)
@@ -26,41 +25,52 @@ class Scorecard:
     """Every statement, judged."""
 
     judged: tuple[Judged, ...]
+    firmness: Mapping[str, Firmness] = field(default_factory=dict)
 
-    def totals(self) -> dict[str, dict[str, dict[str, int]]]:
-        """Return {machine: {group: {hit, near, miss, contradictory, total}, "all": ...}}.
+    def totals(self) -> dict[str, dict[str, Any]]:
+        """Return {machine: {"all": {hit, near, miss, contradictory, total}, "groups": {group: the same}, ...}}.
 
-        What is not computed counts in the total alone, so it is no hit.
+        Further "left_out": {hit, total} of statements whose figure a search did not see, "expected": hits to expect of
+        a neighbour, or None, and "exclusive": pairs of statements that exclude each other. What is not computed counts
+        in the total alone, so it is no hit.
         """
         found: dict[str, dict[str, Counter[str]]] = {}
         for one in self.judged:
             groups = found.setdefault(one.comparison.machine, {})
             for group in (one.comparison.group, "all"):
                 groups.setdefault(group, Counter())[one.verdict] += 1
+        return {machine: self._totals(machine, groups) for machine, groups in found.items()}
+
+    def _totals(self, machine: str, groups: Mapping[str, Counter[str]]) -> dict[str, Any]:
+        counts = {
+            group: {**{name: count[name] for name in COUNTED}, "total": count.total()}
+            for group, count in groups.items()
+        }
+        known = self.firmness.get(machine)
+        hits, total = known.left_out if known else (0, 0)
         return {
-            machine: {
-                group: {**{name: count[name] for name in COUNTED}, "total": count.total()}
-                for group, count in sorted(groups.items(), key=lambda item: item[0] == "all")
-            }
-            for machine, groups in found.items()
+            "all": counts.pop("all"),
+            "groups": counts,
+            "left_out": {"hit": hits, "total": total},
+            "expected": round(sum(known.neighbours.values()), 2) if known else None,
+            "exclusive": [list(pair) for pair in known.exclusive] if known else [],
         }
 
-    def hit_rate(self, machine: str, part: str | None = None) -> tuple[int, int]:
-        """Hits, and statements that count, of a machine; of one part of them if one is named."""
-        counted = [
-            one
-            for one in self.judged
-            if one.comparison.machine == machine
-            and one.verdict != "contradictory"
-            and part in (None, one.comparison.part)
-        ]
+    def share(self, one: Judged) -> float | None:
+        """Share of the machine's neighbours that hit a statement; None if it is not known."""
+        known = self.firmness.get(one.comparison.machine)
+        return known.neighbours.get(one.comparison.id) if known else None
+
+    def hit_rate(self, machine: str) -> tuple[int, int]:
+        """Hits, and statements that count, of a machine."""
+        counted = [one for one in self.judged if one.comparison.machine == machine and one.verdict != "contradictory"]
         return sum(one.verdict == "hit" for one in counted), len(counted)
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         return {
             "version": __version__,
-            "targets": [one.as_dict() for one in self.judged],
+            "targets": [{**one.as_dict(), "neighbours": self.share(one)} for one in self.judged],
             "totals": self.totals(),
         }
 
@@ -73,6 +83,7 @@ def scorecard(
     folder: Path | None = None,
     workers: int | None = None,
     progress: bool = False,
+    unprinted: Mapping[str, float] | None = None,
 ) -> Scorecard:
     """Judge every simulated statement of the thesis about some machines.
 
@@ -90,46 +101,20 @@ def scorecard(
         Number of threads; all processors by default.
     progress
         Show a progress bar on standard error.
+    unprinted
+        Conditions that are not in print, by name, in place of those of the table.
     """
-    wanted = set(MACHINES) if machines is None else set(machines)
+    wanted = set(THESIS_MACHINES) if machines is None else set(machines)
     comparisons = [one for one in read_comparisons().compared if one.machine in wanted]
-    made = {name: (bases or {}).get(name) or MACHINES[name] for name in wanted}
-    return Scorecard(
-        evaluate(
-            comparisons,
-            made,
-            efforts=efforts,
-            folder=folder,
-            workers=workers,
-            progress="scorecard" if progress else None,
-        )
+    made = {name: (bases or {}).get(name, THESIS_MACHINES[name]) for name in wanted}
+    judged = evaluate(
+        comparisons,
+        made,
+        efforts=efforts,
+        folder=folder,
+        workers=workers,
+        progress="scorecard" if progress else None,
+        unprinted=unprinted,
     )
-
-
-def evaluate(
-    comparisons: Sequence[Comparison],
-    bases: Mapping[str, Machine],
-    *,
-    efforts: Mapping[str, Effort],
-    folder: Path | None = None,
-    workers: int | None = None,
-    progress: str | None = None,
-) -> tuple[Judged, ...]:
-    """Judge some comparisons on given machines; see ``scorecard``."""
-    plans: list[list[tuple[Machine, list[Job]]]] = []
-    for one in comparisons:
-        machines = [] if one.not_computed else [with_settings(bases[one.machine], at) for at in one.at]
-        effort = efforts[one.machine]
-        plans.append([(machine, QUANTITIES[one.quantity].jobs(machine, one, effort)) for machine in machines])
-    jobs = [job for plan in plans for _, needed in plan for job in needed]
-    results = run_jobs(jobs, folder=folder, workers=workers, progress=progress)
-    return tuple(
-        judge(
-            one,
-            [
-                QUANTITIES[one.quantity].finding(machine, one, [results[job] for job in needed])
-                for machine, needed in plan
-            ],
-        )
-        for one, plan in zip(comparisons, plans, strict=True)
-    )
+    known = {name: firmness_of(machine) for name, machine in made.items()}
+    return Scorecard(judged, {name: one for name, one in known.items() if one is not None})

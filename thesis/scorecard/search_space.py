@@ -4,20 +4,26 @@ Printed and derived numbers stay: where one follows from the others (the static 
 frequency of the crank), it is solved for anew for every candidate.
 """
 
+import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import scipy.optimize
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, ImpactBeam, Machine, SliderCrank
 from chaosgym.machines.impact_beam.modes import static_tip_deflection
 from chaosgym.machines.slider_crank.parameters import frequencies_at
+from thesis.machines import BEAM, CRANK, ImpactBeam, Machine, SliderCrank
+from thesis.scorecard.quantities import lateral_mass
+from thesis.statements import read_comparisons
 
 STATIC_TIP_DEFLECTION = 3.175e-3
 """Tip deflection [m] under 8.9 N: a dimensionless clearance of 0.04 is 0.127 mm (thesis 3.5.1)."""
+
+SLIDER_SHARE = 0.3175
+"""Slider over lateral mass: +-0.254 mm is a dimensionless clearance of 0.016, so r m / M is 15.875 mm (4.5.1)."""
 
 FIRST_FREQUENCY = 75.6
 """First natural frequency [Hz] of the crank's rod at crank angle zero (thesis 4.5.5)."""
@@ -30,30 +36,43 @@ class Real:
     name: str
     low: float
     high: float
-    unit: str
+    unit: str = "-"
     log: bool = False
 
+    def share(self, value: float) -> float:
+        """Where a value lies in its range, 0 to 1; the nearer bound for one outside."""
+        if self.log:
+            found = math.log(value / self.low) / math.log(self.high / self.low)
+        else:
+            found = (value - self.low) / (self.high - self.low)
+        return min(max(found, 0.0), 1.0)
+
+    def at(self, share: float) -> float:
+        """Value at a share of the range."""
+        if self.log:
+            return float(self.low * (self.high / self.low) ** share)
+        return float(self.low + share * (self.high - self.low))
+
 
 @dataclass(frozen=True)
-class Whole:
-    """A whole number between two bounds, both included."""
+class Basin:
+    """One structure of a machine, and where its search begins.
+
+    ``fixed`` are the fields that make the structure, ``dimensions`` the numbers that are searched, from ``start`` on.
+    """
 
     name: str
-    low: int
-    high: int
-    unit: str = "-"
+    fixed: Mapping[str, Any]
+    dimensions: tuple[Real, ...]
+    start: Mapping[str, float]
 
+    def shares(self) -> list[float]:
+        """The start as shares of the ranges."""
+        return [one.share(self.start[one.name]) for one in self.dimensions]
 
-@dataclass(frozen=True)
-class Word:
-    """One of several words."""
-
-    name: str
-    choices: tuple[str, ...]
-    unit: str = "-"
-
-
-Dimension = Real | Whole | Word
+    def values(self, shares: Sequence[float]) -> dict[str, float]:
+        """Numbers by name, from shares of the ranges."""
+        return {one.name: one.at(float(share)) for one, share in zip(self.dimensions, shares, strict=True)}
 
 
 @dataclass(frozen=True)
@@ -64,25 +83,45 @@ class SearchSpace:
     ----------
     base : Machine
         Machine whose other fields stay.
-    dimensions
-        What is searched.
+    basins
+        Structures, each with a start.
     build
-        Machine from the base and one value for each dimension; raises ``ParameterError`` if there is none.
-    starts
-        Candidates to try first; the first one gives the present constants.
-    random_trials
-        Candidates before the estimator takes over from chance: fewer where a candidate costs more.
+        Machine from the base and the values of a candidate, fixed ones included; raises ``ParameterError`` if there is
+        none.
+    joint
+        Joint whose statements are followed; None for all.
     """
 
     base: Machine
-    dimensions: tuple[Dimension, ...]
+    basins: tuple[Basin, ...]
     build: Callable[[Any, Mapping[str, Any]], Machine]
-    starts: tuple[Mapping[str, Any], ...]
-    random_trials: int
+    joint: str | None = None
 
-    def machine(self, values: Mapping[str, Any]) -> Machine:
+    def machine(self, basin: Basin, shares: Sequence[float]) -> Machine:
         """Build the machine of one candidate."""
-        return self.build(self.base, values)
+        values = {**basin.fixed, **basin.values(shares)}
+        return self.build(self.base, {name: value for name, value in values.items() if name not in self.unprinted})
+
+    def conditions(self, basin: Basin, shares: Sequence[float]) -> dict[str, float]:
+        """Conditions that are not in print, as the candidate has them."""
+        return {name: value for name, value in basin.values(shares).items() if name in self.unprinted}
+
+    def from_the_middle(self) -> "SearchSpace":
+        """Return the space with every structure once, its search beginning in the middle of the ranges.
+
+        The starts come from fits to all statements; a search that must not know some of them may not use them.
+        """
+        seen: dict[str, Basin] = {}
+        for one in self.basins:
+            structure = json.dumps([dict(one.fixed), [each.name for each in one.dimensions]], sort_keys=True)
+            middle = {each.name: each.at(0.5) for each in one.dimensions}
+            seen.setdefault(structure, replace(one, start=middle))
+        return replace(self, basins=tuple(seen.values()))
+
+    @property
+    def unprinted(self) -> frozenset[str]:
+        """Names of conditions that are not in print."""
+        return frozenset(read_comparisons().unprinted)
 
 
 def with_printed_deflection(beam: ImpactBeam) -> ImpactBeam:
@@ -138,115 +177,119 @@ def _beam(base: ImpactBeam, values: Mapping[str, Any]) -> Machine:
 
 
 def _crank(base: SliderCrank, values: Mapping[str, Any]) -> Machine:
-    fields = {name: value for name, value in values.items() if name != "inertia_ratio"}
-    offsets = {f"{body}_inertia": 1.0 for body in ("housing", "yoke")}
-    return with_printed_frequency(replace(base, **{**fields, **offsets}), values["inertia_ratio"])
+    """The crank of a candidate: end inertias by the first frequency, masses by the printed dimensionless clearance."""
+    fields = dict(values)
+    ratio, lateral = fields.pop("inertia_ratio"), fields.pop("lateral_mass")
+    slider, offset = SLIDER_SHARE * lateral, fields.get("slider_offset_across", 0.0)
+    plain = {"housing_inertia": 1.0, "yoke_inertia": 1.0, "slider_mass": slider}
+    block = base.slider_pitch_inertia + slider * offset**2
+    crank = with_printed_frequency(replace(base, **{**fields, **plain}, slider_pitch_inertia=block), ratio)
+    without = lateral_mass(replace(crank, yoke_mass=0.0))
+    yoke = (lateral - without) / (1.0 + 2.0 * crank.yoke_offset_along / crank.rod_length)
+    return replace(crank, yoke_mass=yoke)
 
 
-_BEAM_FIELDS = (
-    Real("width", 12e-3, 26e-3, "m"),
-    Real("force_position", 0.12, 0.22, "m"),
-    Real("shaker_mass", 0.0, 0.3, "kg"),
+BEAM_FIELDS = (
+    Real("width", 8e-3, 32e-3, "m"),
+    Real("force_position", 0.12, 0.24, "m"),
     Real("shaker_damping", 5.0, 120.0, "N s/m", log=True),
-    Real("pivot_translational_stiffness", 1e6, 1e9, "N/m", log=True),
-    Word("damping_family", ("uniform", "stiffness")),
-    Whole("n_modes", 4, 8),
+    Real("shaker_stiffness", 50.0, 3000.0, "N/m", log=True),
+    Real("pivot_translational_stiffness", 2e4, 1e9, "N/m", log=True),
 )
 
-_CRANK_FIELDS = (
-    Real("slider_mass", 0.10, 0.35, "kg"),
-    Real("yoke_mass", 0.05, 0.30, "kg"),
-    Real("housing_mass", 0.15, 0.60, "kg"),
-    Real("housing_offset_along", -0.010, 0.035, "m"),
+_MASS = Real("shaker_mass", 0.0, 0.3, "kg")
+
+CRANK_FIELDS = (
+    Real("contact_stiffness", 8e6, 4e7, "N/m", log=True),
+    Real("lateral_mass", 0.4, 0.9, "kg"),
+    Real("housing_offset_along", -0.03, 0.03, "m"),
     Real("yoke_offset_along", -0.040, 0.030, "m"),
     Real("inertia_ratio", 0.25, 4.0, "-", log=True),
-    Real("damping_ratio", 5e-4, 0.06, "-", log=True),
-    Word("damping_family", ("uniform", "stiffness")),
-    Whole("n_modes", 2, 6),
-    Word("geometric_stiffness", ("off", "on")),
+    Real("damping_ratio", 1e-3, 0.06, "-", log=True),
+    Real("damping_exponent", 0.0, 2.0),
+    Real("contact_damping_mass", 0.2, 20.0, "kg", log=True),
+    Real("damping_of_section_4_4", 0.005, 0.05, "-", log=True),
 )
 
+_PITCH = (Real("slider_offset_across", 0.02, 0.07, "m"), Real("sensor_distance", 0.03, 0.05, "m"))
 
-def _present(machine: Machine, dimensions: tuple[Dimension, ...]) -> dict[str, Any]:
-    return {one.name: getattr(machine, one.name) for one in dimensions if hasattr(machine, one.name)}
+_MADE_OF_PARTS: Mapping[str, Any] = {"reduction": "interfaces", "damping_family": "beam", "shaker_mass": 0.0}
+_TILTING: Mapping[str, Any] = {"slider_joint": "instrumented", "gravity": 9.81}
+_POWER: Mapping[str, Any] = {"damping_family": "power", "housing_mass": 0.16}
+
+
+def _numbers(fields: tuple[Real, ...], *values: float) -> dict[str, float]:
+    return {one.name: value for one, value in zip(fields, values, strict=True)}
 
 
 SEARCH_SPACES: Mapping[str, SearchSpace] = {
     ImpactBeam.name: SearchSpace(
-        THESIS_IMPACT_BEAM,
-        _BEAM_FIELDS,
-        _beam,
+        BEAM,
         (
-            _present(THESIS_IMPACT_BEAM, _BEAM_FIELDS),
-            {
-                "width": 17.71e-3,
-                "force_position": 0.1969,
-                "shaker_mass": 0.111,
-                "shaker_damping": 30.4,
-                "pivot_translational_stiffness": 9.7e7,
-                "damping_family": "stiffness",
-                "n_modes": 5,
-            },
-            {
-                "width": 12.7e-3,
-                "force_position": 0.160,
-                "shaker_mass": 0.195,
-                "shaker_damping": 11.3,
-                "pivot_translational_stiffness": 3.6e7,
-                "damping_family": "stiffness",
-                "n_modes": 7,
-            },
-            {
-                "width": 25.4e-3,
-                "force_position": 0.209,
-                "shaker_mass": 0.1,
-                "shaker_damping": 30.0,
-                "pivot_translational_stiffness": 1e8,
-                "damping_family": "uniform",
-                "n_modes": 5,
-            },
-            {
-                "width": 0.0210043483,
-                "force_position": 0.2010367187,
-                "shaker_mass": 0.1016893242,
-                "shaker_damping": 43.65022747,
-                "pivot_translational_stiffness": 36299594.42,
-                "damping_family": "stiffness",
-                "n_modes": 5,
-            },
+            Basin(
+                "interfaces, wide",
+                _MADE_OF_PARTS,
+                BEAM_FIELDS,
+                _numbers(BEAM_FIELDS, 0.0288756, 0.2141664, 36.92865, 242.6488, 1.98941e7),
+            ),
+            Basin(
+                "interfaces, narrow",
+                _MADE_OF_PARTS,
+                BEAM_FIELDS,
+                _numbers(BEAM_FIELDS, 0.01312045, 0.1615463, 16.41517, 122.99, 4.09267e7),
+            ),
+            Basin(
+                "interfaces, soft pivot",
+                _MADE_OF_PARTS,
+                BEAM_FIELDS,
+                _numbers(BEAM_FIELDS, 0.0150, 0.2100, 15.0, 200.0, 1.1e5),
+            ),
+            Basin(
+                "free modes, soft pivot",
+                {"shaker_mass": 0.0},
+                BEAM_FIELDS,
+                _numbers(BEAM_FIELDS, 0.010170, 0.226429, 11.8522, 143.351, 1.08320e5),
+            ),
+            Basin(
+                "free modes, moving mass",
+                {},
+                (*BEAM_FIELDS, _MASS),
+                _numbers((*BEAM_FIELDS, _MASS), 0.01758, 0.1809, 22.5, 510.0, 9.7e7, 0.089),
+            ),
         ),
-        60,
+        _beam,
     ),
     SliderCrank.name: SearchSpace(
-        THESIS_SLIDER_CRANK,
-        _CRANK_FIELDS,
-        _crank,
+        CRANK,
         (
-            {
-                **_present(THESIS_SLIDER_CRANK, _CRANK_FIELDS),
-                "inertia_ratio": THESIS_SLIDER_CRANK.yoke_inertia / THESIS_SLIDER_CRANK.housing_inertia,
-            },
-            {
-                **_present(THESIS_SLIDER_CRANK, _CRANK_FIELDS),
-                "slider_mass": 0.12,
-                "yoke_mass": 0.26,
-                "yoke_offset_along": 0.02,
-                "inertia_ratio": 1.8,
-            },
-            {
-                "slider_mass": 0.118758,
-                "yoke_mass": 0.244289,
-                "housing_mass": 0.545084,
-                "housing_offset_along": 0.0101523,
-                "yoke_offset_along": 0.0114435,
-                "inertia_ratio": 1.98658,
-                "damping_ratio": 0.0430875,
-                "damping_family": "stiffness",
-                "n_modes": 4,
-                "geometric_stiffness": "off",
-            },
+            Basin(
+                "weightless, bouncing decides",
+                _POWER,
+                CRANK_FIELDS,
+                _numbers(
+                    CRANK_FIELDS, 1.4865e7, 0.6, -0.010736, 0.017667, 0.96226, 0.012488, 1.28105, 8.10882, 0.01485
+                ),
+            ),
+            Basin(
+                "weightless, softer rod",
+                _POWER,
+                CRANK_FIELDS,
+                _numbers(
+                    CRANK_FIELDS, 1.55171e7, 0.564, -0.01355, 0.018438, 1.035287, 0.010768, 1.32567, 6.90793, 0.015223
+                ),
+            ),
+            Basin(
+                "under gravity, tilting slider",
+                {**_POWER, **_TILTING},
+                (*CRANK_FIELDS, *_PITCH),
+                _numbers(
+                    (*CRANK_FIELDS, *_PITCH),
+                    *(2.98e7, 0.50, 0.0, 0.0, 1.0, 0.0032, 1.0, 2.0, 0.015, 0.0505, 0.043),
+                ),
+            ),
         ),
-        20,
+        _crank,
+        "slider",
     ),
 }
-"""By machine. Ranges and candidates: algebra on printed numbers, and fits that preceded this one."""
+"""By machine. Ranges and starts: algebra on printed numbers, and fits that preceded this one."""

@@ -40,6 +40,7 @@ class Judged(NamedTuple):
             "tolerance": allowed(self.comparison),
             "verdict": self.verdict,
             "reason": self.reason,
+            "reading": self.comparison.reading,
         }
 
     @property

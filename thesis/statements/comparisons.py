@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from chaosgym.errors import DatasetError
 from thesis.statements.statements import SYSTEMS, Statement, read_statements
-
-Part = Literal["calibration", "held-out"]
 
 Printed = float | str | tuple[float, float]
 """A number, a word, or both ends of a range."""
@@ -50,7 +48,7 @@ class Axis(NamedTuple):
     def values(self) -> tuple[float, ...]:
         """Values of the field, in SI or the field's own unit."""
         count = round((self.high - self.low) / self.step) + 1
-        return tuple(float(value) for value in np.linspace(self.low, self.high, count))
+        return tuple(round(float(value), 12) for value in np.linspace(self.low, self.high, count))
 
 
 @dataclass(frozen=True)
@@ -65,8 +63,6 @@ class Comparison:
         Name of the machine.
     group
         Kind of statement, for the totals.
-    part
-        "calibration" if a calibration may see it, "held-out" if not.
     quantity
         Name of what is computed.
     printed
@@ -74,11 +70,14 @@ class Comparison:
     tolerance
         How far it may be off.
     at
-        Operating conditions: fields of the machine, one mapping for each run or curve.
+        Operating conditions: fields of the machine, one mapping for each run or curve. A value may be the name of a
+        condition that is not in print, ``{"unprinted": name}``.
     along, across
         Axes of a curve or map; None for single runs.
     contradictory
         What the text itself says against it; empty if nothing.
+    reading
+        Where it can be read in several ways: the words of the thesis, and what was decided; empty elsewhere.
     not_computed
         Why it can't be computed here; empty if it is.
     unit
@@ -88,7 +87,6 @@ class Comparison:
     statement: Statement
     machine: str
     group: str
-    part: Part
     quantity: str
     printed: Printed
     tolerance: Tolerance
@@ -98,6 +96,7 @@ class Comparison:
     contradictory: str
     not_computed: str
     unit: str
+    reading: str
 
     @property
     def id(self) -> str:
@@ -110,11 +109,19 @@ class Comparison:
         return "-" if isinstance(self.printed, str) else self.unit
 
 
+class Condition(NamedTuple):
+    """An operating condition that is not in print but the same for several statements: its value, and why it."""
+
+    value: float
+    reason: str
+
+
 class Comparisons(NamedTuple):
-    """Statements that are compared, and why the others about simulations are not: {id: reason}."""
+    """Statements that are compared; why the others about simulations are not, {id: reason}; what is not in print."""
 
     compared: tuple[Comparison, ...]
     out: Mapping[str, str]
+    unprinted: Mapping[str, Condition]
 
 
 @cache
@@ -138,6 +145,7 @@ def parse_comparisons(text: str, statements: Mapping[str, Statement]) -> Compari
         raise DatasetError(f"the table of comparisons is damaged: {error}") from error
     tolerances = {name: _tolerance(name, entry) for name, entry in table.pop("tolerances", {}).items()}
     out: dict[str, str] = table.pop("out", {})
+    unprinted = {name: Condition(**entry) for name, entry in table.pop("unprinted", {}).items()}
     for name in (*table, *out):
         if name not in statements:
             raise DatasetError(f"{name} is no statement of the thesis")
@@ -146,7 +154,20 @@ def parse_comparisons(text: str, statements: Mapping[str, Statement]) -> Compari
         simulated = not {"simulation", "criterion"}.isdisjoint(statement.kinds)
         if simulated and (statement.id in table) == (statement.id in out):
             raise DatasetError(f"{statement.id} must be either compared or left out with a reason")
-    return Comparisons(compared, MappingProxyType(out))
+    for one in compared:
+        for name in _names(one.at):
+            if name not in unprinted:
+                raise DatasetError(f"{one.id}: unprinted = {name!r} is not one of {', '.join(unprinted)}")
+    return Comparisons(compared, MappingProxyType(out), MappingProxyType(unprinted))
+
+
+def _names(at: tuple[Mapping[str, Any], ...]) -> list[str]:
+    return [value["unprinted"] for one in at for value in one.values() if isinstance(value, Mapping)]
+
+
+def conditions(at: Mapping[str, Any], unprinted: Mapping[str, float]) -> dict[str, Any]:
+    """Operating conditions with the names of those that are not in print replaced by values."""
+    return {name: unprinted[v["unprinted"]] if isinstance(v, Mapping) else v for name, v in at.items()}
 
 
 def _tolerance(name: str, entry: Mapping[str, Any]) -> Tolerance:
@@ -156,8 +177,8 @@ def _tolerance(name: str, entry: Mapping[str, Any]) -> Tolerance:
     return Tolerance(name=name, **entry)
 
 
-_REQUIRED = frozenset({"group", "part", "quantity", "tolerance", "at"})
-_OPTIONAL = frozenset({"printed", "along", "across", "contradictory", "not_computed", "unit"})
+_REQUIRED = frozenset({"group", "quantity", "tolerance", "at"})
+_OPTIONAL = frozenset({"printed", "along", "across", "contradictory", "not_computed", "unit", "reading"})
 
 
 def _comparison(statement: Statement, entry: Mapping[str, Any], tolerances: Mapping[str, Tolerance]) -> Comparison:
@@ -167,15 +188,12 @@ def _comparison(statement: Statement, entry: Mapping[str, Any], tolerances: Mapp
     machine = SYSTEMS[statement.system]
     if machine is None:
         raise DatasetError(f"{statement.id} speaks of both machines and can't be compared")
-    if entry["part"] not in ("calibration", "held-out"):
-        raise DatasetError(f"{statement.id}: part = {entry['part']!r} is not one of calibration, held-out")
     if entry["tolerance"] not in tolerances:
         raise DatasetError(f"{statement.id}: tolerance = {entry['tolerance']!r} is not one of {', '.join(tolerances)}")
     return Comparison(
         statement=statement,
         machine=machine,
         group=entry["group"],
-        part=entry["part"],
         quantity=entry["quantity"],
         printed=_printed(statement, entry),
         tolerance=tolerances[entry["tolerance"]],
@@ -185,6 +203,7 @@ def _comparison(statement: Statement, entry: Mapping[str, Any], tolerances: Mapp
         contradictory=entry.get("contradictory", ""),
         not_computed=entry.get("not_computed", ""),
         unit=entry.get("unit", statement.unit),
+        reading=entry.get("reading", ""),
     )
 
 

@@ -1,0 +1,186 @@
+"""How firm each verdict is: the share of neighbours that hit, statements that exclude each other, and figures left out.
+
+A neighbour is the machine with every fitted or assumed constant up to 1 % off, run at speeds up to half a step of the
+printed grid off, from another initial state. A statement that few neighbours hit is luck, in either direction.
+Neighbours are judged by hasty runs. The numbers are kept in ``firmness.json``, which names the machine they hold for:
+``python -m thesis firmness`` writes it anew.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from chaosgym.errors import DatasetError, ParameterError
+from chaosgym.files import write_atomically
+from chaosgym.machines import Machine
+from chaosgym.machines.parameters import parameters_of
+from thesis.scorecard.evaluation import evaluate
+from thesis.scorecard.objective import HASTENED, statements_of
+from thesis.scorecard.observation import QUICK
+from thesis.statements import Comparison
+from thesis.statements.comparisons import Axis
+
+KEPT = Path(__file__).with_name("firmness.json")
+
+NUDGE = 0.01
+"""Largest relative change of a constant."""
+
+GRID = {"impact-beam": 1.0, "slider-crank": 10.0}
+"""Steps of the thesis' sweeps over the speed [Hz, rpm] (3.5.1, 4.5.1)."""
+
+RARE, EXPECTED = 0.25, 8.0
+"""Statements exclude each other if less than this share of the expected number of candidates, at least so many, hit
+both."""
+
+
+@dataclass(frozen=True)
+class Firmness:
+    """How firm the verdicts on one machine are.
+
+    Attributes
+    ----------
+    neighbours
+        Share of the neighbours that hit, by statement.
+    count
+        Number of neighbours.
+    exclusive
+        Pairs of statements that no candidate of the search hit together, or hardly any.
+    left_out
+        Hits and number of those statements whose figure a search of its own did not see; 0 of 0 without such searches.
+    """
+
+    neighbours: Mapping[str, float]
+    count: int
+    exclusive: tuple[tuple[str, str], ...] = ()
+    left_out: tuple[int, int] = (0, 0)
+
+
+def fingerprint(machine: Machine) -> str:
+    """Hash of the constants of a machine."""
+    fields = {name: getattr(machine, name) for name in parameters_of(machine)}
+    return hashlib.sha256(json.dumps(fields, sort_keys=True).encode()).hexdigest()[:16]
+
+
+@cache
+def _kept() -> Mapping[str, Any]:
+    found: Mapping[str, Any] = json.loads(KEPT.read_text()) if KEPT.is_file() else {}
+    return found
+
+
+def firmness_of(machine: Machine) -> Firmness | None:
+    """What is known of a machine; None if it was never asked, or for other constants."""
+    entry = _kept().get(machine.name)
+    if entry is None or entry["machine"] != fingerprint(machine):
+        return None
+    pairs = tuple((one, other) for one, other in entry["exclusive"])
+    return Firmness(entry["neighbours"], entry["count"], pairs, tuple(entry["left_out"]))
+
+
+def keep(machine: Machine, found: Firmness) -> None:
+    """Write what was found into ``firmness.json``."""
+    entry = {
+        "machine": fingerprint(machine),
+        "count": found.count,
+        "neighbours": {name: round(share, 3) for name, share in found.neighbours.items()},
+        "exclusive": [list(pair) for pair in found.exclusive],
+        "left_out": list(found.left_out),
+    }
+    text = json.dumps({**_kept(), machine.name: entry}, indent=1, sort_keys=True) + "\n"
+    write_atomically(KEPT, lambda temporary: temporary.write_text(text))
+    _kept.cache_clear()
+
+
+def neighbour_shares(
+    machine: Machine, count: int, *, seed: int = 0, workers: int | None = None, progress: bool = False
+) -> dict[str, float]:
+    """Share of the neighbours of a machine that hit each statement; contradictory ones are left out."""
+    asked = statements_of(machine.name)
+    hits = {one.id: 0 for one in asked}
+    effort = QUICK[machine.name]
+    for k in tqdm(range(count), desc="neighbours", disable=not progress, unit="machine"):
+        rng = np.random.default_rng((seed, k))
+        nearby = nudged(machine, rng)
+        shift = float(rng.uniform(-0.5, 0.5)) * GRID[machine.name]
+        moved = [shifted(one, machine.speed_field, shift) for one in asked]
+        efforts = {machine.name: effort._replace(start=1 + k)}
+        judged = evaluate(moved, {machine.name: nearby}, efforts=efforts, workers=workers)
+        for one in judged:
+            hits[one.comparison.id] += one.verdict == "hit"
+    return {name: hit / count for name, hit in hits.items()}
+
+
+def nudged(machine: Machine, rng: np.random.Generator) -> Machine:
+    """The machine with every constant that is not in print up to 1 % off."""
+    described = parameters_of(machine)
+    while True:
+        factors = {
+            name: getattr(machine, name) * (1.0 + NUDGE * rng.uniform(-1.0, 1.0))
+            for name, about in described.items()
+            if about.provenance in ("calibrated", "assumed") and isinstance(getattr(machine, name), float)
+        }
+        factors.pop("matrix_update_interval", None)
+        try:
+            return replace(machine, **factors, **HASTENED.get(machine.name, {}))
+        except ParameterError:  # an inertia just below what its offset mass requires
+            continue
+
+
+def shifted(one: Comparison, field: str, shift: float) -> Comparison:
+    """The statement at speeds that are shifted, where it has any."""
+    at = tuple({**here, field: here[field] + shift} if field in here else here for here in one.at)
+    return replace(one, at=at, along=_moved(one.along, field, shift), across=_moved(one.across, field, shift))
+
+
+def _moved(axis: Axis | None, field: str, shift: float) -> Axis | None:
+    if axis is None or axis.field != field:
+        return axis
+    return axis._replace(low=axis.low + shift, high=axis.high + shift)
+
+
+def exclusive_pairs(costs: Sequence[Mapping[str, float]]) -> tuple[tuple[str, str], ...]:
+    """Pairs of statements that candidates of a search hit together much less often than by chance.
+
+    Parameters
+    ----------
+    costs
+        Of candidates that were judged on every statement; below a half it is hit.
+    """
+    if not costs:
+        return ()
+    names = sorted(set.intersection(*(set(one) for one in costs)))
+    hit = np.array([[one[name] < 0.5 for name in names] for one in costs], dtype=float)
+    together, share = hit.T @ hit, hit.mean(axis=0)
+    expected = len(costs) * np.outer(share, share)
+    return tuple(
+        (names[i], names[j])
+        for i in range(len(names))
+        for j in range(i + 1, len(names))
+        if expected[i, j] >= EXPECTED and together[i, j] <= RARE * expected[i, j]
+    )
+
+
+def left_out_hits(results: Sequence[Path]) -> tuple[int, int]:
+    """Hits and number of the statements of figures that searches were not shown, from those searches' results.
+
+    Raises
+    ------
+    DatasetError
+        If a folder holds no finished search, or one that saw everything.
+    """
+    hits, total = 0, 0
+    for folder in results:
+        try:
+            found = json.loads((folder / "result.json").read_text())
+        except (OSError, ValueError) as error:
+            raise DatasetError(f"{folder} holds no finished search with figures left out") from error
+        unseen = [one for one in found["residuals"] if one["id"] in found["left_out"]]
+        hits += sum(one["verdict"] == "hit" for one in unseen)
+        total += len(unseen)
+    return hits, total
