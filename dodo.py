@@ -86,18 +86,28 @@ def task_page():
     yield task("environments", sources("src/chaosgym/envs"), pages, made)
     statements = [str(path) for path in Path("thesis/statements").iterdir() if path.suffix in (".csv", ".toml")]
     statements.append("thesis/scorecard/firmness.json")
-    write = "python -m thesis scorecard --markdown > docs/scorecard.md"
-    yield task("scorecard", [*statements, *sources("thesis/scorecard")], ["docs/scorecard.md"], write)
-    options = f"--out docs/figures --gallery docs/figures.md --overwrite --results {RUNS}/figures"
-    draw = f"python -m thesis figures all {options}"
-    yield task("figures", sources("thesis/figures"), ["docs/figures.md"], draw)
+    write = "python -m thesis scorecard --markdown > docs/development/scorecard.md"
+    yield task("scorecard", [*statements, *sources("thesis/scorecard")], ["docs/development/scorecard.md"], write)
+    options = f"--gallery docs/development/figures.md --overwrite --results {RUNS}/figures"
+    draw = f"python -m thesis figures all --out docs/development/figures {options}"
+    examples = "benchmarks/documentation/examples.toml"
+    pages = [str(path) for path in Path("docs/commands").glob("*.md")]
+    write = "python -m benchmarks.documentation.commands docs/commands"
+    yield task("commands", [examples, *sources("src/chaosgym/cli")], pages, write)
+    for script in sorted(Path("docs/tutorials").glob("*.py")):
+        run = f"python -m benchmarks.documentation.tutorials docs/tutorials {script.name}"
+        yield task(script.stem, [str(script)], [str(script.with_suffix(".ipynb"))], run)
+    yield task("figures", sources("thesis/figures"), ["docs/development/figures.md"], draw)
 
 
 def task_picture():
-    """Pictures of the trade-off and of the extremes."""
+    """Pictures of the rattling beam, of the trade-off and of the extremes."""
+    rattle = "benchmarks/documentation/rattle.py"
+    yield task("rattle", [rattle], ["docs/rattle.gif"], "python -m benchmarks.documentation.rattle docs/rattle.gif")
     for machine in SWEEPS:
         for kind, options in (("tradeoff", LADDER_OPTIONS), ("stability", "")):
-            made, run = f"docs/{kind}-{machine}.png", f"{RUNS}/{kind}-{machine}"
+            folder = "docs/development" if kind == "stability" else "docs"
+            made, run = f"{folder}/{kind}-{machine}.png", f"{RUNS}/{kind}-{machine}"
             measure = f"chaosgym {kind} {machine} {options} --out {run}"
             copy = f"cp {run}/{kind}.png {made}"
             yield task(f"{kind}-{machine}", sources("src/chaosgym/fidelity"), [made], f"mkdir -p {run}", measure, copy)

@@ -32,7 +32,7 @@ def test_parameter_table_is_current(name):
 
 def test_scorecard_page_lists_every_statement():
     """Each comparison has its row and each statement left out its reason."""
-    page = (DOCS / "scorecard.md").read_text()
+    page = (DOCS / "development" / "scorecard.md").read_text()
     known = read_comparisons()
     for one in known.compared:
         assert re.search(rf"^\| {one.id} \|.*$", page, re.MULTILINE) is not None, one.id
@@ -43,7 +43,7 @@ def test_scorecard_page_lists_every_statement():
 
 def test_scorecard_page_shows_what_the_machines_do():
     """Rows of periodic responses and of the machines' own numbers, computed again, are those of the page."""
-    page = (DOCS / "scorecard.md").read_text().splitlines()
+    page = (DOCS / "development" / "scorecard.md").read_text().splitlines()
     cheap = (
         "IBS-013",
         "IBS-016",
@@ -68,7 +68,7 @@ def test_scorecard_page_shows_what_the_machines_do():
 
 def test_hits_are_those_of_the_rows():
     """Totals of the page count its rows, and the README repeats them."""
-    page, readme = (DOCS / "scorecard.md").read_text(), (DOCS.parent / "README.md").read_text()
+    page, readme = (DOCS / "development" / "scorecard.md").read_text(), (DOCS.parent / "README.md").read_text()
     told = []
     for name, letters in (("impact-beam", "IBS"), ("slider-crank", "SSC")):
         verdicts = re.findall(rf"^\| {letters}-\d+ \|(?:[^|]*\|){{4}} (\S+) \| (?:-|\d+%) \|", page, re.MULTILINE)

@@ -74,9 +74,10 @@ def test_editing_a_kernel_source_changes_the_digest(tmp_path):
 
 @pytest.mark.slow
 def test_wheel_alone_classifies_and_simulates(tmp_path):
-    """The built wheel, installed with its base dependencies into a fresh environment, classifies and simulates."""
-    subprocess.run([sys.executable, "-m", "build", "--wheel", "--outdir", str(tmp_path), str(ROOT)], check=True)
-    (wheel,) = tmp_path.glob("chaosgym-*.whl")
+    """Wheel and source pass ``twine check``; the wheel alone, in a fresh environment, classifies and simulates."""
+    subprocess.run([sys.executable, "-m", "build", "--outdir", str(tmp_path), str(ROOT)], check=True)
+    (wheel,), (source,) = tmp_path.glob("chaosgym-*.whl"), tmp_path.glob("chaosgym-*.tar.gz")
+    subprocess.run([sys.executable, "-m", "twine", "check", "--strict", str(wheel), str(source)], check=True)
     names = zipfile.ZipFile(wheel).namelist()
     assert "chaosgym/py.typed" in names
     assert {"chaosgym/weights/impact-beam.npz", "chaosgym/weights/slider-crank.npz"} <= set(names)
@@ -93,3 +94,15 @@ def test_wheel_alone_classifies_and_simulates(tmp_path):
             cwd=tmp_path,
         )
         assert json.loads(done.stdout)[key]
+
+
+def test_version_is_said_once():
+    """The citation and the latest section of the changelog name the package's version."""
+    import chaosgym
+
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {chaosgym.__version__}\n" in citation
+    latest = next(
+        line for line in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").splitlines() if line[:3] == "## "
+    )
+    assert latest.split()[1] in (chaosgym.__version__, "Unreleased")

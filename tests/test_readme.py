@@ -37,3 +37,23 @@ def test_commands_exist():
         assert given <= (machine if "--set" in known else known), line
         checked += 1
     assert checked > 4
+
+
+def sentences(markdown):
+    """Sentences of the running text: no code, tables, headings, pictures or comments."""
+    text = re.sub(r"```.*?```|<!--.*?-->|!\[[^\]]*\]\([^)]*\)", "\n\n", markdown, flags=re.DOTALL)
+    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
+    lines = ["" if line.startswith(("|", "#")) else re.sub(r"^- ", "\n", line) for line in text.splitlines()]
+    paragraphs = re.split(r"\n\s*\n", "\n".join(lines))
+    return [
+        one for part in paragraphs for one in re.split(r"(?<=[.!?])(?<!\b[A-Z]\.)\s+", " ".join(part.split())) if one
+    ]
+
+
+def test_the_readme_is_short():
+    """At most 700 words and two pictures; sentences of at most 30 words, half of them of at most 15."""
+    lengths = sorted(len(sentence.split()) for sentence in sentences(README))
+    assert len([word for word in README.split() if re.search(r"\w", word)]) <= 700  # table rules are no words
+    assert README.count("![") == 2
+    assert lengths[-1] <= 30
+    assert lengths[len(lengths) // 2] <= 15

@@ -117,7 +117,7 @@ def chaotic():
 @pytest.mark.slow
 def test_worked_example_of_the_documentation(chaotic):
     """What the page prints is what the command gives, within what chaos leaves open between computers."""
-    page = (DOCUMENTATION / "design.md").read_text()
+    page = (DOCUMENTATION / "commands" / "design.md").read_text()
     shown, given = (
         {name: float(value) for name, value in re.findall(r"  (fatigue life|reliability|load rating) +([\d.]+)", text)}
         for text in (page, "\n".join(chaotic.lines()))

@@ -24,7 +24,7 @@ P. Gu, *Chaotic Vibration in Machine Systems and Its Implications for Design*, P
 figures are not available; axes and ranges follow the text, and everything that the text prints about a figure is drawn
 over it in one colour and compared with the machine here. Written by
 
-    python -m thesis figures all --out FOLDER --gallery docs/figures.md
+    python -m thesis figures all --out FOLDER --gallery docs/development/figures.md
 
 which draws every figure (`python -m thesis figures --list` names them) and keeps what it computed in `FOLDER/results`.
 Numbers

@@ -1,0 +1,159 @@
+"""What does each command print? A page a command: examples with their real output, and its options.
+
+python -m benchmarks.documentation.commands docs/commands [NAME ...]
+
+With --options in place of names no example runs: only options and summaries become those of today.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import click
+
+from chaosgym.cli import COMMANDS, app
+from chaosgym.files import write_atomically
+
+ROOT = Path(__file__).parents[2]
+
+EXAMPLES: dict[str, list[dict[str, Any]]] = tomllib.loads(Path(__file__).with_name("examples.toml").read_text("utf-8"))
+"""What each page shows, by the name of the command."""
+
+LONGEST = 60
+"""Lines of an output that a page shows."""
+
+PICTURES = (".png", ".gif", ".webp")
+
+
+def summary(name: str) -> str:
+    """Return what a command does, in its own words."""
+    command = _command(name)
+    return " ".join((command.help or "").split("\n\n")[0].split())
+
+
+def options(name: str) -> str:
+    """Return the help of a command and of those below it, as a terminal of 100 columns shows it."""
+    command = _command(name)
+    texts = [_help(command, f"chaosgym {name}")]
+    if isinstance(command, click.Group):
+        texts += [_help(below, f"chaosgym {name} {inner}") for inner, below in sorted(command.commands.items())]
+    return "\n\n".join(texts)
+
+
+def index() -> str:
+    """Return the page that lists all commands."""
+    rows = [f"| [chaosgym {name}]({name}.md) | {summary(name)} |" for name in COMMANDS]
+    return "\n".join(
+        [
+            "# Commands",
+            "",
+            "A command prints lines for people, or one JSON object with `--json`. Only `dataset card` and",
+            "`dataset map`, which write a file, have no `--json`. Progress goes to standard error.",
+            "",
+            "Exit codes: 0 done, 1 a computation failed, 2 wrong usage, 130 stopped by Ctrl-C.",
+            "",
+            "| command | what it does |",
+            "|---|---|",
+            *rows,
+            "",
+        ]
+    )
+
+
+def page(name: str, outputs: list[str]) -> str:
+    """Return the page of a command, given what its examples printed."""
+    parts = [f"# chaosgym {name}", summary(name)]
+    for example, output in zip(EXAMPLES.get(name, []), outputs, strict=True):
+        parts += [f"## {example['what'].rstrip('.')}", f"```console\n$ {example['run']}\n{output}```"]
+        parts += [f"![{example['what']}]({name}-{picture})" for picture in _pictures(example["run"])]
+    return "\n\n".join([*parts, _last_part(name)])
+
+
+def renewed(name: str, text: str) -> str:
+    """Return a page with its outputs as they stand, and what the command says of itself today."""
+    _, *examples, _ = text.split("\n\n## ")
+    return "\n\n".join([f"# chaosgym {name}", summary(name), *(f"## {part}" for part in examples), _last_part(name)])
+
+
+def outputs_of(name: str, folder: Path, chosen: Collection[int] | None = None) -> list[str]:
+    """Return what the examples of a command, or some of them by number, print when they run in an empty folder."""
+    (folder / "docs").mkdir()
+    for source in ("docs/data", "datasets"):
+        (folder / source).symlink_to(ROOT / source)
+    found = []
+    for number, example in enumerate(EXAMPLES.get(name, [])):
+        if chosen is not None and number not in chosen:
+            continue
+        if "before" in example:
+            _run(example["before"], folder)
+        found.append(_run(example["run"], folder))
+    return found
+
+
+def write_page(name: str, folder: Path) -> None:
+    """Run the examples of a command, and write its page and its pictures."""
+    with tempfile.TemporaryDirectory() as place:
+        outputs = outputs_of(name, Path(place))
+        for example in EXAMPLES.get(name, []):
+            for picture in _pictures(example["run"]):
+                shutil.copyfile(Path(place) / picture, folder / f"{name}-{picture}")
+    _write(folder / f"{name}.md", page(name, outputs))
+
+
+def _run(line: str, folder: Path) -> str:
+    """Return what a command line prints on standard output, cut where it is long."""
+    python = f'chaosgym() {{ "{sys.executable}" -m chaosgym "$@"; }}; '
+    environment = os.environ | {"COLUMNS": "100", "MPLBACKEND": "Agg"}
+    command = ["bash", "-o", "pipefail", "-c", python + line]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise SystemExit(f"{line}\n{done.stderr}")
+    lines = done.stdout.replace(str(Path.home()), "~").splitlines(keepends=True)
+    return "".join([*lines[:LONGEST], "...\n"] if len(lines) > LONGEST else lines)
+
+
+def _last_part(name: str) -> str:
+    return f"## Options\n\n```text\n{options(name)}\n```\n"
+
+
+def _pictures(line: str) -> list[str]:
+    return [word for word in line.split() if word.endswith(PICTURES)]
+
+
+def _command(name: str) -> click.Command:
+    command = app.get_command(click.Context(app), name)
+    assert command is not None, name
+    return command
+
+
+def _help(command: click.Command, called: str) -> str:
+    with click.Context(command, info_name=called, terminal_width=100, max_content_width=100) as context:
+        text = command.get_help(context)
+    return "\n".join(line.rstrip() for line in text.splitlines())
+
+
+def _write(path: Path, text: str) -> None:
+    write_atomically(path, lambda unfinished: unfinished.write_text(text, encoding="utf-8"))
+
+
+def main(folder: Path, names: list[str]) -> None:
+    """Write the list of commands and the pages of some, or of all."""
+    folder.mkdir(parents=True, exist_ok=True)
+    _write(folder / "index.md", index())
+    for name in COMMANDS if names == ["--options"] else names or COMMANDS:
+        place = folder / f"{name}.md"
+        if names == ["--options"] and place.is_file():
+            _write(place, renewed(name, place.read_text(encoding="utf-8")))
+        else:
+            print(name, file=sys.stderr, flush=True)
+            write_page(name, folder)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2:])
