@@ -76,3 +76,16 @@ def test_hits_are_those_of_the_rows():
         assert f"## {name}\n\nHits: {hits} of {counted} (" in page
         told.append(f"{hits} of {counted}")
     assert f"hit by the fitted beam and crank | {told[0]}, {told[1]} |" in readme
+
+
+def test_files_named_in_the_documentation_exist():
+    """Sources, tests and scripts that a page names lie where it says, in the repository or in the package."""
+    pages = [*DOCS.rglob("*.md"), *DOCS.rglob("*.py"), *DOCS.parent.glob("*.md")]
+    assert len(pages) > 50
+    missing = {
+        f"{page.name}: {name}"
+        for page in pages
+        for name in re.findall(r"[\w./-]+/[\w-]+\.(?:py|toml|md|csv|png)\b", page.read_text(encoding="utf-8"))
+        if not any((base / name).exists() for base in (page.parent, DOCS.parent, DOCS.parent / "src" / "chaosgym"))
+    }
+    assert missing == set()

@@ -70,7 +70,8 @@ def page(name: str, outputs: list[str]) -> str:
     """Return the page of a command, given what its examples printed."""
     parts = [f"# chaosgym {name}", summary(name)]
     for example, output in zip(EXAMPLES.get(name, []), outputs, strict=True):
-        parts += [f"## {example['what'].rstrip('.')}", f"```console\n$ {example['run']}\n{output}```"]
+        heading, _, more = example["what"].rstrip(".").partition(". ")
+        parts += [f"## {heading}", *([f"{more}."] if more else []), f"```console\n$ {example['run']}\n{output}```"]
         parts += [f"![{example['what']}]({name}-{picture})" for picture in _pictures(example["run"])]
     return "\n\n".join([*parts, _last_part(name)])
 

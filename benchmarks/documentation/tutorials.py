@@ -22,7 +22,11 @@ def executed(script: Path) -> Any:
     for number, cell in enumerate(notebook.cells):
         cell.id = f"cell-{number}"
     client = NotebookClient(
-        notebook, timeout=SECONDS, record_timing=False, resources={"metadata": {"path": script.parent}}
+        notebook,
+        timeout=SECONDS,
+        record_timing=False,
+        coalesce_streams=True,
+        resources={"metadata": {"path": script.parent}},
     )
     client.execute()
     return notebook
@@ -40,7 +44,8 @@ def write(script: Path) -> None:
     for cell in notebook.cells:  # progress and warnings are of no interest to a reader
         if "outputs" in cell:
             cell.outputs = [output for output in cell.outputs if output.get("name") != "stderr"]
-    write_atomically(script.with_suffix(".ipynb"), lambda file: jupytext.write(notebook, file, fmt="ipynb"))
+    text = jupytext.writes(notebook, fmt="ipynb")
+    write_atomically(script.with_suffix(".ipynb"), lambda file: file.write_text(text, encoding="utf-8"))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@
 # Production demands a speed. The agent trims it a little, away from chaos. Every reset draws another machine within
 # the tolerances, so the agent must feel which speeds are calm.
 #
-# This tutorial trains for some seconds only. That is enough to see how the pieces fit, and far too little to learn
+# This tutorial trains for half a minute only. That is enough to see how the pieces fit, and far too little to learn
 # the task. The shipped policy took 900,000 steps.
 #
 # ## The environment
@@ -59,11 +59,12 @@ returns = []
 
 
 def keep(local, _):
-    """Note the return of every finished job."""
+    """Note the return of every finished job, and go on."""
     returns.extend(one["episode"]["r"] for one in local["infos"] if "episode" in one)
+    return True
 
 
-model.learn(12_000, callback=keep)
+model.learn(24_000, callback=keep)
 print(f"{len(returns)} jobs of training")
 
 # %% [markdown]
@@ -96,7 +97,7 @@ shipped = chaosgym.evaluate(shipped_policy(name), name, machines=16)
 print(f"shipped:      {shipped.score:.2f} ({shipped.interval[0]:.2f} to {shipped.interval[1]:.2f})")
 
 # %% [markdown]
-# Sixteen machines leave wide intervals; use all 256 for a result that you report, and several seeds. A score below
-# zero is worse than doing nothing. That is usual after so few steps: exploring costs before it pays.
+# Sixteen machines leave wide intervals; use all 256 for a result that you report, and several seeds. An interval that
+# holds zero can't be told from following the demand. After so few steps nothing better is to be expected.
 #
 # The training scripts in `agents/` add a memory of visited speeds, which makes the difference (page *Training*).
