@@ -6,6 +6,7 @@ With --options in place of names no example runs: only options and summaries bec
 """
 
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -115,7 +116,8 @@ def _run(line: str, folder: Path) -> str:
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     if done.returncode:
         raise SystemExit(f"{line}\n{done.stderr}")
-    lines = done.stdout.replace(str(Path.home()), "~").splitlines(keepends=True)
+    told = done.stdout.replace(str(Path.home()), "~").replace(platform.platform(), platform.system())
+    lines = told.splitlines(keepends=True)
     return "".join([*lines[:LONGEST], "...\n"] if len(lines) > LONGEST else lines)
 
 

@@ -25,23 +25,22 @@ KINDS = {
 """What each task adds, by the end of the id's name."""
 
 MACHINES = {
-    "impact-beam": "A steel beam on a flexure pivot is shaken in the middle, and its tip rattles in the gap between "
-    "two force sensors: the Impact Beam System of P. Gu's thesis (*Chaotic Vibration in Machine Systems and Its "
-    "Implications for Design*, MIT, 1994, chapter 3). It is shaken twice as hard as there, and its damping ratio is "
-    "3 % instead of 1 %. On the thesis' own beam most speeds above 18 Hz are chaotic and no schedule helps; here calm "
-    "speeds lie between, and where they lie is mostly a matter of the clearance, which the mean peak force tells.",
-    "slider-crank": "A motor turns a crank, a slender steel rod drives a slider along a straight guide, and the slider "
-    "rattles in its clearance across the guide: the Spatial Slider Crank of P. Gu's thesis (*Chaotic Vibration in "
-    "Machine Systems and Its Implications for Design*, MIT, 1994, chapter 4), with the clearance of its figure 4.14b "
-    "and an assumed damping ratio of the contact.",
+    "impact-beam": "A steel beam on a flexure pivot is shaken in the middle, and its tip rattles between two force "
+    "sensors. It is the Impact Beam System of P. Gu's thesis (MIT, 1994, chapter 3), shaken twice as hard as there and "
+    "with a damping ratio of 3 % instead of 1 %. On the thesis' own beam most speeds above 18 Hz are chaotic, and no "
+    "schedule helps. Here calm speeds lie between. Where they lie depends mostly on the clearance, which the mean peak "
+    "force tells.",
+    "slider-crank": "A motor turns a crank, and a slender steel rod drives a slider along a straight guide. The slider "
+    "rattles in its clearance across the guide. It is the Spatial Slider Crank of P. Gu's thesis (MIT, 1994, chapter 4) "
+    "with the clearance of its figure 4.14b and an assumed damping ratio of the contact.",
 }
 
 JUDGES = {
-    True: "The motion is judged as it runs. A small deviation travels with it, exactly, through every contact; the "
-    "mean over some ten cycles of the logarithm of its growth in a cycle is an exponent, and a cycle in which that is "
+    True: "The motion is judged as it runs. A small deviation travels with it, exactly, through every contact. Its "
+    "exponent is the mean over some ten cycles of the logarithm of its growth in a cycle. A cycle in which that is "
     "positive is Type III. What transient motion damps is not charged.",
-    False: "The motion is judged as it runs: a step is Type III if the peak forces of its last cycles miss those of "
-    "the cycles before, at every period up to eight, by more than 2 % of their mean.",
+    False: "The motion is judged as it runs. The peak forces of a step's last cycles are compared with those of the "
+    "cycles before. A step is Type III if they differ, at every period up to eight, by more than 2 % of their mean.",
 }
 
 TEXT = (Path(__file__).parent / "page.md").read_text(encoding="utf-8")

@@ -192,8 +192,8 @@ def test_bad_keywords_are_named(name: str, keywords: dict[str, Any], message: st
 
 
 def test_an_unknown_keyword_is_a_type_error_too(name: str) -> None:
-    """Libraries that try a keyword, such as TorchRL with frameskip, expect one."""
-    with pytest.raises(UnknownKeywordError, match="there is no keyword 'frameskip'") as refusal:
+    """TorchRL tries frameskip, and looks for Python's own words in the answer."""
+    with pytest.raises(UnknownKeywordError, match="unexpected keyword argument 'frameskip'") as refusal:
         _make(name, frameskip=1)
     assert isinstance(refusal.value, TypeError)
     with pytest.raises(TypeError, match="did you mean cycles_per_step"):

@@ -170,6 +170,6 @@ def split(task: Task, machine: Machine, keywords: Mapping[str, Any]) -> tuple[Ta
 
             near = get_close_matches(name, [*own, *theirs, "fidelity", "model_fidelity", "tolerances"], n=1)
             hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(own)}, and the fields of {machine.name}"
-            raise UnknownKeywordError(f"there is no keyword {name!r}; {hint}")
+            raise UnknownKeywordError(f"unexpected keyword argument {name!r}; {hint}")
     mine = {name: value for name, value in keywords.items() if name in own}
     return replace(task, **mine), {name: value for name, value in keywords.items() if name not in own}
