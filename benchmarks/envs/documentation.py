@@ -31,8 +31,8 @@ MACHINES = {
     "schedule helps. Here calm speeds lie between. Where they lie depends mostly on the clearance, which the mean peak "
     "force tells.",
     "slider-crank": "A motor turns a crank, and a slender steel rod drives a slider along a straight guide. The slider "
-    "rattles in its clearance across the guide. It is the Spatial Slider Crank of P. Gu's thesis (MIT, 1994, chapter 4) "
-    "with the clearance of its figure 4.14b and an assumed damping ratio of the contact.",
+    "rattles in its clearance across the guide. It is the Spatial Slider Crank of P. Gu's thesis (MIT, 1994, chapter "
+    "4) with the clearance of its figure 4.14b and an assumed damping ratio of the contact.",
 }
 
 JUDGES = {
