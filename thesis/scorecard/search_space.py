@@ -13,9 +13,10 @@ from typing import Any
 import scipy.optimize
 
 from chaosgym.errors import ParameterError
+from chaosgym.machines import ImpactBeam, Machine, SliderCrank
 from chaosgym.machines.impact_beam.modes import static_tip_deflection
 from chaosgym.machines.slider_crank.parameters import frequencies_at
-from thesis.machines import BEAM, CRANK, ImpactBeam, Machine, SliderCrank
+from thesis.machines import BEAM, CRANK
 from thesis.scorecard.quantities import lateral_mass
 from thesis.statements import read_comparisons
 

@@ -10,8 +10,8 @@ from bokeh.models import Button, Div
 from chaosgym.control.policies import shipped_policy
 from chaosgym.control.policies.shipped import shipped_folder
 from chaosgym.control.rollout import play
-from chaosgym.envs import MACHINES
 from chaosgym.machines import Machine
+from chaosgym.machines.registry import MACHINES
 
 MILLISECONDS = 150
 """Between two steps."""
@@ -29,8 +29,9 @@ class Playback:
 
     def panel(self, machine: Machine) -> Any:
         """The button, for a machine that an agent was trained on."""
-        self._env = f"chaosgym/{MACHINES.get(machine.name, '')}Tolerance-v1"
-        self._button.visible = machine.name in MACHINES and shipped_folder(self._env).is_dir()
+        known = machine.name in MACHINES
+        self._env = f"chaosgym/{MACHINES.class_name(machine.name)}Tolerance-v1" if known else ""
+        self._button.visible = known and shipped_folder(self._env).is_dir()
         return column(self._button, self._told)
 
     def _pressed(self) -> None:
