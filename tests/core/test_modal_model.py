@@ -6,6 +6,8 @@ import pytest
 from chaosgym.core import status
 from chaosgym.core.cycle import Episode, cycle_arrays
 from chaosgym.core.modal_impact import advance
+from chaosgym.core.modal_run import make_run
+from chaosgym.core.tangent import no_tangents
 from chaosgym.machines.modal_impact import Modes, Stop, flexible_model
 from tests.core.twin import twin_trajectory
 
@@ -56,7 +58,8 @@ def _run(model, cycles, samples, parts=(1,)):
     arrays = cycle_arrays(cycles, 2 * n, samples)
     for rows in np.split(np.arange(cycles), np.cumsum(parts)[:-1]) if len(parts) > 1 else [np.arange(cycles)]:
         part = type(arrays)(*(array[rows[0] : rows[-1] + 1] for array in arrays))
-        assert advance(model, state, episode, part, 0.5, 1e-9, 20_000)[0] == status.OK
+        run, none = make_run(model, 0.5, 1e-9), no_tangents(2 * n, len(rows))
+        assert advance(run, model, state, episode, part, 20_000, none)[0] == status.OK
     return arrays.history.reshape(-1, 3), arrays.impacts, state
 
 

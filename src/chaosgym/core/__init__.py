@@ -54,6 +54,7 @@ try:
         modal_impact,
         modal_model,
         modal_run,
+        modal_stay,
         propagator,
         restitution,
         status,

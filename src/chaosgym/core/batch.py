@@ -12,8 +12,10 @@ from chaosgym.core.cycle import CycleArrays, Episode
 from chaosgym.core.event_tables import Tables
 from chaosgym.core.modal_impact import advance as advance_beam
 from chaosgym.core.modal_model import ModalImpactModel
+from chaosgym.core.modal_run import make_run
 from chaosgym.core.propagator import Regimes
 from chaosgym.core.restitution import RestitutionModel, advance_restitution
+from chaosgym.core.tangent import no_tangents
 
 
 class Motions(NamedTuple):
@@ -66,18 +68,7 @@ def regimes_of(regimes, i):
 @njit(cache=True, inline="always")
 def tables_of(tables, i):
     """Tables of machine i."""
-    return Tables(
-        tables.step_phase[i],
-        tables.shortest[i],
-        tables.ahead[i],
-        tables.turn[i],
-        tables.fine[i],
-        tables.generator[i],
-        tables.taylor[i],
-        tables.now[i],
-        tables.bounds[i],
-        tables.switch[i],
-    )
+    return Tables(tables.step_phase[i], tables.shortest[i], tables.values[i])
 
 
 @njit(cache=True, inline="always")
@@ -111,14 +102,15 @@ def advance_beams(batch, regimes, tables, which, motions, arrays, settings, outc
     """
     for k in prange(which.shape[0]):
         i = which[k]
+        model = beam_of(batch, regimes, tables, i)
         outcome[k] = advance_beam(
-            beam_of(batch, regimes, tables, i),
+            make_run(model, settings.step_phase, settings.event_tolerance),
+            model,
             motions.coordinates[i],
             episode_of(motions, i),
             rows_of(arrays, k),
-            settings.step_phase,
-            settings.event_tolerance,
             settings.event_budget,
+            no_tangents(motions.coordinates.shape[1], arrays.section.shape[1]),
         )[0]
 
 
@@ -152,4 +144,5 @@ def advance_rigid_beams(batch, regimes, which, motions, arrays, settings, outcom
             rows_of(arrays, k),
             settings.step_phase,
             settings.event_budget,
+            no_tangents(motions.coordinates.shape[1], arrays.section.shape[1]),
         )[0]

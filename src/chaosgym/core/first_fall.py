@@ -7,7 +7,7 @@ turns by an angle of at most one.
 import math
 
 from chaosgym.core.kernel import leaf
-from chaosgym.core.lanes import fma
+from chaosgym.core.lanes import fma, item
 
 DEGREE = 15
 
@@ -22,21 +22,21 @@ OVERSHOOT = 4.0 / 27.0
 
 
 @leaf
-def polynomial(coefficients, s):
-    """Value and slope at s."""
-    value, slope = coefficients[DEGREE], 0.0
+def polynomial(own, at, s):
+    """Value and slope at s of the polynomial whose coefficients begin at a place in an array."""
+    value, slope = item(own, at + DEGREE), 0.0
     for k in range(DEGREE - 1, -1, -1):
         slope = fma(slope, s, value)
-        value = fma(value, s, coefficients[k])
+        value = fma(value, s, item(own, at + k))
     return value, slope
 
 
 @leaf
-def polished(coefficients, sign, inverse, low, high, start, bend, resolution):
+def polished(own, at, sign, inverse, low, high, start, bend, resolution):
     """Zero in [low, high] of sign times the polynomial of time * inverse, which falls there, by Newton's method."""
     t = start
     for _ in range(MAX_POLISH):
-        value, slope = polynomial(coefficients, t * inverse)
+        value, slope = polynomial(own, at, t * inverse)
         value, slope = sign * value, sign * slope * inverse
         if value > 0.0:
             low = t
@@ -54,7 +54,7 @@ def polished(coefficients, sign, inverse, low, high, start, bend, resolution):
 
 
 @leaf
-def first_fall(coefficients, sign, inverse, start, until, bound2, bound4, resolution):
+def first_fall(own, at, sign, inverse, start, until, bound2, bound4, resolution):
     """First instant in (start, until] at which sign times the polynomial of time * inverse falls to 0, inf if none.
 
     ``bound2`` and ``bound4`` bound its second and fourth derivative in time. A piece is passed only if the cubic
@@ -62,13 +62,13 @@ def first_fall(coefficients, sign, inverse, start, until, bound2, bound4, resolu
     throughout; else it is halved. What happens within ``resolution`` [s] is not resolved.
     """
     a = start
-    value, slope = polynomial(coefficients, a * inverse)
+    value, slope = polynomial(own, at, a * inverse)
     value, slope = sign * value, sign * slope * inverse
     length = until - a
     for _ in range(MAX_PIECES):
         length = min(length, until - a)
         b = a + length
-        value1, slope1 = polynomial(coefficients, b * inverse)
+        value1, slope1 = polynomial(own, at, b * inverse)
         value1, slope1 = sign * value1, sign * slope1 * inverse
         if value1 > 0.0:
             swing = OVERSHOOT * length * (max(-slope, 0.0) + max(slope1, 0.0))
@@ -82,7 +82,7 @@ def first_fall(coefficients, sign, inverse, start, until, bound2, bound4, resolu
         else:
             if slope + slope1 + bound2 * length < 0.0:
                 guess = a - value / slope if slope < 0.0 else a + length * value / (value - value1)
-                return polished(coefficients, sign, inverse, a, b, min(max(guess, a), b), bound2, resolution)
+                return polished(own, at, sign, inverse, a, b, min(max(guess, a), b), bound2, resolution)
             if length <= resolution:
                 return b
         length *= 0.5

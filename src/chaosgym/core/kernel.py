@@ -13,16 +13,11 @@ from numba import njit
 
 def leaf(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a kernel that allocates no array and returns none, without reference counts."""
-    compiled: Callable[..., Any] = njit(cache=True, nogil=True, _nrt=False)(function)
+    compiled: Callable[..., Any] = njit(cache=True, nogil=True, _nrt=False, error_model="numpy")(function)
     return compiled
 
 
-def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-    """As ``leaf``, for parts of a kernel that are handed many arrays: they become part of their caller.
-
-    A call would copy every array's pointer, shape and strides to the stack, which takes longer than the part.
-    """
-    compiled: Callable[..., Any] = njit(cache=True, nogil=True, _nrt=False, forceinline=True, error_model="numpy")(
-        function
-    )
+def part(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a piece of other kernels as if it were written out in each: it needs no call and no code of its own."""
+    compiled: Callable[..., Any] = njit(cache=True, inline="always")(function)
     return compiled

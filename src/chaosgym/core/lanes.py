@@ -1,70 +1,98 @@
-"""Arithmetic of eight lanes at once: products, sums and comparisons of LLVM vectors, for kernels.
+"""Arithmetic of several lanes at once: products, sums and comparisons of LLVM vectors, for kernels.
 
 Every sum has a fixed order and every fused multiply-add is written out, so that a result does not depend on how LLVM
 optimises the kernel around it. A vector of eight doubles is legal on every processor: LLVM splits it where registers
 are shorter, and calls a function for ``fma`` where the processor has none.
 
-All arrays are contiguous. Coordinates u are (2 lanes + 2 harmonics, rounded up to a multiple of 8): the first and the
-second coordinate of each block, padded to ``lanes``, then cosine and sine of each harmonic of the drive.
+Operations take arrays of one dimension, contiguous, each followed by the place at which something begins in it: an
+array of more dimensions costs a kernel's compilation three numbers a dimension wherever it is handed on. Coordinates u
+are (2 lanes + 2 harmonics, rounded up to a multiple of 8): the first and the second coordinate of each block, padded to
+``lanes``, then cosine and sine of each harmonic of the drive.
 """
 
+from collections.abc import Callable
+from inspect import signature as signature_of
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
+from numba.extending import intrinsic, register_jitable
 
 LANES = 8
 """Doubles of one vector."""
 
+GROUP = 4
+"""Doubles of one vector where rows are short."""
+
 _DOUBLE, _INT, _INDEX = ir.DoubleType(), ir.IntType(32), ir.IntType(64)
-_VECTOR = ir.VectorType(_DOUBLE, LANES)
-_UNDEFINED = ir.Constant(_VECTOR, ir.Undefined)
 _OVERSHOOT = 4.0 / 27.0
 
 
-class _Emitter:
-    """Instructions of vectors, and the data pointers of arguments that are arrays."""
+@register_jitable
+def padded(count: int, lanes: int = LANES) -> int:
+    """Count, rounded up to a multiple of the lanes."""
+    return lanes * ((count + lanes - 1) // lanes)
 
-    def __init__(self, context: Any, builder: Any, signature: Any, arguments: Any) -> None:
-        self.builder = builder
-        self.arguments = [
-            context.make_array(kind)(context, builder, value).data if isinstance(kind, types.Array) else value
-            for kind, value in zip(signature.args, arguments, strict=True)
-        ]
+
+@register_jitable
+def aligned(size: int) -> Any:
+    """Return zeros (size,) that begin a line of the cache: a vector that lies in two takes twice as long to load."""
+    zeros = np.zeros(size + LANES - 1)
+    skipped = (-zeros.ctypes.data % (8 * LANES)) // 8
+    return zeros[skipped : skipped + size]
+
+
+class _Emitter:
+    """Instructions of vectors of some lanes."""
+
+    def __init__(self, builder: Any, lanes: int) -> None:
+        self.builder, self.lanes = builder, lanes
+        self.kind = ir.VectorType(_DOUBLE, lanes)
 
     def intrinsic(self, name: str, operands: list[Any]) -> Any:
-        kind = ir.FunctionType(_VECTOR, [_VECTOR] * len(operands))
-        function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.{name}.v{LANES}f64")
+        kind = ir.FunctionType(self.kind, [self.kind] * len(operands))
+        function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.{name}.v{self.lanes}f64")
         return self.builder.call(function, operands)
 
     def fma(self, a: Any, b: Any, c: Any) -> Any:
         return self.intrinsic("fma", [a, b, c])
 
     def constant(self, value: float) -> Any:
-        return ir.Constant(_VECTOR, [value] * LANES)
-
-    def address(self, pointer: Any, offset: Any) -> Any:
-        return self.builder.bitcast(self.builder.gep(pointer, [offset]), _VECTOR.as_pointer())
-
-    def load(self, pointer: Any, offset: Any) -> Any:
-        vector = self.builder.load(self.address(pointer, offset))
-        vector.align = 8
-        return vector
-
-    def store(self, vector: Any, pointer: Any, offset: Any) -> None:
-        self.builder.store(vector, self.address(pointer, offset)).align = 8
-
-    def spread(self, scalar: Any) -> Any:
-        first = self.builder.insert_element(_UNDEFINED, scalar, ir.Constant(_INT, 0))
-        return self.builder.shuffle_vector(first, _UNDEFINED, ir.Constant(ir.VectorType(_INT, LANES), [0] * LANES))
+        return ir.Constant(self.kind, [value] * self.lanes)
 
     def index(self, value: int) -> Any:
         return ir.Constant(_INDEX, value)
 
     def times(self, value: Any, factor: int) -> Any:
         return self.builder.mul(value, self.index(factor))
+
+    def number(self, pointer: Any, at: Any) -> Any:
+        return self.builder.load(self.builder.gep(pointer, [at]))
+
+    def address(self, pointer: Any, at: Any) -> Any:
+        return self.builder.bitcast(self.builder.gep(pointer, [at]), self.kind.as_pointer())
+
+    def load(self, pointer: Any, at: Any) -> Any:
+        vector = self.builder.load(self.address(pointer, at))
+        vector.align = 8
+        return vector
+
+    def store(self, vector: Any, pointer: Any, at: Any) -> None:
+        self.builder.store(vector, self.address(pointer, at)).align = 8
+
+    def spread(self, scalar: Any) -> Any:
+        kind = ir.VectorType(scalar.type, self.lanes)
+        nothing = ir.Constant(kind, ir.Undefined)
+        first = self.builder.insert_element(nothing, scalar, ir.Constant(_INT, 0))
+        zeros = ir.Constant(ir.VectorType(_INT, self.lanes), [0] * self.lanes)
+        return self.builder.shuffle_vector(first, nothing, zeros)
+
+    def shifted(self, vector: Any, first: Any) -> Any:
+        """A number and all lanes but the last: a load across what was just stored would wait for it."""
+        mask = ir.Constant(ir.VectorType(_INT, self.lanes), [self.lanes, *range(self.lanes - 1)])
+        return self.builder.shuffle_vector(vector, self.spread(first), mask)
 
     def larger(self, a: Any, b: Any) -> Any:
         return self.builder.select(self.builder.fcmp_ordered(">", a, b), a, b)
@@ -74,9 +102,12 @@ class _Emitter:
 
     def folded(self, vector: Any, combine: Any) -> Any:
         """All lanes combined, halves first."""
-        for shift in (4, 2, 1):
-            mask = ir.Constant(ir.VectorType(_INT, LANES), [(i + shift) % LANES for i in range(LANES)])
-            vector = combine(vector, self.builder.shuffle_vector(vector, _UNDEFINED, mask))
+        shift = self.lanes // 2
+        while shift:
+            lanes = [(i + shift) % self.lanes for i in range(self.lanes)]
+            mask = ir.Constant(ir.VectorType(_INT, self.lanes), lanes)
+            vector = combine(vector, self.builder.shuffle_vector(vector, ir.Constant(self.kind, ir.Undefined), mask))
+            shift //= 2
         return self.builder.extract_element(vector, ir.Constant(_INT, 0))
 
     def accumulator(self, start: Any) -> Any:
@@ -85,215 +116,242 @@ class _Emitter:
     def add_product(self, accumulator: Any, a: Any, b: Any) -> None:
         self.builder.store(self.fma(a, b, self.builder.load(accumulator)), accumulator)
 
+    def total(self, first: Any, second: Any) -> Any:
+        return self.builder.fadd(self.builder.load(first), self.builder.load(second))
+
+    def vectors(self, width: Any, at_once: int = 1) -> Any:
+        """Loop over the vectors of a width, some at once; its index times their lanes is where each begins."""
+        return cgutils.for_range(self.builder, self.builder.udiv(width, self.index(at_once * self.lanes)))
+
     def lanes_below(self, count: Any) -> Any:
         """Mask of the lanes whose number is below a count."""
-        kind = ir.VectorType(_INDEX, LANES)
-        first = self.builder.insert_element(ir.Constant(kind, ir.Undefined), count, ir.Constant(_INT, 0))
-        zeros = ir.Constant(ir.VectorType(_INT, LANES), [0] * LANES)
-        spread = self.builder.shuffle_vector(first, ir.Constant(kind, ir.Undefined), zeros)
-        return self.builder.icmp_signed("<", ir.Constant(kind, list(range(LANES))), spread)
+        numbers = ir.Constant(ir.VectorType(_INDEX, self.lanes), list(range(self.lanes)))
+        return self.builder.icmp_signed("<", numbers, self.spread(count))
 
 
-@intrinsic
-def sample(typing, free, driven, u, blocks, lanes, harmonics, scale, first, first_at, second, second_at):
-    """Two quantities at eight instants, times ``scale``: to ``first`` and ``second`` from an offset on.
+def _argument_type(kind: Any) -> Any:
+    return kind if isinstance(kind, types.Array) else types.int64 if isinstance(kind, types.Integer) else types.float64
+
+
+def _operation(returns: Any = types.void, lanes: int = LANES) -> Callable[[Callable[..., Any]], Any]:
+    """Intrinsic whose instructions a function of an emitter and the arguments writes; an array comes as a pointer."""
+
+    def decorate(write: Callable[..., Any]) -> Any:
+        def define(typing, *given):
+            def build(context, builder, signature, arguments):
+                values = [
+                    context.make_array(kind)(context, builder, value).data if isinstance(kind, types.Array) else value
+                    for kind, value in zip(signature.args, arguments, strict=True)
+                ]
+                result = write(_Emitter(builder, lanes), *values)
+                return context.get_dummy_value() if result is None else result
+
+            return returns(*map(_argument_type, given)), build
+
+        define.__name__, define.__doc__ = write.__name__, write.__doc__
+        define.__signature__ = signature_of(write)  # type: ignore[attr-defined]
+        return intrinsic(define)
+
+    return decorate
+
+
+@_operation()
+def sample(e, free, free_at, driven, driven_at, u_at, blocks, lanes, harmonics, scale, first_at, second_at):
+    """Two quantities at eight instants, times ``scale``: into ``driven`` from ``first_at`` and ``second_at`` on.
 
     ``free`` (2, 2, blocks, 8) and ``driven`` (2, 2, harmonics, 8): what each coordinate contributes, by quantity,
-    coordinate of the block, block and instant.
+    coordinate of the block, block and instant. u is in ``driven`` too.
     """
-
-    def build(context, builder, signature, arguments):
-        e = _Emitter(context, builder, signature, arguments)
-        p_free, p_driven, p_u, n, width, h, factor, p_first, at_first, p_second, at_second = e.arguments
-        sums = [e.accumulator(e.constant(0.0)) for _ in range(4)]
-        for table, count, start, step in ((p_free, n, e.index(0), width), (p_driven, h, e.times(width, 2), h)):
-            row = e.times(count, LANES)
-            with cgutils.for_range(builder, count) as loop:
-                offset = e.times(loop.index, LANES)
-                for k in range(2):
-                    at = builder.add(builder.add(start, loop.index), step) if k else builder.add(start, loop.index)
-                    value = e.spread(builder.load(builder.gep(p_u, [at])))
-                    for q in range(2):
-                        place = builder.add(offset, e.times(row, 2 * q + k))
-                        e.add_product(sums[2 * q + k], e.load(table, place), value)
-        factors = e.spread(factor)
-        for q, (pointer, at) in enumerate(((p_first, at_first), (p_second, at_second))):
-            total = builder.fadd(builder.load(sums[2 * q]), builder.load(sums[2 * q + 1]))
-            e.store(builder.fmul(total, factors), pointer, at)
-        return context.get_dummy_value()
-
-    integer = types.int64
-    given = (free, driven, u, integer, integer, integer, types.float64, first, integer, second, integer)
-    return types.void(*given), build
+    b = e.builder
+    sums = [e.accumulator(e.constant(0.0)) for _ in range(4)]
+    tables = (
+        (free, free_at, blocks, u_at, lanes),
+        (driven, driven_at, harmonics, b.add(u_at, e.times(lanes, 2)), harmonics),
+    )
+    for table, begin, count, start, step in tables:
+        row = e.times(count, LANES)
+        with cgutils.for_range(b, count) as loop:
+            offset = b.add(begin, e.times(loop.index, LANES))
+            for k in range(2):
+                at = b.add(b.add(start, loop.index), step) if k else b.add(start, loop.index)
+                value = e.spread(e.number(driven, at))
+                for q in range(2):
+                    e.add_product(sums[2 * q + k], e.load(table, b.add(offset, e.times(row, 2 * q + k))), value)
+    for q, at in enumerate((first_at, second_at)):
+        e.store(b.fmul(e.total(*sums[2 * q : 2 * q + 2]), e.spread(scale)), driven, at)
 
 
-@intrinsic
-def first_doubt(typing, values, slopes, h, low, high, doubt, start):
+@_operation(types.int64)
+def first_doubt(e, own, values_at, slopes_at, h, low, high, doubt, start):
     """Number of the first interval, from ``start`` on, in which a quantity may leave (low, high); 8 if in none.
 
-    ``values`` and ``slopes`` (16,) hold it from 7 on at the nine ends of eight intervals of length ``h``. The cubic
-    through both ends exceeds them by at most 4/27 h times the slopes that lead beyond; ``doubt`` bounds how far the
-    quantity is from the cubic.
+    Values and slopes (9,) are at the ends of eight intervals of length ``h``. The cubic through both ends exceeds them
+    by at most 4/27 h times the slopes that lead beyond; ``doubt`` bounds how far the quantity is from the cubic.
     """
-
-    def build(context, builder, signature, arguments):
-        e = _Emitter(context, builder, signature, arguments)
-        p_values, p_slopes, length, bottom, top, error, begin = e.arguments
-        left, right = (e.load(p_values, e.index(k)) for k in (LANES - 1, LANES))
-        before, after = (e.load(p_slopes, e.index(k)) for k in (LANES - 1, LANES))
-        zero = e.constant(0.0)
-        reach = builder.fmul(e.spread(length), e.constant(_OVERSHOOT))
-        rise = builder.fsub(e.larger(before, zero), e.smaller(after, zero))
-        fall = builder.fsub(e.larger(after, zero), e.smaller(before, zero))
-        errors = e.spread(error)
-        upper = builder.fadd(e.fma(reach, rise, e.larger(left, right)), errors)
-        lower = builder.fsub(e.smaller(left, right), e.fma(reach, fall, errors))
-        within = builder.and_(
-            builder.fcmp_ordered("<", upper, e.spread(top)), builder.fcmp_ordered(">", lower, e.spread(bottom))
-        )
-        within = builder.or_(within, e.lanes_below(begin))
-        bits = builder.zext(builder.bitcast(builder.not_(within), ir.IntType(LANES)), _INDEX)
-        return builder.cttz(builder.or_(bits, e.index(1 << LANES)), ir.Constant(ir.IntType(1), 1))
-
-    real = types.float64
-    return types.int64(values, slopes, real, real, real, real, types.int64), build
+    b, zero = e.builder, e.constant(0.0)
+    right, after = (e.load(own, b.add(at, e.index(1))) for at in (values_at, slopes_at))
+    left, before = e.shifted(right, e.number(own, values_at)), e.shifted(after, e.number(own, slopes_at))
+    reach = b.fmul(e.spread(h), e.constant(_OVERSHOOT))
+    rise = b.fsub(e.larger(before, zero), e.smaller(after, zero))
+    fall = b.fsub(e.larger(after, zero), e.smaller(before, zero))
+    errors = e.spread(doubt)
+    upper = b.fadd(e.fma(reach, rise, e.larger(left, right)), errors)
+    lower = b.fsub(e.smaller(left, right), e.fma(reach, fall, errors))
+    within = b.and_(b.fcmp_ordered("<", upper, e.spread(high)), b.fcmp_ordered(">", lower, e.spread(low)))
+    within = b.or_(within, e.lanes_below(start))
+    bits = b.zext(b.bitcast(b.not_(within), ir.IntType(LANES)), _INDEX)
+    return b.cttz(b.or_(bits, e.index(1 << LANES)), ir.Constant(ir.IntType(1), 1))
 
 
-@intrinsic
-def largest(typing, values, count, least):
-    """Largest of ``least`` and the first ``count`` of the values from 8 on."""
-
-    def build(context, builder, signature, arguments):
-        e = _Emitter(context, builder, signature, arguments)
-        pointer, number, floor = e.arguments
-        floors = e.spread(floor)
-        chosen = builder.select(e.lanes_below(number), e.load(pointer, e.index(LANES)), floors)
-        return e.folded(e.larger(chosen, floors), e.larger)
-
-    return types.float64(values, types.int64, types.float64), build
+@_operation(types.float64)
+def largest(e, own, at, count, least):
+    """Largest of ``least`` and ``count`` values, at most eight."""
+    floors = e.spread(least)
+    chosen = e.builder.select(e.lanes_below(count), e.load(own, at), floors)
+    return e.folded(e.larger(chosen, floors), e.larger)
 
 
-@intrinsic
-def turn(typing, entries, u, out, lanes):
-    """Blocks ``entries`` (4, lanes) times u, to ``out``, which may be u."""
+def _turned(e, entries, at, own, u_at, lanes, offset):
+    """First and second coordinates of the blocks at ``offset`` times ``entries`` (4, lanes), and where they lie."""
+    b = e.builder
+    places = [b.add(offset, e.times(lanes, k)) for k in range(4)]
+    first, second = (e.load(own, b.add(u_at, place)) for place in places[:2])
+    e11, e12, e21, e22 = (e.load(entries, b.add(at, place)) for place in places)
+    return e.fma(e11, first, b.fmul(e12, second)), e.fma(e22, second, b.fmul(e21, first)), places
 
-    def build(context, builder, signature, arguments):
-        e = _Emitter(context, builder, signature, arguments)
-        p_entries, p_u, p_out, width = e.arguments
-        with cgutils.for_range(builder, builder.udiv(width, e.index(LANES))) as loop:
-            at = [builder.add(e.times(loop.index, LANES), e.times(width, k)) for k in range(4)]
-            first, second = e.load(p_u, at[0]), e.load(p_u, at[1])
-            e11, e12, e21, e22 = (e.load(p_entries, k) for k in at)
-            e.store(e.fma(e11, first, builder.fmul(e12, second)), p_out, at[0])
-            e.store(e.fma(e22, second, builder.fmul(e21, first)), p_out, at[1])
-        return context.get_dummy_value()
 
-    return types.void(entries, u, out, types.int64), build
+@_operation()
+def turn(e, entries, at, own, u_at, out_at, lanes):
+    """Blocks ``entries`` (4, lanes) times u, into ``own`` from ``out_at`` on, which may be where u is."""
+    with e.vectors(lanes) as loop:
+        x, y, places = _turned(e, entries, at, own, u_at, lanes, e.times(loop.index, LANES))
+        e.store(x, own, e.builder.add(out_at, places[0]))
+        e.store(y, own, e.builder.add(out_at, places[1]))
 
 
 TAYLOR_TERMS = 6
 """Terms by which ``turn_and_expand`` goes on from the instant of a table."""
 
 
-@intrinsic
-def turn_and_expand(typing, entries, generator, u, time, out, lanes):
-    """exp(B time) times ``entries`` times u by a Taylor series in time, to ``out``; B is ``generator`` (4, lanes)."""
-
-    def build(context, builder, signature, arguments):
-        e = _Emitter(context, builder, signature, arguments)
-        p_entries, p_generator, p_u, elapsed, p_out, width = e.arguments
-        times = e.spread(elapsed)
-        with cgutils.for_range(builder, builder.udiv(width, e.index(LANES))) as loop:
-            at = [builder.add(e.times(loop.index, LANES), e.times(width, k)) for k in range(4)]
-            first, second = e.load(p_u, at[0]), e.load(p_u, at[1])
-            e11, e12, e21, e22 = (e.load(p_entries, k) for k in at)
-            a = e.fma(e11, first, builder.fmul(e12, second))
-            b = e.fma(e22, second, builder.fmul(e21, first))
-            b11, b12, b21, b22 = (builder.fmul(e.load(p_generator, k), times) for k in at)
-            x, y = a, b
-            for term in range(TAYLOR_TERMS, 0, -1):
-                dx = e.fma(b11, x, builder.fmul(b12, y))
-                dy = e.fma(b22, y, builder.fmul(b21, x))
-                share = e.constant(1.0 / term)
-                x, y = e.fma(dx, share, a), e.fma(dy, share, b)
-            e.store(x, p_out, at[0])
-            e.store(y, p_out, at[1])
-        return context.get_dummy_value()
-
-    return types.void(entries, generator, u, types.float64, out, types.int64), build
+@_operation()
+def turn_and_expand(e, entries, at, generator_at, own, u_at, time, out_at, lanes):
+    """As ``turn``, then times exp(B time) by a Taylor series in time; B (4, lanes) is in ``entries`` too."""
+    b = e.builder
+    times = e.spread(time)
+    with e.vectors(lanes) as loop:
+        first, second, places = _turned(e, entries, at, own, u_at, lanes, e.times(loop.index, LANES))
+        b11, b12, b21, b22 = (b.fmul(e.load(entries, b.add(generator_at, place)), times) for place in places)
+        x, y = first, second
+        for term in range(TAYLOR_TERMS, 0, -1):
+            dx = e.fma(b11, x, b.fmul(b12, y))
+            dy = e.fma(b22, y, b.fmul(b21, x))
+            share = e.constant(1.0 / term)
+            x, y = e.fma(dx, share, first), e.fma(dy, share, second)
+        e.store(x, own, b.add(out_at, places[0]))
+        e.store(y, own, b.add(out_at, places[1]))
 
 
-@intrinsic
-def combine(typing, free, driven, constant, u, blocks, lanes, harmonics, out):
-    """constant (2 lanes,) + columns ``free`` (2, blocks, 2 lanes) and ``driven`` (2, harmonics, 2 lanes) times u."""
+@_operation()
+def combine(e, free, free_at, own, driven_at, constant_at, u_at, blocks, lanes, harmonics, out_at):
+    """Constant (2 lanes,) + columns ``free`` (2, blocks, 2 lanes) and driven (2, harmonics, 2 lanes) times u.
 
-    def build(context, builder, signature, arguments):
-        e = _Emitter(context, builder, signature, arguments)
-        p_free, p_driven, p_constant, p_u, n, width, h, p_out = e.arguments
-        double = e.times(width, 2)
-        with cgutils.for_range(builder, builder.udiv(double, e.index(2 * LANES))) as chunk:
-            rows = [builder.add(e.times(chunk.index, 2 * LANES), e.index(k * LANES)) for k in range(2)]
-            sums = [e.accumulator(e.constant(0.0)) for _ in range(4)]
-            for q in range(2):
-                builder.store(e.load(p_constant, rows[q]), sums[2 * q])
-                builder.store(e.constant(0.0), sums[2 * q + 1])
-            for table, count, start, step in ((p_free, n, e.index(0), width), (p_driven, h, double, h)):
-                with cgutils.for_range(builder, count) as loop:
-                    for k in range(2):
-                        at = builder.add(start, loop.index)
-                        column = loop.index
-                        if k:
-                            at, column = builder.add(at, step), builder.add(column, count)
-                        value = e.spread(builder.load(builder.gep(p_u, [at])))
-                        base = builder.mul(column, double)
-                        for q in range(2):
-                            e.add_product(sums[2 * q + k], e.load(table, builder.add(base, rows[q])), value)
-            for q in range(2):
-                total = builder.fadd(builder.load(sums[2 * q]), builder.load(sums[2 * q + 1]))
-                e.store(total, p_out, rows[q])
-        return context.get_dummy_value()
-
-    integer = types.int64
-    return types.void(free, driven, constant, u, integer, integer, integer, out), build
+    All but the free columns is in ``own``; the answer goes there from ``out_at`` on.
+    """
+    b = e.builder
+    double = e.times(lanes, 2)
+    tables = ((free, free_at, blocks, u_at, lanes), (own, driven_at, harmonics, b.add(u_at, double), harmonics))
+    with e.vectors(double, at_once=2) as chunk:
+        rows = [b.add(e.times(chunk.index, 2 * LANES), e.index(k * LANES)) for k in range(2)]
+        sums = [e.accumulator(e.constant(0.0)) for _ in range(4)]
+        for q in range(2):
+            b.store(e.load(own, b.add(constant_at, rows[q])), sums[2 * q])
+            b.store(e.constant(0.0), sums[2 * q + 1])
+        for table, begin, count, start, step in tables:
+            with cgutils.for_range(b, count) as loop:
+                for k in range(2):
+                    at, column = b.add(start, loop.index), loop.index
+                    if k:
+                        at, column = b.add(at, step), b.add(column, count)
+                    value = e.spread(e.number(own, at))
+                    base = b.add(begin, b.mul(column, double))
+                    for q in range(2):
+                        e.add_product(sums[2 * q + k], e.load(table, b.add(base, rows[q])), value)
+        for q in range(2):
+            e.store(e.total(*sums[2 * q : 2 * q + 2]), own, b.add(out_at, rows[q]))
 
 
-@intrinsic
-def dot(typing, a, u, width):
-    """Scalar product of two arrays (width,), a multiple of 8."""
-
-    def build(context, builder, signature, arguments):
-        e = _Emitter(context, builder, signature, arguments)
-        p_a, p_u, count = e.arguments
-        total = e.accumulator(e.constant(0.0))
-        with cgutils.for_range(builder, builder.udiv(count, e.index(LANES))) as loop:
-            at = e.times(loop.index, LANES)
-            e.add_product(total, e.load(p_a, at), e.load(p_u, at))
-        return e.folded(builder.load(total), builder.fadd)
-
-    return types.float64(a, u, types.int64), build
+def _dot(e, own, at, u_at, width, of_sizes):
+    b = e.builder
+    total = e.accumulator(e.constant(0.0))
+    with e.vectors(width) as loop:
+        offset = e.times(loop.index, LANES)
+        u = e.load(own, b.add(u_at, offset))
+        e.add_product(total, e.load(own, b.add(at, offset)), e.intrinsic("fabs", [u]) if of_sizes else u)
+    return e.folded(b.load(total), b.fadd)
 
 
-@intrinsic
-def dot_of_sizes(typing, a, u, width):
-    """Scalar product of an array (width,) and the absolute values of another."""
-
-    def build(context, builder, signature, arguments):
-        e = _Emitter(context, builder, signature, arguments)
-        p_a, p_u, count = e.arguments
-        total = e.accumulator(e.constant(0.0))
-        with cgutils.for_range(builder, builder.udiv(count, e.index(LANES))) as loop:
-            at = e.times(loop.index, LANES)
-            e.add_product(total, e.load(p_a, at), e.intrinsic("fabs", [e.load(p_u, at)]))
-        return e.folded(builder.load(total), builder.fadd)
-
-    return types.float64(a, u, types.int64), build
+@_operation(types.float64)
+def dot(e, own, at, u_at, width):
+    """Scalar product of two parts of an array, (width,), a multiple of 8."""
+    return _dot(e, own, at, u_at, width, of_sizes=False)
 
 
-@intrinsic
-def fma(typing, a, b, c):
-    """a b + c with one rounding."""
+@_operation(types.float64)
+def dot_of_sizes(e, own, at, u_at, width):
+    """Scalar product of one part of an array and the absolute values of another, (width,), a multiple of 8."""
+    return _dot(e, own, at, u_at, width, of_sizes=True)
 
-    def build(context, builder, signature, arguments):
-        return builder.fma(*arguments)
 
-    return types.float64(types.float64, types.float64, types.float64), build
+def _columns(e, table, at, width, count, factors, factors_at):
+    """Sum over c < ``count`` of factor c times column c, whose lanes begin at ``at`` + c ``width``; pairs alternate."""
+    b = e.builder
+    sums = [e.accumulator(e.constant(0.0)) for _ in range(2)]
+    for one in sums:
+        b.store(e.constant(0.0), one)
+
+    def add(c, one):
+        factor = e.spread(e.number(factors, b.add(factors_at, c)))
+        e.add_product(one, e.load(table, b.add(at, b.mul(c, width))), factor)
+
+    with cgutils.for_range(b, b.udiv(count, e.index(2))) as pairs:
+        c = e.times(pairs.index, 2)
+        add(c, sums[0])
+        add(b.add(c, e.index(1)), sums[1])
+    with b.if_then(b.trunc(count, ir.IntType(1))):
+        add(b.sub(count, e.index(1)), sums[0])
+    return e.total(*sums)
+
+
+@_operation(lanes=GROUP)
+def add_columns(e, table, at, width, count, factors, factors_at, out, out_at):
+    """Write the sum over c < ``count`` of factor c times column c of a table (columns, width), a multiple of 4."""
+    with e.vectors(width) as rows:
+        first = e.times(rows.index, GROUP)
+        answer = _columns(e, table, e.builder.add(at, first), width, count, factors, factors_at)
+        e.store(answer, out, e.builder.add(out_at, first))
+
+
+@_operation(lanes=GROUP)
+def next_term(e, table, at, width, count, series, older_at, old_at, weight, share, out_at):
+    """Add to the series from ``out_at`` on ``count`` columns times what is older and ``weight`` times ``count`` more
+    times what is old; then multiply all of it by ``share``."""
+    b = e.builder
+    weights, shares = e.spread(weight), e.spread(share)
+    with e.vectors(width) as rows:
+        first = e.times(rows.index, GROUP)
+        begin, place = b.add(at, first), b.add(out_at, first)
+        known = b.fadd(e.load(series, place), _columns(e, table, begin, width, count, series, older_at))
+        new = _columns(e, table, b.add(begin, b.mul(count, width)), width, count, series, old_at)
+        e.store(b.fmul(shares, e.fma(weights, new, known)), series, place)
+
+
+@_operation(types.float64)
+def item(e, own, at):
+    """Number at a place that is not negative: numba's own indexing first asks for that."""
+    return e.number(own, at)
+
+
+@_operation(types.float64)
+def fma(e, a, b, c):
+    """Product of the first two plus the third, with one rounding."""
+    return e.builder.fma(a, b, c)

@@ -7,8 +7,9 @@ import numpy as np
 from chaosgym.core.event_tables import Tables
 from chaosgym.core.propagator import Regimes
 
-FREE, UPPER_STOP, LOWER_STOP = 0, 1, 2
-"""Where the tip is pressed: nowhere, or against a stop; rows of what differs between the three."""
+FREE, UPPER_STOP, LOWER_STOP = np.int64(0), np.int64(1), np.int64(2)
+"""Where the tip is pressed: nowhere, or against a stop; rows of what differs between the three. Integers of numpy, as
+numba compiles a kernel anew for each plain number that it is called with."""
 
 STOP, LOAD = 0, 1
 """Parts of a position of rest: per unit position of the stop that presses, and under the static force."""

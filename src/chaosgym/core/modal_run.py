@@ -1,6 +1,7 @@
 """One run of a machine of a few modes: what its tables become at one speed, force and gap, and how coordinates move.
 
 Modal coordinates u (W,) are those of ``lanes``: first and second coordinate of each block, then the drive's harmonics.
+All that a run reads lies in two arrays of numbers and one of places in them.
 """
 
 import math
@@ -16,23 +17,41 @@ from chaosgym.core.event_tables import (
     A,
     V,
     X,
+    drive_places,
     make_tables,
+    put_drive,
     shortest_intervals,
-    with_drive,
+    table_places,
 )
-from chaosgym.core.kernel import inlined, leaf
-from chaosgym.core.lanes import combine, dot, dot_of_sizes, sample, turn, turn_and_expand
+from chaosgym.core.kernel import leaf, part
+from chaosgym.core.lanes import LANES, aligned, combine, dot, dot_of_sizes, padded, sample, turn, turn_and_expand
 from chaosgym.core.modal_model import FREE, LOAD, LOWER_STOP, STOP, UPPER_STOP
-from chaosgym.core.propagator import block
+from chaosgym.core.propagator import exponential
 
-SHOWN_BEND, POSITION, STIFFNESS, DAMPING = 5, 6, 7, 8
-"""Columns of ``Run.numbers`` after the rows of ``now``: rate of SHOWN_RATE; position, spring, damper of the stop."""
+SHOWN_BEND, POSITION, STIFFNESS, DAMPING, SHORTEST, NUMBERS = range(5, 11)
+"""Numbers of FREE, UPPER_STOP and LOWER_STOP after the rows of ``now``, which are added to what coordinates show: rate
+of SHOWN_RATE; position, spring and damper of the stop; shortest interval [s]; how many numbers there are."""
 
-REST, DRIFT, BEND, INTO, BACK = 0, 1, 2, 3, 4
-"""Rows of ``Run.constants``."""
+REST, DRIFT, BEND, INTO, BACK, CONSTANTS = range(6)
+"""Constants (2L,) of the same three, in modal coordinates: position of rest; rate of the coordinates that have none,
+and half of its own rate; of the change from FREE to the stop and back; how many there are."""
 
-VALUES, SLOPES, SERIES, FORCE = 0, 1, 2, 3
-"""Rows of ``Run.space``."""
+VALUES, SLOPES, SERIES, SPACE = 7, 23, 32, 64
+"""Work space: what a regime shows, and its rate, now and at eight instants ahead, 9 numbers each; Taylor coefficients
+of it, then of the force of a stop that does not press, 16 each; its size."""
+
+BLOCKS, LANES_OF, HARMONICS, WIDTH, CONSTANT, NUMBER, U, SPARE, WORK, WEIGHTS = range(10)
+"""Entries of ``Run.at``: sizes n, L, H and W; where constants, numbers, coordinates, room for others, work space and
+weights begin in ``own``."""
+
+AHEAD, TURN, FINER, GENERATOR, TAYLOR, SWITCH = range(10, 16)
+"""Where tables begin in a row of the structure."""
+
+DRIVEN_AHEAD, DRIVEN_TAYLOR, DRIVEN_SWITCH, DRIVEN_TURN, NOW, BOUNDS, STEADY = range(16, 23)
+"""Where tables begin in a row of the drive."""
+
+TABLE_ROW, DRIVE_ROW, LEVELS_OF, PLACES = 23, 26, 29, 32
+"""Where the rows of FREE, UPPER_STOP and LOWER_STOP begin, and their levels; how many entries there are."""
 
 
 class Run(NamedTuple):
@@ -40,24 +59,13 @@ class Run(NamedTuple):
 
     Attributes
     ----------
-    ahead, turn, taylor, switch : arrays
-        As in ``Tables``; with ``driven_`` in front, as in ``Drive``.
-    shortest, fine, generator : arrays
-        As in ``Tables``.
-    now, bounds, levels : arrays
-        As in ``Drive``.
-    pressed : (3,) int
-        Regime of FREE, UPPER_STOP and LOWER_STOP.
-    constants : (3, 5, 2L)
-        Of the same three, in modal coordinates: position of rest; rate of the coordinates that have none, and half of
-        its own rate; constants of the change from FREE to a stop and back.
-    numbers : (3, 9)
-        Of the same three: what to add to what coordinates show, by row of ``now``, and the columns named above.
-    u, spare : (W,)
-        Modal coordinates, and room for others.
-    space : (4, 16)
-        What a regime shows, and its rate, now (7) and at eight instants ahead (8 to 15); Taylor coefficients of it, and
-        of the force of a stop that does not press.
+    tables : (...,)
+        Rows of ``Tables.values``.
+    own : (...,)
+        Rows of ``put_drive``; constants (3, CONSTANTS, 2L); numbers (3, NUMBERS); coordinates u (W,), room for others
+        (W,); work space (SPACE,); weights (n,) of the displacements, as in ``orthonormalise``.
+    at : (PLACES,) int
+        What lies where.
     period, omega : float
         Of the cycle [s], [rad/s].
     resolution : float
@@ -66,26 +74,9 @@ class Run(NamedTuple):
         1 if a coordinate has no position of rest, else 0.
     """
 
-    ahead: np.ndarray
-    turn: np.ndarray
-    taylor: np.ndarray
-    switch: np.ndarray
-    driven_ahead: np.ndarray
-    driven_turn: np.ndarray
-    driven_taylor: np.ndarray
-    driven_switch: np.ndarray
-    shortest: np.ndarray
-    fine: np.ndarray
-    generator: np.ndarray
-    now: np.ndarray
-    bounds: np.ndarray
-    levels: np.ndarray
-    pressed: np.ndarray
-    constants: np.ndarray
-    numbers: np.ndarray
-    u: np.ndarray
-    spare: np.ndarray
-    space: np.ndarray
+    tables: np.ndarray
+    own: np.ndarray
+    at: np.ndarray
     period: float
     omega: float
     resolution: float
@@ -94,79 +85,92 @@ class Run(NamedTuple):
 
 @njit(cache=True)
 def make_run(model, step_phase, event_tolerance):
-    """Run of a model, and the steady response (R, 2n, 2H) to its drive.
+    """Run of a model; ``step_phase`` is the angle [rad] by which the fastest mode turns in the shortest interval.
 
-    Tables are made anew if the model's are for another ``step_phase`` or too slow for the drive."""
+    ``event_tolerance`` is the error of an event's instant as such an angle. Tables are made anew if the model's are for
+    another ``step_phase`` or too slow for the drive.
+    """
     omega = 2.0 * math.pi * model.excitation_frequency
-    regimes = model.regimes
-    count, harmonics = regimes.fastest.shape[0], model.drive.shape[1]
+    regimes, tables = model.regimes, model.tables
+    count, n, harmonics = regimes.generator.shape[0], regimes.generator.shape[2], model.drive.shape[1]
     stiffness, damping = np.zeros(count), np.zeros(count)
     for stop in (UPPER_STOP, LOWER_STOP):
         stiffness[model.pressed[stop]] = model.contact_stiffness[stop - 1]
         damping[model.pressed[stop]] = model.contact_damping[stop - 1]
-    tables = model.tables
-    if tables.step_phase != step_phase or np.max(tables.shortest) * harmonics * omega > step_phase:
+    slowest = 0.0
+    for r in range(count):
+        slowest = max(slowest, tables.shortest[r])
+    if tables.step_phase != step_phase or slowest * harmonics * omega > step_phase:
         shortest = shortest_intervals(regimes, step_phase, harmonics * omega)
         tables = make_tables(regimes, stiffness, damping, step_phase, shortest)
-    forces = model.drive[0] + omega * omega * model.drive[1]
-    drive = with_drive(tables, regimes, stiffness, damping, forces, omega)
-    width, lanes = drive.now.shape[2], tables.turn.shape[4]
-    constants, numbers = np.zeros((3, 5, 2 * lanes)), np.zeros((3, 9))
-    drifts = _settle(model, tables.switch, constants, numbers)
-    run = Run(
-        tables.ahead,
-        tables.turn,
-        tables.taylor,
-        tables.switch,
-        drive.ahead,
-        drive.turn,
-        drive.taylor,
-        drive.switch,
-        tables.shortest,
-        tables.fine,
-        tables.generator,
-        drive.now,
-        drive.bounds,
-        drive.levels,
-        model.pressed,
-        constants,
-        numbers,
-        np.zeros(width),
-        np.zeros(width),
-        np.zeros((4, 16)),
-        1.0 / model.excitation_frequency,
-        omega,
-        event_tolerance / step_phase,
-        drifts,
-    )
-    return run, drive.steady
+    at, size = _places(n, harmonics, count, model.pressed)
+    own = aligned(size)
+    drive = np.empty((harmonics, 2, n))
+    for h in range(harmonics):
+        for k in range(2):
+            for i in range(n):
+                drive[h, k, i] = model.drive[0, h, k, i] + omega * omega * model.drive[1, h, k, i]
+    rows = own[: at[CONSTANT]].reshape((count, at[CONSTANT] // count))
+    levels = put_drive(tables, regimes, stiffness, damping, drive, omega, rows)
+    for g in range(3):
+        at[LEVELS_OF + g] = levels[model.pressed[g]]
+        own[at[NUMBER] + g * NUMBERS + SHORTEST] = tables.shortest[model.pressed[g]]
+    for i in range(n):
+        own[at[WEIGHTS] + i] = model.stiffness[i] if model.stiffness[i] != 0.0 else omega * omega
+    values = tables.values.reshape(tables.values.size)
+    period, resolution = 1.0 / model.excitation_frequency, event_tolerance / step_phase
+    drifts = _settle(model, values, own, at)
+    return Run(values, own, at, period, omega, resolution, drifts)
 
 
 @njit(cache=True)
-def _settle(model, switch, constants, numbers):
-    """Fill ``constants`` and ``numbers``; 1.0 if a coordinate has no position of rest, else 0.0."""
-    n, lanes = model.tip_shape.shape[0], switch.shape[4] // 2
+def _places(n, harmonics, count, pressed):
+    """``at`` of a run, and the size of ``own``."""
+    at = np.empty(PLACES, np.int64)
+    lanes = padded(n)
+    width = 2 * lanes + padded(2 * harmonics)
+    structure, drive = table_places(n), drive_places(n, harmonics)
+    at[BLOCKS], at[LANES_OF], at[HARMONICS], at[WIDTH] = n, lanes, harmonics, width
+    at[CONSTANT] = count * drive[7]
+    at[NUMBER] = at[CONSTANT] + 3 * CONSTANTS * 2 * lanes
+    at[U] = padded(at[NUMBER] + 3 * NUMBERS)
+    at[SPARE] = at[U] + width
+    at[WORK] = at[SPARE] + width
+    at[WEIGHTS] = at[WORK] + SPACE
+    at[AHEAD], at[TURN], at[FINER], at[GENERATOR], at[TAYLOR] = structure[:5]
+    at[SWITCH] = structure[7]
+    for k in range(7):
+        at[DRIVEN_AHEAD + k] = drive[k]
+    for g in range(3):
+        at[TABLE_ROW + g], at[DRIVE_ROW + g] = pressed[g] * structure[8], pressed[g] * drive[7]
+    return at, at[WEIGHTS] + n
+
+
+@njit(cache=True)
+def _settle(model, tables, own, at):
+    """Fill constants and numbers; 1.0 if a coordinate has no position of rest, else 0.0."""
+    n, lanes = at[BLOCKS], at[LANES_OF]
     turned, drifts = np.empty(2 * n), 0.0
     for g in range(3):
         r = model.pressed[g]
         stop = 0.0 if g == FREE else model.stops[g - 1]
-        numbers[g, POSITION] = stop
+        tip = own[at[NUMBER] + g * NUMBERS : at[NUMBER] + (g + 1) * NUMBERS]
+        tip[POSITION] = stop
         if not math.isfinite(stop):
             continue
         output, generator = model.regimes.output[r], model.regimes.generator[r]
-        rest = stop * model.rest[r, STOP] + model.rest[r, LOAD]
-        drift = stop * model.drift[r, STOP] + model.drift[r, LOAD]
-        for j in range(n):
-            turned[j] = generator[0, j] * drift[j] + generator[1, j] * drift[n + j]
-            turned[n + j] = generator[2, j] * drift[j] + generator[3, j] * drift[n + j]
-        tip = numbers[g]
+        first = at[CONSTANT] + g * CONSTANTS * 2 * lanes
         for i in range(2 * n):
-            lane = (i // n) * lanes + i % n
-            constants[g, REST, lane], constants[g, DRIFT, lane] = rest[i], drift[i]
-            constants[g, BEND, lane] = 0.5 * turned[i]
-            drifts = 1.0 if drift[i] != 0.0 else drifts
+            j, pair = i % n, (i // n) * 2
+            rest = stop * model.rest[r, STOP, i] + model.rest[r, LOAD, i]
+            drift = stop * model.drift[r, STOP, i] + model.drift[r, LOAD, i]
+            turned[i] = generator[pair, j] * (stop * model.drift[r, STOP, j] + model.drift[r, LOAD, j])
+            turned[i] += generator[pair + 1, j] * (stop * model.drift[r, STOP, n + j] + model.drift[r, LOAD, n + j])
+            lane = first + (i // n) * lanes + j
+            own[lane], own[lane + DRIFT * 2 * lanes], own[lane + BEND * 2 * lanes] = rest, drift, 0.5 * turned[i]
+            drifts = 1.0 if drift != 0.0 else drifts
             tip[X] += output[i] * model.rest[r, LOAD, i]
-            tip[V] += output[i] * drift[i]
+            tip[V] += output[i] * drift
             tip[A] += output[i] * turned[i]
         if g == FREE:
             tip[SHOWN], tip[SHOWN_RATE], tip[SHOWN_BEND] = tip[X], tip[V], tip[A]
@@ -178,175 +182,253 @@ def _settle(model, switch, constants, numbers):
         tip[SHOWN], tip[SHOWN_RATE] = k * penetration + d * side * tip[V], side * (k * tip[V] + d * tip[A])
         tip[SHOWN_BEND], tip[STIFFNESS], tip[DAMPING] = k * side * tip[A], k, d
     for g in (UPPER_STOP, LOWER_STOP):
-        r = model.pressed[g]
+        columns = at[TABLE_ROW + g] + at[SWITCH]
         for which in range(2):
             before, after, row = (FREE, g, INTO) if which == 0 else (g, FREE, BACK)
+            rest = at[CONSTANT] + before * CONSTANTS * 2 * lanes
             for lane in range(2 * lanes):
-                total = -constants[after, REST, lane]
-                for k in range(2):
-                    for j in range(n):
-                        total += switch[r, which, k, j, lane] * constants[before, REST, k * lanes + j]
-                constants[g, row, lane] = total
+                total = -own[at[CONSTANT] + after * CONSTANTS * 2 * lanes + lane]
+                for i in range(2 * n):
+                    value = tables[columns + (which * 2 * n + i) * 2 * lanes + lane]
+                    total += value * own[rest + (i // n) * lanes + i % n]
+                own[at[CONSTANT] + (g * CONSTANTS + row) * 2 * lanes + lane] = total
     return drifts
 
 
-@inlined
-def enter(run, steady, to_modal, g, state):
-    """Set u to a physical state (2n,) at phase zero of the drive."""
-    u, lanes, r = run.u, run.turn.shape[4], run.pressed[g]
-    n, harmonics = run.ahead.shape[4], run.driven_turn.shape[4]
+class Regime(NamedTuple):
+    """A run in the regime of FREE, UPPER_STOP or LOWER_STOP: where everything lies, read from ``Run.at`` once.
+
+    Tables of the structure are in ``tables``, all else in ``own``.
+    """
+
+    tables: np.ndarray
+    own: np.ndarray
+    blocks: int
+    lanes: int
+    harmonics: int
+    width: int
+    ahead: int
+    turn: int
+    fine: int
+    generator: int
+    taylor: int
+    driven_ahead: int
+    driven_taylor: int
+    driven_turn: int
+    now: int
+    bounds: int
+    steady: int
+    constants: int
+    numbers: int
+    u: int
+    spare: int
+    values: int
+    slopes: int
+    series: int
+    levels: int
+    shortest: float
+    shown: float
+    shown_rate: float
+    omega: float
+    drifts: float
+
+
+@part
+def regime_of(run, g):
+    """Regime of g."""
+    at, own = run.at, run.own
+    structure, drive, numbers = at[TABLE_ROW + g], at[DRIVE_ROW + g], at[NUMBER] + g * NUMBERS
+    return Regime(
+        run.tables,
+        own,
+        at[BLOCKS],
+        at[LANES_OF],
+        at[HARMONICS],
+        at[WIDTH],
+        structure + at[AHEAD],
+        structure + at[TURN],
+        structure + at[FINER],
+        structure + at[GENERATOR],
+        structure + at[TAYLOR],
+        drive + at[DRIVEN_AHEAD],
+        drive + at[DRIVEN_TAYLOR],
+        drive + at[DRIVEN_TURN],
+        drive + at[NOW],
+        drive + at[BOUNDS],
+        drive + at[STEADY],
+        at[CONSTANT] + g * CONSTANTS * 2 * at[LANES_OF],
+        numbers,
+        at[U],
+        at[SPARE],
+        at[WORK] + VALUES,
+        at[WORK] + SLOPES,
+        at[WORK] + SERIES,
+        at[LEVELS_OF + g],
+        own[numbers + SHORTEST],
+        own[numbers + SHOWN],
+        own[numbers + SHOWN_RATE],
+        run.omega,
+        run.drifts,
+    )
+
+
+@leaf
+def enter(run, to_modal, g, r, state):
+    """Set u to a physical state (2n,) at phase zero of the drive, in regime r of g."""
+    here = regime_of(run, g)
+    own, u, n, lanes, harmonics = here.own, here.u, here.blocks, here.lanes, here.harmonics
     for i in range(2 * n):
         lane = (i // n) * lanes + i % n
-        total = -run.constants[g, REST, lane]
+        total = -own[here.constants + lane]
         for k in range(harmonics):
-            total -= steady[r, i, k]
+            total -= own[here.steady + 2 * harmonics * i + k]
         for j in range(2 * n):
             total += to_modal[r, i, j] * state[j]
-        u[lane] = total
+        own[u + lane] = total
     for k in range(harmonics):
-        u[2 * lanes + k], u[2 * lanes + harmonics + k] = 1.0, 0.0
+        own[u + 2 * lanes + k], own[u + 2 * lanes + harmonics + k] = 1.0, 0.0
 
 
-@inlined
-def leave(run, steady, from_modal, g, state):
-    """Physical state (2n,) of u."""
-    u, spare, lanes, r = run.u, run.spare, run.turn.shape[4], run.pressed[g]
-    n, harmonics = run.ahead.shape[4], run.driven_turn.shape[4]
+@leaf
+def leave(run, from_modal, g, r, state):
+    """Physical state (2n,) of u in regime r of g."""
+    here = regime_of(run, g)
+    own, u, n, lanes, harmonics = here.own, here.u, here.blocks, here.lanes, here.harmonics
     for i in range(2 * n):
         lane = (i // n) * lanes + i % n
-        total = u[lane] + run.constants[g, REST, lane]
+        total = own[u + lane] + own[here.constants + lane]
         for k in range(2 * harmonics):
-            total += steady[r, i, k] * u[2 * lanes + k]
-        spare[i] = total
+            total += own[here.steady + 2 * harmonics * i + k] * own[u + 2 * lanes + k]
+        own[here.spare + i] = total
     for i in range(2 * n):
         total = 0.0
         for j in range(2 * n):
-            total += from_modal[r, i, j] * spare[j]
+            total += from_modal[r, i, j] * own[here.spare + j]
         state[i] = total
 
 
-@inlined
+@leaf
 def change(run, g, which):
     """Take u from FREE to the regime of stop g (``which`` 0), or back (1)."""
-    lanes, r = run.turn.shape[4], run.pressed[g]
-    combine(
-        run.switch[r, which],
-        run.driven_switch[r, which],
-        run.constants[g, INTO + which],
-        run.u,
-        run.ahead.shape[4],
-        lanes,
-        run.driven_turn.shape[4],
-        run.spare,
-    )
+    at, own = run.at, run.own
+    n, lanes, harmonics, u, spare = at[BLOCKS], at[LANES_OF], at[HARMONICS], at[U], at[SPARE]
+    columns = at[TABLE_ROW + g] + at[SWITCH] + which * 4 * n * lanes
+    driven = at[DRIVE_ROW + g] + at[DRIVEN_SWITCH] + which * 4 * harmonics * lanes
+    constant = at[CONSTANT] + (g * CONSTANTS + INTO + which) * 2 * lanes
+    combine(run.tables, columns, own, driven, constant, u, n, lanes, harmonics, spare)
     for lane in range(2 * lanes):
-        run.u[lane] = run.spare[lane]
+        own[u + lane] = own[spare + lane]
 
 
-@inlined
-def read(run, g, quantity, u):
-    """What u shows in the regime of g, by row of ``now``, without what the numbers add."""
-    return dot(run.now[run.pressed[g], quantity], u, u.shape[0])
+@part
+def number(run, g, which):
+    """A number of g."""
+    return run.own[run.at[NUMBER] + g * NUMBERS + which]
 
 
-@inlined
-def size_of(run, g, which):
-    """Bound of a derivative from now on in the regime of g, by row of ``bounds``."""
-    return dot_of_sizes(run.bounds[run.pressed[g], which], run.u, run.u.shape[0])
+@part
+def read(here, quantity, u):
+    """What coordinates show, by row of ``now``, without what the numbers add."""
+    return dot(here.own, here.now + quantity * here.width, u, here.width)
 
 
-@inlined
-def add_drift(run, g, time, u):
-    """What a constant force adds to coordinates without a position of rest."""
-    for lane in range(run.constants.shape[2]):
-        u[lane] += time * (run.constants[g, DRIFT, lane] + time * run.constants[g, BEND, lane])
-
-
-@inlined
-def jump(run, g, level, intervals, u, out):
-    """out = u after some intervals (1 to 8) of a level; ``out`` may be u."""
-    lanes, harmonics, r = run.turn.shape[4], run.driven_turn.shape[4], run.pressed[g]
-    turn(run.turn[r, level, intervals - 1], u, out, lanes)
-    if run.drifts != 0.0:
-        add_drift(run, g, intervals * math.ldexp(run.shortest[r], level), out)
-    for k in range(harmonics):
-        c, s = run.driven_turn[r, level, intervals - 1, 0, k], run.driven_turn[r, level, intervals - 1, 1, k]
-        cosine, sine = u[2 * lanes + k], u[2 * lanes + harmonics + k]
-        out[2 * lanes + k] = cosine * c - sine * s
-        out[2 * lanes + harmonics + k] = sine * c + cosine * s
-
-
-@inlined
-def place(run, g, time, u, out):
-    """out = u after a time within the shortest interval, or just before now; ``out`` may be u."""
-    lanes, harmonics, r = run.turn.shape[4], run.driven_turn.shape[4], run.pressed[g]
-    piece = run.shortest[r] / FINE
-    number = max(0, int(time / piece + 0.5))
-    turn_and_expand(run.fine[r, number], run.generator[r], u, time - number * piece, out, lanes)
-    if run.drifts != 0.0:
-        add_drift(run, g, time, out)
-    turn_drive(run.omega * time, harmonics, 2 * lanes, u, out)
+@part
+def size_of(here, which):
+    """Bound of a derivative from now on, by row of ``bounds``."""
+    return dot_of_sizes(here.own, here.bounds + which * here.width, here.u, here.width)
 
 
 @leaf
-def turn_drive(angle, harmonics, start, u, out):
-    """Let the harmonics of the drive, coordinates from ``start`` on, turn by once, twice ... an angle [rad]."""
+def add_drift(own, constants, lanes, time, u):
+    """What a constant force adds to coordinates without a position of rest; ``constants`` are those of the regime."""
+    drift, bend = constants + DRIFT * 2 * lanes, constants + BEND * 2 * lanes
+    for lane in range(2 * lanes):
+        own[u + lane] += time * (own[drift + lane] + time * own[bend + lane])
+
+
+@part
+def jump(here, level, intervals, u, out):
+    """Put coordinates after some intervals (1 to 8) of a level at ``out``, which may be u."""
+    own, lanes, harmonics = here.own, here.lanes, here.harmonics
+    instant = LANES * level + intervals - 1
+    turn(here.tables, here.turn + instant * 4 * lanes, own, u, out, lanes)
+    if here.drifts != 0.0:
+        add_drift(own, here.constants, lanes, intervals * math.ldexp(here.shortest, level), out)
+    angles, first = here.driven_turn + instant * 2 * harmonics, 2 * lanes
+    for k in range(harmonics):
+        c, s = own[angles + k], own[angles + harmonics + k]
+        cosine, sine = own[u + first + k], own[u + first + harmonics + k]
+        own[out + first + k] = cosine * c - sine * s
+        own[out + first + harmonics + k] = sine * c + cosine * s
+
+
+@part
+def place(here, time, u, out):
+    """Put coordinates after a time within the shortest interval, or just before now, at ``out``, which may be u."""
+    own, lanes = here.own, here.lanes
+    piece = here.shortest / FINE
+    instant = max(0, int(time / piece + 0.5))
+    entries = here.fine + instant * 4 * lanes
+    turn_and_expand(here.tables, entries, here.generator, own, u, time - instant * piece, out, lanes)
+    if here.drifts != 0.0:
+        add_drift(own, here.constants, lanes, time, out)
+    turn_drive(own, here.omega * time, here.harmonics, u + 2 * lanes, out + 2 * lanes)
+
+
+@leaf
+def turn_drive(own, angle, harmonics, u, out):
+    """Let the harmonics of the drive, which begin at ``u``, turn by once, twice ... an angle [rad]."""
     for k in range(harmonics):
         c, s = math.cos((k + 1) * angle), math.sin((k + 1) * angle)
-        cosine, sine = u[start + k], u[start + harmonics + k]
-        out[start + k] = cosine * c - sine * s
-        out[start + harmonics + k] = sine * c + cosine * s
+        cosine, sine = own[u + k], own[u + harmonics + k]
+        own[out + k] = cosine * c - sine * s
+        own[out + harmonics + k] = sine * c + cosine * s
 
 
 @leaf
-def turn_blocks(generator, blocks, time, u, out):
-    """Blocks of exp(B time) times u, for any time."""
-    lanes = generator.shape[1]
-    for j in range(blocks):
-        e11, e12, e21, e22 = block(generator, j, time)
-        first, second = u[j], u[lanes + j]
-        out[j] = e11 * first + e12 * second
-        out[lanes + j] = e21 * first + e22 * second
-
-
-@inlined
 def travel(run, g, time, u, out):
-    """out = u after any time; ``out`` may be u."""
-    turn_blocks(run.generator[run.pressed[g]], run.ahead.shape[4], time, u, out)
-    if run.drifts != 0.0:
-        add_drift(run, g, time, out)
-    turn_drive(run.omega * time, run.driven_turn.shape[4], 2 * run.turn.shape[4], u, out)
+    """Put coordinates after any time in the regime of g at ``out``, which may be u."""
+    here = regime_of(run, g)
+    own, tables, lanes = here.own, here.tables, here.lanes
+    for j in range(here.blocks):
+        k = here.generator + j
+        p, q, r, s = tables[k], tables[k + lanes], tables[k + 2 * lanes], tables[k + 3 * lanes]
+        e11, e12, e21, e22 = exponential(p, q, r, s, time)
+        first, second = own[u + j], own[u + lanes + j]
+        own[out + j] = e11 * first + e12 * second
+        own[out + lanes + j] = e21 * first + e22 * second
+    if here.drifts != 0.0:
+        add_drift(own, here.constants, lanes, time, out)
+    turn_drive(own, here.omega * time, here.harmonics, u + 2 * lanes, out + 2 * lanes)
 
 
-@inlined
-def look(run, g, level, scale, value, slope):
-    """Fill ``space`` with what the regime of g shows now and after 1 to 8 intervals of a level.
+@part
+def look(here, level, scale, value, slope):
+    """Fill the work space with what the regime shows now and after 1 to 8 intervals of a level.
 
     Times ``scale``, and without the constant that the numbers add; ``value`` and ``slope`` are those of now.
     """
-    r, values, slopes = run.pressed[g], run.space[VALUES], run.space[SLOPES]
-    blocks, lanes, harmonics = run.ahead.shape[4], run.turn.shape[4], run.driven_turn.shape[4]
-    free, driven = run.ahead[r, level], run.driven_ahead[r, level]
-    sample(free, driven, run.u, blocks, lanes, harmonics, scale, values, 8, slopes, 8)
-    if run.drifts != 0.0:
-        rate, bend = run.numbers[g, SHOWN_RATE], run.numbers[g, SHOWN_BEND]
-        for i in range(8):
-            time = (i + 1) * math.ldexp(run.shortest[r], level)
-            values[8 + i] += time * (rate + 0.5 * time * bend)
-            slopes[8 + i] += rate + time * bend
-    values[7], slopes[7] = value, slope
+    own, n, harmonics, values, slopes = here.own, here.blocks, here.harmonics, here.values, here.slopes
+    free, driven = here.ahead + level * 4 * n * LANES, here.driven_ahead + level * 4 * harmonics * LANES
+    sample(here.tables, free, own, driven, here.u, n, here.lanes, harmonics, scale, values + 1, slopes + 1)
+    if here.drifts != 0.0:
+        rate, bend = here.shown_rate, own[here.numbers + SHOWN_BEND]
+        for i in range(1, 9):
+            time = i * math.ldexp(here.shortest, level)
+            own[values + i] += time * (rate + 0.5 * time * bend)
+            own[slopes + i] += rate + time * bend
+    own[values], own[slopes] = value, slope
 
 
-@inlined
-def expand(run, g, scale):
-    """Fill ``space`` with the Taylor series of what the regime of g shows times ``scale``, without its constant.
+@part
+def expand(here, scale):
+    """Fill the work space with the Taylor series of what the regime shows times ``scale``, without its constant.
 
     Time counts in shortest intervals.
     """
-    r, series = run.pressed[g], run.space[SERIES]
-    blocks, lanes, harmonics = run.ahead.shape[4], run.turn.shape[4], run.driven_turn.shape[4]
-    sample(run.taylor[r], run.driven_taylor[r], run.u, blocks, lanes, harmonics, scale, series, 0, series, 8)
-    if run.drifts != 0.0:
-        shortest = run.shortest[r]
-        series[1] += shortest * run.numbers[g, SHOWN_RATE]
-        series[2] += 0.5 * shortest * shortest * run.numbers[g, SHOWN_BEND]
+    own, n, harmonics, series, shortest = here.own, here.blocks, here.harmonics, here.series, here.shortest
+    free, driven, lanes = here.taylor, here.driven_taylor, here.lanes
+    sample(here.tables, free, own, driven, here.u, n, lanes, harmonics, scale, series, series + 8)
+    if here.drifts != 0.0:
+        own[series + 1] += shortest * here.shown_rate
+        own[series + 2] += 0.5 * shortest * shortest * own[here.numbers + SHOWN_BEND]

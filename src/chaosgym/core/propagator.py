@@ -51,14 +51,19 @@ def turns(generator, j):
 
 
 @njit(cache=True, inline="always")
+def exponential(p, q, r, s, time):
+    """Entries (11, 12, 21, 22) of exp(B time) for a block B = [[p, q], [r, s]]."""
+    if r != 0.0:
+        decay, angle = math.exp(p * time), r * time
+        cosine, sine = decay * math.cos(angle), decay * math.sin(angle)
+        return cosine, -sine, sine, cosine
+    return math.exp(p * time), q * time, 0.0, math.exp(s * time)
+
+
+@njit(cache=True, inline="always")
 def block(generator, j, time):
     """Entries (11, 12, 21, 22) of exp(B time) for block j of a regime's generator (4, n)."""
-    if turns(generator, j):
-        decay = math.exp(generator[0, j] * time)
-        angle = generator[2, j] * time
-        c, s = decay * math.cos(angle), decay * math.sin(angle)
-        return c, -s, s, c
-    return math.exp(generator[0, j] * time), generator[1, j] * time, 0.0, math.exp(generator[3, j] * time)
+    return exponential(generator[0, j], generator[1, j], generator[2, j], generator[3, j], time)
 
 
 @leaf

@@ -356,7 +356,7 @@ def comes_to_rest(model, tip, side, speed, push):
 
 
 @njit(cache=True, nogil=True)
-def advance_restitution(model, state, episode, arrays, step_phase, event_budget, tangents=None):
+def advance_restitution(model, state, episode, arrays, step_phase, event_budget, tangents):
     """Advance ``state`` (2,) and ``episode`` in place by whole cycles; see ``modal_impact.advance``.
 
     A tip that starts beyond a surface is put on it.
@@ -369,6 +369,7 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
     fastest = max(model.regimes.fastest[0], omega)
     load = shape * model.force_shape[0] * model.force_amplitude
     tip = Tip(model.stiffness[0], model.damping[0, 0], load, omega, fastest, 1.0 / shape**2)
+    carries = tangents.vectors.shape[0] > 0
     u, moved, spare, series = np.empty(4), np.empty(4), np.empty(4), np.empty(SERIES_TERMS)
 
     for cycle in range(arrays.section.shape[0]):
@@ -383,7 +384,7 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
             arrays.impacts[cycle, column] = 0
             arrays.contact_time[cycle, column] = 0.0
             arrays.bounce_time[cycle, column] = 0.0
-        if tangents is not None:
+        if carries:
             tangents.log_growth[cycle] = 0.0
         time, sample, events = 0.0, 0, 0
         side = 1.0 if x > 0.0 else -1.0
@@ -405,7 +406,7 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
                 push = side * acceleration(tip, x, 0.0, time)
                 if comes_to_rest(model, tip, side, abs(v), push):
                     v = 0.0
-                if tangents is not None and v != 0.0:
+                if carries and v != 0.0:
                     rebound(model, tip, x, side * speed, time, tangents.vectors)
             column = UPPER if side > 0.0 else LOWER
             rests = c == 0.0 or (v == 0.0 and abs(x) == c and push > 0.0 and not released)
@@ -413,7 +414,7 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
             if rests:
                 elapsed = min(hold(tip, c, side, time), period - time)
                 last, released = elapsed == period - time, True
-                if tangents is not None:
+                if carries:
                     tangents.vectors[:] = tangents.vectors * FORGOTTEN
                 arrays.peak_force[cycle, column] = max(
                     arrays.peak_force[cycle, column], largest_hold(tip, c, side, time, elapsed)
@@ -436,7 +437,7 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
                 sample = sample_flight(
                     model, beam, tip, x, v, time, elapsed, False, sample, period, u, moved, arrays.history[cycle]
                 )
-                if tangents is not None:
+                if carries:
                     carry(model.stiffness, model.regimes, 0, elapsed, tangents, cycle, spare)
                 x, v, released = x1, v1, False
             time += elapsed
@@ -449,7 +450,7 @@ def advance_restitution(model, state, episode, arrays, step_phase, event_budget,
 
         arrays.events[cycle] = events
         state[0], state[1] = x / shape, v / shape
-        if tangents is not None:
+        if carries:
             orthonormalise(model.stiffness, tangents, cycle)
         if not (math.isfinite(state[0]) and math.isfinite(state[1])):
             return status.DIVERGED, cycle

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from chaosgym.core.kernel import leaf
 from chaosgym.core.propagator import move
@@ -41,6 +42,12 @@ class Tangents(NamedTuple):
 
     vectors: np.ndarray
     log_growth: np.ndarray
+
+
+@register_jitable
+def no_tangents(states: int, cycles: int) -> Tangents:
+    """Return no deviations of a machine of so many states over so many cycles."""
+    return Tangents(np.empty((0, states)), np.empty((cycles, 0)))
 
 
 @leaf

@@ -5,6 +5,7 @@ from numba import njit, prange
 from chaosgym.core.batch import beam_of, episode_of, rigid_beam_of
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.modal_impact import advance as advance_beam
+from chaosgym.core.modal_run import make_run
 from chaosgym.core.restitution import advance_restitution
 from chaosgym.core.tangent import Tangents
 
@@ -34,13 +35,13 @@ def cycle_of(arrays, k, c):
 def _vary_beam(batch, regimes, tables, i, speeds, motions, vectors, growth, arrays, settings, k):
     for c in range(speeds.shape[1]):
         batch.excitation_frequency[i] = speeds[k, c]
+        model = beam_of(batch, regimes, tables, i)
         outcome = advance_beam(
-            beam_of(batch, regimes, tables, i),
+            make_run(model, settings.step_phase, settings.event_tolerance),
+            model,
             motions.coordinates[i],
             episode_of(motions, i),
             cycle_of(arrays, k, c),
-            settings.step_phase,
-            settings.event_tolerance,
             settings.event_budget,
             Tangents(vectors[i], growth[k, c : c + 1]),
         )[0]

@@ -18,9 +18,10 @@ from chaosgym.core.event_tables import make_tables, shortest_intervals
 from chaosgym.core.fixed_step import advance_fixed_step
 from chaosgym.core.modal_impact import advance
 from chaosgym.core.modal_model import ModalImpactModel
+from chaosgym.core.modal_run import make_run
 from chaosgym.core.propagator import Regimes
 from chaosgym.core.restitution import RestitutionModel, advance_restitution
-from chaosgym.core.tangent import Tangents
+from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.machines.batch import CompiledBatch, ModalImpactBatch, RestitutionBatch
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.linear_impact import linear_impact
@@ -336,13 +337,13 @@ class ModalImpactMachine(Machine):
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
         model = self.reduce()
         motion = (model, coordinates, Episode(side=bouncing[:1], touch=bouncing[1:]), arrays)
-        along = () if tangents is None else (tangents,)
+        along = tangents or no_tangents(len(coordinates), len(arrays.section))
         if isinstance(integrator, ExactEvents):
             step, tolerance, budget = integrator.step_phase, integrator.event_tolerance, integrator.event_budget
             if isinstance(model, ModalImpactModel):
-                outcome = call(advance, *motion, step, tolerance, budget, *along)
+                outcome = call(advance, call(make_run, model, step, tolerance), *motion, budget, along)
             else:
-                outcome = call(advance_restitution, *motion, step, budget, *along)
+                outcome = call(advance_restitution, *motion, step, budget, along)
         elif isinstance(model, ModalImpactModel):
             outcome = call(advance_fixed_step, *motion, integrator.steps_per_cycle)
         else:
