@@ -8,6 +8,7 @@ from chaosgym.diagnosis import diagnose
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam, SliderCrank
 from chaosgym.machines.parameters import with_settings
+from chaosgym.simulation import RungeKutta4
 
 
 @pytest.mark.parametrize(("frequency", "period"), [(10.0, 1), (19.0, 1), (22.0, 4)])
@@ -20,6 +21,25 @@ def test_periodic_responses_are_certified(frequency, period):
     assert verdict.evidence["largest_lyapunov_exponent_per_cycle"]["value"] < 0.0
     assert verdict.settle_cycle is not None
     assert json.dumps(verdict.as_dict())
+
+
+def test_what_soon_repeats_is_proven_at_once():
+    """At 10 Hz 32 cycles are enough; label and peak are those of the stages that start at 100 cycles."""
+    beam = ImpactBeam(excitation_frequency=10.0)
+    early = diagnose(beam)
+    late = diagnose(beam, integrator=RungeKutta4(8000))
+    assert (early.nature, early.period, early.status, early.horizon) == ("periodic", 1, "certified", 32)
+    assert (late.nature, late.period, late.horizon) == ("periodic", 1, 100)
+    assert early.evidence["largest_peak"] == pytest.approx(late.evidence["largest_peak"], rel=1e-3)
+    assert early.votes == {"two_step": "periodic", "lyapunov": "periodic", "newton": "periodic"}
+
+
+def test_step_two_runs_where_the_exponent_does_not_decide():
+    """Chaos by an exponent far from zero has no 0-1 statistic; the verdict says what decided it."""
+    verdict = diagnose(ImpactBeam(), budget=400)
+    assert verdict.votes["lyapunov"] == "chaotic"
+    assert "zero_one" not in verdict.votes
+    assert "exponent" in verdict.reason
 
 
 def test_chaos_of_the_beam_is_agreed():

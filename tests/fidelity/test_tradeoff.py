@@ -8,8 +8,9 @@ from click.testing import CliRunner
 
 from chaosgym.cli import app
 from chaosgym.errors import ParameterError
+from chaosgym.fidelity.sample import operating_points
 from chaosgym.fidelity.stability import StabilityCell, StabilityMap
-from chaosgym.fidelity.tradeoff import operating_points, settings_of, tradeoff
+from chaosgym.fidelity.tradeoff import settings_of, tradeoff
 from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.plotting.fidelity import stability_figure, tradeoff_figure
 

@@ -1,14 +1,17 @@
 """The diagnosis of a machine: it runs in stages, each twice as long, until the verdict is sure.
 
-After 100, 200, 400 ... cycles from the initial condition:
+A motion that repeats after 16 or 32 cycles already is handed to Newton's method: if that proves the orbit, it is
+periodic, certified. All others start again with a deviation that travels along. After 100, 200, 400 ... cycles:
 
     it repeats, or nearly    Newton's method proves the orbit: periodic, certified. Where it can't (near grazing), a
                              largest exponent below zero confirms the recurrence: periodic, agreed
     it does not              go on. At the end of the budget an exponent above three standard errors makes it chaotic,
                              one within them, with the figures of step II, quasiperiodic
 
-On machines whose matrices depend on their configuration the Matrix Update Test votes too (flow chart of figure 5.5).
-Chaos that dies out within the horizon counts as chaotic (thesis 5.2.3), with the status "transient".
+Tests that cost much run where they can change the verdict: step II, with the 0-1 test, where the exponent does not
+decide, and the Matrix Update Test (flow chart of figure 5.5), on machines whose matrices depend on their
+configuration, where no orbit is proven. Chaos that dies out within the horizon counts as chaotic (thesis 5.2.3), with
+the status "transient".
 """
 
 from dataclasses import dataclass, replace
@@ -17,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.diagnosis.lyapunov import Deviation, LyapunovExponent, average_growth
+from chaosgym.diagnosis.lyapunov import BLOCKS, Deviation, LyapunovExponent, average_growth
 from chaosgym.diagnosis.matrix_update import (
     FIELD,
     depends_on_configuration,
@@ -34,9 +37,12 @@ from chaosgym.diagnosis.two_step import (
 )
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
-from chaosgym.simulation import CycleRecord, Integrator, MotionState, simulate
+from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, MotionState, simulate
 
 Array = NDArray[np.float64]
+
+EARLY = (16, 32)
+"""Cycles after which a motion that repeats is tried for a proof, before any deviation travels along."""
 
 FIRST_STAGE = 100
 """Cycles of the first stage."""
@@ -83,7 +89,7 @@ def diagnose(
     initial_state
         Rest by default; part of the label.
     budget
-        Cycles that the last stage may reach, at least 100. Chaos takes them all, a periodic response mostly 100.
+        Cycles that the last stage may reach, at least 100. Chaos takes them all, a periodic response mostly 16 to 100.
     sensor_error
         Peak forces [N] that differ by less count as equal (thesis 3.6: 3 N); 0 judges exactly. Small clearances give
         chaos whose peak forces differ by a fraction of a newton, which no sensor would tell from a period.
@@ -107,7 +113,8 @@ def diagnose(
     verdict, record = diagnosed_run(
         machine, initial_state=initial_state, budget=budget, sensor_error=sensor_error, integrator=integrator
     )
-    return _with_update_test(machine, verdict, record, sensor_error) if depends_on_configuration(machine) else verdict
+    decides = verdict.status == "agreed" and sensor_error == 0.0
+    return _with_update_test(machine, verdict, record) if decides and depends_on_configuration(machine) else verdict
 
 
 def diagnosed_run(
@@ -121,22 +128,12 @@ def diagnosed_run(
     """``diagnose`` without the vote of the Matrix Update Test, and the very run that was judged."""
     if budget < FIRST_STAGE:
         raise DiagnosisError(f"budget = {budget} cycles is out of range; allowed: {FIRST_STAGE} or more")
-    deviation = Deviation(machine, initial_state, integrator)
-    record, growth = deviation.run(FIRST_STAGE)
-    searched = 0
-    while True:
-        stage = _stage(machine, record, growth, searched)
-        last = 2 * len(record) > budget
-        if last or _periodic(stage) or _periodic_within(stage, sensor_error):
-            if stage.verdict.nature == "undetermined":
-                # only the last stage needs step II
-                stage = replace(stage, verdict=two_step_test(record))
-            verdict = _periodic(stage) or _periodic_within(stage, sensor_error)
-            break
-        searched = stage.cycles_used - len(record)
-        more, more_growth = deviation.run(len(record))
-        record, growth = record.followed_by(more), np.concatenate([growth, more_growth])
-    verdict = verdict or _not_periodic(stage)
+    exact = integrator is None or isinstance(integrator, ExactEvents)
+    stage = _proven_early(machine, initial_state, integrator) if exact else None
+    if stage is None:
+        stage = _last_stage(machine, Deviation(machine, initial_state, integrator), budget, sensor_error)
+    record = stage.record
+    verdict = _periodic(stage) or _periodic_within(stage, sensor_error) or _not_periodic(stage)
     evidence = _evidence(stage, verdict, initial_state)
     if stage.orbit is not None:
         evidence["largest_peak"] = float(np.max(simulate(machine, stage.orbit.period, stage.orbit.state).peak_force))
@@ -144,7 +141,46 @@ def diagnosed_run(
     return verdict, record
 
 
-def _with_update_test(machine: Machine, verdict: Diagnosis, record: CycleRecord, sensor_error: float) -> Diagnosis:
+def _proven_early(
+    machine: Machine, initial_state: MotionState | ArrayLike | None, integrator: Integrator | None
+) -> _Stage | None:
+    """The stage in which a motion that soon repeats is proven to do so, else None."""
+    record, searched = None, 0
+    for cycles in EARLY:
+        if record is None:
+            record = simulate(machine, cycles, initial_state, integrator=integrator)
+        else:
+            more = simulate(machine, cycles - len(record), record.final_state, integrator=integrator)
+            record = record.followed_by(more)
+        verdict = two_step_test(record, repeats_only=True)
+        if verdict.settle_cycle is None or verdict.period is None:
+            continue
+        orbit, spent = _proven(machine, record, verdict.period)
+        searched += spent
+        if orbit is not None:
+            per_cycle = np.full(2 * BLOCKS, np.log(max(orbit.largest_multiplier, 1e-300)) / orbit.period)
+            exponent = average_growth(per_cycle, machine.cycle_period)
+            return _Stage(record, per_cycle, verdict, exponent, orbit, len(record) + searched)
+    return None
+
+
+def _last_stage(machine: Machine, deviation: Deviation, budget: int, sensor_error: float) -> _Stage:
+    """The stage after which the motion is known to be periodic in the end, or the budget ends."""
+    record, growth = deviation.run(FIRST_STAGE)
+    searched = 0
+    while True:
+        stage = _stage(machine, record, growth, searched)
+        if 2 * len(record) > budget or _periodic(stage) or _periodic_within(stage, sensor_error):
+            break
+        searched = stage.cycles_used - len(record)
+        more, more_growth = deviation.run(len(record))
+        record, growth = record.followed_by(more), np.concatenate([growth, more_growth])
+    if stage.verdict.nature == "undetermined" and stage.exponent.sign <= 0:
+        return replace(stage, verdict=two_step_test(record))
+    return stage
+
+
+def _with_update_test(machine: Machine, verdict: Diagnosis, record: CycleRecord) -> Diagnosis:
     """Let the Matrix Update Test vote on a verdict, from the state in which the run ended."""
     interval = getattr(machine, FIELD)
     update = matrix_update_test(
@@ -156,9 +192,7 @@ def _with_update_test(machine: Machine, verdict: Diagnosis, record: CycleRecord,
     )
     evidence = {**verdict.evidence, "matrix_update": update.reason}
     evidence["cycles_used"] += 4 * UPDATE_CYCLES
-    status = verdict.status
-    if status == "agreed" and sensor_error == 0.0 and update.nature not in (verdict.nature, "undetermined"):
-        status = "disputed"
+    status: Status = "agreed" if update.nature in (verdict.nature, "undetermined") else "disputed"
     return replace(verdict, status=status, votes={**verdict.votes, "matrix_update": update.nature}, evidence=evidence)
 
 
@@ -167,25 +201,25 @@ def _stage(machine: Machine, record: CycleRecord, growth: Array, searched: int) 
     exponent = average_growth(growth[len(growth) // 2 :], machine.cycle_period)
     orbit, spent = None, 0
     if verdict.period is not None or exponent.sign < 0:
-        for period in _candidates(record, verdict):
-            found = find_periodic_orbit(machine, record.final_state, period)
-            spent += 8 * period
-            if found is not None and found.certified and approaches(machine, record, found):
-                orbit = primitive(machine, found)
-                spent += 6 * period
-                break
+        orbit, spent = _proven(machine, record, verdict.period or _best_return(record))
     return _Stage(record, growth, verdict, exponent, orbit, len(record) + searched + spent)
 
 
-def _candidates(record: CycleRecord, verdict: Diagnosis) -> tuple[int, ...]:
-    """Periods worth a search: that of the verdict, or else the one after which the state comes back best."""
-    if verdict.period is not None:
-        return (verdict.period,)
+def _proven(machine: Machine, record: CycleRecord, period: int) -> tuple[PeriodicOrbit | None, int]:
+    """The orbit that a motion approaches, if Newton's method proves one of this period, and the cycles that took."""
+    found = find_periodic_orbit(machine, record.final_state, period)
+    if found is None or not found.certified or not approaches(machine, record, found):
+        return None, 8 * period
+    return primitive(machine, found), 14 * period
+
+
+def _best_return(record: CycleRecord) -> int:
+    """The period after which the state comes back best."""
     states = record.section / np.ptp(record.section, axis=0).clip(1e-300)
     longest = min(MAX_SEARCHED_PERIOD, len(states) // 2)
     last = states[-4:]
     gaps = np.array([np.linalg.norm(last - states[-4 - k : -k]) for k in range(1, longest + 1)])
-    return (int(np.argmax(gaps <= 1.5 * gaps.min())) + 1,)
+    return int(np.argmax(gaps <= 1.5 * gaps.min())) + 1
 
 
 def primitive(machine: Machine, orbit: PeriodicOrbit) -> PeriodicOrbit:
@@ -297,12 +331,14 @@ def _not_periodic(stage: _Stage) -> Diagnosis:
 
 
 def _votes(stage: _Stage) -> dict[str, Nature]:
-    """What each test says of the last half of the record by itself."""
-    verdict = two_step_test(stage.record.after(len(stage.record) // 2))
-    figures = verdict.evidence
+    """What each test says by itself of what the motion does in the end."""
     by_sign: dict[int, Nature] = {1: "chaotic", -1: "periodic", 0: "undetermined"}
-    votes: dict[str, Nature] = {"two_step": verdict.nature, "lyapunov": by_sign[stage.exponent.sign]}
-    statistic = figures.get("zero_one")
+    repeats = stage.verdict.settle_cycle is not None
+    votes: dict[str, Nature] = {
+        "two_step": "periodic" if repeats else stage.verdict.nature,
+        "lyapunov": by_sign[stage.exponent.sign],
+    }
+    statistic = stage.verdict.evidence.get("zero_one")
     if statistic is not None:
         votes["zero_one"] = (
             "chaotic"

@@ -23,12 +23,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc, wasserstein_distance
+from scipy.stats import wasserstein_distance
 
 from chaosgym.diagnosis.response_type import SHARES, default_tolerances
 from chaosgym.diagnosis.two_step import two_step_test
 from chaosgym.diagnosis.type_rule import Neighbour, judge_type
-from chaosgym.errors import ChaosgymError, ParameterError
+from chaosgym.errors import ChaosgymError
+from chaosgym.fidelity.sample import balanced_points
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, RungeKutta4, parallel_map, simulate
@@ -43,12 +44,6 @@ FIRST_CYCLES = 2
 
 SAMPLES = 500
 """Samples of a cycle of those trajectories."""
-
-CHAOTIC_SHARE = 3
-"""One point in so many is chaotic, if the machine has enough of them."""
-
-MAX_DRAWS = 20
-"""Candidates that are judged for each point of the sample at most."""
 
 EXACT_STEP = 0.5
 """Angle [rad] by which the fastest mode turns in the shortest exact interval; the errors of others are equal."""
@@ -234,36 +229,6 @@ def settings_of(machine: Machine) -> list[Setting]:
     return [Setting(rung, "exact", EXACT_STEP) for rung in rungs] + [
         Setting(default, "Runge-Kutta 4", step) for step in FIXED_STEPS if fixed
     ]
-
-
-def operating_points(machine: Machine, count: int) -> Array:
-    """Speeds and clearances over the usual ranges, (count, 2): a Halton sequence, even in the logarithm."""
-    if count < 1:
-        raise ParameterError(f"points = {count} is out of range; allowed: 1 or more")
-    low, high = np.log([machine.usual_ranges[f] for f in (machine.speed_field, machine.clearance_field)]).T
-    spread = qmc.Halton(2, scramble=False).random(count + 1)[1:]
-    return np.asarray(np.exp(low + spread * (high - low)))
-
-
-def balanced_points(machine: Machine, count: int) -> Array:
-    """Speeds and clearances of the fixed sample, (count, 2), a third of them chaotic where there are enough.
-
-    Of ``operating_points`` those that come first of either kind; the machine itself tells the kinds apart.
-    """
-    wanted = {True: count // CHAOTIC_SHARE, False: count - count // CHAOTIC_SHARE}
-    chosen: list[Array] = []
-    spare: list[Array] = []
-    for point in operating_points(machine, MAX_DRAWS * count):
-        if not any(wanted.values()):
-            break
-        record = simulate(machine.at(*point.tolist()), 100, transient=100)
-        chaotic = two_step_test(record).nature == "chaotic"
-        if wanted[chaotic] > 0:
-            wanted[chaotic] -= 1
-            chosen.append(point)
-        else:
-            spare.append(point)
-    return np.array([*chosen, *spare][:count])
 
 
 def _measure(

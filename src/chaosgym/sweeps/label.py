@@ -51,7 +51,7 @@ def label_point(machine: Machine, budget: int, *, signals: bool = False) -> dict
         "reason": verdict.reason,
     }
     kept = _signals(machine, record) if signals else {}
-    settled = kept.get("settled_peak_force", record.peak_force[-WINDOW:, 0])
+    settled = kept.get("settled_peak_force", peaks[-WINDOW:])
     scatter = irregularity(settled)
     return {**label, **kept, "irregularity": scatter, "resolvable": scatter > SENSOR_ERROR}
 
