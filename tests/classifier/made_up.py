@@ -3,7 +3,7 @@
 import numpy as np
 import pyarrow as pa
 
-from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam
+from chaosgym.machines import ImpactBeam
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import LabelledSweep
 
@@ -45,7 +45,7 @@ def made_up_sweep(seed=0):
     columns["settled_peak_force"] = pa.array(late.astype(np.float32).tolist(), kind)
     for name, factor in (("peak_force", 1.0), ("displacement", 1e-5), ("velocity", 1e-3)):
         columns[f"start_{name}"] = pa.array((factor * start).astype(np.float32).tolist(), kind)
-    base = {name: getattr(THESIS_IMPACT_BEAM, name) for name in parameters_of(ImpactBeam)}
+    base = {name: getattr(ImpactBeam(), name) for name in parameters_of(ImpactBeam)}
     axes = [
         {"field": "excitation_frequency", "low": 4.0, "high": 30.0},
         {"field": "clearance", "low": 2e-5, "high": 2e-4},
