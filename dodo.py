@@ -28,7 +28,10 @@ POLICIES = {
     "ImpactBeamTolerance-v1": "python agents/ppo.py --env chaosgym/ImpactBeamTolerance-v1 --seed 0 --steps 900000 "
     "--units 128 --batch 1920 --rollout 120",
 }
-LADDER_OPTIONS = "--points 60 --cycles 200 --transient 100 --budget 4 --workers 1"
+LADDER_OPTIONS = {
+    "impact-beam": "--points 60 --cycles 200 --transient 100 --budget 4 --workers 1",
+    "slider-crank": "--points 60 --cycles 100 --transient 60 --budget 4 --workers 1",
+}
 
 
 def sources(*folders: str) -> list[str]:
@@ -105,7 +108,7 @@ def task_picture():
     rattle = "benchmarks/documentation/rattle.py"
     yield task("rattle", [rattle], ["docs/rattle.gif"], "python -m benchmarks.documentation.rattle docs/rattle.gif")
     for machine in SWEEPS:
-        for kind, options in (("tradeoff", LADDER_OPTIONS), ("stability", "")):
+        for kind, options in (("tradeoff", LADDER_OPTIONS[machine]), ("stability", "")):
             folder = "docs/development" if kind == "stability" else "docs"
             made, run = f"{folder}/{kind}-{machine}.png", f"{RUNS}/{kind}-{machine}"
             measure = f"chaosgym {kind} {machine} {options} --out {run}"
