@@ -39,7 +39,7 @@ def tradeoff(
     out: Path | None,
     as_json: bool,
 ) -> None:
-    """Measure every rung, integrator and step of a machine against its reference: cost, errors, Pareto front."""
+    """Measure every rung of a machine, and fixed steps, against its reference: cost, errors, Pareto front."""
     from chaosgym.fidelity.tradeoff import tradeoff as measure
 
     result = measure(
