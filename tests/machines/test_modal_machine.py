@@ -328,3 +328,38 @@ def test_commands_and_environments_take_the_file(machine_file, tmp_path):
     assert read_brief(brief).machine == chaosgym.read_machine(path)
     path.write_text(path.read_text().replace("4 N", "5 N"))
     assert "holds another sweep" in run("sweep", path, *axes)[1]
+
+
+def test_new_machine_writes_the_template_once(tmp_path):
+    """The command prints the template or the schema, and never writes over a file."""
+    run = CliRunner().invoke
+    assert run(app, ["new-machine"]).stdout == template()
+    assert run(app, ["new-machine", "--schema"]).stdout == schema_text()
+    path = tmp_path / "mine.toml"
+    assert str(path) in run(app, ["new-machine", "--out", str(path)]).stdout
+    assert path.read_text() == template()
+    assert "exists already" in run(app, ["new-machine", "--out", str(path)]).output
+
+
+def test_stability_tradeoff_and_pictures_take_the_file(machine_file):
+    """Every extreme ends in an answer or a named error, and a job is drawn."""
+    from chaosgym.fidelity.stability import stability_map
+
+    machine = chaosgym.read_machine(machine_file())
+    assert {cell.outcome for cell in stability_map(machine).cells} <= {"answer", "named error"}
+    env = gym.make("chaosgym/MachineWear-v0", machine=machine.name, render_mode="rgb_array")
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+    assert env.render().ndim == 3
+
+
+def test_wear_of_variants_keeps_each_offset():
+    """Clearances of a batch move about the middle of each machine's own gap."""
+    machines = [one_mode(offset=offset) for offset in (1e-4, -2e-4)]
+    batch = machines[0].batch(2)
+    for i, machine in enumerate(machines):
+        batch.start(i, machine)
+    batch.set_clearances(np.arange(2), np.full(2, 5e-4))
+    peaks = batch.run(np.arange(2), 12).peak_force
+    for found, machine in zip(peaks, machines, strict=True):
+        np.testing.assert_array_equal(found, simulate(machine.at(clearance=5e-4), 12).peak_force)
