@@ -193,7 +193,7 @@ def test_the_spec_makes_the_same_environment_again() -> None:
         ({"num_envs": 0}, "num_envs = 0 is out of range"),
         ({"max_episode_steps": 0}, "max_episode_steps = 0 is out of range"),
         ({"autoreset_mode": "never"}, "autoreset_mode = 'never' is not one of NextStep, SameStep, Disabled"),
-        ({"render_mode": "rgb_array"}, "render_mode = 'rgb_array' is not one of None"),
+        ({"render_mode": "human"}, "render_mode = 'human' is not one of None, rgb_array"),
         ({"clearence": 1e-3}, "did you mean clearance"),
     ],
 )
@@ -201,6 +201,23 @@ def test_bad_keywords_are_named(keywords: dict[str, Any], message: str) -> None:
     """Errors name the keyword, the value and what is allowed."""
     with pytest.raises(ParameterError, match=re.escape(message)):
         gym.make_vec(BEAM, **({"num_envs": 2} | keywords))
+
+
+def test_the_first_few_machines_are_drawn() -> None:
+    """A picture for each, as recorders expect; the first one is that of a single environment, bit for bit."""
+    envs, env = gym.make_vec(BEAM, num_envs=6, render_mode="rgb_array"), gym.make(BEAM, render_mode="rgb_array")
+    plain = gym.make_vec(BEAM, num_envs=6)
+    for each in (envs, env, plain):
+        each.reset(seed=3)
+    action = np.ones(6, int)
+    seen, unseen = envs.step(action), plain.step(action)
+    env.step(1)
+    assert np.array_equal(seen[0], unseen[0])
+    frames = envs.render()
+    assert [frame.shape for frame in frames] == 6 * [(640, 960, 3)]
+    assert np.array_equal(frames[0], env.render())
+    assert [bool((frame < 255).any()) for frame in frames] == [True] * 4 + [False] * 2
+    assert not np.array_equal(frames[1], frames[2])
 
 
 def test_bad_calls_are_named() -> None:

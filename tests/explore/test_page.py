@@ -18,7 +18,9 @@ DEEP = """
 const all = (root, want) => [...root.querySelectorAll('*')].flatMap(
     node => [...(node.matches(want) ? [node] : []), ...(node.shadowRoot ? all(node.shadowRoot, want) : [])]);
 const middle = node => {
-    const box = node.getBoundingClientRect(); return [box.x + box.width / 2, box.y + box.height / 2] };
+    const box = node.getBoundingClientRect();
+    return [box.x + box.width / 2, box.y + box.height / 2];
+};
 """
 """Elements inside of shadow roots, and where they are."""
 

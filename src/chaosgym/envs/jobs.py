@@ -72,7 +72,7 @@ class Jobs:
     damage : (N, sides)
         Share of its life that each surface has used up.
     traced
-        Whether ``pieces`` keeps where the last step of job 0 began, for pictures.
+        Number of the first jobs of which ``pieces`` keeps where the last step began, for pictures; a list each.
     """
 
     def __init__(self, rules: Rules, count: int) -> None:
@@ -89,7 +89,8 @@ class Jobs:
         self._changed = np.zeros(count, np.int64)
         self._clearance = np.zeros(count)
         self._job_time = task.job_cycles * float(nominal.period_at(task.highest_speed))
-        self.traced, self.pieces = False, list[Piece]()
+        self.traced = 0
+        self.pieces: list[list[Piece]] = [[] for _ in range(count)]
 
     def machine_at(self, i: int) -> Machine:
         """Machine of job i at its current speed and clearance."""
@@ -207,7 +208,8 @@ class Jobs:
         kicks = None
         if task.kick > 0.0:
             kicks = task.kick * np.array([g.standard_normal((count, half)) for g in generators])
-        self.pieces = []
+        for i in which[which < self.traced].tolist():
+            self.pieces[i] = []
         if kicks is None and isinstance(self.judge, ExponentJudge):
             self._trace(which, speeds)
             cycles, growth = self.batch.run_varied(which, speeds)  # type: ignore[attr-defined]
@@ -241,8 +243,9 @@ class Jobs:
         return Cycles(failed, *results), growth
 
     def _trace(self, which: Indices, speeds: Array) -> None:
-        if self.traced and which[0] == 0:
-            self.pieces.append(Piece(self.machine_at(0), speeds[0], *self.batch.motion(0)))
+        for k in np.flatnonzero(which < self.traced).tolist():
+            i = int(which[k])
+            self.pieces[i].append(Piece(self.machine_at(i), speeds[k], *self.batch.motion(i)))
 
     def _observe(self, which: Indices, cycles: Cycles, generators: Generators) -> Observation:
         rules, task = self.rules, self.rules.task

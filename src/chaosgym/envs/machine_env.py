@@ -5,7 +5,6 @@ motion goes on from the state in which the last step ended.
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import gymnasium as gym
@@ -23,13 +22,10 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.machines.registry import MACHINES
-from chaosgym.simulation import CycleRecord, MotionState, simulate
+from chaosgym.simulation import CycleRecord
 
 if TYPE_CHECKING:
     from chaosgym.envs.rendering import Dashboard
-
-RENDER_SAMPLES = 1000
-"""Samples of the motion kept in each cycle for rendering."""
 
 THE_ONE = np.zeros(1, np.int64)
 """Number of the one job."""
@@ -150,7 +146,7 @@ class MachineEnv(gym.Env[Observation, Any]):
         self.observation_space = cast(Space[Observation], self.workplace.space)
         self.action_space = cast(Space[Any], self.workplace.actions)
         self._job = Jobs(self.workplace.rules, 1)
-        self._job.traced = render_mode is not None
+        self._job.traced = 0 if render_mode is None else 1
         self._runs = False
         self._dashboard: Dashboard | None = None
 
@@ -218,20 +214,10 @@ class MachineEnv(gym.Env[Observation, Any]):
         return outcome.observation[0], float(outcome.reward[0]), not self._runs, False, info
 
     def _shown(self) -> CycleRecord:
-        """Last step with a time history, run once more from its start: showing it changes no bit of it."""
-        records: list[CycleRecord] = []
-        for piece in self._job.pieces:
-            state: MotionState | None = MotionState(piece.coordinates, piece.bouncing)
-            for speed in piece.speeds.tolist():
-                record = simulate(piece.machine.at(speed), 1, state, samples_per_cycle=RENDER_SAMPLES)
-                state = record.final_state
-                records.append(record)
-        records = records[-self.task.cycles_per_step :]
-        joined: dict[str, Any] = {
-            name: np.concatenate([getattr(record, name) for record in records])
-            for name in ("section", "displacement", "velocity", "peak_force", "impacts", "history")
-        }
-        return replace(records[-1], **joined)
+        """Last step with a time history."""
+        from chaosgym.envs.rendering import record_of
+
+        return record_of(self._job.pieces[0], self.task.cycles_per_step)
 
     def _show(self) -> "Dashboard":
         if self._dashboard is None:

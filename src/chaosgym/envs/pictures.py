@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
 from chaosgym.machines.slider_crank.kinematics import crank_pin, slider_position
@@ -17,6 +18,9 @@ Array = NDArray[np.float64]
 
 INK, PALE, CALM, WILD, LIMIT = "#1f2933", "#cbd2d9", "#1f77b4", "#d1495b", "#e09f3e"
 """Colours: text and bodies, background lines, repeating steps, steps that count as Type III, force limit."""
+
+STAYS = "stays"
+"""Mark (gid) of a text that does not change from step to step, so that it is drawn once."""
 
 GHOSTS = 60
 """Other positions shown behind the beam."""
@@ -55,18 +59,18 @@ def draw_beam(panel: Any, record: CycleRecord, colour: str, moment: float, force
     tip = samples_of(record)[:, 0] / beam.clearance * gap
     now = tip[_sample(record, moment)]
     along = np.linspace(0.0, 1.0, 2)
-    for deflection in tip[:: max(1, len(tip) // GHOSTS)]:
-        panel.plot(along, deflection * along, color=PALE, linewidth=1.2, alpha=0.45, solid_capstyle="round")
+    others = [np.column_stack([along, deflection * along]) for deflection in tip[:: max(1, len(tip) // GHOSTS)]]
+    panel.add_collection(LineCollection(others, color=PALE, linewidth=1.2, alpha=0.45, capstyle="round"), autolim=False)
     push = 0.65
-    panel.annotate(
-        "", (push, push * now - 0.02), (push, -0.24), arrowprops={"arrowstyle": "<|-|>", "color": INK, "lw": 1.2}
-    )
-    panel.text(push, -0.26, "shaker", ha="center", va="top", fontsize=8, color=INK)
+    panel.plot([push, push], [push * now - 0.03, -0.23], color=INK, linewidth=1.2)
+    panel.plot(push, push * now - 0.03, "^", color=INK, markersize=6)
+    panel.plot(push, -0.23, "v", color=INK, markersize=6)
+    panel.text(push, -0.26, "shaker", ha="center", va="top", fontsize=8, color=INK, gid=STAYS)
     panel.plot(along, now * along, color=INK, linewidth=6.0, solid_capstyle="round")
     panel.fill_between([-0.09, -0.05], -0.1, 0.1, color=PALE, linewidth=0)
     panel.plot([-0.05, 0.0], [0.0, 0.0], color=INK, linewidth=2.0)
     panel.plot(0.0, 0.0, marker="o", color="white", markeredgecolor=INK, markeredgewidth=2.5, markersize=9)
-    panel.text(-0.09, -0.12, "flexure pivot", ha="left", va="top", fontsize=8, color=INK)
+    panel.text(-0.09, -0.12, "flexure pivot", ha="left", va="top", fontsize=8, color=INK, gid=STAYS)
     for side, (name, sign) in enumerate(zip(beam.sides, (1.0, -1.0), strict=True)):
         peak = float(record.peak_force[:, side].max())
         edge = sign * (gap + 0.014)
@@ -83,8 +87,9 @@ def draw_beam(panel: Any, record: CycleRecord, colour: str, moment: float, force
     panel.set(xlim=(-0.1, 1.24), ylim=(-0.32, 0.32))
     panel.set_title(
         f"Beam in its gap of ±{beam.clearance * 1e3:.3g} mm, exaggerated; peak forces of the step",
-        fontsize=9,
+        fontsize=8.5,
         loc="left",
+        gid=STAYS,
         color=INK,
     )
     panel.axis("off")
@@ -99,6 +104,9 @@ class _CrankPositions(NamedTuple):
 
 GAP, SLIDER_HALF_HEIGHT, SLIDER_HALF_LENGTH = 9.0, 13.0, 24.0
 """Half gap at the slider and the slider itself as drawn [mm]."""
+
+BARS = 600
+"""Contact forces that are drawn, at the most."""
 
 BALL_GAP, BALL = 5.0, 5.0
 """Half gap at the ball joint and radius of the ball as drawn [mm]."""
@@ -145,8 +153,9 @@ def draw_crank(panel: Any, record: CycleRecord, colour: str, moment: float, forc
     places = _crank_positions(machine, angle, samples[:, 0])
     now = _sample(record, moment)
     last = slice(len(samples) - per_cycle, len(samples))
-    for ghost in range(last.start, last.stop, max(1, per_cycle // CRANK_GHOSTS)):
-        panel.plot(*np.stack([places.pin[ghost], places.slider[ghost]]).T, color=PALE, linewidth=1.0, alpha=0.6)
+    ghosts = range(last.start, last.stop, max(1, per_cycle // CRANK_GHOSTS))
+    rods = [np.stack([places.pin[ghost], places.slider[ghost]]) for ghost in ghosts]
+    panel.add_collection(LineCollection(rods, color=PALE, linewidth=1.0, alpha=0.6), autolim=False)
     panel.plot(*places.pin[last].T, color=PALE, linewidth=1.2)
     clearance = _crank_clearance(machine)
     rattles = machine.monitored_joint == "slider"
@@ -179,8 +188,9 @@ def draw_crank(panel: Any, record: CycleRecord, colour: str, moment: float, forc
     bars = "; bars: contact forces" if rattles else ""
     panel.set_title(
         f"Gap of ±{clearance * 1e3:.3g} mm at the {machine.monitored_joint}, drawn {times:.0f} times{bars}",
-        fontsize=9,
+        fontsize=8.5,
         loc="left",
+        gid=STAYS,
         color=INK,
     )
     panel.axis("off")
@@ -206,10 +216,12 @@ def _draw_circle(panel: Any, centre: Array, radius: float) -> None:
 def _draw_impacts(panel: Any, places: _CrankPositions, share: Array, colour: str) -> None:
     """Bars on the guide where it pushes the slider; ``share`` (n,) is the force, upward positive, in force limits."""
     edge = SLIDER_HALF_HEIGHT + GAP + GUIDE
-    touching = share != 0.0
-    push = share[touching]
+    touching = np.flatnonzero(share)
+    touching = touching[:: max(1, len(touching) // BARS)]
+    push, along = share[touching], places.slider[touching, 0]
     foot = -np.sign(push) * edge
-    panel.vlines(places.slider[touching, 0], foot, foot - push * FORCE_LENGTH, color=colour, linewidth=1.0, alpha=0.7)
+    ends = np.stack([np.column_stack([along, foot]), np.column_stack([along, foot - push * FORCE_LENGTH])], axis=1)
+    panel.add_collection(LineCollection(ends, color=colour, linewidth=1.0, alpha=0.7), autolim=False)
 
 
 def _draw_links(panel: Any, pin: Array, rod_end: Array, slider: Array) -> None:

@@ -1,28 +1,70 @@
-"""Pictures of a step: the machine in motion, its phase portrait, the contact force, and the job so far."""
+"""Pictures of a step: the machine in motion, its phase portrait, the contact force, and the job so far.
 
-from collections.abc import Mapping
+What stays from step to step (axes, ticks, labels) is drawn once; a picture adds what has changed.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
+from chaosgym.envs.jobs import Piece
 from chaosgym.envs.observation import OBSERVATION_NAMES
-from chaosgym.envs.pictures import CALM, INK, LIMIT, PALE, PICTURES, PLAIN, WILD, samples_of
+from chaosgym.envs.pictures import CALM, INK, LIMIT, PALE, PICTURES, PLAIN, STAYS, WILD, samples_of
 from chaosgym.envs.task import Task
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
-from chaosgym.simulation import CycleRecord
+from chaosgym.simulation import CycleRecord, MotionState, simulate
+
+Array = NDArray[np.float64]
+Frame = NDArray[np.uint8]
 
 SIZE = (9.6, 6.4)
 DOTS_PER_INCH = 100
+
+RENDER_SAMPLES = 8000
+"""Samples of the motion kept of a step."""
 
 MEAN_PEAK = OBSERVATION_NAMES.index("mean_peak_force")
 
 STROBE = 12
 """Each step is shown at a moment of its last cycle, this fraction of a cycle later than the step before: every step
 ends at the same phase, so that the machine would stand still otherwise."""
+
+GROWTH = 1.3
+"""Factor by which an axis grows when something leaves it."""
+
+COLUMNS = 400
+"""Columns in which the force of a step is drawn, from its least to its largest value in each."""
+
+
+def blank() -> Frame:
+    """Picture of an environment that is not drawn."""
+    return np.full((round(SIZE[1] * DOTS_PER_INCH), round(SIZE[0] * DOTS_PER_INCH), 3), 255, np.uint8)
+
+
+def record_of(pieces: Iterable[Piece], cycles: int) -> CycleRecord:
+    """The last cycles of a step with a time history, run once more from its start: no bit of the step changes."""
+    records: list[CycleRecord] = []
+    for piece in pieces:
+        state: MotionState | None = MotionState(piece.coordinates, piece.bouncing)
+        for speed in piece.speeds.tolist():
+            record = simulate(piece.machine.at(speed), 1, state, samples_per_cycle=RENDER_SAMPLES // cycles)
+            state = record.final_state
+            records.append(record)
+    records = records[-cycles:]
+    joined: dict[str, Any] = {
+        name: np.concatenate([getattr(record, name) for record in records])
+        for name in ("section", "displacement", "velocity", "peak_force", "impacts", "history")
+    }
+    return replace(records[-1], **joined)
 
 
 class Dashboard:
@@ -42,19 +84,26 @@ class Dashboard:
         self._task = task
         self._picture = PICTURES.get(machine.name, PLAIN)
         self._unit = parameters_of(machine)[machine.speed_field].unit
+        self._figure = Figure(figsize=SIZE, dpi=DOTS_PER_INCH)
+        self._canvas: Any = FigureCanvasAgg(self._figure)
+        self._window: Any = None
         if window:
             from matplotlib import pyplot
 
-            self._figure = pyplot.figure(figsize=SIZE, dpi=DOTS_PER_INCH)
-        else:
-            self._figure = Figure(figsize=SIZE, dpi=DOTS_PER_INCH)
-            FigureCanvasAgg(self._figure)
-        self._window = window
+            self._window = pyplot.figure(figsize=SIZE, dpi=DOTS_PER_INCH)
+            self._shown: Any = self._window.figimage(blank())
         grid = self._figure.add_gridspec(
             2, 2, left=0.07, right=0.945, bottom=0.085, top=0.9, hspace=0.36, wspace=0.22, width_ratios=(1.25, 1.0)
         )
-        self._panels = [self._figure.add_subplot(grid[cell]) for cell in range(4)]
-        self._speed_axis = self._panels[3].twinx()
+        self._machine_panel, self._portrait, self._force, self._job = (
+            self._figure.add_subplot(grid[cell]) for cell in range(4)
+        )
+        self._speed_axis = self._job.twinx()
+        self._background: Any = None
+        self._staying: list[str] = []
+        self._limits = {"displacement": 0.0, "velocity": 0.0, "force": 0.0}
+        self._label()
+        self._make_artists()
 
     def start(self) -> None:
         """Begin a job."""
@@ -62,105 +111,176 @@ class Dashboard:
         self._demands: list[float] = []
         self._peaks: list[float] = []
         self._wild: list[bool] = []
-        self._top_velocity = self._top_force = 0.0
 
     def add(self, info: Mapping[str, Any], observation: NDArray[np.float32]) -> None:
         """Take in a step."""
-        self._speeds.append(info["speed"])
-        self._demands.append(info["demand"])
+        self._speeds.append(float(info["speed"]))
+        self._demands.append(float(info["demand"]))
         self._peaks.append(float(observation[MEAN_PEAK]))
-        self._top_force = max(self._top_force, info["largest_force"])
-        self._wild.append(info["type_iii"] > 0.5)
+        self._wild.append(bool(info["type_iii"] > 0.5))
 
-    def draw(self, record: CycleRecord) -> NDArray[np.uint8] | None:
+    def draw(self, record: CycleRecord) -> Frame | None:
         """Draw the last step, given with its time history; return (height, width, 3), or None for a window."""
-        colour = WILD if self._wild and self._wild[-1] else CALM
-        for panel in (*self._panels, self._speed_axis):
-            panel.clear()
-            panel.tick_params(colors=INK, labelsize=8)
-            panel.spines[["top", "right"]].set_visible(False)
-        picture, portrait, force, job = self._panels
-        self._picture.draw(picture, record, colour, (len(self._speeds) % STROBE) / STROBE, self._task.load_rating)
-        self._draw_portrait(portrait, record, colour)
-        self._draw_force(force, record, colour)
-        self._draw_job(job)
-        self._draw_title(record, colour)
-        canvas: Any = self._figure.canvas
-        canvas.draw()
-        if not self._window:
-            return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
-        if canvas.required_interactive_framework is not None:
-            canvas.manager.show()
-            canvas.flush_events()
+        samples, colour = samples_of(record), WILD if self._wild and self._wild[-1] else CALM
+        gap = 1e3 * self._picture.room(record.machine)
+        self._make_room(samples, gap)
+        self._picture_machine(record, colour)
+        if self._background is None:
+            self._draw_background()
+        self._canvas.restore_region(self._background)
+        self._update_title(record, colour)
+        self._update_portrait(record, samples, gap, colour)
+        self._update_force(samples, len(record), colour)
+        self._update_job()
+        for panel, artists in self._artists.items():
+            for artist in artists:
+                panel.draw_artist(artist)
+        self._figure.draw_artist(self._title)
+        self._draw_machine()
+        picture = np.asarray(self._canvas.buffer_rgba())[:, :, :3].copy()
+        if self._window is None:
+            return picture
+        self._show(picture)
         return None
 
     def close(self) -> None:
         """Close the window."""
-        if self._window:
+        if self._window is not None:
             from matplotlib import pyplot
 
-            pyplot.close(self._figure)
+            pyplot.close(self._window)
 
-    def _draw_title(self, record: CycleRecord, colour: str) -> None:
+    def _show(self, picture: Frame) -> None:
+        canvas = self._window.canvas
+        self._shown.set_data(picture)
+        canvas.draw()
+        if canvas.required_interactive_framework is not None:
+            canvas.manager.show()
+            canvas.flush_events()
+
+    def _label(self) -> None:
+        """Write what never changes."""
+        task = self._task
+        for panel, title, across, up in (
+            (self._portrait, "Phase portrait; dots: start of each cycle", "displacement [mm]", "velocity [m/s]"),
+            (self._force, "Contact force in this step; dashes: force limit", "cycle", "force [N]"),
+            (self._job, "Job: mean peak force (dots), speed (line), demand (dashes)", "cycle", "mean peak force [N]"),
+        ):
+            panel.set_title(title, fontsize=8.5, loc="left", color=INK)
+            panel.set_xlabel(across, fontsize=8, color=INK)
+            panel.set_ylabel(up, fontsize=8, color=INK)
+        for axis in (self._force, self._job):
+            axis.axhline(task.load_rating, color=LIMIT, linewidth=1.0, linestyle="--")
+        self._force.axhline(-task.load_rating, color=LIMIT, linewidth=1.0, linestyle="--")
+        self._force.set_xlim(0, task.cycles_per_step)
+        self._job.set_xlim(0, task.job_cycles)
+        margin = 0.05 * (task.highest_speed - task.lowest_speed)
+        self._speed_axis.set_ylim(task.lowest_speed - margin, task.highest_speed + margin)
+        self._speed_axis.yaxis.set_label_position("right")
+        self._speed_axis.set_ylabel(f"speed [{self._unit}]", fontsize=8, color=INK)
+        for panel in (self._machine_panel, self._portrait, self._force, self._job, self._speed_axis):
+            panel.tick_params(colors=INK, labelsize=8)
+            panel.spines[["top", "right"]].set_visible(False)
+
+    def _make_artists(self) -> None:
+        """What changes, in the order of drawing."""
+        portrait, force, job, speed = self._portrait, self._force, self._job, self._speed_axis
+        self._stops = [portrait.add_patch(Rectangle((0, 0), 1, 1, color=PALE, alpha=0.5, lw=0)) for _ in range(2)]
+        (self._path,) = portrait.plot([], [], linewidth=0.8)
+        (self._strobes,) = portrait.plot([], [], "o", color=INK, markersize=4)
+        self._pulses = force.add_collection(PolyCollection([], linewidth=0.6), autolim=False)
+        (self._calm,) = job.plot([], [], ".", color=CALM, markersize=3)
+        (self._wilds,) = job.plot([], [], ".", color=WILD, markersize=3)
+        (self._run,) = speed.step([], [], where="post", color=INK, linewidth=1.2)
+        (self._asked,) = speed.step([], [], where="post", color=INK, linewidth=0.8, linestyle="--")
+        self._artists: dict[Any, list[Any]] = {
+            portrait: [*self._stops, self._path, self._strobes],
+            force: [self._pulses],
+            job: [self._calm, self._wilds],
+            speed: [self._run, self._asked],
+        }
+        self._title = self._figure.text(0.075, 0.98, "", fontsize=12, fontweight="bold", ha="left", va="top")
+        for artist in (self._title, *(one for several in self._artists.values() for one in several)):
+            artist.set_animated(True)
+
+    def _make_room(self, samples: Array, gap: float) -> None:
+        """Let the axes grow where something has left them; the ground is then drawn anew."""
+        reached = {
+            "displacement": max(1.1 * gap, 1e3 * float(np.abs(samples[:, 0]).max())),
+            "velocity": float(np.abs(samples[:, 1]).max()),
+            "force": max(self._task.load_rating, float(np.abs(samples[:, 2]).max()), *self._peaks[-1:]),
+        }
+        beyond = {name: value for name, value in reached.items() if value > self._limits[name]}
+        if not beyond:
+            return
+        self._background = None
+        self._limits |= {name: (1.05 if name == "displacement" else GROWTH) * value for name, value in beyond.items()}
+        across, up, push = self._limits.values()
+        self._portrait.set(xlim=(-across, across), ylim=(-up, up))
+        self._force.set_ylim(-push, push)
+        self._job.set_ylim(0, push)
+
+    def _draw_background(self) -> None:
+        self._machine_panel.set_visible(False)
+        self._canvas.draw()
+        self._machine_panel.set_visible(True)
+        for text in self._texts(stays=True):
+            self._machine_panel.draw_artist(text)
+        self._background = self._canvas.copy_from_bbox(self._figure.bbox)
+
+    def _texts(self, *, stays: bool) -> list[Any]:
+        """Texts of the machine's picture that stay as they are, or the others."""
+        found = [child for child in self._machine_panel.get_children() if isinstance(child, Text) and child.get_text()]
+        return [text for text in found if (text.get_gid() == STAYS) == stays]
+
+    def _picture_machine(self, record: CycleRecord, colour: str) -> None:
+        """Let the machine's picture put its parts on its panel."""
+        panel = self._machine_panel
+        for artist in (*panel.lines, *panel.collections, *panel.patches, *panel.texts):
+            artist.remove()
+        moment = (len(self._speeds) % STROBE) / STROBE
+        self._picture.draw(panel, record, colour, moment, self._task.load_rating)
+        staying = [text.get_text() for text in self._texts(stays=True)]
+        if staying != self._staying:
+            self._staying, self._background = staying, None
+
+    def _draw_machine(self) -> None:
+        panel = self._machine_panel
+        if panel.axison:
+            panel.draw(self._canvas.get_renderer())
+            return
+        parts = [*panel.lines, *panel.collections, *panel.patches, *self._texts(stays=False)]
+        for part in sorted(parts, key=lambda part: part.get_zorder()):
+            panel.draw_artist(part)
+
+    def _update_title(self, record: CycleRecord, colour: str) -> None:
         verdict = "Type III" if colour == WILD else "calm"
         done = len(self._speeds) * self._task.cycles_per_step
-        self._figure.suptitle(
-            f"{self._now(record):.2f} {self._unit}    {done} of {self._task.job_cycles} cycles    {verdict}",
-            color=colour,
-            fontsize=12,
-            x=0.075,
-            ha="left",
-            fontweight="bold",
+        speed = self._speeds[-1] if self._speeds else float(getattr(record.machine, record.machine.speed_field))
+        self._title.set(
+            text=f"{speed:.2f} {self._unit}    {done} of {self._task.job_cycles} cycles    {verdict}", color=colour
         )
 
-    def _draw_portrait(self, panel: Any, record: CycleRecord, colour: str) -> None:
-        samples = samples_of(record)
-        gap = self._picture.room(record.machine) * 1e3
-        panel.axvspan(gap, 10.0 * gap, color=PALE, alpha=0.5, linewidth=0)
-        panel.axvspan(-10.0 * gap, -gap, color=PALE, alpha=0.5, linewidth=0)
-        panel.plot(samples[:, 0] * 1e3, samples[:, 1], color=colour, linewidth=0.8)
-        panel.plot(record.displacement * 1e3, record.velocity, "o", color=INK, markersize=4)
-        self._top_velocity = max(self._top_velocity, float(np.abs(samples[:, 1]).max()))
-        reach = max(1.15 * gap, 1.05e3 * float(np.abs(samples[:, 0]).max()))
-        panel.set(xlim=(-reach, reach), ylim=(-1.1 * self._top_velocity, 1.1 * self._top_velocity))
-        panel.set_title("Phase portrait; dots: start of each cycle", fontsize=9, loc="left", color=INK)
-        panel.set_xlabel("displacement [mm]", fontsize=8, color=INK)
-        panel.set_ylabel("velocity [m/s]", fontsize=8, color=INK)
+    def _update_portrait(self, record: CycleRecord, samples: Array, gap: float, colour: str) -> None:
+        up = self._limits["velocity"]
+        for stop, sign in zip(self._stops, (1.0, -1.0), strict=True):
+            stop.set(x=sign * gap, y=-up, width=sign * self._limits["displacement"], height=2.0 * up)
+        self._path.set_data(1e3 * samples[:, 0], samples[:, 1])
+        self._path.set_color(colour)
+        self._strobes.set_data(1e3 * record.displacement, record.velocity)
 
-    def _force_range(self) -> float:
-        return 1.15 * max(self._task.load_rating, self._top_force)
+    def _update_force(self, samples: Array, cycles: int, colour: str) -> None:
+        force = samples[: len(samples) // COLUMNS * COLUMNS, 2].reshape(COLUMNS, -1)
+        at = np.linspace(0.0, cycles, COLUMNS)
+        low, high = np.minimum(force.min(axis=1), 0.0), np.maximum(force.max(axis=1), 0.0)
+        outline = np.concatenate([np.column_stack([at, high]), np.column_stack([at, low])[::-1]])
+        self._pulses.set_verts([outline])
+        self._pulses.set_color(colour)
 
-    def _draw_force(self, panel: Any, record: CycleRecord, colour: str) -> None:
-        force = samples_of(record)[:, 2]
-        cycles = len(record)
-        panel.axhline(self._task.load_rating, color=LIMIT, linewidth=1.0, linestyle="--")
-        panel.axhline(-self._task.load_rating, color=LIMIT, linewidth=1.0, linestyle="--")
-        panel.fill_between(np.arange(len(force)) * cycles / len(force), force, color=colour, linewidth=0.6)
-        panel.set(xlim=(0, cycles), ylim=(-self._force_range(), self._force_range()))
-        panel.set_title("Contact force in this step", fontsize=9, loc="left", color=INK)
-        panel.set_xlabel("cycle", fontsize=8, color=INK)
-        panel.set_ylabel("force [N]", fontsize=8, color=INK)
-
-    def _draw_job(self, panel: Any) -> None:
-        step = self._task.cycles_per_step
+    def _update_job(self) -> None:
         peaks, wild = np.array(self._peaks), np.array(self._wild, dtype=bool)
-        cycle = step * np.arange(len(peaks))
-        for chosen, colour in ((~wild, CALM), (wild, WILD)):
-            panel.plot(cycle[chosen], peaks[chosen], ".", color=colour, markersize=3)
-        panel.axhline(self._task.load_rating, color=LIMIT, linewidth=1.0, linestyle="--")
-        panel.set(xlim=(0, self._task.job_cycles), ylim=(0, self._force_range()))
-        panel.set_title(
-            "Job: mean peak force (dots), speed (line) and demand (dashes)", fontsize=9, loc="left", color=INK
-        )
-        panel.set_xlabel("cycle", fontsize=8, color=INK)
-        panel.set_ylabel("mean peak force [N]", fontsize=8, color=INK)
-        axis = self._speed_axis
-        axis.step(cycle, self._speeds, where="post", color=INK, linewidth=1.2)
-        axis.step(cycle, self._demands, where="post", color=INK, linewidth=0.8, linestyle="--")
-        margin = 0.05 * (self._task.highest_speed - self._task.lowest_speed)
-        axis.set_ylim(self._task.lowest_speed - margin, self._task.highest_speed + margin)
-        axis.yaxis.set_label_position("right")
-        axis.set_ylabel(f"speed [{self._unit}]", fontsize=8, color=INK)
-
-    def _now(self, record: CycleRecord) -> float:
-        return self._speeds[-1] if self._speeds else float(getattr(record.machine, record.machine.speed_field))
+        cycle = self._task.cycles_per_step * np.arange(len(peaks))
+        self._calm.set_data(cycle[~wild], peaks[~wild])
+        self._wilds.set_data(cycle[wild], peaks[wild])
+        self._run.set_data(cycle, self._speeds)
+        self._asked.set_data(cycle, self._demands)

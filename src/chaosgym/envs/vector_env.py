@@ -6,7 +6,7 @@ Every sub-environment does what a single environment with its seed does, bit for
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -20,6 +20,12 @@ from chaosgym.envs.jobs import Indices, Jobs
 from chaosgym.envs.machine_env import METADATA, Start, Workplace, start_of
 from chaosgym.envs.observation import Observation, observation_names
 from chaosgym.errors import ParameterError
+
+if TYPE_CHECKING:
+    from chaosgym.envs.rendering import Dashboard
+
+DRAWN = 4
+"""Sub-environments that are drawn; pictures of the others are blank."""
 
 Actions = NDArray[Any]
 Flags = NDArray[np.bool_]
@@ -40,16 +46,16 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
     autoreset_mode
         When a sub-environment that has ended is reset: in the next step, in the same step, or by the user with
         ``reset(options={"reset_mask": ...})``.
+    render_mode
+        None, or "rgb_array" for pictures of the first four sub-environments.
     machine, keywords
-        Those of the single environment, ``render_mode`` excepted.
+        Those of the single environment.
 
     Raises
     ------
     ParameterError
         If a value is out of range; names it and the allowed range.
     """
-
-    render_mode = None
 
     def __init__(
         self,
@@ -58,11 +64,12 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         machine: str,
         max_episode_steps: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
         **keywords: Any,
     ) -> None:
-        if (mode := keywords.pop("render_mode", None)) is not None:
+        if render_mode not in (None, "rgb_array"):
             raise ParameterError(
-                f"render_mode = {mode!r} is not one of None; pictures come from vectorization_mode='sync'"
+                f"render_mode = {render_mode!r} is not one of None, rgb_array; a window comes from a single environment"
             )
         for name, count in (("num_envs", num_envs), ("max_episode_steps", max_episode_steps)):
             if count is not None and (isinstance(count, bool) or int(count) != count or count < 1):
@@ -75,6 +82,9 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         self.nominal = self.workplace.variants.nominal
         self.observation_names = observation_names(self.task)
         self.jobs = Jobs(self.workplace.rules, num_envs)
+        self.render_mode = render_mode
+        self.jobs.traced = 0 if render_mode is None else min(num_envs, DRAWN)
+        self._dashboards: list[Dashboard] = []
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._limit = max_episode_steps
         self._elapsed = np.zeros(num_envs, np.int64)
@@ -82,7 +92,7 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         self._has_begun = False
         self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**METADATA, "render_modes": [], "autoreset_mode": self.autoreset_mode}
+        self.metadata = {**METADATA, "render_modes": ["rgb_array"], "autoreset_mode": self.autoreset_mode}
         self.single_action_space = self.workplace.actions
         self.single_observation_space = self.workplace.space
         self.action_space = batch_space(self.workplace.actions, num_envs)
@@ -145,6 +155,7 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
             terminated[running] = outcome.terminated
             if self._limit is not None:
                 truncated[running] = self._elapsed[running] >= self._limit
+            self._take_in(running, outcome.info, outcome.observation)
             self._report(infos, observations, running, outcome.info, terminated | truncated)
         if len(over):
             observations[over], info = self._start(over, [None] * len(over))
@@ -185,7 +196,38 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         result = self.jobs.start(which, self._generators_of(which), numbers, speed)
         self._elapsed[which] = 0
         self._needs_reset[which] = False
+        if self.jobs.traced:
+            self._begin(which)
         return result
+
+    def _begin(self, which: Indices) -> None:
+        """Begin the pictures of jobs."""
+        from chaosgym.envs.rendering import Dashboard
+
+        while len(self._dashboards) < self.jobs.traced:
+            self._dashboards.append(Dashboard(self.nominal, self.task, window=False))
+        for i in which[which < self.jobs.traced].tolist():
+            self._dashboards[i].start()
+
+    def _take_in(self, which: Indices, info: Mapping[str, Any], observation: Observation) -> None:
+        """Let the pictures take in a step."""
+        for k in np.flatnonzero(which < self.jobs.traced).tolist():
+            own = {name: info[name][k] for name in ("speed", "demand", "type_iii")}
+            self._dashboards[int(which[k])].add(own, observation[k])
+
+    def render(self) -> tuple[Any, ...] | None:
+        """Return a picture (height, width, 3) of each sub-environment; those after the first four are blank."""
+        if self.render_mode is None:
+            gym.logger.warn("render() shows nothing without a render_mode; make the environments with rgb_array")
+            return None
+        if not self._has_begun:
+            raise gym.error.ResetNeeded("there is nothing to show yet; call reset() first")
+        from chaosgym.envs.rendering import blank, record_of
+
+        cycles = self.task.cycles_per_step
+        pairs = zip(self._dashboards, self.jobs.pieces, strict=False)
+        drawn = [dashboard.draw(record_of(pieces, cycles)) for dashboard, pieces in pairs]
+        return (*drawn, *(self.num_envs - len(drawn)) * [blank()])
 
     def _generators_of(self, which: Indices) -> list[np.random.Generator]:
         return [cast(np.random.Generator, self._generators[i]) for i in which.tolist()]
