@@ -1,7 +1,8 @@
 """The command line: each command parses, calls one library function, and prints or saves.
 
 Tables for people go to standard output, ``--json`` prints one JSON object there instead; progress and logs go to
-standard error. Exit codes: 0 done, 1 a computation failed, 2 wrong usage.
+standard error. Exit codes: 0 done, 1 a computation failed, 2 wrong usage, 130 ended by Ctrl-C, 141 nobody reads the
+output. Nothing is coloured, so NO_COLOR holds.
 """
 
 import errno

@@ -9,7 +9,7 @@ import click
 
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, verdict_lines
-from chaosgym.cli.output import emit
+from chaosgym.cli.output import emit, patience
 from chaosgym.cli.plot_option import draw, picture_path, plot_option
 from chaosgym.machines.registry import MACHINES
 
@@ -82,7 +82,8 @@ def classify(
     elif batch and out:
         _classify_batch(classifier, batch, out, budget_us, not nature_only, as_json)
     else:
-        answer = classifier.classify(machine, budget_us=budget_us, types=not nature_only)
+        with patience("classify"):
+            answer = classifier.classify(machine, budget_us=budget_us, types=not nature_only)
         emit({"machine": machine.name, **answer.as_dict()}, as_json, lambda: _machine_lines(machine.name, answer))
     return None
 

@@ -57,11 +57,13 @@ def _lines(folder: str, found: dict[str, Any]) -> list[str]:
 
 @dataset.command("card")
 @FOLDER
-def card(folder: str) -> None:
+@AS_JSON
+def card(folder: str, as_json: bool) -> None:
     """Write CARD.md into the folder of a finished sweep."""
     from chaosgym.sweeps.card import write_card
 
-    click.echo(f"wrote {write_card(folder)}")
+    path = write_card(folder)
+    emit({"wrote": str(path)}, as_json, lambda: [f"wrote {path}"])
 
 
 @dataset.command("noise")
@@ -96,13 +98,13 @@ def noise(folder: str, points: int, seed: int, workers: int | None, as_json: boo
 @dataset.command("map")
 @FOLDER
 @click.option("--out", type=click.Path(dir_okay=False), required=True, help="Picture to write (.png, .svg, .pdf).")
-def map_(folder: str, out: str) -> None:
+@AS_JSON
+def map_(folder: str, out: str, as_json: bool) -> None:
     """Draw natures and response types over speed and clearance, as thesis figures 3.9 and 4.15."""
     from chaosgym.plotting.dataset import sweep_map
+    from chaosgym.plotting.picture_file import check_picture, save_picture
     from chaosgym.sweeps import read_sweep
 
-    try:
-        sweep_map(read_sweep(folder)).savefig(out, dpi=130)
-    except ValueError as error:
-        raise click.UsageError(f"--out {out}: {error}") from error
-    click.echo(f"wrote {out}")
+    path = check_picture(Path(out))
+    save_picture(sweep_map(read_sweep(folder)), path)
+    emit({"wrote": out}, as_json, lambda: [f"wrote {out}"])

@@ -8,7 +8,7 @@ import click
 
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, verdict_lines
-from chaosgym.cli.output import emit
+from chaosgym.cli.output import emit, patience
 from chaosgym.cli.plot_option import draw, picture_path, plot_option
 from chaosgym.machines.registry import MACHINES
 
@@ -47,12 +47,16 @@ def diagnose(
     elif machine is None:
         raise click.UsageError(f"give a machine ({', '.join(MACHINES)}), --peaks FILE or --series FILE")
     elif test == "mut":
-        result, lines, verdict = _matrix_update(machine)
+        with patience("diagnose"):
+            result, lines, verdict = _matrix_update(machine)
         draw(picture, lambda: _figure(verdict), result, lines)
     else:
         if measured.sensor_sigma is not None:
             raise click.UsageError("--sensor-sigma belongs to --peaks or --series")
-        result, lines, verdict = _diagnose_machine(machine, budget, types, step_check, measured.sensor_error or 0.0)
+        with patience("diagnose"):
+            result, lines, verdict = _diagnose_machine(
+                machine, budget, types, step_check, measured.sensor_error or 0.0
+            )
         draw(picture, lambda: _figure(verdict), result, lines)
     emit(result, as_json, lambda: lines)
 

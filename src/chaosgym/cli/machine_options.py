@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from chaosgym.cli.quantity import Quantity, millimetres_meant
 from chaosgym.errors import ParameterError
@@ -25,6 +26,13 @@ class MachineName(click.ParamType):  # type: ignore[type-arg]
         """Return the known names, as ``click.Choice`` shows them."""
         names = "|".join([*sorted(MACHINES), f"FILE{FILE_ENDING}"])
         return f"{{{names}}}" if param.required else f"[{names}]"
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Return the names that begin so, and files."""
+        names = [CompletionItem(name) for name in sorted(MACHINES) if name.startswith(incomplete)]
+        return names or [CompletionItem(incomplete, type="file")]
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Return the name, or say which there are."""

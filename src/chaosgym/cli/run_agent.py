@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from chaosgym.cli.output import emit
+from chaosgym.cli.output import emit, patience
 from chaosgym.cli.plot_option import picture_path, plot_option
 
 if TYPE_CHECKING:
@@ -35,7 +35,8 @@ def run_agent(env: str, policy: Path | None, machine: int, plot: str | None, as_
     from chaosgym.control.rollout import play
 
     agent = load_policy(policy) if policy else shipped_policy(env)
-    job, follow = play(agent, env, [machine]), play(Follow(), env, [machine])
+    with patience("run-agent"):
+        job, follow = play(agent, env, [machine]), play(Follow(), env, [machine])
     if out is not None:
         from chaosgym.plotting.played_job import save_job
 

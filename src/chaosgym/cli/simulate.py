@@ -41,7 +41,7 @@ def simulate(
             check_target(path, overwrite)
     run(machine, 1)  # compiles, or loads what is compiled
     start = time.process_time()
-    record = run(machine, cycles, transient=transient, samples_per_cycle=samples if series_out else 0)
+    record = run(machine, cycles, transient=transient, samples_per_cycle=samples if series_out else 0, progress=True)
     seconds_per_cycle = (time.process_time() - start) / (transient + cycles)
     peaks = record.peak_force[:, 0]
     result = {

@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 FIRST_SLICE, MAX_GROWTH = 16, 8.0
 """Cycles of the first call of a kernel, and how much longer than the last one a call may be."""
 
+PATIENCE = 2.0
+"""Seconds after which a progress bar appears."""
+
 SLICE_SECONDS = 0.2
 """Duration that calls of a kernel aim at."""
 
@@ -39,11 +42,12 @@ def _run(
     samples: int,
     integrator: Integrator,
     tangents: Tangents | None = None,
+    bar: Any = None,
 ) -> tuple[int, int, CycleRecord]:
     """Status of the kernel, number of cycles that it finished, and the record."""
     arrays = machine.arrays(cycles, samples)
     final = MotionState(state.coordinates.copy(), state.bouncing.copy())
-    outcome, done = _in_slices(machine, final, arrays, integrator, tangents)
+    outcome, done = _in_slices(machine, final, arrays, integrator, tangents, bar)
     record = CycleRecord(
         machine=machine,
         section=arrays.section,
@@ -61,7 +65,12 @@ def _run(
 
 
 def _in_slices(
-    machine: Machine, motion: MotionState, arrays: CycleArrays, integrator: Integrator, tangents: Tangents | None
+    machine: Machine,
+    motion: MotionState,
+    arrays: CycleArrays,
+    integrator: Integrator,
+    tangents: Tangents | None,
+    bar: Any,
 ) -> tuple[int, int]:
     """Run a machine by calls of its kernel that are short enough for Ctrl-C to be heard; see ``Machine.run``."""
     cycles, done, count, outcome = len(arrays.section), 0, FIRST_SLICE, status.OK
@@ -73,6 +82,8 @@ def _in_slices(
         outcome, finished = machine.run(*motion, rows, integrator, along)
         spent = max(time.perf_counter() - began, 1e-9)
         done += finished
+        if bar is not None:
+            bar.update(finished)
         count = max(1, int(count * min(MAX_GROWTH, SLICE_SECONDS / spent)))
     return outcome, done
 
@@ -108,6 +119,7 @@ def simulate(
     *,
     samples_per_cycle: int = 0,
     integrator: Integrator | None = None,
+    progress: bool = False,
 ) -> CycleRecord:
     """Run a machine for whole operating cycles.
 
@@ -128,6 +140,8 @@ def simulate(
         Samples of the time history to keep in each cycle.
     integrator
         ``ExactEvents()`` by default, or ``RungeKutta4(...)``.
+    progress
+        Show a progress bar on standard error if it takes more than two seconds.
 
     Raises
     ------
@@ -143,13 +157,14 @@ def simulate(
     integrator = integrator or machine.default_integrator
     state = _initial(machine, initial_state)
     first = 0
-    for count, samples in ((transient, 0), (cycles, samples_per_cycle)):
-        if count:
-            outcome, done, record = _run(machine, state, count, samples, integrator)
-            if outcome != status.OK:
-                raise _failure(machine, outcome, first + done, integrator)
-            state = record.final_state
-            first += count
+    with tqdm(total=transient + cycles, desc="simulate", unit="cycle", delay=PATIENCE, disable=not progress) as bar:
+        for count, samples in ((transient, 0), (cycles, samples_per_cycle)):
+            if count:
+                outcome, done, record = _run(machine, state, count, samples, integrator, bar=bar if progress else None)
+                if outcome != status.OK:
+                    raise _failure(machine, outcome, first + done, integrator)
+                state = record.final_state
+                first += count
     return record
 
 

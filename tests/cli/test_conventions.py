@@ -1,0 +1,92 @@
+"""What people expect of a command line: completion, JSON, plain text, quiet ends, constant exit codes."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import click
+import pytest
+
+from chaosgym.cli import app
+
+CHAOSGYM = [sys.executable, "-m", "chaosgym"]
+
+
+def every_command(group, path=()):
+    """Commands of a group and of the groups in it, with their names."""
+    context = click.Context(group)
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        if isinstance(command, click.Group):
+            yield from every_command(command, (*path, name))
+        else:
+            yield " ".join((*path, name)), command
+
+
+def test_every_command_gives_json():
+    """Each has --json."""
+    commands = dict(every_command(app))
+    assert {"dataset card", "dataset map", "explore", "simulate"} <= set(commands)
+    without = [name for name, command in commands.items() if "as_json" not in {p.name for p in command.params}]
+    assert without == []
+
+
+def completed(words, number):
+    """What the shell is offered for the word of that number."""
+    asked = {"_CHAOSGYM_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": str(number)}
+    code = "import sys; sys.argv[0] = 'chaosgym'; from chaosgym.cli import main; main()"
+    done = subprocess.run([sys.executable, "-c", code], env={**os.environ, **asked}, capture_output=True, text=True)
+    return [line.split(",")[1] for line in done.stdout.split()]
+
+
+def test_the_shell_completes_commands_machines_and_options():
+    """As click's completion asks: _CHAOSGYM_COMPLETE=bash_source chaosgym prints the script of it."""
+    assert completed("chaosgym si", 1) == ["simulate"]
+    assert completed("chaosgym diagnose imp", 2) == ["impact-beam"]
+    assert completed("chaosgym diagnose impact-beam --fre", 3) == ["--frequency-hz"]
+
+
+@pytest.mark.parametrize("color", [{}, {"NO_COLOR": "1"}])
+def test_nothing_is_coloured(color):
+    """Neither tables nor errors hold escape sequences."""
+    for words in (["info"], ["simulate", "steam-engine"]):
+        done = subprocess.run([*CHAOSGYM, *words], env={**os.environ, **color}, capture_output=True, check=False)
+        assert done.stdout + done.stderr
+        assert b"\x1b" not in done.stdout + done.stderr
+
+
+def test_a_reader_that_leaves_is_no_error():
+    """`chaosgym simulate --cycles 100000 --json | head -c 1` ends without a word, as any program in a pipe does."""
+    process = subprocess.Popen(
+        [*CHAOSGYM, "simulate", "impact-beam", "--cycles", "100000", "--json"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    assert process.stdout is not None
+    assert process.stderr is not None
+    with process:
+        process.stdout.read(1)
+        process.stdout.close()
+        told = process.stderr.read().decode()
+    assert process.returncode == 141
+    assert "Traceback" not in told
+    assert "Error" not in told
+
+
+def test_ten_million_cycles_show_progress_and_end_at_once():
+    """A bar appears after two seconds; Ctrl-C ends the command within two more, with the exit code 130."""
+    process = subprocess.Popen(
+        [*CHAOSGYM, "simulate", "impact-beam", "--cycles", "10000000"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert process.stderr is not None
+    with process:
+        seen = b""
+        while b"simulate:" not in seen:
+            seen += process.stderr.read(1)
+        process.send_signal(signal.SIGINT)
+        began = time.monotonic()
+        process.communicate(timeout=60)
+        assert time.monotonic() - began < 10.0
+    assert process.returncode == 130
