@@ -21,6 +21,7 @@ from chaosgym.explore.point import (
     view_of,
 )
 from chaosgym.machines import ImpactBeam, SliderCrank
+from chaosgym.machines.registry import MACHINES
 from tests.third_machine import ImpactOscillator
 
 BEAM = ImpactBeam(excitation_frequency=19.0, clearance=1e-4)
@@ -65,6 +66,23 @@ def test_link_and_python_give_the_same_machine():
     names: dict = {}
     exec(python_of(BEAM).replace("print", "str"), names)
     assert names["machine"] == BEAM
+
+
+def test_a_machine_by_file_is_shown_and_taken_along(tmp_path):
+    """One's own machine has sliders, link and Python; no link opens the file of another."""
+    path = tmp_path / "own.toml"
+    path.write_text(CliRunner().invoke(app, ["new-machine"]).stdout)
+    kind = MACHINES[str(path)]
+    machine = kind(clearance=0.9 * kind().clearance)
+    assert len(sliders_of(machine)) == 3
+    assert view_of(machine).headline
+    asked = dict(parse_qsl(link_of(machine)))
+    assert machine_from(asked.pop("machine"), asked, str(path)) == machine
+    names: dict = {}
+    exec(python_of(machine).replace("print", "str"), names)
+    assert names["machine"] == machine
+    with pytest.raises(ParameterError, match="is not one of"):
+        machine_from(str(path), {})
 
 
 def test_the_command_judges_the_same_machine():

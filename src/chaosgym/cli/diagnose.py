@@ -54,9 +54,7 @@ def diagnose(
         if measured.sensor_sigma is not None:
             raise click.UsageError("--sensor-sigma belongs to --peaks or --series")
         with patience("diagnose"):
-            result, lines, verdict = _diagnose_machine(
-                machine, budget, types, step_check, measured.sensor_error or 0.0
-            )
+            result, lines, verdict = _diagnose_machine(machine, budget, types, step_check, measured.sensor_error or 0.0)
         draw(picture, lambda: _figure(verdict), result, lines)
     emit(result, as_json, lambda: lines)
 

@@ -27,9 +27,7 @@ class MachineName(click.ParamType):  # type: ignore[type-arg]
         names = "|".join([*sorted(MACHINES), f"FILE{FILE_ENDING}"])
         return f"{{{names}}}" if param.required else f"[{names}]"
 
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         """Return the names that begin so, and files."""
         names = [CompletionItem(name) for name in sorted(MACHINES) if name.startswith(incomplete)]
         return names or [CompletionItem(incomplete, type="file")]

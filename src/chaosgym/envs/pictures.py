@@ -221,7 +221,7 @@ def _draw_impacts(panel: Any, places: _CrankPositions, share: Array, colour: str
     push, along = share[touching], places.slider[touching, 0]
     foot = -np.sign(push) * edge
     ends = np.stack([np.column_stack([along, foot]), np.column_stack([along, foot - push * FORCE_LENGTH])], axis=1)
-    panel.add_collection(LineCollection(ends, color=colour, linewidth=1.0, alpha=0.7), autolim=False)
+    panel.add_collection(LineCollection(list(ends), color=colour, linewidth=1.0, alpha=0.7), autolim=False)
 
 
 def _draw_links(panel: Any, pin: Array, rod_end: Array, slider: Array) -> None:

@@ -188,7 +188,7 @@ class Dashboard:
         self._stops = [portrait.add_patch(Rectangle((0, 0), 1, 1, color=PALE, alpha=0.5, lw=0)) for _ in range(2)]
         (self._path,) = portrait.plot([], [], linewidth=0.8)
         (self._strobes,) = portrait.plot([], [], "o", color=INK, markersize=4)
-        self._pulses = force.add_collection(PolyCollection([], linewidth=0.6), autolim=False)
+        self._pulses: Any = force.add_collection(PolyCollection([], linewidth=0.6), autolim=False)
         (self._calm,) = job.plot([], [], ".", color=CALM, markersize=3)
         (self._wilds,) = job.plot([], [], ".", color=WILD, markersize=3)
         (self._run,) = speed.step([], [], where="post", color=INK, linewidth=1.2)

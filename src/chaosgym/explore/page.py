@@ -65,7 +65,9 @@ class Page:
         self._link = Div(visible=False, name="link")
         self._python = TextAreaInput(title="This point as Python", rows=5, sizing_mode="stretch_width", name="python")
         self._command = TextAreaInput(title="and as a command", rows=2, sizing_mode="stretch_width", name="command")
-        self._choice = Select(title="machine", value=machine.name, options=list(MACHINES))
+        self._choice = Select(
+            title="machine", value=machine.name, options=list(dict.fromkeys([*MACHINES, machine.name]))
+        )
         self._choice.on_change("value", lambda name, old, new: self.show(MACHINES[new]()))
         self._panel = column(width=340)
         self._playback = Playback(document, self.show)
@@ -223,7 +225,7 @@ def open_page(document: Document, machine: Machine) -> None:
     asked = {name: values[0].decode() for name, values in given.items() if not name.startswith("bokeh")}
     if "machine" in asked:
         try:
-            machine = machine_from(asked.pop("machine"), asked)
+            machine = machine_from(asked.pop("machine"), asked, machine.name)
         except ChaosgymError as error:
             document.add_root(Div(text=f"<h2>This link can't be shown</h2><p>{escape(str(error))}</p>"))
             return

@@ -14,7 +14,7 @@ from chaosgym.envs.pictures import PICTURES, PLAIN
 from chaosgym.errors import ChaosgymError, ModelFileError, ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
-from chaosgym.machines.registry import MACHINES
+from chaosgym.machines.registry import FILE_ENDING, MACHINES
 from chaosgym.monitor import Monitor
 from chaosgym.simulation import simulate
 
@@ -92,16 +92,19 @@ def _slider(machine: Machine, field: str) -> Slider:
     return Slider(field, field.replace("_", " ") + ("" if unit == "-" else f" [{unit}]"), low, high, factor)
 
 
-def machine_from(name: str, settings: Mapping[str, str]) -> Machine:
+def machine_from(name: str, settings: Mapping[str, str], served: str = "") -> Machine:
     """Machine of a deep link: fields in SI by name; what is not given is as in the registry.
+
+    No link makes the page read a file but that of the machine ``served``.
 
     Raises
     ------
     ParameterError
         If the machine, a field or a value is unknown; names it.
     """
-    if name not in MACHINES:
-        raise ParameterError(f"machine = {name!r} is not one of {', '.join(MACHINES)}")
+    known = list(dict.fromkeys([*MACHINES, *filter(None, [served])]))
+    if name not in known:
+        raise ParameterError(f"machine = {name!r} is not one of {', '.join(known)}")
     described = parameters_of(MACHINES[name])
     values: dict[str, Any] = {}
     for field, text in settings.items():
@@ -134,11 +137,14 @@ def python_of(machine: Machine) -> str:
     """Lines of Python that diagnose a machine."""
     kind = type(machine)
     fields = ", ".join(f"{name}={value!r}" for name, value in changes_of(machine).items())
+    if machine.name.endswith(FILE_ENDING):
+        return _python("from chaosgym.machines.registry import MACHINES", f"MACHINES[{machine.name!r}]({fields})")
     home = "chaosgym" if kind.__module__.startswith("chaosgym.") else kind.__module__
-    return (
-        f"import chaosgym\nfrom {home} import {kind.__name__}\n\n"
-        f"machine = {kind.__name__}({fields})\nprint(chaosgym.diagnose(machine))"
-    )
+    return _python(f"from {home} import {kind.__name__}", f"{kind.__name__}({fields})")
+
+
+def _python(line: str, made: str) -> str:
+    return f"import chaosgym\n{line}\n\nmachine = {made}\nprint(chaosgym.diagnose(machine))"
 
 
 def command_of(machine: Machine) -> str:
