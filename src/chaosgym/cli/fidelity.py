@@ -25,7 +25,7 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
     type=click.FloatRange(0.0, min_open=True),
     default=10.0,
     show_default=True,
-    help="Processor time of each setting [s].",
+    help="Processor time of each fixed step [s].",
 )
 @click.option("--workers", type=click.IntRange(1), default=None, help="Threads; all processors by default.")
 @click.option("--out", type=_FOLDER, default=None, help="Write tradeoff.json and tradeoff.png there.")

@@ -11,7 +11,7 @@ the range that the machine usually runs in:
 A third of the points are chaotic. There two runs part, however fine both are, and their statistics scatter: chaotic
 points have a column of their own, and ``noise`` tells how far two halves of the reference's own run lie apart.
 
-Every setting sees the points in the same order. One that is too slow for its share of the budget stops early, is
+Every setting sees the points in the same order. Fixed steps too slow for their budget stop early, and the setting is
 compared with the reference at the points that it reached, and stays off the Pareto front.
 """
 
@@ -181,7 +181,7 @@ def tradeoff(
     cycles, transient
         Cycles that count at each point, and cycles before them.
     budget
-        Processor time [s] that a setting may take before it starts a further point; the reference has no limit.
+        Processor time [s] that a fixed step may take before it starts a further point; exact events have no limit.
     workers
         Number of threads; all processors by default.
     progress
@@ -191,7 +191,7 @@ def tradeoff(
     chosen = settings_of(machine)
 
     def measure(setting: Setting) -> _Measured | ChaosgymError:
-        limit = math.inf if setting.rung == REFERENCE and setting.method == "exact" else budget
+        limit = math.inf if setting.method == "exact" else budget
         try:
             return _measure(machine, setting, sample, cycles, transient, limit)
         except ChaosgymError as error:
