@@ -86,7 +86,7 @@ def in_scipy(machine: Any, cycles: int) -> tuple[Array, float]:
         force = cosine * math.cos(omega * t) + sine * math.sin(omega * t) - (push(state) if pressed else 0.0)
         return [state[1], shape * force - rate**2 * state[0]]
 
-    def touch(t: float, state: Array, pressed: bool) -> float:
+    def touch(t: float, state: Array, pressed: bool) -> Any:
         return push(state) if pressed else state[0] * shape - gap
 
     began, time_now, end, state, pressed = time.process_time(), 0.0, cycles / machine.speed, np.zeros(2), False

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from chaosgym.envs.task import Task
 from chaosgym.errors import ParameterError
@@ -30,7 +31,8 @@ def setup_of(machine: Machine) -> Setup:
     for name in work.task:
         if name not in known:
             raise ParameterError(f"the job of {machine.name} has no number {name!r}{suggestion(name, known)}")
-    task = replace(_usual_task(machine), **work.task)
+    numbers: dict[str, Any] = dict(work.task)
+    task = replace(_usual_task(machine), **numbers)
     return Setup(_shares(machine) if work.tolerances is None else work.tolerances, task)
 
 

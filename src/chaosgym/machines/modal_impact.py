@@ -267,8 +267,7 @@ class ModalImpactMachine(Machine):
             return np.asarray(structure.drive[0, 0, 1])
         return structure.force_shape
 
-    @staticmethod
-    def stops_at(clearance: Any) -> Array:
+    def stops_at(self, clearance: Any) -> Array:
         """Positions of the upper and the lower stop [m] at a clearance, (2,), or at many, (k, 2)."""
         return np.stack([clearance, -np.asarray(clearance)], axis=-1)
 

@@ -67,7 +67,9 @@ def read_machine(path: str | Path) -> ModalMachine:
     ParameterError
         As ``machine_class``.
     """
-    return machine_class(path)()
+    kind: Any = machine_class(path)
+    machine: ModalMachine = kind()
+    return machine
 
 
 def template() -> str:
@@ -114,10 +116,11 @@ def _needed(table: str, values: Mapping[str, Any], *names: str) -> list[Any]:
 def _built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type[ModalMachine]:
     """Make the class: its fields have the file's values as defaults, and one more names the file's content."""
     structure = structure_of(data, folder)
-    joint, operation = dict(data["joint"]), data["operation"]
+    joint: dict[str, Any] = data["joint"]
+    operation: dict[str, Any] = data["operation"]
     at, clearance, stiffness, damping = _needed("joint", joint, "at", "clearance", "stiffness", "damping")
     speed, *ranges = _needed("operation", operation, "speed", "speed_range", "clearance_range")
-    stated = {FIELDS.get(name, name): value for name, value in joint.items() if name != "at"} | {"speed": speed}
+    stated = {"speed": speed} | {FIELDS.get(name, name): value for name, value in joint.items() if name != "at"}
     for name, upper in (("stiffness", stiffness), ("damping", damping)):
         lower = data["joint.lower"].get(name, upper)
         if lower != upper:
@@ -134,20 +137,19 @@ def _built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> typ
         "definition": parameter(digest, choices=(digest,), provenance="stated", source=path),
     }
     known = parameters_of(ModalMachine)
-    for name, value in stated.items():
-        checked = check_parameter(ModalMachine, name, value)
-        fields[name] = _stated(checked, known[name], path)
+    for field, value in stated.items():
+        fields[field] = _stated(check_parameter(ModalMachine, field, value), known[field], path)
     usual = dict(zip(("speed", "clearance"), map(_range, ("speed_range", "clearance_range"), ranges), strict=True))
-    annotations = {name: Any for name in fields}
-    types: dict[str, Any] = {"name": path, "title": data[""].get("title", path), "usual_ranges": usual}
-    annotations |= {name: ClassVar[Any] for name in types}
-    namespace = {"__module__": __name__, "__doc__": f"The machine of {path}.", "__annotations__": annotations}
-    made: type[ModalMachine] = dataclass(frozen=True, kw_only=True)(
+    types: dict[str, Any] = {"name": path, "usual_ranges": usual}
+    annotations: dict[str, Any] = dict.fromkeys(fields, Any) | dict.fromkeys(types, ClassVar[Any])
+    namespace = {"__module__": __name__, "__doc__": data[""].get("title", path), "__annotations__": annotations}
+    made: Any = dataclass(frozen=True, kw_only=True)(
         type("ModalMachine", (ModalMachine,), {**namespace, **fields, **types})
     )
     made.tolerances = _tolerances(data["tolerances"], made())
     made.work = Work(task=data["job"])
-    return made
+    kind: type[ModalMachine] = made
+    return kind
 
 
 def _stated(value: Any, about: Parameter, path: str) -> Any:
