@@ -93,7 +93,7 @@ def test_browser_test_can_fail(browser, tmp_path):
     """A page with a foreign picture, a script error and a missing figure is caught by the same questions."""
     path = tmp_path / "bad.html"
     path.write_text('<img src="http://example.org/x.png"><script>absent()</script>')
-    seen = browser.visit(path)
+    seen = browser.visit(path.as_uri())
     assert "http://example.org/x.png" in seen.requests
     assert any("Uncaught" in complaint for complaint in seen.complaints)
     assert seen.pictures == [[0, 0]]

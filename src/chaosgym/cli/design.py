@@ -1,6 +1,7 @@
 """May a designer rely on the machine? ``design``."""
 
 import datetime
+from pathlib import Path
 from typing import Any
 
 import click
@@ -70,7 +71,12 @@ def design(
     elif asked is not None:
         answer = study(asked, seed=seed, workers=workers, progress=True)
         page, result, lines = (
-            report.design_report(answer, f"chaosgym design {brief} --seed {seed}"),
+            report.design_report(
+                answer,
+                f"chaosgym design {brief} --seed {seed}",
+                date=datetime.date.today().isoformat(),
+                brief=Path(str(brief)).read_text(encoding="utf-8"),
+            ),
             answer.as_dict(),
             answer.lines(),
         )

@@ -55,8 +55,27 @@ class Picture(NamedTuple):
     wide: bool
 
 
-def design_report(study: DesignStudy, command: str = "") -> str:
-    """HTML report of a design study; ``command`` is printed as the way to make it again."""
+NAMES = {
+    "machines that meet": "share of machines that meet",
+    "youngs_modulus": "Young's modulus",
+    "n_modes": "number of modes",
+    "fitted_modes": "number of fitted modes",
+}
+"""Names of criteria and parameters that their own do not tell well."""
+
+
+def design_report(study: DesignStudy, command: str = "", *, date: str = "", brief: str = "") -> str:
+    """HTML report of a design study: one page of summary, then what it rests on.
+
+    Parameters
+    ----------
+    study
+        What was found.
+    command
+        Printed as the way to make it again.
+    date, brief
+        Of the report, and text of the brief's file; left out if empty, so that a study gives the same bytes.
+    """
     found, criteria = study.assessment, study.assessment.criteria
     tone, headline = HEADLINES[found.verdict]
     best = study.improvement.best if study.improvement else None
@@ -70,6 +89,12 @@ def design_report(study: DesignStudy, command: str = "") -> str:
         meaning=WHAT_TYPES_MEAN[found.type],
         missed=[check.name for check in found.checks if not check.met],
         met={check.name: check.met for check in found.checks},
+        intervals={
+            "fatigue life": found.evaluation.life_interval,
+            "reliability": found.evaluation.reliability_interval,
+        },
+        date=date,
+        brief=brief,
         trials=tried if best is None else [best, *(trial for trial in tried if trial is not best)],
         service_hours=found.evaluation.life_interval.low * 1e6 * found.machine.cycle_period / 3600.0,
         rainflow_life=rating_life(study.force_of_every_impact, criteria.load_rating, criteria.life_exponent),
@@ -99,7 +124,7 @@ def _rendered(template: str, command: str, **names: object) -> str:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters["words"] = lambda name: name.replace("_", " ")
+    environment.filters["words"] = environment.filters["named"] = lambda name: NAMES.get(name, name.replace("_", " "))
     known = {
         "version": __version__,
         "command": command,
@@ -278,7 +303,7 @@ def _share(value: float) -> str:
     """Probability with as many nines as it has."""
     if value >= 1.0 - 1e-9:
         return "1.0000" if value == 1.0 else "> 0.99999999"
-    digits = max(4, math.ceil(-math.log10(1.0 - value)) + 2) if value > 0.0 else 4
+    digits = max(4, math.ceil(-math.log10(1.0 - value)) + 1) if value > 0.0 else 4
     return f"{value:.{min(digits, 9)}f}"
 
 
