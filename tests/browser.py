@@ -82,6 +82,10 @@ class Browser:
             self.picture(screenshot)
         return seen
 
+    def media(self, kind: str) -> None:
+        """Show pages as on paper ("print") or as usual ("")."""
+        self._call("Emulation.setEmulatedMedia", media=kind)
+
     def seen(self) -> Visit:
         """What has happened on the page until now."""
         seen = Visit()

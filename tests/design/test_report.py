@@ -227,3 +227,24 @@ def test_wrong_usage_is_one_line_and_code_2(run, arguments, message):
     assert (code, out) == (2, "")
     assert message in err
     assert len(err.strip().splitlines()) == 1
+
+
+def test_a_date_and_the_brief_are_printed_if_given(answered):
+    """The brief is quoted as text, and every entry of the contents has its place."""
+    page = design_report(answered, date="2030-01-02", brief=CALM + "# <b>")
+    assert "2030-01-02" in page
+    assert "# &lt;b&gt;" in page
+    links = re.findall(r'href="#(\w+)"', page)
+    assert links == ["joint", "numbers", "assumed", "brief"]
+    assert all(f'id="{name}"' in page for name in links)
+
+
+@needs_browser
+def test_the_summary_fits_on_one_printed_page(answered, browser, tmp_path):
+    """On A4 with the margins of the style sheet, 182 mm by 269 mm at 96 dots per inch."""
+    path = tmp_path / "report.html"
+    path.write_text(design_report(answered), encoding="utf-8")
+    browser.media("print")
+    browser.visit(path.as_uri(), width=688)
+    assert browser.value("document.querySelector('.summary').getBoundingClientRect().height") <= 1016
+    browser.media("")

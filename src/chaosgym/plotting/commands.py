@@ -168,7 +168,12 @@ def peaks_figure(measured: MeasuredPeaks) -> Figure:
     left, right = figure.subplots(1, 2, width_ratios=(5, 2))
     peak_record(measured.peaks, measured.criteria.life_exponent, left, right)
     found = measured.evaluation
-    left.set_title(
-        f"Life {found.life:.3g} million cycles ({found.life_interval.low:.3g} to {found.life_interval.high:.3g})"
+    life, low, high = (
+        f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"
+        for value in (found.life, found.life_interval.low, found.life_interval.high)
     )
+    figure.suptitle(
+        f"Life {life} million cycles ({low} to {high})", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK
+    )
+    left.set_title("")
     return figure

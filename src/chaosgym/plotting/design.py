@@ -52,7 +52,11 @@ def peak_record(peaks: Array, exponent: float, left: Axes, right: Axes) -> None:
     right.barh(found.edges[:-1], share, heights, align="edge", color=ACCENT, alpha=0.75, lw=0)
     top = 1.15 * float(np.max(peaks)) or 1.0
     left.set(xlabel="cycle", ylabel="peak force [N]", ylim=(0.0, top), title="Peak force of every cycle")
-    right.set(xlabel="share of cycles", ylim=(0.0, top), title=f"How often ({len(found.modes)} mode{'s' * (len(found.modes) > 1)})")
+    right.set(
+        xlabel="share of cycles",
+        ylim=(0.0, top),
+        title=f"How often ({len(found.modes)} mode{'s' * (len(found.modes) > 1)})",
+    )
     right.tick_params(labelleft=False)
     handles = [
         Line2D([], [], color=INK, lw=1.2, label=f"equivalent {force:.1f} N"),

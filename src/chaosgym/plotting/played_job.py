@@ -44,7 +44,7 @@ def draw_jobs(jobs: Jobs, figure: Figure, steps: int | None = None) -> None:
         draw_forces(job, axes[1, column], steps)
         done = slice(steps)
         axes[0, column].set_title(
-            f"{name}: return {np.nansum(job.reward[done, 0]):.1f}, Type III {np.nanmean(job.type_iii[done, 0]):.0%}",
+            f"{name}\nreturn {np.nansum(job.reward[done, 0]):.1f}, Type III {np.nanmean(job.type_iii[done, 0]):.0%}",
             fontsize=9.5,
             color=INK,
         )
@@ -74,7 +74,7 @@ def draw_forces(job: Played, ax: Axes, steps: int | None = None) -> Axes:
         ax.errorbar(
             step[chosen], mean[chosen], 2.0 * spread[chosen], fmt=".", color=colour, markersize=3, linewidth=0.8
         )
-    ax.set(xlim=(0, len(job.speed)), xlabel="step", ylabel="peak force [N], mean ± 2 SD")
+    ax.set(xlim=(0, len(job.speed)), xlabel="step", ylabel="peak force [N]\nmean ± 2 SD")
     return ax
 
 

@@ -113,7 +113,9 @@ def chance_bars(chances: dict[str, float], ax: Axes) -> Axes:
     colours = [NATURE_COLOURS.get(name, ACCENT) for name in names]
     ax.barh(names, list(chances.values()), color=colours, height=0.6)
     for row, value in enumerate(chances.values()):
-        ax.text(min(value, 0.85) + 0.02, row, f"{value:.2f}", va="center", fontsize=8.5)
+        inside = value > 0.8
+        place: dict[str, Any] = {"ha": "right", "color": "white"} if inside else {"ha": "left"}
+        ax.text(value + (-0.02 if inside else 0.02), row, f"{value:.2f}", va="center", fontsize=8.5, **place)
     ax.invert_yaxis()
     ax.set(xlim=(0.0, 1.0), xlabel="probability")
     ax.grid(axis="y", visible=False)
