@@ -73,7 +73,8 @@ def page(name: str, outputs: list[str]) -> str:
     for example, output in zip(EXAMPLES.get(name, []), outputs, strict=True):
         heading, _, more = example["what"].rstrip(".").partition(". ")
         parts += [f"## {heading}", *([f"{more}."] if more else []), f"```console\n$ {example['run']}\n{output}```"]
-        parts += [f"![{example['what']}]({name}-{picture})" for picture in _pictures(example["run"])]
+        pictures = [example["picture"]] if "picture" in example else [f"{name}-{file}" for file in _pictures(example)]
+        parts += [f"![{example['what']}]({picture})" for picture in pictures]
     return "\n\n".join([*parts, _last_part(name)])
 
 
@@ -86,7 +87,7 @@ def renewed(name: str, text: str) -> str:
 def outputs_of(name: str, folder: Path, chosen: Collection[int] | None = None) -> list[str]:
     """Return what the examples of a command, or some of them by number, print when they run in an empty folder."""
     (folder / "docs").mkdir()
-    for source in ("docs/data", "datasets"):
+    for source in ("docs/data", "docs/machines", "datasets"):
         (folder / source).symlink_to(ROOT / source)
     found = []
     for number, example in enumerate(EXAMPLES.get(name, [])):
@@ -94,7 +95,7 @@ def outputs_of(name: str, folder: Path, chosen: Collection[int] | None = None) -
             continue
         if "before" in example:
             _run(example["before"], folder)
-        found.append(_run(example["run"], folder))
+        found.append("" if "picture" in example else _run(example["run"], folder))
     return found
 
 
@@ -103,7 +104,7 @@ def write_page(name: str, folder: Path) -> None:
     with tempfile.TemporaryDirectory() as place:
         outputs = outputs_of(name, Path(place))
         for example in EXAMPLES.get(name, []):
-            for picture in _pictures(example["run"]):
+            for picture in _pictures(example):
                 shutil.copyfile(Path(place) / picture, folder / f"{name}-{picture}")
     _write(folder / f"{name}.md", page(name, outputs))
 
@@ -125,8 +126,8 @@ def _last_part(name: str) -> str:
     return f"## Options\n\n```text\n{options(name)}\n```\n"
 
 
-def _pictures(line: str) -> list[str]:
-    return [word for word in line.split() if word.endswith(PICTURES)]
+def _pictures(example: dict[str, Any]) -> list[str]:
+    return [word for word in example["run"].split() if word.endswith(PICTURES)]
 
 
 def _command(name: str) -> click.Command:
