@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 
@@ -206,6 +207,27 @@ def test_stopped_sweep_goes_on_and_ends_with_the_same_rows(swept, tmp_path, monk
     assert pq.read_table(tmp_path / "s" / "sweep.parquet").equals(pq.read_table(whole / "sweep.parquet"))
     assert pq.ParquetFile(tmp_path / "s" / "sweep.parquet").num_row_groups == 4
     assert not (tmp_path / "s" / "chunks").exists()
+
+
+def test_ctrl_c_ends_the_other_threads_at_their_row(tmp_path, monkeypatch):
+    """One thread is interrupted; the other, at the first of its many rows, ends with it rather than with its chunk."""
+    rows, interrupted = [], threading.Event()
+
+    def slow(machine, budget, *, signals):
+        rows.append(machine)
+        if len(rows) == 1:
+            interrupted.wait(30.0)
+            raise KeyboardInterrupt
+        interrupted.set()
+        time.sleep(0.3)
+        return {"status": "failed", "reason": "nothing was run"}
+
+    monkeypatch.setattr(label_module, "label_point", slow)
+    monkeypatch.setattr(plan_module, "CHUNK_SIZE", 200)
+    axes = (Axis("excitation_frequency", 18.0, 30.0), Axis("clearance", 1e-4, 1.4e-4))
+    with pytest.raises(KeyboardInterrupt):
+        run_sweep(SweepPlan(THESIS_IMPACT_BEAM, axes, "sobol", size=400), tmp_path / "s", workers=2)
+    assert len(rows) < 10
 
 
 def test_a_full_disk_loses_nothing(swept, tmp_path, monkeypatch):

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from itertools import islice
 from os import cpu_count
+from threading import Event
 from typing import Any
 
 import pyarrow as pa
@@ -28,17 +29,18 @@ CONNECT_SECONDS = 15
 def on_threads(plan: SweepPlan, chunks: Iterable[range], workers: int | None = None) -> Iterator[Finished]:
     """Label chunks on threads of this process, one a processor by default."""
     threads = workers or cpu_count() or 1
-    waiting = iter(chunks)
+    waiting, stop = iter(chunks), Event()
     pool = ThreadPoolExecutor(max_workers=threads)
     try:
-        running = {pool.submit(label_rows, plan, rows): rows for rows in islice(waiting, 2 * threads)}
+        running = {pool.submit(label_rows, plan, rows, stop): rows for rows in islice(waiting, 2 * threads)}
         while running:
             done: set[Future[pa.Table]] = wait(running, return_when=FIRST_COMPLETED).done
             for future in done:
                 rows = running.pop(future)
-                running |= {pool.submit(label_rows, plan, rows): rows for rows in islice(waiting, 1)}
+                running |= {pool.submit(label_rows, plan, rows, stop): rows for rows in islice(waiting, 1)}
                 yield rows, future.result()
     finally:
+        stop.set()  # after Ctrl-C, chunks end with the row that they are at
         pool.shutdown(cancel_futures=True)
 
 

@@ -1,5 +1,6 @@
 """The label of one point: one run from rest, judged in stages; evidence and signals come from that run."""
 
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ import pyarrow as pa
 from chaosgym.diagnosis import bounce_fraction, response_type
 from chaosgym.diagnosis.diagnose import diagnosed_run
 from chaosgym.diagnosis.stroboscopic import irregularity
-from chaosgym.errors import DiagnosisError, ParameterError, SimulationError
+from chaosgym.errors import DiagnosisError, ParameterError, SimulationError, UnfinishedError
 from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, simulate
 from chaosgym.sweeps.columns import SENSOR_ERROR, SIGNALS, WINDOW, WINDOWS, fixed_fields, schema
@@ -79,12 +80,20 @@ def _full_type(machine: Machine, budget: int) -> str | None:
         return None
 
 
-def label_rows(plan: SweepPlan, rows: range) -> pa.Table:
-    """Label some rows of a plan; response types that rest on neighbours are left to the end of the sweep."""
+def label_rows(plan: SweepPlan, rows: range, stop: Event | None = None) -> pa.Table:
+    """Label some rows of a plan; response types that rest on neighbours are left to the end of the sweep.
+
+    Raises
+    ------
+    UnfinishedError
+        If ``stop`` is set meanwhile.
+    """
     points = plan.points(rows)
     fixed, lines = fixed_fields(plan), list[dict[str, Any]]()
     with_signals, with_full_type = plan.with_signals(rows), plan.with_full_type(rows)
     for index in range(len(rows)):
+        if stop is not None and stop.is_set():
+            raise UnfinishedError("the sweep was stopped; the same command goes on")
         point = {name: float(column[index]) for name, column in points.items()}
         try:
             machine = plan.machine_at(point)
