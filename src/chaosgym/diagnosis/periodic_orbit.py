@@ -6,6 +6,7 @@ An orbit is certified if |P(y) - y| falls below 1e-10 of the orbit's size and ev
 unit circle. Newton's method, like M itself, fails near grazing, where P is not smooth.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -104,7 +105,7 @@ def find_periodic_orbit(
     try:
         for _ in range(iterations):
             end, monodromy = _period_map(machine, state, period, weight)
-            residual = float(np.linalg.norm(weight * (end - state)) / np.linalg.norm(weight * state))
+            residual = _share(weight * (end - state), weight * state)
             if best is not None and residual >= best[0]:
                 break
             best = (residual, state, monodromy)
@@ -123,8 +124,14 @@ def find_periodic_orbit(
         residual=residual,
         multipliers=np.asarray(multipliers[np.argsort(-np.abs(multipliers))], dtype=complex),
         derivative=monodromy,
-        distance=float(np.linalg.norm(weight * (state - origin)) / np.linalg.norm(weight * origin)),
+        distance=_share(weight * (state - origin), weight * origin),
     )
+
+
+def _share(change: Array, whole: Array) -> float:
+    """Size of a change as a share of the whole: 0 where nothing changes, also of a machine at rest."""
+    size = float(np.linalg.norm(change))
+    return size / float(np.linalg.norm(whole)) if np.any(whole) else math.inf if size else 0.0
 
 
 def _period_map(machine: Machine, state: Array, period: int, weight: Array) -> tuple[Array, Array]:

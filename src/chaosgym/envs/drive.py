@@ -34,7 +34,7 @@ DEAD_BAND = 0.4
 KINDS = ("trim", "continuous", "speed")
 
 
-def action_space(task: Task) -> Box | Discrete[Any]:
+def action_space(task: Task) -> "Box | Discrete[Any]":
     """Return the space of actions of the task's kind."""
     if task.action == "trim":
         return Discrete(BACK + 1)
