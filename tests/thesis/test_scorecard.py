@@ -67,6 +67,17 @@ def test_dots_are_the_series_that_the_thesis_plots():
     assert (seen.nature, seen.low) == ("periodic", record.peak_force.max(axis=1).min())
 
 
+def test_a_hasty_run_reads_what_a_long_one_does():
+    """Where a response settles soon it ends early, with the same force; chaos stays chaos, from any initial state."""
+    calm = replace(THESIS_IMPACT_BEAM, excitation_frequency=6.0, clearance=0.03175e-3)
+    long, hasty = observe(calm, THOROUGH["impact-beam"]._replace(budget=0)), observe(calm, QUICK["impact-beam"])
+    assert (hasty.nature, hasty.period, hasty.settle_cycle) == ("periodic", 1, long.settle_cycle)
+    assert hasty.mean == pytest.approx(long.mean, abs=0.02)
+    for start in (0, 3):
+        assert observe(THESIS_IMPACT_BEAM, QUICK["impact-beam"]._replace(start=start)).nature == "chaotic"
+    assert observe(calm, QUICK["impact-beam"]._replace(start=3)).mean == pytest.approx(long.mean, abs=0.02)
+
+
 def test_dots_that_spread_beyond_the_reading_error_are_chaos():
     """At 170 rpm and 2.5 % the 50 dots spread over 3 N: the nature is told from them, as the thesis told it."""
     crank = replace(THESIS_SLIDER_CRANK, crank_speed=170.0, slider_clearance=0.03175e-3, contact_damping_ratio=0.025)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.diagnosis import Diagnosis, diagnose, two_step_test
-from chaosgym.diagnosis.stroboscopic import irregularity
+from chaosgym.diagnosis.stroboscopic import MIN_REPEATS, class_residuals, irregularity
 from chaosgym.errors import SimulationError
 from chaosgym.machines import ImpactBeam, Machine
 from chaosgym.simulation import CycleRecord, MotionState, simulate
@@ -165,14 +165,23 @@ def _glance(machine: Machine, effort: Effort) -> Observation:
             least = irregularity(peaks[-REPEATING:], 3)
     except SimulationError:
         return Observation("failed")
-    peaks = peaks[-REPEATING:] if least <= CLOSE else peaks[-effort.cycles :]
-    spread = irregularity(peaks, FEW)
+    whole, peaks = peaks, peaks[-REPEATING:] if least <= CLOSE else peaks[-effort.cycles :]
+    residuals = class_residuals(peaks[:, None], min(FEW, len(peaks) // MIN_REPEATS))
+    period, spread = 1 + int(np.argmax(residuals <= max(CLOSE, residuals.min()))), float(residuals.min())
     shares = record.bounce_duration[record.bounce_duration > 0.0] / (0.5 * machine.cycle_period)
     return Observation(
         nature="periodic" if spread <= READING_ERROR else "chaotic",
+        period=period if spread <= READING_ERROR else None,
         irregularity=spread,
         low=float(peaks.min()),
         mean=float(peaks.mean()),
         high=float(peaks.max()),
         bounce_share=float(np.median(shares)) if len(shares) else 0.0,
+        settle_cycle=_repeats_from(whole, period) if spread <= READING_ERROR else None,
     )
+
+
+def _repeats_from(peaks: Array, period: int) -> int:
+    """First cycle from which peak forces repeat with a period within the width of a dot."""
+    off = np.flatnonzero(np.abs(peaks[period:] - peaks[:-period]) > DOT)
+    return int(off[-1]) + 1 if len(off) else 0

@@ -231,7 +231,7 @@ SEARCH_SPACES: Mapping[str, SearchSpace] = {
                 "interfaces, wide",
                 _MADE_OF_PARTS,
                 BEAM_FIELDS,
-                _numbers(BEAM_FIELDS, 0.0288756, 0.2141664, 36.92865, 242.6488, 1.98941e7),
+                _numbers(BEAM_FIELDS, 0.0300078, 0.2084302, 58.02812, 182.73, 1.00136e7),
             ),
             Basin(
                 "interfaces, narrow",
