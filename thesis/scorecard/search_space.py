@@ -215,6 +215,7 @@ CRANK_FIELDS = (
 _PITCH = (Real("slider_offset_across", 0.02, 0.07, "m"), Real("sensor_distance", 0.03, 0.05, "m"))
 
 _MADE_OF_PARTS: Mapping[str, Any] = {"reduction": "interfaces", "damping_family": "beam", "shaker_mass": 0.0}
+_FREE: Mapping[str, Any] = {"reduction": "free", "damping_family": "stiffness"}
 _TILTING: Mapping[str, Any] = {"slider_joint": "instrumented", "gravity": 9.81}
 _POWER: Mapping[str, Any] = {"damping_family": "power", "housing_mass": 0.16}
 
@@ -231,7 +232,7 @@ SEARCH_SPACES: Mapping[str, SearchSpace] = {
                 "interfaces, wide",
                 _MADE_OF_PARTS,
                 BEAM_FIELDS,
-                _numbers(BEAM_FIELDS, 0.0300078, 0.2084302, 58.02812, 182.73, 1.00136e7),
+                _numbers(BEAM_FIELDS, 0.03000784, 0.2084302, 58.02812, 182.73, 1.0013611e7),
             ),
             Basin(
                 "interfaces, narrow",
@@ -247,13 +248,13 @@ SEARCH_SPACES: Mapping[str, SearchSpace] = {
             ),
             Basin(
                 "free modes, soft pivot",
-                {"shaker_mass": 0.0},
+                {**_FREE, "shaker_mass": 0.0},
                 BEAM_FIELDS,
                 _numbers(BEAM_FIELDS, 0.010170, 0.226429, 11.8522, 143.351, 1.08320e5),
             ),
             Basin(
                 "free modes, moving mass",
-                {},
+                _FREE,
                 (*BEAM_FIELDS, _MASS),
                 _numbers((*BEAM_FIELDS, _MASS), 0.01758, 0.1809, 22.5, 510.0, 9.7e7, 0.089),
             ),
