@@ -10,11 +10,11 @@ from chaosgym.machines import THESIS_IMPACT_BEAM
 from chaosgym.machines.impact_beam.modes import static_tip_deflection
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.machines.slider_crank.parameters import frequencies_at
-from thesis.scorecard import calibrate as calibration
-from thesis.scorecard.calibrate import Budget
+from thesis.scorecard import search as calibration
 from thesis.scorecard.findings import Finding
 from thesis.scorecard.objective import WITHOUT_A_SLOPE, Stages, cost, objective, searched_statements
 from thesis.scorecard.quantities import clearance_unit
+from thesis.scorecard.search import Budget
 from thesis.scorecard.search_space import (
     SEARCH_SPACES,
     STATIC_TIP_DEFLECTION,

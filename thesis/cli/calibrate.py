@@ -31,8 +31,8 @@ def calibrate(
     as_json: bool,
 ) -> None:
     """Search the parameters that the thesis does not print (needs the extra [calibrate])."""
-    from thesis.scorecard.calibrate import Budget
     from thesis.scorecard.calibrate import calibrate as search
+    from thesis.scorecard.search import Budget
 
     found = search(
         machine,

@@ -22,8 +22,8 @@ def firmness(
 ) -> None:
     """Judge neighbours of a machine and write thesis/scorecard/firmness.json, which the scorecard shows."""
     from thesis.machines import THESIS_MACHINES
-    from thesis.scorecard.calibrate import complete_costs
     from thesis.scorecard.firmness import Firmness, exclusive_pairs, keep, left_out_hits, neighbour_shares
+    from thesis.scorecard.search import complete_costs
 
     one = THESIS_MACHINES[machine]
     pairs = exclusive_pairs(complete_costs(Path(search))) if search else ()
