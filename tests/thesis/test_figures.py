@@ -1,11 +1,12 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from chaosgym.errors import ChaosgymError
-from chaosgym.machines import MACHINES, THESIS_IMPACT_BEAM, ImpactBeam
+from chaosgym.machines import THESIS_IMPACT_BEAM
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
 from thesis.cache import default_folder
@@ -17,6 +18,7 @@ from thesis.figures.findings import compare_response
 from thesis.figures.gallery import gallery
 from thesis.figures.printed import comparison
 from thesis.figures.produce import computed
+from thesis.machines import BEAM, THESIS_MACHINES
 from thesis.scorecard.evaluation import evaluate
 from thesis.scorecard.observation import THOROUGH
 
@@ -43,7 +45,7 @@ def test_a_periodic_figure_says_what_the_simulation_says(tmp_path):
     """The beam repeats every cycle at 19 Hz and +-0.127 mm; the figure's finding is the nature of that very run."""
     (one,) = draw_figures(chosen(["3.6"]), tmp_path, resolution=0.1, workers=1)
     assert one.path.read_bytes().startswith(b"\x89PNG")
-    peaks = simulate(ImpactBeam(excitation_frequency=19.0), 100, transient=200).peak_force[:, 0]
+    peaks = simulate(replace(BEAM, excitation_frequency=19.0), 100, transient=200).peak_force[:, 0]
     assert one.findings[0].here.startswith(f"{peaks.mean():.3g} N, periodic")
     assert one.findings[0].agrees is True
 
@@ -55,7 +57,7 @@ def test_a_figure_says_of_a_statement_what_the_scorecard_says(number, tmp_path):
     names = [target for finding in one.findings for target in finding.targets]
     judged = evaluate(
         [comparison(name) for name in names],
-        {name: make() for name, make in MACHINES.items()},
+        THESIS_MACHINES,
         efforts=THOROUGH,
         folder=default_folder(),
     )

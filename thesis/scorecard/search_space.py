@@ -220,6 +220,10 @@ _TILTING: Mapping[str, Any] = {"slider_joint": "instrumented", "gravity": 9.81}
 _POWER: Mapping[str, Any] = {"damping_family": "power", "housing_mass": 0.16}
 
 
+def _present(machine: Machine, fields: tuple[Real, ...]) -> dict[str, float]:
+    return {one.name: getattr(machine, one.name) for one in fields}
+
+
 def _numbers(fields: tuple[Real, ...], *values: float) -> dict[str, float]:
     return {one.name: value for one, value in zip(fields, values, strict=True)}
 
@@ -232,7 +236,7 @@ SEARCH_SPACES: Mapping[str, SearchSpace] = {
                 "interfaces, wide",
                 _MADE_OF_PARTS,
                 BEAM_FIELDS,
-                _numbers(BEAM_FIELDS, 0.03000784, 0.2084302, 58.02812, 182.73, 1.0013611e7),
+                _present(BEAM, BEAM_FIELDS),
             ),
             Basin(
                 "interfaces, narrow",
