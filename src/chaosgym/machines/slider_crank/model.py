@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.core.lanes import GROUP, padded
 from chaosgym.machines.slider_crank.equations import Equations, equations, rod_of
 from chaosgym.machines.slider_crank.joints import Channels, channels_of, display_of, gaps_of, hertz_constants, joints_of
 from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
-from chaosgym.machines.slider_crank.kernels.lanes import padded
 from chaosgym.machines.slider_crank.kernels.propagator import FORCING_TERMS, TICKS, series_order, tables
 from chaosgym.machines.slider_crank.kernels.stepped import HERTZ, LINEAR, SteppedCrankModel
 from chaosgym.machines.slider_crank.kinematics import slider_rate
@@ -311,7 +311,7 @@ def _structure(kind: type, *structure: Any) -> _Structure:
 def _with_channels(accelerations: Array, row: Array) -> Array:
     """Accelerations (..., n) followed by those of the channels' displacements and by what fills up the lanes."""
     m, n = row.shape
-    lanes = np.zeros((*accelerations.shape[:-1], padded(n + m)))
+    lanes = np.zeros((*accelerations.shape[:-1], padded(n + m, GROUP)))
     lanes[..., :n] = accelerations
     lanes[..., n : n + m] = accelerations @ row.T
     return lanes

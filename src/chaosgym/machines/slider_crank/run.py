@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from chaosgym.core import status
 from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays, Episode, cycle_arrays
-from chaosgym.core.tangent import Tangents
+from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.slider_crank.joints import gaps_of, sensor_peaks
 from chaosgym.machines.slider_crank.kernels.exact import advance
@@ -58,7 +58,7 @@ def run(
     while done < cycles:
         part = CycleArrays(*(values[done : done + at_once] for values in arrays))
         if kernel is advance:
-            vectors, log_growth = tangents or Tangents(np.empty((0, len(coordinates))), np.empty((cycles, 0)))
+            vectors, log_growth = tangents or no_tangents(len(coordinates), cycles)
             part_settings = (*settings, Tangents(vectors, log_growth[done : done + at_once]))
         else:
             part_settings = settings

@@ -10,7 +10,6 @@ with cached_by_content(Path(__file__).parent):
         contact,
         exact,
         fixed_step,
-        lanes,
         propagator,
         record,
         stepped,

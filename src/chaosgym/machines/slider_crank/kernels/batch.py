@@ -10,10 +10,10 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from chaosgym.core.batch import episode_of, rows_of
-from chaosgym.core.tangent import Tangents
+from chaosgym.core.lanes import GROUP, padded
+from chaosgym.core.tangent import no_tangents
 from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
 from chaosgym.machines.slider_crank.kernels.exact import advance as advance_crank
-from chaosgym.machines.slider_crank.kernels.lanes import padded
 from chaosgym.machines.slider_crank.kernels.propagator import FORCING_TERMS, RUNGS
 from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
 from chaosgym.machines.slider_crank.kernels.stepped import advance as advance_stepped_crank
@@ -52,8 +52,8 @@ def crank_of(batch, bins, i):
         batch.reach[i],
         batch.display[i],
         batch.anchor[i],
-        carray(pointer(batch.acceleration[i]), (sets, bins, columns, padded(n + m)), np.float64),
-        carray(pointer(batch.propagator[i]), (sets, bins, RUNGS, columns, padded(2 * (n + m))), np.float64),
+        carray(pointer(batch.acceleration[i]), (sets, bins, columns, padded(n + m, GROUP)), np.float64),
+        carray(pointer(batch.propagator[i]), (sets, bins, RUNGS, columns, padded(2 * (n + m), GROUP)), np.float64),
         carray(pointer(batch.bound[i]), (sets, bins, m, columns), np.float64),
     )
 
@@ -70,7 +70,7 @@ def advance_cranks(batch, bins, which, motions, arrays, settings, outcome):
             rows_of(arrays, k),
             settings.event_tolerance / batch.contact_rate[i],
             settings.event_budget,
-            Tangents(np.empty((0, motions.coordinates.shape[1])), np.empty((0, 0))),
+            no_tangents(motions.coordinates.shape[1], 0),
         )[0]
 
 

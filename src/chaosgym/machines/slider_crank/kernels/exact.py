@@ -42,11 +42,11 @@ from chaosgym.machines.slider_crank.kernels.contact import (
     surfaces,
     trend,
 )
-from chaosgym.machines.slider_crank.kernels.lanes import combine
 from chaosgym.machines.slider_crank.kernels.propagator import (
     FORCING_TERMS,
     RUNGS,
     TICKS,
+    combine,
     evaluate,
     expand,
     order_for,

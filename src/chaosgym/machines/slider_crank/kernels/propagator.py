@@ -19,8 +19,8 @@ import math
 import numpy as np
 from numba import njit
 
-from chaosgym.core.kernel import leaf
-from chaosgym.machines.slider_crank.kernels.lanes import combine, next_term, padded
+from chaosgym.core.kernel import leaf, part
+from chaosgym.core.lanes import GROUP, add_columns, next_term, padded
 
 FORCING_TERMS = 4
 """Coefficients of the forcing polynomial: a cubic."""
@@ -58,6 +58,12 @@ def order_for(phase, most):
     return order
 
 
+@part
+def combine(table, count, factors, answer):
+    """Write the sum over c < ``count`` of ``factors[c] * table[c]`` into the first ``table.shape[1]`` of ``answer``."""
+    add_columns(table, 0, table.shape[1], count, factors, 0, answer, 0)
+
+
 @leaf
 def expand(a, n, z, duration, last, factors, series):
     """Taylor coefficients about the instant of z, in seconds, up to the order ``last``.
@@ -69,7 +75,7 @@ def expand(a, n, z, duration, last, factors, series):
     for i in range(n):
         series[0, i] = z[i]
         series[1, i] = z[n + i]
-    forcing = a[2 * n :]
+    forcing, row = a[2 * n :], series.shape[1]
     scale = 1.0
     for k in range(last - 1):
         new = series[k + 2]
@@ -89,7 +95,7 @@ def expand(a, n, z, duration, last, factors, series):
         else:
             for i in range(new.shape[0]):
                 new[i] = 0.0
-        next_term(a, n, series[k], series[k + 1], k + 1.0, SHARES[k], new)
+        next_term(a, 0, a.shape[1], n, series, k * row, (k + 1) * row, k + 1.0, SHARES[k], (k + 2) * row)
 
 
 @leaf
@@ -339,7 +345,7 @@ def tables(acceleration, row, lag, anchor, duration, step, order):
     sets, bins, columns, _ = acceleration.shape
     m, n = row.shape
     size = 2 * n + FORCING_TERMS + m
-    propagator = np.zeros((sets, bins, RUNGS, columns, padded(2 * (n + m))))
+    propagator = np.zeros((sets, bins, RUNGS, columns, padded(2 * (n + m), GROUP)))
     bound = np.zeros((sets, bins, m, columns))
     width = size + (-size) % 8
     terms, table, twice = np.empty((3, n, width)), np.empty((2 * n, width)), np.empty((2 * n, width))
