@@ -30,7 +30,7 @@ POLICIES = {
 }
 LADDER_OPTIONS = {
     "impact-beam": "--points 60 --cycles 200 --transient 100 --budget 4 --workers 1",
-    "slider-crank": "--points 60 --cycles 100 --transient 60 --budget 4 --workers 1",
+    "slider-crank": "--points 60 --cycles 50 --transient 30 --budget 4 --workers 1",
 }
 
 
