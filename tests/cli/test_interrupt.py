@@ -34,6 +34,17 @@ COMMANDS = {
 }
 
 
+def _started(*arguments):
+    """A Python process that hears SIGINT, even if this one was started in the background, where it is ignored."""
+    return subprocess.Popen(
+        [sys.executable, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+
+
 def _processor_seconds(process):
     fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
@@ -46,13 +57,11 @@ def test_compiled_code_is_left_and_python_ends_by_itself(work, code, says):
         "import hashlib, time\nfrom chaosgym.cli.interrupt import heard_at_once\n"
         f"with heard_at_once():\n    print('on', flush=True)\n    {work}\n"
     )
-    with subprocess.Popen(
-        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    ) as process:
+    with _started("-c", program) as process:
         assert process.stdout.readline() == "on\n"
         time.sleep(0.3)
         process.send_signal(signal.SIGINT)
-        assert says in process.communicate(timeout=60)[0]
+        assert says in "".join(process.communicate(timeout=60))
         assert process.returncode == code
 
 
@@ -70,9 +79,7 @@ def test_the_watch_ends_with_the_command():
 def test_ctrl_c_ends_a_command_that_computes(command, tmp_path):
     """SIGINT after twelve seconds of processor time: exit 130 within a few more, one line, no traceback."""
     arguments = [str(tmp_path / "out") if word == "OUT" else word for word in COMMANDS[command]]
-    with subprocess.Popen(
-        [sys.executable, "-m", "chaosgym", *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
+    with _started("-m", "chaosgym", *arguments) as process:
         while process.poll() is None and _processor_seconds(process) < 12.0:
             time.sleep(0.05)
         assert process.poll() is None, process.stderr.read()
