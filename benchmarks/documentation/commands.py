@@ -54,10 +54,10 @@ def index() -> str:
         [
             "# Commands",
             "",
-            "A command prints lines for people, or one JSON object with `--json`. Only `dataset card` and",
-            "`dataset map`, which write a file, have no `--json`. Progress goes to standard error.",
+            "A command prints lines for people, or one JSON object with `--json`. Progress goes to standard error.",
             "",
-            "Exit codes: 0 done, 1 a computation failed, 2 wrong usage, 130 stopped by Ctrl-C.",
+            "Exit codes: 0 done, 1 a computation failed, 2 wrong usage, 130 stopped by Ctrl-C, 141 nobody reads the",
+            "output.",
             "",
             "| command | what it does |",
             "|---|---|",
