@@ -1,7 +1,7 @@
 """Your own machine: the modes of a structure, a joint with one or two stops, and a periodic drive.
 
 structure = Structure.of_modes([9.0, 61.0], 0.01, {"tip": [2.1, -1.9], "shaker": [1.2, 0.8]})
-machine = ModalMachine(structure=structure, joint="tip", drives=(Drive.sine("force", "shaker", 8.9),), speed=19.0)
+machine = ModalMachine(modes=structure, joint="tip", drives=(Drive.sine("force", "shaker", 8.9),), speed=19.0)
 """
 
 import math
