@@ -23,13 +23,13 @@ def test_simulate_and_show_speak_of_the_same_machine():
 
 
 def test_show_lists_only_the_degrees_of_freedom_of_the_scene():
-    """A rigid rod with slider clearance is one coordinate, both joints in space with a flexible rod are twelve."""
+    """A rigid rod with slider clearance is one coordinate, both joints in space with a flexible rod are fourteen."""
     rigid = run_json("show", "slider-crank", "--set", "rod=rigid")
     assert rigid["degrees_of_freedom"] == ["slider across the guide"]
     assert rigid["sensors"] == []
     both = run_json("show", "slider-crank", "--clearance-joint", "both", "--motor-angle-deg", "25")
-    assert len(both["degrees_of_freedom"]) == 12
-    assert len(both["natural_frequencies_hz"]) == 7
+    assert len(both["degrees_of_freedom"]) == 14
+    assert len(both["natural_frequencies_hz"]) == 9
     assert "degrees_of_freedom" not in run_json("show", "impact-beam")
 
 

