@@ -52,7 +52,7 @@ def test_what_is_proven_is_periodic(beam):
         assert sum(answer.probabilities.values()) == pytest.approx(1.0)
         if answer.proven:
             proven += 1
-            verdict = diagnose(machine, budget=400)
+            verdict = diagnose(machine)
             assert verdict.nature == "periodic"
             assert answer.largest_peak == pytest.approx(verdict.evidence["largest_peak"], rel=1e-6)
     assert proven > 20

@@ -142,7 +142,7 @@ def test_a_common_schedule_is_the_same_for_all_machines(own):
 
 
 def test_a_job_of_single_cycles_is_the_same_job():
-    """For controllers that act in each cycle: the same machines, nearly the same demand, and as much to lose on average."""
+    """For controllers that act in each cycle: the same machines, nearly the same demand, on average as much to lose."""
     task = gym.make_vec(BEAM, num_envs=1).unwrapped.task
     machines = range(12)
     coarse, fine = play(Follow(), BEAM, machines), play(Follow(), BEAM, machines, **cycle_keywords(task))
