@@ -86,7 +86,7 @@ def test_types_are_those_of_the_diagnosis(beam):
     machines = random_beams(12, 7)
     for machine in machines:
         answer = beam.classify(machine)
-        points = [diagnose(one, budget=400) for one in (machine, *neighbours_of(machine))]
+        points = [diagnose(one) for one in (machine, *neighbours_of(machine))]
         peaks = [verdict.evidence["largest_peak"] for verdict in points]
         agreed += answer.response_type == type_of_cross([verdict.nature for verdict in points], peaks)[0]
         assert sum(answer.type_probabilities.values()) == pytest.approx(1.0)
