@@ -19,10 +19,10 @@ SHIPPED = Path("src/chaosgym/control/policies/shipped")
 
 SWEEPS = {
     "impact-beam": "--axis length=0.26505:0.29295 --axis damping_ratio=0.005:0.08:log --axis contact_damping=10:40:log "
-    "--axis excitation_frequency=1:40 --axis clearance=1e-05:0.0003:log --crosses 860 --seed 10 --budget 400",
+    "--axis excitation_frequency=1:40 --axis clearance=1e-05:0.0003:log --crosses 3000 --seed 10 --budget 400",
     "slider-crank": "--axis rod_length=0.22325:0.24675 --axis contact_damping_ratio=0.01:0.08:log "
     "--axis friction_coefficient=0:0.1 --axis crank_speed=50:300 --axis slider_clearance=1.6e-05:0.0003:log "
-    "--crosses 320 --seed 1 --budget 200",
+    "--crosses 1500 --seed 1 --budget 200",
 }
 POLICIES = {
     "ImpactBeamTolerance-v1": "python agents/ppo.py --env chaosgym/ImpactBeamTolerance-v1 --seed 0 --steps 900000 "
