@@ -23,7 +23,7 @@ MOMENTS = int(os.environ.get("CHAOSGYM_KILLS", "2"))
 SWEEP = "impact-beam --axis excitation_frequency=10:30 --axis clearance=5e-5:2e-4 --sobol 1200 --seed 2 --budget 100"
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
 TRAIN = f"--env {BEAM} --steps 7680 --envs 32 --rollout 60 --batch 240 --every 1920"
-COMPARE = f"compare {BEAM} --machines 8 --only follow --only back-off"
+COMPARE = ("compare", BEAM, "--machines", "8", "--only", "follow the demand", "--only", "back off")
 CROSSES = (
     "impact-beam --axis damping_ratio=0.01:0.05:log --axis excitation_frequency=18:30 "
     "--axis clearance=1e-4:1.4e-4:log --crosses 60 --seed 3 --budget 100 --signals 1"
@@ -57,7 +57,7 @@ def _constants(out):
 
 
 def _comparison(out):
-    return f"-m chaosgym {COMPARE} --out {out / 'jobs.parquet'}"
+    return ["-m", "chaosgym", *COMPARE, "--out", str(out / "jobs.parquet")]
 
 
 def _jobs(out):
