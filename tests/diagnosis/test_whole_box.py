@@ -113,12 +113,14 @@ def test_a_verdict_anywhere_in_the_box_of_the_crank(fields, typed):
 @pytest.mark.slow
 def test_every_extreme_of_the_stability_map_is_judged():
     """All rungs of the beam at all extremes, by their default integrator: a verdict or a named error."""
-    judged = 0
+    tried = judged = 0
     for run in runs_of(THESIS_IMPACT_BEAM):
         if run.integrator is None:
             try:
                 machine = run.machine()
             except ChaosgymError:
                 continue
+            tried += 1
             judged += _judged(machine) is not None
-    assert judged > 100
+    assert tried >= 20 * len(ImpactBeam.fidelity_ladder)
+    assert judged > 0.9 * tried
