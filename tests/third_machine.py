@@ -7,13 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from chaosgym.machines import register_machine
 from chaosgym.machines.modal_impact import ModalImpactMachine, Modes, flexible_model
 from chaosgym.machines.options import Number, Option
 from chaosgym.machines.parameters import parameter
 
 
-@register_machine
 @dataclass(frozen=True, kw_only=True)
 class ImpactOscillator(ModalImpactMachine):
     """A mass on a spring and a damper that a harmonic force drives between two compliant stops."""

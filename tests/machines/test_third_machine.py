@@ -11,9 +11,18 @@ import chaosgym
 from chaosgym.cli import app
 from chaosgym.envs import TASKS, register_environments
 from chaosgym.errors import ChaosgymError
+from chaosgym.machines import MACHINES, register_machine
 from tests.third_machine import ImpactOscillator
 
 NAME = ImpactOscillator.name
+
+
+@pytest.fixture(scope="module", autouse=True)
+def registered():
+    """The machine is known to every command and task while these tests run."""
+    register_machine(ImpactOscillator)
+    yield
+    del MACHINES.entry_points[NAME]
 
 
 def run(*arguments: str) -> Result:

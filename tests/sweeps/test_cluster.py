@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from chaosgym.machines import THESIS_IMPACT_BEAM
+from chaosgym.machines import ImpactBeam
 from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
 
 POINTS = 1100
@@ -101,7 +101,7 @@ def test_rows_of_a_cluster_that_loses_a_worker_are_those_of_one_process(cluster,
     _, errors = run.communicate(timeout=600)
     assert run.returncode == 0, errors.decode()
     axes = (Axis("excitation_frequency", 10.0, 30.0), Axis("clearance", 5e-5, 2e-4))
-    local = run_sweep(SweepPlan(THESIS_IMPACT_BEAM, axes, "random", POINTS, 4, budget=100), tmp_path / "l")
+    local = run_sweep(SweepPlan(ImpactBeam(), axes, "random", POINTS, 4, budget=100), tmp_path / "l")
     assert read_sweep(tmp_path / "c").table.equals(local.table)
     assert len(local.table) == POINTS
 

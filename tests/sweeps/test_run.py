@@ -255,7 +255,7 @@ def test_a_full_disk_loses_nothing(swept, tmp_path, monkeypatch):
 def test_a_killed_sweep_goes_on(tmp_path):
     """kill -9 in the middle; the same command again ends with the rows of an undisturbed run."""
     axes = (Axis("excitation_frequency", 10.0, 30.0), Axis("clearance", 5e-5, 2e-4))
-    plan = SweepPlan(THESIS_IMPACT_BEAM, axes, "sobol", size=900, seed=2, budget=100)
+    plan = SweepPlan(ImpactBeam(), axes, "sobol", size=900, seed=2, budget=100)
     command = [
         sys.executable,
         "-m",
