@@ -10,6 +10,9 @@ import chaosgym
 from benchmarks.published import in_scipy, no_separation, orbit_diagram
 from chaosgym.diagnosis import diagnose
 from chaosgym.machines.linear_impact import linear_impact
+from chaosgym.machines.modal_machine.drive import Drive
+from chaosgym.machines.modal_machine.structure import Structure
+from chaosgym.machines.parameters import with_settings
 
 FOLDER = Path(__file__).parents[2] / "docs" / "machines"
 
@@ -69,6 +72,58 @@ def test_period_doubling_and_chaos_of_the_impact_oscillator():
     assert np.ptp(before[-1]) < 0.002 * before[-1].mean()
     assert np.ptp(after[-1][::2]) < 0.002 * after[-1].mean() < np.ptp(after[-1])
     assert diagnose(machine("shaw-holmes-1983").at(2.9), budget=800).nature == "chaotic"
+
+
+def two_sided(ratio, gap, restitution=0.8):
+    """Speed V of the impacts, and largest multiplier of a cycle, of x'' + x = cos(w t) between rigid stops at +-gap.
+
+    In the symmetric motion half a cycle, from one stop to the other, turns every sign. With p = 1 / (1 - w^2) and c, s
+    of pi / w, the steady motion is gap - k V at the impact, k = (1 + r) s / 2 (1 + c), and its rate (1 - r) V / 2.
+    """
+    c, s = math.cos(math.pi / ratio), math.sin(math.pi / ratio)
+    steady = 1.0 / (1.0 - ratio**2)
+    push, rate = (1.0 + restitution) * s / (2.0 * (1.0 + c)), (1.0 - restitution) / (2.0 * ratio)
+    square = push**2 + rate**2
+    speed = (gap * push + math.sqrt((gap * push) ** 2 - square * (gap**2 - steady**2))) / square
+    pull = gap - (gap - push * speed) / steady
+    trace = -2.0 * restitution * c + (1.0 + restitution) * pull / speed * s
+    return speed, max(abs(np.roots([1.0, -trace, restitution**2]))) ** 2
+
+
+@pytest.mark.parametrize(("ratio", "gap"), [(0.8, 1.0), (1.2, 1.0), (1.5, 1.0), (1.8, 0.5)])
+def test_symmetric_orbit_between_two_stops(ratio, gap):
+    """One impact on either side in a cycle, with force and multiplier of the closed form; gap in static units."""
+    static = 1.0 / (2.0 * math.pi) ** 2
+    settings = {"stops": "two", "clearance": gap * static}
+    found = with_settings(machine("shaw-holmes-1983").at(ratio), settings)
+    verdict = diagnose(found, budget=800)
+    assert (verdict.nature, verdict.period, verdict.status) == ("periodic", 1, "certified")
+    assert verdict.judged.impacts[-1].tolist() == [1, 1]
+    speed, multiplier = two_sided(ratio, gap)
+    impact = linear_impact(1.0, found.contact_stiffness, found.contact_damping)
+    expected = impact.force_per_speed * speed * static * 2.0 * math.pi
+    np.testing.assert_allclose(verdict.judged.peak_force[-1], expected, rtol=2e-3)
+    assert verdict.evidence["orbit"]["largest_multiplier"] == pytest.approx(multiplier, rel=0.01)
+
+
+@pytest.mark.parametrize("stops", ["one", "two"])
+def test_contact_begins_by_grazing(stops):
+    """Contact begins where the amplitude of the linear response, damped by 5 %, equals the gap."""
+    still = chaosgym.ModalMachine(
+        modes=Structure.of_modes([1.0], 0.05, {"mass": [1.0]}),
+        joint="mass",
+        drives=(Drive.sine("force", "mass", 1.0),),
+        speed=1.3,
+        stops=stops,
+        contact_stiffness=4e7,
+        contact_damping=940.526,
+    )
+    amplitude = 1.0 / (2.0 * math.pi) ** 2 / math.hypot(1.0 - 1.3**2, 2.0 * 0.05 * 1.3)
+    lag, omega = math.atan2(2.0 * 0.05 * 1.3, 1.0 - 1.3**2), 2.0 * math.pi * 1.3
+    steady = [-amplitude * math.sin(lag), amplitude * omega * math.cos(lag)]
+    for share, touches in ((1.0005, False), (0.9995, True)):
+        record = chaosgym.simulate(with_settings(still, {"clearance": share * amplitude}), 40, steady)
+        assert record.impacts.any() == touches
 
 
 def test_the_same_orbit_in_scipy():
