@@ -11,7 +11,6 @@ from PIL import Image
 from chaosgym.cli import app
 from chaosgym.errors import ChaosgymError
 from tests.control.made_up import ENV
-from tests.control.test_run_agent import folder  # noqa: F401  (a fixture)
 
 
 @pytest.fixture(autouse=True)
@@ -79,7 +78,7 @@ def test_a_sweep_is_drawn_along_one_field_or_over_two(axes):
     assert len(text) > 5000
 
 
-def test_an_agent_is_drawn(folder):  # noqa: F811
+def test_an_agent_is_drawn(folder):
     """The picture of a job, in a new file by its environment."""
     assert told("run-agent", ENV, "--policy", folder, "--plot")["plot"] == f"run-agent-{ENV.rpartition('/')[2]}.png"
 

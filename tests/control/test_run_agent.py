@@ -7,19 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from chaosgym.control.policies import TrainedPolicy, save_policy
-from chaosgym.control.policies.network import Dense, Network
 from tests.cli.test_cli import run, run_json
 from tests.control.made_up import ENV
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A policy that always goes one trim step down."""
-    layer = Dense(np.zeros((6, 14), np.float32), np.array([0, 1, 0, 0, 0, 0], np.float32), "none")
-    path = tmp_path_factory.mktemp("policy")
-    save_policy(TrainedPolicy(ENV, "trim", Network(None, (layer,))), path)
-    return path
 
 
 def test_a_job_is_played_and_animated(folder, tmp_path):

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.control.test_run_agent import folder  # noqa: F401  (a fixture)
-
 ROOT = Path(__file__).parent.parent.parent
 
 
@@ -20,7 +18,7 @@ def _run(*command, **options):
 
 
 @pytest.mark.slow
-def test_the_wheel_alone_plays_a_policy(folder, tmp_path, monkeypatch):  # noqa: F811
+def test_the_wheel_alone_plays_a_policy(folder, tmp_path, monkeypatch):
     """In a fresh environment, without torch and stable-baselines3, run-agent plays and draws a job."""
     monkeypatch.delenv("PYTHONPATH", raising=False)
     _run(sys.executable, "-m", "build", "--wheel", "--outdir", tmp_path, ROOT)

@@ -24,6 +24,7 @@ def totals(counts, clear):
 def check(counts, wrong):
     """No confident error above 1 % of all records, at most 10 % undetermined away from boundaries."""
     clear, edge = totals(counts, True), totals(counts, False)
+    print(f"away from boundaries {clear}, at boundaries {edge}")
     told = [(seed, record.kind, verdict.diagnosis.reason) for seed, record, verdict in wrong]
     assert clear["wrong"] + edge["wrong"] <= 0.01 * sum(counts.values()), told
     assert clear["undetermined"] <= 0.1 * sum(clear.values())

@@ -1,0 +1,17 @@
+"""Fixtures of several rooms."""
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory):
+    """A policy that always goes one trim step down."""
+    from chaosgym.control.policies import TrainedPolicy, save_policy
+    from chaosgym.control.policies.network import Dense, Network
+    from tests.control.made_up import ENV
+
+    layer = Dense(np.zeros((6, 14), np.float32), np.array([0, 1, 0, 0, 0, 0], np.float32), "none")
+    path = tmp_path_factory.mktemp("policy")
+    save_policy(TrainedPolicy(ENV, "trim", Network(None, (layer,))), path)
+    return path
