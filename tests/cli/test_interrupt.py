@@ -23,12 +23,12 @@ PATIENT = """try:
         raise SystemExit(7)"""
 """What Python can end by itself, in its own way."""
 
-REVOLUTION = ("slider-crank", "--set", "n_modes=20", "--clearance-joint", "ball-spherical")
-"""A crank that takes 4,494,600 steps a revolution, just within its budget: some seconds in one call of a kernel."""
+REVOLUTION = ("slider-crank", "--set", "n_modes=16", "--clearance-joint", "ball-spherical")
+"""A crank that takes millions of steps a revolution, within its budget: some seconds in one call of a kernel."""
 
 COMMANDS = {
-    "revolutions of a million steps": ("simulate", "slider-crank", "--set", "n_modes=20", "--cycles", "1000"),
-    "revolutions of four million steps": ("simulate", *REVOLUTION, "--cycles", "100"),
+    "revolutions of a million steps": ("simulate", "slider-crank", "--set", "n_modes=16", "--cycles", "1000"),
+    "revolutions of millions of steps": ("simulate", *REVOLUTION, "--cycles", "100"),
     "a diagnosis": ("diagnose", *REVOLUTION),
     "a sweep": ("sweep", "impact-beam", "--sobol", "100000", "--budget", "100000", "--workers", "2", "--out", "OUT"),
 }
