@@ -37,7 +37,7 @@ def conformal_thresholds(chances: Array, labels: Labels, coverage: float) -> Arr
     found = np.zeros(chances.shape[1])
     for kind in range(len(found)):
         truth = np.sort(chances[labels == kind, kind])
-        rank = int(np.floor((1.0 - coverage) * (len(truth) + 1))) - 1
+        rank = int(np.floor((1.0 - coverage) * (len(truth) + 1) + 1e-9)) - 1  # 0.9 of ten leaves one, in floats less
         found[kind] = truth[rank] if rank >= 0 else 0.0
     return found
 
