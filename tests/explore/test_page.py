@@ -66,6 +66,24 @@ def test_a_slider_is_dragged_and_the_verdict_follows(address, browser):
     check(browser.seen())
 
 
+def test_the_impacts_are_heard(address, browser):
+    """The button plays as many seconds of the contact force as it says, and no script complains."""
+    browser.visit(address, width=1400)
+    browser.wait(f"{HEADLINE}.includes('periodic')")
+    browser.value(
+        "(() => { const start = AudioBufferSourceNode.prototype.start; window.heard = [];"
+        "AudioBufferSourceNode.prototype.start = function() {"
+        "window.heard.push(Math.max(...this.buffer.getChannelData(0)), this.buffer.duration); start.call(this) } })()"
+    )
+    listen = "(() => { const button = all(document, 'button').find(b => b.textContent.includes('Listen'));"
+    browser.click(browser.value(deep(f"{listen} button.scrollIntoView(); return middle(button) }})()")))
+    assert browser.wait("window.heard.length === 2")
+    loudest, seconds = browser.value("window.heard")
+    assert loudest == pytest.approx(0.8, rel=1e-6)
+    assert 0.05 < seconds < 2.0
+    check(browser.seen())
+
+
 def test_an_agent_plays_its_job(address, browser):
     """The button shows the machine at work: the speed moves by itself, and the page says where the job stands."""
     browser.visit(address, width=1400)

@@ -38,6 +38,25 @@ TOOLS = "pan,wheel_zoom,box_zoom,reset,save"
 NUMBERS = 400
 """Steps of a slider."""
 
+LISTEN = """
+const time = Array.from(motion.data.time, t => t / 1000), force = Array.from(motion.data.f, Math.abs)
+const sound = new AudioContext(), span = time[time.length - 1] - time[0]
+const buffer = sound.createBuffer(1, Math.ceil(span * sound.sampleRate), sound.sampleRate)
+const samples = buffer.getChannelData(0), loudest = Math.max(...force) || 1
+for (let k = 0, n = 0; k < samples.length; k++) {
+    while (n < time.length - 2 && time[n + 1] - time[0] < k / sound.sampleRate) n++
+    samples[k] = 0.8 * force[n] / loudest
+}
+const source = sound.createBufferSource()
+source.buffer = buffer
+source.loop = true
+source.connect(sound.destination)
+source.start()
+source.stop(sound.currentTime + 3)
+source.onended = () => sound.close()
+"""
+"""Three seconds of the contact force as sound: every impact is a click."""
+
 
 class Page:
     """The state behind one opened page.
@@ -197,15 +216,15 @@ class Page:
             row(diagram, record, sizing_mode="stretch_width"),
             row(
                 self._python,
-                column(self._command, self._copies(), sizing_mode="stretch_width"),
+                column(self._command, self._buttons(), sizing_mode="stretch_width"),
                 sizing_mode="stretch_width",
             ),
             sizing_mode="stretch_width",
         )
         return column(row(self._panel, pictures, sizing_mode="stretch_width"), self._link, sizing_mode="stretch_width")
 
-    def _copies(self) -> Any:
-        """Buttons that copy Python, command and link."""
+    def _buttons(self) -> Any:
+        """Buttons that copy Python, command and link, and one that plays the impacts."""
         buttons = []
         for label, source, code in (
             ("Copy Python", self._python, "text.value"),
@@ -215,7 +234,9 @@ class Page:
             button = Button(label=label, width=120)
             button.js_on_click(CustomJS(args={"text": source}, code=f"navigator.clipboard.writeText({code})"))
             buttons.append(button)
-        return row(*buttons)
+        listen = Button(label="Listen", width=120)
+        listen.js_on_click(CustomJS(args={"motion": self._sources["motion"]}, code=LISTEN))
+        return row(*buttons, listen)
 
 
 def open_page(document: Document, machine: Machine) -> None:
