@@ -1,5 +1,9 @@
 """Fixtures of several rooms."""
 
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as commands do: tests run on all processors already
+
 import numpy as np
 import pytest
 

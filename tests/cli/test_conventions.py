@@ -1,5 +1,6 @@
 """What people expect of a command line: completion, JSON, plain text, quiet ends, constant exit codes."""
 
+import json
 import os
 import signal
 import subprocess
@@ -90,3 +91,16 @@ def test_ten_million_cycles_show_progress_and_end_at_once():
         process.communicate(timeout=60)
         assert time.monotonic() - began < 10.0
     assert process.returncode == 130
+
+
+def test_commands_use_one_blas_thread():
+    """Numpy's own BLAS and the one that scipy brings, loaded after the command began."""
+    program = (
+        "import click\nfrom chaosgym.cli import run_command\n"
+        "@click.command()\ndef count():\n"
+        "    import scipy.linalg\n    from threadpoolctl import threadpool_info\n"
+        "    print([pool['num_threads'] for pool in threadpool_info() if pool['user_api'] == 'blas'])\n"
+        "run_command(count)"
+    )
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert set(json.loads(found.stdout)) == {1}

@@ -6,6 +6,7 @@ output. Nothing is coloured, so NO_COLOR holds.
 """
 
 import errno
+import os
 import sys
 from importlib import import_module
 from typing import NoReturn
@@ -70,6 +71,7 @@ def main() -> None:
 
 def run_command(command: click.Command) -> None:
     """Run a command line: one clear line instead of a traceback for every error that chaosgym raises on purpose."""
+    _use_one_blas_thread()
     try:
         with heard_at_once():
             command(standalone_mode=False)
@@ -86,6 +88,14 @@ def run_command(command: click.Command) -> None:
         _end(error, 2)
     except OSError as error:
         _end(error, 1 if error.errno in BEYOND_THE_USER else 2)
+
+
+def _use_one_blas_thread() -> None:
+    """Matrices are small here: threads that wait for each other cost a hundredfold beside other busy programs."""
+    from threadpoolctl import threadpool_limits
+
+    threadpool_limits(1, user_api="blas")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # scipy's, which is loaded later
 
 
 def _end(message: object, code: int) -> NoReturn:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.rating_life import LIFE_EXPONENT
@@ -154,6 +153,8 @@ def build_series(
     names = tuple(tolerances)
     if not names or size == 0:
         return Series(names, np.empty((0, len(names))), ())
+    from scipy.stats import qmc
+
     sequence = qmc.Sobol(len(names), rng=np.random.default_rng(seed))
     shares = 2.0 * sequence.random_base2(int(np.ceil(np.log2(size))))[:size] - 1.0
     machines = [_deviating(machine, tolerances, row) for row in shares]

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import find_peaks
 
 from chaosgym.errors import DesignError
 
@@ -235,6 +234,8 @@ def histogram(forces: ArrayLike, bins: int | None = None) -> Histogram:
 
 
 def _modes(values: Array) -> Array:
+    from scipy.signal import find_peaks  # slow to import, and few questions need it
+
     levels = np.unique(np.round(values / np.max(values), 6))
     if len(levels) <= min(MOST_LEVELS, len(values) // 4):
         return np.asarray(levels * np.max(values))
