@@ -116,7 +116,8 @@ def random_machines(machine: Machine, count: int, seed: int = 0) -> list[Machine
     """
     rng = np.random.default_rng(seed)
     low, high = machine.usual_ranges[machine.speed_field]
-    small, large = machine.usual_ranges[machine.clearance_field]
+    least, large = machine.usual_ranges[machine.clearance_field]
+    small = least or 0.01 * large
     dampings = [name for name in default_tolerances(machine) if "damping" in name]
     drawn = []
     for _ in range(count):

@@ -143,12 +143,24 @@ def monitors(machine: Any, changes: int, seed: int, model: str | None, as_json: 
     emit({"machine": machine.name, "monitors": scores}, as_json, lambda: monitor_table(machine.name, scores))
 
 
+@machine_command
+@click.option("--points", type=click.IntRange(1, 10**6), default=100, show_default=True, help="Random machines.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+def general(machine: Any, points: int, seed: int, as_json: bool) -> None:
+    """Natures of a machine without a classifier of its own, such as my-machine.toml, against the full diagnosis."""
+    from benchmarks.agreement import random_machines
+    from benchmarks.classifier.general import general as judge
+
+    found = judge(random_machines(machine, points, seed), progress=True)
+    emit(found, as_json, lambda: [f"{name:24s} {value}" for name, value in found.items()])
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 def app() -> None:
     """Numbers about chaosgym itself."""
 
 
-for command in (bench, agreement, check, cost, judges, audit, classifier, monitors):
+for command in (bench, agreement, check, cost, judges, audit, classifier, monitors, general):
     app.add_command(command)
 
 

@@ -1,17 +1,22 @@
 """The cascade: proofs that hold, budgets that are kept, types by the printed rule."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from chaosgym.classifier import default_classifier
+from chaosgym.classifier import classifier_for, default_classifier
 from chaosgym.classifier.cascade import returning_period
 from chaosgym.classifier.types import neighbours_of, type_probabilities
 from chaosgym.diagnosis import diagnose
 from chaosgym.diagnosis.type_rule import type_of_cross
+from chaosgym.errors import ModelFileError
 from chaosgym.machines import THESIS_SLIDER_CRANK, ImpactBeam
+from chaosgym.machines.modal_machine import read_machine
 from tests.classifier.made_up import settled
+
+PUBLISHED = Path(__file__).parents[2] / "docs" / "machines"
 
 CALM = ImpactBeam(excitation_frequency=19.0, clearance=1.27e-4)
 WILD = ImpactBeam(excitation_frequency=30.0, clearance=1.27e-4)
@@ -141,3 +146,24 @@ def test_the_returning_period_is_the_smallest(rate, period):
     """States of a period-k orbit come back after k cycles first."""
     series = settled(rate, 33)
     assert returning_period(np.column_stack([series[:-1], series[1:]])) == period
+
+
+def test_a_machine_of_ones_own_is_judged_by_proofs_and_by_its_forces():
+    """Periods of published machines are proven, their chaos is read from forces in any unit, parameters say nothing."""
+    gears = read_machine(PUBLISHED / "kahraman-singh-1990.toml")
+    calm = classifier_for(gears).classify(gears)
+    assert (calm.nature, calm.centre.proven, calm.response_type) == ("periodic", True, "I")
+    beam = read_machine(PUBLISHED / "moon-shaw-1983.toml")
+    general = classifier_for(beam)
+    wild = general.classify(beam).centre
+    assert (wild.nature, wild.proven, wild.cycles) == ("chaotic", False, 128)
+    assert general.classify(beam, budget_us=0.0, types=False).abstained
+    with pytest.raises(ModelFileError, match="diagnose --peaks"):
+        general.classify_record(np.ones(20))
+    with pytest.raises(ModelFileError, match="from parameters alone"):
+        general.classify_table(np.ones((2, 0)))
+
+
+def test_a_shipped_classifier_is_used_where_there_is_one():
+    """The general one is for machines that have none."""
+    assert classifier_for(CALM) is default_classifier("impact-beam")

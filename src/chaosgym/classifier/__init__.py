@@ -2,7 +2,7 @@
 
 from chaosgym.classifier.answer import Classification, NatureAnswer, RecordAnswer
 from chaosgym.classifier.estimator import ResponseClassifier
-from chaosgym.classifier.machine_classifier import MachineClassifier, default_classifier
+from chaosgym.classifier.machine_classifier import MachineClassifier, classifier_for, default_classifier
 
 __all__ = [
     "Classification",
@@ -10,5 +10,6 @@ __all__ = [
     "NatureAnswer",
     "RecordAnswer",
     "ResponseClassifier",
+    "classifier_for",
     "default_classifier",
 ]

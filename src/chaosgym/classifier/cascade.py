@@ -6,6 +6,10 @@
                     motion nears, and its Floquet multipliers
 
 It stops at a proof, where it is sure, or where the next step exceeds the budget. Each stage is calibrated on its own.
+
+Of a machine that was not trained on, its parameters say nothing. Proofs are then tried up to the last stage, whose
+peak forces are judged as those of a record, brought to the level of the records in the training: what repeats and what
+does not is free of units.
 """
 
 from collections.abc import Mapping
@@ -19,11 +23,11 @@ from numpy.typing import NDArray
 
 from chaosgym.classifier.answer import NatureAnswer
 from chaosgym.classifier.estimator import ResponseClassifier
-from chaosgym.classifier.features import response_features
+from chaosgym.classifier.features import MAX_CYCLES, response_features
 from chaosgym.diagnosis.diagnose import approaches, primitive
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
 from chaosgym.errors import SimulationError
-from chaosgym.machines import MACHINES, Machine
+from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, simulate
 
 Array = NDArray[np.float64]
@@ -34,8 +38,8 @@ STAGES = (8, 16, 32, 64)
 SURE = 0.99
 """Probability that is an answer before the last stage."""
 
-CLEAR = 0.6
-"""Probability that is an answer at all."""
+CLEAR, CLEAR_ELSEWHERE = 0.6, 0.8
+"""Probability that is an answer at all, and on a machine that was not trained on."""
 
 HOPE = 0.3
 """Probability of a periodic response from which on a proof is tried."""
@@ -45,6 +49,9 @@ LONGEST_PERIOD, SEEN = 16, 2
 
 BACK = 1e-6
 """Distance, relative to the size of the motion, at which a state has come back."""
+
+LEVEL, FINEST = 50.0, 0.02
+"""Mean peak, and smallest stated error [N], of the records that the classifier of records has learned from."""
 
 MILLION = 1e6
 
@@ -57,9 +64,9 @@ class Costs(NamedTuple):
 
 
 @lru_cache
-def costs_of(machine_name: str) -> Costs:
+def costs_of(kind: type[Machine]) -> Costs:
     """Measured once in a process, on the machine's default: what the next step of a budget is taken to cost."""
-    machine: Machine = MACHINES[machine_name]()
+    machine = kind()
     record = simulate(machine, STAGES[-1])
     find_periodic_orbit(machine, record.final_state, 1)
     began = thread_time()
@@ -78,6 +85,7 @@ class _Progress:
     stage: str
     record: CycleRecord | None = None
     orbit: PeriodicOrbit | None = None
+    clear: float = CLEAR
 
     @property
     def cycles(self) -> int:
@@ -117,15 +125,16 @@ def judge_nature(
     if values is not None and 0 in stages:
         _judge(now, stages[0], values, None, "parameters")
     try:
-        for cycles in STAGES:
+        for cycles in sorted({*STAGES, *stages} - {0}):
             sure = _is_sure(now)
             if sure and now.cycles >= least_cycles and not (prove and now.cycles == 0 and _hopeful(now)):
                 break
             if not _affordable(machine, began, budget_us, cycles - now.cycles, 0):
                 break
             record = _go_on(now, machine, cycles)
-            if values is not None and cycles in stages:
-                _judge(now, stages[cycles], values, record, f"{cycles} cycles")
+            model = stages.get(cycles)
+            if model is not None and (values is not None or model.inputs == "records"):
+                _judge(now, model, values, record, f"{cycles} cycles")
             if prove and _hopeful(now):
                 now.orbit = _proof(machine, record, began, budget_us)
                 if now.orbit is not None:
@@ -135,9 +144,14 @@ def judge_nature(
     return _answer(now, machine, foreign, began)
 
 
-def _judge(now: _Progress, model: ResponseClassifier, values: Array, record: CycleRecord | None, stage: str) -> None:
+def _judge(
+    now: _Progress, model: ResponseClassifier, values: Array | None, record: CycleRecord | None, stage: str
+) -> None:
     """Let one stage speak."""
-    if record is None:
+    if record is not None and model.inputs == "records":
+        now.clear = CLEAR_ELSEWHERE
+        features = response_features(None, None, _as_measured(record), None, np.array([FINEST]))
+    elif record is None:
         features = response_features(model.scaling_, values)
     else:
         section = np.column_stack([record.displacement, record.velocity])[None]
@@ -147,6 +161,13 @@ def _judge(now: _Progress, model: ResponseClassifier, values: Array, record: Cyc
     now.probabilities, now.stage = dict(zip(names, chances, strict=True)), stage
     limits = model.plausible_.tolist()
     now.plausible = tuple(name for name, chance, least in zip(names, chances, limits, strict=True) if chance >= least)
+
+
+def _as_measured(record: CycleRecord) -> Array:
+    """Peak forces (1, cycles) of the side that is hit harder, at the level of the records in the training."""
+    late = record.peak_force[-MAX_CYCLES:]
+    peaks = late[:, int(np.argmax(late.max(axis=0)))]
+    return np.asarray(peaks[None] * (LEVEL / max(float(peaks.mean()), 1e-300)))
 
 
 def _is_sure(now: _Progress) -> bool:
@@ -163,7 +184,7 @@ def _affordable(machine: Machine, began: float, budget_us: float | None, cycles:
     left = budget_us - MILLION * (thread_time() - began)
     if left <= 0.0:
         return False
-    costs = costs_of(machine.name)
+    costs = costs_of(type(machine))
     return cycles * costs.cycle + proofs * costs.proof <= left
 
 
@@ -211,7 +232,7 @@ def _answer(now: _Progress, machine: Machine, foreign: str, began: float) -> Nat
         reason = "no classifier knows this machine, and no periodic orbit was proven"
     elif not reason:
         likely = max(probabilities, key=probabilities.__getitem__)
-        if probabilities[likely] >= CLEAR:
+        if probabilities[likely] >= now.clear:
             nature, reason = likely, f"learned, from {'the ' * (stage == 'parameters')}{stage}"
         else:
             reason = f"too close to call: {likely} has a probability of {probabilities[likely]:.2f} after {stage}"

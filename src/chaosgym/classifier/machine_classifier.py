@@ -1,6 +1,7 @@
 """What chaosgym knows of a machine's responses: its trained classifiers behind one interface.
 
-    classifier = default_classifier("impact-beam")
+    classifier = default_classifier("impact-beam")         the one that is shipped for a machine
+    classifier = classifier_for(machine)                   the same, or a general one for machines that have none
     classifier.classify(machine)                           type and nature, by the cascade
     classifier.classify_record(peaks, sensor_error=3.0)    irregularity and nature from 8 or more measured cycles
     classifier.classify_table(values), classify_records(peaks)    many at once, as columns
@@ -42,6 +43,9 @@ Array = NDArray[np.float64]
 PEAK_CYCLES = 16
 """Cycles from rest that the largest peak of a neighbourhood's point rests on at least, unless an orbit is proven."""
 
+GENERAL, GENERAL_CYCLES = "impact-beam", 128
+"""Machine whose records teach about machines without a classifier, and cycles from rest after which they are asked."""
+
 NATURE, IRREGULAR = "record-nature", "record-irregular"
 """Names of the classifiers of records."""
 
@@ -74,7 +78,15 @@ class MachineClassifier:
 
     @property
     def parameters(self) -> ResponseClassifier:
-        """The classifier of natures from parameters alone."""
+        """The classifier of natures from parameters alone.
+
+        Raises
+        ------
+        ModelFileError
+            If none is trained for this machine.
+        """
+        if 0 not in self.stages:
+            raise ModelFileError(f"nothing is learned of {self.machine.name} from parameters alone")
         return self.stages[0]
 
     def classify(
@@ -232,8 +244,8 @@ class MachineClassifier:
     def _model(self, name: str) -> ResponseClassifier:
         if name not in self.records:
             raise ModelFileError(
-                "this classifier was trained on a sweep without signals and can't judge records; "
-                "use `chaosgym sweep --signals SHARE` for its data"
+                f"no classifier of records is trained for {self.machine.name}: `chaosgym diagnose --peaks` judges them "
+                "without one, and `chaosgym sweep --signals SHARE` gives data to train one on"
             )
         return self.records[name]
 
@@ -245,6 +257,8 @@ class MachineClassifier:
 
     def _foreign(self, machine: Machine, values: Array) -> str:
         """Why a machine lies outside the training; empty if it does not."""
+        if not self.fields:
+            return ""
         known = self.parameters
         for name, value, low, high in zip(self.fields, values, known.low_, known.high_, strict=True):
             if not low <= value <= high:
@@ -369,3 +383,17 @@ def default_classifier(machine_name: str) -> MachineClassifier:
         raise ModelFileError(f"no classifier is shipped for {machine_name}; train one with `chaosgym train-classifier`")
     with resources.as_file(path) as file:
         return MachineClassifier.load(file)
+
+
+def classifier_for(machine: Machine) -> MachineClassifier:
+    """Return the classifier that is shipped for a machine, or else one for any machine with a gap.
+
+    The general one takes proofs of periodic orbits, and reads peak forces as the beam's classifier of records does. It
+    has no guess from parameters, and takes no measured records.
+    """
+    try:
+        return default_classifier(machine.name)
+    except ModelFileError:
+        pass
+    nature = default_classifier(GENERAL).records[NATURE]
+    return MachineClassifier(machine, {GENERAL_CYCLES: nature}, {}, {"fields": ()})

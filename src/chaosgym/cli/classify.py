@@ -72,9 +72,9 @@ def classify(
         raise click.UsageError("--plot goes with --peaks or --series; `chaosgym diagnose` draws a machine")
     if follow:
         return _follow(sys.stdin, half_width, log, as_json)
-    from chaosgym.classifier import MachineClassifier, default_classifier
+    from chaosgym.classifier import MachineClassifier, classifier_for
 
-    classifier = MachineClassifier.load(model) if model else default_classifier(machine.name)
+    classifier = MachineClassifier.load(model) if model else classifier_for(machine)
     if classifier.machine.name != machine.name:
         raise click.UsageError(f"--model {model} knows {classifier.machine.name}, not {machine.name}")
     if measured:

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.classifier import default_classifier
+from chaosgym.classifier import classifier_for
 from chaosgym.diagnosis import Diagnosis, diagnose
 from chaosgym.envs.pictures import PICTURES, PLAIN
-from chaosgym.errors import ChaosgymError, ModelFileError, ParameterError, SimulationError
+from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
 from chaosgym.machines.registry import FILE_ENDING, MACHINES
@@ -196,9 +196,7 @@ def _votes(verdict: Diagnosis) -> str:
 
 def _classified(machine: Machine) -> str:
     try:
-        answer = default_classifier(machine.name).classify(machine, types=False)
-    except ModelFileError:
-        return "classifier: none is trained for this machine"
+        answer = classifier_for(machine).classify(machine, types=False)
     except ChaosgymError as error:
         return f"classifier: {error}"
     centre = answer.centre
