@@ -7,8 +7,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 import chaosgym
+from chaosgym.core import compilation
 from chaosgym.core.compilation import is_cached
 from chaosgym.core.fixed_step import advance_fixed_step
 from chaosgym.core.modal_impact import advance
@@ -50,6 +52,15 @@ def test_processes_that_start_together_compile_once(tmp_path):
     counts = sorted(out.decode().split() for out, _ in ended)
     assert counts == [["0", "1"], ["1", "0"]]
     assert sorted(err.decode().count("compiling fixed_step.advance_fixed_step") for _, err in ended) == [0, 1]
+
+
+def test_what_is_compiled_already_waits_for_no_one():
+    """While another process holds the lock, a kernel that lies on the disk is loaded at once."""
+    simulate(ImpactBeam(), 1)
+    with FileLock(compilation._lock_file()):
+        process = _in_a_process("from chaosgym import *; simulate(ImpactBeam(), 1); print('done')")
+        out, err = process.communicate(timeout=120)
+    assert (out.decode().strip(), err.decode()) == ("done", "")
 
 
 @pytest.mark.slow

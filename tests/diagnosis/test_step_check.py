@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from chaosgym.diagnosis import step_check as module
 from chaosgym.diagnosis.step_check import step_check
-from chaosgym.machines import THESIS_IMPACT_BEAM
+from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam
 from chaosgym.simulation import RungeKutta4
 
 
@@ -17,6 +18,7 @@ def test_exact_propagation_keeps_its_verdict(frequency, nature):
     assert check.nature_stays
     assert check.period_stays
     assert check.spread_stays
+    assert check.settled
     assert "keeps" in check.summary
 
 
@@ -28,3 +30,21 @@ def test_a_coarse_fixed_step_makes_chaos_of_a_periodic_response_and_is_found_out
     assert not check.nature_stays
     assert "CHANGES" in check.summary
     assert check.as_dict()["finer_nature"] == check.finer.nature != "chaotic"
+
+
+def test_two_coarse_steps_that_are_wrong_alike_confirm_nothing():
+    """The standard beam at 19 Hz has period 1; 2000 and 4000 steps both call it chaotic, but by exponents of 1.6 and 0.2."""
+    check = step_check(ImpactBeam(excitation_frequency=19.0), budget=400, integrator=RungeKutta4(2000))
+    assert check.given.nature == "chaotic"
+    assert (check.finer.nature, check.finer.period, check.finer.status) == ("periodic", 1, "certified")
+    assert check.settled
+    assert "CHANGES" in check.summary
+
+
+def test_steps_that_never_agree_leave_the_verdict_undetermined(monkeypatch):
+    """Refined once, from 2000 to 4000 steps, the two verdicts contradict each other and neither is confirmed."""
+    monkeypatch.setattr(module, "REFINEMENTS", 1)
+    check = step_check(ImpactBeam(excitation_frequency=19.0), budget=400, integrator=RungeKutta4(2000))
+    assert check.given.nature == check.finer.nature == "chaotic"
+    assert not check.settled
+    assert check.summary.startswith("undetermined")

@@ -1,9 +1,12 @@
 """Compilation of kernels: once on a computer, however many processes need them.
 
 The first call of a kernel in a process loads its machine code from the disk, or compiles it, which takes seconds, and
-keeps it there. A lock lets one process do that while the others wait and then load; a message says what takes so long.
+keeps it there. A lock lets one process compile while others that need a kernel not there yet wait and then load it; what
+is there already is loaded without the lock. A message says what takes so long.
 
-The machine code has a checksum beside it: a damaged file is compiled anew.
+The machine code has a checksum beside it: a damaged file is compiled anew. Machine code, numba's index of it and
+checksums change under the lock alone. So a reader without the lock that finds them in disagreement can have met a
+change half done, and looks again with the lock.
 """
 
 import atexit
@@ -12,6 +15,7 @@ import logging
 import os
 import shutil
 import tempfile
+import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +23,7 @@ from typing import Any
 
 import numba
 from filelock import FileLock
+from numba.core import event
 
 from chaosgym.core import KERNEL_CACHE, WANTED_CACHE, source_digest
 
@@ -42,6 +47,8 @@ def prepare(kernel: Any, *arguments: Any) -> None:
     missing = kernel.py_func.__code__.co_argcount - len(types)
     defaults = (kernel.py_func.__defaults__ or ())[-missing:] if missing else ()
     signature = (*types, *(numba.types.Omitted(default) for default in defaults))
+    if _loaded(kernel, signature):
+        return
     with FileLock(_lock_file()):
         _discard_damaged(kernel)
         cached = is_cached(kernel)
@@ -57,6 +64,38 @@ def prepare(kernel: Any, *arguments: Any) -> None:
             kernel.compile(signature)
         if not cached or any(kernel.stats.cache_misses.values()):
             _keep_checksums(kernel)
+
+
+class _NotCachedError(Exception):
+    """A kernel is about to be compiled."""
+
+
+class _Refusal(event.Listener):
+    """Keeps numba from compiling in this thread: it may only load."""
+
+    def __init__(self) -> None:
+        self._thread = threading.get_ident()
+
+    def on_start(self, event: event.Event) -> None:
+        """Refuse to compile."""
+        if threading.get_ident() == self._thread:
+            raise _NotCachedError
+
+    def on_end(self, event: event.Event) -> None:
+        """Nothing to do."""
+
+
+def _loaded(kernel: Any, signature: tuple[Any, ...]) -> bool:
+    """Load sound machine code of a kernel without the lock; False where there is none for these arguments."""
+    files = _files_of(kernel)
+    if not files or not all(map(_is_sound, files)):
+        return False
+    try:
+        with event.install_listener("numba:compile", _Refusal()):
+            kernel.compile(signature)
+    except Exception:  # not there, or whatever reading a damaged pickle raises: the lock's holder sees to it
+        return False
+    return True
 
 
 def _how_often() -> str:

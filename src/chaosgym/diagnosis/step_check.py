@@ -1,7 +1,10 @@
-"""The step check: a machine judged again with a finer step, so that the verdict is the machine's and not the step's.
+"""The step check: a machine judged again with finer steps, so that the verdict is the machine's and not the step's.
 
 Touch and release that are placed wrongly by a fraction of a step add or remove energy at every impact, which turns
 periodic responses into chaos and the reverse. A verdict that a finer step changes is no verdict.
+
+Two steps may be wrong alike: both call a periodic motion chaotic. Chaos of the step shrinks with it, that of the machine
+does not. So the step is refined until two successive steps agree in nature, period and, where chaotic, exponent.
 """
 
 from dataclasses import dataclass
@@ -17,6 +20,12 @@ from chaosgym.simulation import Integrator
 SPREAD_CHANGE = 0.05
 """Largest change of the spread of the peak force, as a share of the largest peak, that counts as none."""
 
+EXPONENT_CHANGE = 0.2
+"""Largest change of a positive exponent, as a share of the larger, that counts as none if it exceeds the errors."""
+
+REFINEMENTS = 4
+"""Most times that the step is refined."""
+
 
 @dataclass(frozen=True)
 class StepCheck:
@@ -25,11 +34,14 @@ class StepCheck:
     Attributes
     ----------
     given, finer : Diagnosis
-        Verdicts.
+        Verdicts; the latter with the finest step tried.
+    settled
+        Whether the last two steps tried agree. If not, the machine's own verdict is undetermined.
     """
 
     given: Diagnosis
     finer: Diagnosis
+    settled: bool
 
     @property
     def spreads(self) -> tuple[float, float]:
@@ -57,6 +69,8 @@ class StepCheck:
     def summary(self) -> str:
         """One line for people."""
         finer = self.finer.nature + (f" with period {self.finer.period}" if self.finer.period else "")
+        if not self.settled:
+            return f"undetermined: no two steps agree; the finest says {finer}"
         kept = "keeps" if self.nature_stays and self.period_stays else "CHANGES"
         return (
             f"a finer step {kept} the verdict ({finer}); spread of the peak force {self.spreads[0]:.2f} N, "
@@ -73,8 +87,20 @@ class StepCheck:
             "finer_spread_N": self.spreads[1],
             "finer_nature": self.finer.nature,
             "finer_period": self.finer.period,
+            "settled": self.settled,
             "summary": self.summary,
         }
+
+
+def agree(one: Diagnosis, other: Diagnosis) -> bool:
+    """True if two verdicts have the same nature and period, and about the same exponent where they are chaotic."""
+    if (one.nature, one.period) != (other.nature, other.period):
+        return False
+    exponents = [verdict.evidence["largest_lyapunov_exponent_per_cycle"] for verdict in (one, other)]
+    values, errors = ([exponent[name] for exponent in exponents] for name in ("value", "standard_error"))
+    if one.nature != "chaotic" or min(values) <= 0.0:  # chaos that died out has an exponent below zero
+        return True
+    return bool(abs(values[0] - values[1]) <= max(EXPONENT_CHANGE * max(values), 3.0 * np.hypot(*errors)))
 
 
 def step_check(
@@ -85,7 +111,7 @@ def step_check(
     sensor_error: float = 0.0,
     integrator: Integrator | None = None,
 ) -> StepCheck:
-    """Judge a machine with an integrator and with ``integrator.refined()``.
+    """Judge a machine with an integrator and with ``integrator.refined()``, again refined until two steps agree.
 
     Parameters
     ----------
@@ -100,5 +126,10 @@ def step_check(
     """
     chosen = integrator or machine.default_integrator
     given = given or diagnose(machine, budget=budget, sensor_error=sensor_error, integrator=chosen)
-    finer = diagnose(machine, budget=budget, sensor_error=sensor_error, integrator=chosen.refined())
-    return StepCheck(given, finer)
+    finer = given
+    for _ in range(REFINEMENTS):
+        chosen = chosen.refined()
+        coarser, finer = finer, diagnose(machine, budget=budget, sensor_error=sensor_error, integrator=chosen)
+        if agree(coarser, finer):
+            return StepCheck(given, finer, settled=True)
+    return StepCheck(given, finer, settled=False)
