@@ -14,12 +14,13 @@ import gymnasium as gym
 from tqdm import trange
 
 from chaosgym.control.policies import load_policy
+from chaosgym.envs import environment
 
 
 def main() -> None:
     """Play the jobs and write the dataset."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--env", default="chaosgym/ImpactBeamTolerance-v1")
+    parser.add_argument("--env", default="chaosgym/ImpactBeamTolerance-v1", help="id, or file of a machine")
     parser.add_argument("--policy", type=Path, default=None, help="folder of a policy; random actions by default")
     parser.add_argument("--jobs", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
@@ -30,11 +31,11 @@ def main() -> None:
     from minari import DataCollector  # it looks for the folder when it is imported
 
     behaviour = asked.policy.name if asked.policy else "random"
-    name = f"{asked.env.removesuffix('-v1')}/{behaviour}-v1"
+    name = f"chaosgym/{Path(asked.env).stem.removesuffix('-v1')}/{behaviour}-v1"
     if (asked.out / name).exists():
         raise SystemExit(f"{asked.out / name} exists; choose another folder with --out")
     policy = load_policy(asked.policy) if asked.policy else None
-    env = gym.make(asked.env, **(policy.keywords if policy else {}))
+    env = gym.make(environment(asked.env), **(policy.keywords if policy else {}))
     env.action_space.seed(asked.seed)
     collector = DataCollector(env)
     for job in trange(asked.jobs, desc=name, unit="job"):

@@ -49,7 +49,10 @@ def test_a_film_is_written(folder, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (("chaosgym/ImpactBeam-v0",), "ENV chaosgym/ImpactBeam-v0 is unknown; known: chaosgym/ImpactBeam-v1"),
+        (("chaosgym/ImpactBeam-v0",), "env = 'chaosgym/ImpactBeam-v0' is unknown; known: chaosgym/ImpactBeam-v1"),
+        (("chaosgym/Machine-v0", "--policy", "{folder}"), "machine = '' does not exist"),
+        (("CartPole-v1",), "is unknown"),
+        (("gone.toml", "--policy", "{folder}"), "gone.toml can't be read"),
         ((ENV, "--policy", "nowhere"), "nowhere holds no policy.json"),
         (
             (ENV, "--plot", "job.tex"),
@@ -57,9 +60,9 @@ def test_a_film_is_written(folder, tmp_path):
         ),
     ],
 )
-def test_wrong_input_ends_in_one_line(arguments, complaint):
+def test_wrong_input_ends_in_one_line(arguments, complaint, folder):
     """Exit code 2, and what is allowed."""
-    code, _, err = run("run-agent", *arguments)
+    code, _, err = run("run-agent", *(argument.format(folder=folder) for argument in arguments))
     assert code == 2
     assert complaint in err
     assert len(err.strip().splitlines()) <= 3

@@ -24,11 +24,13 @@ if TYPE_CHECKING:
 @plot_option("--out", formats="figure .png, .svg, .pdf or animation .gif, .mp4")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def run_agent(env: str, policy: Path | None, machine: int, plot: str | None, as_json: bool) -> None:
-    """Let a trained agent run one job of ENV, such as chaosgym/ImpactBeamTolerance-v1, beside following the demand."""
-    from chaosgym.envs import ENVIRONMENTS
+    """Let a trained agent run one job beside following the demand.
 
-    if env not in ENVIRONMENTS:
-        raise click.UsageError(f"ENV {env} is unknown; known: {', '.join(ENVIRONMENTS)}")
+    ENV is an id such as chaosgym/ImpactBeamTolerance-v1, or the file of a machine.
+    """
+    from chaosgym.envs import environment
+
+    environment(env)
     out = _picture(plot, env)
     from chaosgym.control.controllers import Follow
     from chaosgym.control.policies import load_policy, shipped_policy

@@ -13,7 +13,6 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute
@@ -41,6 +40,7 @@ from chaosgym.control.maps import FLEET, FLEET_SEED, Maps, fleet_maps, maps_of, 
 from chaosgym.control.rollout import Played, Policy, play
 from chaosgym.control.statistics import bootstrap_interval, performance_profile
 from chaosgym.envs.task import Status
+from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import DatasetError, ParameterError
 from chaosgym.files import write_atomically
 
@@ -103,7 +103,7 @@ class Contenders:
     def own(self) -> list[Maps]:
         """Maps of the machines that are played; where they wear, at ``WORN_LEVELS`` clearances."""
         if self._own is None:
-            known: Any = gym.make_vec(self.env, num_envs=1, **self.keywords).unwrapped
+            known = native_envs(self.env, **self.keywords)
             wear, nominal = known.task.wear, known.nominal
             field, levels = nominal.clearance_field, WORN_LEVELS if wear > 0.0 else 1
             self._own = [
@@ -152,7 +152,7 @@ def compare(
     Parameters
     ----------
     env
-        Id of the environment.
+        Id of the environment, or the file of a machine.
     out
         The file; a comparison that was interrupted goes on.
     machines
@@ -178,8 +178,10 @@ def compare(
     for name in chosen:
         if name not in makers:
             raise ParameterError(f"there is no controller {name!r}; known: {', '.join(makers)}")
-    table = read_comparison(out, env) if out.exists() else None
-    known: Any = gym.make_vec(env, num_envs=1, **keywords).unwrapped
+    known = native_envs(env, **keywords)
+    kind = known.nominal
+    subject = env if kind.definition == kind.name else f"{env} ({kind.definition})"
+    table = read_comparison(out, subject) if out.exists() else None
     work: list[tuple[str, int, Callable[[], Policy]]] = [(name, 0, makers[name]) for name in chosen]
     for name, trained in (policies or {}).items():
         work += [(name, seed, partial(lambda policy: policy, policy)) for seed, policy in enumerate(trained)]
@@ -195,7 +197,7 @@ def compare(
             progress=name if progress else None,
             **(keywords | (cycle_keywords(known.task) if often else {})),
         )
-        rows = job_rows(name, policy.knows, seed, played, env)
+        rows = job_rows(name, policy.knows, seed, played, subject)
         table = rows if table is None else pa.concat_tables([table, rows])
         write_comparison(table, out)
     assert table is not None
@@ -291,19 +293,25 @@ class Scores:
         Raises
         ------
         ParameterError
-            If following the demand or the own map has not been played.
+            If following the demand or the own map has not been played, or both earn the same everywhere.
         """
         names = list(dict.fromkeys(self.table["contender"].to_pylist()))
         rows = {name: self.row(name) for name in names}
         return dict(sorted(rows.items(), key=lambda item: item[1]["score"]))
 
     def row(self, name: str) -> dict[str, Any]:
-        """What one contender achieved, as plain values."""
+        """What one contender achieved, as plain values; raises as ``summary``."""
         mine, zero, one = self.paired(name, ZERO, ONE)
+        if np.array_equal(zero, one):
+            raise ParameterError(
+                f"there is no score: on these machines {ONE!r} earns what {ZERO!r} does, {zero.mean():.2f}, since calm "
+                "speeds are all it finds; let more machines play, or widen the range of speed"
+            )
 
         def score(drawn: NDArray[np.int64]) -> Array:
             gained = mine[drawn].mean(axis=-1) - zero[drawn].mean(axis=-1)
-            return np.asarray(gained / (one[drawn].mean(axis=-1) - zero[drawn].mean(axis=-1)))
+            scale = one[drawn].mean(axis=-1) - zero[drawn].mean(axis=-1)
+            return np.asarray(np.divide(gained, scale, out=np.full_like(scale, np.nan), where=scale != 0.0))
 
         every = np.arange(len(mine))
         rows = self.table.filter(pa.compute.equal(self.table["contender"], name))

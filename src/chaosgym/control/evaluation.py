@@ -152,7 +152,7 @@ def evaluate(
     policy
         As for ``policy_of``.
     env
-        Id of the environment.
+        Id of the environment, or the file of a machine.
     machines
         How many, from the first on.
     progress

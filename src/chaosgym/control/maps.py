@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from chaosgym.envs.observation import OBSERVATION_NAMES
+from chaosgym.envs.vector_env import native_envs
 
 Array = NDArray[np.float64]
 
@@ -60,13 +60,12 @@ def maps_of(
 ) -> Maps:
     """Maps of machines kept for evaluation, or of those that seeds draw; ``keywords`` of the environment."""
     count = len(machines if machines is not None else seeds or ())
-    known: Any = gym.make_vec(env, num_envs=1, **keywords).unwrapped
-    task = known.task
+    task = native_envs(env, **keywords).task
     grid, cycles = task.grid, task.cycles_per_step
     settling, judged = -(-SETTLING_CYCLES // cycles), -(-JUDGED_CYCLES // cycles)
     span = task.highest_speed - task.lowest_speed
     sweep = {"action": "speed", "steps": len(grid) * (settling + judged), "slew_limit": span, "wear": 0.0}
-    envs: Any = gym.make_vec(env, num_envs=count, **(keywords | sweep)).unwrapped
+    envs = native_envs(env, count, **(keywords | sweep))
     options = {"speed": float(grid[0])} | ({} if machines is None else {"machine": np.asarray(machines)})
     envs.reset(seed=list(seeds if seeds is not None else range(count)), options=options)
     share, peak = np.zeros((count, len(grid))), np.zeros((count, len(grid)))
@@ -83,7 +82,7 @@ def maps_of(
 
 def model_keywords(env: str, **keywords: Any) -> dict[str, Any]:
     """Keywords that make the environment's machine the model that controllers may use."""
-    known: Any = gym.make_vec(env, num_envs=1, **keywords).unwrapped
+    known = native_envs(env, **keywords)
     rung = known.model.rung
     return keywords if rung in (None, known.nominal.rung) else keywords | {"fidelity": rung}
 

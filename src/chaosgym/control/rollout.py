@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import trange
@@ -18,6 +17,7 @@ from tqdm import trange
 from chaosgym.envs.observation import FELT, OBSERVATION_NAMES
 from chaosgym.envs.task import Status
 from chaosgym.envs.variants import HELD_OUT_SEED
+from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ParameterError
 from chaosgym.machines.parameters import parameters_of
 
@@ -53,7 +53,7 @@ class Played:
     Attributes
     ----------
     env, unit
-        Id of the environment, unit of the speeds.
+        Environment, and unit of the speeds.
     machines : (n,)
         Numbers of the machines kept for evaluation; -1 for drawn ones.
     seeds : (n,)
@@ -143,7 +143,7 @@ def play(
     policy
         What sets the speeds.
     env
-        Id of the environment.
+        Id of the environment, or the file of a machine.
     machines
         Numbers of machines kept for evaluation; their jobs have the published seeds unless ``seeds`` is given.
     seeds
@@ -162,8 +162,7 @@ def play(
         raise ParameterError("play needs machines or seeds")
     numbers = None if machines is None else np.asarray(machines, np.int64)
     given = np.asarray(seeds if seeds is not None else HELD_OUT_SEED + np.asarray(machines), np.int64)
-    made: Any = gym.make_vec(env, num_envs=len(given), **(keywords | policy.keywords))
-    envs: Any = made.unwrapped
+    envs = native_envs(env, len(given), **(keywords | policy.keywords))
     options = {} if numbers is None else {"machine": numbers}
     observations, info = envs.reset(seed=given.tolist(), options=options)
     policy.start(envs)

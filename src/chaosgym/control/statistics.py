@@ -5,6 +5,7 @@ References
 Agarwal et al., Deep Reinforcement Learning at the Edge of the Statistical Precipice, NeurIPS 2021.
 """
 
+import warnings
 from collections.abc import Callable
 
 import numpy as np
@@ -25,24 +26,26 @@ def bootstrap_interval(count: int, statistic: Callable[[NDArray[np.int64]], Arra
     count
         Number of things; of one alone nothing is known, and the interval is that one value.
     statistic
-        Of places (resamples, count) or (count,) to (resamples,) or a number.
+        Of places (resamples, count) or (count,) to (resamples,) or a number; draws of which it is NaN are left out.
     seed
         Of the draws.
     """
     places = np.arange(count)
     if count == 1:
         return np.full(2, float(statistic(places)))
-    result = stats.bootstrap(
-        (places,),
-        lambda drawn, axis: statistic(drawn),
-        n_resamples=RESAMPLES,
-        confidence_level=CONFIDENCE,
-        method="percentile",
-        vectorized=True,
-        batch=500,
-        rng=np.random.default_rng(seed),
-    )
-    return np.array(result.confidence_interval)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
+        result = stats.bootstrap(
+            (places,),
+            lambda drawn, axis: statistic(drawn),
+            n_resamples=RESAMPLES,
+            method="percentile",
+            vectorized=True,
+            batch=500,
+            rng=np.random.default_rng(seed),
+        )
+    tail = (1.0 - CONFIDENCE) / 2.0
+    return np.asarray(np.nanpercentile(result.bootstrap_distribution, [100 * tail, 100 * (1 - tail)]))
 
 
 def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Array:

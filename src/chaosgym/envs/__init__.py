@@ -3,12 +3,14 @@
 ``SB3VecEnv``, for stable-baselines3, and ``VisitedSpeeds``, a wrapper with a memory, are imported when asked for.
 """
 
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
-from gymnasium.envs.registration import register, registry
+from gymnasium.envs.registration import EnvSpec, register, registry
 
-from chaosgym.machines.registry import MACHINES
+from chaosgym.errors import ParameterError
+from chaosgym.machines.registry import FILE_ENDING, MACHINES
 
 TASKS: dict[str, dict[str, Any]] = {
     "": {"tolerances": {}},
@@ -19,6 +21,8 @@ TASKS: dict[str, dict[str, Any]] = {
 
 ENVIRONMENTS = tuple(f"chaosgym/{MACHINES.class_name(name)}{task}-v1" for name in MACHINES for task in TASKS)
 """Ids of chaosgym's own machines."""
+
+_ENTRY_POINT = "chaosgym.envs.machine_env:MachineEnv"
 
 _LATER = {"SB3VecEnv": "chaosgym.envs.sb3", "VisitedSpeeds": "chaosgym.envs.memory"}
 
@@ -43,7 +47,7 @@ def _register(name: str, keywords: dict[str, Any]) -> None:
         return
     register(
         id=name,
-        entry_point="chaosgym.envs.machine_env:MachineEnv",
+        entry_point=_ENTRY_POINT,
         vector_entry_point="chaosgym.envs.vector_env:MachineVectorEnv",
         kwargs=keywords,
     )
@@ -51,6 +55,24 @@ def _register(name: str, keywords: dict[str, Any]) -> None:
         gone = "chaosgym.envs.gone:refuse"
         old = name.replace("-v1", "-v0")
         register(id=old, entry_point=gone, vector_entry_point=gone, kwargs={"successor": name})
+
+
+def environment(env: str) -> EnvSpec:
+    """Specification of an environment: that of an id, or of a machine's file, which runs within its tolerances.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such id, among those of registered machines.
+    """
+    if env.endswith(FILE_ENDING):
+        tolerance = registry["chaosgym/MachineTolerance-v0"]
+        return replace(tolerance, kwargs={**tolerance.kwargs, "machine": env})
+    found = registry.get(env)  # gymnasium.spec would import the module of an id like "module:name"
+    if found is None or found.entry_point != _ENTRY_POINT:
+        known = [name for name, spec in registry.items() if spec.entry_point == _ENTRY_POINT and "machine" in spec.kwargs]
+        raise ParameterError(f"env = {env!r} is unknown; known: {', '.join(known)}, or a file my-machine.toml")
+    return found
 
 
 register_environments()

@@ -121,7 +121,7 @@ class MachineEnv(gym.Env[Observation, Any]):
     Parameters
     ----------
     machine
-        Name of the machine on the command line.
+        Name of the machine on the command line, or its file.
     render_mode
         None, "rgb_array" or "human".
     keywords
@@ -135,7 +135,7 @@ class MachineEnv(gym.Env[Observation, Any]):
 
     metadata = METADATA
 
-    def __init__(self, machine: str, *, render_mode: str | None = None, **keywords: Any) -> None:
+    def __init__(self, machine: str = "", *, render_mode: str | None = None, **keywords: Any) -> None:
         if render_mode is not None and render_mode not in METADATA["render_modes"]:
             raise ParameterError(f"render_mode = {render_mode!r} is not one of None, human, rgb_array")
         self.render_mode = render_mode

@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from chaosgym.envs.memory import SpeedMemory, Usual, remembered_space
 from chaosgym.envs.observation import Observation
-from chaosgym.envs.vector_env import MachineVectorEnv
+from chaosgym.envs.vector_env import MachineVectorEnv, native_envs
 from chaosgym.errors import ParameterError
 
 Selection = int | Iterable[int] | None
@@ -43,9 +43,9 @@ class SB3VecEnv(VecEnv):
     Parameters
     ----------
     env
-        Id of a chaosgym environment, or a native vector environment with autoreset in the same step.
+        Id of a chaosgym environment, a machine's file, or a native vector environment with autoreset in the same step.
     num_envs, keywords
-        Of ``gymnasium.make_vec``, for an id.
+        Of ``native_envs``, for an id or a file.
 
     Raises
     ------
@@ -55,7 +55,7 @@ class SB3VecEnv(VecEnv):
 
     def __init__(self, env: str | gym.vector.VectorEnv[Any, Any, Any], num_envs: int = 1, **keywords: Any) -> None:
         if isinstance(env, str):
-            env = gym.make_vec(env, num_envs=num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **keywords)
+            env = native_envs(env, num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **keywords)
         native = env.unwrapped
         if not isinstance(native, MachineVectorEnv) or native.autoreset_mode is not AutoresetMode.SAME_STEP:
             raise ParameterError(f"env = {env} is not one of a chaosgym id, make_vec(id, autoreset_mode='SameStep')")

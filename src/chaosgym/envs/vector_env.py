@@ -15,6 +15,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from chaosgym.envs import environment
 from chaosgym.envs.drive import checked_actions
 from chaosgym.envs.jobs import Indices, Jobs
 from chaosgym.envs.machine_env import METADATA, Start, Workplace, start_of
@@ -32,6 +33,17 @@ Flags = NDArray[np.bool_]
 
 SHARED = ("model", "nominal", "observation_names", "render_mode", "task", "workplace")
 """Attributes that all sub-environments have in common."""
+
+
+def native_envs(env: str, count: int = 1, **keywords: Any) -> "MachineVectorEnv":
+    """Sub-environments side by side of an id, or of a machine's file; ``keywords`` of the environment.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such environment, or a keyword is out of range.
+    """
+    return cast(MachineVectorEnv, gym.make_vec(environment(env), num_envs=count, **keywords).unwrapped)
 
 
 class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]]):
@@ -61,7 +73,7 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         self,
         num_envs: int = 1,
         *,
-        machine: str,
+        machine: str = "",
         max_episode_steps: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,

@@ -11,7 +11,6 @@ from chaosgym.control.policies import shipped_policy
 from chaosgym.control.policies.shipped import shipped_folder
 from chaosgym.control.rollout import play
 from chaosgym.machines import Machine
-from chaosgym.machines.registry import MACHINES
 
 MILLISECONDS = 150
 """Between two steps."""
@@ -29,9 +28,8 @@ class Playback:
 
     def panel(self, machine: Machine) -> Any:
         """The button, for a machine that an agent was trained on."""
-        known = machine.name in MACHINES
-        self._env = f"chaosgym/{MACHINES.class_name(machine.name)}Tolerance-v1" if known else ""
-        self._button.visible = known and shipped_folder(self._env).is_dir()
+        self._env = f"chaosgym/{type(machine).__name__}Tolerance-v1"
+        self._button.visible = shipped_folder(self._env).is_dir()
         return column(self._button, self._told)
 
     def _pressed(self) -> None:

@@ -83,6 +83,11 @@ class Machine(FidelityLadder, ABC):
         validate(self)
 
     @property
+    def definition(self) -> str:
+        """What tells kinds of machines apart: the name, or the hash of the file that describes the kind."""
+        return self.name
+
+    @property
     @abstractmethod
     def clearance_field(self) -> str:
         """Field that holds the clearance of the monitored joint; a class attribute serves too."""

@@ -22,7 +22,7 @@ def exported(model: Any, env: str, envs: Any, *, memory: bool = False) -> Traine
     model
         PPO, SAC or RecurrentPPO.
     env
-        Id of the environment.
+        Id of the environment, or the file of the machine.
     envs
         What it was trained in: a ``VecNormalize`` or plain; with ``memory``, a ``SB3VisitedSpeeds`` in it.
     memory
@@ -55,6 +55,7 @@ def exported(model: Any, env: str, envs: Any, *, memory: bool = False) -> Traine
         normalisation=_normalisation(envs),
         usual=usual,
         squashed=bool(model.policy.squash_output),
+        machine=envs.get_attr("nominal")[0].definition,
     )
 
 

@@ -13,12 +13,11 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.control.policies.network import Dense, Lstm, Network, State
-from chaosgym.envs import ENVIRONMENTS
+from chaosgym.envs import environment
 from chaosgym.envs.drive import BACK
 from chaosgym.envs.memory import SpeedMemory, Usual
 from chaosgym.envs.observation import OBSERVATION_NAMES
@@ -60,7 +59,7 @@ class TrainedPolicy:
     Attributes
     ----------
     env
-        Id of the environment that it was trained on.
+        Environment that it was trained on: its id, or the file of the machine.
     action
         Kind of its actions, "trim" or "continuous".
     network
@@ -71,6 +70,8 @@ class TrainedPolicy:
         For a policy with a ``SpeedMemory``, what is usual at each speed; None for one without a memory.
     squashed
         Whether continuous answers go through tanh; otherwise they are clipped.
+    machine
+        ``definition`` of the machine that it was trained on; by default the name in the environment's id.
 
     Raises
     ------
@@ -84,6 +85,7 @@ class TrainedPolicy:
     normalisation: Normalisation | None = None
     usual: Usual | None = None
     squashed: bool = False
+    machine: str = ""
     knows: str = "measurements"
     _state: State | None = field(default=None, init=False, repr=False)
     _memory: SpeedMemory | None = field(default=None, init=False, repr=False)
@@ -91,6 +93,7 @@ class TrainedPolicy:
     def __post_init__(self) -> None:
         if self.action not in ACTIONS:
             raise ModelFileError(f"the kind of actions is {self.action!r}; known: {', '.join(ACTIONS)}")
+        self.machine = self.machine or environment(self.env).kwargs["machine"]
         size = len(OBSERVATION_NAMES) + (len(SpeedMemory.names()) if self.usual else 0)
         self.network.check(size, ACTIONS[self.action])
         if self.normalisation:
@@ -115,11 +118,11 @@ class TrainedPolicy:
         ModelFileError
             If it is of another machine, or has another kind of actions.
         """
-        name = gym.spec(self.env).kwargs["machine"]
-        if envs.nominal.name != name or envs.task.action != self.action:
+        here = envs.nominal.definition
+        if here != self.machine or envs.task.action != self.action:
             raise ModelFileError(
-                f"the policy was trained on {self.env} with action={self.action!r}; "
-                f"this is {envs.nominal.name} with action={envs.task.action!r}"
+                f"the policy was trained on {self.env} (machine {self.machine}) with action={self.action!r}; "
+                f"this is {envs.nominal.name} (machine {here}) with action={envs.task.action!r}"
             )
         self.begin(envs.task, envs.num_envs)
 
@@ -179,6 +182,7 @@ def save_policy(policy: TrainedPolicy, folder: str | Path) -> None:
     description = {
         "format": FORMAT,
         "env": policy.env,
+        "machine": policy.machine,
         "action": policy.action,
         "lstm": network.lstm is not None,
         "activations": [layer.activation for layer in network.layers],
@@ -228,10 +232,7 @@ def load_policy(folder: str | Path) -> TrainedPolicy:
 
 
 def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPolicy:
-    env, limit = description["env"], description["normalisation_limit"]
-    if env not in ENVIRONMENTS:
-        # Gymnasium would import the module of an id like "module:name"
-        raise ModelFileError(f"its environment, {env!r}, is none of {', '.join(ENVIRONMENTS)}")
+    limit = description["normalisation_limit"]
     lstm = Lstm(*(arrays[f"lstm.{name}"] for name in Lstm._fields)) if description["lstm"] else None
     layers = tuple(
         Dense(arrays[f"layer{place}.weight"], arrays[f"layer{place}.bias"], activation)
@@ -246,12 +247,13 @@ def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPol
                 raise ModelFileError(f"usual.{name} has shape {given.shape}; expected: {values.shape}, all finite")
             setattr(usual, name, given)
     return TrainedPolicy(
-        env=env,
+        env=str(description["env"]),
         action=description["action"],
         network=Network(lstm, layers),
         normalisation=None if limit is None else Normalisation(arrays["mean"], arrays["deviation"], float(limit)),
         usual=usual,
         squashed=bool(description["squashed"]),
+        machine=str(description.get("machine", "")),
     )
 
 

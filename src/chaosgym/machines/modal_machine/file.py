@@ -5,7 +5,7 @@ import json
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib import resources
 from pathlib import Path
 from typing import Any, ClassVar
@@ -142,7 +142,8 @@ def _built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> typ
     usual = dict(zip(("speed", "clearance"), map(_range, ("speed_range", "clearance_range"), ranges), strict=True))
     types: dict[str, Any] = {"name": path, "usual_ranges": usual}
     annotations: dict[str, Any] = dict.fromkeys(fields, Any) | dict.fromkeys(types, ClassVar[Any])
-    namespace = {"__module__": __name__, "__doc__": data[""].get("title", path), "__annotations__": annotations}
+    described = {"__module__": __name__, "__doc__": data[""].get("title", path), "__annotations__": annotations}
+    namespace = {**described, "__reduce__": _reduced}
     made: Any = dataclass(frozen=True, kw_only=True)(
         type("ModalMachine", (ModalMachine,), {**namespace, **fields, **types})
     )
@@ -150,6 +151,19 @@ def _built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> typ
     made.work = Work(task=data["job"])
     kind: type[ModalMachine] = made
     return kind
+
+
+def _reduced(machine: Any) -> Any:
+    """How a machine is pickled: by the name of its file, whose class has no name of its own."""
+    return _restored, (machine.name, {each.name: getattr(machine, each.name) for each in fields(machine)})
+
+
+def _restored(path: str, values: Mapping[str, Any]) -> ModalMachine:
+    kind: Any = machine_class(path)
+    if kind.definition != values["definition"]:
+        raise ParameterError(f"{path} has changed: it is not the machine that was kept")
+    machine: ModalMachine = kind(**values)
+    return machine
 
 
 def _stated(value: Any, about: Parameter, path: str) -> Any:
