@@ -7,8 +7,7 @@ import pytest
 
 from chaosgym.machines import MACHINES
 from chaosgym.machines.parameters import markdown_table
-from thesis.machines import THESIS_MACHINES
-from thesis.scorecard.evaluation import evaluate
+from thesis.scorecard.evaluation import THESIS_MACHINES, evaluate
 from thesis.scorecard.firmness import firmness_of
 from thesis.scorecard.observation import THOROUGH
 from thesis.scorecard.page import row

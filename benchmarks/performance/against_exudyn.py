@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from benchmarks.performance.exudyn_machines import ExudynSetting, load_exudyn, run_in_exudyn
 from benchmarks.performance.timing import processor_seconds
-from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, Machine
+from chaosgym.machines import ImpactBeam, Machine, SliderCrank
 from chaosgym.simulation import ExactEvents, simulate
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ class Contest:
 
 CONTESTS = (
     Contest(
-        machine=replace(THESIS_IMPACT_BEAM, clearance=0.127e-3),
+        machine=ImpactBeam(n_modes=5, fitted_modes=0, clearance=0.127e-3),
         speeds=tuple(float(frequency) for frequency in range(8, 31)),
         settings=(
             ExudynSetting("GeneralizedAlpha", "stop", 1e-5),
@@ -78,7 +78,7 @@ CONTESTS = (
         goal=80.0,
     ),
     Contest(
-        machine=THESIS_SLIDER_CRANK,
+        machine=SliderCrank(n_modes=3, fitted_modes=0, matrix_update_interval=1.0),
         speeds=(100.0, 150.0, 200.0, 250.0),
         settings=(
             ExudynSetting("TrapezoidalIndex2", "stop", 1e-5, 1e-4),

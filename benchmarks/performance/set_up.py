@@ -4,7 +4,7 @@ import statistics
 import time
 from dataclasses import replace
 
-from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK, SliderCrank
+from chaosgym.machines.slider_crank import SliderCrank
 
 
 def set_up_times(repeats: int = 5) -> dict[str, float]:
@@ -15,7 +15,7 @@ def set_up_times(repeats: int = 5) -> dict[str, float]:
     result = {}
     changes = range(1, 5 * repeats + 1)
     for interval in (1.0, 5.0):
-        crank = replace(THESIS_SLIDER_CRANK, matrix_update_interval=interval)
+        crank = SliderCrank(n_modes=3, fitted_modes=0, matrix_update_interval=interval)
         machines = {
             "new machine": [replace(crank, yoke_mass=0.16 + 1e-6 * k) for k in changes],
             "new speed": [replace(crank, crank_speed=200.0 + 1e-3 * k) for k in changes],

@@ -18,10 +18,10 @@ from benchmarks.performance.against_exudyn import Contest, against_exudyn, perio
 from benchmarks.performance.exudyn_machines import ExudynSetting, load_exudyn, run_in_exudyn
 from benchmarks.performance.timing import processor_seconds, rate
 from chaosgym.errors import ChaosgymError
-from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK
 from chaosgym.simulation import simulate
+from tests.plain_modes import PLAIN_BEAM, PLAIN_CRANK
 
-BEAM_30 = replace(THESIS_IMPACT_BEAM, excitation_frequency=30.0, clearance=0.127e-3)
+BEAM_30 = replace(PLAIN_BEAM, excitation_frequency=30.0, clearance=0.127e-3)
 
 
 def test_a_rate_counts_units_of_work() -> None:
@@ -86,7 +86,7 @@ _points = rates._points
 @pytest.mark.slow
 def test_a_sweep_is_timed() -> None:
     """Points per second of a whole sweep, labels and files included."""
-    assert rates.sweep_rate(THESIS_IMPACT_BEAM, 1).per_second > 0.5
+    assert rates.sweep_rate(PLAIN_BEAM, 1).per_second > 0.5
 
 
 def test_periods_of_peaks() -> None:
@@ -118,7 +118,7 @@ def test_exudyn_integrates_the_same_beam(setting: ExudynSetting) -> None:
 def test_exudyn_builds_the_same_crank() -> None:
     """Tight in the guide, the slider's side force over a revolution is that of our mechanism within 3 %."""
     pytest.importorskip("exudyn")
-    crank = replace(THESIS_SLIDER_CRANK, crank_speed=300.0, slider_clearance=0.0, contact_damping_ratio=1.0)
+    crank = replace(PLAIN_CRANK, crank_speed=300.0, slider_clearance=0.0, contact_damping_ratio=1.0)
     _, peaks = run_in_exudyn(crank, 2, ExudynSetting("TrapezoidalIndex2", "stop", 2e-5, 1e-4), forces=True)
     assert peaks is not None
     assert peaks[1] == pytest.approx(simulate(crank, 2).peak_force[1, 0], rel=0.03)

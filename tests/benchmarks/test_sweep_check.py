@@ -9,8 +9,8 @@ import pytest
 
 from benchmarks.sweeps.check import check_rows
 from chaosgym.errors import DatasetError
-from chaosgym.machines import THESIS_IMPACT_BEAM
 from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
+from tests.plain_modes import PLAIN_BEAM
 
 SHIPPED = Path(__file__).parents[2] / "datasets"
 
@@ -19,7 +19,7 @@ SHIPPED = Path(__file__).parents[2] / "datasets"
 def sweep(tmp_path_factory):
     """Six beams, labelled here and now."""
     axes = (Axis("excitation_frequency", 18.0, 29.0, 3), Axis("clearance", 5e-5, 1e-4, 2))
-    return run_sweep(SweepPlan(THESIS_IMPACT_BEAM, axes, budget=100, signals=0.5), tmp_path_factory.mktemp("six") / "b")
+    return run_sweep(SweepPlan(PLAIN_BEAM, axes, budget=100, signals=0.5), tmp_path_factory.mktemp("six") / "b")
 
 
 def with_column(sweep, name, values):

@@ -12,9 +12,10 @@ from chaosgym.classifier.types import neighbours_of, type_probabilities
 from chaosgym.diagnosis import diagnose
 from chaosgym.diagnosis.type_rule import type_of_cross
 from chaosgym.errors import ModelFileError
-from chaosgym.machines import THESIS_SLIDER_CRANK, ImpactBeam
+from chaosgym.machines import ImpactBeam
 from chaosgym.machines.modal_machine import read_machine
 from tests.classifier.made_up import settled
+from tests.plain_modes import PLAIN_CRANK
 
 PUBLISHED = Path(__file__).parents[2] / "docs" / "machines"
 
@@ -127,7 +128,7 @@ def test_neighbours_lie_one_tolerance_away():
     around = neighbours_of(CALM)
     assert [m.excitation_frequency / 19.0 for m in around] == pytest.approx([1 / 1.02, 1.02, 1.0, 1.0])
     assert [m.clearance / 1.27e-4 for m in around] == pytest.approx([1.0, 1.0, 1 / 1.05, 1.05])
-    speeds = [m.crank_speed - THESIS_SLIDER_CRANK.crank_speed for m in neighbours_of(THESIS_SLIDER_CRANK)]
+    speeds = [m.crank_speed - PLAIN_CRANK.crank_speed for m in neighbours_of(PLAIN_CRANK)]
     assert speeds == pytest.approx([-10.0, 10.0, 0.0, 0.0])
 
 

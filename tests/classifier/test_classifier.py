@@ -9,10 +9,11 @@ from chaosgym.classifier import MachineClassifier, default_classifier
 from chaosgym.classifier.data import examples_of
 from chaosgym.classifier.train import train_classifier
 from chaosgym.errors import DatasetError, ModelFileError, ParameterError
-from chaosgym.machines import MACHINES, THESIS_SLIDER_CRANK, ImpactBeam
+from chaosgym.machines import MACHINES, ImpactBeam
 from chaosgym.simulation import simulate
 from chaosgym.sweeps import LabelledSweep
 from tests.classifier.made_up import made_up_sweep, settled
+from tests.plain_modes import PLAIN_CRANK
 
 
 def test_learns_a_known_border(trained):
@@ -112,7 +113,7 @@ def test_refuses_machines_that_it_was_not_trained_on(trained):
     far = trained.classifier.classify(ImpactBeam(excitation_frequency=100.0, clearance=5e-5), budget_us=0.0)
     assert "excitation_frequency = 100 Hz is outside what the classifier was trained on" in far.centre.reason
     with pytest.raises(ParameterError, match="knows impact-beam, not slider-crank"):
-        trained.classifier.classify(THESIS_SLIDER_CRANK)
+        trained.classifier.classify(PLAIN_CRANK)
 
 
 def test_file_survives_a_round_trip_and_rejects_damage(trained, tmp_path):

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from chaosgym.classifier.kernels.parameters import flight
 from chaosgym.classifier.parameter_features import feature_count, parameter_features, parameter_scaling
-from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK
+from tests.plain_modes import PLAIN_BEAM, PLAIN_CRANK
 
 
 @pytest.mark.parametrize(("frequency", "gap"), [(2.0, 1e-5), (12.0, 1e-4), (38.0, 3e-4)])
@@ -32,8 +32,8 @@ def test_flight_follows_the_equation_of_motion(frequency, gap):
 def test_only_beams_have_swing_groups():
     """A crank has the groups of its natural frequencies only; a beam's features have no gap in the known range."""
     speeds = np.array([[5.0, 2e-5], [35.0, 3e-4]])
-    beam = parameter_scaling(THESIS_IMPACT_BEAM, ("excitation_frequency", "clearance"), speeds)
-    crank = parameter_scaling(THESIS_SLIDER_CRANK, ("crank_speed", "slider_clearance"), speeds)
+    beam = parameter_scaling(PLAIN_BEAM, ("excitation_frequency", "clearance"), speeds)
+    crank = parameter_scaling(PLAIN_CRANK, ("crank_speed", "slider_clearance"), speeds)
     assert feature_count(beam) > feature_count(crank) == 12
     assert np.isfinite(parameter_features(beam, speeds)).all()
     assert np.isnan(parameter_features(beam, np.zeros((1, 2)))).any()

@@ -12,9 +12,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from chaosgym.cli import main
-from chaosgym.machines import THESIS_IMPACT_BEAM
 from chaosgym.simulation import simulate
 from tests.classifier.made_up import settled
+from tests.plain_modes import PLAIN_BEAM
 
 KEYS = {
     "irregular",
@@ -153,7 +153,7 @@ def test_batch_keeps_the_columns_and_adds_the_answers(tmp_path):
     speeds = [10.0, 30.0, 1e9]
     table = pa.table({"name": ["a", "b", "c"], "excitation_frequency": speeds, "clearance": [1.27e-4] * 3})
     for field in ("length", "damping_ratio", "contact_damping"):
-        table = table.append_column(field, pa.array([getattr(THESIS_IMPACT_BEAM, field)] * 3))
+        table = table.append_column(field, pa.array([getattr(PLAIN_BEAM, field)] * 3))
     pq.write_table(table, tmp_path / "in.parquet")
     code, out, _ = run("--batch", tmp_path / "in.parquet", "--out", tmp_path / "out.parquet")
     assert code == 0
@@ -240,7 +240,7 @@ def test_wrong_units_are_suspected(model):
 def test_shipped_classifier_judges_a_simulated_record():
     """To a 3 N sensor the thesis' chaotic point is irregular beyond its error, and the one at 19 Hz is not."""
     for frequency, irregular in ((30.0, True), (19.0, False)):
-        peaks = simulate(THESIS_IMPACT_BEAM.at(frequency), 50, transient=200).peak_force[:, 0]
+        peaks = simulate(PLAIN_BEAM.at(frequency), 50, transient=200).peak_force[:, 0]
         noisy = peaks + np.random.default_rng(0).uniform(-3.0, 3.0, 50)
         code, out, _ = run("--peaks", "-", "--sensor-error", "3", "--json", stdin=lines_of(noisy))
         assert code == 0

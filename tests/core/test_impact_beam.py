@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chaosgym.errors import SimulationError
-from chaosgym.machines.impact_beam import THESIS_IMPACT_BEAM, ImpactBeam
+from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.simulation import ExactEvents, RungeKutta4, simulate
 from tests.core.twin import twin_trajectory
+from tests.plain_modes import PLAIN_BEAM
 
 
 def _history(beam, cycles, samples, **options):
@@ -20,7 +21,7 @@ def _history(beam, cycles, samples, **options):
 @pytest.mark.parametrize("clearance", [0.127e-3, 0.032e-3])
 def test_agrees_with_a_general_integrator_over_three_cycles(clearance):
     """At 30 Hz displacement, velocity and contact force equal DOP853's (rtol 1e-11, events) to 1e-7."""
-    beam = replace(THESIS_IMPACT_BEAM, clearance=clearance)
+    beam = replace(PLAIN_BEAM, clearance=clearance)
     twin = twin_trajectory(beam.reduce(), cycles=3, samples_per_cycle=200)
     exact = _history(beam, 3, 200)
     assert np.abs(twin[:, 2]).max() > 20.0
@@ -29,7 +30,7 @@ def test_agrees_with_a_general_integrator_over_three_cycles(clearance):
 
 def test_finds_a_release_that_lasts_less_than_a_step():
     """At 19 Hz a sensor lets go for microseconds: coarse twins pull there, the exact kernel and a fine twin do not."""
-    beam = replace(THESIS_IMPACT_BEAM, excitation_frequency=19.0)
+    beam = replace(PLAIN_BEAM, excitation_frequency=19.0)
     fine = twin_trajectory(beam.reduce(), cycles=1, samples_per_cycle=2000, max_phase=0.1)
     coarse = twin_trajectory(beam.reduce(), cycles=1, samples_per_cycle=2000, max_phase=0.5)
     exact = _history(beam, 1, 2000)
@@ -42,7 +43,7 @@ def test_finds_a_release_that_lasts_less_than_a_step():
 @pytest.mark.parametrize("integrator", [ExactEvents(), RungeKutta4(8000)])
 def test_contact_never_pulls(integrator):
     """The force acts outwards only, only beyond a surface, and vanishes in the detached state beyond it."""
-    beam = THESIS_IMPACT_BEAM
+    beam = PLAIN_BEAM
     displacement, _, force = _history(beam, 40, 2000, integrator=integrator).T
     assert np.all(force * displacement >= 0.0)
     assert np.all(force[np.abs(displacement) < beam.clearance * (1 - 1e-9)] == 0.0)
@@ -51,16 +52,16 @@ def test_contact_never_pulls(integrator):
 
 def test_accuracy_does_not_depend_on_the_step():
     """A four times longer shortest step changes three cycles by less than 1e-8: propagation has no truncation error."""
-    short = _history(THESIS_IMPACT_BEAM, 3, 100, integrator=ExactEvents(step_phase=0.25))
-    long = _history(THESIS_IMPACT_BEAM, 3, 100, integrator=ExactEvents(step_phase=1.0))
+    short = _history(PLAIN_BEAM, 3, 100, integrator=ExactEvents(step_phase=0.25))
+    long = _history(PLAIN_BEAM, 3, 100, integrator=ExactEvents(step_phase=1.0))
     assert np.all(np.abs(short - long).max(axis=0) <= 1e-8 * np.abs(short).max(axis=0))
 
 
 def test_runge_kutta_approaches_the_exact_motion():
     """The error of the fixed-step method in the first three cycles falls steadily as the step shrinks."""
-    exact = _history(THESIS_IMPACT_BEAM, 3, 50)[:, 0]
+    exact = _history(PLAIN_BEAM, 3, 50)[:, 0]
     errors = [
-        np.abs(_history(THESIS_IMPACT_BEAM, 3, 50, integrator=RungeKutta4(steps))[:, 0] - exact).max()
+        np.abs(_history(PLAIN_BEAM, 3, 50, integrator=RungeKutta4(steps))[:, 0] - exact).max()
         for steps in (2000, 8000, 32000)
     ]
     assert errors[0] > 2 * errors[1] > 4 * errors[2]
@@ -68,7 +69,7 @@ def test_runge_kutta_approaches_the_exact_motion():
 
 def test_without_contact_the_response_is_the_linear_one():
     """With a gap that is never touched the motion settles on the closed-form frequency response."""
-    beam = replace(THESIS_IMPACT_BEAM, clearance=1.0, shaker_damping=200.0)
+    beam = replace(PLAIN_BEAM, clearance=1.0, shaker_damping=200.0)
     model = beam.reduce()
     omega = 2 * np.pi * beam.excitation_frequency
     dynamic = np.diag(model.stiffness - omega**2) + 1j * omega * model.damping
@@ -82,7 +83,7 @@ def test_without_contact_the_response_is_the_linear_one():
 
 def test_energy_is_conserved_without_damping():
     """With no damper and no force, kinetic, bending and contact energy stay constant through 200 cycles of impacts."""
-    beam = replace(THESIS_IMPACT_BEAM, force_amplitude=0.0, damping_ratio=0.0, shaker_damping=0.0, contact_damping=0.0)
+    beam = replace(PLAIN_BEAM, force_amplitude=0.0, damping_ratio=0.0, shaker_damping=0.0, contact_damping=0.0)
     model = beam.reduce()
     start = np.zeros(2 * beam.n_modes)
     start[beam.n_modes] = 0.02
@@ -99,7 +100,7 @@ def test_energy_is_conserved_without_damping():
 def test_one_impact_of_one_mode_has_the_closed_form_restitution():
     """A single mode rebounds like a damped oscillator that lets go when spring and damper stop pushing."""
     beam = replace(
-        THESIS_IMPACT_BEAM,
+        PLAIN_BEAM,
         n_modes=1,
         force_amplitude=0.0,
         shaker_damping=0.0,
@@ -128,7 +129,7 @@ def test_one_impact_of_one_mode_has_the_closed_form_restitution():
 
 def test_bouncing_dies_out_into_sustained_contact():
     """At 4 Hz and +-0.032 mm each half cycle has finitely many bounces and then one long contact."""
-    record = simulate(replace(THESIS_IMPACT_BEAM, excitation_frequency=4.0, clearance=0.032e-3), 20, transient=30)
+    record = simulate(replace(PLAIN_BEAM, excitation_frequency=4.0, clearance=0.032e-3), 20, transient=30)
     assert np.all((record.impacts > 3) & (record.impacts < 100))
     assert np.all(record.contact_fraction > 0.3)
     assert np.all((record.bounce_duration > 0.0) & (record.bounce_duration < 0.5 * record.machine.cycle_period))
@@ -136,25 +137,25 @@ def test_bouncing_dies_out_into_sustained_contact():
 
 def test_runs_are_reproducible_and_can_be_continued():
     """Same input, same bytes; and 60 cycles equal 25 followed by 35 from their final state."""
-    whole = simulate(THESIS_IMPACT_BEAM, 60)
-    first = simulate(THESIS_IMPACT_BEAM, 25)
-    second = simulate(THESIS_IMPACT_BEAM, 35, first.final_state)
+    whole = simulate(PLAIN_BEAM, 60)
+    first = simulate(PLAIN_BEAM, 25)
+    second = simulate(PLAIN_BEAM, 35, first.final_state)
     for field in ("section", "peak_force", "impacts", "bounce_duration", "contact_fraction"):
         parts = np.concatenate([getattr(first, field), getattr(second, field)])
         np.testing.assert_array_equal(getattr(whole, field), parts)
-        np.testing.assert_array_equal(getattr(whole, field), getattr(simulate(THESIS_IMPACT_BEAM, 60), field))
+        np.testing.assert_array_equal(getattr(whole, field), getattr(simulate(PLAIN_BEAM, 60), field))
 
 
 def test_an_exhausted_event_budget_is_an_error_that_names_the_machine():
     """A cycle with more events than allowed ends in a SimulationError with every parameter."""
     with pytest.raises(SimulationError, match=r"more contact events.*cycle 0.*clearance=0\.000127"):
-        simulate(THESIS_IMPACT_BEAM, 5, integrator=ExactEvents(event_budget=3))
+        simulate(PLAIN_BEAM, 5, integrator=ExactEvents(event_budget=3))
 
 
 def test_a_step_too_coarse_for_contact_is_an_error():
     """A fixed step beyond the stability limit of the fastest mode in contact is refused before it diverges."""
     with pytest.raises(SimulationError, match="too coarse"):
-        simulate(THESIS_IMPACT_BEAM, 1, integrator=RungeKutta4(100))
+        simulate(PLAIN_BEAM, 1, integrator=RungeKutta4(100))
 
 
 @settings(max_examples=60, deadline=None)

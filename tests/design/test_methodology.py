@@ -15,8 +15,9 @@ from chaosgym.design.reliability import hertz_pressure, normal_reliability
 from chaosgym.design.runs import build_series, settled_run
 from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import ParameterError
-from chaosgym.machines import MACHINES, THESIS_IMPACT_BEAM, ImpactBeam
+from chaosgym.machines import MACHINES, ImpactBeam
 from chaosgym.machines.parameters import with_settings
+from tests.plain_modes import PLAIN_BEAM
 
 REGION = {"excitation_frequency": Tolerance(0.02), "clearance": Tolerance(0.05)}
 CALM = ImpactBeam(excitation_frequency=8.0)
@@ -60,9 +61,7 @@ def test_type_i_is_evaluated_by_its_trend():
 
 def test_type_ii_is_evaluated_by_its_worst_case():
     """At 19 Hz the largest force anywhere in the tolerances acts in every cycle."""
-    found = assess(
-        replace(THESIS_IMPACT_BEAM, excitation_frequency=19.0), REGION, Criteria(load_rating=500.0), series_size=8
-    )
+    found = assess(replace(PLAIN_BEAM, excitation_frequency=19.0), REGION, Criteria(load_rating=500.0), series_size=8)
     assert found.type == "II"
     seen = [run.largest_peak for run in found.series.runs] + [point.largest_peak for point in found.response.neighbours]
     assert found.evaluation.force >= max(seen)

@@ -6,15 +6,16 @@ import pytest
 from benchmarks.agreement import agreement, random_machines
 from chaosgym.diagnosis import diagnose
 from chaosgym.errors import DiagnosisError
-from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam, SliderCrank
+from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import RungeKutta4
+from tests.plain_modes import PLAIN_BEAM
 
 
 @pytest.mark.parametrize(("frequency", "period"), [(10.0, 1), (19.0, 1), (22.0, 4)])
 def test_periodic_responses_are_certified(frequency, period):
     """Newton's method proves the orbits at 10, 19 and 22 Hz within 200 cycles; their exponents are negative."""
-    verdict = diagnose(THESIS_IMPACT_BEAM.at(frequency))
+    verdict = diagnose(PLAIN_BEAM.at(frequency))
     assert (verdict.nature, verdict.period, verdict.status) == ("periodic", period, "certified")
     assert verdict.horizon <= 200
     assert verdict.evidence["orbit"]["residual"] < 1e-10
@@ -54,14 +55,14 @@ def test_chaos_of_the_beam_is_agreed():
 def test_transient_chaos_is_chaos_with_a_flag():
     """A beam that is chaotic for some 76 cycles before it settles on period 3."""
     fields = {"excitation_frequency": 27.2, "clearance": 0.158e-3, "damping_ratio": 0.028}
-    verdict = diagnose(with_settings(THESIS_IMPACT_BEAM, fields))
+    verdict = diagnose(with_settings(PLAIN_BEAM, fields))
     assert (verdict.nature, verdict.status, verdict.transient, verdict.period) == ("chaotic", "transient", True, 3)
 
 
 def test_a_long_period_is_proven_where_recurrence_does_not_look():
     """At 26.6 Hz a long transient locks on 34 cycles; at 28.6 Hz it settles on one cycle."""
-    assert diagnose(THESIS_IMPACT_BEAM.at(26.6), budget=1600).period == 34
-    slow = diagnose(THESIS_IMPACT_BEAM.at(28.6), budget=800)
+    assert diagnose(PLAIN_BEAM.at(26.6), budget=1600).period == 34
+    slow = diagnose(PLAIN_BEAM.at(28.6), budget=800)
     assert (slow.period, slow.transient) == (1, True)
 
 

@@ -9,8 +9,9 @@ from chaosgym.diagnosis import (
 )
 from chaosgym.diagnosis.lyapunov import average_growth
 from chaosgym.errors import DiagnosisError
-from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam, SliderCrank
+from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.simulation import RungeKutta4, simulate
+from tests.plain_modes import PLAIN_BEAM
 
 from .maps import GOLDEN, circle, henon, logistic
 
@@ -95,7 +96,7 @@ def test_carried_and_parted_deviations_agree_on_the_beam():
 def test_the_exponent_of_a_periodic_response_is_its_multiplier():
     """At 10 Hz and 22 Hz (period 4): the exponent is log |mu| / k of the orbit that Newton's method finds."""
     for frequency, period in ((10.0, 1), (22.0, 4)):
-        beam = THESIS_IMPACT_BEAM.at(frequency)
+        beam = PLAIN_BEAM.at(frequency)
         orbit = find_periodic_orbit(beam, simulate(beam, 1, transient=200).final_state, period)
         assert orbit is not None
         assert orbit.certified

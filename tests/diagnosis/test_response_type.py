@@ -14,7 +14,8 @@ from chaosgym.diagnosis import (
     types_on_grid,
 )
 from chaosgym.errors import DiagnosisError, ParameterError
-from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam
+from chaosgym.machines import ImpactBeam
+from tests.plain_modes import PLAIN_BEAM
 
 
 def around(*points, parameter="clearance"):
@@ -88,7 +89,7 @@ def test_default_tolerances_cover_speed_clearance_length_and_dampings():
 @pytest.mark.parametrize(("frequency", "expected"), [(8.0, "I"), (19.0, "II"), (30.0, "III")])
 def test_types_of_the_beam(frequency, expected):
     """Smooth at 8 Hz, next to chaos at 19 Hz, chaotic at 30 Hz."""
-    result = response_type(THESIS_IMPACT_BEAM.at(frequency), window="speed-clearance", budget=400)
+    result = response_type(PLAIN_BEAM.at(frequency), window="speed-clearance", budget=400)
     assert result.type == expected
     assert len(result.neighbours) == (0 if frequency == 30.0 else 8)
     assert json.dumps(result.as_dict())
@@ -123,7 +124,7 @@ def test_the_definition_of_the_window_is_part_of_the_label():
     """A wide window at 16.5 Hz reaches what a narrow one does not."""
     narrow = {"excitation_frequency": Tolerance(0.001)}
     wide = {"excitation_frequency": Tolerance(0.2)}
-    beam = THESIS_IMPACT_BEAM.at(16.5)
+    beam = PLAIN_BEAM.at(16.5)
     kinds = [response_type(beam, tolerances, initial_states=1, budget=400).type for tolerances in (narrow, wide)]
     assert kinds[0] != kinds[1]
     assert (

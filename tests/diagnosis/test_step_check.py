@@ -6,14 +6,15 @@ import pytest
 
 from chaosgym.diagnosis import step_check as module
 from chaosgym.diagnosis.step_check import step_check
-from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam
+from chaosgym.machines import ImpactBeam
 from chaosgym.simulation import RungeKutta4
+from tests.plain_modes import PLAIN_BEAM
 
 
 @pytest.mark.parametrize(("frequency", "nature"), [(18.0, "periodic"), (19.0, "periodic"), (30.0, "chaotic")])
 def test_exact_propagation_keeps_its_verdict(frequency, nature):
     """Half the step and a tenth of the event tolerance change neither nature nor period nor spread."""
-    check = step_check(replace(THESIS_IMPACT_BEAM, excitation_frequency=frequency))
+    check = step_check(replace(PLAIN_BEAM, excitation_frequency=frequency))
     assert check.given.nature == check.finer.nature == nature
     assert check.nature_stays
     assert check.period_stays
@@ -24,7 +25,7 @@ def test_exact_propagation_keeps_its_verdict(frequency, nature):
 
 def test_a_coarse_fixed_step_makes_chaos_of_a_periodic_response_and_is_found_out():
     """At 19 Hz the response is period 1; Runge-Kutta with 2000 steps a cycle calls it chaotic, and a finer step not."""
-    beam = replace(THESIS_IMPACT_BEAM, excitation_frequency=19.0)
+    beam = replace(PLAIN_BEAM, excitation_frequency=19.0)
     check = step_check(beam, integrator=RungeKutta4(2000))
     assert check.given.nature == "chaotic"
     assert not check.nature_stays

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from chaosgym.diagnosis import diagnose, response_type
 from chaosgym.errors import ChaosgymError
 from chaosgym.fidelity.stability import runs_of
-from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam, SliderCrank
+from chaosgym.machines import ImpactBeam, SliderCrank
 from tests.fidelity.test_stability import box
+from tests.plain_modes import PLAIN_BEAM
 
 BUDGET = 100
 
@@ -114,7 +115,7 @@ def test_a_verdict_anywhere_in_the_box_of_the_crank(fields, typed):
 def test_every_extreme_of_the_stability_map_is_judged():
     """All rungs of the beam at all extremes, by their default integrator: a verdict or a named error."""
     tried = judged = 0
-    for run in runs_of(THESIS_IMPACT_BEAM):
+    for run in runs_of(PLAIN_BEAM):
         if run.integrator is None:
             try:
                 machine = run.machine()

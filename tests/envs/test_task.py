@@ -5,7 +5,7 @@ import pytest
 
 from chaosgym.envs.task import Status, Task, UnknownKeywordError, split
 from chaosgym.errors import ParameterError
-from chaosgym.machines import THESIS_IMPACT_BEAM
+from tests.plain_modes import PLAIN_BEAM
 
 TASK = Task(steps=10, cycles_per_step=2, load_rating=50.0, life_share=0.5)
 
@@ -80,11 +80,11 @@ def test_a_task_that_contradicts_itself_is_refused(fields, message):
 
 def test_keywords_go_to_the_task_or_to_the_machine():
     """The speed is the agent's; a keyword of neither is named with the one that was meant."""
-    task, fields = split(TASK, THESIS_IMPACT_BEAM, {"steps": 5, "damping_ratio": 0.02, "fidelity": "standard"})
+    task, fields = split(TASK, PLAIN_BEAM, {"steps": 5, "damping_ratio": 0.02, "fidelity": "standard"})
     assert (task.steps, task.load_rating, fields) == (5, 50.0, {"damping_ratio": 0.02, "fidelity": "standard"})
     with pytest.raises(ParameterError, match="is what the agent sets"):
-        split(TASK, THESIS_IMPACT_BEAM, {"excitation_frequency": 20.0})
+        split(TASK, PLAIN_BEAM, {"excitation_frequency": 20.0})
     with pytest.raises(UnknownKeywordError, match="did you mean damping_ratio"):
-        split(TASK, THESIS_IMPACT_BEAM, {"damping_ration": 0.02})
+        split(TASK, PLAIN_BEAM, {"damping_ration": 0.02})
     with pytest.raises(UnknownKeywordError, match="known: action"):
-        split(TASK, THESIS_IMPACT_BEAM, {"zzz": 0.02})
+        split(TASK, PLAIN_BEAM, {"zzz": 0.02})

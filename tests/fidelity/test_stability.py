@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 
 from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
 from chaosgym.fidelity.stability import Run, runs_of, share_of_bound, stability_map, try_run
-from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam, SliderCrank
+from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.simulation import ExactEvents, RungeKutta4, simulate
 from tests.machines.crank_twin import continuous_twin
+from tests.plain_modes import PLAIN_BEAM
 
-UNDAMPED = replace(THESIS_IMPACT_BEAM, force_amplitude=0.0, damping_ratio=0.0, shaker_damping=0.0, contact_damping=0.0)
+UNDAMPED = replace(PLAIN_BEAM, force_amplitude=0.0, damping_ratio=0.0, shaker_damping=0.0, contact_damping=0.0)
 
 
 def _linear_response(beam, phase):
@@ -28,7 +29,7 @@ def _linear_response(beam, phase):
 
 def test_every_extreme_of_the_beam_ends_well():
     """All rungs at all extremes: no value that is not finite, no energy from nowhere, no unnamed error."""
-    result = stability_map(THESIS_IMPACT_BEAM, workers=1)
+    result = stability_map(PLAIN_BEAM, workers=1)
     assert [cell.as_dict() for cell in result.cells if cell.outcome == "failure"] == []
     refused = {(cell.extreme, cell.model) for cell in result.cells if cell.outcome == "named error"}
     assert all(extreme.endswith("steps a cycle") for extreme, _ in refused)
@@ -50,11 +51,11 @@ def test_the_map_would_show_a_failure():
         raise ZeroDivisionError("no")
 
     assert try_run(Run("nothing", "none", broken, None)).outcome == "failure"
-    record = simulate(THESIS_IMPACT_BEAM, 3)
+    record = simulate(PLAIN_BEAM, 3)
     assert 0.0 < share_of_bound(record) < 1.0
     assert share_of_bound(replace(record, section=1e6 * record.section)) > 1.0
     assert share_of_bound(replace(record, section=np.nan * record.section)) == np.inf
-    assert len(runs_of(THESIS_IMPACT_BEAM)) > 100
+    assert len(runs_of(PLAIN_BEAM)) > 100
 
 
 @pytest.mark.parametrize("rung", [rung for rung in ImpactBeam.fidelity_ladder])
@@ -92,7 +93,7 @@ def test_a_closed_gap_carries_the_quasi_static_force(clearance):
 def test_overdamped_modes_have_real_eigenvalues_and_still_answer():
     """A structure far beyond critical damping creeps: every block decays, and the force bound holds."""
     for fields in ({"damping_ratio": 100.0}, {"contact_damping": 1e6}, {"shaker_damping": 1e6}):
-        beam = replace(THESIS_IMPACT_BEAM, **fields)
+        beam = replace(PLAIN_BEAM, **fields)
         assert np.any(beam.reduce().regimes.generator[:, 2] == 0.0)
         assert share_of_bound(simulate(beam, 3)) < 1.0
 
@@ -112,7 +113,7 @@ def test_energy_stays_where_nothing_takes_it():
 
 def test_ten_thousand_cycles_do_not_drift():
     """A certified period-1 response stays on its orbit: same state, same peaks, after 100 and after 10,000 cycles."""
-    beam = replace(THESIS_IMPACT_BEAM, excitation_frequency=8.0)
+    beam = replace(PLAIN_BEAM, excitation_frequency=8.0)
     early = simulate(beam, 1, transient=400)
     late = simulate(beam, 1, transient=10_000)
     np.testing.assert_allclose(late.section, early.section, rtol=1e-6, atol=1e-12)
@@ -147,7 +148,7 @@ def test_a_million_revolutions_of_the_crank_do_not_drift():
 def test_coarse_fixed_steps_are_refused(steps):
     """Below its stability limit Runge-Kutta's method is refused before it diverges."""
     with pytest.raises(SimulationError, match="too coarse"):
-        simulate(THESIS_IMPACT_BEAM, 1, integrator=RungeKutta4(steps))
+        simulate(PLAIN_BEAM, 1, integrator=RungeKutta4(steps))
 
 
 def test_more_samples_than_fixed_steps_are_all_written():
@@ -162,12 +163,12 @@ def test_more_samples_than_fixed_steps_are_all_written():
 @pytest.mark.parametrize("steps", [600, 1000, 10_000])
 def test_the_coarsest_fixed_steps_that_run_make_no_energy(steps):
     """Just above the stability limit the motion stays within what the force can give."""
-    assert share_of_bound(simulate(THESIS_IMPACT_BEAM, 20, integrator=RungeKutta4(steps))) < 1.0
+    assert share_of_bound(simulate(PLAIN_BEAM, 20, integrator=RungeKutta4(steps))) < 1.0
 
 
 def test_a_cycle_within_its_budget_of_steps_or_an_error_that_says_so():
     """A budget too small for the steps of a slow cycle ends the run by name."""
-    beam = replace(THESIS_IMPACT_BEAM, excitation_frequency=0.5)
+    beam = replace(PLAIN_BEAM, excitation_frequency=0.5)
     with pytest.raises(SimulationError, match=r"needed more (steps|contact events) than its budget"):
         simulate(beam, 1, integrator=ExactEvents(step_phase=1e-4, event_budget=40))
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import SimulationError
-from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.simulation import RungeKutta4, simulate
+from tests.plain_modes import PLAIN_CRANK
 
-SMALL_GAP = replace(THESIS_SLIDER_CRANK, crank_speed=250.0, slider_clearance=0.032e-3, matrix_update_interval=5.0)
+SMALL_GAP = replace(PLAIN_CRANK, crank_speed=250.0, slider_clearance=0.032e-3, matrix_update_interval=5.0)
 BALL = replace(
     SMALL_GAP,
     slider_joint="ideal",

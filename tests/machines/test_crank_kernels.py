@@ -10,15 +10,15 @@ from chaosgym.core.cubic import cubic
 from chaosgym.core.cycle import Episode, cycle_arrays
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import SimulationError
-from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.kernels.contact import KEEPS, UNSURE, judge
 from chaosgym.machines.slider_crank.kernels.exact import advance
 from chaosgym.machines.slider_crank.kernels.propagator import TICKS, series_order, tables
 from chaosgym.simulation import ExactEvents, simulate, simulate_with_deviations
 from tests.machines.crank_twin import continuous_twin, rigid_twin
+from tests.plain_modes import PLAIN_CRANK
 
-CRANK = THESIS_SLIDER_CRANK
+CRANK = PLAIN_CRANK
 SMALL_GAP = replace(CRANK, crank_speed=250.0, slider_clearance=0.032e-3)
 
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from chaosgym.core.cycle import Episode, cycle_arrays
-from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.machines.slider_crank.kernels.stepped import advance
 from chaosgym.machines.slider_crank.model import stepped_model
 from chaosgym.simulation import ExactEvents, simulate
 from tests.machines.crank_twin import rigid_ball_twin
+from tests.plain_modes import PLAIN_CRANK
 
-SMALL_GAP = replace(THESIS_SLIDER_CRANK, crank_speed=250.0, slider_clearance=0.032e-3)
+SMALL_GAP = replace(PLAIN_CRANK, crank_speed=250.0, slider_clearance=0.032e-3)
 BALL = replace(
-    THESIS_SLIDER_CRANK,
+    PLAIN_CRANK,
     slider_joint="ideal",
     ball_joint="spherical",
     gravity=9.81,
@@ -85,7 +85,7 @@ def test_hertzian_contact_gives_forces_of_the_same_size():
 def test_a_hertzian_drop_keeps_its_restitution():
     """A rigid slider that strikes at the reference force leaves with the linear law's speed, within 2 %."""
     machine = replace(
-        THESIS_SLIDER_CRANK,
+        PLAIN_CRANK,
         crank_speed=1.0,
         rod="rigid",
         matrix_update_interval=30.0,

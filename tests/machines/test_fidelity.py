@@ -16,7 +16,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import CycleRecord, simulate
-from thesis.machines import THESIS_MACHINES
+from thesis.scorecard.evaluation import THESIS_MACHINES
 
 
 @pytest.mark.parametrize("machine", [ImpactBeam, SliderCrank])

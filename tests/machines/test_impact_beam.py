@@ -7,24 +7,25 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.impact_beam import THESIS_IMPACT_BEAM, ImpactBeam
+from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.machines.impact_beam.modes import modal_analysis, pinned_pinned_frequency, static_tip_deflection
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
+from tests.plain_modes import PLAIN_BEAM
 
-FREE = replace(THESIS_IMPACT_BEAM, reduction="free")
+FREE = replace(PLAIN_BEAM, reduction="free")
 
 
 def test_pinned_pinned_frequency_is_that_of_table_3_1():
     """288.2 Hz at 284.0 mm, the surviving row of table 3.1; the other lengths follow as 1 / length squared."""
-    assert pinned_pinned_frequency(THESIS_IMPACT_BEAM, 0.284) == pytest.approx(288.2, abs=0.3)
-    ratio = pinned_pinned_frequency(THESIS_IMPACT_BEAM, 0.279) / pinned_pinned_frequency(THESIS_IMPACT_BEAM, 0.284)
+    assert pinned_pinned_frequency(PLAIN_BEAM, 0.284) == pytest.approx(288.2, abs=0.3)
+    ratio = pinned_pinned_frequency(PLAIN_BEAM, 0.279) / pinned_pinned_frequency(PLAIN_BEAM, 0.284)
     assert ratio == pytest.approx((0.284 / 0.279) ** 2, rel=1e-9)
 
 
 def test_pinned_pinned_frequency_has_the_closed_form():
     """The finite elements give (pi / 2 L^2) sqrt(E I / rho A)."""
-    beam = THESIS_IMPACT_BEAM
+    beam = PLAIN_BEAM
     wave = math.sqrt(beam.youngs_modulus / beam.density)
     expected = math.pi / 2 * beam.height / math.sqrt(12) * wave / 0.284**2
     assert pinned_pinned_frequency(beam, 0.284) == pytest.approx(expected, rel=1e-6)
@@ -32,7 +33,7 @@ def test_pinned_pinned_frequency_has_the_closed_form():
 
 def test_static_tip_deflection_is_the_unit_of_clearance():
     """8.9 N deflect the free tip by 3.175 mm, so that +-0.127 mm is the dimensionless clearance 0.04."""
-    assert static_tip_deflection(THESIS_IMPACT_BEAM) == pytest.approx(3.175e-3, rel=0.005)
+    assert static_tip_deflection(PLAIN_BEAM) == pytest.approx(3.175e-3, rel=0.005)
 
 
 def test_a_beam_on_a_hard_pivot_has_pinned_free_modes():
@@ -52,9 +53,9 @@ def test_a_beam_on_a_hard_pivot_has_pinned_free_modes():
 
 def test_modes_converge_with_the_mesh():
     """A finer mesh lowers every kept frequency, and four times the default mesh by less than 1e-4."""
-    coarse = modal_analysis(THESIS_IMPACT_BEAM, elements=12).angular_frequency
-    default = modal_analysis(THESIS_IMPACT_BEAM).angular_frequency
-    fine = modal_analysis(THESIS_IMPACT_BEAM, elements=96).angular_frequency
+    coarse = modal_analysis(PLAIN_BEAM, elements=12).angular_frequency
+    default = modal_analysis(PLAIN_BEAM).angular_frequency
+    fine = modal_analysis(PLAIN_BEAM, elements=96).angular_frequency
     assert np.all(coarse >= default * (1 - 1e-6))
     assert np.all(default >= fine * (1 - 1e-6))
     np.testing.assert_allclose(default, fine, rtol=1e-4)
@@ -62,7 +63,7 @@ def test_modes_converge_with_the_mesh():
 
 def test_default_model_has_five_degrees_of_freedom():
     """One rocking mode inside the speed range and four bending modes (thesis 5.2.3)."""
-    model = THESIS_IMPACT_BEAM.reduce()
+    model = PLAIN_BEAM.reduce()
     hertz = np.sqrt(model.stiffness) / (2 * np.pi)
     assert len(hertz) == 5
     assert 10.0 < hertz[0] < 28.0
@@ -112,16 +113,16 @@ def test_the_reduction_by_interfaces_keeps_the_static_deflection():
 
 def test_a_shaker_at_the_tip_is_one_interface_with_it():
     """The force point and the tip are then the same place, and one more mode takes the freedom left."""
-    model = modal_analysis(replace(THESIS_IMPACT_BEAM, reduction="interfaces", force_position=0.279))
+    model = modal_analysis(replace(PLAIN_BEAM, reduction="interfaces", force_position=0.279))
     assert len(model.tip_shape) == 5
     np.testing.assert_allclose(model.tip_shape, model.force_shape, rtol=1e-12)
 
 
 def test_beam_is_a_frozen_machine_with_described_parameters():
     """Every field carries unit, range, provenance and source."""
-    assert isinstance(THESIS_IMPACT_BEAM, Machine)
+    assert isinstance(PLAIN_BEAM, Machine)
     with pytest.raises(FrozenInstanceError):
-        THESIS_IMPACT_BEAM.length = 1.0  # type: ignore[misc]
+        PLAIN_BEAM.length = 1.0  # type: ignore[misc]
     for described in parameters_of(ImpactBeam).values():
         assert described.provenance in ("printed", "derived", "calibrated", "assumed")
         assert described.source
@@ -146,4 +147,4 @@ def test_beam_is_a_frozen_machine_with_described_parameters():
 def test_bad_parameters_name_field_value_and_range(settings, message):
     """Nothing out of range is constructed, and the message says what is allowed."""
     with pytest.raises(ParameterError, match=message):
-        with_settings(THESIS_IMPACT_BEAM, settings)
+        with_settings(PLAIN_BEAM, settings)

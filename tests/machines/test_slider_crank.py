@@ -15,12 +15,12 @@ from chaosgym.machines.slider_crank.joints import joints_of
 from chaosgym.machines.slider_crank.kinematics import planar_motion, slider_position, stroke
 from chaosgym.machines.slider_crank.parameters import (
     SUPERHARMONIC_SLIDER_CRANK,
-    THESIS_SLIDER_CRANK,
     SliderCrank,
     frequencies_at,
 )
+from tests.plain_modes import PLAIN_CRANK
 
-CRANK = THESIS_SLIDER_CRANK
+CRANK = PLAIN_CRANK
 RIGID = replace(
     CRANK,
     rod="rigid",

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK
 from chaosgym.machines.slider_crank.equations import degrees_of_freedom, equations
 from chaosgym.machines.slider_crank.joints import InstrumentedSlider
 from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
@@ -16,8 +15,9 @@ from chaosgym.machines.slider_crank.kinematics import crank_pin, slider_position
 from chaosgym.machines.slider_crank.spatial_equations import spatial_equations, spatial_loads
 from chaosgym.simulation import simulate
 from tests.machines.spatial_twin import RigidMechanism
+from tests.plain_modes import PLAIN_CRANK
 
-CRANK = replace(THESIS_SLIDER_CRANK, matrix_update_interval=5.0)
+CRANK = replace(PLAIN_CRANK, matrix_update_interval=5.0)
 LOPSIDED = replace(
     CRANK,
     housing_offset_across=0.004,
@@ -270,7 +270,5 @@ def test_a_scene_with_many_contact_sets_is_left_to_the_stepper():
 
 def test_many_modes_in_space():
     """A motor at an angle takes as many modes as one that stands straight: six give nearly the force of five."""
-    five, six = (
-        simulate(replace(THESIS_SLIDER_CRANK, motor_angle=10.0, n_modes=n), 1).peak_force.max() for n in (5, 6)
-    )
+    five, six = (simulate(replace(PLAIN_CRANK, motor_angle=10.0, n_modes=n), 1).peak_force.max() for n in (5, 6))
     assert six == pytest.approx(five, rel=0.05)

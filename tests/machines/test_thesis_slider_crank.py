@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chaosgym.machines.slider_crank.parameters import SUPERHARMONIC_SLIDER_CRANK, THESIS_SLIDER_CRANK
+from chaosgym.machines.slider_crank.parameters import SUPERHARMONIC_SLIDER_CRANK
 from chaosgym.simulation import simulate
+from tests.plain_modes import PLAIN_CRANK
 
-CRANK = THESIS_SLIDER_CRANK
+CRANK = PLAIN_CRANK
 
 
 def peaks(machine, cycles=50, transient=60, **changes):

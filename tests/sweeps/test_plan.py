@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines import THESIS_IMPACT_BEAM
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import Axis, SweepPlan
 from chaosgym.sweeps.plan import default_axes
+from tests.plain_modes import PLAIN_BEAM
 
 SPEED = Axis("excitation_frequency", 4.0, 16.0, 3, "log")
 CLEARANCE = Axis("clearance", 1e-5, 3e-5, 2)
@@ -25,7 +25,7 @@ def test_axis_is_read_from_text():
 
 def test_grid_has_every_combination_with_the_first_axis_slowest():
     """Three speeds in geometric and two clearances in arithmetic progression."""
-    points = SweepPlan(THESIS_IMPACT_BEAM, (SPEED, CLEARANCE)).points()
+    points = SweepPlan(PLAIN_BEAM, (SPEED, CLEARANCE)).points()
     np.testing.assert_allclose(points["excitation_frequency"], [4, 4, 8, 8, 16, 16])
     np.testing.assert_allclose(points["clearance"], [1e-5, 3e-5] * 3)
 
@@ -34,7 +34,7 @@ def test_grid_has_every_combination_with_the_first_axis_slowest():
 def test_drawn_points_fill_the_range_and_depend_on_the_seed_alone(sampling):
     """Same seed, same points; another seed, others; all inside the ranges."""
     axes = (Axis("excitation_frequency", 4.0, 16.0, scale="log"), Axis("clearance", 1e-5, 3e-5))
-    first, again, other = (SweepPlan(THESIS_IMPACT_BEAM, axes, sampling, 100, seed).points() for seed in (1, 1, 2))
+    first, again, other = (SweepPlan(PLAIN_BEAM, axes, sampling, 100, seed).points() for seed in (1, 1, 2))
     for name, low, high in (("excitation_frequency", 4.0, 16.0), ("clearance", 1e-5, 3e-5)):
         np.testing.assert_array_equal(first[name], again[name])
         assert not np.array_equal(first[name], other[name])
@@ -50,7 +50,7 @@ def test_any_rows_can_be_computed_by_themselves(sampling):
         Axis("clearance", 1e-5, 3e-5, 30 if grid else None, "log"),
         Axis("excitation_frequency", 4.0, 16.0, 40 if grid else None),
     )
-    plan = SweepPlan(THESIS_IMPACT_BEAM, axes, sampling, 0 if grid else 300, 1)
+    plan = SweepPlan(PLAIN_BEAM, axes, sampling, 0 if grid else 300, 1)
     whole = plan.points()
     for rows in plan.chunks():
         for name, column in plan.points(rows).items():
@@ -58,13 +58,13 @@ def test_any_rows_can_be_computed_by_themselves(sampling):
     assert sum(len(rows) for rows in plan.chunks()) == len(plan)
 
 
-HIGHEST = parameters_of(THESIS_IMPACT_BEAM)["excitation_frequency"].high
+HIGHEST = parameters_of(PLAIN_BEAM)["excitation_frequency"].high
 CROSS_AXES = (Axis("length", 0.265, 0.293), Axis("excitation_frequency", 1.0, 40.0), Axis("clearance", 1e-5, 3e-4))
 
 
 def test_arms_of_a_cross_are_one_tolerance_long():
     """2 % of speed and 5 % of clearance around every centre; centres fill the ranges, and nothing else differs."""
-    plan = SweepPlan(THESIS_IMPACT_BEAM, CROSS_AXES, "crosses", 256, 2)
+    plan = SweepPlan(PLAIN_BEAM, CROSS_AXES, "crosses", 256, 2)
     points = {name: column.reshape(256, 5) for name, column in plan.points().items()}
     speed, clearance = points["excitation_frequency"], points["clearance"]
     np.testing.assert_allclose(speed / speed[:, :1], np.tile([1.0, 1 / 1.02, 1.02, 1.0, 1.0], (256, 1)))
@@ -76,7 +76,7 @@ def test_arms_of_a_cross_are_one_tolerance_long():
 
 def test_the_split_of_a_machine_does_not_depend_on_how_many_there_are():
     """A larger dataset of the same seed keeps the machines of the smaller one, and the part of each."""
-    small, large = (SweepPlan(THESIS_IMPACT_BEAM, CROSS_AXES, "crosses", size, 2) for size in (64, 512))
+    small, large = (SweepPlan(PLAIN_BEAM, CROSS_AXES, "crosses", size, 2) for size in (64, 512))
     rows = range(5 * 64)
     assert small.splits(rows) == large.splits(rows)
     for name, column in small.points(rows).items():
@@ -95,12 +95,12 @@ def test_the_split_of_a_machine_does_not_depend_on_how_many_there_are():
 def test_crosses_lie_in_speed_and_clearance(axes, message):
     """Both must be axes, and the arms must stay inside what the machine allows."""
     with pytest.raises(ParameterError, match=message):
-        SweepPlan(THESIS_IMPACT_BEAM, axes, "crosses", 8)
+        SweepPlan(PLAIN_BEAM, axes, "crosses", 8)
 
 
 def test_plans_survive_their_settings():
     """Settings, as JSON keeps them, give the plan again; those of another kind of sampling are refused."""
-    plan = SweepPlan(THESIS_IMPACT_BEAM, CROSS_AXES, "crosses", 7, 3, 200, 0.2, 0.1)
+    plan = SweepPlan(PLAIN_BEAM, CROSS_AXES, "crosses", 7, 3, 200, 0.2, 0.1)
     assert SweepPlan.from_settings(json.loads(json.dumps(plan.settings()))) == plan
     with pytest.raises(ParameterError, match="sampling = 'lattice' is unknown; allowed: grid, random, sobol, crosses"):
         SweepPlan.from_settings(plan.settings() | {"sampling": "lattice"})
@@ -108,7 +108,7 @@ def test_plans_survive_their_settings():
 
 def test_whole_numbers_stay_whole():
     """A random axis over a count gives counts."""
-    plan = SweepPlan(THESIS_IMPACT_BEAM, (Axis("n_modes", 1, 8),), "random", 50)
+    plan = SweepPlan(PLAIN_BEAM, (Axis("n_modes", 1, 8),), "random", 50)
     modes = plan.points()["n_modes"]
     assert set(modes) <= set(range(1, 9))
     assert plan.machine_at({"n_modes": modes[0]}).n_modes == modes[0]
@@ -116,7 +116,7 @@ def test_whole_numbers_stay_whole():
 
 def test_default_axes_are_speed_and_clearance():
     """With no axis a sweep covers the machine's usual ranges."""
-    fields = [axis.field for axis in default_axes(THESIS_IMPACT_BEAM, "grid")]
+    fields = [axis.field for axis in default_axes(PLAIN_BEAM, "grid")]
     assert fields == ["excitation_frequency", "clearance"]
 
 
@@ -125,8 +125,8 @@ def test_types_reach_one_tolerance_far():
     fine = Axis("excitation_frequency", 10.0, 10.0 * 1.02**20, 21, "log")
     half = Axis("clearance", 1e-4, 1e-4 * 1.025**10, 11, "log")
     coarse = Axis("clearance", 1e-5, 1e-3, 4, "log")
-    assert SweepPlan(THESIS_IMPACT_BEAM, (fine, half)).type_reach() == {"excitation_frequency": 1, "clearance": 2}
-    assert SweepPlan(THESIS_IMPACT_BEAM, (fine, coarse)).type_reach() == {}
+    assert SweepPlan(PLAIN_BEAM, (fine, half)).type_reach() == {"excitation_frequency": 1, "clearance": 2}
+    assert SweepPlan(PLAIN_BEAM, (fine, coarse)).type_reach() == {}
 
 
 @pytest.mark.parametrize(
@@ -163,4 +163,4 @@ def test_bad_axes_are_refused(text, message):
 def test_bad_plans_are_refused(axes, options, message):
     """A plan that can't be run is not constructed."""
     with pytest.raises(ParameterError, match=message):
-        SweepPlan(THESIS_IMPACT_BEAM, axes, **options)
+        SweepPlan(PLAIN_BEAM, axes, **options)

@@ -9,11 +9,11 @@ import polars
 import pyarrow.parquet as pq
 import pytest
 
-from chaosgym.machines import THESIS_IMPACT_BEAM
 from chaosgym.sweeps import Axis, SweepPlan, run_sweep
+from tests.plain_modes import PLAIN_BEAM
 
 PLAN = SweepPlan(
-    THESIS_IMPACT_BEAM,
+    PLAIN_BEAM,
     (Axis("length", 0.27, 0.28), Axis("excitation_frequency", 8.0, 12.0), Axis("clearance", 1e-4, 2e-4)),
     "crosses",
     5,

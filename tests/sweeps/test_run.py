@@ -18,17 +18,18 @@ import chaosgym.sweeps.label as label_module
 import chaosgym.sweeps.plan as plan_module
 from chaosgym.diagnosis import diagnose, response_type
 from chaosgym.errors import DatasetError, SimulationError, UnfinishedError
-from chaosgym.machines import THESIS_IMPACT_BEAM, ImpactBeam
+from chaosgym.machines import ImpactBeam
 from chaosgym.simulation import simulate
 from chaosgym.sweeps import Axis, SweepPlan, read_sweep, relabel, run_sweep
+from tests.plain_modes import PLAIN_BEAM
 
 PLAN = SweepPlan(
-    THESIS_IMPACT_BEAM,
+    PLAIN_BEAM,
     (Axis("excitation_frequency", 18.0, 30.0, 5), Axis("clearance", 0.1e-3, 0.14e-3, 3)),
     budget=100,
 )
 CROSSES = SweepPlan(
-    THESIS_IMPACT_BEAM,
+    PLAIN_BEAM,
     (
         Axis("damping_ratio", 0.01, 0.05, scale="log"),
         Axis("excitation_frequency", 18.0, 30.0),
@@ -134,7 +135,7 @@ def test_a_split_never_cuts_a_machine(crosses):
 def test_random_points_are_typed_over_the_full_window(tmp_path):
     """Points without neighbours get their response type from runs of their own, where that is asked for."""
     axes = tuple(Axis(axis.field, axis.low, axis.high) for axis in PLAN.axes)
-    plan = SweepPlan(THESIS_IMPACT_BEAM, axes, "random", size=4, budget=100, full_types=1.0)
+    plan = SweepPlan(PLAIN_BEAM, axes, "random", size=4, budget=100, full_types=1.0)
     sweep = run_sweep(plan, tmp_path / "s")
     beam = ImpactBeam(**{name: float(sweep.column(name)[2]) for name in plan.fields})
     assert sweep.column("response_type")[2] == response_type(beam, budget=100).type
@@ -226,7 +227,7 @@ def test_ctrl_c_ends_the_other_threads_at_their_row(tmp_path, monkeypatch):
     monkeypatch.setattr(plan_module, "CHUNK_SIZE", 200)
     axes = (Axis("excitation_frequency", 18.0, 30.0), Axis("clearance", 1e-4, 1.4e-4))
     with pytest.raises(KeyboardInterrupt):
-        run_sweep(SweepPlan(THESIS_IMPACT_BEAM, axes, "sobol", size=400), tmp_path / "s", workers=2)
+        run_sweep(SweepPlan(PLAIN_BEAM, axes, "sobol", size=400), tmp_path / "s", workers=2)
     assert len(rows) < 10
 
 
@@ -336,7 +337,7 @@ def _fail(machine, *, budget):
 
 def test_impossible_machines_are_rows(tmp_path):
     """A point that is no machine, here one whose shaker pushes beyond the tip, fails by itself."""
-    plan = SweepPlan(THESIS_IMPACT_BEAM, (Axis("length", 0.17, 0.28, 2),), budget=100)
+    plan = SweepPlan(PLAIN_BEAM, (Axis("length", 0.17, 0.28, 2),), budget=100)
     sweep = run_sweep(plan, tmp_path / "s")
     assert list(sweep.column("status")) == ["failed", "agreed"]
     assert "force_position" in sweep.column("reason")[0]

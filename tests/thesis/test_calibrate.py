@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import DatasetError, ParameterError
-from chaosgym.machines import THESIS_IMPACT_BEAM
 from chaosgym.machines.impact_beam.modes import static_tip_deflection
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.machines.slider_crank.parameters import frequencies_at
+from tests.plain_modes import PLAIN_BEAM
 from thesis.scorecard import search as calibration
 from thesis.scorecard.findings import Finding
 from thesis.scorecard.objective import WITHOUT_A_SLOPE, Stages, cost, objective, searched_statements
@@ -54,7 +54,7 @@ def test_every_candidate_keeps_the_printed_numbers():
     rng = np.random.default_rng(3)
     for _ in range(3):
         beam = with_printed_deflection(
-            replace(THESIS_IMPACT_BEAM, width=rng.uniform(12e-3, 26e-3), force_position=rng.uniform(0.12, 0.22))
+            replace(PLAIN_BEAM, width=rng.uniform(12e-3, 26e-3), force_position=rng.uniform(0.12, 0.22))
         )
         assert static_tip_deflection(beam) == pytest.approx(STATIC_TIP_DEFLECTION, rel=1e-5)
         basin = CRANK.basins[0]
@@ -66,7 +66,7 @@ def test_every_candidate_keeps_the_printed_numbers():
 def test_a_beam_without_such_a_pivot_is_refused():
     """A shaker stiffer than the printed static deflection allows leaves nothing to the pivot."""
     with pytest.raises(ParameterError, match="shaker_stiffness = 10000 N/m"):
-        with_printed_deflection(replace(THESIS_IMPACT_BEAM, shaker_stiffness=1e4))
+        with_printed_deflection(replace(PLAIN_BEAM, shaker_stiffness=1e4))
 
 
 def test_cost_grows_with_the_error_and_stays_below_one():
@@ -119,7 +119,7 @@ def test_budgets_are_candidates_or_minutes():
 
 NUMBERS = (Real("width", 12e-3, 26e-3, "m"), Real("shaker_damping", 5.0, 120.0, "N s/m", log=True))
 TOY = SearchSpace(
-    THESIS_IMPACT_BEAM,
+    PLAIN_BEAM,
     (
         Basin("stiffness", {"damping_family": "stiffness"}, NUMBERS, {"width": 17.58e-3, "shaker_damping": 22.5}),
         Basin("uniform", {"damping_family": "uniform"}, NUMBERS, {"width": 13e-3, "shaker_damping": 100.0}),
@@ -191,3 +191,11 @@ def test_a_search_that_must_not_know_some_statements_begins_in_the_middle():
     space = BEAM.from_the_middle()
     assert len(space.basins) == 3 < len(BEAM.basins)
     assert all(basin.shares() == pytest.approx([0.5] * len(basin.dimensions)) for basin in space.basins)
+
+
+def test_structures_are_searched_by_the_beginning_of_their_names():
+    """The others are left out, and a name that no structure has is refused."""
+    assert [basin.fixed["gravity"] for basin in CRANK.only("under gravity").basins] == [9.81]
+    assert len(CRANK.only("weightless").basins) == 2
+    with pytest.raises(ParameterError, match=r"known: .*under gravity"):
+        CRANK.only("heavy")

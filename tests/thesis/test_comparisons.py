@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import SimulationError
-from chaosgym.machines import THESIS_IMPACT_BEAM
+from tests.plain_modes import PLAIN_BEAM
 from thesis.figures import FIGURES, draw_figures
 from thesis.figures.beam import DAMPING
 from thesis.figures.computations import Runs, Types
@@ -43,7 +43,7 @@ def test_a_run_that_fails_is_shown_as_failed(monkeypatch):
         raise SimulationError("diverged")
 
     monkeypatch.setattr("thesis.figures.computations.simulate", fail)
-    data = Runs(machines=(THESIS_IMPACT_BEAM,), fields=("clearance",), cycles=20, transient=0).run()
+    data = Runs(machines=(PLAIN_BEAM,), fields=("clearance",), cycles=20, transient=0).run()
     assert data["nature"].tolist() == ["failed"]
     assert np.isnan(data["peaks"]).all()
 

@@ -9,6 +9,7 @@ from chaosgym.errors import ChaosgymError
 from chaosgym.machines import THESIS_IMPACT_BEAM
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
+from tests.plain_modes import PLAIN_BEAM
 from thesis.cache import default_folder
 from thesis.cli import app
 from thesis.figures import FIGURES, chosen, draw_figures
@@ -18,8 +19,7 @@ from thesis.figures.findings import compare_response
 from thesis.figures.gallery import gallery
 from thesis.figures.printed import comparison
 from thesis.figures.produce import computed
-from thesis.machines import BEAM, THESIS_MACHINES
-from thesis.scorecard.evaluation import evaluate
+from thesis.scorecard.evaluation import THESIS_MACHINES, evaluate
 from thesis.scorecard.observation import THOROUGH
 
 SIMULATED = [
@@ -45,7 +45,7 @@ def test_a_periodic_figure_says_what_the_simulation_says(tmp_path):
     """The beam repeats every cycle at 19 Hz and +-0.127 mm; the figure's finding is the nature of that very run."""
     (one,) = draw_figures(chosen(["3.6"]), tmp_path, resolution=0.1, workers=1)
     assert one.path.read_bytes().startswith(b"\x89PNG")
-    peaks = simulate(replace(BEAM, excitation_frequency=19.0), 100, transient=200).peak_force[:, 0]
+    peaks = simulate(replace(THESIS_IMPACT_BEAM, excitation_frequency=19.0), 100, transient=200).peak_force[:, 0]
     assert one.findings[0].here.startswith(f"{peaks.mean():.3g} N, periodic")
     assert one.findings[0].agrees is True
 
@@ -127,18 +127,18 @@ def test_pictures_are_replaced_only_on_request(tmp_path):
 
 def test_a_result_is_kept_under_all_that_it_depends_on(tmp_path, monkeypatch):
     """Another machine, count of cycles or source is another file; the same description is read, not computed."""
-    runs = Runs(machines=(THESIS_IMPACT_BEAM,), fields=("clearance",), cycles=20, transient=0)
+    runs = Runs(machines=(PLAIN_BEAM,), fields=("clearance",), cycles=20, transient=0)
     others = [
         Runs(
-            machines=(with_settings(THESIS_IMPACT_BEAM, {"width": 0.0176}),),
+            machines=(with_settings(PLAIN_BEAM, {"width": 0.0176}),),
             fields=("clearance",),
             cycles=20,
             transient=0,
         ),
-        Runs(machines=(THESIS_IMPACT_BEAM,), fields=("clearance",), cycles=21, transient=0),
+        Runs(machines=(PLAIN_BEAM,), fields=("clearance",), cycles=21, transient=0),
     ]
     first = computed(runs, tmp_path)
-    assert np.array_equal(first["peaks"][0], simulate(THESIS_IMPACT_BEAM, 20).peak_force[:, 0])
+    assert np.array_equal(first["peaks"][0], simulate(PLAIN_BEAM, 20).peak_force[:, 0])
     (kept,) = tmp_path.iterdir()
     monkeypatch.setattr(Runs, "run", lambda *_: pytest.fail("computed again"))
     assert all(np.array_equal(first[name], again) for name, again in computed(runs, tmp_path).items())
@@ -156,9 +156,9 @@ def test_a_result_is_kept_under_all_that_it_depends_on(tmp_path, monkeypatch):
 
 def test_the_force_point_follows_the_recorded_forces():
     """Driven by shaker and recorded contact force, the modes give the kernel's tip motion within 1 % of the gap."""
-    data = ForcePointHistory(machine=THESIS_IMPACT_BEAM, cycles=3, transient=40).run()
-    assert np.max(np.abs(data["tip_check"] - data["tip_displacement"])) < 0.01 * THESIS_IMPACT_BEAM.clearance
-    assert np.max(np.abs(data["displacement"])) < 1.5 * THESIS_IMPACT_BEAM.clearance
+    data = ForcePointHistory(machine=PLAIN_BEAM, cycles=3, transient=40).run()
+    assert np.max(np.abs(data["tip_check"] - data["tip_displacement"])) < 0.01 * PLAIN_BEAM.clearance
+    assert np.max(np.abs(data["displacement"])) < 1.5 * PLAIN_BEAM.clearance
 
 
 @pytest.mark.slow

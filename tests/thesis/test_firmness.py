@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import DatasetError
-from chaosgym.machines import THESIS_IMPACT_BEAM
 from chaosgym.machines.parameters import parameters_of
+from tests.plain_modes import PLAIN_BEAM
 from thesis.scorecard import firmness
 from thesis.scorecard.findings import Finding
 from thesis.scorecard.firmness import Firmness, exclusive_pairs, left_out_hits, neighbour_shares, nudged, shifted
@@ -20,12 +20,12 @@ COMPARED = {one.id: one for one in read_comparisons().compared}
 
 def test_a_neighbour_keeps_what_is_printed():
     """Fitted and assumed constants move by 1 % at most, printed and derived ones not at all."""
-    near = nudged(THESIS_IMPACT_BEAM, np.random.default_rng(1))
-    moved = {name for name in parameters_of(near) if getattr(near, name) != getattr(THESIS_IMPACT_BEAM, name)}
+    near = nudged(PLAIN_BEAM, np.random.default_rng(1))
+    moved = {name for name in parameters_of(near) if getattr(near, name) != getattr(PLAIN_BEAM, name)}
     assert {"width", "shaker_damping", "youngs_modulus"} <= moved
     for name in moved:
         assert parameters_of(near)[name].provenance in ("calibrated", "assumed")
-        assert getattr(near, name) == pytest.approx(getattr(THESIS_IMPACT_BEAM, name), rel=0.01)
+        assert getattr(near, name) == pytest.approx(getattr(PLAIN_BEAM, name), rel=0.01)
 
 
 def test_a_neighbour_runs_at_a_shifted_speed():
@@ -42,7 +42,7 @@ def test_a_scale_is_firm_and_a_wrong_nature_is_not(monkeypatch):
     loose = replace(frequency, tolerance=frequency.tolerance._replace(relative=0.02))
     asked = (loose, replace(COMPARED["IBS-013"], printed="odd"))
     monkeypatch.setattr(firmness, "statements_of", lambda name: asked)
-    assert neighbour_shares(THESIS_IMPACT_BEAM, 3, workers=1) == {"IBS-034": 1.0, "IBS-013": 0.0}
+    assert neighbour_shares(PLAIN_BEAM, 3, workers=1) == {"IBS-034": 1.0, "IBS-013": 0.0}
 
 
 def test_statements_that_no_candidate_hits_together_exclude_each_other():
@@ -68,9 +68,9 @@ def test_what_is_kept_holds_for_the_same_constants_alone(tmp_path, monkeypatch):
     monkeypatch.setattr(firmness, "KEPT", tmp_path / "firmness.json")
     firmness._kept.cache_clear()
     found = Firmness({"IBS-013": 0.25}, 4, (("IBS-013", "IBS-014"),), (3, 5))
-    firmness.keep(THESIS_IMPACT_BEAM, found)
-    assert firmness.firmness_of(THESIS_IMPACT_BEAM) == found
-    assert firmness.firmness_of(replace(THESIS_IMPACT_BEAM, width=0.02)) is None
+    firmness.keep(PLAIN_BEAM, found)
+    assert firmness.firmness_of(PLAIN_BEAM) == found
+    assert firmness.firmness_of(replace(PLAIN_BEAM, width=0.02)) is None
     firmness._kept.cache_clear()
 
 

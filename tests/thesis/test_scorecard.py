@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from chaosgym.diagnosis import two_step_test
-from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, ImpactBeam
+from chaosgym.machines import ImpactBeam
 from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.simulation import simulate
+from tests.plain_modes import PLAIN_BEAM, PLAIN_CRANK
 from thesis.scorecard.beam_runs import bouncing_shares, force_point_motion, long_run
 from thesis.scorecard.crank_runs import median_angles
 from thesis.scorecard.evaluation import evaluate
@@ -48,16 +49,16 @@ def curve(natures, forces):
 def test_beam_scales_and_natures_are_those_of_the_thesis():
     """Chaos at 30 Hz, the dimensionless clearance of 0.127 mm, the frequency at 284.0 mm: hit by the thesis' beam."""
     wanted = [COMPARED[name] for name in ("IBS-014", "IBS-017", "IBS-034")]
-    judged = evaluate(wanted, {"impact-beam": THESIS_IMPACT_BEAM}, efforts=THOROUGH)
+    judged = evaluate(wanted, {"impact-beam": PLAIN_BEAM}, efforts=THOROUGH)
     assert [one.verdict for one in judged] == ["hit", "hit", "hit"]
 
 
 def test_dots_closer_than_the_width_of_a_dot_are_one():
     """A spread below 1 N reads as periodic from a figure; without the reading error the same run is judged exactly."""
-    seen = observe(replace(THESIS_IMPACT_BEAM, excitation_frequency=30.0, clearance=0.127e-3), Effort(100, 60, 0))
+    seen = observe(replace(PLAIN_BEAM, excitation_frequency=30.0, clearance=0.127e-3), Effort(100, 60, 0))
     assert not seen.is_periodic
     assert seen.low < seen.mean < seen.high
-    quiet = observe(replace(THESIS_IMPACT_BEAM, excitation_frequency=6.0, clearance=0.03175e-3), Effort(60, 60, 0))
+    quiet = observe(replace(PLAIN_BEAM, excitation_frequency=6.0, clearance=0.03175e-3), Effort(60, 60, 0))
     assert quiet.is_periodic
     assert quiet.high - quiet.low < 1.0
 
@@ -73,7 +74,7 @@ def test_dots_are_the_series_that_the_thesis_plots():
     assert np.array_equal(plotted_peaks(record), record.peak_force[:, 0])
     assert two_step_test(record, sensor_error=READING_ERROR).nature != "periodic"
     assert observe(beam, THOROUGH["impact-beam"]).nature == "periodic"
-    crank = replace(THESIS_SLIDER_CRANK, crank_speed=100.0, slider_clearance=0.03175e-3, contact_damping_ratio=0.025)
+    crank = replace(PLAIN_CRANK, crank_speed=100.0, slider_clearance=0.03175e-3, contact_damping_ratio=0.025)
     record = simulate(crank, 110).after(60)
     assert np.array_equal(plotted_peaks(record), record.peak_force.max(axis=1))
     assert np.ptp(record.peak_force[:, 0]) > 2.0 * READING_ERROR
@@ -83,18 +84,18 @@ def test_dots_are_the_series_that_the_thesis_plots():
 
 def test_a_hasty_run_reads_what_a_long_one_does():
     """Where a response settles soon it ends early, with the same force; chaos stays chaos, from any initial state."""
-    calm = replace(THESIS_IMPACT_BEAM, excitation_frequency=6.0, clearance=0.03175e-3)
+    calm = replace(PLAIN_BEAM, excitation_frequency=6.0, clearance=0.03175e-3)
     long, hasty = observe(calm, THOROUGH["impact-beam"]._replace(budget=0)), observe(calm, QUICK["impact-beam"])
     assert (hasty.nature, hasty.period, hasty.settle_cycle) == ("periodic", 1, long.settle_cycle)
     assert hasty.mean == pytest.approx(long.mean, abs=0.02)
     for start in (0, 3):
-        assert observe(THESIS_IMPACT_BEAM, QUICK["impact-beam"]._replace(start=start)).nature == "chaotic"
+        assert observe(PLAIN_BEAM, QUICK["impact-beam"]._replace(start=start)).nature == "chaotic"
     assert observe(calm, QUICK["impact-beam"]._replace(start=3)).mean == pytest.approx(long.mean, abs=0.02)
 
 
 def test_dots_that_spread_beyond_the_reading_error_are_chaos():
     """At 170 rpm and 2.5 % the 50 dots spread over 3 N: the nature is told from them, as the thesis told it."""
-    crank = replace(THESIS_SLIDER_CRANK, crank_speed=170.0, slider_clearance=0.03175e-3, contact_damping_ratio=0.025)
+    crank = replace(PLAIN_CRANK, crank_speed=170.0, slider_clearance=0.03175e-3, contact_damping_ratio=0.025)
     seen = observe(crank, THOROUGH["slider-crank"])
     assert (seen.nature, seen.period, seen.settle_cycle) == ("chaotic", None, None)
     assert seen.high - seen.low > 3.0
@@ -107,20 +108,18 @@ def test_type_one_ends_where_the_force_first_falls():
     natures = ["periodic"] * 30
     smooth_end = RESPONSE_QUANTITIES["smooth_end"].finding
     falls = curve(natures, rising + [16.0] * 22)
-    assert smooth_end(THESIS_IMPACT_BEAM, comparison, falls).value == 8.0
+    assert smooth_end(PLAIN_BEAM, comparison, falls).value == 8.0
     breaks = curve(natures[:8] + ["chaotic"] * 22, rising + [30.0] * 22)
-    assert smooth_end(THESIS_IMPACT_BEAM, comparison, breaks).value == 8.0
+    assert smooth_end(PLAIN_BEAM, comparison, breaks).value == 8.0
 
 
 def test_chaos_begins_at_the_first_response_that_is_not_periodic():
     """From 16 Hz on, with a periodic window at 19 Hz."""
     comparison = COMPARED["IBS-023"]
     natures = ["periodic"] * 15 + ["chaotic"] * 3 + ["periodic"] + ["chaotic"] * 11
-    found = RESPONSE_QUANTITIES["chaos_begin"].finding(THESIS_IMPACT_BEAM, comparison, curve(natures, [40.0] * 30))
+    found = RESPONSE_QUANTITIES["chaos_begin"].finding(PLAIN_BEAM, comparison, curve(natures, [40.0] * 30))
     assert found.value == 16.0
-    none = RESPONSE_QUANTITIES["chaos_begin"].finding(
-        THESIS_IMPACT_BEAM, comparison, curve(["periodic"] * 30, [40.0] * 30)
-    )
+    none = RESPONSE_QUANTITIES["chaos_begin"].finding(PLAIN_BEAM, comparison, curve(["periodic"] * 30, [40.0] * 30))
     assert none.value == 31.0
 
 
@@ -129,7 +128,7 @@ def test_what_is_not_known_to_be_chaotic_agrees_with_no_chaos(nature):
     """A response without a nature meets neither "chaotic" nor "periodic", ends no range and begins none."""
     one, curve_of_30 = curve([nature], [40.0]), curve(["periodic"] * 15 + [nature] + ["chaotic"] * 14, [40.0] * 30)
     found = {
-        name: RESPONSE_QUANTITIES[COMPARED[name].quantity].finding(THESIS_IMPACT_BEAM, COMPARED[name], results)
+        name: RESPONSE_QUANTITIES[COMPARED[name].quantity].finding(PLAIN_BEAM, COMPARED[name], results)
         for name, results in {
             "IBS-013": one,
             "IBS-014": one,
@@ -151,16 +150,16 @@ def test_what_is_not_known_to_be_chaotic_agrees_with_no_chaos(nature):
 
 def test_modes_driven_by_the_recorded_force_follow_the_tip():
     """The motion of the force point is rebuilt from the contact force; the rebuilt tip lies within 1 % of the gap."""
-    found = force_point_motion(THESIS_IMPACT_BEAM, 20, 20)
-    assert found["tip_error"] < 0.01 * THESIS_IMPACT_BEAM.clearance
+    found = force_point_motion(PLAIN_BEAM, 20, 20)
+    assert found["tip_error"] < 0.01 * PLAIN_BEAM.clearance
     assert found["velocity"][1] == pytest.approx(-found["velocity"][0], rel=0.3)
 
 
 def test_a_long_run_tells_how_long_it_was_irregular():
     """At 30 Hz and +-0.127 mm the chaos of the thesis lasts; at 4 Hz the motion repeats after a few cycles."""
-    chaotic = long_run(replace(THESIS_IMPACT_BEAM, excitation_frequency=30.0, clearance=0.127e-3), 400)
+    chaotic = long_run(replace(PLAIN_BEAM, excitation_frequency=30.0, clearance=0.127e-3), 400)
     assert chaotic == {"irregular_cycles": 400, "period": None, "nature": "chaotic"}
-    settled = long_run(replace(THESIS_IMPACT_BEAM, excitation_frequency=4.0, clearance=0.03175e-3), 200)
+    settled = long_run(replace(PLAIN_BEAM, excitation_frequency=4.0, clearance=0.03175e-3), 200)
     assert settled["period"] == 1
     assert settled["irregular_cycles"] < 50
 
@@ -176,7 +175,7 @@ def test_a_long_run_tells_how_long_it_was_irregular():
 def test_chaos_up_to_the_end_of_the_run_leaves_out_no_cycle(run, verdict):
     """Chaos "up to 4000 cycles" (5.2.3) is met by all 4000 of them, and by chaos alone."""
     one = COMPARED["IBS-071"]
-    assert judge(one, [QUANTITIES[one.quantity].finding(THESIS_IMPACT_BEAM, one, [run])]).verdict == verdict
+    assert judge(one, [QUANTITIES[one.quantity].finding(PLAIN_BEAM, one, [run])]).verdict == verdict
 
 
 def test_angles_are_those_of_the_revolutions_that_lose_contact():
@@ -191,14 +190,14 @@ def test_angles_are_those_of_the_revolutions_that_lose_contact():
 def test_crank_clearance_unit_is_the_thrust_of_the_slider():
     """r m / M: the whole crank radius for a slider on a rod without mass or end inertias (thesis 4.5.1)."""
     bare = dict.fromkeys(("yoke_mass", "yoke_inertia", "yoke_offset_along", "housing_inertia", "housing_mass"), 0.0)
-    alone = replace(THESIS_SLIDER_CRANK, **bare, density=10.0)
+    alone = replace(PLAIN_CRANK, **bare, density=10.0)
     assert clearance_unit(alone) == pytest.approx(alone.crank_radius, rel=1e-3)
-    assert clearance_unit(THESIS_SLIDER_CRANK) < 0.6 * alone.crank_radius
+    assert clearance_unit(PLAIN_CRANK) < 0.6 * alone.crank_radius
 
 
 def test_what_swings_about_the_ball_centre_goes_with_the_slider():
     """The lateral mass is the kinetic energy at a speed of 1 m/s of the slider, twice, of all that moves with it."""
-    crank = THESIS_SLIDER_CRANK
+    crank = PLAIN_CRANK
     at_rest = equations(replace(crank, rod="rigid"), np.zeros(1))
     assert lateral_mass(crank) == pytest.approx(at_rest.mass[0, 0, 0], rel=1e-3)
 
@@ -228,7 +227,7 @@ def test_impacts_only_within_a_range_need_not_fill_it():
 
     def verdict(*lost):
         results = [{"lost": float(speed in lost)} for _ in range(rows) for speed in speeds]
-        return judge(one, [QUANTITIES[one.quantity].finding(THESIS_SLIDER_CRANK, one, results)]).verdict
+        return judge(one, [QUANTITIES[one.quantity].finding(PLAIN_CRANK, one, results)]).verdict
 
     assert verdict(110.0, 120.0, 150.0) == verdict(200.0, 210.0) == "hit"
     assert (verdict(90.0, 220.0), verdict(230.0), verdict()) == ("near", "miss", "miss")
@@ -241,7 +240,7 @@ def test_the_trend_of_chaos_leaves_out_periodic_windows():
     results = [Observation("periodic", 1, low=50.0, mean=50.0, high=50.0).as_dict() for _ in range(count)]
     for place, spread in ((0, 30.0), (9, 20.0), (20, 10.0)):
         results[place] = Observation("chaotic", low=40.0, mean=45.0, high=40.0 + spread).as_dict()
-    assert QUANTITIES[one.quantity].finding(THESIS_IMPACT_BEAM, one, results).value == pytest.approx(-1.0)
+    assert QUANTITIES[one.quantity].finding(PLAIN_BEAM, one, results).value == pytest.approx(-1.0)
 
 
 def test_an_irregular_approach_is_settling_of_the_single_degree_of_freedom():
@@ -249,14 +248,14 @@ def test_an_irregular_approach_is_settling_of_the_single_degree_of_freedom():
     one = COMPARED["IBS-068"]
     runs = [{"irregular_cycles": 12, "period": 1}, {"irregular_cycles": 140, "period": 2}]
     runs += [{"irregular_cycles": 500, "period": None}]
-    assert QUANTITIES[one.quantity].finding(THESIS_IMPACT_BEAM, one, runs).value == 140.0
+    assert QUANTITIES[one.quantity].finding(PLAIN_BEAM, one, runs).value == 140.0
 
 
 def test_a_nature_is_told_from_the_dots_and_the_diagnosis_stands_beside_it():
     """Dots that spread over the reading error are chaos to a reader; the note says what the diagnosis calls them."""
     seen = Observation("chaotic", None, "quasiperiodic", 2.0, 30.0, 33.0, 36.0)
     one = COMPARED["IBS-014"]
-    found = QUANTITIES[one.quantity].finding(THESIS_IMPACT_BEAM, one, [seen.as_dict()])
+    found = QUANTITIES[one.quantity].finding(PLAIN_BEAM, one, [seen.as_dict()])
     assert found.agrees
     assert "diagnosis: quasiperiodic" in found.note
 
@@ -273,7 +272,7 @@ def test_one_damping_ratio_holds_for_the_whole_of_section_4_4():
 
 def test_results_are_kept_and_found_again(tmp_path, monkeypatch):
     """The second call runs nothing and gives the same result; another machine or an edited source does."""
-    job = Job(observation, THESIS_IMPACT_BEAM, QUICK["impact-beam"])
+    job = Job(observation, PLAIN_BEAM, QUICK["impact-beam"])
     first = run_jobs([job, job], folder=tmp_path)
     assert len(first) == 1
     kept = list(tmp_path.glob("*.json"))
@@ -290,6 +289,6 @@ def test_results_are_kept_and_found_again(tmp_path, monkeypatch):
 
 def test_same_machine_same_bytes():
     """Two runs of one job give the same result."""
-    one, other = (observe(THESIS_IMPACT_BEAM, Effort(20, 30, 0)) for _ in range(2))
+    one, other = (observe(PLAIN_BEAM, Effort(20, 30, 0)) for _ in range(2))
     assert one == other
     assert np.isfinite(one.mean)

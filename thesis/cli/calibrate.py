@@ -18,6 +18,7 @@ from chaosgym.cli.output import emit
 )
 @click.option("--out", type=click.Path(file_okay=False), required=True, help="Folder; the same command again resumes.")
 @click.option("--leave-out", multiple=True, metavar="FIGURE", help="Figure, such as 3.9, that the search does not see.")
+@click.option("--basin", metavar="NAME", help="Beginning of the names of the structures that are searched.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -26,6 +27,7 @@ def calibrate(
     budget: str,
     out: str,
     leave_out: tuple[str, ...],
+    basin: str | None,
     seed: int,
     workers: int | None,
     as_json: bool,
@@ -40,6 +42,7 @@ def calibrate(
         Path(out),
         seed=seed,
         left_out=frozenset(leave_out),
+        basin=basin,
         workers=workers,
         progress=True,
     )

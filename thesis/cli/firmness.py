@@ -21,7 +21,7 @@ def firmness(
     machine: str, neighbours: int, search: str | None, left_out: tuple[str, ...], workers: int | None, as_json: bool
 ) -> None:
     """Judge neighbours of a machine and write thesis/scorecard/firmness.json, which the scorecard shows."""
-    from thesis.machines import THESIS_MACHINES
+    from thesis.scorecard.evaluation import THESIS_MACHINES
     from thesis.scorecard.firmness import Firmness, exclusive_pairs, keep, left_out_hits, neighbour_shares
     from thesis.scorecard.search import complete_costs
 

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from chaosgym.design.statistics import histogram
+from chaosgym.machines import THESIS_IMPACT_BEAM
 from chaosgym.plotting.style import ACCENT, NATURE_COLOURS
 from thesis import plotting as thesis
 from thesis.figures.beam import DAMPING, LARGE, SMALL, TRANSIENT, runs, sweep
@@ -17,7 +18,6 @@ from thesis.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
 from thesis.figures.panels import cycles_panel, force_panel, histogram_panel
 from thesis.figures.printed import printed
 from thesis.figures.scored import agrees, scored, scored_finding
-from thesis.machines import BEAM
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ HISTOGRAM_FREQUENCIES = (22.0, 25.0, 30.0)
 
 def transient_chaos(resolution: float) -> Mapping[str, Computation]:
     """Runs from rest at the two printed dampings, and over the dampings around them."""
-    beam = replace(BEAM, excitation_frequency=30.0, clearance=LARGE)
+    beam = replace(THESIS_IMPACT_BEAM, excitation_frequency=30.0, clearance=LARGE)
     around = steps(0.0090, 0.0130, 0.0001 / resolution, BRIEF_DAMPING, ENDLESS_DAMPING)
     return {
         "printed": sweep(beam, "damping_ratio", (BRIEF_DAMPING, ENDLESS_DAMPING), cycles=LONGEST, transient=0),
@@ -130,8 +130,8 @@ TRANSIENT_CHAOS = ThesisFigure(
 def bouncing(resolution: float) -> Mapping[str, Computation]:
     """Impact force of a periodic and of a chaotic response."""
     beams = {
-        "a": replace(BEAM, excitation_frequency=18.0, clearance=SMALL),
-        "b": replace(BEAM, excitation_frequency=30.0, clearance=LARGE),
+        "a": replace(THESIS_IMPACT_BEAM, excitation_frequency=18.0, clearance=SMALL),
+        "b": replace(THESIS_IMPACT_BEAM, excitation_frequency=30.0, clearance=LARGE),
     }
     return {
         name: History(machine=beam, cycles=4, transient=TRANSIENT, samples=4000) for name, beam in beams.items()
@@ -189,7 +189,10 @@ def beam_histograms(resolution: float) -> Mapping[str, Computation]:
     """Long records at three frequencies."""
     return {
         "long": runs(
-            [replace(BEAM, excitation_frequency=frequency, clearance=LARGE) for frequency in HISTOGRAM_FREQUENCIES],
+            [
+                replace(THESIS_IMPACT_BEAM, excitation_frequency=frequency, clearance=LARGE)
+                for frequency in HISTOGRAM_FREQUENCIES
+            ],
             "excitation_frequency",
             cycles=round(3000 * resolution),
         )

@@ -10,8 +10,7 @@ from thesis.cache import default_folder
 from thesis.figures.computations import Computation, Data
 from thesis.figures.figure import Finding, Parts
 from thesis.figures.printed import comparison
-from thesis.machines import THESIS_MACHINES
-from thesis.scorecard.evaluation import evaluate
+from thesis.scorecard.evaluation import THESIS_MACHINES, evaluate
 from thesis.scorecard.observation import THOROUGH
 from thesis.statements import Comparison
 

@@ -6,7 +6,7 @@ most hits wins.
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from thesis.cache import default_folder
 from thesis.scorecard.evaluation import evaluate
 from thesis.scorecard.objective import searched_statements, statements_of
 from thesis.scorecard.observation import THOROUGH
-from thesis.scorecard.scorecard import Scorecard, scorecard
+from thesis.scorecard.scorecard import Scorecard
 from thesis.scorecard.search import JOURNAL_FILE, WIDE, WIDTH, Budget, Candidate, open_journal, search
 from thesis.scorecard.search_space import SEARCH_SPACES, Basin, SearchSpace
 
@@ -49,7 +49,7 @@ class Calibration:
     best : Candidate
         The finalist with the most hits.
     card, present_card
-        Every statement judged on it and on the present constants.
+        Every statement about the joint that was searched, judged on it and on the present constants.
     candidates
         All of the journal.
     left_out
@@ -115,6 +115,7 @@ def calibrate(
     *,
     seed: int = 0,
     left_out: frozenset[str] = frozenset(),
+    basin: str | None = None,
     workers: int | None = None,
     cache: Path | None = None,
     progress: bool = False,
@@ -134,6 +135,8 @@ def calibrate(
     left_out
         Figures whose statements the search does not see; it then begins in the middle of the ranges, since the starts
         come from fits to all statements.
+    basin
+        Beginning of the names of the structures that are searched; all by default.
     workers
         Number of threads; all processors by default.
     cache
@@ -145,10 +148,13 @@ def calibrate(
     ------
     DatasetError
         If the folder holds anything else. Nothing in it is touched.
+    ParameterError
+        If no structure has such a name.
     ChaosgymError
         If the optimiser is not installed.
     """
-    space = SEARCH_SPACES[name].from_the_middle() if left_out else SEARCH_SPACES[name]
+    space = SEARCH_SPACES[name].only(basin) if basin else SEARCH_SPACES[name]
+    space = space.from_the_middle() if left_out else space
     stages = searched_statements(name, space.joint)
     stages = stages.without(frozenset(one.id for stage in stages for one in stage if one.statement.figure in left_out))
     plan = {"machine": name, "seed": seed, "version": __version__, "statements": list(stages.ids)}
@@ -181,23 +187,17 @@ def _judged(
     asked = statements_of(name, space.joint)
     unseen = frozenset(one.id for one in asked if one.statement.figure in left_out)
 
-    def hits(one: Candidate) -> int:
-        basin = space.basins[one.basin]
-        bases, unprinted = {name: space.machine(basin, one.shares)}, space.conditions(basin, one.shares)
-        judged = evaluate(asked, bases, efforts=THOROUGH, folder=cache, workers=workers, unprinted=unprinted)
-        return sum(each.verdict == "hit" and each.comparison.id not in unseen for each in judged)
+    def card(machine: Machine, unprinted: Mapping[str, float]) -> Scorecard:
+        return Scorecard(
+            evaluate(asked, {name: machine}, efforts=THOROUGH, folder=cache, workers=workers, unprinted=unprinted)
+        )
 
-    bar = tqdm(finalists, desc="finalists", disable=not progress, unit="candidate")
-    reached = [(hits(one), -one.value) for one in bar]
-    best = finalists[max(range(len(finalists)), key=lambda k: reached[k])]
-    basin = space.basins[best.basin]
-    card = scorecard(
-        [name],
-        bases={name: space.machine(basin, best.shares)},
-        folder=cache,
-        workers=workers,
-        progress=progress,
-        unprinted=space.conditions(basin, best.shares),
-    )
-    present = scorecard([name], bases={name: space.base}, folder=cache, workers=workers, progress=progress)
-    return Calibration(space, best, card, present, found, unseen)
+    def hits(found: Scorecard) -> int:
+        return sum(one.verdict == "hit" and one.comparison.id not in unseen for one in found.judged)
+
+    cards = []
+    for one in tqdm(finalists, desc="finalists", disable=not progress, unit="candidate"):
+        basin = space.basins[one.basin]
+        cards.append(card(space.machine(basin, one.shares), space.conditions(basin, one.shares)))
+    best = max(range(len(finalists)), key=lambda k: (hits(cards[k]), -finalists[k].value))
+    return Calibration(space, finalists[best], cards[best], card(space.base, {}), found, unseen)

@@ -3,13 +3,16 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from chaosgym.machines import Machine
+from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, Machine
 from chaosgym.machines.parameters import with_settings
 from thesis.scorecard.jobs import Job, run_jobs
 from thesis.scorecard.observation import Effort
 from thesis.scorecard.quantities import QUANTITIES
 from thesis.scorecard.verdicts import Judged, judge
 from thesis.statements import Comparison, conditions, read_comparisons
+
+THESIS_MACHINES: Mapping[str, Machine] = {one.name: one for one in (THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK)}
+"""By name: what the scorecard judges and the figures show."""
 
 
 def evaluate(

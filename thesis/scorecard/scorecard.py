@@ -12,8 +12,7 @@ from typing import Any
 
 from chaosgym.machines import Machine
 from chaosgym.version import __version__
-from thesis.machines import THESIS_MACHINES
-from thesis.scorecard.evaluation import evaluate
+from thesis.scorecard.evaluation import THESIS_MACHINES, evaluate
 from thesis.scorecard.firmness import Firmness, firmness_of
 from thesis.scorecard.observation import THOROUGH, Effort
 from thesis.scorecard.verdicts import COUNTED, Judged

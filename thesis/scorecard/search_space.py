@@ -13,10 +13,9 @@ from typing import Any
 import scipy.optimize
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines import ImpactBeam, Machine, SliderCrank
+from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, ImpactBeam, Machine, SliderCrank
 from chaosgym.machines.impact_beam.modes import static_tip_deflection
 from chaosgym.machines.slider_crank.parameters import frequencies_at
-from thesis.machines import BEAM, CRANK
 from thesis.scorecard.quantities import lateral_mass
 from thesis.statements import read_comparisons
 
@@ -106,6 +105,20 @@ class SearchSpace:
     def conditions(self, basin: Basin, shares: Sequence[float]) -> dict[str, float]:
         """Conditions that are not in print, as the candidate has them."""
         return {name: value for name, value in basin.values(shares).items() if name in self.unprinted}
+
+    def only(self, beginning: str) -> "SearchSpace":
+        """Return the space with those structures alone whose names begin so.
+
+        Raises
+        ------
+        ParameterError
+            If none does.
+        """
+        basins = tuple(one for one in self.basins if one.name.startswith(beginning))
+        if not basins:
+            known = ", ".join(repr(one.name) for one in self.basins)
+            raise ParameterError(f"basin = {beginning!r} begins no name of a structure; known: {known}")
+        return replace(self, basins=basins)
 
     def from_the_middle(self) -> "SearchSpace":
         """Return the space with every structure once, its search beginning in the middle of the ranges.
@@ -230,13 +243,13 @@ def _numbers(fields: tuple[Real, ...], *values: float) -> dict[str, float]:
 
 SEARCH_SPACES: Mapping[str, SearchSpace] = {
     ImpactBeam.name: SearchSpace(
-        BEAM,
+        THESIS_IMPACT_BEAM,
         (
             Basin(
                 "interfaces, wide",
                 _MADE_OF_PARTS,
                 BEAM_FIELDS,
-                _present(BEAM, BEAM_FIELDS),
+                _present(THESIS_IMPACT_BEAM, BEAM_FIELDS),
             ),
             Basin(
                 "interfaces, narrow",
@@ -266,7 +279,7 @@ SEARCH_SPACES: Mapping[str, SearchSpace] = {
         _beam,
     ),
     SliderCrank.name: SearchSpace(
-        CRANK,
+        THESIS_SLIDER_CRANK,
         (
             Basin(
                 "weightless, bouncing decides",

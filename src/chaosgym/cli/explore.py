@@ -16,7 +16,7 @@ def explore(machine: Any, port: int, browser: bool, as_json: bool) -> None:
     import json
 
     from chaosgym.errors import ChaosgymError
-    from chaosgym.machines import THESIS_IMPACT_BEAM
+    from chaosgym.machines import ImpactBeam
 
     try:
         from chaosgym.explore.server import serve
@@ -31,7 +31,7 @@ def explore(machine: Any, port: int, browser: bool, as_json: bool) -> None:
             click.launch(address)
 
     try:
-        serve(machine or THESIS_IMPACT_BEAM, port, ready)
+        serve(machine or ImpactBeam(), port, ready)
     except OSError as error:
         if error.errno != errno.EADDRINUSE:
             raise

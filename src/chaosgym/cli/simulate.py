@@ -93,18 +93,16 @@ def _largest(sensor_peak: Any) -> list[float]:
 @click.option("--markdown", is_flag=True, help="Print the table of the documentation.")
 def show(machine: Any, markdown: bool, as_json: bool) -> None:
     """Print every parameter of a machine, where the number comes from, and what follows from them."""
-    from chaosgym.machines.parameters import markdown_table, parameters_of
+    from chaosgym.machines.parameters import markdown_table, origin_of, parameters_of
 
     if markdown:
         return click.echo("\n".join(markdown_table(machine)))
     described = parameters_of(machine)
     frequencies = machine.natural_frequencies.tolist()
-    default = type(machine)()
+    origins = {name: origin_of(machine, name) for name in described}
     provenance = {
-        name: {"unit": about.unit, "grade": about.provenance, "source": about.source}
-        if getattr(machine, name) == getattr(default, name)
-        else {"unit": about.unit, "grade": "given", "source": "this command"}
-        for name, about in described.items()
+        name: {"unit": described[name].unit, "grade": grade, "source": source}
+        for name, (grade, source) in origins.items()
     }
     result = {
         "machine": machine.name,

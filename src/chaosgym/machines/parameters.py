@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from types import MappingProxyType
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.fidelity import expand_fidelity
@@ -31,6 +31,14 @@ class Parameter:
     choices: tuple[str, ...]
     provenance: Provenance
     source: str
+
+
+class Fitted(NamedTuple):
+    """Value of a field in the fit to the thesis, and its provenance."""
+
+    value: Any
+    provenance: Provenance = "calibrated"
+    source: str = "fitted on all statements, see docs/development/calibration.md"
 
 
 def parameter(
@@ -122,6 +130,17 @@ def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
     return replace(machine, **settings)  # type: ignore[type-var]
 
 
+def origin_of(machine: Any, name: str) -> tuple[str, str]:
+    """Provenance and source of a field's value: those of the default, of the fit to the thesis, or "given"."""
+    value, about = getattr(machine, name), parameters_of(machine)[name]
+    if value == getattr(type(machine)(), name):
+        return about.provenance, about.source
+    fitted = machine.thesis_fit.get(name)
+    if fitted is not None and value == fitted.value:
+        return fitted.provenance, fitted.source
+    return "given", "this command"
+
+
 def markdown_table(machine: Any) -> list[str]:
     """Lines of a table with every parameter of a machine, its value, unit, provenance and source."""
     rows = ["| parameter | value | unit | provenance | source |", "|---|---|---|---|---|"]
@@ -129,5 +148,5 @@ def markdown_table(machine: Any) -> list[str]:
         value = getattr(machine, name)
         shown = value if isinstance(value, str) else f"{value:.6g}"
         unit = "" if about.unit == "-" else about.unit
-        rows.append(f"| `{name}` | {shown} | {unit} | {about.provenance} | {about.source} |")
+        rows.append(f"| `{name}` | {shown} | {unit} | {' | '.join(origin_of(machine, name))} |")
     return rows

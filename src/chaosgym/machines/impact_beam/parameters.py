@@ -14,11 +14,12 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from chaosgym.errors import ParameterError
+from chaosgym.machines.impact_beam.thesis_fit import THESIS_FIT
 from chaosgym.machines.impact_beam.work import WORK
 from chaosgym.machines.machine import Work
 from chaosgym.machines.modal_impact import ModalImpactMachine
-from chaosgym.machines.options import Number, Option
-from chaosgym.machines.parameters import parameter
+from chaosgym.machines.options import Number, Option, constants
+from chaosgym.machines.parameters import Fitted, parameter
 
 _FIT = "five-mode fit to the printed natures and forces of figures 3.8 to 3.12"
 
@@ -55,7 +56,7 @@ class BeamParameters(ModalImpactMachine):
         "restitution": "contact_law='restitution', n_modes=1, fitted_modes=0",
         "rigid": "n_modes=1, fitted_modes=0",
         "modes-3": "fidelity='draft'",
-        "modes-5": "fidelity='standard', or THESIS_IMPACT_BEAM (n_modes=5, fitted_modes=0) for the thesis' model",
+        "modes-5": "fidelity='standard', or n_modes=5, fitted_modes=0",
         "modes-8": "fidelity='fine'",
     }
 
@@ -67,6 +68,7 @@ class BeamParameters(ModalImpactMachine):
         "clearance": (0.02e-3, 0.2e-3),
     }
     options: ClassVar[Mapping[str, Option]] = {
+        "--constants": constants(THESIS_FIT),
         "--frequency-hz": Number("excitation_frequency", "Hz"),
         "--clearance-mm": Number("clearance", "mm", 1e-3),
     }
@@ -94,6 +96,7 @@ class BeamParameters(ModalImpactMachine):
         "force 1e6 N": {"force_amplitude": 1e6},
     }
 
+    thesis_fit: ClassVar[Mapping[str, Fitted]] = THESIS_FIT
     work: ClassVar[Work] = WORK
 
     excitation_frequency: float = parameter(

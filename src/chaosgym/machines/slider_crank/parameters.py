@@ -33,7 +33,7 @@ from chaosgym.machines.batch import CompiledBatch
 from chaosgym.machines.integrators import Integrator
 from chaosgym.machines.machine import Machine, Work
 from chaosgym.machines.options import Option
-from chaosgym.machines.parameters import parameter
+from chaosgym.machines.parameters import Fitted, parameter
 from chaosgym.machines.slider_crank import run as running
 from chaosgym.machines.slider_crank.batch import CrankBatch, SteppedCrankBatch
 from chaosgym.machines.slider_crank.equations import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom, equations
@@ -44,6 +44,7 @@ from chaosgym.machines.slider_crank.kinematics import slider_position
 from chaosgym.machines.slider_crank.model import STEP_PHASE, exact_model, fastest_rate, has_propagators, stepped_model
 from chaosgym.machines.slider_crank.scenes import EXTREMES, OPTIONS, SCENES
 from chaosgym.machines.slider_crank.spatial_equations import spatial_equations
+from chaosgym.machines.slider_crank.thesis_fit import THESIS_FIT
 from chaosgym.machines.slider_crank.work import WORK
 
 Array = NDArray[np.float64]
@@ -74,7 +75,7 @@ class SliderCrank(Machine):
     former_rungs: ClassVar[Mapping[str, str]] = {
         "rigid": "rod='rigid'",
         "flexible-5deg": "fidelity='draft'",
-        "flexible-1deg": "fidelity='standard', or THESIS_SLIDER_CRANK for the thesis' model",
+        "flexible-1deg": "fidelity='standard', or n_modes=3, fitted_modes=0, matrix_update_interval=1",
     }
 
     name: ClassVar[str] = "slider-crank"
@@ -87,6 +88,7 @@ class SliderCrank(Machine):
     options: ClassVar[Mapping[str, Option]] = OPTIONS
     scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = SCENES
     extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = EXTREMES
+    thesis_fit: ClassVar[Mapping[str, Fitted]] = THESIS_FIT
     work: ClassVar[Work] = WORK
     sides: ClassVar[tuple[str, ...]] = ("upper", "lower")
     """Surfaces whose force points up and down: on the slider, or on the housing if the ball joint is monitored."""
@@ -431,11 +433,12 @@ class SliderCrank(Machine):
         return (CrankBatch if has_propagators(self) else SteppedCrankBatch)(self, count)
 
 
-THESIS_SLIDER_CRANK = SliderCrank(n_modes=3, fitted_modes=0, matrix_update_interval=1.0)
-"""The planar mechanism as fitted to the thesis; ``parameters_of(SliderCrank)`` says where each number comes from."""
+THESIS_SLIDER_CRANK = SliderCrank(**{name: one.value for name, one in THESIS_FIT.items()})
+"""The thesis' crank, fitted on all its statements; ``SliderCrank.thesis_fit`` says where each number comes from."""
 
-SUPERHARMONIC_SLIDER_CRANK = replace(
-    THESIS_SLIDER_CRANK,
+SUPERHARMONIC_SLIDER_CRANK = SliderCrank(
+    fitted_modes=0,
+    matrix_update_interval=1.0,
     crank_speed=1508.0,
     slider_clearance=0.127e-3,
     n_modes=4,
