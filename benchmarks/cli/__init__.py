@@ -1,5 +1,6 @@
 """Command line of ``python -m benchmarks``."""
 
+from pathlib import Path
 from typing import Any
 
 import click
@@ -113,6 +114,28 @@ def audit(env: str, machines: int, as_json: bool) -> None:
     )
 
 
+@click.command()
+@click.argument("runs", nargs=-1)
+@click.option("--table", type=click.Path(dir_okay=False, path_type=Path), required=True, help="CSV file of the curves.")
+@click.option("--figure", type=click.Path(dir_okay=False), default=None, help="Picture of the curves.")
+@AS_JSON
+def curves(runs: tuple[str, ...], table: Path, figure: str | None, as_json: bool) -> None:
+    """Write the training curves of RUNS, each NAME=FOLDER, into a table; without RUNS, show those of the table."""
+    from benchmarks.envs.curves import COLUMNS, curve_figure, curve_lines, read_curve, read_table, write_table
+
+    pairs = [run.partition("=") for run in runs]
+    for run, (_, separator, folder) in zip(runs, pairs, strict=True):
+        if not separator or not folder:
+            raise click.UsageError(f"RUNS {run}: allowed: NAME=FOLDER")
+    if runs:
+        write_table([read_curve(name, Path(folder)) for name, _, folder in pairs], table)
+    found = read_table(table)
+    if figure is not None:
+        curve_figure(found).savefig(figure, dpi=110)
+    plain = [{"agent": curve.agent, "env": curve.env, "rows": curve.values.tolist()} for curve in found]
+    emit({"columns": COLUMNS, "runs": plain}, as_json, lambda: curve_lines(found))
+
+
 @machine_command
 @click.option("--crosses", type=click.IntRange(1, 10**6), default=300, show_default=True, help="Fresh machines.")
 @click.option("--seed", type=click.IntRange(0), default=1000, show_default=True, help="Not one of the training data.")
@@ -160,7 +183,7 @@ def app() -> None:
     """Numbers about chaosgym itself."""
 
 
-for command in (bench, agreement, check, cost, judges, audit, classifier, monitors, general):
+for command in (bench, agreement, check, cost, judges, audit, curves, classifier, monitors, general):
     app.add_command(command)
 
 
