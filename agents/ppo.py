@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import torch
 from stable_baselines3 import PPO
@@ -19,12 +20,12 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 from tqdm import tqdm
 
-from chaosgym.control.policies import save_policy
+from chaosgym.control.policies import load_policy, save_policy
 from chaosgym.control.policies.checkpoint import load_checkpoint, save_checkpoint
 from chaosgym.control.policies.export import exported
 from chaosgym.envs import SB3VecEnv
 from chaosgym.envs.sb3 import SB3VisitedSpeeds
-from chaosgym.errors import ChaosgymError
+from chaosgym.errors import ChaosgymError, ModelFileError
 from chaosgym.files import held, write_atomically
 
 HOLD_BIAS = 2.0
@@ -40,6 +41,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--steps", type=int, default=300_000)
     parser.add_argument("--out", type=Path, default=Path("runs/ppo"))
+    parser.add_argument("--start", type=Path, default=None, help="Run folder whose policy this training begins with.")
     parser.add_argument("--envs", type=int, default=64)
     parser.add_argument("--every", type=int, default=10_000, help="Steps between rows and checkpoints.")
     parser.add_argument("--rollout", type=int, default=60)
@@ -111,10 +113,31 @@ def main() -> None:
         sys.exit(2)
 
 
+def environments(env: str, asked: argparse.Namespace) -> VecNormalize:
+    """Machines side by side, with a memory of visited speeds, normalised."""
+    return VecNormalize(SB3VisitedSpeeds(VecMonitor(SB3VecEnv(env, asked.envs))), gamma=asked.gamma)
+
+
+def take_over(model: PPO, envs: VecNormalize, asked: argparse.Namespace) -> None:
+    """Begin with the weights of another run; on the same machine, with its scales and what it found usual too."""
+    env = load_policy(asked.start).env
+    found = load_checkpoint(asked.start, PPO, environments(env, asked))
+    if found is None:
+        raise ModelFileError(f"{asked.start} holds no checkpoint.bin; --start takes the folder of a run of this script")
+    try:
+        model.policy.load_state_dict(found[0].policy.state_dict())
+    except RuntimeError:
+        raise ModelFileError(f"{asked.start} has layers of another size; give its --units here too") from None
+    if gym.spec(env).kwargs["machine"] == gym.spec(asked.env).kwargs["machine"]:
+        before = found[0].get_env()
+        envs.obs_rms, envs.ret_rms = before.obs_rms, before.ret_rms
+        envs.venv.memory.usual = before.venv.memory.usual
+    model.set_random_seed(asked.seed)
+
+
 def train(asked: argparse.Namespace) -> None:
     """Train, or go on, until the steps are done."""
-    native = VecMonitor(SB3VecEnv(asked.env, asked.envs))
-    envs = VecNormalize(SB3VisitedSpeeds(native), gamma=asked.gamma)
+    envs = environments(asked.env, asked)
     model, kept = load_checkpoint(asked.out, PPO, envs) or (None, None)
     if model is None:
         model = PPO(
@@ -132,6 +155,8 @@ def train(asked: argparse.Namespace) -> None:
         )
         with torch.no_grad():
             model.policy.action_net.bias[0] += HOLD_BIAS
+        if asked.start is not None:
+            take_over(model, envs, asked)
         envs.seed(1_000_000 * (asked.seed + 1))
     model.learn(asked.steps - model.num_timesteps, Progress(asked, kept), reset_num_timesteps=False)
     save_policy(exported(model, asked.env, envs, memory=True), asked.out)

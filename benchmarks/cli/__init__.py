@@ -1,5 +1,6 @@
 """Command line of ``python -m benchmarks``."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -115,6 +116,24 @@ def audit(env: str, machines: int, as_json: bool) -> None:
 
 
 @click.command()
+@click.argument("env", type=click.Choice(ENVIRONMENTS))
+@click.option("--machines", type=click.IntRange(3), default=40, show_default=True)
+@click.option("--keywords", default="{}", help="Of the environment, as JSON.")
+@AS_JSON
+def headroom(env: str, machines: int, keywords: str, as_json: bool) -> None:
+    """Show what a schedule can win, and how much of it knowing the clearance gives."""
+    from benchmarks.envs.headroom import headroom as measure
+
+    try:
+        given = json.loads(keywords)
+    except ValueError as error:
+        raise click.UsageError(f"--keywords is no JSON: {error}") from None
+    found = measure(env, machines, given)
+    lines = [f"{value:7.3f}  {name}" for name, value in found.items()]
+    emit({"env": env, "machines": machines, "keywords": given, **found}, as_json, lambda: lines)
+
+
+@click.command()
 @click.argument("runs", nargs=-1)
 @click.option("--table", type=click.Path(dir_okay=False, path_type=Path), required=True, help="CSV file of the curves.")
 @click.option("--figure", type=click.Path(dir_okay=False), default=None, help="Picture of the curves.")
@@ -183,7 +202,7 @@ def app() -> None:
     """Numbers about chaosgym itself."""
 
 
-for command in (bench, agreement, check, cost, judges, audit, curves, classifier, monitors, general):
+for command in (bench, agreement, check, cost, judges, audit, curves, headroom, classifier, monitors, general):
     app.add_command(command)
 
 

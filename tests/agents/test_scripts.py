@@ -12,6 +12,7 @@ from chaosgym.control.rollout import play
 
 AGENTS = Path(__file__).parent.parent.parent / "agents"
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
+WORN = "chaosgym/ImpactBeamWear-v1"
 SMALL = {
     "ppo": ("--rollout", "60", "--batch", "240"),
     "recurrent_ppo": ("--rollout", "60", "--batch", "240"),
@@ -40,6 +41,19 @@ def test_a_script_trains_resumes_and_exports(script, tmp_path):
     _train(script, out, 22_000, "--envs", "32", *SMALL[script])
     assert len((out / "progress.csv").read_text().splitlines()) >= 3
     assert play(load_policy(out), BEAM, range(2)).returns.max() < 0.0
+
+
+@pytest.mark.slow
+def test_a_training_begins_with_another_policy(tmp_path):
+    """With too few steps to learn from, it plays as the one that it began with."""
+    small = ("--envs", "4", "--rollout", "10", "--batch", "40")
+    _train("ppo", tmp_path / "first", 40, *small)
+    _train("ppo", tmp_path / "second", 40, "--env", WORN, "--start", tmp_path / "first", "--learning-rate", 0, *small)
+    first, second = (load_policy(tmp_path / name) for name in ("first", "second"))
+    for one, other in zip(first.network.layers, second.network.layers, strict=True):
+        assert (one.weight == other.weight).all()
+    assert second.env == WORN
+    assert second.usual.count.sum() > first.usual.count.sum()
 
 
 @pytest.mark.slow

@@ -3,10 +3,11 @@
 from chaosgym.machines.machine import Work
 
 WORK = Work(
-    # figure 4.14b; the contact damping is assumed: more of it makes Type III rare and too weak to be felt
-    fields={"slider_clearance": 0.254e-3, "contact_damping_ratio": 0.13},
+    # figure 4.14b; the contact damping is assumed. More of it makes Type III rare, and backing off is as good as
+    # knowing the machine; if it varies too, or the rod does, the clearance tells little (docs/development/tasks.md)
+    fields={"slider_clearance": 0.254e-3, "contact_damping_ratio": 0.10},
     model_fidelity="draft",
-    tolerances={"slider_clearance": 0.1, "contact_damping_ratio": 0.1, "rod_length": 0.002},
+    tolerances={"slider_clearance": 0.1},
     task={
         "cycles_per_step": 20,
         "lowest_speed": 120.0,
