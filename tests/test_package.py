@@ -1,5 +1,6 @@
 """The package as a user installs it."""
 
+import ast
 import json
 import subprocess
 import sys
@@ -42,6 +43,67 @@ def test_public_names_exist():
         assert getattr(chaosgym, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
         chaosgym.nonsense  # noqa: B018
+
+
+def _asks_what_machine(node, kinds, names):
+    """True for a type check against a machine's class, and for a table or a comparison by a machine's name."""
+    if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("isinstance", "issubclass"):
+        return any(getattr(part, "id", getattr(part, "attr", "")) in kinds for part in ast.walk(node.args[1]))
+    asked = []
+    if isinstance(node, ast.Dict):
+        asked = node.keys
+    elif isinstance(node, ast.Compare):
+        asked = [node.left, *node.comparators]
+    elif isinstance(node, ast.MatchValue | ast.Subscript):
+        asked = [getattr(node, "value", None), getattr(node, "slice", None)]
+    if isinstance(node, ast.MatchClass):
+        return getattr(node.cls, "id", "") in kinds
+    return any(isinstance(part, ast.Constant) and part.value in names for part in asked)
+
+
+def _above_machines():
+    """Syntax trees of the modules on the floors above the machines, by their path."""
+    package = ROOT / "src/chaosgym"
+    for path in sorted(package.rglob("*.py")):
+        if path.relative_to(package).parts[0] not in ("core", "machines"):
+            yield path, ast.parse(path.read_text(encoding="utf-8"))
+
+
+def test_no_floor_above_the_machines_asks_which_machine_it_has():
+    """A machine is a folder and a line: above ``machines`` there is no type check and no table by a machine's name."""
+    from chaosgym.machines import MACHINES, Machine
+    from chaosgym.machines.modal_machine import ModalMachine
+
+    kinds, left = {ModalMachine.__name__}, [MACHINES[name] for name in MACHINES]
+    while left:
+        kind = left.pop()
+        if kind is not Machine and issubclass(kind, Machine):
+            kinds.add(kind.__name__)
+            left.extend(kind.__bases__)
+    guilty = [
+        f"{path.relative_to(ROOT)}:{node.lineno}"
+        for path, tree in _above_machines()
+        for node in ast.walk(tree)
+        if _asks_what_machine(node, kinds, set(MACHINES))
+    ]
+    assert guilty == []
+
+
+def test_no_floor_above_the_machines_reaches_into_the_folder_of_one():
+    """What a floor needs is in the protocol; the folder of one is open to public names and the writer of its file."""
+    folders = tuple(
+        f"chaosgym.machines.{path.parent.name}." for path in (ROOT / "src/chaosgym/machines").glob("*/__init__.py")
+    )
+    guilty = [
+        f"{path.relative_to(ROOT)}:{node.lineno}"
+        for path, tree in _above_machines()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith(folders)
+    ]
+    assert {place.partition(":")[0] for place in guilty} == {
+        "src/chaosgym/__init__.py",
+        "src/chaosgym/cli/new_machine.py",
+    }
 
 
 def test_compiled_kernels_are_cached_by_their_sources():

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from chaosgym.envs.jobs import Piece
 from chaosgym.envs.observation import OBSERVATION_NAMES
-from chaosgym.envs.pictures import CALM, INK, LIMIT, PALE, PICTURES, PLAIN, STAYS, WILD, samples_of
 from chaosgym.envs.task import Task
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of
+from chaosgym.machines.picture import CALM, INK, LIMIT, PALE, STAYS, WILD, samples_of
 from chaosgym.simulation import CycleRecord, MotionState, simulate
 
 Array = NDArray[np.float64]
@@ -73,7 +73,7 @@ class Dashboard:
     Parameters
     ----------
     machine
-        For the picture of it.
+        For the unit of its speed.
     task
         For the ranges of the axes.
     window
@@ -82,7 +82,6 @@ class Dashboard:
 
     def __init__(self, machine: Machine, task: Task, *, window: bool) -> None:
         self._task = task
-        self._picture = PICTURES.get(machine.name, PLAIN)
         self._unit = parameters_of(machine)[machine.speed_field].unit
         self._figure = Figure(figsize=SIZE, dpi=DOTS_PER_INCH)
         self._canvas: Any = FigureCanvasAgg(self._figure)
@@ -122,7 +121,7 @@ class Dashboard:
     def draw(self, record: CycleRecord) -> Frame | None:
         """Draw the last step, given with its time history; return (height, width, 3), or None for a window."""
         samples, colour = samples_of(record), WILD if self._wild and self._wild[-1] else CALM
-        gap = 1e3 * self._picture.room(record.machine)
+        gap = 1e3 * record.machine.room
         self._make_room(samples, gap)
         self._picture_machine(record, colour)
         if self._background is None:
@@ -239,7 +238,7 @@ class Dashboard:
         for artist in (*panel.lines, *panel.collections, *panel.patches, *panel.texts):
             artist.remove()
         moment = (len(self._speeds) % STROBE) / STROBE
-        self._picture.draw(panel, record, colour, moment, self._task.load_rating)
+        record.machine.draw(panel, record, colour, moment, self._task.load_rating)
         staying = [text.get_text() for text in self._texts(stays=True)]
         if staying != self._staying:
             self._staying, self._background = staying, None

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from chaosgym.classifier import classifier_for
 from chaosgym.diagnosis import Diagnosis, diagnose
-from chaosgym.envs.pictures import PICTURES, PLAIN
 from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
@@ -155,7 +154,7 @@ def command_of(machine: Machine) -> str:
 
 def view_of(machine: Machine) -> View:
     """Everything that is shown of a point; a motion that can't be followed is told, not raised."""
-    room = PICTURES.get(machine.name, PLAIN).room(machine)
+    room = machine.room
     try:
         verdict = diagnose(machine, budget=BUDGET)
     except (SimulationError, ParameterError) as error:

@@ -210,6 +210,36 @@ class Machine(FidelityLadder, ABC):
         other.__dict__.update(self.__dict__, **fields)
         return other
 
+    @property
+    def room(self) -> float:
+        """How far [m] the gap lets the displacement of the monitored joint go to either side."""
+        return float(getattr(self, self.clearance_field))
+
+    def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
+        """Draw the machine in motion.
+
+        Parameters
+        ----------
+        panel
+            Axes of matplotlib.
+        record
+            ``CycleRecord`` of a run, with its time history.
+        colour
+            Of what tells how the step went: calm, or of Type III.
+        moment
+            Of the last cycle, from 0 to 1.
+        force_limit
+            Force [N] to which pictures scale.
+        """
+        from chaosgym.machines.picture import draw_displacement
+
+        draw_displacement(panel, record, colour, moment, force_limit)
+
+    @property
+    def swings(self) -> bool:
+        """True for a beam, with the fields of ``ImpactBeam``, that flies from one spring to another as it rocks."""
+        return False
+
     def arrays(self, cycles: int, samples: int = 0) -> CycleArrays:
         """Return the arrays into which ``run`` writes what happens in some cycles, with samples of the history."""
         return cycle_arrays(cycles, self.n_states, samples)

@@ -22,10 +22,12 @@ from chaosgym.core.modal_run import make_run
 from chaosgym.core.propagator import Regimes
 from chaosgym.core.restitution import RestitutionModel, advance_restitution
 from chaosgym.core.tangent import Tangents, no_tangents
-from chaosgym.machines.batch import CompiledBatch, ModalImpactBatch, RestitutionBatch
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.linear_impact import linear_impact
 from chaosgym.machines.machine import Machine, refuse_fixed_steps
+
+if TYPE_CHECKING:
+    from chaosgym.machines.batch import CompiledBatch
 
 Array = NDArray[np.float64]
 
@@ -365,6 +367,8 @@ class ModalImpactMachine(Machine):
         force = surface * speed
         return max(float(np.max(np.sqrt(energy[1:]) / speed)), float(np.max(peak_force.max(axis=1) / force)))
 
-    def batch(self, count: int) -> CompiledBatch:
+    def batch(self, count: int) -> "CompiledBatch":
         """Return ``count`` variants that move in one compiled call."""
+        from chaosgym.machines.batch import ModalImpactBatch, RestitutionBatch
+
         return (ModalImpactBatch if self.runs_fixed_steps else RestitutionBatch)(self, count)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.diagnosis import Diagnosis
-from chaosgym.envs.pictures import PICTURES, PLAIN
 from chaosgym.machines import Machine
 from chaosgym.plotting import response
 from chaosgym.plotting.design import axis_label, peak_record
@@ -43,11 +42,6 @@ def _styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
             return draw(*arguments, **keywords)
 
     return drawn
-
-
-def room_of(machine: Machine) -> float:
-    """How far [m] the gap lets the displacement of the monitored joint go to either side."""
-    return PICTURES.get(machine.name, PLAIN).room(machine)
 
 
 def point_of(machine: Machine) -> str:
@@ -83,7 +77,7 @@ def simulation_figure(record: CycleRecord, transient: int = 0) -> Figure:
     peaks.set_ylim(0.0, 1.3 * float(record.peak_force.max()) or 1.0)
     peaks.legend(loc="upper right", ncols=2, borderpad=0.1, markerscale=2.0)
     response.curve(factor * last.time, 1e3 * motion[:, 0], moves)
-    response.stops(room_of(machine), moves, vertical=True)
+    response.stops(machine.room, moves, vertical=True)
     moves.set_ylabel("displacement [mm]")
     moves.tick_params(labelbottom=False)
     response.curve(factor * last.time, motion[:, 2], force)
@@ -107,7 +101,7 @@ def diagnosis_figure(verdict: Diagnosis) -> Figure:
     motion = last.history.reshape(-1, 3)
     response.phase_plane(motion[:, 0], motion[:, 1], portrait, pale=repeats is None)
     response.section_points(judged.displacement, judged.velocity, portrait, color=INK if repeats else colour)
-    response.stops(room_of(machine), portrait)
+    response.stops(machine.room, portrait)
     portrait.set_title("Motion between the stops; dots: once a cycle", fontweight="normal", fontsize=9.5)
     first = (verdict.horizon or len(judged)) - len(judged) + 1
     response.cycle_points(judged.peak_force[:, 0], peaks, first=first, color=colour)

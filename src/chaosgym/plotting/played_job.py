@@ -15,9 +15,9 @@ from PIL import Image
 from tqdm import tqdm
 
 from chaosgym.control.rollout import Played
-from chaosgym.envs.pictures import CALM, INK, WILD
 from chaosgym.errors import ChaosgymError
 from chaosgym.files import write_atomically
+from chaosgym.machines.picture import CALM, INK, WILD
 from chaosgym.plotting.picture_file import FORMATS as STILL
 from chaosgym.plotting.picture_file import check_picture, save_picture
 from chaosgym.plotting.style import STYLE

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.core.restitution import RestitutionModel
@@ -41,6 +42,17 @@ class ImpactBeam(BeamParameters):
         clearance = self.clearance / static_tip_deflection(self)
         least = 0.02 + 0.02 * (self.damping_ratio - 0.01) / 0.07
         return {"clearance": (clearance, max(0.0, least)), "frequency": (self.excitation_frequency, 16.0)}
+
+    def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
+        """Draw the beam between its sensors; see ``Machine.draw``."""
+        from chaosgym.machines.impact_beam.picture import draw_beam
+
+        draw_beam(panel, record, colour, moment)
+
+    @property
+    def swings(self) -> bool:
+        """True where the sensors are springs."""
+        return self.contact_law == "linear"
 
     @property
     def structure(self) -> ModalImpactModel | RestitutionModel:

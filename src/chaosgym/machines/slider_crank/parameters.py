@@ -424,6 +424,18 @@ class SliderCrank(Machine):
         """Phase and components of each peak force, and the peaks of the sensors."""
         return running.further_results(self, arrays)
 
+    @property
+    def room(self) -> float:
+        """How far [m] the gap lets the displacement go: a ball among tetrahedral sensors, further than half of it."""
+        sensors = self.monitored_joint == "ball" and self.ball_joint == "instrumented"
+        return float(getattr(self, self.clearance_field)) * (math.sqrt(3.0) if sensors else 1.0)
+
+    def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
+        """Draw crank, rod and slider; see ``Machine.draw``."""
+        from chaosgym.machines.slider_crank.picture import draw_crank
+
+        draw_crank(panel, record, colour, moment, force_limit)
+
     def share_of_bound(self, states: Array, peak_force: Array) -> float:
         """Largest force, as a share of that of an impact of all masses at ten times the speed of the crank pin."""
         return float(peak_force.max()) / running.force_bound(self)

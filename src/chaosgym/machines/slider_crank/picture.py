@@ -1,98 +1,19 @@
-"""Pictures of each machine in motion, drawn on the panel of a dashboard, its gap exaggerated.
-
-A picture shows one moment of the last cycle of a step, and pale what happened in the rest of the step.
-"""
+"""Crank, rod and slider in motion, drawn on a panel, the gap of the monitored joint exaggerated."""
 
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
+from chaosgym.machines.picture import INK, PALE, STAYS, sample_at, samples_of
 from chaosgym.machines.slider_crank.kinematics import crank_pin, slider_position
-from chaosgym.simulation import CycleRecord
 
 Array = NDArray[np.float64]
 
-INK, PALE, CALM, WILD, LIMIT = "#1f2933", "#cbd2d9", "#1f77b4", "#d1495b", "#e09f3e"
-"""Colours: text and bodies, background lines, repeating steps, steps that count as Type III, force limit."""
-
-STAYS = "stays"
-"""Mark (gid) of a text that does not change from step to step, so that it is drawn once."""
-
-GHOSTS = 60
-"""Other positions shown behind the beam."""
-
-CRANK_GHOSTS = 12
+GHOSTS = 12
 """Other positions shown behind the crank and its rod."""
-
-
-class Picture(NamedTuple):
-    """How to draw a machine.
-
-    ``draw(panel, record, colour, moment, force_limit)`` draws it at a moment of its last cycle, from 0 to 1;
-    ``room(machine)`` is how far [m] the gap lets its displacement go to either side.
-    """
-
-    draw: Callable[[Any, Any, str, float, float], None]
-    room: Callable[[Any], float]
-
-
-def samples_of(record: CycleRecord) -> Array:
-    """Displacement [m], velocity [m/s] and force [N] of all cycles in a row, (n, 3)."""
-    assert record.history is not None
-    return record.history.reshape(-1, 3)
-
-
-def _sample(record: CycleRecord, moment: float) -> int:
-    """Row of ``samples_of`` at a moment of the last cycle."""
-    per_cycle = len(samples_of(record)) // len(record)
-    return (len(record) - 1) * per_cycle + int(moment * per_cycle)
-
-
-def draw_beam(panel: Any, record: CycleRecord, colour: str, moment: float, force_limit: float) -> None:
-    """Draw the beam between its sensors, its other positions pale, its deflection exaggerated."""
-    beam: Any = record.machine
-    gap = 0.13
-    tip = samples_of(record)[:, 0] / beam.clearance * gap
-    now = tip[_sample(record, moment)]
-    along = np.linspace(0.0, 1.0, 2)
-    others = [np.column_stack([along, deflection * along]) for deflection in tip[:: max(1, len(tip) // GHOSTS)]]
-    panel.add_collection(LineCollection(others, color=PALE, linewidth=1.2, alpha=0.45, capstyle="round"), autolim=False)
-    push = 0.65
-    panel.plot([push, push], [push * now - 0.03, -0.23], color=INK, linewidth=1.2)
-    panel.plot(push, push * now - 0.03, "^", color=INK, markersize=6)
-    panel.plot(push, -0.23, "v", color=INK, markersize=6)
-    panel.text(push, -0.26, "shaker", ha="center", va="top", fontsize=8, color=INK, gid=STAYS)
-    panel.plot(along, now * along, color=INK, linewidth=6.0, solid_capstyle="round")
-    panel.fill_between([-0.09, -0.05], -0.1, 0.1, color=PALE, linewidth=0)
-    panel.plot([-0.05, 0.0], [0.0, 0.0], color=INK, linewidth=2.0)
-    panel.plot(0.0, 0.0, marker="o", color="white", markeredgecolor=INK, markeredgewidth=2.5, markersize=9)
-    panel.text(-0.09, -0.12, "flexure pivot", ha="left", va="top", fontsize=8, color=INK, gid=STAYS)
-    for side, (name, sign) in enumerate(zip(beam.sides, (1.0, -1.0), strict=True)):
-        peak = float(record.peak_force[:, side].max())
-        edge = sign * (gap + 0.014)
-        panel.fill_between([0.93, 1.07], edge, edge + sign * 0.05, color=colour, linewidth=0)
-        panel.text(
-            1.0,
-            edge + sign * 0.07,
-            f"{name} sensor: {peak:.0f} N",
-            ha="center",
-            fontsize=8,
-            color=INK,
-            va="bottom" if sign > 0 else "top",
-        )
-    panel.set(xlim=(-0.1, 1.24), ylim=(-0.32, 0.32))
-    panel.set_title(
-        f"Beam in its gap of ±{beam.clearance * 1e3:.3g} mm, exaggerated; peak forces of the step",
-        fontsize=8.5,
-        loc="left",
-        gid=STAYS,
-        color=INK,
-    )
-    panel.axis("off")
 
 
 class _CrankPositions(NamedTuple):
@@ -111,9 +32,6 @@ BARS = 600
 BALL_GAP, BALL = 5.0, 5.0
 """Half gap at the ball joint and radius of the ball as drawn [mm]."""
 
-SENSOR_GAP = math.sqrt(3.0)
-"""How far a ball between tetrahedral sensors gets from its centre across the rod, in half gaps."""
-
 WIDTH = 395.0
 """Width of the picture [mm]."""
 
@@ -129,35 +47,24 @@ def _crank_positions(machine: Any, angle: Array, displacement: Array) -> _CrankP
     pin = 1e3 * crank_pin(angle, machine.crank_radius, turned)[:, :2]
     along = 1e3 * slider_position(angle, machine.crank_radius, machine.rod_length, turned)
     rattling = machine.monitored_joint == "slider"
-    across = displacement / _crank_clearance(machine) * GAP if rattling else np.zeros(len(angle))
+    across = displacement / getattr(machine, machine.clearance_field) * GAP if rattling else np.zeros(len(angle))
     return _CrankPositions(pin, np.stack([along, across], axis=1))
 
 
-def _crank_clearance(machine: Any) -> float:
-    """Half gap [m] of the monitored joint."""
-    return float(machine.slider_clearance if machine.monitored_joint == "slider" else machine.ball_clearance)
-
-
-def _crank_room(machine: Any) -> float:
-    """How far [m] the monitored joint lets its displacement go to either side."""
-    sensors = machine.monitored_joint == "ball" and machine.ball_joint == "instrumented"
-    return _crank_clearance(machine) * (SENSOR_GAP if sensors else 1.0)
-
-
-def draw_crank(panel: Any, record: CycleRecord, colour: str, moment: float, force_limit: float) -> None:
+def draw_crank(panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
     """Draw crank, rod and slider on its guide; bars on the guide show where and how hard the slider hits it."""
     machine: Any = record.machine
     samples = samples_of(record)
     per_cycle = len(samples) // len(record)
     angle: Array = np.arange(len(samples)) % per_cycle * np.float64(2.0 * math.pi / per_cycle)
     places = _crank_positions(machine, angle, samples[:, 0])
-    now = _sample(record, moment)
+    now = sample_at(record, moment)
     last = slice(len(samples) - per_cycle, len(samples))
-    ghosts = range(last.start, last.stop, max(1, per_cycle // CRANK_GHOSTS))
+    ghosts = range(last.start, last.stop, max(1, per_cycle // GHOSTS))
     rods = [np.stack([places.pin[ghost], places.slider[ghost]]) for ghost in ghosts]
     panel.add_collection(LineCollection(rods, color=PALE, linewidth=1.0, alpha=0.6), autolim=False)
     panel.plot(*places.pin[last].T, color=PALE, linewidth=1.2)
-    clearance = _crank_clearance(machine)
+    clearance = getattr(machine, machine.clearance_field)
     rattles = machine.monitored_joint == "slider"
     _draw_guide(panel, places, SLIDER_HALF_HEIGHT + (GAP if rattles else 0.0))
     rod_end = places.pin[now]
@@ -166,7 +73,7 @@ def draw_crank(panel: Any, record: CycleRecord, colour: str, moment: float, forc
         panel.plot(*places.slider[last].T, color=colour, linewidth=1.0)
     else:
         rod_end = rod_end + _across_rod(places, now) * samples[now, 0] / clearance * BALL_GAP
-        _draw_circle(panel, rod_end, BALL + BALL_GAP * _crank_room(machine) / clearance)
+        _draw_circle(panel, rod_end, BALL + BALL_GAP * machine.room / clearance)
         _draw_circle(panel, places.pin[now], BALL)
     _draw_links(panel, places.pin[now], rod_end, places.slider[now])
     degrees = math.degrees(angle[now])
@@ -232,24 +139,3 @@ def _draw_links(panel: Any, pin: Array, rod_end: Array, slider: Array) -> None:
     panel.fill([left, right, right, left], [low, low, high, high], facecolor="white", edgecolor=INK, linewidth=2.0)
     for place in ((0.0, 0.0), pin, slider):
         panel.plot(*place, marker="o", color="white", markeredgecolor=INK, markeredgewidth=2.0, markersize=7)
-
-
-PICTURES = {
-    "impact-beam": Picture(draw_beam, lambda beam: float(beam.clearance)),
-    "slider-crank": Picture(draw_crank, _crank_room),
-}
-"""What draws a machine, by its name."""
-
-
-def draw_displacement(panel: Any, record: CycleRecord, colour: str, moment: float, force_limit: float) -> None:
-    """Draw the displacement in the last cycle, for a machine without a picture of its own."""
-    samples = samples_of(record)
-    last = samples[-(len(samples) // len(record)) :, 0] * 1e3
-    panel.plot(np.linspace(0.0, 1.0, len(last)), last, color=colour, linewidth=1.0)
-    panel.plot(moment, last[min(len(last) - 1, int(moment * len(last)))], "o", color=INK, markersize=5)
-    panel.set_xlabel("cycle", fontsize=8, color=INK)
-    panel.set_ylabel("displacement [mm]", fontsize=8, color=INK)
-
-
-PLAIN = Picture(draw_displacement, lambda machine: float(getattr(machine, machine.clearance_field)))
-"""Picture of a machine that has none of its own."""
