@@ -324,7 +324,7 @@ def test_damage_is_named_and_repaired(tmp_path, monkeypatch):
 
 def test_failed_runs_are_rows(tmp_path, monkeypatch):
     """A machine that can't be simulated is a row with status failed and the reason, not a missing one."""
-    monkeypatch.setattr(label_module, "diagnosed_run", _fail)
+    monkeypatch.setattr(label_module, "diagnose_alone", _fail)
     sweep = run_sweep(PLAN, tmp_path / "s")
     assert set(sweep.column("status")) == {"failed"}
     assert np.all([reason.startswith("no luck") for reason in sweep.column("reason")])

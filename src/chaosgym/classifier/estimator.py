@@ -196,11 +196,6 @@ class ResponseClassifier:
         weights = None if sample_weight is None else np.asarray(sample_weight, dtype=float)
         return float(np.average(self.predict(X, **more) == np.asarray(y), weights=weights))
 
-    def out_of_range(self, X: ArrayLike) -> NDArray[np.bool_]:
-        """Whether the parameters of each row (n,) lie outside what was trained on."""
-        values = self._checked(X)
-        return np.asarray(((values < self.low_) | (values > self.high_)).any(axis=1))
-
     def _features(self, values: Array, cycles: ArrayLike | None = None, sensor_error: ArrayLike | None = None) -> Array:
         if self.inputs == "records":
             peaks, _, errors = as_records(values, None, sensor_error)

@@ -10,7 +10,6 @@ from itertools import product
 from chaosgym.classifier.answer import NatureAnswer
 from chaosgym.diagnosis import default_tolerances
 from chaosgym.diagnosis.type_rule import CROSS, type_of_cross
-from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
 
 NEGLIGIBLE = 1e-3
@@ -31,14 +30,6 @@ def neighbours_of(machine: Machine) -> list[Machine]:
         [tolerances[field].at(getattr(machine, field), side) for side in (-1.0, 0.0, 1.0)] for field in fields
     )
     return [machine.at(speed[one + 1], clearance[other + 1]) for one, other in CROSS[1:]]
-
-
-def has_neighbours(machine: Machine) -> bool:
-    """Whether all four neighbours are allowed."""
-    try:
-        return bool(neighbours_of(machine))
-    except ParameterError:
-        return False
 
 
 def type_probabilities(machine: Machine, points: Sequence[NatureAnswer]) -> tuple[dict[str, float], str]:

@@ -110,22 +110,22 @@ def diagnose(
     SimulationError
         If the motion can't be followed.
     """
-    verdict, record = diagnosed_run(
+    verdict = diagnose_alone(
         machine, initial_state=initial_state, budget=budget, sensor_error=sensor_error, integrator=integrator
     )
     decides = verdict.status == "agreed" and sensor_error == 0.0
-    return _with_update_test(machine, verdict, record) if decides and depends_on_configuration(machine) else verdict
+    return _with_update_test(machine, verdict) if decides and depends_on_configuration(machine) else verdict
 
 
-def diagnosed_run(
+def diagnose_alone(
     machine: Machine,
     *,
     initial_state: MotionState | ArrayLike | None = None,
     budget: int = DEFAULT_BUDGET,
     sensor_error: float = 0.0,
     integrator: Integrator | None = None,
-) -> tuple[Diagnosis, CycleRecord]:
-    """``diagnose`` without the vote of the Matrix Update Test, and the very run that was judged."""
+) -> Diagnosis:
+    """``diagnose`` without the vote of the Matrix Update Test, which judges a machine by other machines."""
     if budget < FIRST_STAGE:
         raise DiagnosisError(f"budget = {budget} cycles is out of range; allowed: {FIRST_STAGE} or more")
     exact = integrator is None or isinstance(integrator, ExactEvents)
@@ -137,8 +137,7 @@ def diagnosed_run(
     evidence = _evidence(stage, verdict, initial_state)
     if stage.orbit is not None:
         evidence["largest_peak"] = float(np.max(simulate(machine, stage.orbit.period, stage.orbit.state).peak_force))
-    verdict = replace(verdict, votes=_votes(stage), horizon=len(record), evidence=evidence, record=record)
-    return verdict, record
+    return replace(verdict, votes=_votes(stage), horizon=len(record), evidence=evidence, record=record)
 
 
 def _proven_early(
@@ -180,7 +179,7 @@ def _last_stage(machine: Machine, deviation: Deviation, budget: int, sensor_erro
     return stage
 
 
-def _with_update_test(machine: Machine, verdict: Diagnosis, record: CycleRecord) -> Diagnosis:
+def _with_update_test(machine: Machine, verdict: Diagnosis) -> Diagnosis:
     """Let the Matrix Update Test vote on a verdict, from the state in which the run ended."""
     interval = getattr(machine, FIELD)
     update = matrix_update_test(
@@ -188,7 +187,7 @@ def _with_update_test(machine: Machine, verdict: Diagnosis, record: CycleRecord)
         intervals=(interval, neighbouring_interval(interval)),
         transient=0,
         cycles=UPDATE_CYCLES,
-        initial_state=record.final_state,
+        initial_state=verdict.run.final_state,
     )
     evidence = {**verdict.evidence, "matrix_update": update.reason}
     evidence["cycles_used"] += 4 * UPDATE_CYCLES

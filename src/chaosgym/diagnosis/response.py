@@ -73,8 +73,8 @@ class Diagnosis:
     record: "CycleRecord | None" = field(default=None, repr=False, compare=False)
 
     @property
-    def judged(self) -> "CycleRecord":
-        """The last half of the run: the cycles that count as settled.
+    def run(self) -> "CycleRecord":
+        """The run that was judged.
 
         Raises
         ------
@@ -83,7 +83,12 @@ class Diagnosis:
         """
         if self.record is None:
             raise DiagnosisError("the verdict was reached on a plain series; diagnose a machine to get its run")
-        return self.record.after(len(self.record) // 2)
+        return self.record
+
+    @property
+    def judged(self) -> "CycleRecord":
+        """The last half of the run, whose cycles count as settled; raises as ``run`` does."""
+        return self.run.after(len(self.run) // 2)
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""

@@ -5,7 +5,7 @@
 
 from dataclasses import replace
 from importlib import import_module
-from typing import Any
+from typing import Any, NoReturn
 
 from gymnasium.envs.registration import EnvSpec, register, registry
 
@@ -52,7 +52,7 @@ def _register(name: str, keywords: dict[str, Any]) -> None:
         kwargs=keywords,
     )
     if name in ENVIRONMENTS:
-        gone = "chaosgym.envs.gone:refuse"
+        gone = f"{__name__}:{_refuse.__name__}"
         old = name.replace("-v1", "-v0")
         register(id=old, entry_point=gone, vector_entry_point=gone, kwargs={"successor": name})
 
@@ -73,6 +73,13 @@ def environment(env: str) -> EnvSpec:
         known = [name for name, spec in registry.items() if spec.entry_point == _ENTRY_POINT and "machine" in spec.kwargs]
         raise ParameterError(f"env = {env!r} is unknown; known: {', '.join(known)}, or a file my-machine.toml")
     return found
+
+
+def _refuse(successor: str, **_: Any) -> NoReturn:
+    """Refuse to make an environment of version 0; names the id to use instead."""
+    raise ParameterError(
+        f"{successor.replace('-v1', '-v0')} is gone: its Type III was a table's, not the motion's; use {successor}"
+    )
 
 
 register_environments()

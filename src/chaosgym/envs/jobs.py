@@ -7,11 +7,10 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from chaosgym.envs.demand import demand_of
 from chaosgym.envs.drive import approached, trimmed
 from chaosgym.envs.judge import ExponentJudge, Judge, RecurrenceJudge
 from chaosgym.envs.observation import COMMANDED, OBSERVATION_NAMES, Observation, felt, observation_names
-from chaosgym.envs.task import Status, Task
+from chaosgym.envs.task import Status, Task, demand_of
 from chaosgym.envs.variants import DRAWN, Variants
 from chaosgym.errors import SimulationError
 from chaosgym.machines.batch import Cycles

@@ -25,11 +25,6 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
-def at_speed(machine: Machine, speed: float) -> Machine:
-    """Return the machine at a speed, in the unit of its speed field."""
-    return machine.at(speed)
-
-
 class Batch(Protocol):
     """Machines that run side by side."""
 

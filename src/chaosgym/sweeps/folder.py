@@ -19,8 +19,8 @@ from chaosgym.errors import DatasetError, UnfinishedError
 from chaosgym.files import is_empty, write_atomically
 from chaosgym.sweeps.columns import schema
 from chaosgym.sweeps.dataset import DAMAGE, DATA_FILE, parquet_writer
+from chaosgym.sweeps.label import with_response_types
 from chaosgym.sweeps.plan import SweepPlan
-from chaosgym.sweeps.types import with_response_types
 
 PLAN_FILE = "plan.json"
 CHUNK_FOLDER = "chunks"

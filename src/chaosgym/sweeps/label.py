@@ -1,4 +1,4 @@
-"""The label of one point: one run from rest, judged in stages; evidence and signals come from that run."""
+"""The labels of points: of each, one run from rest, judged in stages; then the types, which rest on neighbours too."""
 
 from threading import Event
 from typing import Any
@@ -7,8 +7,9 @@ import numpy as np
 import pyarrow as pa
 
 from chaosgym.diagnosis import bounce_fraction, response_type
-from chaosgym.diagnosis.diagnose import diagnosed_run
+from chaosgym.diagnosis.diagnose import diagnose_alone
 from chaosgym.diagnosis.stroboscopic import irregularity
+from chaosgym.diagnosis.type_rule import CROSS, type_of_cross, types_on_grid
 from chaosgym.errors import DiagnosisError, ParameterError, SimulationError, UnfinishedError
 from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, simulate
@@ -23,12 +24,12 @@ RETRY = 8
 def label_point(machine: Machine, budget: int, *, signals: bool = False) -> dict[str, Any]:
     """Label one machine; a run that fails is a row with status "failed"."""
     try:
-        verdict, record = diagnosed_run(machine, budget=budget)
+        verdict = diagnose_alone(machine, budget=budget)
         if verdict.nature == "undetermined":
-            verdict, record = diagnosed_run(machine, budget=RETRY * budget)
+            verdict = diagnose_alone(machine, budget=RETRY * budget)
     except (DiagnosisError, SimulationError) as error:
         return {"status": "failed", "reason": str(error)}
-    judged = record.after(len(record) // 2)
+    judged = verdict.judged
     peaks = judged.peak_force[:, 0]
     exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
     label = {
@@ -51,7 +52,7 @@ def label_point(machine: Machine, budget: int, *, signals: bool = False) -> dict
         "cycles_used": verdict.evidence["cycles_used"],
         "reason": verdict.reason,
     }
-    kept = _signals(machine, record) if signals else {}
+    kept = _signals(machine, verdict.run) if signals else {}
     settled = kept.get("settled_peak_force", peaks[-WINDOW:])
     scatter = irregularity(settled)
     return {**label, **kept, "irregularity": scatter, "resolvable": scatter > SENSOR_ERROR}
@@ -109,3 +110,40 @@ def label_rows(plan: SweepPlan, rows: range, stop: Event | None = None) -> pa.Ta
             line |= {"machine": int(number), "split": part}
     described = schema(plan, {"rows": [rows.start, rows.stop], "provenance": provenance()})
     return pa.Table.from_pylist(lines, schema=described)
+
+
+def with_response_types(table: pa.Table, plan: SweepPlan, rows: range) -> pa.Table:
+    """Fill in the response types of some rows: a whole grid, whole crosses, or any other points.
+
+    That of a point follows from the points up to one tolerance beside it, along speed and clearance.
+    """
+    natures = np.array(table.column("nature").fill_null("undetermined").to_pylist())
+    largest = table.column("largest_peak").to_numpy(zero_copy_only=False)
+    if plan.sampling == "crosses":
+        crosses = zip(natures.reshape(-1, len(CROSS)), largest.reshape(-1, len(CROSS)), strict=True)
+        kinds = [kind for cross in crosses for kind in (type_of_cross(*cross)[0], *[None] * (len(CROSS) - 1))]
+        table = _with_column(table, "response_type", pa.array(kinds, pa.string()))
+        return _with_column(table, "type_neighbours", pa.array(plan.type_neighbours(rows), pa.int8()))
+    reach = plan.type_axes()
+    if not reach and plan.sampling == "grid":
+        return _with_column(table, "response_type", _without_neighbours(table))
+    if not reach:
+        return _with_column(table, "response_type", table.column("full_response_type").combine_chunks())
+    types = types_on_grid(
+        natures.reshape(plan.shape), largest.reshape(plan.shape), axes=list(reach), reach=list(reach.values())
+    )
+    table = _with_column(table, "response_type", pa.array(types.ravel().tolist(), pa.string()))
+    return _with_column(table, "type_neighbours", pa.array(plan.type_neighbours(rows), pa.int8()))
+
+
+def _without_neighbours(table: pa.Table) -> pa.Array:
+    """Types on a grid that is too coarse: III where not periodic, else that of runs of its own, or undetermined."""
+    types = []
+    for nature, full in zip(table["nature"].to_pylist(), table["full_response_type"].to_pylist(), strict=True):
+        types.append(full or ("III" if nature in ("chaotic", "quasiperiodic") else "undetermined"))
+    return pa.array(types, pa.string())
+
+
+def _with_column(table: pa.Table, name: str, values: pa.Array) -> pa.Table:
+    position = table.schema.get_field_index(name)
+    return table.set_column(position, table.schema.field(position), values)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.diagnosis import Diagnosis, default_tolerances
-from chaosgym.diagnosis.diagnose import diagnosed_run
+from chaosgym.diagnosis.diagnose import diagnose_alone
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE
 from chaosgym.errors import DatasetError, ParameterError, SimulationError
 from chaosgym.machines import Machine
@@ -77,15 +77,15 @@ def label_noise(
 def _changes(machine: Machine, budget: int, signs: dict[str, float]) -> dict[str, tuple[bool, bool]] | None:
     """By variant: whether the nature changed, and whether the largest peak of a periodic point moved."""
     try:
-        truth, record = diagnosed_run(machine, budget=budget)
+        truth = diagnose_alone(machine, budget=budget)
     except SimulationError:
         return None
-    reached, bouncing = record.final_state.coordinates, rest_state(machine).bouncing
+    reached, bouncing = truth.run.final_state.coordinates, rest_state(machine).bouncing
     variants: dict[str, Callable[[], Diagnosis]] = {}
 
     def add(name: str, other: Machine, start: NDArray[np.float64] | None = None, cycles: int = budget) -> None:
         state = None if start is None else MotionState(start, bouncing)
-        variants[name] = lambda: diagnosed_run(other, initial_state=state, budget=cycles)[0]
+        variants[name] = lambda: diagnose_alone(other, initial_state=state, budget=cycles)
 
     add("mirrored initial state", machine, -reached)
     add("half the initial state", machine, 0.5 * reached)
