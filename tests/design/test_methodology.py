@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from chaosgym.design import Criteria, assess, improve, variation_region
+from chaosgym.design.bearing import evaluate
 from chaosgym.design.fatigue import equivalent_force, rating_life
 from chaosgym.design.improve import change_cost, default_changes
-from chaosgym.design.methodology import evaluate, fit_trend
+from chaosgym.design.methodology import fit_trend
 from chaosgym.design.reliability import hertz_pressure, normal_reliability
 from chaosgym.design.runs import build_series, settled_run
 from chaosgym.diagnosis import Tolerance

@@ -21,20 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.diagnosis.lyapunov import BLOCKS, Deviation, LyapunovExponent, average_growth
-from chaosgym.diagnosis.matrix_update import (
-    FIELD,
-    depends_on_configuration,
-    matrix_update_test,
-    neighbouring_interval,
-)
+from chaosgym.diagnosis.matrix_update import FIELD, depends_on_configuration, matrix_update_test, neighbouring_interval
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
 from chaosgym.diagnosis.response import Diagnosis, Nature, Status
-from chaosgym.diagnosis.two_step import (
-    CHAOTIC_STATISTIC,
-    QUASIPERIODIC_CYCLES,
-    REGULAR_STATISTIC,
-    two_step_test,
-)
+from chaosgym.diagnosis.two_step import CHAOTIC_STATISTIC, QUASIPERIODIC_CYCLES, REGULAR_STATISTIC, two_step_test
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, MotionState, simulate
@@ -248,7 +238,6 @@ def approaches(machine: Machine, record: CycleRecord, orbit: PeriodicOrbit) -> b
 def _periodic(stage: _Stage) -> Diagnosis | None:
     """The verdict if the motion is known to be periodic in the end, else None."""
     verdict, orbit = stage.verdict, stage.orbit
-    transient = _was_chaotic(stage)
     if orbit is not None:
         reason = f"period {orbit.period} proven: miss {orbit.residual:.0e}, multiplier {orbit.largest_multiplier:.3g}"
         margin = 1.0 - orbit.largest_multiplier
@@ -258,23 +247,16 @@ def _periodic(stage: _Stage) -> Diagnosis | None:
         margin, status = verdict.margin, "agreed"
     else:
         return None
-    settle = verdict.settle_cycle if verdict.settle_cycle is not None else len(stage.record)
+    transient = _was_chaotic(stage)
     if transient:
-        return Diagnosis(
-            nature="chaotic",
-            period=orbit.period if orbit else verdict.period,
-            margin=margin,
-            transient=True,
-            status="transient",
-            settle_cycle=settle,
-            reason=f"transient chaos for {verdict.evidence['irregular_cycles']} cycles; then {reason}",
-        )
+        reason = f"transient chaos for {verdict.evidence['irregular_cycles']} cycles; then {reason}"
     return Diagnosis(
-        nature="periodic",
+        nature="chaotic" if transient else "periodic",
         period=orbit.period if orbit else verdict.period,
         margin=margin,
-        status=status,
-        settle_cycle=settle,
+        transient=transient,
+        status="transient" if transient else status,
+        settle_cycle=verdict.settle_cycle if verdict.settle_cycle is not None else len(stage.record),
         reason=reason,
     )
 
@@ -300,33 +282,18 @@ def _was_chaotic(stage: _Stage) -> bool:
 
 def _not_periodic(stage: _Stage) -> Diagnosis:
     verdict, exponent = stage.verdict, stage.exponent
-    shown = f"exponent {exponent.per_cycle:.3g} +- {exponent.standard_error:.2g} a cycle"
+    reason = f"exponent {exponent.per_cycle:.3g} +- {exponent.standard_error:.2g} a cycle; {verdict.reason}"
     if exponent.sign > 0 and verdict.settle_cycle is None:
         margin = float(np.clip(exponent.per_cycle / (3.0 * exponent.standard_error) - 1.0, 0.0, 1.0))
         status: Status = "agreed" if verdict.nature in ("chaotic", "undetermined") else "disputed"
-        return Diagnosis(
-            nature="chaotic", period=None, margin=margin, status=status, reason=f"{shown}; {verdict.reason}"
-        )
+        return Diagnosis(nature="chaotic", period=None, margin=margin, status=status, reason=reason)
     settled = len(stage.record) - len(stage.record) // 2
     if exponent.sign == 0 and verdict.nature == "quasiperiodic" and settled >= QUASIPERIODIC_CYCLES:
-        return Diagnosis(
-            nature="quasiperiodic",
-            period=None,
-            margin=verdict.margin,
-            status="agreed",
-            reason=f"{shown}; {verdict.reason}",
-        )
+        return Diagnosis(nature="quasiperiodic", period=None, margin=verdict.margin, status="agreed", reason=reason)
     if exponent.sign < 0 and verdict.nature == "periodic":
-        return Diagnosis(
-            nature="periodic", period=verdict.period, margin=0.0, status="agreed", reason=f"{shown}; {verdict.reason}"
-        )
-    return Diagnosis(
-        nature="undetermined",
-        period=None,
-        margin=0.0,
-        status="unresolved",
-        reason=f"not settled after {len(stage.record)} cycles: {shown}; {verdict.reason}",
-    )
+        return Diagnosis(nature="periodic", period=verdict.period, margin=0.0, status="agreed", reason=reason)
+    reason = f"not settled after {len(stage.record)} cycles: {reason}"
+    return Diagnosis(nature="undetermined", period=None, margin=0.0, status="unresolved", reason=reason)
 
 
 def _votes(stage: _Stage) -> dict[str, Nature]:

@@ -2,6 +2,8 @@
 
 A subclass of ``ModalImpactMachine`` has the fields of a machine and returns its model from ``reduce``, made by
 ``flexible_model`` or ``rigid_model`` of its modal data.
+
+The file is long because it is all that a new machine of this kind imports.
 """
 
 import math

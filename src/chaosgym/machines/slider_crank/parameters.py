@@ -13,6 +13,8 @@ Gravity is off by default. With the mechanism's plane upright, the slider's weig
 therefore says which gravity it has. What makes impacts of the printed size under gravity is pitch: an instrumented
 slider joint whose slider has its centre of gravity about 30 mm off the guide.
 
+The file is long because half of it is the table of fields, each with its range, its provenance and its source.
+
 References
 ----------
 P. Gu, Chaotic Vibration in Machine Systems and Its Implications for Design, PhD thesis, MIT, 1994, chapter 4.
