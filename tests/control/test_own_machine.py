@@ -119,7 +119,7 @@ def _scores(following, own, mine):
 def test_calm_machines_have_no_score_and_do_not_spoil_that_of_others():
     """Where the own map gains nothing there is no scale; draws of calm machines alone are left out of the interval."""
     calm = np.array([-3.0, -4.0, -5.0])
-    with pytest.raises(ParameterError, match="there is no score.*earns what 'follow the demand' does, -4.00"):
+    with pytest.raises(ParameterError, match=r"there is no score.*earns what 'follow the demand' does, -4.00"):
         _scores(calm, calm, calm + 1.0).row("mine")
     following = np.array([-3.0, -3.0, -9.0])
     row = _scores(following, np.array([-3.0, -3.0, -5.0]), np.array([-3.0, -3.0, -7.0])).row("mine")

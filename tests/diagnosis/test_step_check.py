@@ -34,7 +34,7 @@ def test_a_coarse_fixed_step_makes_chaos_of_a_periodic_response_and_is_found_out
 
 
 def test_two_coarse_steps_that_are_wrong_alike_confirm_nothing():
-    """The standard beam at 19 Hz has period 1; 2000 and 4000 steps both call it chaotic, but by exponents of 1.6 and 0.2."""
+    """The standard beam at 19 Hz has period 1; 2000 and 4000 steps call it chaotic, by exponents of 1.6 and 0.2."""
     check = step_check(ImpactBeam(excitation_frequency=19.0), budget=400, integrator=RungeKutta4(2000))
     assert check.given.nature == "chaotic"
     assert (check.finer.nature, check.finer.period, check.finer.status) == ("periodic", 1, "certified")

@@ -1,8 +1,8 @@
 """Compilation of kernels: once on a computer, however many processes need them.
 
 The first call of a kernel in a process loads its machine code from the disk, or compiles it, which takes seconds, and
-keeps it there. A lock lets one process compile while others that need a kernel not there yet wait and then load it; what
-is there already is loaded without the lock. A message says what takes so long.
+keeps it there. A lock lets one process compile while others that need a kernel not there yet wait and then load it;
+what is there already is loaded without the lock. A message says what takes so long.
 
 The machine code has a checksum beside it: a damaged file is compiled anew. Machine code, numba's index of it and
 checksums change under the lock alone. So a reader without the lock that finds them in disagreement can have met a
@@ -70,7 +70,7 @@ class _NotCachedError(Exception):
     """A kernel is about to be compiled."""
 
 
-class _Refusal(event.Listener):
+class _Refusal(event.Listener):  # type: ignore[misc] # numba has no types
     """Keeps numba from compiling in this thread: it may only load."""
 
     def __init__(self) -> None:

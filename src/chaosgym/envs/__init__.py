@@ -70,7 +70,8 @@ def environment(env: str) -> EnvSpec:
         return replace(tolerance, kwargs={**tolerance.kwargs, "machine": env})
     found = registry.get(env)  # gymnasium.spec would import the module of an id like "module:name"
     if found is None or found.entry_point != _ENTRY_POINT:
-        known = [name for name, spec in registry.items() if spec.entry_point == _ENTRY_POINT and "machine" in spec.kwargs]
+        ours = {name: spec for name, spec in registry.items() if spec.entry_point == _ENTRY_POINT}
+        known = [name for name, spec in ours.items() if "machine" in spec.kwargs]
         raise ParameterError(f"env = {env!r} is unknown; known: {', '.join(known)}, or a file my-machine.toml")
     return found
 
