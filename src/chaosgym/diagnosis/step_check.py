@@ -4,7 +4,7 @@ Touch and release that are placed wrongly by a fraction of a step add or remove 
 periodic responses into chaos and the reverse. A verdict that a finer step changes is no verdict.
 
 Two steps may be wrong alike: both call a periodic motion chaotic. Chaos of the step shrinks with it, that of the
-machine does not. So the step is refined until two successive steps agree in nature, period and, where chaotic, exponent.
+machine does not. So the step is refined until two successive steps agree in nature, period and exponent of chaos.
 """
 
 from dataclasses import dataclass
