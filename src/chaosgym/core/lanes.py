@@ -8,6 +8,8 @@ Operations take arrays of one dimension, contiguous, each followed by the place 
 array of more dimensions costs a kernel's compilation three numbers a dimension wherever it is handed on. Coordinates u
 are (2 lanes + 2 harmonics, rounded up to a multiple of 8): the first and the second coordinate of each block, padded to
 ``lanes``, then cosine and sine of each harmonic of the drive.
+
+The file is long because it is a list: an operation for every shape of operands that a kernel has.
 """
 
 from collections.abc import Callable

@@ -2,6 +2,8 @@
 
 Modal coordinates u (W,) are those of ``lanes``: first and second coordinate of each block, then the drive's harmonics.
 All that a run reads lies in two arrays of numbers and one of places in them.
+
+The file is long because whoever writes these arrays and whoever reads them must agree on every place.
 """
 
 import math

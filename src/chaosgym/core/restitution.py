@@ -13,6 +13,8 @@ surface; as soon as all that are left would be over within ``CHATTER_PHASE``, th
 A force that takes no time has no size. What stands in the records is the largest force of the compliant contact from
 which e was derived: ``force_per_speed`` times the speed before; while the tip rests, it is the force that holds it.
 
+The file is long because flight, bounce and rest share one state, and no other machine has any of the three.
+
 References
 ----------
 A. B. Nordmark, P. T. Piiroinen, Simulation and stability analysis of impacting systems with complete chattering,

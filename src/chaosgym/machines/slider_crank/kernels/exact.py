@@ -12,6 +12,9 @@ propagated exactly (``propagator``).
 A step is taken if it is proven by both ends that no contact changes (``contact``) and that no force exceeds the peak
 of the revolution between them. Otherwise a shorter one is tried, and a tick is expanded in its Taylor series, on which
 events and crests are found. Recording only reads: a time history does not change the motion by a bit.
+
+The file is long because these kernels call one another in a ring of state that only they know: where the motion is,
+which step was proven, and what is left of the bin.
 """
 
 from typing import NamedTuple

@@ -12,6 +12,8 @@ with no other error.
 Steps are halves of halves of a bin. The propagator of the shortest, a tick, is the series for all columns of z at
 once; squared again and again it is that of longer steps, of which every second is kept: a ladder of ``RUNGS`` steps,
 each four times as long as the next.
+
+The file is long because the tables, their layout in memory and the bounds of what they leave out go together.
 """
 
 import math

@@ -10,6 +10,8 @@ pushes along e / |e| with a force N of penetration x = |e| - c:
 as long as x and N are positive. The classical Runge-Kutta method steps from change to change of contact: which joints
 push is fixed within a step, and the instant of a change is found by repeating the step with the right length. Matrices
 are held over each bin of crank angle, the forcing is continuous.
+
+The file is long because it is a whole second way to run the machine, from the force of a joint to the revolution.
 """
 
 import math
