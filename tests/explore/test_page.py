@@ -4,12 +4,14 @@ import json
 import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 from urllib.parse import urlparse
 
 import pytest
 
 pytest.importorskip("bokeh")
 
+from chaosgym.machines.modal_machine.file import template
 from tests.browser import CHROMIUM, Browser
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
@@ -33,15 +35,24 @@ def deep(expression):
 HEADLINE = deep("all(document, 'h2').map(node => node.textContent).join()")
 
 
+@contextmanager
+def served(*arguments):
+    """Address of a page that the command serves."""
+    command = [sys.executable, "-m", "chaosgym", "explore", *arguments, "--port", "0", "--no-browser", "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        try:
+            yield json.loads(server.stdout.readline())["address"]
+        finally:
+            server.send_signal(signal.SIGINT)
+        assert server.wait(60) == 130
+
+
 @pytest.fixture(scope="module")
 def address():
-    """Address of a page at 19 Hz that the command serves."""
-    command = [sys.executable, "-m", "chaosgym", "explore", "impact-beam", "--frequency-hz", "19", "--port", "0"]
-    with subprocess.Popen([*command, "--no-browser", "--json"], stdout=subprocess.PIPE, text=True) as server:
-        assert server.stdout is not None
-        yield json.loads(server.stdout.readline())["address"]
-        server.send_signal(signal.SIGINT)
-        assert server.wait(60) == 130
+    """Address of a page of the beam at 19 Hz."""
+    with served("impact-beam", "--frequency-hz", "19") as address:
+        yield address
 
 
 @pytest.fixture(scope="module")
@@ -92,6 +103,20 @@ def test_an_agent_plays_its_job(address, browser):
     told = deep("all(document, 'div').map(node => node.textContent).find(text => /^step [3-9] of 120/.test(text))")
     assert "Hz" in browser.wait(told, 240.0)
     check(browser.seen())
+
+
+def test_the_file_of_a_machine_is_dragged_too(browser, tmp_path):
+    """The template has period 2 at 14 Hz and period 1 at 17 Hz; its file is in the address, and no agent plays it."""
+    path = tmp_path / "my-machine.toml"
+    path.write_text(template())
+    with served(str(path)) as address:
+        browser.visit(address, width=1400)
+        assert browser.wait(f"{HEADLINE}.includes('periodic, period 2 (certified)')")
+        browser.drag(browser.value(deep("middle(all(document, '.noUi-handle')[0])")), 60.0)
+        assert browser.wait(f"{HEADLINE}.includes('periodic, period 1 (certified)')")
+        assert browser.wait("location.search.includes('my-machine.toml&speed=17')")
+        assert browser.value("Bokeh.documents[0].get_model_by_name('play').visible") is False
+        check(browser.seen())
 
 
 def test_a_link_that_says_nonsense_is_answered_in_words(address, browser):

@@ -245,7 +245,7 @@ BAD = {
     "a drive nowhere": ([('at = "motor"', 'at = "moter"')], "no point 'moter'; did you mean motor"),
     "a drive at rest": ([('"0.96, 2.02, -0.05', '"0, 0, 0')], "moves no mode"),
     "a drive of two kinds": ([('# unbalance = "20', 'unbalance = "20')], "force and unbalance"),
-    "frequencies of 1e6 Hz": ([('"8.7, 54.6, 153 Hz"', '"8.7, 54.6, 1e6 Hz"')], "1e+06 Hz are out of range"),
+    "frequencies of 1e6 Hz": ([('"8.7, 54.6, 153 Hz"', '"8.7, 54.6, 1e6 Hz"')], 'units = "t mm N"'),
     "shapes of size one": (
         [('"2.83, -2.79, 2.71', '"1, -1, 1'), ('"0.96, 2.02, -0.05', '"0.3, 0.7, 0')], "not mass-normalised"),
     "a reversed range": ([('"6 to 24 Hz"', '"24 to 6 Hz"')], "speed_range is no range"),

@@ -28,7 +28,7 @@ BASE = "base"
 HIGHEST = 1e5
 """Highest natural frequency [Hz] that a machine with clearance is believed to have."""
 
-CURED = 'a unit is likely wrong (a model in mm, t and N? then units = "mm t N")'
+CURED = 'a unit is likely wrong (a model in mm, t and N? then units = "t mm N")'
 
 
 @dataclass(frozen=True, eq=False)
