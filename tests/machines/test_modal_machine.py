@@ -9,6 +9,7 @@ import jsonschema
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from matplotlib.figure import Figure
 from scipy.io import mmwrite
 from scipy.sparse import csc_matrix
 
@@ -19,6 +20,7 @@ from chaosgym.errors import ChaosgymError, ParameterError
 from chaosgym.machines.beam_element import bending_matrices
 from chaosgym.machines.impact_beam.modes import modal_analysis
 from chaosgym.machines.modal_machine.file import schema_text, template
+from chaosgym.plotting import response
 
 FIELDS = ("section", "peak_force", "impacts", "contact_fraction", "bounce_duration")
 
@@ -165,6 +167,17 @@ def test_one_stop_is_one_sided():
     turned = one_mode(stops="one", drives=(Drive.sine("force", "x", 5.0, angle=math.pi),))
     mirrored = ModalMachine(**{**vars(turned), "joint": "-x"})
     np.testing.assert_allclose(simulate(mirrored, 20).peak_force, record.peak_force[:20], rtol=1e-6)
+
+
+def test_pictures_show_the_stops_that_there_are():
+    """One stop is one shaded ground, from the stop on; an offset moves both of two."""
+    lower, upper = one_mode(stops="one").room
+    assert lower == -math.inf
+    assert upper == one_mode().clearance
+    moved = one_mode(offset=1e-4)
+    assert moved.room == (1e-4 - moved.clearance, 1e-4 + moved.clearance)
+    for machine, number in ((one_mode(stops="one"), 1), (moved, 2)):
+        assert len(response.stops(machine.room, Figure().subplots()).patches) == number
 
 
 def test_an_offset_gap_with_different_stops_agrees_with_fixed_steps():

@@ -121,14 +121,14 @@ class Dashboard:
     def draw(self, record: CycleRecord) -> Frame | None:
         """Draw the last step, given with its time history; return (height, width, 3), or None for a window."""
         samples, colour = samples_of(record), WILD if self._wild and self._wild[-1] else CALM
-        gap = 1e3 * record.machine.room
-        self._make_room(samples, gap)
+        room = 1e3 * np.array(record.machine.room)
+        self._make_room(samples, room)
         self._picture_machine(record, colour)
         if self._background is None:
             self._draw_background()
         self._canvas.restore_region(self._background)
         self._update_title(record, colour)
-        self._update_portrait(record, samples, gap, colour)
+        self._update_portrait(record, samples, room, colour)
         self._update_force(samples, len(record), colour)
         self._update_job()
         for panel, artists in self._artists.items():
@@ -202,10 +202,12 @@ class Dashboard:
         for artist in (self._title, *(one for several in self._artists.values() for one in several)):
             artist.set_animated(True)
 
-    def _make_room(self, samples: Array, gap: float) -> None:
+    def _make_room(self, samples: Array, room: Array) -> None:
         """Let the axes grow where something has left them; the ground is then drawn anew."""
         reached = {
-            "displacement": max(1.1 * gap, 1e3 * float(np.abs(samples[:, 0]).max())),
+            "displacement": max(
+                1.1 * float(np.abs(room[np.isfinite(room)]).max()), 1e3 * float(np.abs(samples[:, 0]).max())
+            ),
             "velocity": float(np.abs(samples[:, 1]).max()),
             "force": max(self._task.load_rating, float(np.abs(samples[:, 2]).max()), *self._peaks[-1:]),
         }
@@ -260,10 +262,12 @@ class Dashboard:
             text=f"{speed:.2f} {self._unit}    {done} of {self._task.job_cycles} cycles    {verdict}", color=colour
         )
 
-    def _update_portrait(self, record: CycleRecord, samples: Array, gap: float, colour: str) -> None:
+    def _update_portrait(self, record: CycleRecord, samples: Array, room: Array, colour: str) -> None:
         up = self._limits["velocity"]
-        for stop, sign in zip(self._stops, (1.0, -1.0), strict=True):
-            stop.set(x=sign * gap, y=-up, width=sign * self._limits["displacement"], height=2.0 * up)
+        for stop, sign, place in zip(self._stops, (-1.0, 1.0), room.tolist(), strict=True):
+            stop.set_visible(np.isfinite(place))
+            if np.isfinite(place):
+                stop.set(x=place, y=-up, width=sign * 2.0 * self._limits["displacement"], height=2.0 * up)
         self._path.set_data(1e3 * samples[:, 0], samples[:, 1])
         self._path.set_color(colour)
         self._strobes.set_data(1e3 * record.displacement, record.velocity)

@@ -1,5 +1,6 @@
 """The page: sliders, five pictures that follow them, the verdict, and the point as link, Python and command."""
 
+import math
 from html import escape
 from typing import Any
 
@@ -151,10 +152,9 @@ class Page:
         }
         self._sources["section"].data = {"x": 1e3 * view.section[:, 0], "v": view.section[:, 1]}
         self._sources["peaks"].data = {"n": np.arange(1, len(view.peaks) + 1), "peak": view.peaks}
-        for box, (field, sign) in zip(
-            self._stops, (("bottom", 1.0), ("top", -1.0), ("left", 1.0), ("right", -1.0)), strict=True
-        ):
-            box.update(**{field: sign * 1e3 * view.room})
+        for box, (field, side) in zip(self._stops, (("bottom", 1), ("top", 0), ("left", 1), ("right", 0)), strict=True):
+            place = view.room[side]
+            box.update(**{field: 1e3 * place if math.isfinite(place) else None}, visible=math.isfinite(place))
 
     def _start_diagram(self) -> None:
         """Begin the orbit diagram anew; it fills while the page stays alive to the sliders."""

@@ -55,7 +55,7 @@ class View:
     peaks : (cycles,)
         Peak forces [N] of the settled cycles, first side.
     room
-        How far [m] the gap lets the displacement go.
+        Displacement [m] at the lower and the upper stop.
     nature
         Of the verdict; "undetermined" where the motion could not be followed.
     headline, lines
@@ -68,7 +68,7 @@ class View:
     force: Array
     section: Array
     peaks: Array
-    room: float
+    room: tuple[float, float]
     nature: str
     headline: str
     lines: tuple[str, ...]

@@ -211,9 +211,10 @@ class Machine(FidelityLadder, ABC):
         return other
 
     @property
-    def room(self) -> float:
-        """How far [m] the gap lets the displacement of the monitored joint go to either side."""
-        return float(getattr(self, self.clearance_field))
+    def room(self) -> tuple[float, float]:
+        """Displacement [m] of the monitored joint at its lower and its upper stop, infinite where there is none."""
+        gap = float(getattr(self, self.clearance_field))
+        return -gap, gap
 
     def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
         """Draw the machine in motion.

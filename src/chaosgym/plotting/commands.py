@@ -5,6 +5,7 @@ Figures are as wide as a column of a journal takes at 80 % (4.4 in), so that the
 
 from collections.abc import Callable, Sequence
 from functools import wraps
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -46,12 +47,13 @@ def _styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
 
 def point_of(machine: Machine) -> str:
     """Name and operating point of a machine, for a title."""
-    shown = []
+    lower, upper = machine.room
+    shown, gap = [], "±" if lower == -upper else "gap "
     for name in (machine.speed_field, machine.clearance_field):
         label, factor = axis_label(machine, name)
-        sign = "±" if name == machine.clearance_field else ""
+        sign = gap if name == machine.clearance_field else ""
         shown.append(f"{sign}{factor * getattr(machine, name):.4g} {label.rpartition('[')[2].rstrip(']')}")
-    return f"{machine.name}, {', '.join(shown)}"
+    return f"{Path(machine.name).stem}, {', '.join(shown)}"
 
 
 def _followed(record: CycleRecord, cycles: int) -> CycleRecord:

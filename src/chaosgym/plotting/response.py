@@ -38,13 +38,14 @@ def _plane_labels(ax: Axes) -> Axes:
     return ax
 
 
-def stops(room: float, ax: Axes, *, vertical: bool = False) -> Axes:
-    """The two stops at +-room [m], as shaded ground in mm, across the axis of the displacement."""
+def stops(room: tuple[float, float], ax: Axes, *, vertical: bool = False) -> Axes:
+    """The lower and the upper stop [m], as shaded ground in mm, across the axis of the displacement."""
     ends = ax.get_ylim() if vertical else ax.get_xlim()
-    reach = max(1.15e3 * room, 1.02 * float(np.max(np.abs(ends))))
+    places = [(sign, 1e3 * place) for sign, place in zip((-1.0, 1.0), room, strict=True) if np.isfinite(place)]
+    reach = max(1.02 * float(np.max(np.abs(ends))), *(1.15 * abs(place) for _, place in places))
     span = ax.axhspan if vertical else ax.axvspan
-    for sign in (-1.0, 1.0):
-        span(sign * 1e3 * room, sign * 2.0 * reach, color=PALE, lw=0, zorder=0)
+    for sign, place in places:
+        span(place, sign * 2.0 * reach, color=PALE, lw=0, zorder=0)
     (ax.set_ylim if vertical else ax.set_xlim)(-reach, reach)
     return ax
 

@@ -108,6 +108,12 @@ class ModalMachine(ModalImpactMachine):
         """Model at no speed and no gap; machines that differ in these and in the level of the drive share it."""
         return _structure(self._with_unchecked(speed=1.0, clearance=0.0, offset=0.0, drive_level=1.0))
 
+    @property
+    def room(self) -> tuple[float, float]:
+        """Displacement [m] of the joint at its lower and its upper stop; with one stop there is no lower one."""
+        upper, lower = self.stops_at(self.clearance).tolist()
+        return lower, upper
+
     def stops_at(self, clearance: Any) -> Array:
         """Positions of the upper and the lower stop [m] at a clearance, (2,), or at many, (k, 2)."""
         gap = np.asarray(clearance, dtype=float)

@@ -427,10 +427,11 @@ class SliderCrank(Machine):
         return running.further_results(self, arrays)
 
     @property
-    def room(self) -> float:
+    def room(self) -> tuple[float, float]:
         """How far [m] the gap lets the displacement go: a ball among tetrahedral sensors, further than half of it."""
         sensors = self.monitored_joint == "ball" and self.ball_joint == "instrumented"
-        return float(getattr(self, self.clearance_field)) * (math.sqrt(3.0) if sensors else 1.0)
+        gap = float(getattr(self, self.clearance_field)) * (math.sqrt(3.0) if sensors else 1.0)
+        return -gap, gap
 
     def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
         """Draw crank, rod and slider; see ``Machine.draw``."""

@@ -73,7 +73,7 @@ def draw_crank(panel: Any, record: Any, colour: str, moment: float, force_limit:
         panel.plot(*places.slider[last].T, color=colour, linewidth=1.0)
     else:
         rod_end = rod_end + _across_rod(places, now) * samples[now, 0] / clearance * BALL_GAP
-        _draw_circle(panel, rod_end, BALL + BALL_GAP * machine.room / clearance)
+        _draw_circle(panel, rod_end, BALL + BALL_GAP * machine.room[1] / clearance)
         _draw_circle(panel, places.pin[now], BALL)
     _draw_links(panel, places.pin[now], rod_end, places.slider[now])
     degrees = math.degrees(angle[now])
