@@ -1,4 +1,4 @@
-"""What the thesis saw on the slider crank: printed forces and natures of responses, hits and documented misses."""
+"""What the thesis saw, on the library's crank: printed forces and natures of responses, hits and documented misses."""
 
 from dataclasses import replace
 

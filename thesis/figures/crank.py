@@ -8,6 +8,7 @@ from chaosgym.machines import THESIS_SLIDER_CRANK, SliderCrank
 from thesis.figures.computations import Runs
 from thesis.figures.panels import ParameterAxis
 from thesis.scorecard.observation import THOROUGH
+from thesis.statements import read_comparisons
 
 GRAVITY = 9.81
 """The ball joint needs it, the slider joint must do without (see ``machines.slider_crank``) [m/s^2]."""
@@ -17,6 +18,9 @@ SMALL, MIDDLE, WIDE, LARGE = 0.03175e-3, 0.0635e-3, 0.127e-3, 0.254e-3
 
 LOW_DAMPING, HIGH_DAMPING = 0.025, 0.05
 """Contact damping ratios (4.5.4)."""
+
+SECTION_4_4_DAMPING = read_comparisons().unprinted["damping_of_section_4_4"].value
+"""Contact damping ratio of figures 4.11 to 4.13, which is not in print: fitted, as for the scorecard."""
 
 TRANSIENT, CYCLES, *_ = THOROUGH["slider-crank"]
 """Revolutions in which a response settles, and those shown of it (4.4.1): as for the scorecard."""

@@ -16,6 +16,7 @@ from thesis.figures.crank import (
     LARGE,
     LOW_DAMPING,
     MIDDLE,
+    SECTION_4_4_DAMPING,
     SMALL,
     TRANSIENT,
     WIDE,
@@ -159,7 +160,7 @@ SLIDER_CLOUD = ThesisFigure(
 
 def life_sweep(resolution: float) -> Mapping[str, Computation]:
     """Peak forces over the speed, as in figure 4.13."""
-    machine = slider(SMALL, contact_damping_ratio=LOW_DAMPING)
+    machine = slider(SMALL, contact_damping_ratio=SECTION_4_4_DAMPING)
     return {"slider": sweep(machine, "crank_speed", steps(100.0, 300.0, 10.0 / max(1, round(resolution))))}
 
 
