@@ -41,7 +41,7 @@ def test_a_scale_is_firm_and_a_wrong_nature_is_not(monkeypatch):
     frequency = COMPARED["IBS-034"]
     loose = replace(frequency, tolerance=frequency.tolerance._replace(relative=0.02))
     asked = (loose, replace(COMPARED["IBS-013"], printed="odd"))
-    monkeypatch.setattr(firmness, "statements_of", lambda name: asked)
+    monkeypatch.setattr(firmness, "statements_of", lambda name, joint: asked)
     assert neighbour_shares(PLAIN_BEAM, 3, workers=1) == {"IBS-034": 1.0, "IBS-013": 0.0}
 
 

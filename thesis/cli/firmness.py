@@ -15,10 +15,17 @@ from chaosgym.cli.output import emit
 @click.option(
     "--left-out", type=click.Path(file_okay=False, exists=True), multiple=True, help="Search with a figure left out."
 )
+@click.option("--joint", type=click.Choice(["slider", "ball"]), help="Only the crank's statements about one joint.")
 @click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def firmness(
-    machine: str, neighbours: int, search: str | None, left_out: tuple[str, ...], workers: int | None, as_json: bool
+    machine: str,
+    neighbours: int,
+    search: str | None,
+    left_out: tuple[str, ...],
+    joint: str | None,
+    workers: int | None,
+    as_json: bool,
 ) -> None:
     """Judge neighbours of a machine and write thesis/scorecard/firmness.json, which the scorecard shows."""
     from thesis.scorecard.evaluation import THESIS_MACHINES
@@ -28,7 +35,7 @@ def firmness(
     one = THESIS_MACHINES[machine]
     pairs = exclusive_pairs(complete_costs(Path(search))) if search else ()
     hits = left_out_hits([Path(folder) for folder in left_out])
-    shares = neighbour_shares(one, neighbours, workers=workers, progress=True)
+    shares = neighbour_shares(one, neighbours, joint=joint, workers=workers, progress=True)
     keep(one, Firmness(shares, neighbours, pairs, hits))
     result: dict[str, Any] = {"machine": machine, "count": neighbours, "neighbours": shares, "exclusive": pairs}
     result["left_out"] = {"hit": hits[0], "total": hits[1]}

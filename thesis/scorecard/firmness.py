@@ -47,7 +47,7 @@ class Firmness:
     Attributes
     ----------
     neighbours
-        Share of the neighbours that hit, by statement.
+        Share of the neighbours that hit, by statement; of those statements that were asked.
     count
         Number of neighbours.
     exclusive
@@ -98,10 +98,19 @@ def keep(machine: Machine, found: Firmness) -> None:
 
 
 def neighbour_shares(
-    machine: Machine, count: int, *, seed: int = 0, workers: int | None = None, progress: bool = False
+    machine: Machine,
+    count: int,
+    *,
+    joint: str | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: bool = False,
 ) -> dict[str, float]:
-    """Share of the neighbours of a machine that hit each statement; contradictory ones are left out."""
-    asked = statements_of(machine.name)
+    """Share of the neighbours of a machine that hit each statement; contradictory ones are left out.
+
+    Of statements with clearance in one ``joint``, "slider" or "ball", if it is named.
+    """
+    asked = statements_of(machine.name, joint)
     hits = {one.id: 0 for one in asked}
     effort = QUICK[machine.name]
     for k in tqdm(range(count), desc="neighbours", disable=not progress, unit="machine"):

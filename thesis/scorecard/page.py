@@ -16,6 +16,7 @@ impact force on one side of the bearing, and of the crank's joints the resultant
 A calibration is shown every statement, so the bare number of hits says little about the next one. Beside it stands the
 share of neighbours that hit it: the machine with every constant that is not in print up to 1 % off, at speeds up to
 half a step of the printed grid off, from another initial state. What few neighbours hit is luck, in either direction.
+What was tried, and which statements stand in each other's way: [calibration](calibration.md).
 """
 
 
@@ -43,10 +44,13 @@ def _firm(card: Scorecard, machine: str) -> str:
     known, totals = card.firmness.get(machine), card.totals()[machine]
     if known is None:
         return "How firm they are is not known for these constants: `python -m thesis firmness`."
-    said = [f"Of a neighbour {totals['expected']:.1f} hits are to be expected, by {known.count} of them."]
+    hits = f"{totals['expected']:.1f} hits of {len(known.neighbours)}"
+    said = [f"Of a neighbour {hits} are to be expected, by {known.count} of them."]
     left_out = totals["left_out"]
     if left_out["total"]:
         said.append(f"Left out of the fit by figure: {left_out['hit']} of {left_out['total']}.")
+    else:
+        said.append("No search has left a figure out.")
     if known.exclusive:
         pairs = ", ".join(f"{one} with {other}" for one, other in known.exclusive)
         said.append(f"Hardly any candidate of the search hits both of these: {pairs}.")

@@ -30,8 +30,8 @@ class Scorecard:
         """Return {machine: {"all": {hit, near, miss, contradictory, total}, "groups": {group: the same}, ...}}.
 
         Further "left_out": {hit, total} of statements whose figure a search did not see, "expected": hits to expect of
-        a neighbour, or None, and "exclusive": pairs of statements that exclude each other. What is not computed counts
-        in the total alone, so it is no hit.
+        a neighbour, among the statements that were asked of it, or None, and "exclusive": pairs of statements that
+        exclude each other. What is not computed counts in the total alone, so it is no hit.
         """
         found: dict[str, dict[str, Counter[str]]] = {}
         for one in self.judged:
