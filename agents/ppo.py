@@ -42,6 +42,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--steps", type=int, default=300_000)
     parser.add_argument("--out", type=Path, default=Path("runs/ppo"))
     parser.add_argument("--start", type=Path, default=None, help="Run folder whose policy this training begins with.")
+    parser.add_argument("--fidelity", default=None, help="Rung of the machines in training; default: the task's.")
     parser.add_argument("--envs", type=int, default=64)
     parser.add_argument("--every", type=int, default=10_000, help="Steps between rows and checkpoints.")
     parser.add_argument("--rollout", type=int, default=60)
@@ -115,7 +116,8 @@ def main() -> None:
 
 def environments(env: str, asked: argparse.Namespace) -> VecNormalize:
     """Machines side by side, with a memory of visited speeds, normalised."""
-    return VecNormalize(SB3VisitedSpeeds(VecMonitor(SB3VecEnv(env, asked.envs))), gamma=asked.gamma)
+    native = VecMonitor(SB3VecEnv(env, asked.envs, fidelity=asked.fidelity))
+    return VecNormalize(SB3VisitedSpeeds(native), gamma=asked.gamma)
 
 
 def take_over(model: PPO, envs: VecNormalize, asked: argparse.Namespace) -> None:
