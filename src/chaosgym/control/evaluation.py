@@ -158,12 +158,13 @@ def evaluate(
     progress
         Show progress bars on standard error.
     keywords
-        Of the environment. The scale of the default ones is shipped; that of others is computed first, in minutes.
+        Of the environment. The scale of the default ones is shipped for the beam's tolerances, and for fewer machines
+        of other ids; any other scale is computed first, in minutes.
     """
     runs = policy_of(policy, **keywords)
     played = play(runs, env, range(machines), progress=NAME if progress else None, **keywords)
     scale = None if keywords else shipped_comparison(env)
-    if scale is None:
+    if scale is None or pa.compute.max(scale["machine"]).as_py() < machines - 1:
         makers = Contenders(env, range(machines), keywords, progress).makers()
         scale = pa.concat_tables(
             [job_rows(name, "", 0, play(makers[name](), env, range(machines), **keywords), env) for name in (ZERO, ONE)]
