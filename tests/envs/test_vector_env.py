@@ -2,6 +2,8 @@
 
 import pickle
 import re
+import subprocess
+import sys
 from typing import Any
 
 import gymnasium as gym
@@ -176,6 +178,27 @@ def test_sub_environments_can_be_asked() -> None:
     assert envs.get_attr("task")[1].highest_speed == 30.0
     with pytest.raises(AttributeError, match="no attribute 'sped'; known: speed"):
         envs.get_attr("sped")
+
+
+def test_a_copy_in_another_process_goes_on_alike() -> None:
+    """A pickled vector of cranks holds no address: where the process that made it has ended, it steps as it would have.
+
+    That is how a training run goes on from its checkpoint.
+    """
+    envs: Any = gym.make_vec(CRANK, num_envs=2, fidelity="draft").unwrapped
+    envs.reset(seed=3)
+    actions = np.array([1, 0])
+    script = (
+        "import pickle, sys, chaosgym; envs = pickle.load(sys.stdin.buffer);"
+        "sys.stdout.buffer.write(pickle.dumps([envs.step(actions)[:2] for actions in pickle.load(sys.stdin.buffer)]))"
+    )
+    sent = pickle.dumps(envs) + pickle.dumps([actions, actions])
+    done = subprocess.run([sys.executable, "-c", script], input=sent, capture_output=True, check=True)
+    for (there, reward_there), (here, reward, *_) in zip(
+        pickle.loads(done.stdout), (envs.step(actions), envs.step(actions)), strict=True
+    ):
+        np.testing.assert_array_equal(there, here)
+        np.testing.assert_array_equal(reward_there, reward)
 
 
 def test_the_spec_makes_the_same_environment_again() -> None:

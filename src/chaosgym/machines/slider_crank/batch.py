@@ -33,6 +33,19 @@ class CrankBatch(CompiledBatch):
         # the tables live as long as the batch holds their addresses
         self._kept: list[KeptModel | None] = [None] * count
 
+    def __getstate__(self) -> dict[str, Any]:
+        """State without models: addresses mean nothing in another process."""
+        return {name: value for name, value in vars(self).items() if name not in ("_models", "_kept")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take over a state, and look the models up anew."""
+        vars(self).update(state)
+        self._models = [models_by_speed(machine) for machine in self._machines]
+        self._kept = [None] * len(self._machines)
+        started, speeds = np.flatnonzero(np.isfinite(self._speeds)), self._speeds.copy()
+        self._speeds[:] = np.nan
+        self.set_speeds(started, speeds[started])
+
     def change(self, i: int, machine: Any) -> None:
         """Put another machine into place i, whose motion goes on."""
         put(self._batch, i, machine.reduce()._replace(**dict.fromkeys(TABLES, 0)))
