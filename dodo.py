@@ -24,10 +24,17 @@ SWEEPS = {
     "--axis friction_coefficient=0:0.1 --axis crank_speed=50:300 --axis slider_clearance=1.6e-05:0.0003:log "
     "--crosses 1500 --seed 1 --budget 200",
 }
+LARGE = "--units 128 --batch 1920 --rollout 120"
+START = f"python agents/ppo.py --env chaosgym/ImpactBeamTolerance-v1 --seed 1 --steps 900000 {LARGE} --out {RUNS}/start"
 POLICIES = {
-    "ImpactBeamTolerance-v1": "python agents/ppo.py --env chaosgym/ImpactBeamTolerance-v1 --seed 0 --steps 900000 "
-    "--units 128 --batch 1920 --rollout 120",
+    "ImpactBeamTolerance-v1": [f"python agents/ppo.py --seed 0 --steps 900000 {LARGE}"],
+    "ImpactBeamWear-v1": [
+        START,
+        f"python agents/ppo.py --start {RUNS}/start --seed 0 --steps 300000 {LARGE} --learning-rate 5e-4",
+    ],
 }
+"""Commands of the shipped policies; the last of each writes the policy."""
+
 LADDER_OPTIONS = {
     "impact-beam": "--points 60 --cycles 200 --transient 100 --budget 4 --workers 1",
     "slider-crank": "--points 60 --cycles 50 --transient 30 --budget 4 --workers 1",
@@ -66,11 +73,12 @@ def task_classifier():
 def task_policy():
     """Shipped policies; each command goes on where it was stopped."""
     work = sorted(map(str, Path("src/chaosgym/machines").glob("*/work.py")))
-    for name, command in POLICIES.items():
+    for name, (*before, command) in POLICIES.items():
         folder, run = SHIPPED / name, f"{RUNS}/{name}"
         made = [f"{folder}/{file}" for file in ("policy.json", "weights.npz", "progress.csv")]
         copies = [f"cp {run}/{Path(file).name} {file}" for file in made]
-        yield task(name, ["src/chaosgym/envs/setups.py", *work], made, f"{command} --out {run}", *copies)
+        full = f"{command} --env chaosgym/{name} --out {run}"
+        yield task(name, ["src/chaosgym/envs/setups.py", *work], made, *before, full, *copies)
 
 
 def task_scores():

@@ -5,6 +5,7 @@ following the demand and backing off return on the machines kept for evaluation 
 """
 
 import csv
+import io
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -62,11 +63,13 @@ def read_curve(agent: str, folder: Path) -> Curve:
 def write_table(curves: Sequence[Curve], path: Path) -> None:
     """Write all curves into one CSV file, a row for each row of theirs."""
     numbers: dict[tuple[str, str], int] = {}
-    lines = [",".join(("env", "agent", "run", *COLUMNS))]
+    rows: list[tuple[Any, ...]] = [("env", "agent", "run", *COLUMNS)]
     for curve in curves:
         run = numbers[curve.env, curve.agent] = numbers.get((curve.env, curve.agent), -1) + 1
-        lines += [",".join((curve.env, curve.agent, str(run), *(f"{x:.10g}" for x in row))) for row in curve.values]
-    write_atomically(path, lambda file: file.write_text("\n".join(lines) + "\n", encoding="utf-8"))
+        rows += [(curve.env, curve.agent, run, *(f"{value:.10g}" for value in row)) for row in curve.values]
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    write_atomically(path, lambda file: file.write_text(text.getvalue(), encoding="utf-8"))
 
 
 def read_table(path: Path) -> list[Curve]:
