@@ -38,7 +38,7 @@ class Fitted(NamedTuple):
 
     value: Any
     provenance: Provenance = "calibrated"
-    source: str = "fitted on all statements, see docs/development/calibration.md"
+    source: str = "fitted to the statements, see docs/development/calibration.md"
 
 
 def parameter(
