@@ -167,8 +167,8 @@ def _structural_damping(machine: "SliderCrank", rod: ConnectingRod) -> Array:
     return damping
 
 
-def _coordinate_map(machine: "SliderCrank", phi: Array, size: int) -> Array:
-    """R and its first two derivatives by phi: (3, B, size, n); the last three of ``size`` rows are the slider's."""
+def _coordinate_map(machine: "SliderCrank", phi: Array, size: int, orders: int = 3) -> Array:
+    """R and its derivatives by phi: (orders, B, size, n); the last three of ``size`` rows are the slider's."""
     names = degrees_of_freedom(machine)
     sine, cosine = np.sin(phi), np.cos(phi)
     secant, tangent = 1.0 / cosine, sine / cosine
@@ -186,10 +186,10 @@ def _coordinate_map(machine: "SliderCrank", phi: Array, size: int) -> Array:
     }
     modes = [name for name in names if name not in entries]
     entries.update({name: [(MODES + mode, one)] for mode, name in enumerate(modes)})
-    mapping = np.zeros((3, len(phi), size, len(names)))
+    mapping = np.zeros((orders, len(phi), size, len(names)))
     for column, name in enumerate(names):
         for row, functions in entries[name]:
-            for order in range(3):
+            for order in range(orders):
                 mapping[order, :, row, column] = functions[order]
     return mapping
 
@@ -237,6 +237,35 @@ def _inertia(machine: "SliderCrank", motion: PlanarMotion) -> _Inertia:
     )
 
 
+def _slider_mass(machine: "SliderCrank") -> Array:
+    """Mass matrix (3, 3) of the slider about its pivot."""
+    x, y = machine.slider_offset_along, machine.slider_offset_across
+    slider = machine.slider_mass * np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [-y, x, 0.0]])
+    slider[2, 2] = machine.slider_pitch_inertia
+    return slider
+
+
+def _body_load(rod: ConnectingRod, slider: Array, inertia: _Inertia) -> Array:
+    """Loads (2, B, size) on the coordinates of rod and slider."""
+    n_rod = len(rod.mass)
+    load = np.zeros((2, inertia.along.shape[1], n_rod + 3))
+    load[..., :n_rod] = (
+        inertia.along[..., None] * rod.load.along
+        + inertia.across[..., None] * rod.load.across
+        + inertia.spin[..., None] * rod.load.spin
+        + inertia.centrifugal[..., None] * rod.load.centrifugal
+    )
+    load[..., n_rod:] = inertia.slider_along[..., None] * slider[0] + inertia.slider_across[..., None] * slider[1]
+    return load
+
+
+def loads(machine: "SliderCrank", crank_angle: Array, rod: ConnectingRod) -> Array:
+    """``equations(machine, crank_angle, rod).load`` alone: (2, B, n)."""
+    motion = planar_motion(crank_angle, machine.crank_radius, machine.rod_length)
+    load = _body_load(rod, _slider_mass(machine), _inertia(machine, motion))
+    return np.asarray(np.einsum("bij,kbi->kbj", _coordinate_map(machine, motion.phi, load.shape[-1], 1)[0], load))
+
+
 def equations(machine: "SliderCrank", crank_angle: Array, rod: ConnectingRod | None = None) -> Equations:
     """Assemble the equations of motion at given crank angles.
 
@@ -262,19 +291,9 @@ def equations(machine: "SliderCrank", crank_angle: Array, rod: ConnectingRod | N
 
     mass, gyroscopic, translating = embedded(rod.mass), embedded(rod.gyroscopic), embedded(rod.translating_mass)
     damping = embedded(_structural_damping(machine, rod))
-    x, y = machine.slider_offset_along, machine.slider_offset_across
-    slider = machine.slider_mass * np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [-y, x, 0.0]])
-    slider[2, 2] = machine.slider_pitch_inertia
+    slider = _slider_mass(machine)
     mass[n_rod:, n_rod:] = slider
-
-    load = np.zeros((2, len(crank_angle), size))
-    load[..., :n_rod] = (
-        inertia.along[..., None] * rod.load.along
-        + inertia.across[..., None] * rod.load.across
-        + inertia.spin[..., None] * rod.load.spin
-        + inertia.centrifugal[..., None] * rod.load.centrifugal
-    )
-    load[..., n_rod:] = inertia.slider_along[..., None] * slider[0] + inertia.slider_across[..., None] * slider[1]
+    load = _body_load(rod, slider, inertia)
 
     r, r_phi, r_phiphi = _coordinate_map(machine, motion.phi, size)
     rate, acceleration = motion.phi_rate[:, None, None], motion.phi_acceleration[:, None, None]
@@ -286,6 +305,7 @@ def equations(machine: "SliderCrank", crank_angle: Array, rod: ConnectingRod | N
     if machine.geometric_stiffness == "on":
         geometric = embedded(_geometric_stiffness(machine, rod, motion.phi, inertia, load))
         # the slider's centre of gravity is off its pivot and turns with it
+        x, y = machine.slider_offset_along, machine.slider_offset_across
         geometric[..., -1, -1] = -machine.slider_mass * (x * inertia.slider_along + y * inertia.slider_across)
         static = static + geometric[0]
         inertial = inertial + geometric[1]

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.core.lanes import GROUP, padded
-from chaosgym.machines.slider_crank.equations import Equations, equations, rod_of
+from chaosgym.machines.slider_crank.equations import Equations, equations, loads, rod_of
 from chaosgym.machines.slider_crank.joints import Channels, channels_of, display_of, gaps_of, hertz_constants, joints_of
 from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
 from chaosgym.machines.slider_crank.kernels.propagator import FORCING_TERMS, TICKS, series_order, tables
@@ -157,7 +157,7 @@ def _assembled(machine: "SliderCrank", middles: Array, nodes: Array) -> tuple[Eq
     if machine.is_spatial:
         return spatial_equations(machine, middles), spatial_loads(machine, nodes)
     rod = rod_of(machine)
-    return equations(machine, middles, rod), equations(machine, nodes, rod).load
+    return equations(machine, middles, rod), loads(machine, nodes, rod)
 
 
 @lru_cache(maxsize=KEPT)
