@@ -53,7 +53,7 @@ def checked_actions(task: Task, actions: Any, count: int) -> NDArray[Any]:
     """
     given = np.asarray(actions)
     if task.action == "trim":
-        fits = given.shape == (count,) and np.issubdtype(given.dtype, np.integer)
+        fits = given.shape == (count,) and given.dtype.kind in "iu"
         if not fits or given.min() < 0 or given.max() > BACK:
             raise ParameterError(f"action = {actions!r} is not usable; allowed: whole numbers from 0 to {BACK}")
         return given
@@ -74,12 +74,12 @@ def trimmed(task: Task, actions: NDArray[Any], demand: Array, trim: Array) -> Ar
         back = actions[:, 1] > 0.5
         size = np.clip((np.abs(actions[:, 0]) - DEAD_BAND) / (1.0 - DEAD_BAND), 0.0, 1.0)
         change = 2.0 * task.trim_step * np.sign(actions[:, 0]) * size
-    return np.where(back, 0.0, np.clip(trim + change, -task.largest_trim, task.largest_trim))
+    return np.where(back, 0.0, (trim + change).clip(-task.largest_trim, task.largest_trim))
 
 
 def approached(task: Task, speed: Array, target: Array) -> Array:
     """Return the speeds (k,) of the next step, within the range of the drive, its rate and its grid."""
-    moved = speed + np.clip(target - speed, -task.slew_limit, task.slew_limit)
+    moved = speed + (target - speed).clip(-task.slew_limit, task.slew_limit)
     if task.speed_grid > 0.0:
         moved = task.speed_grid * np.rint(moved / task.speed_grid)
-    return np.asarray(np.clip(moved, task.lowest_speed, task.highest_speed))
+    return np.asarray(moved.clip(task.lowest_speed, task.highest_speed))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chaosgym.envs.drive import approached, trimmed
 from chaosgym.envs.judge import ExponentJudge, Judge, RecurrenceJudge
-from chaosgym.envs.observation import COMMANDED, OBSERVATION_NAMES, Observation, felt, observation_names
+from chaosgym.envs.observation import COMMANDED, OBSERVATION_NAMES, Observation, felt
 from chaosgym.envs.task import Status, Task, demand_of
 from chaosgym.envs.variants import DRAWN, Variants
 from chaosgym.errors import SimulationError
@@ -164,12 +164,16 @@ class Jobs:
         after = before + task.damage(cycles.peak_force)
         self.damage[which] = after
         worse = after.max(axis=-1)
-        self.done[which] = now + 1
-        self._changed[which] = np.where(self.demand[which, now + 1] != demand, now + 1, self._changed[which])
-        status = task.status(cycles.failed, now + 1, worse)
+        done = now + 1
+        self.done[which] = done
+        changed = self.demand[which, done] != demand
+        if changed.any():
+            self._changed[which[changed]] = done[changed]
+        status = task.status(cycles.failed, done, worse)
+        deviation, charged = np.abs(speed - demand), type_iii * ~cycles.failed
         terms = task.rewards(
-            deviation=np.abs(speed - demand),
-            type_iii=type_iii * ~cycles.failed,
+            deviation=deviation,
+            type_iii=charged,
             damage=worse - before.max(axis=-1),
             time=task.cycles_per_step * self.rules.variants.nominal.period_at(speed) / self._job_time,
             failed=(status == int(Status.FRACTURE)) | (status == int(Status.SIMULATION_FAILED)),
@@ -178,9 +182,9 @@ class Jobs:
         info = terms | {
             "speed": speed,
             "demand": demand,
-            "deviation": np.abs(speed - demand),
-            "type_iii": type_iii * ~cycles.failed,
-            "cost": type_iii * ~cycles.failed,
+            "deviation": deviation,
+            "type_iii": charged,
+            "cost": charged,
             "irregularity": irregularity,
             "largest_force": cycles.peak_force.reshape(len(which), -1).max(axis=1),
             "damage": worse,
@@ -194,8 +198,8 @@ class Jobs:
 
     def _worn(self, which: Indices) -> Array:
         """Clearances (k,) [m] after the steps done."""
-        task = self.rules.task
-        return np.asarray(self._clearance[which] * (1.0 + task.wear * self.done[which] / task.steps))
+        task, clearance = self.rules.task, self._clearance[which]
+        return clearance if task.wear == 0.0 else clearance * (1.0 + task.wear * self.done[which] / task.steps)
 
     def _run(self, which: Indices, speed: Array, count: int, generators: Generators) -> tuple[Cycles, Array]:
         """Run machines at speeds (k,) that ripple, with kicks; growth is zero where it is not known."""
@@ -207,8 +211,9 @@ class Jobs:
         kicks = None
         if task.kick > 0.0:
             kicks = task.kick * np.array([g.standard_normal((count, half)) for g in generators])
-        for i in which[which < self.traced].tolist():
-            self.pieces[i] = []
+        if self.traced:
+            for i in which[which < self.traced].tolist():
+                self.pieces[i] = []
         if kicks is None and isinstance(self.judge, ExponentJudge):
             self._trace(which, speeds)
             cycles, growth = self.batch.run_varied(which, speeds)  # type: ignore[attr-defined]
@@ -218,6 +223,9 @@ class Jobs:
             self.batch.set_speeds(which, speed)
             self._trace(which, speeds)
             return self.batch.run(which, count), np.zeros_like(speeds)
+        if task.speed_ripple == 0.0 and not self.traced and hasattr(self.batch, "run_kicked"):
+            self.batch.set_speeds(which, speed)
+            return self.batch.run_kicked(which, kicks), np.zeros_like(speeds)
         return self._run_cycles(which, speeds, kicks)
 
     def _run_cycles(self, which: Indices, speeds: Array, kicks: Array | None) -> tuple[Cycles, Array]:
@@ -242,13 +250,15 @@ class Jobs:
         return Cycles(failed, *results), growth
 
     def _trace(self, which: Indices, speeds: Array) -> None:
+        if not self.traced:
+            return
         for k in np.flatnonzero(which < self.traced).tolist():
             i = int(which[k])
             self.pieces[i].append(Piece(self.machine_at(i), speeds[k], *self.batch.motion(i)))
 
     def _observe(self, which: Indices, cycles: Cycles, generators: Generators) -> Observation:
         rules, task = self.rules, self.rules.task
-        values = np.empty((len(which), len(observation_names(task))), np.float32)
+        values = np.empty((len(which), rules.space.shape[0]), np.float32)
         speed, done = self.speed[which], self.done[which]
         demand = self.demand[which, done]
         age = np.minimum(done - self._changed[which], task.shortest_hold)
@@ -262,4 +272,4 @@ class Jobs:
             for column in peaks.T:
                 self._monitor.add(which, column, max(task.sensor_error, LEAST_ERROR))
             values[:, -1] = self._monitor.level(which)
-        return np.clip(values, rules.space.low, rules.space.high, out=values)
+        return values.clip(rules.space.low, rules.space.high, out=values)

@@ -112,7 +112,7 @@ class Workplace:
 
 def first_of(info: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
     """Return the info of the one job as plain numbers."""
-    return {name: values[0].item() for name, values in info.items()}
+    return {name: values.item() for name, values in info.items()}
 
 
 class MachineEnv(gym.Env[Observation, Any]):

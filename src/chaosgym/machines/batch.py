@@ -56,7 +56,7 @@ def put(batch: Any, i: int, model: Any) -> None:
         column[i] = value
 
 
-_one_call_at_a_time = Lock()
+one_call_at_a_time = Lock()
 """Some of numba's threading layers abort the process if two threads call parallel kernels at once."""
 
 
@@ -70,6 +70,7 @@ class CompiledBatch(ABC):
         integrator = ExactEvents()
         self._settings = Settings(integrator.step_phase, integrator.event_tolerance, integrator.event_budget)
         self._machine = machine
+        self._columns = [(array.shape[1:], array.dtype, len(array)) for array in machine.arrays(1)]
         self._motions = Motions(np.zeros((count, machine.n_states)), np.zeros((count, 3)))
         self._scale = np.zeros_like(self._motions.coordinates)
 
@@ -96,15 +97,15 @@ class CompiledBatch(ABC):
     def run(self, which: Indices, cycles: int) -> Cycles:
         """Run the machines ``which`` (k,) for some cycles."""
         arrays, outcome = self._empty(len(which), cycles)
-        with _one_call_at_a_time:
+        with one_call_at_a_time:
             self._advance(which, arrays, outcome)
         return self._cycles(arrays, outcome)
 
     def _empty(self, count: int, cycles: int) -> tuple[CycleArrays, Indices]:
         """Arrays and outcome for a number of machines and cycles."""
-        one = self._machine.arrays(cycles)
-        arrays = CycleArrays(*(np.empty((count, *array.shape), array.dtype) for array in one))
-        return arrays, np.empty(count, np.int64)
+        # columns that the machine doesn't write have no rows
+        arrays = (np.empty((count, cycles * rows, *shape), dtype) for shape, dtype, rows in self._columns)
+        return CycleArrays(*arrays), np.empty(count, np.int64)
 
     def _cycles(self, arrays: CycleArrays, outcome: Indices) -> Cycles:
         failed = outcome != status.OK
@@ -177,7 +178,7 @@ class RestitutionBatch(CompiledBatch):
         arrays, outcome = self._empty(len(which), speeds.shape[1])
         growth = np.zeros((*speeds.shape, 1))
         given = (self._batch, *self._parts, which, speeds, self._motions, self._deviations, growth, arrays)
-        with _one_call_at_a_time:
+        with one_call_at_a_time:
             call(self._varied, *given, self._settings, outcome)
         return self._cycles(arrays, outcome), growth[:, :, 0]
 

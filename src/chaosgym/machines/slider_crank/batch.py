@@ -7,9 +7,13 @@ from numpy.typing import NDArray
 
 from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays
-from chaosgym.machines.batch import CompiledBatch, put, stacked
+from chaosgym.machines.batch import CompiledBatch, Cycles, one_call_at_a_time, put, stacked
 from chaosgym.machines.slider_crank.joints import gaps_of
-from chaosgym.machines.slider_crank.kernels.batch import advance_cranks, advance_stepped_cranks
+from chaosgym.machines.slider_crank.kernels.batch import (
+    advance_cranks,
+    advance_kicked_cranks,
+    advance_stepped_cranks,
+)
 from chaosgym.machines.slider_crank.model import TABLES, KeptModel, ModelsBySpeed, models_by_speed
 
 Array = NDArray[np.float64]
@@ -78,6 +82,14 @@ class CrankBatch(CompiledBatch):
         for i, clearance in zip(which.tolist(), clearances.tolist(), strict=True):
             self._machines[i] = self._machines[i].at(clearance=clearance)
             self._batch.gap[i] = gaps_of(self._machines[i])
+
+    def run_kicked(self, which: Indices, kicks: Array) -> Cycles:
+        """``kick`` the machines ``which`` (k,) by each of the shares (k, cycles, n_states / 2) and run them a cycle."""
+        arrays, outcome = self._empty(*kicks.shape[:2])
+        given = (self._batch, self._bins, which, kicks, self._motions, self._scale, arrays, self._settings, outcome)
+        with one_call_at_a_time:
+            call(advance_kicked_cranks, *given)
+        return self._cycles(arrays, outcome)
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         call(advance_cranks, self._batch, self._bins, which, self._motions, arrays, self._settings, outcome)

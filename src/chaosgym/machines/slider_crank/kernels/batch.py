@@ -12,6 +12,7 @@ from numba.extending import intrinsic
 from chaosgym.core.batch import episode_of, rows_of
 from chaosgym.core.lanes import GROUP, padded
 from chaosgym.core.tangent import no_tangents
+from chaosgym.core.varied import cycle_of
 from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
 from chaosgym.machines.slider_crank.kernels.exact import advance as advance_crank
 from chaosgym.machines.slider_crank.kernels.propagator import FORCING_TERMS, RUNGS
@@ -72,6 +73,41 @@ def advance_cranks(batch, bins, which, motions, arrays, settings, outcome):
             settings.event_budget,
             no_tangents(motions.coordinates.shape[1], 0),
         )[0]
+
+
+# cycles are looped over in a function of its own, as in ``core.varied``
+@njit(cache=True)
+def _kick_crank(model, kicks, coordinates, scale, episode, arrays, settings, k):
+    half = kicks.shape[2]
+    for cycle in range(kicks.shape[1]):
+        for c in range(coordinates.shape[0]):
+            scale[c] = max(scale[c], abs(coordinates[c]))
+        for c in range(half):
+            coordinates[half + c] += kicks[k, cycle, c] * scale[half + c]
+        outcome = advance_crank(
+            model,
+            coordinates,
+            episode,
+            cycle_of(arrays, k, cycle),
+            settings.event_tolerance / model.contact_rate,
+            settings.event_budget,
+            no_tangents(coordinates.shape[0], 0),
+        )[0]
+        if outcome != 0:
+            return outcome
+    return 0
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def advance_kicked_cranks(batch, bins, which, kicks, motions, scale, arrays, settings, outcome):
+    """As ``advance_cranks``; before each cycle velocities change by ``kicks`` (k, cycles, n_states / 2).
+
+    These are shares of the largest velocities so far, which ``scale`` (N, n_states) keeps.
+    """
+    for k in prange(which.shape[0]):
+        i = which[k]
+        model, episode = crank_of(batch, bins, i), episode_of(motions, i)
+        outcome[k] = _kick_crank(model, kicks, motions.coordinates[i], scale[i], episode, arrays, settings, k)
 
 
 @njit(cache=True, inline="always")
