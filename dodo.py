@@ -35,6 +35,16 @@ POLICIES = {
 }
 """Commands of the shipped policies; the last of each writes the policy."""
 
+SCORES = {
+    "ImpactBeamTolerance-v1": "--machines 256",
+    "ImpactBeamWear-v1": "--machines 64",
+    "ImpactBeam-v1": "--machines 64",
+    "SliderCrankTolerance-v1": "--machines 32",
+    "SliderCrankWear-v1": "--machines 16",
+    "SliderCrank-v1": "--machines 16",
+}
+"""How many of the machines kept for evaluation the shipped comparisons have."""
+
 LADDER_OPTIONS = {
     "impact-beam": "--points 60 --cycles 200 --transient 100 --budget 4 --workers 1",
     "slider-crank": "--points 60 --cycles 50 --transient 30 --budget 4 --workers 1",
@@ -83,10 +93,13 @@ def task_policy():
 
 def task_scores():
     """Jobs of controllers and policies on the machines kept for evaluation."""
-    for name in POLICIES:
+    for name, options in SCORES.items():
         made, run = f"src/chaosgym/control/results/{name}.parquet", f"{RUNS}/{name}.parquet"
-        used = [f"{SHIPPED}/{name}/weights.npz", *sources("src/chaosgym/control/controllers")]
-        compare = f"chaosgym compare chaosgym/{name} --policy ppo={SHIPPED}/{name} --out {run}"
+        used = sources("src/chaosgym/control/controllers")
+        if name in POLICIES:
+            used.append(f"{SHIPPED}/{name}/weights.npz")
+            options += f" --policy ppo={SHIPPED}/{name}"
+        compare = f"chaosgym compare chaosgym/{name} {options} --out {run}"
         yield task(name, used, [made], f"mkdir -p {RUNS}", compare, f"cp {run} {made}")
 
 
@@ -115,6 +128,9 @@ def task_picture():
     """Pictures of the rattling beam, of the trade-off and of the extremes."""
     rattle = "benchmarks/documentation/rattle.py"
     yield task("rattle", [rattle], ["docs/rattle.gif"], "python -m benchmarks.documentation.rattle docs/rattle.gif")
+    curves, drawn = "docs/data/training.csv", "docs/training.png"
+    draw = f"python -m benchmarks curves --table {curves} --figure {drawn}"
+    yield task("training", [curves, "benchmarks/envs/curves.py"], [drawn], draw)
     for machine in SWEEPS:
         for kind, options in (("tradeoff", LADDER_OPTIONS[machine]), ("stability", "")):
             folder = "docs/development" if kind == "stability" else "docs"
