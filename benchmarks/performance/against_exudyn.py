@@ -75,7 +75,7 @@ CONTESTS = (
         timed=20,
         reference_cycles=600,
         repeatability=0.5,
-        goal=80.0,
+        goal=300.0,
     ),
     Contest(
         machine=SliderCrank(n_modes=3, fitted_modes=0, matrix_update_interval=1.0),
