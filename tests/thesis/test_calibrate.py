@@ -11,6 +11,7 @@ from chaosgym.machines.parameters import parameters_of
 from chaosgym.machines.slider_crank.parameters import frequencies_at
 from tests.plain_modes import PLAIN_BEAM
 from thesis.scorecard import search as calibration
+from thesis.scorecard.calibrate import calibrate
 from thesis.scorecard.findings import Finding
 from thesis.scorecard.objective import WITHOUT_A_SLOPE, Stages, cost, objective, searched_statements
 from thesis.scorecard.quantities import clearance_unit
@@ -199,3 +200,10 @@ def test_structures_are_searched_by_the_beginning_of_their_names():
     assert len(CRANK.only("weightless").basins) == 2
     with pytest.raises(ParameterError, match=r"known: .*under gravity"):
         CRANK.only("heavy")
+
+
+def test_a_figure_that_no_statement_is_about_is_refused(tmp_path):
+    """A wrong name would leave nothing out and call it left out."""
+    with pytest.raises(ParameterError, match=r"about figure 4\.14; known: .*4\.14a"):
+        calibrate("slider-crank", Budget(candidates=1), tmp_path / "search", left_out=frozenset({"4.14"}))
+    assert not (tmp_path / "search").exists()

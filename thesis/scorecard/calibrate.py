@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from chaosgym.errors import ParameterError
 from chaosgym.files import write_atomically
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
@@ -149,13 +150,17 @@ def calibrate(
     DatasetError
         If the folder holds anything else. Nothing in it is touched.
     ParameterError
-        If no structure has such a name.
+        If no structure has such a name, or no statement is about a figure that is left out.
     ChaosgymError
         If the optimiser is not installed.
     """
     space = SEARCH_SPACES[name].only(basin) if basin else SEARCH_SPACES[name]
     space = space.from_the_middle() if left_out else space
     stages = searched_statements(name, space.joint)
+    figures = {one.statement.figure for stage in stages for one in stage}
+    if unknown := left_out - figures:
+        known = ", ".join(sorted(filter(None, figures)))
+        raise ParameterError(f"no statement that is searched on is about figure {min(unknown)}; known: {known}")
     stages = stages.without(frozenset(one.id for stage in stages for one in stage if one.statement.figure in left_out))
     plan = {"machine": name, "seed": seed, "version": __version__, "statements": list(stages.ids)}
     found = open_journal(folder, {**plan, "basins": [one.name for one in space.basins]})
