@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -40,12 +41,12 @@ def model(tmp_path_factory):
     return str(folder / "classifier.npz")
 
 
-def run(*arguments, stdin=""):
-    """Exit code, standard output and standard error of ``chaosgym classify impact-beam``, run in this process."""
+def run(*arguments, stdin="", machine="impact-beam"):
+    """Exit code, standard output and standard error of ``chaosgym classify``, run in this process."""
     out, err = io.StringIO(), io.StringIO()
     code = 0
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
-        patch.setattr(sys, "argv", ["chaosgym", "classify", "impact-beam", *map(str, arguments)])
+        patch.setattr(sys, "argv", ["chaosgym", "classify", str(machine), *map(str, arguments)])
         patch.setattr(sys, "stdin", io.StringIO(stdin))
         try:
             main()
@@ -164,6 +165,18 @@ def test_batch_keeps_the_columns_and_adds_the_answers(tmp_path):
     assert answers.column("response_type").to_pylist()[1:] == ["III", None]
     assert "excitation_frequency = 1e+09" in answers.column("reason").to_pylist()[2]
     assert "3 rows judged, 1 of them without an answer" in out
+
+
+def test_batch_of_a_machine_of_ones_own(tmp_path):
+    """Rows of a machine without a classifier are judged by the general one, which knows nothing from parameters."""
+    gears = Path(__file__).parents[2] / "docs" / "machines" / "kahraman-singh-1990.toml"
+    pq.write_table(pa.table({"clearance": [1e-4, 1.2e-4]}), tmp_path / "in.parquet")
+    given = ("--batch", tmp_path / "in.parquet", "--out")
+    assert run(*given, tmp_path / "out.parquet", machine=gears)[0] == 0
+    assert pq.read_table(tmp_path / "out.parquet").column("proven").to_pylist() == [True, True]
+    code, _, err = run(*given, tmp_path / "none.parquet", "--budget-us", "0", machine=gears)
+    assert code == 2
+    assert "from parameters alone" in err
 
 
 def test_batch_from_parameters_alone(model, tmp_path):

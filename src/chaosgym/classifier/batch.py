@@ -108,7 +108,8 @@ def _numbers(table: pa.Table, name: str, source: str) -> list[float]:
 
 def _of_parameters(classifier: MachineClassifier, table: pa.Table, source: str) -> dict[str, Any]:
     columns = _values(classifier, table, source)
-    answers = classifier.classify_table(np.column_stack([columns[name] for name in classifier.fields]))
+    varied = [columns[name] for name in classifier.fields]
+    answers = classifier.classify_table(np.column_stack(varied) if varied else np.empty((len(table), 0)))
     base = classifier.card["base"]
     others = [name for name in columns if name not in classifier.fields]
     foreign = np.array([any(columns[name][row] != base[name] for name in others) for row in range(len(table))], bool)
@@ -135,7 +136,7 @@ def _of_machines(
         except ParameterError as error:
             found = {"abstained": True, "reason": str(error), "nature_probabilities": {}}
         chances = found["nature_probabilities"]
-        told = {f"probability_{name}": chances.get(name) for name in classifier.parameters.classes_}
+        told = {f"probability_{name}": chances.get(name) for name in classifier.classes}
         rows.append({**{name: found.get(name) for name in (*KEPT, "abstained", "reason")}, **told})
     return {name: [row[name] for row in rows] for name in rows[0]} if rows else {"abstained": []}
 

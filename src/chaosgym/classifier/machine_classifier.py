@@ -70,6 +70,11 @@ class MachineClassifier:
         return tuple(self.card["fields"])
 
     @property
+    def classes(self) -> tuple[str, ...]:
+        """Natures that it tells apart."""
+        return tuple(str(name) for name in next(iter(self.stages.values())).classes_)
+
+    @property
     def parameters(self) -> ResponseClassifier:
         """The classifier of natures from parameters alone.
 
