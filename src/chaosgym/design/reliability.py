@@ -26,7 +26,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
 
 from chaosgym.errors import DesignError
 
@@ -49,7 +48,13 @@ class Strength(NamedTuple):
         """Probability that the strength exceeds each stress [Pa]; the inner integral of eq. 5.8."""
         if self.deviation == 0.0:
             return np.asarray(np.asarray(stress, dtype=float) < self.mean, dtype=float)
-        return np.asarray(stats.norm.sf(stress, self.mean, self.deviation))
+        return _normal_cdf((self.mean - np.asarray(stress, dtype=float)) / self.deviation)
+
+
+def _normal_cdf(values: ArrayLike) -> Array:
+    from scipy.special import ndtr  # slow to import, as scipy.stats is below, and few questions need them
+
+    return np.asarray(ndtr(values))
 
 
 def hertz_pressure(forces: ArrayLike, radius: float, modulus: float) -> Array:
@@ -86,7 +91,7 @@ def normal_reliability(
     spread = math.hypot(stress_deviation, strength_deviation)
     if spread == 0.0:
         return float(strength_mean > stress_mean)
-    return float(stats.norm.cdf((strength_mean - stress_mean) / spread))
+    return float(_normal_cdf((strength_mean - stress_mean) / spread))
 
 
 class Interval(NamedTuple):
@@ -119,7 +124,9 @@ def mean_interval(blocks: Sequence[ArrayLike], confidence: float = 0.95, seed: i
     means = np.array([np.mean(np.asarray(block, dtype=float)) for block in blocks])
     if np.ptp(means) == 0.0:
         return Interval(float(means[0]), float(means[0]))
-    result = stats.bootstrap(
+    from scipy.stats import bootstrap
+
+    result = bootstrap(
         (means,),
         np.mean,
         n_resamples=RESAMPLES,
