@@ -12,7 +12,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import torch
 from stable_baselines3 import PPO
@@ -23,7 +22,7 @@ from tqdm import tqdm
 from chaosgym.control.policies import load_policy, save_policy
 from chaosgym.control.policies.checkpoint import load_checkpoint, save_checkpoint
 from chaosgym.control.policies.export import exported
-from chaosgym.envs import SB3VecEnv
+from chaosgym.envs import SB3VecEnv, environment
 from chaosgym.envs.sb3 import SB3VisitedSpeeds
 from chaosgym.errors import ChaosgymError, ModelFileError
 from chaosgym.files import held, write_atomically
@@ -130,7 +129,7 @@ def take_over(model: PPO, envs: VecNormalize, asked: argparse.Namespace) -> None
         model.policy.load_state_dict(found[0].policy.state_dict())
     except RuntimeError:
         raise ModelFileError(f"{asked.start} has layers of another size; give its --units here too") from None
-    if gym.spec(env).kwargs["machine"] == gym.spec(asked.env).kwargs["machine"]:
+    if environment(env).kwargs["machine"] == environment(asked.env).kwargs["machine"]:
         before = found[0].get_env()
         envs.obs_rms, envs.ret_rms = before.obs_rms, before.ret_rms
         envs.venv.memory.usual = before.venv.memory.usual

@@ -85,7 +85,7 @@ def test_hits_are_those_of_the_rows():
         hits, counted = verdicts.count("hit"), len(verdicts) - verdicts.count("contradictory")
         assert f"## {name}\n\nHits: {hits} of {counted} (" in page
         told.append(f"{hits} of {counted}")
-    assert f"hit by the fitted beam and crank | {told[0]}, {told[1]} |" in readme
+    assert f"hit by the fitted beam and crank: **{told[0]}, {told[1]}**" in readme
 
 
 def test_files_named_in_the_documentation_exist():
