@@ -13,6 +13,7 @@ from chaosgym.control.rollout import play
 AGENTS = Path(__file__).parent.parent.parent / "agents"
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
 WORN = "chaosgym/ImpactBeamWear-v1"
+OWN = str(AGENTS.parent / "docs" / "machines" / "moon-shaw-1983.toml")
 SMALL = {
     "ppo": ("--rollout", "60", "--batch", "240"),
     "recurrent_ppo": ("--rollout", "60", "--batch", "240"),
@@ -44,16 +45,17 @@ def test_a_script_trains_resumes_and_exports(script, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_training_begins_with_another_policy(tmp_path):
-    """With too few steps to learn from, it plays as the one that it began with."""
+@pytest.mark.parametrize("env", [WORN, OWN])
+def test_a_training_begins_with_another_policy(env, tmp_path):
+    """With too few steps to learn from, it plays as the one that it began with, also on a machine of one's own."""
     small = ("--envs", "4", "--rollout", "10", "--batch", "40")
     _train("ppo", tmp_path / "first", 40, *small)
-    _train("ppo", tmp_path / "second", 40, "--env", WORN, "--start", tmp_path / "first", "--learning-rate", 0, *small)
+    _train("ppo", tmp_path / "second", 40, "--env", env, "--start", tmp_path / "first", "--learning-rate", 0, *small)
     first, second = (load_policy(tmp_path / name) for name in ("first", "second"))
     for one, other in zip(first.network.layers, second.network.layers, strict=True):
         assert (one.weight == other.weight).all()
-    assert second.env == WORN
-    assert second.usual.count.sum() > first.usual.count.sum()
+    assert second.env == env
+    assert (second.usual.count.sum() > first.usual.count.sum()) == (env == WORN), "what is usual belongs to a machine"
 
 
 @pytest.mark.slow
