@@ -14,7 +14,7 @@ from chaosgym.diagnosis import (
     types_on_grid,
 )
 from chaosgym.errors import DiagnosisError, ParameterError
-from chaosgym.machines import ImpactBeam
+from chaosgym.machines import THESIS_SLIDER_CRANK, ImpactBeam
 from tests.plain_modes import PLAIN_BEAM
 
 
@@ -69,6 +69,12 @@ def test_types_on_a_grid():
     assert types_on_grid(grid, np.full((5, 5), 50.0), axes=(1,))[2, 2] == "I"
     with pytest.raises(DiagnosisError, match="same shape"):
         types_on_grid(natures, [1.0])
+
+
+def test_only_damping_constants_and_ratios_have_a_tolerance():
+    """The fitted crank has an exponent and base masses of its damping too: no workshop builds them 10 % off."""
+    dampings = {name for name in default_tolerances(THESIS_SLIDER_CRANK) if "damping" in name}
+    assert dampings == {"damping_ratio", "contact_damping_ratio"}
 
 
 def test_default_tolerances_cover_speed_clearance_length_and_dampings():

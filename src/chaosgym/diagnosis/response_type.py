@@ -45,7 +45,8 @@ def default_tolerances(machine: Machine) -> dict[str, Tolerance]:
     """Tolerances of a machine's speed, clearance, length and dampings.
 
     Speed +-2 % of a frequency, +-10 rpm of a rotation (thesis 5.5.2); clearance +-5 %; lengths +-0.1 %; every damping
-    +-10 %. A machine that states tolerances has these instead; of speed and clearance where it states none.
+    constant or ratio +-10 %. A machine that states tolerances has these instead; of speed and clearance where it
+    states none.
     """
     known = parameters_of(machine)
     rotates = known[machine.speed_field].unit == "rpm"
@@ -58,7 +59,7 @@ def default_tolerances(machine: Machine) -> dict[str, Tolerance]:
     for name in known:
         if name in ("length", "rod_length"):
             tolerances[name] = Tolerance(0.001)
-        elif "damping" in name and not known[name].choices and getattr(machine, name) > 0.0:
+        elif "damping" in name and name.endswith(("damping", "ratio", "factor")) and getattr(machine, name) > 0.0:
             tolerances[name] = Tolerance(0.10)
     return tolerances
 
