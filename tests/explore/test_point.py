@@ -49,6 +49,13 @@ def test_the_view_is_the_diagnosis():
     assert any(line.startswith("monitor") and "regular" in line for line in view.lines)
 
 
+def test_the_monitor_hears_enough_of_a_motion_that_was_proven_at_once():
+    """A period that is proven after 16 cycles leaves 8 judged ones, too few for the monitor."""
+    beam = ImpactBeam(excitation_frequency=6.0)
+    assert len(chaosgym.diagnose(beam, budget=400).judged) < 12
+    assert any(line.startswith("monitor") and "regular" in line for line in view_of(beam).lines)
+
+
 def test_a_machine_without_contact_says_so():
     """A gap that is never closed has no peaks, and no verdict hides it."""
     assert any("no contact" in line for line in view_of(ImpactBeam(clearance=0.1)).lines)

@@ -28,8 +28,8 @@ SHOWN_CYCLES, SAMPLES = 6, 300
 DIAGRAM_POINTS, DIAGRAM_CYCLES, DIAGRAM_TRANSIENT = 140, 30, 60
 """Speeds of the orbit diagram, cycles shown of each, and cycles before them."""
 
-SENSOR_ERROR = 3.0
-"""Largest error [N] of the monitor's sensor (thesis 3.6)."""
+SENSOR_ERROR, MONITORED_CYCLES = 3.0, 64
+"""Largest error [N] of the monitor's sensor (thesis 3.6), and settled cycles that it sees."""
 
 
 class Slider(NamedTuple):
@@ -166,6 +166,7 @@ def view_of(machine: Machine) -> View:
     last = simulate(machine, cycles, judged.section[-cycles], samples_per_cycle=SAMPLES)
     assert last.history is not None
     motion = last.history.reshape(-1, 3)
+    heard = simulate(machine, MONITORED_CYCLES, judged.section[-1]).peak_force[:, 0]
     return View(
         time=last.time,
         displacement=motion[:, 0],
@@ -176,7 +177,7 @@ def view_of(machine: Machine) -> View:
         room=room,
         nature=verdict.nature,
         headline=_headline(verdict),
-        lines=(verdict.reason, _votes(verdict), _classified(machine), _watched(judged.peak_force[:, 0])),
+        lines=(verdict.reason, _votes(verdict), _classified(machine), _watched(heard)),
     )
 
 
