@@ -45,8 +45,8 @@ def default_tolerances(machine: Machine) -> dict[str, Tolerance]:
     """Tolerances of a machine's speed, clearance, length and dampings.
 
     Speed +-2 % of a frequency, +-10 rpm of a rotation (thesis 5.5.2); clearance +-5 %; lengths +-0.1 %; every damping
-    constant or ratio +-10 %. A machine that states tolerances has these instead; of speed and clearance where it
-    states none.
+    constant, ratio or factor +-10 %. A machine that states tolerances has these instead; of speed and clearance
+    where it states none.
     """
     known = parameters_of(machine)
     rotates = known[machine.speed_field].unit == "rpm"
