@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chaosgym import SliderCrank
 from chaosgym.core.cubic import cubic
 from chaosgym.core.cycle import Episode, cycle_arrays
 from chaosgym.core.tangent import Tangents
@@ -178,6 +179,13 @@ def test_an_exhausted_event_budget_is_an_error():
     """A revolution with more contact events than allowed names the machine instead of returning numbers."""
     with pytest.raises(SimulationError, match="slider_clearance"):
         simulate(CRANK, 1, integrator=ExactEvents(event_budget=2))
+
+
+def test_contacts_that_change_together_do_not_change_each_other_without_end():
+    """The sliders' two ends touch and part at one instant, forces zero by rounding: no revolution has 400 changes."""
+    for speed in np.linspace(60.0, 290.0, 24):
+        machine = SliderCrank(slider_joint="instrumented", crank_speed=speed)
+        simulate(machine, 3, integrator=ExactEvents(event_budget=400))
 
 
 def test_a_cubic_that_dips_between_slopes_of_one_sign_is_not_taken_for_quiet():

@@ -184,7 +184,11 @@ def settled(surface, j, side, start, end, h, fourth):
 
 @leaf
 def opening(surface, j, side, series, column, last, h, tolerance):
-    """First instant in [0, h] at which closed channel j opens, or inf."""
+    """First instant in [0, h] at which closed channel j opens, or inf.
+
+    A force that is zero by rounding and grows does not open it; likewise in ``closing``. Else two channels that open at
+    one instant open and close each other without end.
+    """
     if h <= 0.0:
         return math.inf
     gap, lag = surface[j, GAP], surface[j, LAG]
@@ -203,7 +207,7 @@ def opening(surface, j, side, series, column, last, h, tolerance):
             if length > tolerance:
                 length *= 0.5
                 continue
-            if e1 <= 0.0:
+            if e1 <= 0.0 and (d1 <= 0.0 or e1 < -ROUNDING * (gap + abs(y) + lag * abs(v))):
                 return high
         length *= 2.0
         low, e0, d0 = high, e1, d1
@@ -243,7 +247,7 @@ def closing(surface, j, side, series, column, last, h, tolerance):
             if length > tolerance:
                 length *= 0.5
                 continue
-            if p1 < 0.0 and e1 < 0.0:
+            if p1 < 0.0 and e1 < 0.0 and (d1 <= 0.0 or e1 < -slack):
                 return high
         length *= 2.0
         low, p0, q0, e0, d0 = high, p1, q1, e1, d1
