@@ -45,6 +45,14 @@ def test_a_comparison_goes_on(table, monkeypatch):
     assert again.equals(table[0])
 
 
+def test_more_machines_are_added(table, tmp_path):
+    """A comparison on two machines that goes on to four holds the jobs of one that had four from the start."""
+    out, names = tmp_path / "beam.parquet", [ZERO, ONE, "back off"]
+    compare(BEAM, out, machines=2, only=names)
+    order = [("contender", "ascending"), ("machine", "ascending")]
+    assert compare(BEAM, out, machines=4, only=names).sort_by(order).equals(table[0].sort_by(order))
+
+
 def test_one_file_holds_all_jobs(table):
     """Its columns are named, its rows are those of every job, and a file of something else is refused."""
     found = read_comparison(table[1], BEAM)

@@ -55,8 +55,8 @@ COLUMNS = ("contender", "knows", "seed", "machine", "job_return", "type_iii", "d
 WORN_LEVELS = 5
 """Clearances at which a machine that wears is mapped."""
 
-CYCLE_BY_CYCLE_MACHINES = 32
-"""Machines for controllers that act in each cycle, which take long."""
+CYCLE_BY_CYCLE, CYCLE_BY_CYCLE_MACHINES = ("delayed feedback", "OGY"), 32
+"""Controllers that act in each cycle instead of each step, and for how many machines at most: they take long."""
 
 PROFILE_SCORES = np.linspace(-1.0, 2.0, 121)
 """Scores of single jobs at which the performance profile is given."""
@@ -65,17 +65,17 @@ PROFILE_SCORES = np.linspace(-1.0, 2.0, 121)
 class Contenders:
     """The controllers of a comparison by name; maps are made when the first one needs them."""
 
-    def __init__(self, env: str, machines: Sequence[int], keywords: Mapping[str, Any], progress: bool) -> None:
-        self.env, self.machines, self.progress, self.keywords = env, machines, progress, dict(keywords)
+    def __init__(self, env: str, keywords: Mapping[str, Any], progress: bool) -> None:
+        self.env, self.progress, self.keywords = env, progress, dict(keywords)
         self._fleet: Maps | None = None
-        self._own: list[Maps] | None = None
+        self._own: dict[tuple[int, ...], list[Maps]] = {}
 
-    def makers(self) -> dict[str, Callable[[], Policy]]:
-        """What makes each contender, in the order in which they are run."""
+    def makers(self, machines: Sequence[int] = ()) -> dict[str, Callable[[], Policy]]:
+        """What makes each contender for these machines, in the order in which they are run."""
         return {
             ZERO: Follow,
-            ONE: lambda: MapFollower(self.own),
-            "own map, demands known": lambda: Schedule(self.own),
+            ONE: lambda: MapFollower(self.own(machines)),
+            "own map, demands known": lambda: Schedule(self.own(machines)),
             "best constant trim": lambda: ConstantTrim(self.fleet),
             "skip bands": lambda: SkipBands(self._nominal()),
             "best common schedule, demands known": lambda: CommonSchedule(self.fleet),
@@ -99,23 +99,23 @@ class Contenders:
             self._fleet = fleet_maps(self.env, progress=self._bar("maps of models"), **self.keywords)
         return self._fleet
 
-    @property
-    def own(self) -> list[Maps]:
-        """Maps of the machines that are played; where they wear, at ``WORN_LEVELS`` clearances."""
-        if self._own is None:
+    def own(self, machines: Sequence[int]) -> list[Maps]:
+        """Maps of machines that are played; where they wear, at ``WORN_LEVELS`` clearances."""
+        key = tuple(machines)
+        if key not in self._own:
             known = native_envs(self.env, **self.keywords)
             wear, nominal = known.task.wear, known.nominal
             field, levels = nominal.clearance_field, WORN_LEVELS if wear > 0.0 else 1
-            self._own = [
+            self._own[key] = [
                 maps_of(
                     self.env,
-                    machines=self.machines,
+                    machines=machines,
                     progress=self._bar("own maps"),
                     **(self.keywords | {field: getattr(nominal, field) * (1.0 + wear * k / max(1, levels - 1))}),
                 )
                 for k in range(levels)
             ]
-        return self._own
+        return self._own[key]
 
     def _exact_fleet(self) -> Maps:
         """As ``fleet``, of models as fine as the machine: what the belief is worth if the model is right."""
@@ -147,7 +147,7 @@ def compare(
     progress: bool = False,
     **keywords: Any,
 ) -> pa.Table:
-    """Let everybody play, and keep a row a job in one Parquet file; what it holds already is not run again.
+    """Let everybody play, and keep a row a job in one Parquet file; jobs that it holds already are not run again.
 
     Parameters
     ----------
@@ -171,42 +171,45 @@ def compare(
     DatasetError
         If the file is no comparison of this environment.
     """
-    numbers = list(range(machines))
-    contenders = Contenders(env, numbers, keywords, progress)
-    makers = contenders.makers()
-    chosen = list(makers) if only is None else list(only)
+    contenders = Contenders(env, keywords, progress)
+    controllers = list(contenders.makers())
+    chosen = controllers if only is None else list(only)
     for name in chosen:
-        if name not in makers:
-            raise ParameterError(f"there is no controller {name!r}; known: {', '.join(makers)}")
+        if name not in controllers:
+            raise ParameterError(f"there is no controller {name!r}; known: {', '.join(controllers)}")
     known = native_envs(env, **keywords)
     kind = known.nominal
     subject = env if kind.definition == kind.name else f"{env} ({kind.definition})"
     table = read_comparison(out, subject) if out.exists() else None
-    work: list[tuple[str, int, Callable[[], Policy]]] = [(name, 0, makers[name]) for name in chosen]
-    for name, trained in (policies or {}).items():
-        work += [(name, seed, partial(lambda policy: policy, policy)) for seed, policy in enumerate(trained)]
-    for name, seed, make in work:
-        if table is not None and _has(table, name, seed):
+    work: list[tuple[str, int, Policy | None]] = [(name, 0, None) for name in chosen]
+    work += [(name, seed, policy) for name, seeds in (policies or {}).items() for seed, policy in enumerate(seeds)]
+    for name, seed, policy in work:
+        often = name in CYCLE_BY_CYCLE
+        wanted = range(min(machines, CYCLE_BY_CYCLE_MACHINES) if often else machines)
+        missing = sorted(set(wanted) - _played(table, name, seed))
+        if not missing:
             continue
-        policy = make()
-        often = getattr(policy, "cycle_by_cycle", False)
+        player = policy or contenders.makers(missing)[name]()
         played = play(
-            policy,
+            player,
             env,
-            numbers[:CYCLE_BY_CYCLE_MACHINES] if often else numbers,
+            missing,
             progress=name if progress else None,
             **(keywords | (cycle_keywords(known.task) if often else {})),
         )
-        rows = job_rows(name, policy.knows, seed, played, subject)
+        rows = job_rows(name, player.knows, seed, played, subject)
         table = rows if table is None else pa.concat_tables([table, rows])
         write_comparison(table, out)
     assert table is not None
     return table
 
 
-def _has(table: pa.Table, name: str, seed: int) -> bool:
-    pairs = zip(table["contender"].to_pylist(), table["seed"].to_pylist(), strict=True)
-    return (name, seed) in set(pairs)
+def _played(table: pa.Table | None, name: str, seed: int) -> set[int]:
+    """Machines that a contender has played."""
+    if table is None:
+        return set()
+    its = (pa.compute.field("contender") == name) & (pa.compute.field("seed") == seed)
+    return set(table.filter(its)["machine"].to_pylist())
 
 
 def job_rows(name: str, knows: str, seed: int, played: Played, env: str) -> pa.Table:

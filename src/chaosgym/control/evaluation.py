@@ -165,7 +165,7 @@ def evaluate(
     played = play(runs, env, range(machines), progress=NAME if progress else None, **keywords)
     scale = None if keywords else shipped_comparison(env)
     if scale is None or pa.compute.max(scale["machine"]).as_py() < machines - 1:
-        makers = Contenders(env, range(machines), keywords, progress).makers()
+        makers = Contenders(env, keywords, progress).makers(range(machines))
         scale = pa.concat_tables(
             [job_rows(name, "", 0, play(makers[name](), env, range(machines), **keywords), env) for name in (ZERO, ONE)]
         )

@@ -45,7 +45,6 @@ class OGY(Controller):
     """Goes to the demand and, where an orbit of period 1 is found there, corrects the speed by the state."""
 
     knows = "machine"
-    cycle_by_cycle = True
 
     def begin(self, envs: Any) -> None:
         """Forget the orbits."""
@@ -81,7 +80,6 @@ class DelayedFeedback(Controller):
     """
 
     knows = "measurements"
-    cycle_by_cycle = True
 
     def __init__(self, *, gain: float = -0.009, memory: float = 0.2) -> None:
         super().__init__()

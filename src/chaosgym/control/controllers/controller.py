@@ -5,7 +5,7 @@ controller.start(envs)                   # a native vector environment with acti
 actions = controller(observations)       # (n, 1)
 """
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +26,6 @@ class Controller:
     knows: str = "nothing"
     """Beside the demand: "measurements", the nominal "model", models within "tolerances", or this very "machine"; and
     the demands to come ("future")."""
-    cycle_by_cycle: ClassVar[bool] = False
-    """Whether it acts in each cycle instead of in each step."""
 
     def __init__(self) -> None:
         self.task: Task
