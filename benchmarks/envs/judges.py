@@ -56,7 +56,7 @@ def _verdicts(drawn: list[Any], grid: Array, task: Any, share: float, generator:
     for i, machine in enumerate(drawn):
         batch.start(i, machine.at(float(grid[0])))
     carries = hasattr(batch, "run_varied")
-    exponent, recurrence = ExponentJudge(len(drawn)), RecurrenceJudge()
+    exponent, recurrence = ExponentJudge(len(drawn)), RecurrenceJudge(len(drawn))
     result: dict[str, Any] = {"recurrence": np.zeros((len(drawn), len(grid)), np.bool_)}
     if carries:
         result["exponent"] = np.zeros((len(drawn), len(grid)), np.bool_)

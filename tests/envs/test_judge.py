@@ -6,7 +6,7 @@ import pytest
 
 from chaosgym.diagnosis import diagnose
 from chaosgym.diagnosis.lyapunov import largest_lyapunov_exponent
-from chaosgym.envs.judge import MISS, ExponentJudge, recurrence_miss
+from chaosgym.envs.judge import MISS, ExponentJudge, RecurrenceJudge, recurrence_miss
 from chaosgym.simulation import simulate
 from chaosgym.simulation.batch import batch_of
 from chaosgym.simulation.run import simulate_with_deviations
@@ -72,7 +72,21 @@ def test_motion_of_a_period_up_to_eight_repeats(period):
     assert recurrence_miss(50.0 + 10.0 * (cycle[None] % 9 == 0))[0] > MISS
 
 
-@pytest.mark.parametrize(("speed", "alarms"), [(19.0, False), (26.0, True)])
+@pytest.mark.parametrize("cycles", [1, 4, 10])
+def test_short_steps_are_judged_with_the_cycles_before_them(cycles):
+    """However a motion is cut into steps, its last 20 cycles decide, and nothing of a job before."""
+    peaks = 50.0 + np.random.default_rng(0).normal(0.0, 5.0, (1, 40))
+    judge, which = RecurrenceJudge(1), np.zeros(1, np.int64)
+    for first in range(0, 40, cycles):
+        wild, miss = judge.verdict(which, np.empty((1, 0)), peaks[:, first : first + cycles])
+    assert (wild[0], miss[0]) == (1.0, recurrence_miss(peaks[:, -20:])[0])
+    judge.start(which)
+    for _ in range(20):
+        wild, miss = judge.verdict(which, np.empty((1, 0)), np.full((1, cycles), 50.0))
+        assert (wild[0], miss[0]) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("speed", "alarms"), [(19.0, False), (23.5, True)])
 def test_the_monitor_tells_what_the_judge_tells(speed, alarms):
     """With ``monitor="on"`` the last entry is the monitor's level: above 1 on a chaotic beam, below on a periodic."""
     env = gym.make("chaosgym/ImpactBeam-v1", action="speed", speed_ripple=0.0, tolerances={}, monitor="on")

@@ -77,7 +77,7 @@ class Jobs:
     def __init__(self, rules: Rules, count: int) -> None:
         task, nominal = rules.task, rules.variants.nominal
         self.rules, self.batch = rules, batch_of(nominal, count)
-        self.judge: Judge = ExponentJudge(count) if hasattr(self.batch, "run_varied") else RecurrenceJudge()
+        self.judge: Judge = (ExponentJudge if hasattr(self.batch, "run_varied") else RecurrenceJudge)(count)
         self._monitor = RepeatSums(count) if task.monitor == "on" else None
         self.machines: list[Machine] = [nominal] * count
         self.number = np.full(count, DRAWN)

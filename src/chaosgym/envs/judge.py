@@ -6,7 +6,8 @@ transient motion damps is not charged, and chaos that dies out is charged while 
 
 Other machines are judged by recurrence with an amplitude: a step is Type III if, over its last cycles, peak forces miss
 those of the cycles before, at every period up to eight, by more than 2 % of their mean. The first eight cycles after a
-change of speed are compared with nothing.
+change of speed are compared with nothing. A step of less than 20 cycles is judged with those before it, so that a speed
+which changes in every cycle is judged too.
 
 Under speed ripple recurrence can't tell chaos from a motion that the ripple shakes, which is why the beam is not
 judged by it: ``python -m benchmarks judges`` measures both.
@@ -31,6 +32,10 @@ LARGEST_GROWTH = 3.0
 
 MISS = 0.02
 """Share of the mean peak force by which a motion that repeats may miss itself."""
+
+
+WINDOW = 20
+"""Cycles of which recurrence hears at least."""
 
 
 class Judge(Protocol):
@@ -72,19 +77,24 @@ class ExponentJudge:
 class RecurrenceJudge:
     """Judges by peaks that do not repeat; ``irregularity`` is the smallest miss as a share of the mean peak."""
 
+    def __init__(self, count: int) -> None:
+        self._recent = np.full((count, WINDOW), np.nan)
+
     def start(self, which: Indices) -> None:
-        """Nothing is kept from step to step."""
+        """Forget the machines ``which`` (k,)."""
+        self._recent[which] = np.nan
 
     def verdict(self, which: Indices, growth: Array, peaks: Array) -> tuple[Array, Array]:
         """1 where the step does not repeat, otherwise 0, and the miss, (k,) each."""
-        miss = recurrence_miss(peaks)
+        self._recent[which] = recent = np.concatenate([self._recent[which], peaks], axis=1)[:, -WINDOW:]
+        miss = recurrence_miss(peaks if peaks.shape[1] >= WINDOW else recent)
         return (miss > MISS).astype(float), miss
 
 
 def recurrence_miss(peaks: Array) -> Array:
     """Mean miss at the period that fits best, as a share of the mean peak, (k,), of peak forces (k, cycles).
 
-    The first eight cycles, at most half, are only compared with.
+    The first eight cycles, at most half, are only compared with. Cycles that are not known, nan, come first.
     """
     misses = np.empty(len(peaks))
     call(recurrence_misses, peaks, misses)

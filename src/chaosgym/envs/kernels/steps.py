@@ -30,13 +30,17 @@ def running_exponents(growth: Array, exponents: Array, memory: float, largest: f
 def recurrence_misses(peaks: Array, misses: Array) -> None:
     """Mean miss at the period that fits best, as a share of the mean peak, (k,), of peak forces (k, cycles)."""
     count, cycles = peaks.shape
-    first = min(PERIODS, cycles // 2)
     for i in range(count):
+        unknown = 0
+        while unknown < cycles and np.isnan(peaks[i, unknown]):
+            unknown += 1
+        lags = min(PERIODS, (cycles - unknown) // 2)
+        first = unknown + lags
         total = 0.0
         for cycle in range(first, cycles):
             total += peaks[i, cycle]
-        least = np.inf if first > 0 else 0.0
-        for period in range(1, first + 1):
+        least = np.inf if lags > 0 else 0.0
+        for period in range(1, lags + 1):
             miss = 0.0
             for cycle in range(first, cycles):
                 miss += abs(peaks[i, cycle] - peaks[i, cycle - period])
