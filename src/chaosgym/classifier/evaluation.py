@@ -20,6 +20,9 @@ LEVEL = 0.95
 SENSOR = 3.0
 """Largest error of a peak [N] of the sensor whose records are judged (thesis 3.6)."""
 
+NEAR = 1.5
+"""Factor between true amplitude and the sensor's error within which a record says little."""
+
 LENGTHS = (8, 16, 32, 64)
 """Cycles of the records that are judged."""
 
@@ -89,27 +92,32 @@ def score_stages(stages: Mapping[int, ResponseClassifier], examples: Examples) -
 def score_records(models: Mapping[str, ResponseClassifier], examples: Examples, seed: int) -> dict[str, Any]:
     """Scores of both questions on settled held-out records of a 3 N sensor, by length, beside the plain rule.
 
-    The rule: irregular, or chaotic, if ``least_scatter`` exceeds the sensor's error.
+    The rule: irregular, or chaotic, if ``least_scatter`` exceeds the sensor's error. ``irregular_away`` is the accuracy
+    where the true amplitude is more than a factor ``NEAR`` from that error, and ``near`` the share where it is not.
     """
     rows = np.flatnonzero(examples.test & examples.has_signals & (examples.settled.max(axis=1) > 0.0))
     generator = np.random.default_rng(seed + 1)
     clean, groups = examples.settled[rows], examples.groups[rows]
-    truth = {NATURE: examples.nature[rows], IRREGULAR: np.array([irregularity(peaks) > SENSOR for peaks in clean])}
+    amplitude = np.array([irregularity(peaks) for peaks in clean])
+    truth = {NATURE: examples.nature[rows], IRREGULAR: amplitude > SENSOR}
+    away = (amplitude < SENSOR / NEAR) | (amplitude > SENSOR * NEAR)
     error = np.full(len(rows), SENSOR)
     found = {}
     for cycles in LENGTHS:
         peaks = clean[:, :cycles] + SENSOR * generator.uniform(-1.0, 1.0, (len(rows), cycles))
         peaks = np.maximum(peaks, 0.0)
         rule = np.array([least_scatter(record) for record in peaks]) > SENSOR
+        chances = {name: models[name].predict_proba(peaks, sensor_error=error) for name in truth}
         scores = {
-            name: probability_scores(
-                models[name].classes_, models[name].predict_proba(peaks, sensor_error=error), label, groups
-            )
+            name: probability_scores(models[name].classes_, chances[name], label, groups)
             for name, label in truth.items()
         }
+        right = models[IRREGULAR].classes_[chances[IRREGULAR].argmax(axis=1)] == truth[IRREGULAR]
         found[f"{cycles} peaks, {SENSOR:g} N sensor"] = {
             "irregular": scores[IRREGULAR],
             "irregular_rule": float(np.mean(rule == truth[IRREGULAR])),
+            "irregular_away": float(right[away].mean()),
+            "near": float(1.0 - away.mean()),
             "nature": scores[NATURE],
             "nature_rule": float(np.mean(rule == (truth[NATURE] == "chaotic"))),
         }

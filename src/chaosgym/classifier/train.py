@@ -194,14 +194,15 @@ def report_table(report: dict[str, Any]) -> list[str]:
         return lines
     lines += [
         "",
-        "| settled | irregular: model | rule | ECE | nature: model | rule |",
-        "|---|---|---|---|---|---|",
+        "| settled | irregular: model | rule | away from the error | near it | ECE | nature: model | rule |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for name, found in report["records"].items():
         irregular, nature = found["irregular"], found["nature"]
         lines.append(
             f"| {name} | {_interval(irregular['accuracy'])} | {found['irregular_rule']:.3f} | "
-            f"{irregular['calibration_error']:.3f} | {_interval(nature['accuracy'])} | {found['nature_rule']:.3f} |"
+            f"{found['irregular_away']:.3f} | {found['near']:.1%} | {irregular['calibration_error']:.3f} | "
+            f"{_interval(nature['accuracy'])} | {found['nature_rule']:.3f} |"
         )
     return lines
 
