@@ -1,0 +1,127 @@
+"""The operations of ``chaosgym.core.lanes`` in numpy, without care for the order of sums.
+
+Arguments are those of the compiled operations, which the library documents.
+"""
+
+import numpy as np
+
+from chaosgym.core.lanes import LANES, TAYLOR_TERMS
+
+OPERATIONS = {}
+"""All operations by name."""
+
+
+def operation(function):
+    """List an operation; it sees arrays of any shape as one row, as compiled ones do."""
+
+    def flat(*arguments):
+        return function(*(one.reshape(-1) if isinstance(one, np.ndarray) else one for one in arguments))
+
+    OPERATIONS[function.__name__] = flat
+    return flat
+
+
+def _taken(array, at, *shape):
+    return array[at : at + int(np.prod(shape))].reshape(shape)
+
+
+def _coordinates(own, u_at, blocks, lanes, harmonics):
+    """First and second coordinate of each block (2, blocks), cosine and sine of each harmonic (2, harmonics)."""
+    return _taken(own, u_at, 2, lanes)[:, :blocks], _taken(own, u_at + 2 * lanes, 2, harmonics)
+
+
+@operation
+def sample(free, free_at, driven, driven_at, u_at, blocks, lanes, harmonics, scale, first_at, second_at):
+    """What two quantities are at eight instants."""
+    u, drive = _coordinates(driven, u_at, blocks, lanes, harmonics)
+    shown = np.einsum("qkbi,kb->qi", _taken(free, free_at, 2, 2, blocks, LANES), u)
+    shown += np.einsum("qkhi,kh->qi", _taken(driven, driven_at, 2, 2, harmonics, LANES), drive)
+    for at, quantity in zip((first_at, second_at), shown, strict=True):
+        driven[at : at + LANES] = scale * quantity
+
+
+@operation
+def first_doubt(own, values_at, slopes_at, h, low, high, doubt, start):
+    """First interval that a quantity may leave."""
+    values, slopes = own[values_at : values_at + 9], own[slopes_at : slopes_at + 9]
+    rise, fall = 4.0 / 27.0 * h * np.maximum(slopes, 0.0), 4.0 / 27.0 * h * np.maximum(-slopes, 0.0)
+    upper = np.maximum(values[:-1], values[1:]) + rise[:-1] + fall[1:] + doubt
+    lower = np.minimum(values[:-1], values[1:]) - fall[:-1] - rise[1:] - doubt
+    doubtful = ~((upper < high) & (lower > low))
+    doubtful[:start] = False
+    return int(np.argmax(doubtful)) if doubtful.any() else LANES
+
+
+@operation
+def largest(own, at, count, least):
+    """Largest of some values, or ``least``."""
+    return max(least, *own[at : at + count]) if count else least
+
+
+def _turned(entries, at, u, lanes):
+    blocks = _taken(entries, at, 2, 2, lanes)
+    return np.einsum("ijb,jb->ib", blocks, u)
+
+
+@operation
+def turn(entries, at, own, u_at, out_at, lanes):
+    """Each block times its coordinates."""
+    own[out_at : out_at + 2 * lanes] = _turned(entries, at, _taken(own, u_at, 2, lanes), lanes).ravel()
+
+
+@operation
+def turn_and_expand(entries, at, generator_at, own, u_at, time, out_at, lanes):
+    """As ``turn``, and on from there by the series of the exponential."""
+    start = _turned(entries, at, _taken(own, u_at, 2, lanes), lanes)
+    moved = start
+    for term in range(TAYLOR_TERMS, 0, -1):
+        moved = start + time / term * _turned(entries, generator_at, moved, lanes)
+    own[out_at : out_at + 2 * lanes] = moved.ravel()
+
+
+@operation
+def combine(free, free_at, own, driven_at, constant_at, u_at, blocks, lanes, harmonics, out_at):
+    """A constant and columns times coordinates."""
+    u, drive = _coordinates(own, u_at, blocks, lanes, harmonics)
+    answer = own[constant_at : constant_at + 2 * lanes].copy()
+    answer += np.einsum("kbi,kb->i", _taken(free, free_at, 2, blocks, 2 * lanes), u)
+    answer += np.einsum("khi,kh->i", _taken(own, driven_at, 2, harmonics, 2 * lanes), drive)
+    own[out_at : out_at + 2 * lanes] = answer
+
+
+@operation
+def dot(own, at, u_at, width):
+    """Scalar product."""
+    return own[at : at + width] @ own[u_at : u_at + width]
+
+
+@operation
+def dot_of_sizes(own, at, u_at, width):
+    """Scalar product with absolute values."""
+    return own[at : at + width] @ abs(own[u_at : u_at + width])
+
+
+@operation
+def add_columns(table, at, width, count, factors, factors_at, out, out_at):
+    """Columns times factors."""
+    out[out_at : out_at + width] = factors[factors_at : factors_at + count] @ _taken(table, at, count, width)
+
+
+@operation
+def next_term(table, at, width, count, series, older_at, old_at, weight, share, out_at):
+    """A term of a series from the two before it."""
+    older, old = series[older_at : older_at + count], series[old_at : old_at + count]
+    known = series[out_at : out_at + width] + older @ _taken(table, at, count, width)
+    series[out_at : out_at + width] = share * (known + weight * (old @ _taken(table, at + count * width, count, width)))
+
+
+@operation
+def item(own, at):
+    """Number at a place."""
+    return own[at]
+
+
+@operation
+def fma(a, b, c):
+    """Product and sum, rounded twice."""
+    return a * b + c

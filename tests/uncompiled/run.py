@@ -1,0 +1,61 @@
+"""Small runs by kernels that are not compiled: `NUMBA_DISABLE_JIT=1 python -m tests.uncompiled.run FILE`."""
+
+import ctypes
+import sys
+
+import gymnasium as gym
+import numpy as np
+
+import chaosgym
+import chaosgym.core.compilation
+import chaosgym.core.lanes
+import chaosgym.machines.slider_crank.kernels.batch
+from chaosgym import ImpactBeam, SliderCrank
+from chaosgym.classifier import classifier_for
+from chaosgym.classifier.features import record_features
+from chaosgym.simulation import simulate_with_deviations
+from tests.golden.golden import RECORDED, scenes
+from tests.uncompiled.lanes import OPERATIONS
+
+TASKS = {"chaosgym/ImpactBeamTolerance-v1": {}, "chaosgym/SliderCrankTolerance-v1": {"contact_damping_ratio": 0.3}}
+"""Keywords of tasks that are calm: chaos would magnify rounding in the 20 cycles before the first step."""
+
+
+def install():
+    """Let every kernel call the operations of numpy: vectors of LLVM exist compiled only."""
+    plain = {id(getattr(chaosgym.core.lanes, name)): operation for name, operation in OPERATIONS.items()}
+    for module in [module for name, module in sys.modules.items() if name.startswith("chaosgym.")]:
+        for name, value in list(vars(module).items()):
+            if id(value) in plain:
+                setattr(module, name, plain[id(value)])
+    chaosgym.machines.slider_crank.kernels.batch.pointer = lambda address: ctypes.c_void_p(int(address))
+    chaosgym.core.compilation.prepare = lambda *_: None
+
+
+def results():
+    """Arrays by name: records of every golden scene, deviations, one step of each kind of task."""
+    found = {}
+    for name, machine in scenes():
+        record = chaosgym.simulate(machine, 2, samples_per_cycle=3)
+        found |= {f"{name}, {field}": getattr(record, field) for field in RECORDED}
+        found[f"{name}, history"] = record.history
+        if machine.carries_deviations:
+            vectors = np.eye(len(record.section[0]))[:2]
+            found[f"{name}, deviations"] = simulate_with_deviations(machine, 1, deviations=vectors)[1]
+    fixed = chaosgym.RungeKutta4(steps_per_cycle=2000)
+    for machine in (ImpactBeam(), SliderCrank()):
+        found[f"{machine.name}, fixed steps"] = chaosgym.simulate(machine, 1, integrator=fixed).section
+    for name, fields in TASKS.items():
+        envs = gym.make_vec(name, num_envs=2, cycles_per_step=2, **fields)
+        found[f"{name}, reset"] = envs.reset(seed=5)[0]
+        found[f"{name}, step"], found[f"{name}, reward"] = envs.step(np.array([5, 5]))[:2]
+    for machine in (ImpactBeam(), SliderCrank()):
+        answer = classifier_for(machine).classify(machine, budget_us=0.0, types=False)
+        found[f"{machine.name}, by parameters"] = np.array([*answer.centre.probabilities.values()])
+    found["a record"] = record_features(found["impact-beam: periodic, peak_force"].repeat(8)[None], sensor_error=[1.0])
+    return found
+
+
+if __name__ == "__main__":
+    install()
+    np.savez(sys.argv[1], **results())

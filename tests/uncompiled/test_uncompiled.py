@@ -1,0 +1,62 @@
+"""Kernels mean what their Python source says: run as it stands, without numba, it gives what machine code gives."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numba import njit
+
+from chaosgym.core import lanes
+from tests.uncompiled.lanes import OPERATIONS
+from tests.uncompiled.run import results
+
+CALLS = {
+    "sample": lambda call, table, own: call(table, 0, own, 256, 512, 5, 8, 3, 0.3, 600, 610),
+    "first_doubt": lambda call, table, own: call(own, 0, 20, 0.1, -3.0, 3.0, 0.01, 2),
+    "largest": lambda call, table, own: call(own, 3, 5, -0.1),
+    "turn": lambda call, table, own: call(table, 0, own, 512, 600, 16),
+    "turn_and_expand": lambda call, table, own: call(table, 0, 64, own, 512, 0.02, 600, 16),
+    "combine": lambda call, table, own: call(table, 0, own, 256, 900, 512, 5, 8, 2, 600),
+    "dot": lambda call, table, own: call(own, 0, 100, 24),
+    "dot_of_sizes": lambda call, table, own: call(own, 0, 100, 24),
+    "add_columns": lambda call, table, own: call(table, 0, 16, 5, own, 700, own, 900),
+    "next_term": lambda call, table, own: call(table, 0, 16, 5, own, 512, 540, 2.0, 0.25, 600),
+    "item": lambda call, table, own: call(own, 7),
+    "fma": lambda call, table, own: call(own[0], own[1], own[2]),
+}
+"""One call of each operation on two arrays."""
+
+
+def _compiled(operation):
+    @njit
+    def call(*arguments):
+        return operation(*arguments)
+
+    return call
+
+
+@pytest.mark.parametrize("name", OPERATIONS)
+def test_a_vector_operation_is_its_sentence_in_numpy(name):
+    """What it returns and all that it writes, but for the order of sums."""
+    found = []
+    for operation in (_compiled(getattr(lanes, name)), OPERATIONS[name]):
+        generator = np.random.default_rng(3)
+        table, own = generator.normal(size=1024), generator.normal(size=1024)
+        returned = CALLS[name](operation, table, own)
+        found.append(own if returned is None else np.append(own, returned))
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_kernels_run_as_plain_python(tmp_path):
+    """Records of every scene, deviations and steps of the tasks are those of machine code, but for rounding."""
+    file = tmp_path / "plain.npz"
+    command = [sys.executable, "-m", "tests.uncompiled.run", str(file)]
+    subprocess.run(command, env=os.environ | {"NUMBA_DISABLE_JIT": "1"}, check=True)
+    plain = np.load(file)
+    compiled = results()
+    assert set(plain) == set(compiled)
+    for name, value in compiled.items():
+        np.testing.assert_allclose(plain[name], value, rtol=0.0, atol=1e-7 * np.nanmax(np.abs(value)), err_msg=name)
