@@ -17,12 +17,16 @@ RUNS = "runs/" + hashlib.sha256(Path(GOLDEN).read_bytes()).hexdigest()[:8]
 
 SHIPPED = Path("src/chaosgym/control/policies/shipped")
 
+TASKS = ["src/chaosgym/envs/setups.py", "src/chaosgym/envs/judge.py"]
+TASKS += sorted(map(str, Path("src/chaosgym/machines").glob("*/work.py")))
+"""What says how machines are used in the environments, and when they cost."""
+
 SWEEPS = {
     "impact-beam": "--axis length=0.26505:0.29295 --axis damping_ratio=0.005:0.08:log --axis contact_damping=10:40:log "
-    "--axis excitation_frequency=1:40 --axis clearance=1e-05:0.0003:log --crosses 3000 --seed 10 --budget 400",
+    "--axis excitation_frequency=1:40 --axis clearance=1e-05:0.0003:log --crosses 20000 --seed 10 --budget 400",
     "slider-crank": "--axis rod_length=0.22325:0.24675 --axis contact_damping_ratio=0.01:0.08:log "
     "--axis friction_coefficient=0:0.1 --axis crank_speed=50:300 --axis slider_clearance=1.6e-05:0.0003:log "
-    "--crosses 1500 --seed 1 --budget 200",
+    "--crosses 3000 --seed 1 --budget 200",
 }
 LARGE = "--units 128 --batch 1920 --rollout 120"
 START = f"python agents/ppo.py --env chaosgym/ImpactBeamTolerance-v1 --seed 1 --steps 900000 {LARGE} --out {RUNS}/start"
@@ -32,18 +36,23 @@ POLICIES = {
         START,
         f"python agents/ppo.py --start {RUNS}/start --seed 0 --steps 300000 {LARGE} --learning-rate 5e-4",
     ],
+    "SliderCrankTolerance-v1": [f"python agents/ppo.py --fidelity draft --seed 0 --steps 240000 {LARGE}"],
 }
 """Commands of the shipped policies; the last of each writes the policy."""
 
 SCORES = {
     "ImpactBeamTolerance-v1": "--machines 256",
-    "ImpactBeamWear-v1": "--machines 64",
+    "ImpactBeamWear-v1": "--machines 256",
     "ImpactBeam-v1": "--machines 64",
-    "SliderCrankTolerance-v1": "--machines 32",
+    "SliderCrankTolerance-v1": "--machines 128",
     "SliderCrankWear-v1": "--machines 16",
     "SliderCrank-v1": "--machines 16",
 }
 """How many of the machines kept for evaluation the shipped comparisons have."""
+
+LEARNED = [f"src/chaosgym/weights/{machine}.npz" for machine in SWEEPS]
+LEARNED += [f"{SHIPPED}/{name}/weights.npz" for name in POLICIES]
+"""What answers and plays in commands and tutorials."""
 
 LADDER_OPTIONS = {
     "impact-beam": "--points 60 --cycles 200 --transient 100 --budget 4 --workers 1",
@@ -82,20 +91,19 @@ def task_classifier():
 
 def task_policy():
     """Shipped policies; each command goes on where it was stopped."""
-    work = sorted(map(str, Path("src/chaosgym/machines").glob("*/work.py")))
     for name, (*before, command) in POLICIES.items():
         folder, run = SHIPPED / name, f"{RUNS}/{name}"
         made = [f"{folder}/{file}" for file in ("policy.json", "weights.npz", "progress.csv")]
         copies = [f"cp {run}/{Path(file).name} {file}" for file in made]
         full = f"{command} --env chaosgym/{name} --out {run}"
-        yield task(name, ["src/chaosgym/envs/setups.py", *work], made, *before, full, *copies)
+        yield task(name, TASKS, made, *before, full, *copies)
 
 
 def task_scores():
     """Jobs of controllers and policies on the machines kept for evaluation."""
     for name, options in SCORES.items():
         made, run = f"src/chaosgym/control/results/{name}.parquet", f"{RUNS}/{name}.parquet"
-        used = sources("src/chaosgym/control/controllers")
+        used = TASKS + sources("src/chaosgym/control/controllers")
         if name in POLICIES:
             used.append(f"{SHIPPED}/{name}/weights.npz")
             options += f" --policy ppo={SHIPPED}/{name}"
@@ -107,7 +115,7 @@ def task_page():
     """Pages of the documentation that a command writes."""
     pages = [str(path) for path in Path("docs/environments").glob("*.md")]
     made = "python -m benchmarks.envs.documentation docs"
-    yield task("environments", sources("src/chaosgym/envs"), pages, made)
+    yield task("environments", TASKS + sources("src/chaosgym/envs"), pages, made)
     statements = [str(path) for path in Path("thesis/statements").iterdir() if path.suffix in (".csv", ".toml")]
     statements.append("thesis/scorecard/firmness.json")
     write = "python -m thesis scorecard --markdown > docs/development/scorecard.md"
@@ -117,10 +125,10 @@ def task_page():
     examples = "benchmarks/documentation/examples.toml"
     pages = [str(path) for path in Path("docs/commands").glob("*.md")]
     write = "python -m benchmarks.documentation.commands docs/commands"
-    yield task("commands", [examples, *sources("src/chaosgym/cli")], pages, write)
+    yield task("commands", [examples, *TASKS, *LEARNED, *sources("src/chaosgym/cli")], pages, write)
     for script in sorted(Path("docs/tutorials").glob("*.py")):
         run = f"python -m benchmarks.documentation.tutorials docs/tutorials {script.name}"
-        yield task(script.stem, [str(script)], [str(script.with_suffix(".ipynb"))], run)
+        yield task(script.stem, [str(script), *TASKS, *LEARNED], [str(script.with_suffix(".ipynb"))], run)
     yield task("figures", sources("thesis/figures"), ["docs/development/figures.md"], draw)
 
 

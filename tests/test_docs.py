@@ -29,17 +29,6 @@ def test_parameter_table_is_current(name):
     assert table[1].strip().splitlines() == markdown_table(MACHINES[name]())
 
 
-@pytest.mark.parametrize("machine", THESIS_MACHINES.values(), ids=THESIS_MACHINES)
-def test_table_of_the_fit_is_current(machine):
-    """The page of a machine has those rows of ``chaosgym show --constants thesis`` that differ from the default."""
-    page = (DOCS / f"{machine.name}.md").read_text()
-    table = re.search(rf"<!-- fit {machine.name} -->\n(.*?)<!-- end -->", page, re.DOTALL)
-    assert table is not None
-    head, line, *rows = markdown_table(machine)
-    fitted = [row for row in rows if row.split("`")[1] in machine.thesis_fit]
-    assert table[1].strip().splitlines() == [head, line, *fitted]
-
-
 def test_scorecard_page_lists_every_statement():
     """Each comparison has its row and each statement left out its reason."""
     page = (DOCS / "development" / "scorecard.md").read_text()

@@ -187,7 +187,8 @@ def test_shipped_classifier_beats_its_majority_on_held_out_machines(name):
 def test_no_simulated_record_is_refused(name, shape):
     """Records of the machine's own map, clean or read by a sensor as good as stated or better, are all judged.
 
-    Silence because it is too close to call is no refusal, and rare.
+    Silence because it is too close to call is no refusal. It is rare where the sensor's error is stated; the exact
+    nature, which is asked for without one, is closer more often.
     """
     machine, classifier = MACHINES[name](), default_classifier(name)
     ranges = [machine.usual_ranges[field] for field in (machine.speed_field, machine.clearance_field)]
@@ -199,4 +200,4 @@ def test_no_simulated_record_is_refused(name, shape):
     for real, told in ((0.0, None), (0.0, 3.0), (0.5, 3.0), (3.0, 3.0)):
         answers = classifier.classify_records(np.maximum(clean + real * noise, 0.0), sensor_error=told)
         assert {*answers["reason"]} <= {"", "too close to call"}
-        assert np.mean(answers["abstained"]) <= 0.05
+        assert np.mean(answers["abstained"]) <= (0.1 if told is None else 0.05)

@@ -28,7 +28,7 @@ from chaosgym.control.rollout import play
 from chaosgym.simulation import simulate
 
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
-MACHINES = range(8)
+MACHINES = range(24)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def following():
 def test_following_is_at_the_demand(following):
     """But for the steps after a change."""
     assert np.mean(following.speed == following.demand) > 0.95
-    assert following.type_iii_share.mean() > 0.15
+    assert following.type_iii_share.mean() > 0.05
 
 
 def test_the_own_map_avoids_type_iii_close_to_the_demand(own, following):
@@ -61,10 +61,12 @@ def test_the_own_map_avoids_type_iii_close_to_the_demand(own, following):
     assert ahead.returns.mean() == pytest.approx(played.returns.mean(), abs=0.2 * abs(played.returns.mean()))
 
 
-def test_backing_off_learns_from_measurements(following):
-    """It has less than half of the Type III of following, with or without a memory."""
+def test_backing_off_learns_from_measurements():
+    """It has less than 0.6 of the Type III of following, with or without a memory."""
+    many = range(128)
+    following = play(Follow(), BEAM, many)
     for remembers in (True, False):
-        played = play(BackOff(remembers=remembers), BEAM, MACHINES)
+        played = play(BackOff(remembers=remembers), BEAM, many)
         assert played.type_iii_share.mean() < 0.6 * following.type_iii_share.mean()
         assert played.returns.mean() > following.returns.mean()
 
@@ -85,12 +87,10 @@ def test_others_stay_within_the_range_of_the_task(make):
     assert np.all(played.status == 1)
 
 
-def test_those_that_know_models_use_their_maps(own):
+def test_those_that_know_models_use_their_maps(own, following):
     """With the machines' own maps as the fleet, belief, bandit and common plan all beat following."""
-    few = range(4)
-    zero = play(Follow(), BEAM, few).returns.mean()
     for controller in (Bandit(own), Belief(own)):
-        assert play(controller, BEAM, few).returns.mean() > zero
+        assert play(controller, BEAM, MACHINES).returns.mean() > following.returns.mean()
 
 
 def _maps(share):

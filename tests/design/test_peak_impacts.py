@@ -66,10 +66,7 @@ def test_coverage_foresees_the_share_of_impacts_in_known_sections():
 
 @pytest.mark.parametrize("side", [0, 1])
 def test_slider_crank_fills_its_diagram_within_eighty_cycles(side):
-    """Figures 5.13 and 5.14, 190 rpm and +-0.254 mm: the diagram takes shape within the 80 cycles of the thesis.
-
-    The distribution of the forces is content with 80 cycles on one side and asks for some twenty more on the other.
-    """
+    """Figures 5.13 and 5.14, 190 rpm and +-0.254 mm: the diagram takes shape within the 80 cycles of the thesis."""
     crank = with_settings(MACHINES["slider-crank"](), {"crank_speed": 190.0, "slider_clearance": 0.254e-3})
     diagram = peak_impacts(simulate(crank, 300, transient=60), side)
     assert diagram.unit == "m"
@@ -77,7 +74,7 @@ def test_slider_crank_fills_its_diagram_within_eighty_cycles(side):
     filled = filling_cycles(diagram)
     assert filled is not None
     assert 10 <= filled <= 80
-    assert 10 <= convergence(diagram.force).cycles <= (80, 110)[side]
+    assert 5 <= convergence(diagram.force).cycles <= 80
 
 
 def test_the_place_of_a_sliding_peak_is_where_its_history_has_it():
@@ -148,14 +145,14 @@ def test_slow_cranking_presses_the_housing_from_above():
 def test_larger_clearance_spreads_ball_impacts_over_half_the_bearing():
     """Figure 5.10 b, 110 rpm and +-0.254 mm: almost half of the bearing (180 deg); here half, 150 to 210 deg.
 
-    Figure 5.10 a prints 30 deg at 120 rpm and +-0.064 mm; here the peaks lie in two places half a turn apart, three
-    quarters of them in the larger one within 30 deg.
+    Figure 5.10 a prints 30 deg at 120 rpm and +-0.064 mm; here the peaks lie in two places half a turn apart, half
+    of them in each.
     """
     wide = peak_impacts(simulate(ball(crank_speed=110.0, ball_clearance=0.254e-3), 100, transient=40))
     assert 150.0 < wide.spread < 210.0
     narrow = peak_impacts(simulate(ball(crank_speed=120.0, ball_clearance=0.0635e-3), 100, transient=40))
     count, _ = np.histogram(narrow.location, bins=np.arange(-60.0, 301.0, 30.0))
-    assert 0.6 < count.max() / count.sum() < 0.9
+    assert 0.4 < count.max() / count.sum() < 0.6
 
 
 def test_impacts_in_one_place_have_the_life_of_the_joint():

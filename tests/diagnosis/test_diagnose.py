@@ -25,11 +25,11 @@ def test_periodic_responses_are_certified(frequency, period):
 
 
 def test_what_soon_repeats_is_proven_at_once():
-    """At 10 Hz 32 cycles are enough; label and peak are those of the stages that start at 100 cycles."""
+    """At 10 Hz 16 cycles are enough; label and peak are those of the stages that start at 100 cycles."""
     beam = ImpactBeam(excitation_frequency=10.0)
     early = diagnose(beam)
     late = diagnose(beam, integrator=RungeKutta4(8000))
-    assert (early.nature, early.period, early.status, early.horizon) == ("periodic", 1, "certified", 32)
+    assert (early.nature, early.period, early.status, early.horizon) == ("periodic", 1, "certified", 16)
     assert (late.nature, late.period, late.horizon) == ("periodic", 1, 100)
     assert early.evidence["largest_peak"] == pytest.approx(late.evidence["largest_peak"], rel=1e-3)
     assert early.votes == {"two_step": "periodic", "lyapunov": "periodic", "newton": "periodic"}

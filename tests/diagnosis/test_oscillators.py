@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -5,6 +7,7 @@ from benchmarks.agreement import random_machines
 from chaosgym.diagnosis import diagnose, find_periodic_orbit, two_step_test, two_trajectory_exponent
 from chaosgym.machines import ImpactBeam
 from chaosgym.simulation import simulate
+from tests.plain_modes import PLAIN_BEAM
 
 from .oscillators import RigidImpact, duffing, iterate
 
@@ -62,7 +65,7 @@ def test_a_damped_duffing_oscillator_is_periodic():
 
 def test_the_bilinear_beam_contracts_area_by_its_damping():
     """One mode between soft stops: the product of the multipliers is exp(-D T - d phi_t^2 t_contact)."""
-    beam = ImpactBeam(n_modes=1, fitted_modes=0, excitation_frequency=12.0, shaker_damping=60.0)
+    beam = replace(PLAIN_BEAM, n_modes=1, excitation_frequency=12.0, shaker_damping=60.0)
     record = simulate(beam, 1, transient=400)
     verdict = two_step_test(simulate(beam, 200, transient=400))
     assert verdict.nature == "periodic"

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from chaosgym.machines.slider_crank.parameters import SUPERHARMONIC_SLIDER_CRANK
 from chaosgym.simulation import simulate
 from tests.plain_modes import PLAIN_CRANK
+from thesis.figures.crank_resonances import SUPERHARMONIC_SLIDER_CRANK
 
 CRANK = PLAIN_CRANK
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from chaosgym.machines.slider_crank.parameters import SUPERHARMONIC_SLIDER_CRANK
+from chaosgym.machines import SliderCrank
 from chaosgym.plotting.style import ACCENT, MUTED, NATURE_COLOURS
 from thesis import plotting as thesis
 from thesis.figures.computations import Computation, Data
@@ -19,6 +19,27 @@ from thesis.figures.printed import printed
 from thesis.figures.scored import scored, scored_finding
 
 Array = NDArray[np.float64]
+
+SUPERHARMONIC_SLIDER_CRANK = SliderCrank(
+    contact_stiffness=1.5e7,
+    contact_damping_mass=0.0,
+    ball_damping_mass=0.0,
+    fitted_modes=0,
+    matrix_update_interval=1.0,
+    crank_speed=1508.0,
+    slider_clearance=0.127e-3,
+    n_modes=4,
+    damping_ratio=0.0007,
+    damping_family="uniform",
+    housing_mass=0.4,
+    housing_inertia=5.68e-4,
+    housing_offset_along=0.035,
+    yoke_mass=0.25,
+    yoke_inertia=5.68e-4,
+    yoke_offset_along=-0.040,
+    slider_mass=0.1,
+)
+"""The mechanism of figure 4.18: end bodies whose centres of gravity lie along the rod excite its first mode."""
 
 ORDERS = {5: 907.0, 4: 1134.0, 3: 1512.0}
 """Speeds [rpm] at which these orders meet the first natural frequency of 75.6 Hz."""

@@ -14,7 +14,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.fidelity import FidelityLadder
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.options import Option
-from chaosgym.machines.parameters import Fitted, check_parameter, validate
+from chaosgym.machines.parameters import check_parameter, validate
 
 if TYPE_CHECKING:
     from chaosgym.machines.batch import CompiledBatch
@@ -75,8 +75,6 @@ class Machine(FidelityLadder, ABC):
 
     tolerances: ClassVar[Mapping[str, tuple[float, bool]]] = {}
     """Half width of each field within which machines are built, and whether it is a share; usual ones if empty."""
-    thesis_fit: ClassVar[Mapping[str, Fitted]] = {}
-    """Fields in which the machine that was fitted to the thesis differs from the default; none for other machines."""
     work: ClassVar[Work] = Work()
     """What environments start from, where the usual does not serve."""
 

@@ -3,8 +3,6 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from chaosgym.machines.parameters import Fitted
-
 
 class Number(NamedTuple):
     """A number: the field that it sets, its unit on the command line, and how many SI units that is.
@@ -27,8 +25,3 @@ class Choice(NamedTuple):
 
 
 Option = Number | Choice
-
-
-def constants(thesis_fit: Mapping[str, Fitted]) -> Choice:
-    """Return the option that takes the fit to the thesis in place of the library's default constants."""
-    return Choice({"library": {}, "thesis": {name: one.value for name, one in thesis_fit.items()}})

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, Literal, TypeVar
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.fidelity import expand_fidelity
@@ -31,14 +31,6 @@ class Parameter:
     choices: tuple[str, ...]
     provenance: Provenance
     source: str
-
-
-class Fitted(NamedTuple):
-    """Value of a field in the fit to the thesis, and its provenance."""
-
-    value: Any
-    provenance: Provenance = "calibrated"
-    source: str = "fitted to the statements, see docs/development/calibration.md"
 
 
 def parameter(
@@ -131,13 +123,10 @@ def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
 
 
 def origin_of(machine: Any, name: str) -> tuple[str, str]:
-    """Provenance and source of a field's value: those of the default, of the fit to the thesis, or "given"."""
+    """Provenance and source of a field's value: those of the default, or "given"."""
     value, about = getattr(machine, name), parameters_of(machine)[name]
     if value == getattr(type(machine)(), name):
         return about.provenance, about.source
-    fitted = machine.thesis_fit.get(name)
-    if fitted is not None and value == fitted.value:
-        return fitted.provenance, fitted.source
     return "given", "this command"
 
 

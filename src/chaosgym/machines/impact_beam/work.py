@@ -3,12 +3,13 @@
 from chaosgym.machines.machine import Work
 
 WORK = Work(
-    # twice the thesis' force at its gap, and three times its damping (assumed): on its own beam most speeds above
-    # 18 Hz are chaotic, and no schedule helps
-    fields={"force_amplitude": 17.8, "clearance": 0.127e-3, "damping_ratio": 0.03},
+    # twice the thesis' force (assumed): with less, chaos fills whole ranges of speed that no trim leaves
+    # (docs/development/tasks.md)
+    fields={"force_amplitude": 17.8, "clearance": 0.127e-3},
     model_fidelity="draft",
-    # clearance: repeatability of the thesis' feeler gauges (3.4, printed); damping and length: assumed
-    tolerances={"clearance": 0.2, "damping_ratio": 0.2, "length": 0.002},
+    # repeatability of the thesis' feeler gauges (3.4, printed). Damping and length move the calm speeds too, but no
+    # sensor tells them
+    tolerances={"clearance": 0.2},
     task={
         "lowest_speed": 16.0,
         "highest_speed": 30.0,
@@ -22,6 +23,6 @@ WORK = Work(
         "start_below": 2.0,
         "deviation_weight": 0.25,
         "speed_ripple": 0.002,
-        "load_rating": 80.0,
+        "load_rating": 95.0,
     },
 )

@@ -35,7 +35,7 @@ from chaosgym.machines.batch import CompiledBatch
 from chaosgym.machines.integrators import Integrator
 from chaosgym.machines.machine import Machine, Work
 from chaosgym.machines.options import Option
-from chaosgym.machines.parameters import Fitted, parameter
+from chaosgym.machines.parameters import parameter
 from chaosgym.machines.slider_crank import run as running
 from chaosgym.machines.slider_crank.batch import CrankBatch, SteppedCrankBatch
 from chaosgym.machines.slider_crank.equations import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom, equations
@@ -46,12 +46,12 @@ from chaosgym.machines.slider_crank.kinematics import slider_position
 from chaosgym.machines.slider_crank.model import STEP_PHASE, exact_model, fastest_rate, has_propagators, stepped_model
 from chaosgym.machines.slider_crank.scenes import EXTREMES, OPTIONS, SCENES
 from chaosgym.machines.slider_crank.spatial_equations import spatial_equations
-from chaosgym.machines.slider_crank.thesis_fit import THESIS_FIT
 from chaosgym.machines.slider_crank.work import WORK
 
 Array = NDArray[np.float64]
 
-_FIT = "set S: search over the printed natures and forces of figures 4.13 to 4.16"
+_FIT = "fitted to the statements, see docs/development/calibration.md"
+_FREQUENCY = "first natural frequency 75.6 Hz, thesis 4.5.5"
 _STEEL = "steel"
 
 
@@ -90,7 +90,6 @@ class SliderCrank(Machine):
     options: ClassVar[Mapping[str, Option]] = OPTIONS
     scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = SCENES
     extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = EXTREMES
-    thesis_fit: ClassVar[Mapping[str, Fitted]] = THESIS_FIT
     work: ClassVar[Work] = WORK
     sides: ClassVar[tuple[str, ...]] = ("upper", "lower")
     """Surfaces whose force points up and down: on the slider, or on the housing if the ball joint is monitored."""
@@ -119,16 +118,14 @@ class SliderCrank(Machine):
     """Bending modes of the flexible rod, in each plane; three and none fitted in the fit."""
     fitted_modes: int = parameter(1, low=0, high=6, provenance="assumed", source="a matter of computing")
     """Modes added that stand for all that are left out: they give the slider the rod's inertia."""
-    damping_ratio: float = parameter(0.027, low=0.0, high=100.0, provenance="calibrated", source=_FIT)
+    damping_ratio: float = parameter(0.01077, low=0.0, high=100.0, provenance="calibrated", source=_FIT)
     """Structural damping ratio of the rod's first mode."""
     damping_family: str = parameter(
-        "stiffness", choices=("uniform", "stiffness", "power"), provenance="calibrated", source=_FIT
+        "power", choices=("uniform", "stiffness", "power"), provenance="calibrated", source=_FIT
     )
     """"uniform": the same ratio in every mode; "stiffness": proportional to the mode's frequency; "power": to that
     power of it that ``damping_exponent`` names."""
-    damping_exponent: float = parameter(
-        1.0, low=-2.0, high=4.0, provenance="assumed", source="proportional to stiffness"
-    )
+    damping_exponent: float = parameter(1.3257, low=-2.0, high=4.0, provenance="calibrated", source=_FIT)
     """Exponent of the frequency in the structural damping ratio of a mode, with damping_family = "power"."""
     geometric_stiffness: str = parameter(
         "off", choices=("off", "on"), provenance="calibrated", source="figure 4.18: 2500 N only without it"
@@ -138,37 +135,36 @@ class SliderCrank(Machine):
     """Young's modulus of the rod [Pa]."""
     density: float = parameter(7833.0, unit="kg/m^3", low=10.0, high=1e5, provenance="assumed", source=_STEEL)
     """Mass density of the rod [kg/m^3]."""
-    housing_mass: float = parameter(0.36, unit="kg", low=0.0, high=100.0, provenance="calibrated", source=_FIT)
+    housing_mass: float = parameter(0.3705, unit="kg", low=0.0, high=100.0, provenance="calibrated", source=_FIT)
     """Ball joint housing at the rod's end [kg]."""
     housing_inertia: float = parameter(
-        3.922e-4,
-        unit="kg m^2",
-        low=0.0,
-        high=10.0,
-        provenance="calibrated",
-        source="first natural frequency 75.6 Hz, thesis 4.5.5",
+        5.57889e-4, unit="kg m^2", low=0.0, high=10.0, provenance="derived", source=_FREQUENCY
     )
     """Moment of inertia of the housing about the ball centre [kg m^2]."""
-    housing_offset_along: float = parameter(3e-3, unit="m", low=-0.1, high=0.1, provenance="calibrated", source=_FIT)
+    housing_offset_along: float = parameter(
+        -5.85e-3, unit="m", low=-0.1, high=0.1, provenance="calibrated", source=_FIT
+    )
     """Centre of gravity of the housing from the ball centre towards the slider [m]."""
     housing_offset_across: float = parameter(0.0, unit="m", low=-0.1, high=0.1, provenance="assumed", source="symmetry")
     """Centre of gravity of the housing across the rod [m]."""
-    yoke_mass: float = parameter(0.16, unit="kg", low=0.0, high=100.0, provenance="calibrated", source=_FIT)
+    yoke_mass: float = parameter(0.2982, unit="kg", low=0.0, high=100.0, provenance="calibrated", source=_FIT)
     """Yoke at the rod's other end [kg]."""
     yoke_inertia: float = parameter(
-        7.059e-4,
-        unit="kg m^2",
-        low=0.0,
-        high=10.0,
-        provenance="calibrated",
-        source="first natural frequency 75.6 Hz, thesis 4.5.5",
+        5.77575e-4, unit="kg m^2", low=0.0, high=10.0, provenance="derived", source=_FREQUENCY
     )
     """Moment of inertia of the yoke about the slider pivot [kg m^2]."""
-    yoke_offset_along: float = parameter(-8e-3, unit="m", low=-0.1, high=0.1, provenance="calibrated", source=_FIT)
+    yoke_offset_along: float = parameter(0.01844, unit="m", low=-0.1, high=0.1, provenance="calibrated", source=_FIT)
     """Centre of gravity of the yoke from the slider pivot, positive away from the crank [m]."""
     yoke_offset_across: float = parameter(0.0, unit="m", low=-0.1, high=0.1, provenance="assumed", source="symmetry")
     """Centre of gravity of the yoke across the rod [m]."""
-    slider_mass: float = parameter(0.22, unit="kg", low=1e-3, high=100.0, provenance="calibrated", source=_FIT)
+    slider_mass: float = parameter(
+        0.1791,
+        unit="kg",
+        low=1e-3,
+        high=100.0,
+        provenance="derived",
+        source="share of the lateral mass: 0.254 mm is 0.016, thesis 4.5.1",
+    )
     """Slider [kg]."""
     slider_pitch_inertia: float = parameter(
         2e-4, unit="kg m^2", low=1e-9, high=10.0, provenance="assumed", source="a block 100 mm long"
@@ -234,21 +230,15 @@ class SliderCrank(Machine):
         50.0, unit="N", low=1e-3, high=1e6, provenance="assumed", source="middle of the printed forces"
     )
     """Force [N] at which the Hertzian law has the linear law's secant stiffness and restitution."""
-    contact_stiffness: float = parameter(
-        1.5e7, unit="N/m", low=1e3, high=1e12, provenance="assumed", source="that of the beam's sensors, thesis 3.3"
-    )
+    contact_stiffness: float = parameter(1.552e7, unit="N/m", low=1e3, high=1e12, provenance="calibrated", source=_FIT)
     """Linearised Hertzian stiffness of a joint [N/m]; the stations of an instrumented slider joint share it."""
     contact_damping_ratio: float = parameter(
         0.05, low=0.0, high=100.0, provenance="printed", source="thesis 4.5.4: 2.5 % and 5 %"
     )
     """Damping ratio of a joint in contact, related to ``contact_damping_mass``."""
-    contact_damping_mass: float = parameter(
-        0.0, unit="kg", low=0.0, high=1e3, provenance="assumed", source="slider and yoke; no mass is in print (3.3)"
-    )
+    contact_damping_mass: float = parameter(6.908, unit="kg", low=0.0, high=1e3, provenance="calibrated", source=_FIT)
     """Mass to which the contact damping ratio is related [kg]; 0: that of slider and yoke."""
-    ball_damping_mass: float = parameter(
-        0.0, unit="kg", low=0.0, high=1e3, provenance="assumed", source="as for the slider joint"
-    )
+    ball_damping_mass: float = parameter(0.48, unit="kg", low=0.0, high=1e3, provenance="calibrated", source=_FIT)
     """The same for the ball joint [kg]; 0: that of the slider joint."""
     friction_coefficient: float = parameter(
         0.0, low=0.0, high=0.5, provenance="printed", source="thesis 4.5.3: 0 and 0.1"
@@ -448,26 +438,8 @@ class SliderCrank(Machine):
         return (CrankBatch if has_propagators(self) else SteppedCrankBatch)(self, count)
 
 
-THESIS_SLIDER_CRANK = SliderCrank(**{name: one.value for name, one in THESIS_FIT.items()})
-"""The thesis' crank, fitted on all its statements; ``SliderCrank.thesis_fit`` says where each number comes from."""
-
-SUPERHARMONIC_SLIDER_CRANK = SliderCrank(
-    fitted_modes=0,
-    matrix_update_interval=1.0,
-    crank_speed=1508.0,
-    slider_clearance=0.127e-3,
-    n_modes=4,
-    damping_ratio=0.0007,
-    damping_family="uniform",
-    housing_mass=0.4,
-    housing_inertia=5.68e-4,
-    housing_offset_along=0.035,
-    yoke_mass=0.25,
-    yoke_inertia=5.68e-4,
-    yoke_offset_along=-0.040,
-    slider_mass=0.1,
-)
-"""The mechanism of figure 4.18: end bodies whose centres of gravity lie along the rod excite its first mode."""
+THESIS_SLIDER_CRANK = SliderCrank(fitted_modes=0, matrix_update_interval=5.0)
+"""The default crank in the thesis' own reduction (5.2.2), in which its constants were fitted."""
 
 
 def frequencies_at(machine: SliderCrank, crank_angle: float) -> Array:

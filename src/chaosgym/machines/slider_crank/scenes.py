@@ -3,15 +3,13 @@
 from collections.abc import Mapping
 from typing import Any
 
-from chaosgym.machines.options import Choice, Number, Option, constants
-from chaosgym.machines.slider_crank.thesis_fit import THESIS_FIT
+from chaosgym.machines.options import Choice, Number, Option
 
 STANDARD_GRAVITY = 9.81
 
 _BALL_ALONE = {"slider_joint": "ideal", "gravity": STANDARD_GRAVITY}
 
 OPTIONS: Mapping[str, Option] = {
-    "--constants": constants(THESIS_FIT),
     "--clearance-joint": Choice(
         {
             "slider": {"slider_joint": "clearance", "ball_joint": "ideal"},

@@ -3,9 +3,9 @@
 from chaosgym.machines.machine import Work
 
 WORK = Work(
-    # figure 4.14b; the contact damping is assumed. More of it makes Type III rare, and backing off is as good as
-    # knowing the machine; if it varies too, or the rod does, the clearance tells little (docs/development/tasks.md)
-    fields={"slider_clearance": 0.254e-3, "contact_damping_ratio": 0.10},
+    # figure 4.14b, with more than the printed 5 % of contact damping (assumed), with which hardly a speed is calm; with
+    # 8 % backing off finds a calm one at once (docs/development/tasks.md)
+    fields={"slider_clearance": 0.254e-3, "contact_damping_ratio": 0.065},
     model_fidelity="draft",
     tolerances={"slider_clearance": 0.1},
     task={
@@ -24,6 +24,6 @@ WORK = Work(
         "kick": 3e-4,
         "speed_ripple": 0.0,
         "deviation_weight": 0.0125,
-        "load_rating": 141.3,
+        "load_rating": 140.0,
     },
 )
