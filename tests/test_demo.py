@@ -11,7 +11,7 @@ from chaosgym.sweeps import Axis
 @pytest.mark.filterwarnings("ignore:CUDA initialization")
 def test_demo_computes_every_number_and_draws_the_figure(tmp_path, monkeypatch):
     """Three points of the printed natures, a typed sweep, a judged classifier, an agent beside two rules."""
-    axes = (Axis("excitation_frequency", 6.0, 30.0, 24, "log"), Axis("clearance", 1.0e-4, 1.45e-4, 5, "log"))
+    axes = (Axis("excitation_frequency", 6.0, 30.0, 24, "log"), Axis("clearance", 1.07e-4, 1.47e-4, 5))
     monkeypatch.setattr(demo, "AXES", axes)
     monkeypatch.setattr(demo, "TRAINING_STEPS", 1600)
     monkeypatch.setattr(demo, "MACHINES", 2)

@@ -23,7 +23,7 @@ PATIENT = """try:
         raise SystemExit(7)"""
 """What Python can end by itself, in its own way."""
 
-REVOLUTION = ("slider-crank", "--set", "n_modes=16", "--clearance-joint", "ball-spherical")
+REVOLUTION = ("slider-crank", "--set", "n_modes=12", "--clearance-joint", "ball-spherical")
 """A crank that takes millions of steps a revolution, within its budget: some seconds in one call of a kernel."""
 
 COMMANDS = {

@@ -125,7 +125,8 @@ def test_worked_example_of_the_documentation(chaotic):
     assert shown.keys() == given.keys() == {"fatigue life", "reliability", "load rating"}
     assert given == pytest.approx(shown, rel=0.1)
     assert chaotic.assessment.type == "III"
-    assert chaotic.improvement.best.changes["clearance"] == pytest.approx(9.87e-5, rel=0.15)
+    printed = re.search(r"cheapest change that meets all criteria: clearance = (\S+) ", page)
+    assert chaotic.improvement.best.changes["clearance"] == pytest.approx(float(printed[1]), rel=0.15)
 
 
 def test_examples_of_the_documentation():

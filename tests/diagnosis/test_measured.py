@@ -12,6 +12,10 @@ SEEDS = range(7000, 7042)
 """Seeds of the full table; thresholds were set on seeds below 4000."""
 
 
+ANSWERS = ("right", "wrong", "undetermined")
+"""Columns of the table."""
+
+
 def totals(counts, clear):
     """Records by answer."""
     found = {"right": 0, "wrong": 0, "undetermined": 0, "within": 0}
@@ -24,6 +28,10 @@ def totals(counts, clear):
 def check(counts, wrong):
     """No confident error above 1 % of all records, at most 10 % undetermined away from boundaries."""
     clear, edge = totals(counts, True), totals(counts, False)
+    print("| kind | right | wrong | undetermined | at a boundary: right | wrong | undetermined |")
+    for kind in dict.fromkeys(kind for kind, _, _ in counts):
+        columns = [counts.get((kind, where, what), 0) for where in (True, False) for what in ANSWERS]
+        print("|", " | ".join(map(str, [kind, *columns])), "|")
     print(f"away from boundaries {clear}, at boundaries {edge}")
     told = [(seed, record.kind, verdict.diagnosis.reason) for seed, record, verdict in wrong]
     assert clear["wrong"] + edge["wrong"] <= 0.01 * sum(counts.values()), told

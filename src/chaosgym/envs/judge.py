@@ -9,8 +9,8 @@ those of the cycles before, at every period up to eight, by more than 2 % of the
 change of speed are compared with nothing. A step of less than 20 cycles is judged with those before it, so that a speed
 which changes in every cycle is judged too.
 
-Under speed ripple recurrence can't tell chaos from a motion that the ripple shakes, which is why the beam is not
-judged by it: ``python -m benchmarks judges`` measures both.
+On the beam recurrence takes weak chaos for calm, which is why the beam is not judged by it: ``python -m benchmarks
+judges`` measures both.
 """
 
 from typing import Protocol

@@ -84,9 +84,9 @@ def _how_made(plan: SweepPlan, info: Mapping[str, Any], folder: Path) -> str:
         )
     return (
         f"## How it was made\n\n    {sweep_command(plan, str(folder))}\n\n"
-        f"{crosses}Every point is run from rest and diagnosed in stages of 100, 200, ... cycles, {plan.budget} at the "
-        "most; one that is undetermined may take eight times as many. The other parameters are those of the base "
-        "machine in the file's metadata.\n\n"
+        f"{crosses}Every point is run from rest and diagnosed in stages of 16, 32, 100, 200, ... cycles, {plan.budget} "
+        "at the most; one that is undetermined may take eight times as many. The other parameters are those of the "
+        "base machine in the file's metadata.\n\n"
         "| field | range | unit | uniform in |\n|---|---|---|---|\n" + "\n".join(ranges)
     )
 

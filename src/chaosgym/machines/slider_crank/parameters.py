@@ -115,7 +115,7 @@ class SliderCrank(Machine):
     rod: str = parameter("flexible", choices=("flexible", "rigid"), provenance="printed", source="thesis 4.3.1")
     """Whether the rod bends and stretches."""
     n_modes: int = parameter(3, low=1, high=40, provenance="calibrated", source=_FIT)
-    """Bending modes of the flexible rod, in each plane; three and none fitted in the fit."""
+    """Bending modes of the flexible rod, in each plane; the fit to the thesis kept three and ``fitted_modes`` 0."""
     fitted_modes: int = parameter(1, low=0, high=6, provenance="assumed", source="a matter of computing")
     """Modes added that stand for all that are left out: they give the slider the rod's inertia."""
     damping_ratio: float = parameter(0.01077, low=0.0, high=100.0, provenance="calibrated", source=_FIT)
@@ -128,7 +128,10 @@ class SliderCrank(Machine):
     damping_exponent: float = parameter(1.3257, low=-2.0, high=4.0, provenance="calibrated", source=_FIT)
     """Exponent of the frequency in the structural damping ratio of a mode, with damping_family = "power"."""
     geometric_stiffness: str = parameter(
-        "off", choices=("off", "on"), provenance="calibrated", source="figure 4.18: 2500 N only without it"
+        "off",
+        choices=("off", "on"),
+        provenance="calibrated",
+        source="figure 4.18: 2500 N only without it, by a set of its own",
     )
     """Whether tension in the rod stiffens it."""
     youngs_modulus: float = parameter(2.068e11, unit="Pa", low=1e8, high=1e13, provenance="assumed", source=_STEEL)
@@ -197,7 +200,7 @@ class SliderCrank(Machine):
         provenance="printed",
         source="thesis figure 4.14; adjustable to 1 mm, 4.2",
     )
-    """Half the gap of the slider joint [m]; in one of 20 mm the slider of the thesis touches nothing."""
+    """Half the gap of the slider joint [m]."""
     ball_clearance: float = parameter(
         0.127e-3,
         unit="m",
@@ -307,7 +310,7 @@ class SliderCrank(Machine):
 
     @property
     def damped_mass(self) -> float:
-        """Mass [kg] to which the contact damping ratio is related: by default that of slider and yoke."""
+        """Mass [kg] to which the contact damping ratio is related: ``contact_damping_mass``, or slider and yoke."""
         return self.contact_damping_mass or self.slider_mass + self.yoke_mass
 
     @property

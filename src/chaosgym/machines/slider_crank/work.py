@@ -3,8 +3,8 @@
 from chaosgym.machines.machine import Work
 
 WORK = Work(
-    # figure 4.14b, with more than the printed 5 % of contact damping (assumed), with which hardly a speed is calm; with
-    # 8 % backing off finds a calm one at once (docs/development/tasks.md)
+    # figure 4.14b, with an assumed contact damping of 6.5 %: with the printed 5 % hardly a speed is calm, with 8 %
+    # backing off finds a calm one at once (docs/development/tasks.md)
     fields={"slider_clearance": 0.254e-3, "contact_damping_ratio": 0.065},
     model_fidelity="draft",
     tolerances={"slider_clearance": 0.1},
