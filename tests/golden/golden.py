@@ -6,6 +6,7 @@ result, and say in the commit by how much it moved.
 
 import json
 from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ from chaosgym import ImpactBeam, SliderCrank
 from chaosgym.envs import ENVIRONMENTS
 
 STORED = Path(__file__).with_name("golden.json")
+VERSIONS = Path(__file__).with_name("versions.json")
+"""Versions of what compiles and computes, with which the set was written: others round otherwise."""
 
 CYCLES, TRANSIENT = 6, 2
 """Cycles of a record, and before it: short, so that chaos does not magnify what differs."""
@@ -130,5 +133,11 @@ def golden() -> dict[str, Any]:
     return result
 
 
+def versions() -> dict[str, str]:
+    """Versions at hand."""
+    return {name: version(name) for name in ("llvmlite", "numba", "numpy", "scipy")}
+
+
 if __name__ == "__main__":
     STORED.write_text(json.dumps(golden(), indent=0) + "\n")
+    VERSIONS.write_text(json.dumps(versions(), indent=0) + "\n")

@@ -14,6 +14,8 @@ STORED = json.loads(golden.STORED.read_text())
 )
 def test_the_golden_set_is_repeated_bit_for_bit(part, compute):
     """Records, labels and observations are those that were kept, to the last digit."""
+    if golden.versions() != (written := json.loads(golden.VERSIONS.read_text())):
+        pytest.skip(f"the set was written with {written}")
     found = golden.plain(compute())
     assert sorted(found) == sorted(STORED[part])
     for name, values in STORED[part].items():

@@ -306,6 +306,6 @@ def _one_matrix(path: Path) -> Any:
     from scipy.io import mmread
 
     try:
-        return np.load(path, allow_pickle=False) if path.suffix == ".npy" else mmread(path)
+        return np.load(path, allow_pickle=False) if path.suffix == ".npy" else mmread(path, spmatrix=False)
     except (OSError, ValueError) as error:
         raise ParameterError(f"{path} can't be read as a matrix: {str(error).splitlines()[0]}") from None
