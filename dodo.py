@@ -133,9 +133,11 @@ def task_page():
 
 
 def task_picture():
-    """Pictures of the rattling beam, of the trade-off and of the extremes."""
+    """Pictures of the rattling beam, of an agent at work, of the trade-off and of the extremes."""
     rattle = "benchmarks/documentation/rattle.py"
     yield task("rattle", [rattle], ["docs/rattle.gif"], "python -m benchmarks.documentation.rattle docs/rattle.gif")
+    play = "chaosgym run-agent chaosgym/ImpactBeamTolerance-v1 --machine 13 --out docs/agent.gif"
+    yield task("agent", [*TASKS, *LEARNED], ["docs/agent.gif"], play)
     curves, drawn = "docs/data/training.csv", "docs/training.png"
     draw = f"python -m benchmarks curves --table {curves} --figure {drawn}"
     yield task("training", [curves, "benchmarks/envs/curves.py"], [drawn], draw)
