@@ -39,6 +39,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--steps", type=int, default=300_000)
     parser.add_argument("--out", type=Path, default=Path("runs/recurrent"))
+    parser.add_argument("--fidelity", default=None, help="Rung of the machines in training; default: the task's.")
     parser.add_argument("--envs", type=int, default=64)
     parser.add_argument("--every", type=int, default=10_000, help="Steps between rows and checkpoints.")
     parser.add_argument("--rollout", type=int, default=60)
@@ -112,7 +113,7 @@ def main() -> None:
 
 def train(asked: argparse.Namespace) -> None:
     """Train, or go on, until the steps are done."""
-    envs = VecNormalize(VecMonitor(SB3VecEnv(asked.env, asked.envs)), gamma=asked.gamma)
+    envs = VecNormalize(VecMonitor(SB3VecEnv(asked.env, asked.envs, fidelity=asked.fidelity)), gamma=asked.gamma)
     model, kept = load_checkpoint(asked.out, RecurrentPPO, envs) or (None, None)
     if model is None:
         model = RecurrentPPO(
