@@ -26,6 +26,15 @@ def test_import_is_light():
     assert loaded == "[]"
 
 
+def test_simulating_imports_few_modules():
+    """The simplest command loads what it needs: not the other machine, nor diagnosis, sweeps, learning or plotting."""
+    code = (
+        "import sys; from chaosgym.cli import app; app(['simulate', 'impact-beam'], standalone_mode=False);"
+        "print(sum(name.partition('.')[0] == 'chaosgym' for name in sys.modules))"
+    )
+    assert int(_python(code).splitlines()[-1]) <= 45
+
+
 def test_classifying_needs_neither_torch_nor_scikit_learn():
     """Inference is numpy alone."""
     code = (
@@ -102,7 +111,7 @@ def test_no_floor_above_the_machines_reaches_into_the_folder_of_one():
     ]
     assert {place.partition(":")[0] for place in guilty} == {
         "src/chaosgym/__init__.py",
-        "src/chaosgym/cli/new_machine.py",
+        "src/chaosgym/cli/simulate.py",
     }
 
 

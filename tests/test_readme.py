@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from chaosgym.machines.registry import MACHINES
+from chaosgym.machines import MACHINES
 
 README = (Path(__file__).parent.parent / "README.md").read_text()
 

@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from chaosgym.machines.machine import Number, Option
 from chaosgym.machines.modal_impact import ModalImpactMachine, Modes, flexible_model
-from chaosgym.machines.options import Number, Option
 from chaosgym.machines.parameters import parameter
 
 

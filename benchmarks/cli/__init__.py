@@ -8,9 +8,9 @@ import click
 
 from benchmarks.cli.bench import bench
 from chaosgym.cli import run_command
-from chaosgym.cli.dataset import AS_JSON, FOLDER
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import emit
+from chaosgym.cli.sweep import AS_JSON, FOLDER
 from chaosgym.envs import ENVIRONMENTS
 
 

@@ -18,8 +18,7 @@ from tqdm import tqdm
 
 from benchmarks.performance.timing import Rate, rate
 from chaosgym.classifier import default_classifier
-from chaosgym.machines import ImpactBeam, Machine, SliderCrank
-from chaosgym.machines.registry import MACHINES
+from chaosgym.machines import MACHINES, ImpactBeam, Machine, SliderCrank
 from chaosgym.simulation import ExactEvents, Integrator, RungeKutta4, simulate
 from chaosgym.sweeps import SweepPlan, run_sweep
 from chaosgym.sweeps.plan import default_axes

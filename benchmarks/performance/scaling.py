@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.performance.rates import SUB_ENVIRONMENTS
 from chaosgym.envs.jobs import Indices
-from chaosgym.machines.registry import MACHINES
+from chaosgym.machines import MACHINES
 from chaosgym.simulation.batch import Batch, Cycles
 
 WARM_UP_STEPS = 12

@@ -20,8 +20,7 @@ from chaosgym.explore.point import (
     sliders_of,
     view_of,
 )
-from chaosgym.machines import ImpactBeam, SliderCrank
-from chaosgym.machines.registry import MACHINES
+from chaosgym.machines import MACHINES, ImpactBeam, SliderCrank
 from tests.third_machine import ImpactOscillator
 
 BEAM = ImpactBeam(excitation_frequency=19.0, clearance=1e-4)

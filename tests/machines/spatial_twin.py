@@ -16,7 +16,7 @@ ANGLE_STEP, SHIFT = 0.02, 1e-3
 
 
 class Equations(NamedTuple):
-    """Linearised equations: M, D and K per powers of the crank rate, and the load, as in ``crank_equations``."""
+    """Linearised equations: M, D and K per powers of the crank rate, and the load, as in ``equations``."""
 
     mass: np.ndarray
     damping: np.ndarray

@@ -1,17 +1,17 @@
-"""What the classifier says of a machine, of measured records, of many at once, or live: ``classify``."""
+"""The commands ``classify`` and ``train-classifier``: what the classifier says, and how it is trained."""
 
 import os
 import sys
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import click
 
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, verdict_lines
-from chaosgym.cli.output import emit, patience
-from chaosgym.cli.plot_option import draw, picture_path, plot_option
-from chaosgym.machines.registry import MACHINES
+from chaosgym.cli.output import draw, emit, patience, picture_path, plot_option
+from chaosgym.machines import MACHINES
 
 KERNELS = ("--follow", "--batch")
 """Options under which the machine code of the kernels is worth its loading."""
@@ -214,3 +214,35 @@ def _follow(lines: Iterable[str], sensor_error: float | None, log: str | None, a
             sys.stdout.flush()
     if monitor.cycle == 0:
         raise click.UsageError("--follow found no peak on standard input")
+
+
+@click.command("train-classifier")
+@click.option(
+    "--data",
+    type=click.Path(exists=True, file_okay=False),
+    required=True,
+    multiple=True,
+    help="Folder of a finished sweep; repeatable, one classifier each.",
+)
+@click.option("--out", type=click.Path(), required=True, help="New folder: classifier, report and card; one a machine.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def train_classifier(data: tuple[str, ...], out: str, seed: int, as_json: bool) -> None:
+    """Train the classifier on a sweep and judge it on machines held out (needs the extra [learn])."""
+    from chaosgym.classifier.train import report_table
+    from chaosgym.classifier.train import train_classifier as train
+    from chaosgym.sweeps import read_sweep
+
+    target = Path(out)
+    if target.exists() and (not target.is_dir() or any(target.iterdir())):
+        raise click.UsageError(f"--out {out} exists already and is not an empty folder; choose another one")
+    if not target.absolute().parent.is_dir():
+        raise click.UsageError(f"--out {out} lies in a folder that does not exist")
+    reports = {}
+    for folder in data:
+        trained = train(read_sweep(folder), seed, progress=True)
+        name = trained.classifier.machine.name
+        trained.save(target / name if len(data) > 1 else target)
+        reports[name] = trained.report
+    result = {"out": out, **(reports if len(data) > 1 else next(iter(reports.values())))}
+    emit(result, as_json, lambda: [line for name, report in reports.items() for line in (name, *report_table(report))])

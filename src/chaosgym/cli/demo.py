@@ -1,7 +1,10 @@
-"""The command ``demo``: what chaosgym does, in a few minutes."""
+"""The commands ``demo`` and ``explore``: what chaosgym does, in a few minutes or in the browser."""
+
+from typing import Any
 
 import click
 
+from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.output import emit
 
 
@@ -15,3 +18,34 @@ def demo(out: str, seed: int, as_json: bool) -> None:
 
     result = run_demo(out, seed, say=lambda line: click.echo(line, err=True))
     emit(result, as_json, lambda: demo_table(result))
+
+
+@machine_command(required=False)
+@click.option("--port", type=click.IntRange(0, 65535), default=5006, show_default=True, help="0: any that is free.")
+@click.option("--browser/--no-browser", default=True, show_default=True, help="Open the page in the usual browser.")
+def explore(machine: Any, port: int, browser: bool, as_json: bool) -> None:
+    """Drag sliders and watch motion, forces, verdict and classifier of a machine; Ctrl-C ends (extra [explore])."""
+    import errno
+    import json
+
+    from chaosgym.errors import ChaosgymError
+    from chaosgym.machines import ImpactBeam
+
+    try:
+        from chaosgym.explore.server import serve
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "bokeh":
+            raise
+        raise ChaosgymError("explore needs bokeh: pip install '.[explore]' in a clone of chaosgym") from None
+
+    def ready(address: str) -> None:
+        click.echo(json.dumps({"address": address}) if as_json else f"{address}   (Ctrl-C ends)")
+        if browser:
+            click.launch(address)
+
+    try:
+        serve(machine or ImpactBeam(), port, ready)
+    except OSError as error:
+        if error.errno != errno.EADDRINUSE:
+            raise
+        raise click.UsageError(f"--port {port} is taken; choose another one, or 0 for any that is free") from error

@@ -6,10 +6,9 @@ from typing import Any
 
 import click
 
+from chaosgym.cli.machine_options import Quantity
 from chaosgym.cli.measured_options import Measured, measured_options, measured_runs
-from chaosgym.cli.output import emit
-from chaosgym.cli.plot_option import draw, picture_path, plot_option
-from chaosgym.cli.quantity import Quantity
+from chaosgym.cli.output import draw, emit, picture_path, plot_option
 
 
 @click.command()

@@ -3,7 +3,7 @@
 import click
 
 from chaosgym.cli.output import emit
-from chaosgym.machines.registry import MACHINES
+from chaosgym.machines import MACHINES
 from chaosgym.version import __version__
 
 

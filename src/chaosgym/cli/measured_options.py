@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import click
 
-from chaosgym.cli.quantity import Quantity
+from chaosgym.cli.machine_options import Quantity
 
 OPTIONS = (
     click.option("--peaks", metavar="FILE", help="Peak forces, one a cycle: CSV, Parquet, .npy, .mat; - is stdin."),

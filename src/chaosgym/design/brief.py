@@ -12,9 +12,8 @@ from chaosgym.design.improve import default_changes
 from chaosgym.design.methodology import SERIES_SIZE
 from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError
-from chaosgym.machines import MACHINES, Machine
+from chaosgym.machines import FILE_ENDING, MACHINES, Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
-from chaosgym.machines.registry import FILE_ENDING
 from chaosgym.machines.units import parse_quantity
 
 REQUIRED_CRITERIA = ("load_rating", "life", "reliability")

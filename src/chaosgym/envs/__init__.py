@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 from gymnasium.envs.registration import EnvSpec, register, registry
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.registry import FILE_ENDING, MACHINES
+from chaosgym.machines import FILE_ENDING, MACHINES
 
 TASKS: dict[str, dict[str, Any]] = {
     "": {"tolerances": {}},

@@ -19,9 +19,9 @@ from chaosgym.envs.setups import setup_of
 from chaosgym.envs.task import Status, Task, split
 from chaosgym.envs.variants import Variants, checked_numbers
 from chaosgym.errors import ParameterError
+from chaosgym.machines import MACHINES
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import with_settings
-from chaosgym.machines.registry import MACHINES
 from chaosgym.simulation import CycleRecord
 
 if TYPE_CHECKING:

@@ -23,9 +23,8 @@ from chaosgym.explore.point import (
     sliders_of,
     view_of,
 )
-from chaosgym.machines import Machine
+from chaosgym.machines import MACHINES, Machine
 from chaosgym.machines.parameters import with_settings
-from chaosgym.machines.registry import MACHINES
 from chaosgym.plotting.style import ACCENT, BAD, INK, MUTED, NATURE_COLOURS, PALE
 
 PAUSE = 15

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from chaosgym.classifier import classifier_for
 from chaosgym.diagnosis import Diagnosis, diagnose
 from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
-from chaosgym.machines import Machine
+from chaosgym.machines import FILE_ENDING, MACHINES, Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
-from chaosgym.machines.registry import FILE_ENDING, MACHINES
 from chaosgym.monitor import Monitor
 from chaosgym.simulation import simulate
 
@@ -137,7 +136,7 @@ def python_of(machine: Machine) -> str:
     kind = type(machine)
     fields = ", ".join(f"{name}={value!r}" for name, value in changes_of(machine).items())
     if machine.name.endswith(FILE_ENDING):
-        return _python("from chaosgym.machines.registry import MACHINES", f"MACHINES[{machine.name!r}]({fields})")
+        return _python("from chaosgym.machines import MACHINES", f"MACHINES[{machine.name!r}]({fields})")
     home = "chaosgym" if kind.__module__.startswith("chaosgym.") else kind.__module__
     return _python(f"from {home} import {kind.__name__}", f"{kind.__name__}({fields})")
 

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -11,13 +11,35 @@ from numpy.typing import NDArray
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
-from chaosgym.machines.fidelity import FidelityLadder
 from chaosgym.machines.integrators import ExactEvents, Integrator
-from chaosgym.machines.options import Option
-from chaosgym.machines.parameters import check_parameter, validate
+from chaosgym.machines.parameters import check_parameter, expand_fidelity, validate
 
 if TYPE_CHECKING:
     from chaosgym.machines.batch import CompiledBatch
+
+
+class Number(NamedTuple):
+    """A number: the field that it sets, its unit on the command line, and how many SI units that is.
+
+    ``joints`` are the words of ``--clearance-joint`` with which it makes sense; all if there are none.
+    """
+
+    field: str
+    unit: str
+    factor: float = 1.0
+    joints: tuple[str, ...] = ()
+
+
+class Choice(NamedTuple):
+    """A word: the fields that each word sets, and the options that it redirects to another field."""
+
+    words: Mapping[str, Mapping[str, Any]]
+    redirects: Mapping[str, Mapping[str, str]] = {}
+    joints: tuple[str, ...] = ()
+
+
+Option = Number | Choice
+"""An option of a machine on the command line: a short name in shop-floor units for some of its fields."""
 
 Array = NDArray[np.float64]
 
@@ -44,16 +66,20 @@ class Work(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Machine(FidelityLadder, ABC):
+class Machine(ABC):
     """A frozen dataclass of parameters in SI units, and how the machine runs.
 
     A subclass declares its fields with ``parameter`` and defines what is abstract here. The rest has a default.
     ``ModalImpactMachine`` defines all but the fields and the model of a machine that is a few modes and one gap.
 
+    The keyword ``fidelity`` sets the fields of a rung of the ladder, as in ``ImpactBeam(fidelity="draft")``. A machine
+    keeps the fields, not the name, so that ``dataclasses.replace`` and ``with_settings`` may change any of them.
+
     Raises
     ------
     ParameterError
-        On construction, if a field is outside its range; names the field, the value and the range.
+        On construction, if a field is outside its range, if the rung is unknown, or if a field that it sets is given
+        too; names the field, the value and what is allowed.
     """
 
     name: ClassVar[str]
@@ -66,6 +92,8 @@ class Machine(FidelityLadder, ABC):
     """Names of the bearing surfaces whose contact force is recorded."""
     fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {"reference": {}}
     """Fields that each rung sets, from the cheapest rung to the reference."""
+    former_rungs: ClassVar[Mapping[str, str]] = {}
+    """Rungs of earlier versions, and what stands for them now."""
     options: ClassVar[Mapping[str, Option]] = {}
     """Options on the command line, in the order in which they take effect; other fields are reached by ``--set``."""
     scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = {"as it is": {}}
@@ -78,9 +106,25 @@ class Machine(FidelityLadder, ABC):
     work: ClassVar[Work] = Work()
     """What environments start from, where the usual does not serve."""
 
+    fidelity: InitVar[str | None] = None
+
+    def __new__(cls, **given: Any) -> Self:
+        """Refuse a rung together with a field that it sets: only here is it known what was given."""
+        expand_fidelity(cls, given)
+        return super().__new__(cls)
+
     def __post_init__(self, fidelity: str | None) -> None:
-        super().__post_init__(fidelity)
+        for name, value in expand_fidelity(type(self), {"fidelity": fidelity}).items():
+            object.__setattr__(self, name, value)
         validate(self)
+
+    @property
+    def rung(self) -> str | None:
+        """Rung of the ladder whose fields this machine has; None if it stands beside the ladder."""
+        for rung, fields in self.fidelity_ladder.items():
+            if all(getattr(self, name) == value for name, value in fields.items()):
+                return rung
+        return None
 
     @property
     def definition(self) -> str:

@@ -1,7 +1,8 @@
 """Machine parameters: numbers with a unit, an allowed range and a provenance.
 
 A machine is a frozen dataclass whose fields are made by ``parameter``. Default, unit, range and source of a number
-live there and nowhere else; validation, the command line and the documentation read them.
+live there and nowhere else; validation, the command line and the documentation read them. A rung of the fidelity
+ladder is a short name for some fields that are set together and that decide accuracy alone.
 """
 
 import math
@@ -12,7 +13,6 @@ from types import MappingProxyType
 from typing import Any, Literal, TypeVar
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.fidelity import expand_fidelity
 
 Provenance = Literal["printed", "derived", "calibrated", "assumed", "stated"]
 """printed: in the thesis; derived: follows from printed numbers; calibrated: fitted to printed results; assumed;
@@ -139,3 +139,30 @@ def markdown_table(machine: Any) -> list[str]:
         unit = "" if about.unit == "-" else about.unit
         rows.append(f"| `{name}` | {shown} | {unit} | {' | '.join(origin_of(machine, name))} |")
     return rows
+
+
+def expand_fidelity(machine: Any, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings with ``fidelity`` replaced by the fields that it sets.
+
+    Raises
+    ------
+    ParameterError
+        If the rung is unknown, or if a field that it sets is given too; names both.
+    """
+    others = {name: value for name, value in settings.items() if name != "fidelity"}
+    rung = settings.get("fidelity")
+    if rung is None:
+        return others
+    ladder = getattr(machine, "fidelity_ladder", {})
+    former = getattr(machine, "former_rungs", {})
+    if rung in former:
+        raise ParameterError(f"fidelity = {rung!r} is no rung any more; allowed: {former[rung]}")
+    if rung not in ladder:
+        raise ParameterError(f"fidelity = {rung!r} is not one of {', '.join(ladder)}")
+    for name, value in ladder[rung].items():
+        if name in others:
+            raise ParameterError(
+                f"fidelity = {rung!r} sets {name} = {value!r}, and {name} = {others[name]!r} is given too; "
+                "allowed: one of the two"
+            )
+    return {**others, **ladder[rung]}

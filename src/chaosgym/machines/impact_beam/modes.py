@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.beam_element import bending_matrices, graded_mesh
-from chaosgym.machines.fitted_modes import fitted_modes
+from chaosgym.machines.beam_element import bending_matrices, fitted_modes, graded_mesh
 from chaosgym.machines.impact_beam.parameters import BeamParameters
 from chaosgym.machines.modal_impact import Modes
 

@@ -15,9 +15,8 @@ from typing import Any, ClassVar
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.impact_beam.work import WORK
-from chaosgym.machines.machine import Work
+from chaosgym.machines.machine import Number, Option, Work
 from chaosgym.machines.modal_impact import ModalImpactMachine
-from chaosgym.machines.options import Number, Option
 from chaosgym.machines.parameters import parameter
 
 _FIT = "fitted to the statements, see docs/development/calibration.md"

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.errors import ParameterError
+from chaosgym.machines.machine import Number, Option
 from chaosgym.machines.modal_impact import ModalImpactMachine, Modes, Stop, flexible_model
 from chaosgym.machines.modal_machine.drive import Drive, checked, modal_drive
 from chaosgym.machines.modal_machine.structure import Structure
-from chaosgym.machines.options import Number, Option
 from chaosgym.machines.parameters import parameter
 
 Array = NDArray[np.float64]

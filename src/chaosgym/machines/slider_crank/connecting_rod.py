@@ -25,8 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.machines.beam_element import bending_matrices, interpolation
-from chaosgym.machines.fitted_modes import fitted_modes
+from chaosgym.machines.beam_element import bending_matrices, fitted_modes, interpolation
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ A motor turns the crank at constant speed. A ball joint drives a slender steel r
 slider that runs along a straight guide (thesis 4.2). Clearance in the slider joint lets the slider rattle across the
 guide, clearance in the ball joint lets the ball rattle in its housing.
 
-Nominal kinematics and rod (``kinematics``, ``connecting_rod``) -> equations of small motions (``crank_equations``),
+Nominal kinematics and rod (``kinematics``, ``connecting_rod``) -> equations of small motions (``equations``),
 held over bins of crank angle -> exact propagators (``core.crank_propagator``) -> SliderCrankModel.
 
 Gravity is off by default. With the mechanism's plane upright, the slider's weight keeps it on the guide below about
@@ -33,8 +33,7 @@ from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.batch import CompiledBatch
 from chaosgym.machines.integrators import Integrator
-from chaosgym.machines.machine import Machine, Work
-from chaosgym.machines.options import Option
+from chaosgym.machines.machine import Machine, Option, Work
 from chaosgym.machines.parameters import parameter
 from chaosgym.machines.slider_crank import run as running
 from chaosgym.machines.slider_crank.batch import CrankBatch, SteppedCrankBatch

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from chaosgym.machines.options import Choice, Number, Option
+from chaosgym.machines.machine import Choice, Number, Option
 
 STANDARD_GRAVITY = 9.81
 
