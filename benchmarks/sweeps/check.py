@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from chaosgym.errors import DatasetError
 from chaosgym.sweeps.dataset import LabelledSweep
-from chaosgym.sweeps.provenance import provenance
+from chaosgym.sweeps.label import provenance
 from chaosgym.sweeps.run import relabel
 
 SOURCES = ("commit", "physics")

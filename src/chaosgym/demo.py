@@ -89,7 +89,7 @@ def run_demo(folder: str | Path, seed: int = 0, say: Callable[[str], None] = pri
         "agent": {name: _agent_row(played) for name, played in jobs.items()},
         "figure": str(folder / "overview.png"),
     }
-    from chaosgym.plotting.overview import overview
+    from chaosgym.plotting.played_job import overview
 
     figure = overview(records, sweep, trained.classifier, jobs["agent"])
     figure.savefig(folder / "overview.png", dpi=130)

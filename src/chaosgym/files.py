@@ -1,20 +1,22 @@
 """Files that are either whole or not there, also after a crash, and folders that one process at a time writes into.
 
-Archives of arrays are read without pickle, and only as far as a bound on their unpacked size allows.
+Archives of arrays are read without pickle, and only as far as a bound on their unpacked size allows. Tables are CSV or
+Parquet by the end of the name.
 """
 
 import io
 import os
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from filelock import FileLock, Timeout
+from numpy.typing import ArrayLike
 
-from chaosgym.errors import UnfinishedError
+from chaosgym.errors import DatasetError, UnfinishedError
 
 LOCK_FILE = ".lock"
 TEMPORARY = ".*.tmp"
@@ -98,3 +100,34 @@ def _array(member: bytes) -> Any:
         return np.load(io.BytesIO(member), allow_pickle=False)
     except MemoryError:
         raise ValueError("an array claims more bytes than the computer has") from None
+
+
+def check_target(path: str | Path, overwrite: bool) -> None:
+    """Check that a table may be written before it is computed.
+
+    Raises
+    ------
+    DatasetError
+        If the name ends in neither .csv nor .parquet, the folder is missing, or the file exists.
+    """
+    target = Path(path)
+    if target.suffix not in (".csv", ".parquet"):
+        raise DatasetError(f"{path} ends in {target.suffix or 'nothing'}; allowed: .csv, .parquet")
+    if not target.absolute().parent.is_dir():
+        raise DatasetError(f"{target.absolute().parent} is no folder; choose another file")
+    if target.exists() and not overwrite:
+        raise DatasetError(f"{path} exists; use --overwrite or another name")
+
+
+def write_table(columns: Mapping[str, ArrayLike], path: str | Path) -> None:
+    """Write columns by name as CSV or Parquet."""
+    import pyarrow as pa
+    import pyarrow.csv
+    import pyarrow.parquet as pq
+
+    table = pa.table({name: pa.array(values) for name, values in columns.items()})
+    if Path(path).suffix == ".csv":
+        options = pyarrow.csv.WriteOptions(quoting_style="none")
+        write_atomically(Path(path), lambda target: pyarrow.csv.write_csv(table, target, write_options=options))
+    else:
+        write_atomically(Path(path), lambda target: pq.write_table(table, target))

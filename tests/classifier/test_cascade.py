@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from chaosgym.classifier import classifier_for, default_classifier
+from chaosgym.classifier.answer import neighbours_of, type_probabilities
 from chaosgym.classifier.cascade import returning_period
-from chaosgym.classifier.types import neighbours_of, type_probabilities
 from chaosgym.diagnosis import diagnose
 from chaosgym.diagnosis.type_rule import type_of_cross
 from chaosgym.errors import ModelFileError

@@ -1,8 +1,17 @@
-"""What the classifier says: of a machine, its type and nature; of a record, whether it is irregular, and its nature."""
+"""What the classifier says: of a machine, its type and nature; of a record, whether it is irregular, and its nature.
 
-from collections.abc import Mapping
+The type follows from the natures of a cross by the printed rule (``diagnosis.type_rule``). Where a nature is only
+probable, the type's probabilities are those of the rule over every combination of natures.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import product
 from typing import Any
+
+from chaosgym.diagnosis import default_tolerances
+from chaosgym.diagnosis.type_rule import CROSS, type_of_cross
+from chaosgym.machines import Machine
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,3 +161,50 @@ class RecordAnswer:
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         return {**asdict(self), "plausible": list(self.plausible)}
+
+
+NEGLIGIBLE = 1e-3
+"""Probability below which a nature is left out."""
+
+
+def neighbours_of(machine: Machine) -> list[Machine]:
+    """The four neighbours of a machine, in the order of ``CROSS``.
+
+    Raises
+    ------
+    ParameterError
+        If one of them is not allowed.
+    """
+    tolerances = default_tolerances(machine)
+    fields = (machine.speed_field, machine.clearance_field)
+    speed, clearance = (
+        [tolerances[field].at(getattr(machine, field), side) for side in (-1.0, 0.0, 1.0)] for field in fields
+    )
+    return [machine.at(speed[one + 1], clearance[other + 1]) for one, other in CROSS[1:]]
+
+
+def type_probabilities(machine: Machine, points: Sequence[NatureAnswer]) -> tuple[dict[str, float], str]:
+    """Probabilities of Types I, II and III from centre and neighbours (5,), and the reason of the likeliest natures.
+
+    A nature without any probability counts as either with equal chances.
+    """
+    natures = [_likely(point) for point in points]
+    fields = (machine.speed_field, machine.clearance_field)
+    peaks = [point.largest_peak or 0.0 for point in points]
+    told = {"I": 0.0, "II": 0.0, "III": 0.0}
+    best, reason = -1.0, ""
+    for combination in product(*natures):
+        chance = 1.0
+        for _, share in combination:
+            chance *= share
+        kind, why = type_of_cross([nature for nature, _ in combination], peaks, fields)
+        told[kind] += chance
+        if chance > best:
+            best, reason = chance, why
+    total = sum(told.values())
+    return {kind: chance / total for kind, chance in told.items()}, reason
+
+
+def _likely(point: NatureAnswer) -> list[tuple[str, float]]:
+    known = [(nature, chance) for nature, chance in point.probabilities.items() if chance >= NEGLIGIBLE]
+    return known or [("periodic", 0.5), ("chaotic", 0.5)]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from chaosgym.errors import DatasetError
 from chaosgym.machines import MACHINES, Machine
 from chaosgym.sweeps import LabelledSweep
-from chaosgym.sweeps.columns import WINDOW
+from chaosgym.sweeps.dataset import WINDOW
 
 Array = NDArray[np.float64]
 

@@ -21,12 +21,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.classifier.answer import Classification, NatureAnswer, RecordAnswer
+from chaosgym.classifier.answer import Classification, NatureAnswer, RecordAnswer, neighbours_of, type_probabilities
 from chaosgym.classifier.cascade import CLEAR, MILLION, judge_nature
 from chaosgym.classifier.estimator import ResponseClassifier
 from chaosgym.classifier.record_answers import judge_records
 from chaosgym.classifier.storage import read_model, write_model
-from chaosgym.classifier.types import neighbours_of, type_probabilities
 from chaosgym.errors import DiagnosisError, ModelFileError, ParameterError
 from chaosgym.machines import MACHINES, Machine
 from chaosgym.machines.parameters import parameters_of

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from chaosgym.classifier.beam_swing import SwingTable
-from chaosgym.classifier.parameter_features import ParameterScaling
+from chaosgym.classifier.parameter_features import ParameterScaling, SwingTable
 from chaosgym.classifier.trees import Forest
 from chaosgym.errors import ModelFileError
 from chaosgym.files import unpacked, write_atomically

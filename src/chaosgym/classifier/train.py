@@ -1,11 +1,19 @@
-"""Training of a machine's classifier on a labelled sweep, and its scores on machines that no training has seen."""
+"""Training of a machine's classifier on a labelled sweep, and its scores on machines that no training has seen.
+
+Records for training are runs as a sensor shows them, of any length, from the start or settled. Each copy of a run takes
+a window of 8 to 64 cycles and one sensor. The error that it is told is even or normal (three deviations), 0.02 to 10 N
+or 0.1 to 10 % of the record's mean; in one copy of six nothing is told. Its real error is none in one copy of five,
+anything up to the told one in two, the told one in one, and up to one and a half times as large in one: sensors are
+mostly better than they promise. A tenth of the records are rounded, to 0.1 or 0.01 N. A record is irregular beyond the
+sensor's error if the ``irregularity`` of the settled run, without any noise, exceeds the told error.
+"""
 
 import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +23,80 @@ from chaosgym.classifier.cascade import STAGES
 from chaosgym.classifier.data import Examples, examples_of
 from chaosgym.classifier.estimator import ResponseClassifier
 from chaosgym.classifier.evaluation import score_records, score_stages
-from chaosgym.classifier.features import MAX_CYCLES
+from chaosgym.classifier.features import MAX_CYCLES, MIN_CYCLES
 from chaosgym.classifier.machine_classifier import IRREGULAR, NATURE, MachineClassifier
-from chaosgym.classifier.noisy_records import training_records
 from chaosgym.diagnosis.stroboscopic import irregularity
 from chaosgym.errors import DatasetError
 from chaosgym.files import write_atomically
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import LabelledSweep
 from chaosgym.version import __version__
+
+Array = NDArray[np.float64]
+
+TOLD, RELATIVE = (-1.7, 1.0), (-3.0, -1.0)
+"""Decades of the told errors [N], and of those that are shares of the mean peak."""
+
+WORSE = 1.5
+"""Largest real error over the told one."""
+
+NORMAL_DEVIATIONS = 3.0
+"""Standard deviations that count as the largest error of normal noise."""
+
+
+class Records(NamedTuple):
+    """Records as a sensor gives them.
+
+    ``peaks`` (n, cycles) [N], NaN after the end; ``sensor_error`` (n,) [N], NaN where not told; ``rows`` (n,) which run
+    each record is of.
+    """
+
+    peaks: Array
+    sensor_error: Array
+    rows: NDArray[np.int64]
+
+
+def training_records(start: Array, settled: Array, copies: int, seed: int) -> Records:
+    """Noisy copies of runs, whose peaks [N] of two windows are given (n, cycles)."""
+    generator = np.random.default_rng(seed)
+    parts = [_copy(window, generator) for _ in range(copies) for window in (settled, start)]
+    return Records(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def _copy(peaks: Array, generator: np.random.Generator) -> Records:
+    count, cycles = peaks.shape
+    lengths = np.exp(generator.uniform(np.log(MIN_CYCLES), np.log(cycles + 1.0), count)).astype(int)
+    starts = (generator.random(count) * (cycles - lengths + 1)).astype(int) * (generator.random(count) < 0.5)
+    columns = np.minimum(starts[:, None] + np.arange(cycles), cycles - 1)
+    ended = np.arange(cycles) >= lengths[:, None]
+    forces = np.take_along_axis(peaks, columns, axis=1)
+    level = np.where(ended, 0.0, forces).sum(axis=1) / lengths
+    relative = generator.random(count) < 1.0 / 3.0
+    absolute, shares = (10.0 ** generator.uniform(*decades, count) for decades in (TOLD, RELATIVE))
+    told = np.asarray(np.where(relative, level * shares, absolute))
+    forces = noisy(forces, told * _quality(count, generator), generator)
+    step = generator.choice([0.0, 0.1, 0.01], count, p=[0.9, 0.05, 0.05])[:, None]
+    forces = np.where(step > 0.0, np.round(forces / np.where(step > 0.0, step, 1.0)) * step, forces)
+    forces[ended] = np.nan
+    silent = generator.random(count) < 1.0 / 6.0
+    return Records(forces, np.where(silent, np.nan, told), np.arange(count))
+
+
+def _quality(count: int, generator: np.random.Generator) -> Array:
+    """Real error over the told one, (count,)."""
+    kind, share = generator.integers(0, 5, count), generator.random(count)
+    return np.select(
+        [kind == 0, kind <= 2, kind == 3], [0.0 * share, share, 1.0 + 0.0 * share], 1.0 + (WORSE - 1.0) * share
+    )
+
+
+def noisy(forces: Array, error: Array, generator: np.random.Generator) -> Array:
+    """Peaks (n, cycles) with errors of at most ``error`` (n,): even in half of the rows, normal in the others."""
+    normal = generator.random(len(forces)) < 0.5
+    even = generator.uniform(-1.0, 1.0, forces.shape)
+    bell = generator.standard_normal(forces.shape) / NORMAL_DEVIATIONS
+    return np.asarray(np.maximum(forces + error[:, None] * np.where(normal[:, None], bell, even), 0.0))
+
 
 RECORDS, COPIES = 60_000, 6
 """Noisy training records made of the signals, about, and copies of a run's window at most."""

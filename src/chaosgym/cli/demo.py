@@ -32,7 +32,7 @@ def explore(machine: Any, port: int, browser: bool, as_json: bool) -> None:
     from chaosgym.machines import ImpactBeam
 
     try:
-        from chaosgym.explore.server import serve
+        from chaosgym.explore.page import serve
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "bokeh":
             raise

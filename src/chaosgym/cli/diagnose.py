@@ -137,7 +137,7 @@ def overlay(machine: Any, measured: Measured, out: Path, as_json: bool) -> None:
     if not measured:
         raise click.UsageError("give what was measured: --peaks FILE or --series FILE")
     from chaosgym.diagnosis.overlay import overlay as compare
-    from chaosgym.plotting.overlay import overlay_figure
+    from chaosgym.plotting.commands import overlay_figure
 
     (run,) = measured_runs(measured)
     found = compare(machine, run.peaks, run.verdict.diagnosis, larger=bool(measured.series))

@@ -84,7 +84,7 @@ def picture_path(plot: str | None, stem: str, formats: tuple[str, ...] | None = 
     """
     if plot is None:
         return None
-    from chaosgym.plotting.picture_file import FORMATS, check_picture, free_name
+    from chaosgym.plotting.style import FORMATS, check_picture, free_name
 
     return free_name(stem) if plot == UNNAMED else check_picture(Path(plot), formats or FORMATS)
 
@@ -93,7 +93,7 @@ def draw(path: Path | None, figure: Callable[[], "Figure"], result: dict[str, An
     """Save the figure, if one was asked for, and say where."""
     if path is None:
         return
-    from chaosgym.plotting.picture_file import save_picture
+    from chaosgym.plotting.style import save_picture
 
     save_picture(figure(), path)
     result["plot"] = str(path)

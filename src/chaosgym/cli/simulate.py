@@ -35,7 +35,7 @@ def simulate(
 
     picture = picture_path(plot, f"simulate-{machine.name}")
     if out or series_out:
-        from chaosgym.signals.write import check_target, write_table
+        from chaosgym.files import check_target, write_table
 
         for path in filter(None, (out, series_out)):
             check_target(path, overwrite)

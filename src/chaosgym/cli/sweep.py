@@ -148,7 +148,7 @@ def dataset() -> None:
 @AS_JSON
 def info(folder: str, as_json: bool) -> None:
     """Print rows, classes, settings, label definitions, faults and provenance."""
-    from chaosgym.sweeps.info import dataset_info
+    from chaosgym.sweeps.card import dataset_info
 
     found = dataset_info(folder)
     emit(found, as_json, lambda: _lines(folder, found))
@@ -228,7 +228,7 @@ def noise(folder: str, points: int, seed: int, workers: int | None, as_json: boo
 def map_(folder: str, out: str, as_json: bool) -> None:
     """Draw natures and response types over speed and clearance, as thesis figures 3.9 and 4.15."""
     from chaosgym.plotting.dataset import sweep_map
-    from chaosgym.plotting.picture_file import check_picture, save_picture
+    from chaosgym.plotting.style import check_picture, save_picture
     from chaosgym.sweeps import read_sweep
 
     path = check_picture(Path(out))

@@ -23,8 +23,7 @@ from chaosgym.diagnosis.scatter import (
 )
 from chaosgym.diagnosis.two_step import INITIAL_TRANSIENT, two_step_test
 from chaosgym.errors import DiagnosisError
-from chaosgym.signals.changes import find_change
-from chaosgym.signals.noise import SensorError, quantum, repair, stated_error
+from chaosgym.signals.noise import SensorError, find_change, quantum, repair, stated_error
 
 Array = NDArray[np.float64]
 

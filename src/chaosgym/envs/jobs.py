@@ -7,10 +7,9 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from chaosgym.envs.drive import approached, trimmed
 from chaosgym.envs.judge import ExponentJudge, Judge, RecurrenceJudge
 from chaosgym.envs.observation import COMMANDED, OBSERVATION_NAMES, Observation, felt
-from chaosgym.envs.task import Status, Task, demand_of
+from chaosgym.envs.task import Status, Task, approached, demand_of, trimmed
 from chaosgym.envs.variants import DRAWN, Variants
 from chaosgym.errors import SimulationError
 from chaosgym.machines.batch import Cycles

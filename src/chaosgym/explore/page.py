@@ -1,15 +1,20 @@
-"""The page: sliders, five pictures that follow them, the verdict, and the point as link, Python and command."""
+"""The page and its server on this computer: sliders, pictures that follow them, the verdict, the point as command."""
 
 import math
+from collections.abc import Callable
+from functools import partial
 from html import escape
 from typing import Any
 
 import numpy as np
+from bokeh.application import Application
+from bokeh.application.handlers import FunctionHandler
 from bokeh.document import Document
 from bokeh.layouts import column, row
 from bokeh.models import BoxAnnotation, Button, ColumnDataSource, CustomJS, Div, Select, Span, TextAreaInput
 from bokeh.models import Slider as Widget
 from bokeh.plotting import figure
+from bokeh.server.server import Server
 
 from chaosgym.errors import ChaosgymError
 from chaosgym.explore.playback import Playback
@@ -250,3 +255,34 @@ def open_page(document: Document, machine: Machine) -> None:
             document.add_root(Div(text=f"<h2>This link can't be shown</h2><p>{escape(str(error))}</p>"))
             return
     Page(document, machine)
+
+
+LOOPBACK = "127.0.0.1"
+
+
+def serve(machine: Machine, port: int, ready: Callable[[str], object]) -> None:
+    """Serve the page until Ctrl-C.
+
+    Parameters
+    ----------
+    machine
+        What it shows first.
+    port
+        0 for any that is free.
+    ready
+        Called with the address when the page can be opened.
+
+    Raises
+    ------
+    OSError
+        If the port is taken.
+    """
+    application = Application(FunctionHandler(partial(open_page, machine=machine)))
+    # only pages from localhost and this port may open its websocket, which is Bokeh's default
+    server: Any = Server({"/": application}, address=LOOPBACK, port=port)
+    server.start()
+    ready(f"http://localhost:{server.port}/?{link_of(machine)}")
+    try:
+        server.io_loop.start()
+    finally:
+        server.stop()

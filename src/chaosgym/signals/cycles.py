@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.errors import DiagnosisError
-from chaosgym.signals.columns import Signal, choose_force
+from chaosgym.signals.columns import Sampling, Signal, choose_force, sampling
 from chaosgym.signals.read import Recording
-from chaosgym.signals.sampling import Sampling, sampling
 
 Array = NDArray[np.float64]
 

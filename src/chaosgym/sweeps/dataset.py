@@ -5,17 +5,146 @@ signals. Every page has a checksum, so that damage is found and named. Row group
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from chaosgym.errors import DatasetError
+from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps.plan import SweepPlan
+
+WINDOW = 64
+"""Cycles of a signal."""
+
+WINDOWS: Mapping[str, int] = {"start": 0, "settled": 200}
+"""First cycle of each signal, counted from rest."""
+
+SIGNALS: Mapping[str, Mapping[str, str]] = {
+    "start": {"peak_force": "N", "displacement": "m", "velocity": "m/s"},
+    "settled": {"peak_force": "N"},
+}
+"""What is kept of each cycle: peak force of the first side; stroboscopic displacement and velocity of the joint."""
+
+SENSOR_ERROR = 3.0
+"""Largest error [N] of the sensor to which ``resolvable`` refers (thesis 3.6)."""
+
+
+class Column(NamedTuple):
+    """Type, unit and meaning of a column."""
+
+    kind: pa.DataType
+    unit: str
+    meaning: str
+
+
+STATUS_MEANING = (
+    "certified: a periodic orbit proven by Newton's method; agreed: all tests that speak say the same; disputed: they "
+    "don't; transient: chaos that died out; unresolved: the budget ended first; failed: no run"
+)
+
+
+def _figure(unit: str, meaning: str) -> Column:
+    return Column(pa.float32(), unit, meaning)
+
+
+CROSS_COLUMNS: Mapping[str, Column] = {
+    "machine": Column(pa.int32(), "-", "the five rows of one cross: centre, speed below and above, clearance likewise"),
+    "split": Column(pa.string(), "-", "train, validation or test; whole machines"),
+}
+
+LABELS: Mapping[str, Column] = {
+    "nature": Column(pa.string(), "-", "periodic, quasiperiodic, chaotic or undetermined; null if failed"),
+    "period": Column(pa.int32(), "cycles", "cycles after which a periodic response repeats; null otherwise"),
+    "response_type": Column(pa.string(), "-", ""),
+    "type_neighbours": Column(pa.int8(), "-", "neighbours that the response type rests on; fewer at a border"),
+    "full_response_type": Column(
+        pa.string(), "-", "I, II, III or undetermined over all tolerances and three initial states, by runs of its own"
+    ),
+    "status": Column(pa.string(), "-", STATUS_MEANING),
+    "margin": _figure("-", "distance of the verdict from its threshold: 0 on it, 1 without doubt"),
+    "irregularity": _figure(
+        "N",
+        "half range of the peak force within the classes of the best period up to 16, largest class, of the settled "
+        "signal or, where that is not kept, of the last 64 judged cycles: what a sensor must resolve to see that the "
+        "response does not repeat",
+    ),
+    "resolvable": Column(
+        pa.bool_(), "-", f"irregularity above {SENSOR_ERROR:g} N: irregular to the sensor of the thesis"
+    ),
+    "exponent": _figure("1/cycle", "largest Lyapunov exponent; of the orbit itself where certified"),
+    "exponent_error": _figure("1/cycle", "standard error of the exponent; 0 where certified"),
+    "peak_force_min": _figure("N", "smallest peak force of a judged cycle, first side of the joint"),
+    "peak_force_max": _figure("N", "largest peak force of a judged cycle, first side"),
+    "peak_force_mean": _figure("N", "mean peak force of the judged cycles, first side"),
+    "peak_force_std": _figure("N", "standard deviation of the peak force, first side"),
+    "largest_peak": _figure("N", "largest peak force of the settled cycles, both sides: the statistic of the types"),
+    "impacts_per_cycle": _figure("-", "contacts that begin in a judged cycle, both sides"),
+    "contact_fraction": _figure("-", "share of the time in contact, both sides"),
+    "bounce_fraction": _figure("-", "longest bouncing before sustained contact, in half cycles"),
+    "settle_cycle": Column(pa.int32(), "cycles", "first cycle from rest that repeats; null if none does"),
+    "horizon": Column(pa.int32(), "cycles", "cycles from rest that the verdict rests on; the last half is judged"),
+    "cycles_used": Column(pa.int32(), "cycles", "cycles computed for the verdict, Newton's method included"),
+    "reason": Column(pa.string(), "-", "why the verdict is what it is, or why the run failed"),
+}
+"""Labels and their evidence."""
+
+_NEIGHBOURS = "I, II, III or undetermined over the neighbours in {fields} up to one tolerance away, one initial state"
+_CROSS = "I, II, III or undetermined over the other four points of the cross, one initial state; of centres only"
+_FULL = "as full_response_type, since the sweep has no neighbours one tolerance away; on a grid III where not periodic"
+
+
+def signal_columns() -> dict[str, Column]:
+    """Columns of the signals, lists of ``WINDOW`` cycles each; null where they are not kept.
+
+    Lists without a fixed size: some readers fail on those with one among which there are nulls.
+    """
+    kind = pa.list_(pa.float32())
+    return {
+        f"{window}_{name}": Column(kind, unit, f"{name} of cycles {first} to {first + WINDOW - 1} from rest")
+        for window, first in WINDOWS.items()
+        for name, unit in SIGNALS[window].items()
+    }
+
+
+FIXED = "the same in every row"
+
+
+def fixed_fields(plan: SweepPlan) -> dict[str, Any]:
+    """Fields that the sweep does not vary, which every row repeats: a row alone describes its machine."""
+    values = {name: getattr(plan.machine, name) for name in parameters_of(plan.machine) if name not in plan.fields}
+    return {name: value if isinstance(value, str) else float(value) for name, value in values.items()}
+
+
+def schema(plan: SweepPlan, settings: Mapping[str, Any]) -> pa.Schema:
+    """Schema of a plan's rows: units and meanings on the columns, settings and label definitions on the whole."""
+    described = parameters_of(plan.machine)
+    columns = {name: Column(pa.float64(), described[name].unit, described[name].source) for name in plan.fields}
+    for name, value in fixed_fields(plan).items():
+        kind = pa.string() if isinstance(value, str) else pa.float64()
+        columns[name] = Column(kind, described[name].unit, f"{FIXED}: {described[name].source}")
+    if plan.sampling == "crosses":
+        columns |= CROSS_COLUMNS
+    columns |= LABELS
+    reach = plan.type_reach()
+    about_type = _NEIGHBOURS.format(fields=" and ".join(reach)) if reach else _FULL
+    about_type = _CROSS if plan.sampling == "crosses" else about_type
+    columns["response_type"] = LABELS["response_type"]._replace(meaning=about_type)
+    if plan.signals:
+        columns |= signal_columns()
+    definitions = {name: column.meaning for name, column in columns.items() if name not in described}
+    return pa.schema(
+        [
+            pa.field(name, kind, metadata={"unit": unit, "meaning": meaning})
+            for name, (kind, unit, meaning) in columns.items()
+        ],
+        metadata={"chaosgym": json.dumps(settings, sort_keys=True), "definitions": json.dumps(definitions)},
+    )
+
 
 DATA_FILE = "sweep.parquet"
 

@@ -17,8 +17,7 @@ import pyarrow.parquet as pq
 
 from chaosgym.errors import DatasetError, UnfinishedError
 from chaosgym.files import is_empty, write_atomically
-from chaosgym.sweeps.columns import schema
-from chaosgym.sweeps.dataset import DAMAGE, DATA_FILE, parquet_writer
+from chaosgym.sweeps.dataset import DAMAGE, DATA_FILE, parquet_writer, schema
 from chaosgym.sweeps.label import with_response_types
 from chaosgym.sweeps.plan import SweepPlan
 

@@ -1,11 +1,18 @@
 """The labels of points: of each, one run from rest, judged in stages; then the types, which rest on neighbours too."""
 
+import platform
+import subprocess
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
 from threading import Event
 from typing import Any
 
+import llvmlite.binding
 import numpy as np
 import pyarrow as pa
 
+from chaosgym.core import source_digest
 from chaosgym.diagnosis import bounce_fraction, response_type
 from chaosgym.diagnosis.diagnose import diagnose_alone
 from chaosgym.diagnosis.stroboscopic import irregularity
@@ -13,9 +20,42 @@ from chaosgym.diagnosis.type_rule import CROSS, type_of_cross, types_on_grid
 from chaosgym.errors import DiagnosisError, ParameterError, SimulationError, UnfinishedError
 from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, simulate
-from chaosgym.sweeps.columns import SENSOR_ERROR, SIGNALS, WINDOW, WINDOWS, fixed_fields, schema
+from chaosgym.sweeps.dataset import SENSOR_ERROR, SIGNALS, WINDOW, WINDOWS, fixed_fields, schema
 from chaosgym.sweeps.plan import SweepPlan
-from chaosgym.sweeps.provenance import provenance
+from chaosgym.version import __version__
+
+SOURCES = Path(__file__).resolve().parents[1]
+
+PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "pyarrow")
+
+
+@cache
+def provenance() -> dict[str, str]:
+    """Describe this installation in words."""
+    return {
+        "chaosgym": __version__,
+        "commit": source_commit(),
+        "physics": "-".join(source_digest(SOURCES / floor) for floor in ("core", "machines")),
+        "python": platform.python_version(),
+        **{name: version(name) for name in PACKAGES},
+        "platform": f"{platform.system()} {platform.machine()}",
+        "processor": str(llvmlite.binding.get_host_cpu_name()),
+    }
+
+
+def source_commit() -> str:
+    """Commit that last changed the package's sources; "+" if they have changed since, "unknown" without Git."""
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(SOURCES), *arguments, "--", "."]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+
+    try:
+        commit = git("log", "-1", "--format=%H")
+        return f"{commit}{'+' if git('status', '--porcelain') else ''}" if commit else "unknown"
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
 
 RETRY = 8
 """Budgets that a point may take which is undetermined after one."""

@@ -1,11 +1,18 @@
 """Rules that set speeds without learning; ``chaosgym.control.comparison`` runs them all on the same machines."""
 
-from chaosgym.control.controllers.belief import Belief
 from chaosgym.control.controllers.chaos_control import OGY, DelayedFeedback
 from chaosgym.control.controllers.controller import Controller
 from chaosgym.control.controllers.feedback import BackOff, Bandit, ExtremumSeeking, ForceFeedback, HillClimbing
-from chaosgym.control.controllers.planned import CommonSchedule, ConstantTrim, Follow, MapFollower, Schedule, SkipBands
-from chaosgym.control.controllers.receding_horizon import RecedingHorizon
+from chaosgym.control.controllers.planned import (
+    Belief,
+    CommonSchedule,
+    ConstantTrim,
+    Follow,
+    MapFollower,
+    RecedingHorizon,
+    Schedule,
+    SkipBands,
+)
 
 __all__ = [
     "OGY",

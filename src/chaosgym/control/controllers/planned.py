@@ -1,12 +1,14 @@
-"""Controllers that plan on maps: of the nominal model, of models within tolerances, or of the machine itself."""
+"""Controllers that plan: on maps of a model or of the machine itself, on a belief, or by simulating ahead."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.control.controllers.controller import Array, Controller, Observations, seen
+from chaosgym.control.controllers.controller import Array, Controller, Observations, irregular, seen
 from chaosgym.control.maps import Maps
+from chaosgym.envs.judge import MISS, recurrence_miss
+from chaosgym.simulation.batch import batch_of
 
 
 class Follow(Controller):
@@ -161,3 +163,105 @@ def best_schedule(cost: Array, start: NDArray[np.int64], reach: int) -> NDArray[
         now = choice[step, every, now]
         places[step] = now
     return places
+
+
+HORIZON = 24
+"""Cycles that are simulated ahead."""
+
+
+class RecedingHorizon(Controller):
+    """Searches anew every ten steps and when the demand changes; copies of the nominal model run beside the machines.
+
+    Parameters
+    ----------
+    every
+        Steps between searches.
+    """
+
+    knows = "model"
+
+    def __init__(self, *, every: int = 10) -> None:
+        super().__init__()
+        self.every = every
+
+    def begin(self, envs: Any) -> None:
+        """Start the copies as the machines were started."""
+        task, self._model = self.task, envs.model
+        self._trims = np.arange(-task.largest_trim, task.largest_trim + 1e-9, task.trim_step)
+        self._batch = batch_of(self._model, self.count * (1 + len(self._trims)))
+        for place in range(len(self._batch)):
+            self._batch.start(place, self._model.at(float(envs.jobs.speed[place % self.count])))
+        self._batch.run(np.arange(self.count), task.run_in_cycles)
+        self._step, self._demand = 0, np.full(self.count, np.nan)
+        self._target = envs.jobs.speed.copy()
+
+    def speeds(self, observations: Observations) -> Array:
+        """The target of the last search."""
+        demand, task = seen(observations, "demand"), self.task
+        if self._step:
+            self._batch.set_speeds(np.arange(self.count), seen(observations, "speed"))
+            self._batch.run(np.arange(self.count), task.cycles_per_step)
+        due = (demand != self._demand) | (self._step % self.every == 0)
+        self._demand = demand
+        self._step += 1
+        if due.any():
+            jobs = np.flatnonzero(due)
+            self._target[jobs] = self._best(jobs, demand[jobs])
+        return np.asarray(self._target)
+
+    def _best(self, jobs: Any, demand: Array) -> Array:
+        task, width = self.task, len(self._trims)
+        targets = np.clip(demand[:, None] + self._trims, task.lowest_speed, task.highest_speed)
+        places = self.count + jobs[:, None] * width + np.arange(width)
+        for job, row in zip(jobs.tolist(), places, strict=True):
+            self._batch.branch(job, row)
+        which = places.ravel()
+        self._batch.set_speeds(which, targets.ravel())
+        peaks = self._batch.run(which, HORIZON).peak_force[:, :, 0]
+        wild = (recurrence_miss(peaks) > MISS).reshape(targets.shape).astype(float)
+        cost = task.deviation_weight * np.abs(targets - demand[:, None]) + task.type_iii_weight * wild
+        return np.asarray(targets[np.arange(len(jobs)), cost.argmin(axis=1)])
+
+
+class Belief(Controller):
+    """Goes to the speed of least expected cost over simulated machines, weighed by how well their mean peaks fit.
+
+    Parameters
+    ----------
+    fleet
+        Maps of models within tolerances.
+    spread
+        Miss of a mean peak, in units of the sensor's error, that is nothing unusual.
+    temper
+        Share of the evidence of a step that counts, since steps are alike.
+    """
+
+    knows = "tolerances"
+
+    def __init__(self, fleet: Maps, *, spread: float = 1.33, temper: float = 0.5) -> None:
+        super().__init__()
+        self.fleet, self.spread, self.temper = fleet, spread, temper
+
+    def begin(self, envs: Any) -> None:
+        """Believe in all simulated machines alike."""
+        shape = (self.count, len(self.fleet.speeds))
+        self._fit = np.zeros((self.count, len(self.fleet.share)))
+        self._wild, self._visits = np.zeros(shape), np.zeros(shape)
+        self._speed = np.full(self.count, np.nan)
+
+    def speeds(self, observations: Observations) -> Array:
+        """The best speed on the expected map, what was felt at a speed counted in."""
+        speed, every = seen(observations, "speed"), np.arange(self.count)
+        held = np.abs(speed - self._speed) < 0.5 * self.task.trim_step
+        self._speed = speed
+        place = self.fleet.nearest(speed)
+        error = self.spread * max(self.task.sensor_error, 1e-3 * self.task.load_rating)
+        miss = (seen(observations, "mean_peak_force")[:, None] - self.fleet.mean_peak[:, place].T) / error
+        self._fit -= self.temper * np.where(held[:, None], np.log1p(0.5 * miss**2), 0.0)
+        weight = np.exp(self._fit - self._fit.max(axis=1, keepdims=True))
+        weight /= weight.sum(axis=1, keepdims=True)
+        self._wild[every, place] += irregular(observations, self.task, 1.17, 0.1) * held
+        self._visits[every, place] += held
+        share = (weight @ self.fleet.share + self._wild) / (1.0 + self._visits)
+        grid = self.fleet.speeds
+        return np.asarray(grid[self.cost(share, seen(observations, "demand"), grid).argmin(axis=1)])

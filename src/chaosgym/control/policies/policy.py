@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 
 from chaosgym.control.policies.network import Dense, Lstm, Network, State
 from chaosgym.envs import environment
-from chaosgym.envs.drive import BACK
 from chaosgym.envs.memory import SpeedMemory, Usual
 from chaosgym.envs.observation import OBSERVATION_NAMES
-from chaosgym.envs.task import Task
+from chaosgym.envs.task import BACK, Task
 from chaosgym.errors import ModelFileError, ParameterError
 from chaosgym.files import unpacked, write_atomically
 

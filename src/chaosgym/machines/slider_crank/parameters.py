@@ -36,13 +36,13 @@ from chaosgym.machines.integrators import Integrator
 from chaosgym.machines.machine import Machine, Option, Work
 from chaosgym.machines.parameters import parameter
 from chaosgym.machines.slider_crank import run as running
-from chaosgym.machines.slider_crank.batch import CrankBatch, SteppedCrankBatch
 from chaosgym.machines.slider_crank.equations import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom, equations
 from chaosgym.machines.slider_crank.joints import sensors_of
 from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
 from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
 from chaosgym.machines.slider_crank.kinematics import slider_position
 from chaosgym.machines.slider_crank.model import STEP_PHASE, exact_model, fastest_rate, has_propagators, stepped_model
+from chaosgym.machines.slider_crank.run import CrankBatch, SteppedCrankBatch
 from chaosgym.machines.slider_crank.scenes import EXTREMES, OPTIONS, SCENES
 from chaosgym.machines.slider_crank.spatial_equations import spatial_equations
 from chaosgym.machines.slider_crank.work import WORK
