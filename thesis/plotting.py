@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.design.statistics import Histogram
 from chaosgym.plotting.response import curve as curve
-from chaosgym.plotting.response import force_points as force_points
 from chaosgym.plotting.response import phase_plane as phase_plane
 from chaosgym.plotting.response import section_points as section_points
 from chaosgym.plotting.style import ACCENT, INK, MUTED, NATURE_COLOURS, TYPE_COLOURS
@@ -41,6 +40,23 @@ class TypeBand(NamedTuple):
     type: str
     low: float
     high: float
+
+
+def force_points(values: Array, peaks: Array, nature: Sequence[str] | NDArray[Any], ax: Axes) -> Axes:
+    """Peak forces (values, cycles) [N] against a parameter (values,), coloured by the nature of each response."""
+    for kind, colour in NATURE_COLOURS.items():
+        of_kind = np.asarray(nature) == kind
+        if np.any(of_kind):
+            shown = peaks[of_kind]
+            across = np.repeat(values[of_kind], shown.shape[1])
+            size = 3.0 if kind == "chaotic" else 4.5
+            ax.plot(across, shown.ravel(), ".", ms=size, mew=0.0, color=colour, rasterized=True)
+            ax.plot([], [], ".", ms=8.0, mew=0.0, color=colour, label=kind)
+    middle = np.nanmean(peaks, axis=1)
+    ax.plot(values, middle, lw=0.6, color=MUTED, zorder=1)
+    ax.set_ylabel("peak impact force [N]")
+    ax.margins(x=0.02)
+    return ax
 
 
 def line_spectrum(frequency: Array, power: Array, cycle_frequency: float, ax: Axes) -> Axes:

@@ -4,16 +4,15 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from chaosgym.design.peak_impacts import PeakImpactDiagram, coverage, filling_cycles, peak_impacts, spot_life
+from chaosgym.design.peak_impacts import PeakImpactDiagram, coverage, filling_cycles, peak_impacts
 from chaosgym.design.statistics import convergence
-from chaosgym.design.trends import clearance_trade_off, life_against
-from chaosgym.errors import DesignError, SimulationError
+from chaosgym.design.trends import life_against
+from chaosgym.errors import SimulationError
 from chaosgym.machines import MACHINES, ImpactBeam
 from chaosgym.machines.parameters import with_settings
 from chaosgym.machines.slider_crank.kinematics import slider_position
 from chaosgym.plotting.design import impact_diagram
 from chaosgym.simulation import simulate
-from tests.plain_modes import PLAIN_BEAM
 
 
 def test_a_periodic_response_gives_one_point():
@@ -153,30 +152,6 @@ def test_larger_clearance_spreads_ball_impacts_over_half_the_bearing():
     narrow = peak_impacts(simulate(ball(crank_speed=120.0, ball_clearance=0.0635e-3), 100, transient=40))
     count, _ = np.histogram(narrow.location, bins=np.arange(-60.0, 301.0, 30.0))
     assert 0.4 < count.max() / count.sum() < 0.6
-
-
-def test_impacts_in_one_place_have_the_life_of_the_joint():
-    """Without spread, and with a stretch as wide as the spread, the worst spot takes all the damage (eq. 5.4)."""
-    assert spot_life(np.zeros(4), [50.0] * 4, 100.0, 1e-3, 3.0) == pytest.approx(8.0)
-    assert spot_life([0.0, 1.0, 2.0, 3.0], [50.0] * 4, 100.0, 3.0, 3.0) == pytest.approx(8.0)
-
-
-def test_spreading_impacts_over_two_places_doubles_the_life():
-    """Half the impacts in each of two distant places: each place sees half the damage."""
-    place = np.tile([0.0, 1.0], 10)
-    assert spot_life(place, [50.0] * 20, 100.0, 0.1, 3.0) == pytest.approx(16.0)
-    with pytest.raises(DesignError, match="width"):
-        spot_life(place, [50.0] * 20, 100.0, 0.0)
-
-
-def test_less_clearance_trades_force_against_spread():
-    """5.4.1 on the beam: at 30 Hz a larger clearance gives larger peaks, a wider spread and a shorter life."""
-    small, large = clearance_trade_off(PLAIN_BEAM, [0.03e-3, 0.127e-3], 500.0, 5.0, cycles=100)
-    assert small.largest_peak < large.largest_peak
-    assert small.spread < large.spread
-    assert large.life < small.life
-    assert large.spot_life >= large.life
-    assert large.spot_life / large.life > small.spot_life / small.life
 
 
 def test_life_against_speed_is_one_at_its_reference_and_scattered_in_chaos():

@@ -5,7 +5,6 @@ from chaosgym.diagnosis import (
     exponent_from_series,
     find_periodic_orbit,
     largest_lyapunov_exponent,
-    two_trajectory_exponent,
 )
 from chaosgym.diagnosis.lyapunov import average_growth
 from chaosgym.errors import DiagnosisError
@@ -14,6 +13,7 @@ from chaosgym.simulation import RungeKutta4, simulate
 from tests.plain_modes import PLAIN_BEAM
 
 from .maps import GOLDEN, circle, henon, logistic
+from .two_trajectories import two_trajectory_exponent
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@ import pytest
 
 from chaosgym.diagnosis import (
     bounce_fraction,
-    criterion_rate,
     precursors,
     predictive_criteria,
 )
@@ -47,16 +46,3 @@ def test_predictive_criteria_of_the_beam():
     assert not predictive_criteria(ImpactBeam(clearance=0.06e-3)).chaos_possible
     assert not predictive_criteria(ImpactBeam(damping_ratio=0.081)).chaos_possible
     assert "clearance" in predictive_criteria(ImpactBeam(clearance=0.06e-3)).reason
-
-
-def test_criterion_rate_counts():
-    """Two of three chaotic points expected, one false expectation, one quiet point."""
-    machines = [
-        ImpactBeam(),
-        ImpactBeam(),
-        ImpactBeam(excitation_frequency=5.0),
-        ImpactBeam(),
-        ImpactBeam(clearance=1e-5),
-    ]
-    rate = criterion_rate(machines, ["chaotic", "chaotic", "chaotic", "periodic", "periodic"])
-    assert (rate.points, rate.hit_rate, rate.precision, rate.quiet) == (5, 2 / 3, 2 / 3, 0.5)

@@ -7,12 +7,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from chaosgym.diagnosis.criteria import criterion_rate
 from chaosgym.machines import THESIS_IMPACT_BEAM
 from chaosgym.machines.impact_beam.modes import static_tip_deflection
 from thesis import plotting as thesis
 from thesis.figures.beam import LARGE
 from thesis.figures.computations import Computation, Types
+from thesis.figures.criterion import criterion_rate
 from thesis.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
 from thesis.figures.panels import FREQUENCY
 from thesis.figures.printed import printed

@@ -6,12 +6,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from chaosgym.diagnosis.criteria import criterion_rate
 from chaosgym.diagnosis.type_rule import types_on_grid
 from chaosgym.plotting.style import INK
 from thesis import plotting as thesis
 from thesis.figures.computations import Computation, Data
 from thesis.figures.crank import HIGH_DAMPING, LARGE, MIDDLE, SMALL, WIDE, ball, runs, slider, sweep
+from thesis.figures.criterion import criterion_rate
 from thesis.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
 from thesis.figures.findings import words
 from thesis.figures.panels import CRANK_SPEED, Mark, force_diagram

@@ -38,7 +38,7 @@ def design(
 ) -> None:
     """Say whether a machine meets its criteria within its tolerances, and what to change if not."""
     from chaosgym.design import brief as briefs
-    from chaosgym.design.criteria import Criteria
+    from chaosgym.design.bearing import Criteria
     from chaosgym.design.measured import evaluate_peaks
     from chaosgym.design.study import study
     from chaosgym.plotting import design_report as report

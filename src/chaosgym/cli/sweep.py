@@ -102,7 +102,7 @@ def sweep(
 
 
 def _figure(labelled: Any) -> Any:
-    from chaosgym.plotting.dataset import sweep_map
+    from chaosgym.plotting.response import sweep_map
 
     return sweep_map(labelled)
 
@@ -227,7 +227,7 @@ def noise(folder: str, points: int, seed: int, workers: int | None, as_json: boo
 @AS_JSON
 def map_(folder: str, out: str, as_json: bool) -> None:
     """Draw natures and response types over speed and clearance, as thesis figures 3.9 and 4.15."""
-    from chaosgym.plotting.dataset import sweep_map
+    from chaosgym.plotting.response import sweep_map
     from chaosgym.plotting.style import check_picture, save_picture
     from chaosgym.sweeps import read_sweep
 

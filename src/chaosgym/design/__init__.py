@@ -5,7 +5,7 @@ assessment = assess(ImpactBeam(), criteria=Criteria(load_rating=500.0, life=500.
 assessment.verdict, improve(assessment).best
 """
 
-from chaosgym.design.criteria import Criteria, variation_region
+from chaosgym.design.bearing import Criteria, variation_region
 from chaosgym.design.improve import Improvement, Trial, improve
 from chaosgym.design.methodology import Assessment, assess
 

@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from chaosgym.design.criteria import Criteria, variation_region
+from chaosgym.design.bearing import Criteria, variation_region
 from chaosgym.design.improve import default_changes
 from chaosgym.design.methodology import SERIES_SIZE
 from chaosgym.diagnosis import Tolerance, default_tolerances

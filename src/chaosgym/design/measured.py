@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.design.bearing import Evaluation, evaluate, plain
-from chaosgym.design.criteria import Criteria
+from chaosgym.design.bearing import Criteria, Evaluation, evaluate, plain
 from chaosgym.design.reliability import time_blocks
 from chaosgym.design.statistics import Convergence, Histogram, as_forces, convergence, histogram, require_enough
 from chaosgym.diagnosis.measured import judge_peaks

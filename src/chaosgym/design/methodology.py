@@ -25,8 +25,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.design.bearing import Evaluation, evaluate, plain
-from chaosgym.design.criteria import Criteria
+from chaosgym.design.bearing import Criteria, Evaluation, evaluate, plain
 from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.reliability import time_blocks
 from chaosgym.design.runs import (

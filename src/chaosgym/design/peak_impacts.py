@@ -17,11 +17,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from chaosgym.design.fatigue import rating_life
 from chaosgym.design.rating_life import LIFE_EXPONENT
-from chaosgym.design.statistics import as_forces
 from chaosgym.errors import DesignError
 from chaosgym.simulation import CycleRecord
 
@@ -156,35 +154,3 @@ def _section(values: Array, sections: int) -> NDArray[np.int64]:
     if width <= 1e-9 * max(abs(low), 1e-300):
         return np.zeros(len(values), dtype=np.int64)
     return np.minimum((values - low) / width * sections, sections - 1).astype(np.int64)
-
-
-def spot_life(
-    location: ArrayLike, forces: ArrayLike, load_rating: float, width: float, exponent: float = LIFE_EXPONENT
-) -> float:
-    """Life [10^6 cycles] of the most heavily damaged stretch of a bearing.
-
-    Palmgren-Miner (thesis eq. 5.4) over the impacts that hit the same stretch, so that it weighs larger forces against
-    a wider spread (5.4.1). With all impacts in one place it is the life of eq. 5.4.
-
-    Parameters
-    ----------
-    location : (impacts,)
-        Place of each impact.
-    forces : (impacts,)
-        [N].
-    load_rating
-        [N].
-    width
-        Length of bearing that one impact damages, in the unit of ``location``.
-    exponent
-        Of the life law.
-    """
-    place, force = np.asarray(location, dtype=float), as_forces(forces)
-    if not width > 0.0:
-        raise DesignError(f"width = {width:g} is out of range; allowed: above 0")
-    order = np.argsort(place, kind="stable")
-    place, damage = place[order], force[order] ** exponent
-    total = np.concatenate([[0.0], np.cumsum(damage)])
-    end = np.searchsorted(place, place + width, side="right")
-    worst = float(np.max(total[end] - total[:-1])) / len(force)
-    return rating_life(worst ** (1.0 / exponent), load_rating, exponent)

@@ -1,28 +1,21 @@
-r"""Life against speed or clearance, over a whole range (thesis figure 5.12 and 5.4.1).
+r"""Life against speed or clearance, over a whole range (thesis figure 5.12).
 
 Life is relative to the first value of the range, by the cubic law: the statistical mean life (eq. 5.4), and what the
 largest and the smallest peak alone would suggest. Where the response is chaotic the two are far apart.
-
-Over clearances the trade-off of 5.4.1 is drawn too: less clearance lowers the peak force, but gathers the impacts in
-one place. ``spot_life`` weighs the two.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.design.fatigue import CUBIC_EXPONENT, equivalent_force, relative_life
-from chaosgym.design.peak_impacts import peak_impacts, spot_life, worn_side
-from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.design.runs import SettledRun, settled_run
 from chaosgym.diagnosis import Nature
 from chaosgym.errors import DesignError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
-from chaosgym.simulation import parallel_map, simulate
+from chaosgym.simulation import parallel_map
 
 Array = NDArray[np.float64]
 
@@ -111,65 +104,3 @@ def life_against(
         np.array([run.largest_peak for run in runs]),
         np.array([float(np.mean(each)) for each in peaks]),
     )
-
-
-class ClearancePoint(NamedTuple):
-    """One clearance [m]: largest peak [N], spread of the impacts, life of the joint and of its worst spot [10^6]."""
-
-    clearance: float
-    largest_peak: float
-    spread: float
-    unit: str
-    life: float
-    spot_life: float
-
-
-def clearance_trade_off(
-    machine: Machine,
-    clearances: Sequence[float],
-    load_rating: float,
-    width: float,
-    exponent: float = LIFE_EXPONENT,
-    *,
-    cycles: int = 200,
-    transient: int = 200,
-    workers: int | None = None,
-) -> list[ClearancePoint]:
-    """Weigh peak force against the spread of impacts over a range of clearances (thesis 5.4.1).
-
-    Parameters
-    ----------
-    machine
-        Base machine.
-    clearances
-        [m].
-    load_rating
-        [N].
-    width
-        Length of bearing that one impact damages, in the unit of the diagram's location.
-    exponent
-        Of the life law.
-    cycles, transient
-        Cycles to record, and to skip first.
-    workers
-        Number of threads; all processors by default.
-
-    Returns
-    -------
-    list of ClearancePoint, in the order of ``clearances``; the one of the largest ``spot_life`` is the best.
-    """
-
-    def one(clearance: float) -> ClearancePoint:
-        changed = with_settings(machine, {machine.clearance_field: clearance})
-        record = simulate(changed, cycles, transient=transient, samples_per_cycle=HISTORY_SAMPLES)
-        diagram = peak_impacts(record, worn_side(record, exponent))
-        if len(diagram.force) == 0:
-            return ClearancePoint(clearance, 0.0, 0.0, diagram.unit, np.inf, np.inf)
-        share = len(diagram.force) / len(record)
-        everywhere = spot_life(np.zeros(len(diagram.force)), diagram.force, load_rating, width, exponent) / share
-        worst = spot_life(diagram.location, diagram.force, load_rating, width, exponent) / share
-        peak = float(np.max(record.peak_force))
-        return ClearancePoint(clearance, peak, diagram.spread, diagram.unit, everywhere, worst)
-
-    points: list[ClearancePoint] = parallel_map(one, clearances, workers=workers)
-    return points

@@ -1,17 +1,21 @@
 """Tests of a response: periodic, quasiperiodic or chaotic; they take a ``CycleRecord`` or one sample a cycle."""
 
-from chaosgym.diagnosis.criteria import CriterionRate, PredictiveCriterion, criterion_rate, predictive_criteria
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.lyapunov import (
     LyapunovExponent,
     exponent_from_series,
     largest_lyapunov_exponent,
     lyapunov_spectrum,
-    two_trajectory_exponent,
 )
 from chaosgym.diagnosis.matrix_update import compare_attractors, compare_outcomes, matrix_update_test
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
-from chaosgym.diagnosis.precursors import Precursors, bounce_fraction, precursors
+from chaosgym.diagnosis.precursors import (
+    Precursors,
+    PredictiveCriterion,
+    bounce_fraction,
+    precursors,
+    predictive_criteria,
+)
 from chaosgym.diagnosis.response import NATURES, STATUSES, TYPES, Diagnosis, Nature, Status, Type
 from chaosgym.diagnosis.response_map import ResponseMap, geometric_grid, response_map
 from chaosgym.diagnosis.response_type import ResponseType, Tolerance, default_tolerances, response_type
@@ -25,7 +29,6 @@ __all__ = [
     "NATURES",
     "STATUSES",
     "TYPES",
-    "CriterionRate",
     "Diagnosis",
     "LyapunovExponent",
     "Nature",
@@ -43,7 +46,6 @@ __all__ = [
     "bounce_fraction",
     "compare_attractors",
     "compare_outcomes",
-    "criterion_rate",
     "default_tolerances",
     "diagnose",
     "exponent_from_series",
@@ -60,7 +62,6 @@ __all__ = [
     "response_map",
     "response_type",
     "two_step_test",
-    "two_trajectory_exponent",
     "types_on_grid",
     "zero_one_statistic",
 ]

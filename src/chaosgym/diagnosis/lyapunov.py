@@ -2,8 +2,8 @@ r"""Lyapunov exponents, per cycle and per second: do neighbouring motions part o
 
     value = lim  1/N  log |w(N)| / |w(0)|         w: a small deviation of the state, N cycles
 
-On a machine that ``carries_deviations`` w is carried exactly, through contacts by saltation matrices. On any other, or
-a map, a second trajectory starts at a small distance and is brought back to it each cycle (Benettin). On a measured
+On a machine that ``carries_deviations`` w is carried exactly, through contacts by saltation matrices. On any other
+a second trajectory starts at a small distance and is brought back to it each cycle (Benettin). On a measured
 series the mean divergence of nearest neighbours serves (Rosenstein), which needs a few thousand cycles and sees neither
 weak chaos nor decay.
 
@@ -16,7 +16,6 @@ G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9-30.
 M. T. Rosenstein, J. J. Collins, C. J. De Luca, Physica D 65 (1993) 117-134.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -217,41 +216,6 @@ def lyapunov_spectrum(
     contact_time = record.contact_fraction.mean(axis=0) * machine.cycle_period
     trace = machine.contraction(contact_time, float(record.impacts.sum(axis=1).mean()))
     return np.asarray(growth.mean(axis=0)), trace
-
-
-def two_trajectory_exponent(
-    step: Callable[[Array], Array],
-    state: ArrayLike,
-    cycles: int = 1000,
-    *,
-    transient: int = 200,
-    distance: float = DISTANCE,
-    cycle_period: float = 1.0,
-) -> LyapunovExponent:
-    """Largest exponent of any map by two trajectories that are brought back to ``distance`` each cycle.
-
-    Parameters
-    ----------
-    step
-        Advances a state (d,) by one cycle.
-    state : (d,)
-        Initial state.
-    """
-    reference = np.array(state, dtype=float, ndmin=1)
-    for _ in range(transient):
-        reference = np.asarray(step(reference), dtype=float)
-    direction = _any_direction(len(reference))
-    settle = 20
-    log_growth = np.empty(settle + cycles)
-    for cycle in range(settle + cycles):
-        other = np.asarray(step(reference + distance / np.linalg.norm(direction) * direction), dtype=float)
-        reference = np.asarray(step(reference), dtype=float)
-        direction = other - reference
-        length = float(np.linalg.norm(direction))
-        log_growth[cycle] = np.log(max(length, 1e-300) / distance)
-        if length == 0.0:
-            direction = _any_direction(len(reference))
-    return average_growth(log_growth[settle:], cycle_period)
 
 
 def exponent_from_series(

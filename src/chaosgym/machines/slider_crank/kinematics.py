@@ -88,9 +88,3 @@ def slider_rate(crank_angle: Array, radius: float, length: float, motor_angle: f
     pin_rate = crank_pin(crank_angle + 0.5 * np.pi, radius, motor_angle)
     along = np.sqrt(length**2 - pin[..., 1] ** 2 - pin[..., 2] ** 2)
     return np.asarray(pin_rate[..., 0] - (pin[..., 1] * pin_rate[..., 1] + pin[..., 2] * pin_rate[..., 2]) / along)
-
-
-def stroke(radius: float, length: float, motor_angle: float) -> float:
-    """Length [m] of the slider's way from one dead point to the other: 2 r cos(motor angle)."""
-    outer, inner = slider_position(np.array([0.0, np.pi]), radius, length, motor_angle)
-    return float(outer - inner)

@@ -1,50 +1,13 @@
-"""The predictive criteria of thesis 5.3.1: where chaos is possible, without any simulation.
+"""How often the printed criteria for chaos (thesis 5.3.1) are right, on machines whose natures are known."""
 
-A machine's ``chaos_thresholds`` hold the printed ones. They do not say that chaos occurs: periodic windows lie inside.
-"""
-
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from chaosgym.diagnosis.response import Nature
+from chaosgym.diagnosis import Nature, predictive_criteria
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
-
-
-@dataclass(frozen=True)
-class PredictiveCriterion:
-    """Whether chaos is possible, and why.
-
-    ``margins``: how far each quantity lies above (positive) or below its threshold, as a share of the threshold.
-    """
-
-    chaos_possible: bool
-    reason: str
-    margins: dict[str, float]
-
-
-def predictive_criteria(machine: Machine) -> PredictiveCriterion:
-    """Say whether the printed criteria expect chaos of a machine.
-
-    Raises
-    ------
-    DiagnosisError
-        If the thesis gives no criterion for the machine.
-    """
-    thresholds = machine.chaos_thresholds
-    if not thresholds:
-        raise DiagnosisError(f"there is no printed criterion for {machine.name}")
-    return _criterion(thresholds)
-
-
-def _criterion(values: Mapping[str, tuple[float, float]]) -> PredictiveCriterion:
-    margins = {name: value / least - 1.0 if least > 0.0 else np.inf for name, (value, least) in values.items()}
-    lacking = [name for name, margin in margins.items() if margin <= 0.0]
-    if lacking:
-        return PredictiveCriterion(False, f"{' and '.join(lacking)} below the threshold", margins)
-    return PredictiveCriterion(True, f"{' and '.join(margins)} above the thresholds", margins)
 
 
 @dataclass(frozen=True)
