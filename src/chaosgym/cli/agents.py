@@ -49,7 +49,7 @@ def compare(
     scores = Scores(run(env, out, machines=machines, only=chosen, policies=trained, progress=True))
     summary = scores.summary()
     if figure is not None:
-        from chaosgym.plotting.commands import comparison_figure
+        from chaosgym.plotting.played_job import comparison_figure
 
         comparison_figure(summary, env).savefig(figure, dpi=130)
     emit({"env": env, "contenders": summary}, as_json, lambda: table_lines(summary))

@@ -2,10 +2,10 @@ r"""Lyapunov exponents, per cycle and per second: do neighbouring motions part o
 
     value = lim  1/N  log |w(N)| / |w(0)|         w: a small deviation of the state, N cycles
 
-On a machine that ``carries_deviations`` w is carried exactly, through contacts by saltation matrices. On any other
-a second trajectory starts at a small distance and is brought back to it each cycle (Benettin). On a measured
-series the mean divergence of nearest neighbours serves (Rosenstein), which needs a few thousand cycles and sees neither
-weak chaos nor decay.
+On a machine that ``carries_deviations`` w is carried exactly, through contacts by saltation matrices. On any other a
+second trajectory starts at a small distance and is brought back to it each cycle (Benettin). On a measured series the
+mean divergence of nearest neighbours serves (Rosenstein), which needs a few thousand cycles and sees neither weak chaos
+nor decay.
 
 A forced machine has no exponent of zero from the direction of the flow: a periodic response has a negative largest
 exponent, and zero means a torus or a bifurcation.

@@ -3,18 +3,16 @@
 Figures are as wide as a column of a journal takes at 80 % (4.4 in), so that their letters stay above 7 points there.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chaosgym.control.comparison import PROFILE_SCORES
 from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.diagnosis import Diagnosis
 from chaosgym.diagnosis.overlay import Overlay
@@ -178,22 +176,22 @@ def peaks_figure(measured: MeasuredPeaks) -> Figure:
     return figure
 
 
-SHOWN = 120
-"""Cycles shown in their order."""
+OVERLAID = 120
+"""Cycles of both records shown in their order."""
 
-STYLES = {"measured": ("tab:red", "o"), "simulated": ("tab:blue", ".")}
+OVERLAY_STYLES = {"measured": ("tab:red", "o"), "simulated": ("tab:blue", ".")}
 
 
 def overlay_figure(result: Overlay) -> Figure:
     """Draw both records in three panels."""
     figure = Figure(figsize=(12.0, 4.0), layout="constrained")
     order, spread, section = figure.subplots(1, 3)
-    for name, (colour, marker) in STYLES.items():
+    for name, (colour, marker) in OVERLAY_STYLES.items():
         peaks, verdict = getattr(result, name), getattr(result, f"{name}_verdict")
         period = f", period {verdict.period}" if verdict.period else ""
         label = f"{name}: {verdict.nature}{period}"
         style = {"color": colour, "marker": marker, "ms": 4, "mfc": "none" if marker == "o" else colour}
-        order.plot(np.arange(1, min(SHOWN, len(peaks)) + 1), peaks[:SHOWN], lw=0.4, label=label, **style)
+        order.plot(np.arange(1, min(OVERLAID, len(peaks)) + 1), peaks[:OVERLAID], lw=0.4, label=label, **style)
         spread.plot(np.sort(peaks), (np.arange(len(peaks)) + 0.5) / len(peaks), color=colour)
         section.plot(peaks[:-1], peaks[1:], ls="", **style)
     order.set(xlabel="cycle", ylabel="peak force [N]")
@@ -204,53 +202,3 @@ def overlay_figure(result: Overlay) -> Figure:
     section.set(xlabel="peak force of a cycle [N]", ylabel="of the next [N]")
     figure.suptitle(result.machine.name, fontsize=10)
     return figure
-
-
-LOWEST_SHOWN = -1.0
-"""Scores below are drawn at the edge."""
-
-PROFILED = 7
-"""Contenders of the best scores whose profiles are drawn; the palette tells no more of them apart."""
-
-
-def comparison_figure(summaries: Mapping[str, Mapping[str, Any]], title: str) -> Figure:
-    """Draw scores and profiles, side by side."""
-    figure = Figure(figsize=(12.0, 0.32 * len(summaries) + 1.8), layout="constrained")
-    scores, profiles = figure.subplots(1, 2)
-    figure.suptitle(title)
-    _draw_scores(scores, summaries)
-    _draw_profiles(profiles, summaries)
-    return figure
-
-
-def _draw_scores(axes: Axes, summaries: Mapping[str, Mapping[str, Any]]) -> None:
-    ordered = sorted(summaries.items(), key=lambda item: item[1]["score"])
-    for height, (_, row) in enumerate(ordered):
-        low, high = row["score_interval"]
-        axes.plot([max(low, LOWEST_SHOWN), max(high, LOWEST_SHOWN)], [height, height], color="0.6", linewidth=2)
-        hidden = row["score"] < LOWEST_SHOWN
-        axes.plot(max(row["score"], LOWEST_SHOWN), height, "<" if hidden else "o", color="tab:blue", clip_on=False)
-        axes.annotate(
-            f"{row['score']:.2f}",
-            (max(row["score"], LOWEST_SHOWN), height),
-            xytext=(0, 4),
-            fontsize=7,
-            ha="center",
-            textcoords="offset points",
-        )
-    axes.set_yticks(range(len(ordered)), [f"{name} ({row['knows']})" for name, row in ordered], fontsize=8)
-    for worth in (0.0, 1.0):
-        axes.axvline(worth, color="0.8", zorder=0)
-    axes.set_xlim(left=LOWEST_SHOWN)
-    axes.set_ylim(-0.7, len(ordered) - 0.2)
-    axes.set_xlabel("score: following 0, own map 1; bars: 95 % over machines")
-
-
-def _draw_profiles(axes: Axes, summaries: Mapping[str, Mapping[str, Any]]) -> None:
-    best = sorted(summaries.items(), key=lambda item: -item[1]["score"])[:PROFILED]
-    for name, row in best:
-        axes.plot(PROFILE_SCORES, row["profile"], label=name)
-    axes.set_xlabel("score of a job, on the common scale")
-    axes.set_ylabel("share of the jobs that reach it")
-    axes.set_ylim(0.0, 1.02)
-    axes.legend(fontsize=8, loc="lower left")
