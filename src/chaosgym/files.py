@@ -7,6 +7,7 @@ Parquet by the end of the name.
 import io
 import os
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +22,12 @@ from chaosgym.errors import DatasetError, UnfinishedError
 LOCK_FILE = ".lock"
 TEMPORARY = ".*.tmp"
 """Pattern of temporary files; a process that was killed may leave one."""
+
+DAMAGE = (
+    *(OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, EOFError, RecursionError),
+    *(zipfile.BadZipFile, zlib.error),
+)
+"""What the reading of a damaged archive raises, and of a description in JSON."""
 
 
 def write_atomically(path: Path, write: Callable[[Path], object]) -> None:

@@ -6,8 +6,6 @@ The hash covers the arrays and the description, model card included.
 import hashlib
 import io
 import json
-import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,7 +15,7 @@ import numpy as np
 from chaosgym.classifier.parameter_features import ParameterScaling, SwingTable
 from chaosgym.classifier.trees import Forest
 from chaosgym.errors import ModelFileError
-from chaosgym.files import unpacked, write_atomically
+from chaosgym.files import DAMAGE, unpacked, write_atomically
 
 FORMAT = 4
 """Version of the model file."""
@@ -70,18 +68,7 @@ def read_model(path: str | Path) -> tuple[dict[str, Any], dict[str, dict[str, An
             name: {key: _restore(value, arrays) for key, value in part.items()} for name, part in head["parts"].items()
         }
         return {**head["card"], "sha256": head["sha256"]}, parts
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        TypeError,
-        IndexError,
-        AttributeError,
-        RecursionError,
-        zipfile.BadZipFile,
-        zlib.error,
-        EOFError,
-    ) as error:
+    except DAMAGE as error:
         if isinstance(error, ModelFileError):
             raise
         raise ModelFileError(f"{path} can't be read as a classifier: {error}") from error

@@ -11,12 +11,13 @@ updates of these matrices. Each update disturbs the motion a little, so the two 
 """
 
 from dataclasses import replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.diagnosis.response import Diagnosis
+from chaosgym.diagnosis.response import Diagnosis, Nature
 from chaosgym.diagnosis.stroboscopic import as_samples, find_decay, find_recurrence, scales
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
@@ -120,23 +121,12 @@ def compare_outcomes(first: ArrayLike, second: ArrayLike, *, tolerance: float = 
     """
     one, two, scale = _pair(first, second)
     agreeing = float(np.mean(np.max(np.abs(one - two), axis=1) <= tolerance * scale))
-    evidence = {"agreeing_cycles": agreeing}
+    judged = partial(Diagnosis, period=None, evidence={"agreeing_cycles": agreeing})
     if agreeing >= 0.95:
-        return Diagnosis(
-            nature="periodic",
-            period=None,
-            margin=agreeing,
-            evidence=evidence,
-            reason=f"runs agree in {agreeing:.0%} of the cycles",
-        )
-    nature: Literal["chaotic", "undetermined"] = "chaotic" if agreeing <= 0.5 else "undetermined"
-    return Diagnosis(
-        nature=nature,
-        period=None,
-        margin=max(0.0, 1.0 - 2.0 * agreeing),
-        evidence=evidence,
-        reason=f"runs agree in only {agreeing:.0%} of the cycles",
-    )
+        return judged(nature="periodic", margin=agreeing, reason=f"runs agree in {agreeing:.0%} of the cycles")
+    reason = f"runs agree in only {agreeing:.0%} of the cycles"
+    nature: Nature = "chaotic" if agreeing <= 0.5 else "undetermined"
+    return judged(nature=nature, margin=max(0.0, 1.0 - 2.0 * agreeing), reason=reason)
 
 
 def compare_attractors(first: ArrayLike, second: ArrayLike, *, tolerance: float = TOLERANCE) -> Diagnosis:
@@ -151,37 +141,19 @@ def compare_attractors(first: ArrayLike, second: ArrayLike, *, tolerance: float 
     shift, distance = _best_shift(one, two)
     periods = [_period(one), _period(two)]
     evidence: dict[str, Any] = {"shift": shift, "distance": distance / scale, "periods": periods}
+    judged = partial(Diagnosis, period=None, evidence=evidence)
+    apart, same = distance / (tolerance * scale), distance <= tolerance * scale
     if all(period is not None for period in periods):
-        same = distance <= tolerance * scale
         reason = f"both runs repeat, {'the same motion' if same else 'but not the same motion'}"
         period = periods[0] if same else None
-        return Diagnosis(
-            nature="periodic", period=period, margin=1.0 if same else 0.5, evidence=evidence, reason=reason
-        )
-    if distance <= tolerance * scale:
-        return Diagnosis(
-            nature="periodic",
-            period=None,
-            margin=1.0 - distance / (tolerance * scale),
-            evidence=evidence,
-            reason=f"runs agree within {distance / scale:.1e} of the largest peak",
-        )
+        return judged(nature="periodic", period=period, margin=1.0 if same else 0.5, reason=reason)
+    if same:
+        reason = f"runs agree within {distance / scale:.1e} of the largest peak"
+        return judged(nature="periodic", margin=1.0 - apart, reason=reason)
     if any(period is not None for period in periods):
-        return Diagnosis(
-            nature="undetermined",
-            period=None,
-            margin=0.0,
-            evidence=evidence,
-            reason="one run repeats, the other does not",
-        )
-    margin = float(np.clip(np.log10(distance / (tolerance * scale)), 0.0, 1.0))
-    return Diagnosis(
-        nature="chaotic",
-        period=None,
-        margin=margin,
-        evidence=evidence,
-        reason=f"neither run repeats, and they part by {distance / scale:.0%} of the largest peak",
-    )
+        return judged(nature="undetermined", margin=0.0, reason="one run repeats, the other does not")
+    reason = f"neither run repeats, and they part by {distance / scale:.0%} of the largest peak"
+    return judged(nature="chaotic", margin=float(np.clip(np.log10(apart), 0.0, 1.0)), reason=reason)
 
 
 def _pair(first: ArrayLike, second: ArrayLike) -> tuple[Array, Array, float]:

@@ -129,47 +129,10 @@ def _titles(fitting: list[list[str]], width: int) -> tuple[list[str], dict[str, 
     return names, {name: unit or lower for (_, unit), name, lower in zip(split, names, below, strict=True)}
 
 
-UNITS = frozenset(
-    [
-        "N",
-        "kN",
-        "mN",
-        "MN",
-        "lbf",
-        "kgf",
-        "s",
-        "ms",
-        "us",
-        "µs",
-        "μs",
-        "min",
-        "h",
-        "rpm",
-        "1/min",
-        "min-1",
-        "Hz",
-        "kHz",
-        "1/s",
-        "V",
-        "mV",
-        "g",
-        "m/s²",
-        "m/s2",
-        "m/s^2",
-        "m",
-        "mm",
-        "um",
-        "µm",
-        "deg",
-        "°",
-        "rad",
-        "°C",
-        "K",
-        "A",
-        "%",
-        "-",
-    ]
-)
+_WRITTEN = """
+N kN mN MN lbf kgf s ms us µs μs min h rpm 1/min min-1 Hz kHz 1/s V mV g m/s² m/s2 m/s^2 m mm um µm deg ° rad °C K A % -
+"""
+UNITS = frozenset(_WRITTEN.split())
 """Units that a heading may name."""
 
 

@@ -5,8 +5,6 @@ chaosgym.evaluate(policy, "chaosgym/ImpactBeamTolerance-v1")
 """
 
 import json
-import zipfile
-import zlib
 from dataclasses import dataclass, field
 from hashlib import sha256
 from io import BytesIO
@@ -22,7 +20,7 @@ from chaosgym.envs.memory import SpeedMemory, Usual
 from chaosgym.envs.observation import OBSERVATION_NAMES
 from chaosgym.envs.task import BACK, Task
 from chaosgym.errors import ModelFileError, ParameterError
-from chaosgym.files import unpacked, write_atomically
+from chaosgym.files import DAMAGE, unpacked, write_atomically
 
 Array = NDArray[Any]
 
@@ -214,18 +212,7 @@ def load_policy(folder: str | Path) -> TrainedPolicy:
                 f"{folder} has format {description['format']}; this version reads format {FORMAT}: train it again"
             )
         return _policy(description, _arrays(folder / WEIGHTS, description["sha256"]))
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        TypeError,
-        IndexError,
-        AttributeError,
-        EOFError,
-        RecursionError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
+    except DAMAGE as error:
         told = error if isinstance(error, ModelFileError) else f"{type(error).__name__}: {error}"
         raise ModelFileError(f"{folder} can't be read as a policy: {told}") from error
 
