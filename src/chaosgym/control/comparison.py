@@ -19,23 +19,7 @@ import pyarrow.compute
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from chaosgym.control.controllers import (
-    OGY,
-    BackOff,
-    Bandit,
-    Belief,
-    CommonSchedule,
-    ConstantTrim,
-    DelayedFeedback,
-    ExtremumSeeking,
-    Follow,
-    ForceFeedback,
-    HillClimbing,
-    MapFollower,
-    RecedingHorizon,
-    Schedule,
-    SkipBands,
-)
+from chaosgym.control import controllers
 from chaosgym.control.maps import FLEET, FLEET_SEED, Maps, fleet_maps, maps_of, model_keywords
 from chaosgym.control.rollout import Played, Policy, play
 from chaosgym.control.statistics import bootstrap_interval, performance_profile
@@ -73,23 +57,23 @@ class Contenders:
     def makers(self, machines: Sequence[int] = ()) -> dict[str, Callable[[], Policy]]:
         """What makes each contender for these machines, in the order in which they are run."""
         return {
-            ZERO: Follow,
-            ONE: lambda: MapFollower(self.own(machines)),
-            "own map, demands known": lambda: Schedule(self.own(machines)),
-            "best constant trim": lambda: ConstantTrim(self.fleet),
-            "skip bands": lambda: SkipBands(self._nominal()),
-            "best common schedule, demands known": lambda: CommonSchedule(self.fleet),
-            "back off": partial(BackOff, remembers=False),
-            "back off, with memory": BackOff,
-            "hill climbing": HillClimbing,
-            "bandit": lambda: Bandit(self.fleet),
-            "extremum seeking": ExtremumSeeking,
-            "force feedback": ForceFeedback,
-            "belief": lambda: Belief(self.fleet),
-            "belief, exact model": lambda: Belief(self._exact_fleet()),
-            "receding horizon": RecedingHorizon,
-            "delayed feedback": DelayedFeedback,
-            "OGY": OGY,
+            ZERO: controllers.Follow,
+            ONE: lambda: controllers.MapFollower(self.own(machines)),
+            "own map, demands known": lambda: controllers.Schedule(self.own(machines)),
+            "best constant trim": lambda: controllers.ConstantTrim(self.fleet),
+            "skip bands": lambda: controllers.SkipBands(self._nominal()),
+            "best common schedule, demands known": lambda: controllers.CommonSchedule(self.fleet),
+            "back off": partial(controllers.BackOff, remembers=False),
+            "back off, with memory": controllers.BackOff,
+            "hill climbing": controllers.HillClimbing,
+            "bandit": lambda: controllers.Bandit(self.fleet),
+            "extremum seeking": controllers.ExtremumSeeking,
+            "force feedback": controllers.ForceFeedback,
+            "belief": lambda: controllers.Belief(self.fleet),
+            "belief, exact model": lambda: controllers.Belief(self._exact_fleet()),
+            "receding horizon": controllers.RecedingHorizon,
+            "delayed feedback": controllers.DelayedFeedback,
+            "OGY": controllers.OGY,
         }
 
     @property
@@ -172,11 +156,11 @@ def compare(
         If the file is no comparison of this environment.
     """
     contenders = Contenders(env, keywords, progress)
-    controllers = list(contenders.makers())
-    chosen = controllers if only is None else list(only)
+    known_names = list(contenders.makers())
+    chosen = known_names if only is None else list(only)
     for name in chosen:
-        if name not in controllers:
-            raise ParameterError(f"there is no controller {name!r}; known: {', '.join(controllers)}")
+        if name not in known_names:
+            raise ParameterError(f"there is no controller {name!r}; known: {', '.join(known_names)}")
     known = native_envs(env, **keywords)
     kind = known.nominal
     subject = env if kind.definition == kind.name else f"{env} ({kind.definition})"
