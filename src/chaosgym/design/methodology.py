@@ -28,14 +28,7 @@ from numpy.typing import NDArray
 from chaosgym.design.bearing import Criteria, Evaluation, evaluate, plain
 from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.reliability import time_blocks
-from chaosgym.design.runs import (
-    DIAGNOSIS_BUDGET,
-    NOMINAL_BUDGET,
-    Series,
-    SettledRun,
-    build_series,
-    settled_run,
-)
+from chaosgym.design.runs import DIAGNOSIS_BUDGET, NOMINAL_BUDGET, Series, SettledRun, build_series, settled_run
 from chaosgym.design.statistics import Convergence, convergence
 from chaosgym.diagnosis import ResponseType, Tolerance, Type, default_tolerances, response_type
 from chaosgym.machines import Machine

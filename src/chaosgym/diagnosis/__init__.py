@@ -9,38 +9,24 @@ from chaosgym.diagnosis.lyapunov import (
 )
 from chaosgym.diagnosis.matrix_update import compare_attractors, compare_outcomes, matrix_update_test
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
-from chaosgym.diagnosis.precursors import (
-    Precursors,
-    PredictiveCriterion,
-    bounce_fraction,
-    precursors,
-    predictive_criteria,
-)
-from chaosgym.diagnosis.response import NATURES, STATUSES, TYPES, Diagnosis, Nature, Status, Type
+from chaosgym.diagnosis.precursors import bounce_fraction, precursors, predictive_criteria
+from chaosgym.diagnosis.response import TYPES, Diagnosis, Nature, Type
 from chaosgym.diagnosis.response_map import ResponseMap, geometric_grid, response_map
 from chaosgym.diagnosis.response_type import ResponseType, Tolerance, default_tolerances, response_type
-from chaosgym.diagnosis.spectrum import Spectrum, power_spectrum
-from chaosgym.diagnosis.stroboscopic import Recurrence, find_recurrence
+from chaosgym.diagnosis.spectrum import power_spectrum
 from chaosgym.diagnosis.two_step import two_step_test
 from chaosgym.diagnosis.type_rule import Neighbour, judge_type, types_on_grid
 from chaosgym.diagnosis.zero_one import zero_one_statistic
 
 __all__ = [
-    "NATURES",
-    "STATUSES",
     "TYPES",
     "Diagnosis",
     "LyapunovExponent",
     "Nature",
     "Neighbour",
     "PeriodicOrbit",
-    "Precursors",
-    "PredictiveCriterion",
-    "Recurrence",
     "ResponseMap",
     "ResponseType",
-    "Spectrum",
-    "Status",
     "Tolerance",
     "Type",
     "bounce_fraction",
@@ -50,7 +36,6 @@ __all__ = [
     "diagnose",
     "exponent_from_series",
     "find_periodic_orbit",
-    "find_recurrence",
     "geometric_grid",
     "judge_type",
     "largest_lyapunov_exponent",

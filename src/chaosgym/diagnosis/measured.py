@@ -14,13 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.diagnosis.response import Diagnosis
-from chaosgym.diagnosis.scatter import (
-    MeasuredVerdict,
-    judge_scatter,
-    newton,
-    scatter_of,
-    undetermined,
-)
+from chaosgym.diagnosis.scatter import MeasuredVerdict, judge_scatter, newton, scatter_of, undetermined
 from chaosgym.diagnosis.two_step import INITIAL_TRANSIENT, two_step_test
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals.noise import SensorError, find_change, quantum, repair, stated_error

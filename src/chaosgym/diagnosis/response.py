@@ -23,9 +23,7 @@ Status = Literal["certified", "agreed", "disputed", "transient", "unresolved"]
 """certified: proven to machine precision; agreed: all tests that speak say the same; disputed: they don't;
 transient: irregular for long before it settled; unresolved: the budget ended first."""
 
-NATURES: tuple[Nature, ...] = ("periodic", "quasiperiodic", "chaotic", "undetermined")
 TYPES: tuple[Type, ...] = ("I", "II", "III", "undetermined")
-STATUSES: tuple[Status, ...] = ("certified", "agreed", "disputed", "transient", "unresolved")
 
 _EMPTY: Mapping[str, Any] = MappingProxyType({})
 
@@ -37,7 +35,7 @@ class Diagnosis:
     Attributes
     ----------
     nature
-        One of ``NATURES``.
+        A ``Nature``.
     period
         Cycles after which a periodic response (or the motion that transient chaos settles on) repeats; else None.
     margin
@@ -49,7 +47,7 @@ class Diagnosis:
     transient
         True where the response was irregular for long and then settled: transient chaos.
     status
-        One of ``STATUSES``; None where a single test spoke.
+        A ``Status``; None where a single test spoke.
     horizon
         Number of cycles, counted from the initial condition, that the verdict rests on.
     settle_cycle

@@ -2,13 +2,7 @@
 
 from chaosgym.machines.integrators import ExactEvents, Integrator, RungeKutta4
 from chaosgym.simulation.record import CycleRecord, MotionState
-from chaosgym.simulation.run import (
-    parallel_map,
-    rest_state,
-    simulate,
-    simulate_many,
-    simulate_with_deviations,
-)
+from chaosgym.simulation.run import parallel_map, rest_state, simulate, simulate_many, simulate_with_deviations
 
 __all__ = [
     "CycleRecord",

@@ -13,11 +13,7 @@ from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.machines.batch import CompiledBatch, Cycles, one_call_at_a_time, put, stacked
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.slider_crank.joints import gaps_of, sensor_peaks
-from chaosgym.machines.slider_crank.kernels.batch import (
-    advance_cranks,
-    advance_kicked_cranks,
-    advance_stepped_cranks,
-)
+from chaosgym.machines.slider_crank.kernels.batch import advance_cranks, advance_kicked_cranks, advance_stepped_cranks
 from chaosgym.machines.slider_crank.kernels.exact import advance
 from chaosgym.machines.slider_crank.kernels.fixed_step import advance_crank_fixed_step
 from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
