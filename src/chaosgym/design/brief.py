@@ -3,7 +3,6 @@
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from chaosgym.design.methodology import SERIES_SIZE
 from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
-from chaosgym.machines.parameters import parameters_of, with_settings
+from chaosgym.machines.parameters import parameters_of, suggestion, with_settings
 from chaosgym.machines.units import parse_quantity
 
 REQUIRED_CRITERIA = ("load_rating", "life", "reliability")
@@ -113,9 +112,7 @@ def _known(where: str, given: Iterable[str], known: Iterable[str]) -> None:
     known = list(known)
     for key in given:
         if key not in known:
-            near = get_close_matches(key, known, n=1)
-            hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(known)}"
-            raise DesignError(f"{where} has no key {key!r}; {hint}")
+            raise DesignError(f"{where} has no key {key!r}{suggestion(key, known)}")
 
 
 def _section(values: Mapping[str, Any], name: str, known: Iterable[str]) -> Mapping[str, Any]:

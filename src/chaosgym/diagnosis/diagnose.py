@@ -286,14 +286,14 @@ def _not_periodic(stage: _Stage) -> Diagnosis:
     if exponent.sign > 0 and verdict.settle_cycle is None:
         margin = float(np.clip(exponent.per_cycle / (3.0 * exponent.standard_error) - 1.0, 0.0, 1.0))
         status: Status = "agreed" if verdict.nature in ("chaotic", "undetermined") else "disputed"
-        return Diagnosis(nature="chaotic", period=None, margin=margin, status=status, reason=reason)
+        return Diagnosis(nature="chaotic", margin=margin, status=status, reason=reason)
     settled = len(stage.record) - len(stage.record) // 2
     if exponent.sign == 0 and verdict.nature == "quasiperiodic" and settled >= QUASIPERIODIC_CYCLES:
-        return Diagnosis(nature="quasiperiodic", period=None, margin=verdict.margin, status="agreed", reason=reason)
+        return Diagnosis(nature="quasiperiodic", margin=verdict.margin, status="agreed", reason=reason)
     if exponent.sign < 0 and verdict.nature == "periodic":
         return Diagnosis(nature="periodic", period=verdict.period, margin=0.0, status="agreed", reason=reason)
     reason = f"not settled after {len(stage.record)} cycles: {reason}"
-    return Diagnosis(nature="undetermined", period=None, margin=0.0, status="unresolved", reason=reason)
+    return Diagnosis(nature="undetermined", margin=0.0, status="unresolved", reason=reason)
 
 
 def _votes(stage: _Stage) -> dict[str, Nature]:

@@ -121,7 +121,7 @@ def compare_outcomes(first: ArrayLike, second: ArrayLike, *, tolerance: float = 
     """
     one, two, scale = _pair(first, second)
     agreeing = float(np.mean(np.max(np.abs(one - two), axis=1) <= tolerance * scale))
-    judged = partial(Diagnosis, period=None, evidence={"agreeing_cycles": agreeing})
+    judged = partial(Diagnosis, evidence={"agreeing_cycles": agreeing})
     if agreeing >= 0.95:
         return judged(nature="periodic", margin=agreeing, reason=f"runs agree in {agreeing:.0%} of the cycles")
     reason = f"runs agree in only {agreeing:.0%} of the cycles"
@@ -141,7 +141,7 @@ def compare_attractors(first: ArrayLike, second: ArrayLike, *, tolerance: float 
     shift, distance = _best_shift(one, two)
     periods = [_period(one), _period(two)]
     evidence: dict[str, Any] = {"shift": shift, "distance": distance / scale, "periods": periods}
-    judged = partial(Diagnosis, period=None, evidence=evidence)
+    judged = partial(Diagnosis, evidence=evidence)
     apart, same = distance / (tolerance * scale), distance <= tolerance * scale
     if all(period is not None for period in periods):
         reason = f"both runs repeat, {'the same motion' if same else 'but not the same motion'}"

@@ -59,7 +59,7 @@ class Diagnosis:
     """
 
     nature: Nature
-    period: int | None
+    period: int | None = None
     margin: float
     reason: str
     evidence: Mapping[str, Any] = field(default_factory=lambda: _EMPTY)

@@ -128,7 +128,6 @@ def undetermined(reason: str, readings: Array, **evidence: Any) -> Diagnosis:
     """Diagnosis of a record that can't be judged, and why."""
     return Diagnosis(
         nature="undetermined",
-        period=None,
         margin=0.0,
         reason=reason,
         horizon=len(readings),
@@ -275,7 +274,7 @@ def _torus(found: Scatter, most: float, told: SensorError | None) -> MeasuredVer
     reason = f"does not repeat; {lines} lines of the spectrum leave {newton(sigma)}, no more than the sensor's error"
     evidence = {"cycles": size, **found.evidence(), "spectral_lines": lines}
     diagnosis = Diagnosis(
-        nature="quasiperiodic", period=None, margin=1.0 - sigma / most, reason=reason, horizon=size, evidence=evidence
+        nature="quasiperiodic", margin=1.0 - sigma / most, reason=reason, horizon=size, evidence=evidence
     )
     return MeasuredVerdict(diagnosis, told or SensorError(3.0 * sigma, sigma, "estimated"))
 
@@ -292,7 +291,6 @@ def _irregular(found: Scatter, beyond: float, lead: str, told: SensorError | Non
     second = two_step_test(found.readings, sensor_error=beyond)
     diagnosis = Diagnosis(
         nature=second.nature if second.nature != "periodic" else "undetermined",
-        period=None,
         margin=second.margin,
         reason=f"{lead}: {second.reason}",
         horizon=len(found.readings),

@@ -259,7 +259,7 @@ def peaks_of_series(
     """
     if column is None and tachometer is not None:
         rest = {name: values for name, values in recording.columns.items() if name != tachometer}
-        signal = choose_force(_with_columns(recording, rest), None, unit)
+        signal = choose_force(replace(recording, columns=rest), None, unit)
     else:
         signal = choose_force(recording, column, unit)
     instants = sampling(recording, len(signal.values), rate_hz)
@@ -271,7 +271,3 @@ def peaks_of_series(
             raise DiagnosisError(f"{recording.source} has no column {tachometer!r} for the tachometer")
         starts = tachometer_starts(recording.columns[tachometer][:size], instants.time)
     return signal, cycle_peaks(signal.values[:size], instants, period, starts)
-
-
-def _with_columns(recording: Recording, columns: dict[str, Array]) -> Recording:
-    return replace(recording, columns=columns)

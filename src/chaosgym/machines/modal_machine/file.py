@@ -18,7 +18,7 @@ from chaosgym.machines.modal_machine.drive import KINDS, Drive
 from chaosgym.machines.modal_machine.keys import REQUIRED, TABLES, checked_table, schema
 from chaosgym.machines.modal_machine.machine import ModalMachine
 from chaosgym.machines.modal_machine.structure import BASE, Structure
-from chaosgym.machines.parameters import Parameter, check_parameter, parameter, parameters_of, suggestion
+from chaosgym.machines.parameters import check_parameter, parameter, parameters_of, suggestion
 from chaosgym.machines.units import parse_quantity
 
 FIELDS = {"stiffness": "contact_stiffness", "damping": "contact_damping"}
@@ -138,7 +138,8 @@ def _built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> typ
     }
     known = parameters_of(ModalMachine)
     for field, value in stated.items():
-        fields[field] = _stated(check_parameter(ModalMachine, field, value), known[field], path)
+        about = {**vars(known[field]), "provenance": "stated", "source": path}
+        fields[field] = parameter(check_parameter(ModalMachine, field, value), **about)
     usual = dict(zip(("speed", "clearance"), map(_range, ("speed_range", "clearance_range"), ranges), strict=True))
     types: dict[str, Any] = {"name": path, "usual_ranges": usual}
     annotations: dict[str, Any] = dict.fromkeys(fields, Any) | dict.fromkeys(types, ClassVar[Any])
@@ -164,18 +165,6 @@ def _restored(path: str, values: Mapping[str, Any]) -> ModalMachine:
         raise ParameterError(f"{path} has changed: it is not the machine that was kept")
     machine: ModalMachine = kind(**values)
     return machine
-
-
-def _stated(value: Any, about: Parameter, path: str) -> Any:
-    return parameter(
-        value,
-        unit=about.unit,
-        low=about.low,
-        high=about.high,
-        choices=about.choices,
-        provenance="stated",
-        source=path,
-    )
 
 
 def _range(name: str, values: Any) -> tuple[float, float]:

@@ -108,11 +108,7 @@ def checked_table(path: str, given: Any) -> dict[str, Any]:
     if not isinstance(given, dict):
         raise ParameterError(f"{path} = {given!r} is not a table; write [{path}] and one line a value below it")
     known, prefix = TABLES[path], f"{path}." if path else ""
-    inner = [
-        name[len(prefix) :]
-        for name in TABLES
-        if name.startswith(prefix) and name != path and "." not in name[len(prefix) :]
-    ]
+    inner = _inner(path)
     values = {}
     for name, value in given.items():
         if name in inner:
