@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from chaosgym.classifier.answer import NatureAnswer
 from chaosgym.classifier.estimator import ResponseClassifier
 from chaosgym.classifier.features import MAX_CYCLES, response_features
-from chaosgym.diagnosis.diagnose import approaches, primitive
+from chaosgym.diagnosis.diagnose import proven_orbit, returning_period
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
 from chaosgym.errors import SimulationError
 from chaosgym.machines import Machine
@@ -199,22 +199,10 @@ def _go_on(now: _Progress, machine: Machine, cycles: int) -> CycleRecord:
 
 def _proof(machine: Machine, record: CycleRecord, began: float, budget_us: float | None) -> PeriodicOrbit | None:
     """The periodic orbit that the run nears, if the budget holds Newton's method and it proves one."""
-    period = returning_period(record.section)
+    period = returning_period(record.section, LONGEST_PERIOD, SEEN, BACK)
     if not _affordable(machine, began, budget_us, 0, period):
         return None
-    orbit = find_periodic_orbit(machine, record.final_state, period)
-    if orbit is None or not (orbit.certified and approaches(machine, record, orbit)):
-        return None
-    return primitive(machine, orbit) if orbit.period > 1 else orbit
-
-
-def returning_period(section: Array) -> int:
-    """Period after which the last states of a section (cycles, n_states) come back best."""
-    states = section / np.ptp(section, axis=0).clip(1e-300)
-    last = states[-SEEN:]
-    longest = min(LONGEST_PERIOD, len(states) // 2)
-    gaps = np.array([np.linalg.norm(last - states[-SEEN - k : -k]) for k in range(1, longest + 1)])
-    return int(np.argmax(gaps <= max(1.5 * float(gaps.min()), BACK))) + 1
+    return proven_orbit(machine, record, period)[0]
 
 
 def _answer(now: _Progress, machine: Machine, foreign: str, began: float) -> NatureAnswer:

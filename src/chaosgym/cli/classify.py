@@ -160,7 +160,7 @@ def _classify_measured(
         drawn.append((run.name, run.peaks, verdict, _chances(learned)))
     (only,) = results.values() if len(results) == 1 else (None,)
     result = {"machine": machine, **only} if only else {"machine": machine, "runs": results}
-    draw(picture, lambda: _figure(drawn), result, lines)
+    draw(picture, lambda plots: plots.classified_figure(drawn), result, lines)
     emit(result, as_json, lambda: lines)
 
 
@@ -168,12 +168,6 @@ def _chances(answer: Any) -> dict[str, float]:
     """Probabilities that the classifier gives for a record."""
     irregular = {} if answer.irregular_probability is None else {"irregular": answer.irregular_probability}
     return {**irregular, **answer.nature_probabilities}
-
-
-def _figure(runs: Any) -> Any:
-    from chaosgym.plotting.commands import classified_figure
-
-    return classified_figure(runs)
 
 
 def _classify_batch(

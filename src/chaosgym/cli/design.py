@@ -2,7 +2,6 @@
 
 import datetime
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -66,7 +65,7 @@ def design(
         stated = asked.stated if asked is not None else ("load_rating",)
         found = evaluate_peaks(run.peaks, criteria, verdict=run.verdict, stated=stated, source=source)
         page, result, lines = report.measured_report(found), found.as_dict(), [*found.lines(), *run.notes]
-        draw(picture, lambda: _figure(found), result, lines)
+        draw(picture, lambda plots: plots.peaks_figure(found), result, lines)
     elif asked is not None:
         answer = study(asked, seed=seed, workers=workers, progress=True)
         page, result, lines = (
@@ -83,9 +82,3 @@ def design(
         report.write_report(page, result, out, overwrite)
         lines.append(f"report: {out}")
     emit(result, as_json, lambda: lines)
-
-
-def _figure(found: Any) -> Any:
-    from chaosgym.plotting.commands import peaks_figure
-
-    return peaks_figure(found)

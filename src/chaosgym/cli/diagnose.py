@@ -42,19 +42,20 @@ def diagnose(
             raise click.UsageError("--peaks and --series go without a machine, --types and --step-check")
         (run,) = measured_runs(measured)
         result, lines = run_as_dict(run), verdict_lines(run.source, run)
-        draw(picture, lambda: _figure_of_run(run), result, lines)
+        name = f"{Path(run.source).name}, {run.name}"
+        draw(picture, lambda plots: plots.measured_figure(run.peaks, run.verdict.diagnosis, name), result, lines)
     elif machine is None:
         raise click.UsageError(f"give a machine ({', '.join(MACHINES)}), --peaks FILE or --series FILE")
     elif test == "mut":
         with patience("diagnose"):
             result, lines, verdict = _matrix_update(machine)
-        draw(picture, lambda: _figure(verdict), result, lines)
+        draw(picture, lambda plots: plots.diagnosis_figure(verdict), result, lines)
     else:
         if measured.sensor_sigma is not None:
             raise click.UsageError("--sensor-sigma belongs to --peaks or --series")
         with patience("diagnose"):
             result, lines, verdict = _diagnose_machine(machine, budget, types, step_check, measured.sensor_error or 0.0)
-        draw(picture, lambda: _figure(verdict), result, lines)
+        draw(picture, lambda plots: plots.diagnosis_figure(verdict), result, lines)
     emit(result, as_json, lambda: lines)
 
 
@@ -67,18 +68,6 @@ def _verdict_lines(subject: str, verdict: Any, summary: Mapping[str, float], uni
         f"  {summary['min']:.2f} to {summary['max']:.2f}{unit}, mean {summary['mean']:.2f}{unit}, "
         f"standard deviation {summary['std']:.2f}{unit}",
     ]
-
-
-def _figure(verdict: Any) -> Any:
-    from chaosgym.plotting.commands import diagnosis_figure
-
-    return diagnosis_figure(verdict)
-
-
-def _figure_of_run(run: Any) -> Any:
-    from chaosgym.plotting.commands import measured_figure
-
-    return measured_figure(run.peaks, run.verdict.diagnosis, f"{Path(run.source).name}, {run.name}")
 
 
 def _matrix_update(machine: Any) -> tuple[dict[str, Any], list[str], Any]:

@@ -89,12 +89,13 @@ def picture_path(plot: str | None, stem: str, formats: tuple[str, ...] | None = 
     return free_name(stem) if plot == UNNAMED else check_picture(Path(plot), formats or FORMATS)
 
 
-def draw(path: Path | None, figure: Callable[[], "Figure"], result: dict[str, Any], lines: list[str]) -> None:
-    """Save the figure, if one was asked for, and say where."""
+def draw(path: Path | None, figure: Callable[[Any], "Figure"], result: dict[str, Any], lines: list[str]) -> None:
+    """Save the figure, if one was asked for, and say where; ``figure`` is given the module ``plotting.commands``."""
     if path is None:
         return
+    from chaosgym.plotting import commands
     from chaosgym.plotting.style import save_picture
 
-    save_picture(figure(), path)
+    save_picture(figure(commands), path)
     result["plot"] = str(path)
     lines.append(f"picture: {path}")

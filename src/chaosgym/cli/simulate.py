@@ -75,14 +75,8 @@ def simulate(
         *(f"written to {path}" for path in result["files"]),
         f"computing time            {1e6 * seconds_per_cycle:.0f} us per cycle",
     ]
-    draw(picture, lambda: _figure(record, transient), result, lines)
+    draw(picture, lambda plots: plots.simulation_figure(record, transient), result, lines)
     emit(result, as_json, lambda: lines)
-
-
-def _figure(record: Any, transient: int) -> Any:
-    from chaosgym.plotting.commands import simulation_figure
-
-    return simulation_figure(record, transient)
 
 
 def _largest(sensor_peak: Any) -> list[float]:

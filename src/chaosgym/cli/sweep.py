@@ -97,14 +97,8 @@ def sweep(
         ),
         *(f"  {warning}" for warning in warnings),
     ]
-    draw(picture, lambda: _figure(labelled), result, lines)
+    draw(picture, lambda plots: plots.response.sweep_map(labelled), result, lines)
     emit(result, as_json, lambda: lines)
-
-
-def _figure(labelled: Any) -> Any:
-    from chaosgym.plotting.response import sweep_map
-
-    return sweep_map(labelled)
 
 
 def _note_millimetres(machine: Any, text: str) -> None:

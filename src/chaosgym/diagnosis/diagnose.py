@@ -144,7 +144,7 @@ def _proven_early(
         verdict = two_step_test(record, repeats_only=True)
         if verdict.settle_cycle is None or verdict.period is None:
             continue
-        orbit, spent = _proven(machine, record, verdict.period)
+        orbit, spent = proven_orbit(machine, record, verdict.period)
         searched += spent
         if orbit is not None:
             per_cycle = np.full(2 * BLOCKS, np.log(max(orbit.largest_multiplier, 1e-300)) / orbit.period)
@@ -190,29 +190,42 @@ def _stage(machine: Machine, record: CycleRecord, growth: Array, searched: int) 
     exponent = average_growth(growth[len(growth) // 2 :], machine.cycle_period)
     orbit, spent = None, 0
     if verdict.period is not None or exponent.sign < 0:
-        orbit, spent = _proven(machine, record, verdict.period or _best_return(record))
+        period = verdict.period or returning_period(record.section, MAX_SEARCHED_PERIOD)
+        orbit, spent = proven_orbit(machine, record, period)
     return _Stage(record, growth, verdict, exponent, orbit, len(record) + searched + spent)
 
 
-def _proven(machine: Machine, record: CycleRecord, period: int) -> tuple[PeriodicOrbit | None, int]:
+def proven_orbit(machine: Machine, record: CycleRecord, period: int) -> tuple[PeriodicOrbit | None, int]:
     """The orbit that a motion approaches, if Newton's method proves one of this period, and the cycles that took."""
     found = find_periodic_orbit(machine, record.final_state, period)
-    if found is None or not found.certified or not approaches(machine, record, found):
+    if found is None or not found.certified or not _approaches(machine, record, found):
         return None, 8 * period
-    return primitive(machine, found), 14 * period
+    return _primitive(machine, found), 14 * period
 
 
-def _best_return(record: CycleRecord) -> int:
-    """The period after which the state comes back best."""
-    states = record.section / np.ptp(record.section, axis=0).clip(1e-300)
-    longest = min(MAX_SEARCHED_PERIOD, len(states) // 2)
-    last = states[-4:]
-    gaps = np.array([np.linalg.norm(last - states[-4 - k : -k]) for k in range(1, longest + 1)])
-    return int(np.argmax(gaps <= 1.5 * gaps.min())) + 1
+def returning_period(section: Array, longest: int, seen: int = 4, back: float = 0.0) -> int:
+    """Period after which the last states of a section (cycles, n_states) come back best.
+
+    Parameters
+    ----------
+    longest
+        Longest period that is tried.
+    seen
+        How many of the last states must come back.
+    back
+        Distance, relative to the size of the motion, at which a state has come back.
+    """
+    states = section / np.ptp(section, axis=0).clip(1e-300)
+    last = states[-seen:]
+    periods = range(1, min(longest, len(states) // 2) + 1)
+    gaps = np.array([np.linalg.norm(last - states[-seen - k : -k]) for k in periods])
+    return int(np.argmax(gaps <= max(1.5 * float(gaps.min()), back))) + 1
 
 
-def primitive(machine: Machine, orbit: PeriodicOrbit) -> PeriodicOrbit:
+def _primitive(machine: Machine, orbit: PeriodicOrbit) -> PeriodicOrbit:
     """The orbit with its smallest period: a multiple of it closes too."""
+    if orbit.period == 1:
+        return orbit
     states = simulate(machine, orbit.period, orbit.state).section
     size = np.maximum(np.abs(orbit.state), 1e-9 * np.max(np.abs(orbit.state)))
     for divisor in (d for d in range(1, orbit.period) if orbit.period % d == 0):
@@ -223,7 +236,7 @@ def primitive(machine: Machine, orbit: PeriodicOrbit) -> PeriodicOrbit:
     return orbit
 
 
-def approaches(machine: Machine, record: CycleRecord, orbit: PeriodicOrbit) -> bool:
+def _approaches(machine: Machine, record: CycleRecord, orbit: PeriodicOrbit) -> bool:
     """True if the motion is near the orbit, and nearer four periods later unless it is there already."""
     if orbit.distance > NEAR:
         return False

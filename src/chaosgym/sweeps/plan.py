@@ -255,9 +255,7 @@ class SweepPlan:
 
     def settings(self) -> dict[str, Any]:
         """Everything that decides the rows of the sweep, as JSON values."""
-        described = {
-            name: getattr(self, name) for name in ("sampling", "size", "seed", "budget", "signals", "full_types")
-        }
+        described = {name: getattr(self, name) for name in _PLAIN_FIELDS}
         described["machine"] = self.machine.name
         described["base"] = {name: getattr(self.machine, name) for name in parameters_of(self.machine)}
         described["axes"] = [asdict(axis) for axis in self.axes]
