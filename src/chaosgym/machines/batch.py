@@ -36,14 +36,6 @@ class Cycles(NamedTuple):
     impacts: NDArray[np.int64]
     bounce_duration: Array
 
-    def of(self, chosen: NDArray[np.bool_]) -> "Cycles":
-        """Return those of some of the machines."""
-        return Cycles(self.failed[chosen], self.peak_force[chosen], self.impacts[chosen], self.bounce_duration[chosen])
-
-    def until(self, end: int) -> "Cycles":
-        """Return the first ``end`` cycles."""
-        return Cycles(self.failed, self.peak_force[:, :end], self.impacts[:, :end], self.bounce_duration[:, :end])
-
 
 def stacked(models: list[Any]) -> Any:
     """Batch of models: a model whose fields have one more axis in front."""

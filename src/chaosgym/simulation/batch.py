@@ -8,7 +8,7 @@ cycles = batch.run(which, 5)             # one compiled call on all processors
 Every machine moves as ``simulate`` moves it, bit for bit.
 """
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +69,7 @@ class SerialBatch:
     """Machines that run one after the other; ``records`` holds the last cycles of each that did not fail."""
 
     def __init__(self, count: int) -> None:
-        self._machines: list[Machine | None] = [None] * count
+        self._machines: list[Any] = [None] * count
         self._motions: list[MotionState | None] = [None] * count
         self.records: list[CycleRecord | None] = [None] * count
 
@@ -87,26 +87,20 @@ class SerialBatch:
     def set_speeds(self, which: Indices, speeds: Array) -> None:
         """Change the speeds of the machines ``which`` (k,) to ``speeds`` (k,), in the unit of their speed field."""
         for i, speed in zip(which.tolist(), speeds.tolist(), strict=True):
-            machine = self._machines[i]
-            assert machine is not None
-            self._machines[i] = machine.at(speed)
+            self._machines[i] = self._machines[i].at(speed)
 
     def set_clearances(self, which: Indices, clearances: Array) -> None:
         """Change the clearances of the machines ``which`` (k,) to ``clearances`` (k,) [m]."""
         for i, clearance in zip(which.tolist(), clearances.tolist(), strict=True):
-            machine = self._machines[i]
-            assert machine is not None
-            self._machines[i] = machine.at(clearance=clearance)
+            self._machines[i] = self._machines[i].at(clearance=clearance)
 
     def run(self, which: Indices, cycles: int) -> Cycles:
         """Run the machines ``which`` (k,) for some cycles."""
         shape = (len(which), cycles, 2)
         results = Cycles(np.zeros(len(which), np.bool_), np.zeros(shape), np.zeros(shape, np.int64), np.zeros(shape))
         for k, i in enumerate(which.tolist()):
-            machine = self._machines[i]
-            assert machine is not None
             try:
-                record = simulate(machine, cycles, self._motions[i])
+                record = simulate(self._machines[i], cycles, self._motions[i])
             except SimulationError:
                 results.failed[k] = True
                 continue
@@ -123,9 +117,7 @@ class SerialBatch:
 
     def motion(self, i: int) -> tuple[Array, Array]:
         """Return copies of the coordinates and the bouncing of machine i, as in a ``MotionState``."""
-        machine = self._machines[i]
-        assert machine is not None
-        coordinates, bouncing = self._motions[i] or rest_state(machine)
+        coordinates, bouncing = self._motions[i] or rest_state(self._machines[i])
         return coordinates.copy(), bouncing.copy()
 
     def kick(self, which: Indices, shares: Array) -> None:
