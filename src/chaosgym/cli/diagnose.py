@@ -60,10 +60,9 @@ def diagnose(
 
 
 def _verdict_lines(subject: str, verdict: Any, summary: Mapping[str, float], unit: str) -> list[str]:
-    period = f", period {verdict.period}" if verdict.period else ""
     status = f"{verdict.status}, " if verdict.status else ""
     return [
-        f"{subject}: {verdict.nature}{period} ({status}margin {verdict.margin:.2f})",
+        f"{subject}: {verdict.words} ({status}margin {verdict.margin:.2f})",
         f"  {verdict.reason}",
         f"  {summary['min']:.2f} to {summary['max']:.2f}{unit}, mean {summary['mean']:.2f}{unit}, "
         f"standard deviation {summary['std']:.2f}{unit}",

@@ -128,9 +128,8 @@ def verdict_lines(subject: str, run: Run) -> list[str]:
     from chaosgym.design.statistics import summary
 
     verdict, told = run.verdict.diagnosis, summary(run.peaks)
-    period = f", period {verdict.period}" if verdict.period else ""
     return [
-        f"{subject}: {verdict.nature}{period} (margin {verdict.margin:.2f})",
+        f"{subject}: {verdict.words} (margin {verdict.margin:.2f})",
         f"  {verdict.reason}",
         *(f"  {note}" for note in run.verdict.notes),
         f"  {told['min']:.2f} to {told['max']:.2f} N, mean {told['mean']:.2f} N, "

@@ -70,8 +70,7 @@ class MeasuredPeaks:
     def headline(self) -> str:
         """Nature of the response, and what follows for its life."""
         verdict = self.verdict.diagnosis
-        period = f", period {verdict.period}" if verdict.period else ""
-        return f"{verdict.nature}{period}: {FOLLOWS[verdict.nature]}"
+        return f"{verdict.words}: {FOLLOWS[verdict.nature]}"
 
     @property
     def doubt(self) -> str:

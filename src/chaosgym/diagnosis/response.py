@@ -71,6 +71,11 @@ class Diagnosis:
     record: "CycleRecord | None" = field(default=None, repr=False, compare=False)
 
     @property
+    def words(self) -> str:
+        """Nature and period, such as "periodic, period 2"."""
+        return f"{self.nature}, period {self.period}" if self.period else self.nature
+
+    @property
     def run(self) -> "CycleRecord":
         """The run that was judged.
 

@@ -12,8 +12,9 @@ from chaosgym.classifier import classifier_for
 from chaosgym.diagnosis import Diagnosis, diagnose
 from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
-from chaosgym.machines.parameters import parameters_of, with_settings
+from chaosgym.machines.parameters import changes_of, parameters_of, with_settings
 from chaosgym.monitor import Monitor
+from chaosgym.plotting.design import axis_label
 from chaosgym.simulation import simulate
 
 Array = NDArray[np.float64]
@@ -86,8 +87,8 @@ def _slider(machine: Machine, field: str) -> Slider:
     about, value = parameters_of(machine)[field], float(getattr(machine, field))
     usual = machine.usual_ranges.get(field, (0.2 * value, 5.0 * value if value else 1.0))
     low, high = max(min(usual[0], value), about.low), min(max(usual[1], value), about.high)
-    unit, factor = ("mm", 1e3) if about.unit == "m" else (about.unit, 1.0)
-    return Slider(field, field.replace("_", " ") + ("" if unit == "-" else f" [{unit}]"), low, high, factor)
+    label, factor = axis_label(machine, field)
+    return Slider(field, label, low, high, factor)
 
 
 def machine_from(name: str, settings: Mapping[str, str], served: str = "") -> Machine:
@@ -112,16 +113,6 @@ def machine_from(name: str, settings: Mapping[str, str], served: str = "") -> Ma
         except ValueError:
             raise ParameterError(f"{field} = {text!r} is no number") from None
     return with_settings(MACHINES[name](), values)
-
-
-def changes_of(machine: Machine) -> dict[str, Any]:
-    """Fields in which a machine differs from the default of its kind."""
-    default = type(machine)()
-    return {
-        name: getattr(machine, name)
-        for name in parameters_of(machine)
-        if getattr(machine, name) != getattr(default, name)
-    }
 
 
 def link_of(machine: Machine) -> str:
@@ -175,14 +166,9 @@ def view_of(machine: Machine) -> View:
         peaks=judged.peak_force[:, 0],
         room=room,
         nature=verdict.nature,
-        headline=_headline(verdict),
+        headline=f"{verdict.words} ({verdict.status})",
         lines=(verdict.reason, _votes(verdict), _classified(machine), _watched(heard)),
     )
-
-
-def _headline(verdict: Diagnosis) -> str:
-    period = f", period {verdict.period}" if verdict.period else ""
-    return f"{verdict.nature}{period} ({verdict.status})"
 
 
 def _votes(verdict: Diagnosis) -> str:

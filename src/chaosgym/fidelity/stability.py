@@ -79,10 +79,6 @@ class StabilityCell:
     share_of_bound: float | None
     seconds: float
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        return dict(vars(self))
-
 
 @dataclass(frozen=True)
 class StabilityMap:
@@ -107,7 +103,7 @@ class StabilityMap:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        return {"machine": self.machine, "cells": [cell.as_dict() for cell in self.cells]}
+        return {"machine": self.machine, "cells": [dict(vars(cell)) for cell in self.cells]}
 
 
 def stability_map(machine: Machine, *, workers: int | None = None, progress: bool = False) -> StabilityMap:

@@ -122,6 +122,13 @@ def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
     return replace(machine, **settings)  # type: ignore[type-var]
 
 
+def changes_of(machine: Any) -> dict[str, Any]:
+    """Fields in which a machine differs from the default of its kind."""
+    default = type(machine)()
+    values = {name: getattr(machine, name) for name in parameters_of(machine)}
+    return {name: value for name, value in values.items() if value != getattr(default, name)}
+
+
 def origin_of(machine: Any, name: str) -> tuple[str, str]:
     """Provenance and source of a field's value: those of the default, or "given"."""
     value, about = getattr(machine, name), parameters_of(machine)[name]

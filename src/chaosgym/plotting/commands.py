@@ -117,14 +117,13 @@ def diagnosis_figure(verdict: Diagnosis) -> Figure:
 
 def _told(verdict: Diagnosis) -> str:
     """Nature, period and the exponent or the certificate, in one line."""
-    period = f", period {verdict.period}" if verdict.period else ""
     if verdict.status == "certified":
-        return f"{verdict.nature}{period}: proven"
+        return f"{verdict.words}: proven"
     exponent = verdict.evidence.get("largest_lyapunov_exponent_per_cycle")
     if exponent is None:
-        return f"{verdict.nature}{period} (margin {verdict.margin:.2f})"
+        return f"{verdict.words} (margin {verdict.margin:.2f})"
     return (
-        f"{verdict.nature}{period} ({verdict.status}): exponent {exponent['value']:.2f} "
+        f"{verdict.words} ({verdict.status}): exponent {exponent['value']:.2f} "
         f"± {exponent['standard_error']:.2f} per cycle"
     )
 
@@ -188,8 +187,7 @@ def overlay_figure(result: Overlay) -> Figure:
     order, spread, section = figure.subplots(1, 3)
     for name, (colour, marker) in OVERLAY_STYLES.items():
         peaks, verdict = getattr(result, name), getattr(result, f"{name}_verdict")
-        period = f", period {verdict.period}" if verdict.period else ""
-        label = f"{name}: {verdict.nature}{period}"
+        label = f"{name}: {verdict.words}"
         style = {"color": colour, "marker": marker, "ms": 4, "mfc": "none" if marker == "o" else colour}
         order.plot(np.arange(1, min(OVERLAID, len(peaks)) + 1), peaks[:OVERLAID], lw=0.4, label=label, **style)
         spread.plot(np.sort(peaks), (np.arange(len(peaks)) + 0.5) / len(peaks), color=colour)

@@ -12,8 +12,7 @@ import numpy as np
 from chaosgym.diagnosis import TYPES, default_tolerances
 from chaosgym.errors import DatasetError
 from chaosgym.files import write_atomically
-from chaosgym.machines import MACHINES
-from chaosgym.machines.parameters import parameters_of
+from chaosgym.machines.parameters import changes_of, parameters_of
 from chaosgym.sweeps.dataset import DAMAGE, DATA_FILE, LabelledSweep, read_sweep
 from chaosgym.sweeps.folder import CHUNK_FOLDER, PLAN_FILE, read_plan_file
 from chaosgym.sweeps.plan import SweepPlan
@@ -119,11 +118,9 @@ CARD_FILE, NOISE_FILE = "CARD.md", "noise.json"
 
 def sweep_command(plan: SweepPlan, folder: str) -> str:
     """Return the command line that makes a plan's dataset."""
-    default: Any = MACHINES[plan.machine.name]()
     words = ["chaosgym", "sweep", plan.machine.name]
-    for name in parameters_of(plan.machine):
-        value = getattr(plan.machine, name)
-        if value != getattr(default, name) and name not in plan.fields:
+    for name, value in changes_of(plan.machine).items():
+        if name not in plan.fields:
             words += ["--set", f"{name}={value}"]
     for axis in plan.axes:
         words += ["--axis", str(axis)]
