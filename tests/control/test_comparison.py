@@ -1,7 +1,6 @@
 """A comparison keeps one row a job, goes on where it stopped, and scores in pairs; one line evaluates a policy."""
 
 import numpy as np
-import pyarrow as pa
 import pytest
 from stable_baselines3 import PPO
 
@@ -61,15 +60,6 @@ def test_one_file_holds_all_jobs(table):
     assert found["job_return"].to_numpy().max() < 0.0
     with pytest.raises(DatasetError, match="is no comparison of chaosgym/Other"):
         read_comparison(table[1], "chaosgym/Other-v1")
-
-
-def test_differences_are_paired():
-    """A gain that is the same on every machine has an interval without width, however the machines differ."""
-    rows = {"contender": ["a"] * 5 + ["b"] * 5, "machine": [*range(5)] * 2}
-    returns = np.array([-1.0, -20.0, -3.0, -50.0, -7.0])
-    table = pa.table({**rows, "job_return": np.concatenate([returns, returns - 2.0])})
-    gain, interval = Scores(table).difference("a", "b")
-    assert (gain, *interval) == pytest.approx((2.0, 2.0, 2.0))
 
 
 def test_an_unknown_controller_is_named(tmp_path):

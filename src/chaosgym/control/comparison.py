@@ -267,13 +267,6 @@ class Scores:
         common = sorted(set.intersection(*(set(jobs) for jobs in found)))
         return np.array([[jobs[machine].mean() for machine in common] for jobs in found])
 
-    def difference(self, one: str, other: str) -> tuple[float, tuple[float, float]]:
-        """Mean return of one contender less another's, and its interval of 95 % over machines."""
-        first, second = self.paired(one, other)
-        gain = first - second
-        low, high = bootstrap_interval(len(gain), lambda drawn: gain[drawn].mean(axis=-1))
-        return float(gain.mean()), (float(low), float(high))
-
     def summary(self) -> dict[str, dict[str, Any]]:
         """What each contender achieved, as plain values, best score last.
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.errors import DiagnosisError
+from chaosgym.signals.noise import class_residual
 
 Array = NDArray[np.float64]
 
@@ -203,9 +204,9 @@ def find_decay(scaled: Array, max_period: int = MAX_DECAY_PERIOD) -> Decay | Non
     """Return the steady approach to a periodic motion that a series shows, or None.
 
     The largest distance |x(n + k) - x(n)| of each of eight blocks must be smaller than that of the block before, and
-    their logarithms must fall nearly in a line. Holds
-    for slow real and complex multipliers alike, and for the slower than geometric approach at a bifurcation. The
-    smallest k counts for which they shrink to a quarter; if there is none, the smallest for which they shrink at all.
+    their logarithms must fall nearly in a line. Holds for slow real and complex multipliers alike, and for the slower
+    than geometric approach at a bifurcation. The smallest k counts for which they shrink to a quarter; if there is none,
+    the smallest for which they shrink at all.
     """
     n = len(scaled)
     slow = None
@@ -237,16 +238,10 @@ def subtract_bands(series: Array, max_bands: int = 24, min_repeats: int = 30) ->
     best, variances = series - series.mean(), []
     candidates = range(1, max(1, min(max_bands, n // min_repeats)) + 1)
     for k in candidates:
-        variances.append(float(np.sum(_without_class_means(series, k) ** 2)) / (n - k))
+        variances.append(float(np.sum(class_residual(series, k) ** 2)) / (n - k))
     least = min(variances)
     for k, variance in zip(candidates, variances, strict=True):
         if variance <= 1.1 * least:
-            best = _without_class_means(series, k)
+            best = class_residual(series, k)
             return best, k
     return best, 1
-
-
-def _without_class_means(series: Array, k: int) -> Array:
-    phase = np.arange(len(series)) % k
-    means = np.bincount(phase, weights=series) / np.bincount(phase)
-    return np.asarray(series - means[phase])

@@ -5,7 +5,7 @@ slider that runs along a straight guide (thesis 4.2). Clearance in the slider jo
 guide, clearance in the ball joint lets the ball rattle in its housing.
 
 Nominal kinematics and rod (``kinematics``, ``connecting_rod``) -> equations of small motions (``equations``),
-held over bins of crank angle -> exact propagators (``core.crank_propagator``) -> SliderCrankModel.
+held over bins of crank angle -> exact propagators (``kernels.propagator``) -> SliderCrankModel.
 
 Gravity is off by default. With the mechanism's plane upright, the slider's weight keeps it on the guide below about
 360 rpm, so no impact could happen in the slider joint; yet the thesis shows impacts of 35 to 130 N at 190 to 290 rpm
