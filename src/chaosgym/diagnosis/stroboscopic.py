@@ -205,8 +205,8 @@ def find_decay(scaled: Array, max_period: int = MAX_DECAY_PERIOD) -> Decay | Non
 
     The largest distance |x(n + k) - x(n)| of each of eight blocks must be smaller than that of the block before, and
     their logarithms must fall nearly in a line. Holds for slow real and complex multipliers alike, and for the slower
-    than geometric approach at a bifurcation. The smallest k counts for which they shrink to a quarter; if there is none,
-    the smallest for which they shrink at all.
+    than geometric approach at a bifurcation. The smallest k counts for which they shrink to a quarter, or else the
+    smallest for which they shrink at all.
     """
     n = len(scaled)
     slow = None
