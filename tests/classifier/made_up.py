@@ -3,6 +3,7 @@
 import numpy as np
 import pyarrow as pa
 
+from chaosgym.classifier.features import as_records, response_features
 from chaosgym.machines import ImpactBeam
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import LabelledSweep
@@ -17,6 +18,12 @@ def logistic(rate, start, cycles):
     for i in range(cycles - 1):
         x[i + 1] = rate * x[i] * (1.0 - x[i])
     return 20.0 + 40.0 * x
+
+
+def record_features(peaks, section=None, sensor_error=None):
+    """Figures of records, (n_records, n_features)."""
+    forces, states, errors = as_records(peaks, section, sensor_error)
+    return response_features(None, None, forces, states, errors)
 
 
 def settled(rate, cycles=CYCLES):

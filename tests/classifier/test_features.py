@@ -9,12 +9,11 @@ from chaosgym.classifier.features import (
     as_records,
     least_scatter,
     record_amplitude,
-    record_features,
     repeat_period,
 )
 from chaosgym.diagnosis.stroboscopic import noisy_class_residuals
 from chaosgym.errors import DiagnosisError
-from tests.classifier.made_up import settled
+from tests.classifier.made_up import record_features, settled
 
 
 def figure(record, name, **given):

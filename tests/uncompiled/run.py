@@ -12,8 +12,8 @@ import chaosgym.core.lanes
 import chaosgym.machines.slider_crank.kernels.batch
 from chaosgym import ImpactBeam, SliderCrank
 from chaosgym.classifier import classifier_for
-from chaosgym.classifier.features import record_features
 from chaosgym.simulation import simulate_with_deviations
+from tests.classifier.made_up import record_features
 from tests.golden.golden import RECORDED, scenes
 from tests.uncompiled.lanes import OPERATIONS
 

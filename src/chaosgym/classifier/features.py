@@ -156,12 +156,6 @@ def response_features(
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
 
-def record_features(peaks: ArrayLike, section: ArrayLike | None = None, sensor_error: ArrayLike | None = None) -> Array:
-    """Figures of records, (n_records, n_features); see ``as_records`` for the arguments and errors."""
-    forces, states, errors = as_records(peaks, section, sensor_error)
-    return response_features(None, None, forces, states, errors)
-
-
 def record_amplitude(peaks: Array) -> Array:
     """By how much records, as ``as_records`` returns them, do not repeat [N], (n_records,).
 

@@ -215,8 +215,6 @@ BACK = len(MOVES)
 DEAD_BAND = 0.4
 """Continuous changes below this hold the speed."""
 
-KINDS = ("trim", "continuous", "speed")
-
 
 def action_space(task: Task) -> "Box | Discrete[Any]":
     """Return the space of actions of the task's kind."""

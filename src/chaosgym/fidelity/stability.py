@@ -19,14 +19,12 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
 from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, RungeKutta4, parallel_map, simulate
 
-Array = NDArray[np.float64]
 Outcome = Literal["answer", "named error", "failure"]
 
 CYCLES = 3

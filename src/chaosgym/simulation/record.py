@@ -1,7 +1,7 @@
 """Records of runs: one row of results per operating cycle, and the state from which it goes on."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -102,16 +102,4 @@ class CycleRecord:
         return replace(self, **changes)
 
 
-_PER_CYCLE = (
-    "section",
-    "displacement",
-    "velocity",
-    "peak_force",
-    "impacts",
-    "contact_fraction",
-    "bounce_duration",
-    "history",
-    "peak_phase",
-    "peak_vector",
-    "sensor_peak",
-)
+_PER_CYCLE = tuple(field.name for field in fields(CycleRecord) if field.name not in ("machine", "final_state"))

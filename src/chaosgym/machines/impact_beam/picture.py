@@ -4,11 +4,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.collections import LineCollection
-from numpy.typing import NDArray
 
 from chaosgym.machines.picture import INK, PALE, STAYS, sample_at, samples_of
-
-Array = NDArray[np.float64]
 
 GHOSTS = 60
 """Other positions shown behind the beam."""
