@@ -204,16 +204,9 @@ def proven_orbit(machine: Machine, record: CycleRecord, period: int) -> tuple[Pe
 
 
 def returning_period(section: Array, longest: int, seen: int = 4, back: float = 0.0) -> int:
-    """Period after which the last states of a section (cycles, n_states) come back best.
+    """Period, at most ``longest``, after which the last ``seen`` states of a section (cycles, n_states) come back best.
 
-    Parameters
-    ----------
-    longest
-        Longest period that is tried.
-    seen
-        How many of the last states must come back.
-    back
-        Distance, relative to the size of the motion, at which a state has come back.
+    A state that is nearer than ``back``, relative to the size of the motion, has come back.
     """
     states = section / np.ptp(section, axis=0).clip(1e-300)
     last = states[-seen:]
@@ -319,13 +312,8 @@ def _votes(stage: _Stage) -> dict[str, Nature]:
     }
     statistic = stage.verdict.evidence.get("zero_one")
     if statistic is not None:
-        votes["zero_one"] = (
-            "chaotic"
-            if statistic > CHAOTIC_STATISTIC
-            else "quasiperiodic"
-            if statistic < REGULAR_STATISTIC
-            else "undetermined"
-        )
+        otherwise: Nature = "quasiperiodic" if statistic < REGULAR_STATISTIC else "undetermined"
+        votes["zero_one"] = "chaotic" if statistic > CHAOTIC_STATISTIC else otherwise
     votes["newton"] = "periodic" if stage.orbit is not None else "undetermined"
     return votes
 
