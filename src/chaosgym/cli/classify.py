@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from chaosgym.cli.machine_options import machine_command
-from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, verdict_lines
+from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, run_lines
 from chaosgym.cli.output import draw, emit, patience, picture_path, plot_option
 from chaosgym.machines import MACHINES
 
@@ -155,7 +155,7 @@ def _classify_measured(
             "learned_nature": learned.nature,
             "verdict": run_as_dict(run),
         }
-        lines += verdict_lines(f"{machine}, measured" if len(runs) == 1 else run.name, run)
+        lines += run_lines(f"{machine}, measured" if len(runs) == 1 else run.name, run)
         lines += _learned_lines(learned)
         drawn.append((run.name, run.peaks, verdict, _chances(learned)))
     (only,) = results.values() if len(results) == 1 else (None,)

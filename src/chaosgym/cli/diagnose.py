@@ -1,14 +1,13 @@
 """The commands ``diagnose`` and ``overlay``: is a response periodic or chaotic, and is it what the model says?"""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 
 from chaosgym.cli.machine_options import machine_command
-from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, verdict_lines
-from chaosgym.cli.output import draw, emit, patience, picture_path, plot_option
+from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, run_lines
+from chaosgym.cli.output import draw, emit, patience, picture_path, plot_option, verdict_lines
 from chaosgym.machines import MACHINES
 
 
@@ -41,7 +40,7 @@ def diagnose(
         if machine or types or step_check:
             raise click.UsageError("--peaks and --series go without a machine, --types and --step-check")
         (run,) = measured_runs(measured)
-        result, lines = run_as_dict(run), verdict_lines(run.source, run)
+        result, lines = run_as_dict(run), run_lines(run.source, run)
         name = f"{Path(run.source).name}, {run.name}"
         draw(picture, lambda plots: plots.measured_figure(run.peaks, run.verdict.diagnosis, name), result, lines)
     elif machine is None:
@@ -59,16 +58,6 @@ def diagnose(
     emit(result, as_json, lambda: lines)
 
 
-def _verdict_lines(subject: str, verdict: Any, summary: Mapping[str, float], unit: str) -> list[str]:
-    status = f"{verdict.status}, " if verdict.status else ""
-    return [
-        f"{subject}: {verdict.words} ({status}margin {verdict.margin:.2f})",
-        f"  {verdict.reason}",
-        f"  {summary['min']:.2f} to {summary['max']:.2f}{unit}, mean {summary['mean']:.2f}{unit}, "
-        f"standard deviation {summary['std']:.2f}{unit}",
-    ]
-
-
 def _matrix_update(machine: Any) -> tuple[dict[str, Any], list[str], Any]:
     from chaosgym.design.statistics import summary as summarize
     from chaosgym.diagnosis import matrix_update_test
@@ -76,7 +65,7 @@ def _matrix_update(machine: Any) -> tuple[dict[str, Any], list[str], Any]:
     verdict = matrix_update_test(machine)
     summary = summarize(verdict.judged.peak_force[:, 0])
     result = {"machine": machine.name, **verdict.as_dict(), "peak_force_summary_N": summary, "warnings": []}
-    return result, _verdict_lines(f"{machine.name}, Matrix Update Test", verdict, summary, " N"), verdict
+    return result, verdict_lines(f"{machine.name}, Matrix Update Test", verdict, summary), verdict
 
 
 def _diagnose_machine(
@@ -100,7 +89,7 @@ def _diagnose_machine(
     if not verdict.judged.peak_force.any():
         result["warnings"].append("no contact at all: the gap is never closed")
     votes = ", ".join(f"{test} {vote}" for test, vote in verdict.votes.items())
-    lines = _verdict_lines(machine.name, verdict, summary, " N")
+    lines = verdict_lines(machine.name, verdict, summary)
     lines.append(f"  {result['cycles_used']} cycles used; votes: {votes}")
     if not verdict.judged.peak_force.any():
         lines.append(f"  {result['warnings'][-1]}")

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import click
 
 from chaosgym.cli.machine_options import Quantity
+from chaosgym.cli.output import verdict_lines
 
 OPTIONS = (
     click.option("--peaks", metavar="FILE", help="Peak forces, one a cycle: CSV, Parquet, .npy, .mat; - is stdin."),
@@ -123,19 +124,12 @@ def measured_runs(given: Measured, *, several: bool = False) -> list[Run]:
     return runs
 
 
-def verdict_lines(subject: str, run: Run) -> list[str]:
-    """Lines for people: nature, why, how the readings lie, what was left out, and what was read."""
+def run_lines(subject: str, run: Run) -> list[str]:
+    """Lines for people: nature, why, what was left out, how the readings lie, and what was read."""
     from chaosgym.design.statistics import summary
 
-    verdict, told = run.verdict.diagnosis, summary(run.peaks)
-    return [
-        f"{subject}: {verdict.words} (margin {verdict.margin:.2f})",
-        f"  {verdict.reason}",
-        *(f"  {note}" for note in run.verdict.notes),
-        f"  {told['min']:.2f} to {told['max']:.2f} N, mean {told['mean']:.2f} N, "
-        f"standard deviation {told['std']:.2f} N",
-        *(f"  {note}" for note in run.notes),
-    ]
+    lines = verdict_lines(subject, run.verdict.diagnosis, summary(run.peaks), run.verdict.notes)
+    return [*lines, *(f"  {note}" for note in run.notes)]
 
 
 def run_as_dict(run: Run) -> dict[str, Any]:

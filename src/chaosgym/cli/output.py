@@ -5,7 +5,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,6 +33,18 @@ def emit(result: Mapping[str, Any], as_json: bool, lines: Callable[[], list[str]
         # what is left in the buffer goes nowhere at the end of the process
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(NOBODY_READS)
+
+
+def verdict_lines(subject: str, verdict: Any, summary: Mapping[str, float], notes: Iterable[str] = ()) -> list[str]:
+    """Lines on a ``Diagnosis``: nature, why, some notes, and how the peak forces [N] lie."""
+    status = f"{verdict.status}, " if verdict.status else ""
+    return [
+        f"{subject}: {verdict.words} ({status}margin {verdict.margin:.2f})",
+        f"  {verdict.reason}",
+        *(f"  {note}" for note in notes),
+        f"  {summary['min']:.2f} to {summary['max']:.2f} N, mean {summary['mean']:.2f} N, "
+        f"standard deviation {summary['std']:.2f} N",
+    ]
 
 
 @contextmanager
