@@ -11,10 +11,10 @@ from typing import Any
 import gymnasium as gym
 
 from chaosgym.envs import ENVIRONMENTS
+from chaosgym.envs.drive import MOVES
 from chaosgym.envs.judge import ExponentJudge
 from chaosgym.envs.observation import MEANINGS
 from chaosgym.envs.setups import setup_of
-from chaosgym.envs.task import MOVES
 from chaosgym.machines.parameters import parameters_of
 
 KINDS = {

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import trange
 
-from chaosgym.envs.jobs import HELD_OUT_SEED
 from chaosgym.envs.observation import FELT, OBSERVATION_NAMES
 from chaosgym.envs.task import Status
+from chaosgym.envs.variants import HELD_OUT_SEED
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ParameterError
 from chaosgym.machines.parameters import parameters_of

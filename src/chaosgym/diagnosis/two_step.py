@@ -10,7 +10,6 @@ step II disagree, or the record is too short for the verdict, the answer is "und
 """
 
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -104,11 +103,17 @@ def two_step_test(
         raise DiagnosisError(f"tolerance = {tolerance!r} is out of range; allowed: above 0, below 1")
     samples, series = _observables(x, sensor_error)
     evidence: dict[str, Any] = {"cycles": len(samples)}
-    judged = partial(Diagnosis, nature="undetermined", margin=0.0, horizon=len(samples), evidence=evidence)
     if isinstance(x, CycleRecord):
         evidence["contact"] = bool(np.any(x.peak_force > 0.0))
     elif not np.any(samples):
-        return judged(reason="the series is zero throughout: there is no contact to judge")
+        return Diagnosis(
+            nature="undetermined",
+            period=None,
+            margin=0.0,
+            horizon=len(samples),
+            evidence=evidence,
+            reason="the series is zero throughout: there is no contact to judge",
+        )
     scale = scales(samples)
     scaled = samples / scale
     allowed = tolerance + sensor_error / scale
@@ -121,7 +126,10 @@ def two_step_test(
     if decay is not None:
         return _approaching(decay, evidence)
     if repeats_only:
-        return judged(reason="does not repeat")
+        reason = "does not repeat"
+        return Diagnosis(
+            nature="undetermined", period=None, margin=0.0, horizon=len(samples), evidence=evidence, reason=reason
+        )
     verdict = _step_two(series, evidence, sensor_error)
     longest = (len(samples) - len(samples) // 2) // NOISY_REPEATS
     if verdict.nature == "undetermined" and sensor_error > 0.0 and longest < max_period:
@@ -187,7 +195,7 @@ def _approaching(decay: Decay, evidence: dict[str, Any]) -> Diagnosis:
         reason = f"approaches period {decay.period} by a factor {decay.contraction:.4g} a cycle"
         return Diagnosis(nature="periodic", period=decay.period, reason=reason, **common)
     reason = f"shrinks steadily, but only {decay.factor:.3g} times over the record: too slowly to tell what it ends in"
-    return Diagnosis(nature="undetermined", reason=reason, **common)
+    return Diagnosis(nature="undetermined", period=None, reason=reason, **common)
 
 
 def _irregular_cycles(scaled: Array, series: list[Array], period: int, settle: int) -> int:

@@ -12,10 +12,12 @@ import numpy as np
 from gymnasium.spaces import Space
 from numpy.typing import NDArray
 
-from chaosgym.envs.jobs import Indices, Jobs, Rules, Variants, checked_numbers
+from chaosgym.envs.drive import action_space, checked_actions
+from chaosgym.envs.jobs import Indices, Jobs, Rules
 from chaosgym.envs.observation import Observation, observation_names, observation_space
 from chaosgym.envs.setups import setup_of
-from chaosgym.envs.task import Status, Task, action_space, checked_actions, split
+from chaosgym.envs.task import Status, Task, split
+from chaosgym.envs.variants import Variants, checked_numbers
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES
 from chaosgym.machines.machine import Machine

@@ -16,10 +16,10 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from chaosgym.envs import environment
+from chaosgym.envs.drive import checked_actions
 from chaosgym.envs.jobs import Indices, Jobs
 from chaosgym.envs.machine_env import METADATA, Start, Workplace, start_of
 from chaosgym.envs.observation import Observation, observation_names
-from chaosgym.envs.task import checked_actions
 from chaosgym.errors import ParameterError
 
 if TYPE_CHECKING:

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from chaosgym.control.policies.network import Dense, Lstm, Network, State
 from chaosgym.envs import environment
+from chaosgym.envs.drive import BACK
 from chaosgym.envs.memory import SpeedMemory, Usual
 from chaosgym.envs.observation import OBSERVATION_NAMES
-from chaosgym.envs.task import BACK, Task
+from chaosgym.envs.task import Task
 from chaosgym.errors import ModelFileError, ParameterError
 from chaosgym.files import DAMAGE, unpacked, write_atomically
 
