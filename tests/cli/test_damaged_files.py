@@ -61,19 +61,6 @@ def test_an_array_that_claims_more_than_there_is_is_refused(shape, tmp_path):
         read_model(tmp_path / "liar.npz")
 
 
-def test_arrays_are_what_was_saved():
-    """Names, kinds and values; what holds objects is refused rather than unpickled."""
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, a=np.arange(3), b=np.ones((2, 2), np.float32))
-    found = unpacked(buffer.getvalue(), 10_000)
-    assert found["a"].tolist() == [0, 1, 2]
-    assert (found["b"].dtype, found["b"].shape) == (np.float32, (2, 2))
-    buffer = io.BytesIO()
-    np.savez(buffer, a=np.array([print], dtype=object))
-    with pytest.raises(ValueError, match="pickle"):
-        unpacked(buffer.getvalue(), 10_000)
-
-
 def test_nesting_without_end_is_damage(tmp_path):
     """A description or a plan of 100,000 brackets is named, not a crash of the parser."""
     (tmp_path / "policy.json").write_text("[" * 100_000)

@@ -31,8 +31,9 @@ class Model:
         file.write(bytes([self.weight]))
 
     @classmethod
-    def load(cls, file, envs, **_):
+    def load(cls, file, envs, *, device, force_reset):
         """Read the number."""
+        assert (device, force_reset) == ("cpu", False), "a job that was begun goes on"
         model = cls(envs, file.read()[0])
         model.replay_buffer = None
         return model
@@ -88,5 +89,28 @@ def test_the_pickle_of_others_is_not_read(tmp_path, monkeypatch):
     assert not mark.exists()
     path.write_bytes(sound)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "somebody else"))
-    with pytest.raises(ModelFileError, match="choose another folder"):
+    with pytest.raises(
+        ModelFileError, match="it is a pickle and may hold anything, so it is not read: choose another f"
+    ):
         load_checkpoint(tmp_path, Model, Env(Env()))
+
+
+def test_other_environments_than_those_of_the_run_are_refused(tmp_path):
+    """Each layer has its state; a run that wraps more or fewer is another run."""
+    _written(tmp_path)
+    with pytest.raises(ValueError, match="longer"):
+        load_checkpoint(tmp_path, Model, Env())
+
+
+def test_the_key_lies_where_the_user_keeps_state(tmp_path, monkeypatch):
+    """``~/.local/state`` unless told otherwise, also if the folder is there; made once, and for every checkpoint."""
+    monkeypatch.delenv("XDG_STATE_HOME")
+    for variable in ("HOME", "USERPROFILE"):
+        monkeypatch.setenv(variable, str(tmp_path))
+    folder = tmp_path / ".local" / "state" / "chaosgym"
+    folder.mkdir(parents=True)
+    _written(tmp_path)
+    key = (folder / "checkpoint.key").read_bytes()
+    assert len(key) == 32
+    _written(tmp_path)
+    assert (folder / "checkpoint.key").read_bytes() == key

@@ -33,6 +33,9 @@ def test_life_under_constant_force():
 def test_life_under_two_levels():
     """A quarter of the cycles at the rating and the rest without force use up a life in 4 million cycles (eq. 5.4)."""
     assert statistical_life([100.0, 0.0], 100.0, probabilities=[0.25, 0.75]) == pytest.approx(4.0)
+    assert statistical_life([100.0, 50.0], 100.0, probabilities=[1.0, 0.0]) == pytest.approx(1.0), (
+        "a force that is rare"
+    )
     one_by_one = 1.0 / (0.3 / rating_life(80.0, 200.0) + 0.7 / rating_life(120.0, 200.0))
     assert statistical_life([80.0, 120.0], 200.0, probabilities=[0.3, 0.7]) == pytest.approx(one_by_one, rel=1e-12)
 
@@ -88,6 +91,19 @@ def test_rainflow_of_nested_ranges():
     assert dict(zip(ranges, counts, strict=True)) == {20.0: 1.0, 80.0: 1.0}
 
 
+def test_a_history_that_repeats_has_no_beginning():
+    """Wherever the record was cut, every cycle closes: swings of 60 and of 50 N, each once."""
+    history = np.array([30.0, 10.0, 0.0, 60.0, 0.0, 50.0])
+    for shift in range(6):
+        ranges, counts = rainflow_cycles(np.roll(history, shift))
+        assert dict(zip(ranges, counts, strict=True)) == {50.0: 1.0, 60.0: 1.0}
+
+
+def test_a_constant_force_tires_nothing():
+    """Without a change of force there is no range that counts."""
+    assert equivalent_force_of_history([7.0, 7.0, 7.0], 1) == 0.0
+
+
 def test_history_of_single_impacts_gives_the_force_of_their_peaks():
     """With one impact a cycle, counting impacts and counting peaks agree."""
     peaks = np.array([40.0, 65.0, 52.0, 58.0])
@@ -113,19 +129,20 @@ def test_the_load_rating_for_a_life_is_the_rating_under_which_it_lasts():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: rating_life(10.0, -5.0), "load_rating = -5 N"),
+        (lambda: rating_life(10.0, -5.0), "load_rating = -5 N is out of range"),
         (lambda: equivalent_force([]), "0 cycles"),
         (lambda: equivalent_force([10.0, -1.0]), "-1 N in cycle 2"),
         (lambda: equivalent_force([10.0, 20.0], probabilities=[0.5, 0.6]), "add up to 1.1"),
-        (lambda: required_load_rating(10.0, 0.0), "life = 0"),
-        (lambda: required_load_rating(10.0, 1.0, 0.0), "exponent = 0"),
-        (lambda: rating_life(10.0, 5.0, 0.0), "exponent = 0"),
-        (lambda: rating_life(10.0, math.inf), "load_rating = inf"),
-        (lambda: equivalent_force([10.0], -1.0), "exponent = -1"),
+        (lambda: required_load_rating(10.0, 0.0), "life = 0 million cycles is out of range"),
+        (lambda: required_load_rating(10.0, 1.0, 0.0), "exponent = 0 is out of range"),
+        (lambda: rating_life(10.0, 5.0, 0.0), "exponent = 0 is out of range"),
+        (lambda: rating_life(10.0, math.inf), "load_rating = inf N"),
+        (lambda: equivalent_force([10.0], -1.0), "exponent = -1 is out of range"),
         (lambda: equivalent_force([10.0, 20.0], probabilities=[1.2, -0.2]), "allowed: 0 or more"),
         (lambda: equivalent_force([10.0, 20.0], probabilities=[1.0]), "one a force"),
         (lambda: rainflow_cycles([0.0, 1.0]), r"shape \(2,\)"),
         (lambda: rainflow_cycles([0.0, math.nan, 1.0]), "finite"),
+        (lambda: rainflow_cycles([[0.0], [1.0], [0.0]]), r"shape \(3, 1\)"),
         (lambda: equivalent_force_of_history([0.0, 1.0, 0.0], 0), "cycles = 0"),
     ],
 )

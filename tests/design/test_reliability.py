@@ -1,5 +1,6 @@
 """Reliability: the integral against the closed form, Hertz against his own mean pressure, intervals in practice."""
 
+import itertools
 import math
 
 import numpy as np
@@ -44,7 +45,7 @@ def test_strength_without_scatter_is_the_classical_criterion():
     """With a single strength the reliability is the share of stresses below it."""
     assert reliability([1.0, 2.0, 3.0, 4.0], Strength(3.5, 0.0)) == 0.75
     assert reliability([3.0], Strength(3.0, 0.0)) == 0.0, "a stress that equals the strength is not below it"
-    assert safety_factor(2.0, 5.0, 1.25) == 2.0
+    assert (safety_factor(2.0, 5.0, 1.25), safety_factor(2.0, 5.0)) == (2.0, 2.5)
     assert math.isinf(safety_factor(0.0, 5.0))
     assert [normal_reliability(stress, 0.0, 2.0, 0.0) for stress in (1.0, 2.0, 3.0)] == [1.0, 0.0, 0.0]
     assert normal_reliability(1.0, 0.0, 2.0, 0.5) == pytest.approx(stats.norm.cdf(2.0))
@@ -65,8 +66,10 @@ def test_hertz_pressure_of_a_sphere_on_a_flat():
 
 
 def test_pressure_does_not_depend_on_units():
-    """Newton and millimetre give megapascal: the same pressure."""
-    assert hertz_pressure(60.0, 8.0, 115e3) == pytest.approx(1e-6 * hertz_pressure(60.0, 8e-3, 115e9), rel=1e-12)
+    """Newton and millimetre give megapascal, meganewton and millimetre terapascal: the same pressure."""
+    pressure = hertz_pressure(60.0, 8e-3, 115e9)
+    assert hertz_pressure(60.0, 8.0, 115e3) == pytest.approx(1e-6 * pressure, rel=1e-12)
+    assert hertz_pressure(60e-6, 8.0, 0.115) == pytest.approx(1e-12 * pressure, rel=1e-12)
 
 
 def test_interval_holds_the_mean_as_often_as_it_says():
@@ -90,4 +93,21 @@ def test_interval_is_reproducible_and_degenerate_for_a_constant():
     """Same seed, same interval; a constant has no uncertainty."""
     values = np.random.default_rng(7).normal(size=100)
     assert mean_interval(time_blocks(values)) == mean_interval(time_blocks(values))
+    assert mean_interval(time_blocks(values)) == mean_interval(time_blocks(values), seed=0)
     assert mean_interval([np.array([2.0])]) == (2.0, 2.0)
+
+
+@pytest.mark.parametrize("confidence", [0.5, 0.95])
+def test_interval_ends_at_percentiles_of_all_ways_to_draw_the_blocks(confidence):
+    """Of four blocks, one of them far off, 256 draws with replacement are possible, and all are known."""
+    blocks = [0.0, 1.0, 2.0, 10.0]
+    means = np.mean(list(itertools.product(blocks, repeat=4)), axis=1)
+    expected = np.quantile(means, [(1.0 - confidence) / 2.0, (1.0 + confidence) / 2.0])
+    assert mean_interval(blocks, confidence) == pytest.approx(expected, abs=0.1)
+
+
+@pytest.mark.parametrize("confidence", [-0.1, 0.0, 1.0, 1.5, math.nan])
+def test_certainty_has_no_interval(confidence):
+    """A confidence lies between 0 and 1, without them."""
+    with pytest.raises(DesignError, match=f"confidence = {confidence:g} is out of range"):
+        mean_interval([0.0, 1.0], confidence)

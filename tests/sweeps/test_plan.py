@@ -21,6 +21,24 @@ def test_axis_is_read_from_text():
     assert Axis.parse("clearance=1e-5:3e-5:2") == CLEARANCE
     assert Axis.parse("clearance=1e-5:3e-5") == Axis("clearance", 1e-5, 3e-5)
     assert Axis.parse("clearance=1e-5:3e-5:log") == Axis("clearance", 1e-5, 3e-5, scale="log")
+    assert Axis.parse("clearance=1e-5:3e-5:7:lin") == Axis("clearance", 1e-5, 3e-5, 7)
+
+
+@pytest.mark.parametrize("text", ["length=0.25:0.5", "length=0.25:0.5:4", "clearance=1e-05:0.0003:1000000:log"])
+def test_an_axis_is_written_as_it_is_read(text):
+    """A card repeats the command that made its dataset."""
+    assert str(Axis.parse(text)) == text
+
+
+def test_ends_have_the_unit_of_their_field_unless_they_name_another():
+    """0.1 mm are 1e-4 m, 5 % are 0.05, and what names no unit is in that of its field."""
+    units = {"clearance": "m", "damping_ratio": "-"}
+    assert Axis.parse("clearance=0.1 mm:3e-4", units) == Axis("clearance", 1e-4, 3e-4)
+    assert Axis.parse("damping_ratio=0.01:5 %", units) == Axis("damping_ratio", 0.01, 0.05)
+    with pytest.raises(ParameterError, match=r"^clearance: 'wide' is not a valid float"):
+        Axis.parse("clearance=0.1 mm:wide", units)
+    with pytest.raises(ParameterError, match=r"^clearance = .* has the unknown unit 'Hz'"):
+        Axis.parse("clearance=1 Hz:2 Hz", units)
 
 
 def test_grid_has_every_combination_with_the_first_axis_slowest():
@@ -138,12 +156,25 @@ def test_types_reach_one_tolerance_far():
         ("clearance=3e-5:1e-5:4", "empty or reversed"),
         ("clearance=0:1e-5:4:log", "can't be logarithmic"),
         ("clearance=0:1e-5:1", "1 points; allowed: 2 to 1000000"),
+        ("clearance=0:1e-5:1000001", "1000001 points; allowed: 2 to 1000000"),
+        ("clearance=1e-5:1e-5", "empty or reversed"),
+        ("clearance=1e-5:inf", "empty or reversed"),
+        ("clearance=nan:1e-5", "empty or reversed"),
+        ("clearance=1e-5:3e-5:4:4", "not of the form"),
+        ("clearance=1e-5:3e-5:", "not of the form"),
+        ("=clearance=1e-5:3e-5", "not of the form"),
     ],
 )
 def test_bad_axes_are_refused(text, message):
     """A bad axis names itself and what is allowed."""
     with pytest.raises(ParameterError, match=message):
         Axis.parse(text)
+
+
+def test_an_unknown_scale_is_refused():
+    """Steps are even in the value or in its logarithm."""
+    with pytest.raises(ParameterError, match="has scale 'sqrt'; allowed: lin, log"):
+        Axis("clearance", 1e-5, 3e-5, scale="sqrt")
 
 
 @pytest.mark.parametrize(

@@ -50,5 +50,4 @@ def bootstrap_interval(count: int, statistic: Callable[[NDArray[np.int64]], Arra
 
 def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Array:
     """Share of the scores (any shape) at or above each threshold (n,)."""
-    values, levels = np.ravel(np.asarray(scores, dtype=float)), np.asarray(thresholds, dtype=float)
-    return np.asarray((values[:, None] >= levels).mean(axis=0))
+    return np.asarray(np.greater_equal.outer(np.ravel(scores), thresholds).mean(axis=0))

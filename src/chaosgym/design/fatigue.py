@@ -45,7 +45,7 @@ def rating_life(force: float, load_rating: float, exponent: float = LIFE_EXPONEN
     """Life [10^6 cycles] under a constant force [N], eq. 5.2; infinite without force."""
     _positive("load_rating", load_rating, " N")
     _positive("exponent", exponent, "")
-    damage = float(damage_in_a_million(np.asarray(force, dtype=float), load_rating, exponent))
+    damage = float(damage_in_a_million(np.asarray(force), load_rating, exponent))
     return math.inf if damage == 0.0 else 1.0 / damage
 
 
@@ -78,7 +78,7 @@ def equivalent_force(
     if probabilities is None:
         share = np.full(len(values), 1.0 / len(values))
     else:
-        share = np.asarray(probabilities, dtype=float)
+        share = np.asarray(probabilities)
         if share.shape != values.shape or np.any(share < 0.0) or abs(share.sum() - 1.0) > 1e-9:
             raise DesignError(f"probabilities add up to {share.sum():g}; allowed: 0 or more, one a force, 1 in all")
     largest = float(np.max(values))
@@ -123,13 +123,12 @@ def rainflow_cycles(history: ArrayLike) -> tuple[Array, Array]:
     The history is turned round so that it begins and ends at its largest value; then every cycle closes and none is
     counted half (ASTM E1049, 5.4.5).
     """
-    values = np.asarray(history, dtype=float)
+    values = np.asarray(history)
     if values.ndim != 1 or len(values) < 3 or not np.all(np.isfinite(values)):
         raise DesignError(f"the history has shape {values.shape}; allowed: (samples,) with 3 finite values or more")
     start = int(np.argmax(values))
     closed = np.concatenate([values[start:], values[: start + 1]])
-    found = rainflow.count_cycles(closed.tolist())
-    ranges, counts = np.array(found, dtype=float).reshape(-1, 2).T
+    ranges, counts = np.transpose(rainflow.count_cycles(closed.tolist()))
     return ranges, counts
 
 

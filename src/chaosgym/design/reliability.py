@@ -47,8 +47,8 @@ class Strength(NamedTuple):
     def exceeds(self, stress: ArrayLike) -> Array:
         """Probability that the strength exceeds each stress [Pa]; the inner integral of eq. 5.8."""
         if self.deviation == 0.0:
-            return np.asarray(np.asarray(stress, dtype=float) < self.mean, dtype=float)
-        return _normal_cdf((self.mean - np.asarray(stress, dtype=float)) / self.deviation)
+            return np.less(stress, self.mean).astype(float)
+        return _normal_cdf(np.subtract(self.mean, stress) / self.deviation)
 
 
 def _normal_cdf(values: ArrayLike) -> Array:
@@ -71,7 +71,7 @@ def hertz_pressure(forces: ArrayLike, radius: float, modulus: float) -> Array:
     """
     if not (radius > 0.0 and modulus > 0.0):
         raise DesignError(f"radius = {radius:g} m and modulus = {modulus:g} Pa are out of range; allowed: above 0")
-    return np.asarray(np.cbrt(6.0 * np.asarray(forces, dtype=float) * modulus**2 / (math.pi**3 * radius**2)))
+    return np.asarray(np.cbrt(6.0 * np.asarray(forces) * modulus**2 / (math.pi**3 * radius**2)))
 
 
 def safety_factor(stress: float, strength: float, fatigue_factor: float = 1.0) -> float:
@@ -103,7 +103,7 @@ class Interval(NamedTuple):
 
 def time_blocks(values: ArrayLike, blocks: int = BLOCKS) -> list[Array]:
     """Cut a record into blocks of successive cycles, at least one cycle each."""
-    record = np.asarray(values, dtype=float)
+    record = np.asarray(values)
     return np.array_split(record, min(blocks, len(record)))
 
 
@@ -121,7 +121,7 @@ def mean_interval(blocks: Sequence[ArrayLike], confidence: float = 0.95, seed: i
     """
     if not 0.0 < confidence < 1.0:
         raise DesignError(f"confidence = {confidence:g} is out of range; allowed: above 0, below 1")
-    means = np.array([np.mean(np.asarray(block, dtype=float)) for block in blocks])
+    means = np.array([np.mean(np.asarray(block)) for block in blocks])
     if np.ptp(means) == 0.0:
         return Interval(float(means[0]), float(means[0]))
     from scipy.stats import bootstrap

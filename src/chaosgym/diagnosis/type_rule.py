@@ -10,12 +10,12 @@ A point that is undetermined is not known to be periodic, and counts as not peri
 """
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.diagnosis.response import Nature, Type
+from chaosgym.diagnosis.response import Type
 from chaosgym.errors import DiagnosisError
 
 FORCE_CHANGE = 0.10
@@ -31,12 +31,12 @@ class Neighbour(NamedTuple):
 
     parameter: str
     side: int
-    nature: Nature
+    nature: str
     largest_peak: float
 
 
 def judge_type(
-    nature: Nature, largest_peak: float, neighbours: Iterable[Neighbour], coexisting_peaks: Sequence[float] = ()
+    nature: str, largest_peak: float, neighbours: Iterable[Neighbour], coexisting_peaks: Sequence[float] = ()
 ) -> tuple[Type, str]:
     """Type of a response and its reason, from what the centre and its neighbourhood do.
 
@@ -78,12 +78,12 @@ def type_of_cross(
     fields: tuple[str, str] = ("speed", "clearance"),
 ) -> tuple[Type, str]:
     """Type and its reason of the centre of a cross, from natures and largest peaks (5,) in the order of ``CROSS``."""
-    peaks = np.asarray(largest_peaks, dtype=float).tolist()
+    peaks = np.asarray(largest_peaks).tolist()
     around = [
-        Neighbour(fields[0] if speed else fields[1], speed or clearance, cast(Nature, nature), peak)
+        Neighbour(fields[0] if speed else fields[1], speed or clearance, nature, peak)
         for (speed, clearance), nature, peak in list(zip(CROSS, natures, peaks, strict=True))[1:]
     ]
-    return judge_type(cast(Nature, natures[0]), peaks[0], around)
+    return judge_type(natures[0], peaks[0], around)
 
 
 def types_on_grid(
@@ -106,7 +106,7 @@ def types_on_grid(
     -------
     array of "I", "II", "III" or "undetermined", of the same shape.
     """
-    nature, peak = np.asarray(natures, dtype=object), np.asarray(largest_peaks, dtype=float)
+    nature, peak = np.asarray(natures), np.asarray(largest_peaks)
     if nature.shape != peak.shape:
         raise DiagnosisError(f"natures have shape {nature.shape} and peaks {peak.shape}; allowed: the same shape")
     chosen = range(nature.ndim) if axes is None else axes
@@ -115,10 +115,10 @@ def types_on_grid(
     for index in np.ndindex(nature.shape):
         neighbours = []
         for axis, far in zip(chosen, reaches, strict=True):
-            for step in (*range(-far, 0), *range(1, far + 1)):
+            for step in range(-far, far + 1):  # 0 is the point itself, which differs from itself in nothing
                 place = index[axis] + step
                 if 0 <= place < nature.shape[axis]:
                     at = (*index[:axis], place, *index[axis + 1 :])
                     neighbours.append(Neighbour(f"axis {axis}", int(np.sign(step)), nature[at], float(peak[at])))
-        types[index] = judge_type(cast(Nature, nature[index]), float(peak[index]), neighbours)[0]
+        types[index] = judge_type(str(nature[index]), float(peak[index]), neighbours)[0]
     return types

@@ -1,6 +1,6 @@
 """Axes of a sweep: ranges of parameters."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
@@ -13,6 +13,7 @@ from chaosgym.machines.units import parse_option
 
 Array = NDArray[np.float64]
 Scale = Literal["lin", "log"]
+SCALES: tuple[Scale, ...] = ("lin", "log")
 
 NO_UNITS: Mapping[str, str] = MappingProxyType({})
 
@@ -34,7 +35,12 @@ class Axis:
 
     def __post_init__(self) -> None:
         shown = f"axis {self.field} = {self.low:g}:{self.high:g}"
-        _check_range(shown, self.low, self.high, self.scale)
+        if not np.isfinite([self.low, self.high]).all() or self.low >= self.high:
+            raise ParameterError(f"{shown} is empty or reversed; allowed: LOW below HIGH")
+        if self.scale not in SCALES:
+            raise ParameterError(f"{shown} has scale {self.scale!r}; allowed: lin, log")
+        if self.scale == "log" and self.low <= 0.0:
+            raise ParameterError(f"{shown} can't be logarithmic; allowed: LOW above 0")
         if self.count is not None and not 2 <= self.count <= 10**6:
             raise ParameterError(f"{shown} has {self.count} points; allowed: 2 to 1000000")
 
@@ -42,9 +48,13 @@ class Axis:
     def parse(cls, text: str, units: Mapping[str, str] = NO_UNITS) -> "Axis":
         """Read ``FIELD=LOW:HIGH[:COUNT][:lin|log]``; ends may have units, whose fields' own ``units`` names."""
         try:
-            field, parts, scale = _split(text, (2, 3))
-            count = int(parts[2]) if len(parts) == 3 else None
-            return cls(field, *_ends(field, parts, units), count, scale)
+            field, span = text.split("=")
+            parts = span.split(":")
+            scale: Scale = "log" if parts[-1] == "log" else "lin"
+            low, high, *more = parts[:-1] if parts[-1] in SCALES else parts
+            counts: list[int | None] = [int(one) for one in more]
+            [count] = counts or [None]
+            return cls(field, _value(field, low, units), _value(field, high, units), count, scale)
         except ParameterError:
             raise
         except ValueError:
@@ -57,43 +67,11 @@ class Axis:
 
     def at(self, share: Array) -> Array:
         """Values at shares 0 to 1 of the range."""
-        return _between(self.low, self.high, self.scale, share)
-
-
-def _check_range(shown: str, low: float, high: float, scale: str) -> None:
-    if not np.isfinite([low, high]).all() or not low < high:
-        raise ParameterError(f"{shown} is empty or reversed; allowed: LOW below HIGH")
-    if scale not in ("lin", "log"):
-        raise ParameterError(f"{shown} has scale {scale!r}; allowed: lin, log")
-    if scale == "log" and low <= 0.0:
-        raise ParameterError(f"{shown} can't be logarithmic; allowed: LOW above 0")
-
-
-def _split(text: str, lengths: Sequence[int]) -> tuple[str, list[str], Scale]:
-    """(field, parts of the range, scale) of a text on the command line; ValueError if it has another form."""
-    field, separator, span = text.partition("=")
-    parts = span.split(":")
-    scale: Scale = "lin"
-    if parts[-1] in ("lin", "log"):
-        scale = "log" if parts.pop() == "log" else "lin"
-    if not separator or len(parts) not in lengths:
-        raise ValueError(text)
-    return field, parts, scale
+        if self.scale == "log":
+            return np.asarray(self.low * (self.high / self.low) ** share)
+        return np.asarray(self.low + (self.high - self.low) * share)
 
 
 def _value(field: str, text: str, units: Mapping[str, str]) -> float:
     """Number in the unit of its field, with or without a unit of its own."""
-    if field not in units:
-        return float(text)
-    unit = units[field]
-    return parse_option(field, text, unit, "" if unit == "-" else unit)
-
-
-def _ends(field: str, parts: Sequence[str], units: Mapping[str, str]) -> tuple[float, float]:
-    return _value(field, parts[0], units), _value(field, parts[1], units)
-
-
-def _between(low: float, high: float, scale: Scale, share: Array) -> Array:
-    if scale == "log":
-        return np.asarray(low * (high / low) ** share)
-    return np.asarray(low + (high - low) * share)
+    return parse_option(field, text, units[field], "") if field in units else float(text)
