@@ -63,6 +63,13 @@ def test_calibration_error_is_the_mean_gap_over_bins_of_equal_mass():
     assert equal == pytest.approx(0.5), "equal confidences keep their order, so that every computer bins them alike"
 
 
+@pytest.mark.parametrize(("label", "end"), [(0, -1.5), (1, 2.5)])
+def test_a_temperature_stays_within_its_bounds(label, end):
+    """Scores that are always right would be sharpened without end, those always wrong flattened, sure ones too."""
+    scores = np.array([[1000.0, 0.0], [30.0, 0.0], [10.0, 0.0], [3.0, 0.0]])
+    assert best_temperature(scores, np.full(4, label)) == pytest.approx(np.exp(end), rel=1e-3)
+
+
 def test_temperature_and_conformal_sets_keep_their_promise():
     """Scores that were doubled are brought back, and sets at 90 % hold nine of ten rows of every class."""
     generator = np.random.default_rng(3)

@@ -94,6 +94,7 @@ def test_interval_is_reproducible_and_degenerate_for_a_constant():
     values = np.random.default_rng(7).normal(size=100)
     assert mean_interval(time_blocks(values)) == mean_interval(time_blocks(values))
     assert mean_interval(time_blocks(values)) == mean_interval(time_blocks(values), seed=0)
+    assert mean_interval(time_blocks(values)) != mean_interval(time_blocks(values), seed=1)
     assert mean_interval([np.array([2.0])]) == (2.0, 2.0)
 
 

@@ -4,7 +4,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from chaosgym.envs.task import Status, Task, UnknownKeywordError, split
+from chaosgym.envs.task import Status, Task, UnknownKeywordError, demand_of, split
 from chaosgym.errors import ParameterError
 from tests.plain_modes import PLAIN_BEAM
 
@@ -69,7 +69,7 @@ def test_the_speeds_of_a_task_end_at_its_highest():
         ({"lowest_demand": 29.5}, "lowest_demand = 29.5"),
         ({"smallest_change": 5.0}, "smallest_change = 5"),
         ({"shortest_hold": 50}, "shortest_hold = 50"),
-        ({"trim_step": 0.0}, "trim_step must be positive"),
+        ({"trim_step": 0.0}, "^lowest_speed and highest_speed must differ, and trim_step must be positive$"),
         ({"lowest_speed": 20.0, "highest_speed": 20.0, "lowest_demand": 20.0, "highest_demand": 20.0}, "must differ"),
     ],
 )
@@ -79,15 +79,62 @@ def test_a_task_that_contradicts_itself_is_refused(fields, message):
         Task(**fields)
 
 
+def test_ranges_may_be_single_values():
+    """A demand that never changes by more or less than 2, and holds for 30 steps each."""
+    same = {"smallest_change": 2.0, "largest_change": 2.0, "shortest_hold": 30, "longest_hold": 30}
+    assert Task(**same, lowest_demand=16.0, highest_demand=30.0).largest_change == 2.0
+
+
+class Script:
+    """A generator whose draws are written down: shares of the range, and places in a choice."""
+
+    def __init__(self, *draws):
+        self.draws = iter(draws)
+
+    def random(self):
+        """The next share."""
+        return next(self.draws)
+
+    def uniform(self, low, high):
+        """The next share of a range."""
+        return low + next(self.draws) * (high - low)
+
+    def choice(self, among):
+        """What stands in the next place."""
+        return among[next(self.draws)]
+
+
+def test_a_demand_holds_and_changes_as_it_is_drawn():
+    """First, then hold, sign and change in turn; a change that would leave the range goes the other way."""
+    ranges = {"lowest_demand": 20.0, "highest_demand": 28.0, "smallest_change": 1.0, "largest_change": 3.0}
+    task = Task(steps=7, shortest_hold=2, longest_hold=4, trim_step=0.5, **ranges)
+    down, up = 0, 1
+    #                0.25 -> 22 for 3 steps, -2 -> 20 for 4, -1.6 would be below: +1.6 -> 21.6, on the grid 21.5
+    drawn = demand_of(task, Script(0.25, 0.5, down, 0.5, 0.99, down, 0.3, 0.0, up, 0.0))
+    assert drawn.tolist() == [22.0, 22.0, 22.0, 20.0, 20.0, 20.0, 20.0, 21.5]
+    #                0.75 -> 26, +2 -> 28, +1 would be above: -1 -> 27
+    drawn = demand_of(task, Script(0.75, 0.5, up, 0.5, 0.0, up, 0.0, 0.5, up, 0.0))
+    assert drawn.tolist() == [26.0, 26.0, 26.0, 28.0, 28.0, 27.0, 27.0, 27.0]
+
+
+def test_a_demand_stays_in_a_range_that_is_smaller_than_its_changes():
+    """Neither up nor down stays inside: the demand goes to the end; the grid ends there too."""
+    ranges = {"lowest_demand": 20.0, "highest_demand": 20.8, "smallest_change": 1.0, "largest_change": 1.0}
+    task = Task(steps=2, shortest_hold=1, longest_hold=1, trim_step=0.5, **ranges)
+    assert demand_of(task, Script(1.0, 0.0, 0, 0.0, 0.0, 1, 0.0, 0.0, 1, 0.0)).tolist() == [20.8, 20.8, 20.0]
+
+
 def test_keywords_go_to_the_task_or_to_the_machine():
     """The speed is the agent's; a keyword of neither is named with the one that was meant."""
     task, fields = split(TASK, PLAIN_BEAM, {"steps": 5, "damping_ratio": 0.02, "fidelity": "standard"})
     assert (task.steps, task.load_rating, fields) == (5, 50.0, {"damping_ratio": 0.02, "fidelity": "standard"})
     with pytest.raises(ParameterError, match="is what the agent sets"):
         split(TASK, PLAIN_BEAM, {"excitation_frequency": 20.0})
-    with pytest.raises(UnknownKeywordError, match="did you mean damping_ratio"):
-        split(TASK, PLAIN_BEAM, {"damping_ration": 0.02})
-    with pytest.raises(UnknownKeywordError, match="known: action"):
+    meant = {"damping_ration": "damping_ratio", "step": "steps", "fidelty": "fidelity", "tolerance": "tolerances"}
+    for wrong, right in (meant | {"model_fidelty": "model_fidelity"}).items():
+        with pytest.raises(UnknownKeywordError, match=rf"'{wrong}'; did you mean {right}\?"):
+            split(TASK, PLAIN_BEAM, {wrong: 0.02})
+    with pytest.raises(UnknownKeywordError, match=r"known: action, steps, .* and the fields of impact-beam"):
         split(TASK, PLAIN_BEAM, {"zzz": 0.02})
 
 

@@ -29,7 +29,7 @@ def best_temperature(scores: Array, labels: Labels) -> float:
         chances = softmax(scores / np.exp(logarithm))[np.arange(len(labels)), labels]
         return float(-np.mean(np.log(chances.clip(1e-12))))
 
-    return float(np.exp(minimize_scalar(surprise, bounds=(-1.5, 2.5), method="bounded").x))
+    return float(np.exp(minimize_scalar(surprise, bounds=(-1.5, 2.5)).x))
 
 
 def conformal_thresholds(chances: Array, labels: Labels, coverage: float) -> Array:

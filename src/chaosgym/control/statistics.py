@@ -5,16 +5,17 @@ References
 Agarwal et al., Deep Reinforcement Learning at the Edge of the Statistical Precipice, NeurIPS 2021.
 """
 
-import warnings
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
 
 Array = NDArray[np.float64]
 
 RESAMPLES = 10_000
+BATCH = 500
+"""Resamples that are drawn, and given to the statistic, at once."""
+
 CONFIDENCE = 0.95
 
 
@@ -30,22 +31,12 @@ def bootstrap_interval(count: int, statistic: Callable[[NDArray[np.int64]], Arra
     seed
         Of the draws.
     """
-    places = np.arange(count)
     if count == 1:
-        return np.full(2, float(statistic(places)))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
-        result = stats.bootstrap(
-            (places,),
-            lambda drawn, axis: statistic(drawn),
-            n_resamples=RESAMPLES,
-            method="percentile",
-            vectorized=True,
-            batch=500,
-            rng=np.random.default_rng(seed),
-        )
-    tail = (1.0 - CONFIDENCE) / 2.0
-    return np.asarray(np.nanpercentile(result.bootstrap_distribution, [100 * tail, 100 * (1 - tail)]))
+        return np.full(2, float(statistic(np.zeros(1, dtype=np.int64))))
+    generator = np.random.default_rng(seed)
+    drawn = [statistic(generator.integers(0, count, (BATCH, count))) for _ in range(RESAMPLES // BATCH)]
+    tail = 50.0 * (1.0 - CONFIDENCE)
+    return np.asarray(np.nanpercentile(drawn, [tail, 100.0 - tail]))
 
 
 def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Array:

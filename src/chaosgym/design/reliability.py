@@ -52,7 +52,7 @@ class Strength(NamedTuple):
 
 
 def _normal_cdf(values: ArrayLike) -> Array:
-    from scipy.special import ndtr  # slow to import, as scipy.stats is below, and few questions need them
+    from scipy.special import ndtr  # slow to import, and few questions need it
 
     return np.asarray(ndtr(values))
 
@@ -124,14 +124,7 @@ def mean_interval(blocks: Sequence[ArrayLike], confidence: float = 0.95, seed: i
     means = np.array([np.mean(np.asarray(block)) for block in blocks])
     if np.ptp(means) == 0.0:
         return Interval(float(means[0]), float(means[0]))
-    from scipy.stats import bootstrap
-
-    result = bootstrap(
-        (means,),
-        np.mean,
-        n_resamples=RESAMPLES,
-        confidence_level=confidence,
-        method="percentile",
-        rng=np.random.default_rng(seed),
-    )
-    return Interval(float(result.confidence_interval.low), float(result.confidence_interval.high))
+    drawn = np.random.default_rng(seed).choice(means, (RESAMPLES, len(means)))
+    tail = 50.0 * (1.0 - confidence)
+    low, high = np.percentile(drawn.mean(axis=1), [tail, 100.0 - tail])
+    return Interval(float(low), float(high))
