@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chaosgym.diagnosis import two_step_test
+from chaosgym.diagnosis import Diagnosis, two_step_test
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines.impact_beam import ImpactBeam
-from chaosgym.simulation import simulate
+from chaosgym.simulation import CycleRecord, MotionState, simulate
 
 from .maps import GOLDEN, circle, henon, logistic, three_frequencies
 
@@ -150,11 +150,245 @@ def test_chaos_shows_through_noise_and_a_noisy_torus_is_not_called_chaotic():
     assert two_step_test(torus + noise, sensor_error=3.0).nature in ("quasiperiodic", "undetermined")
 
 
+def _undetermined(evidence, reason):
+    """A verdict that claims nothing."""
+    given = {"horizon": evidence["cycles"], "evidence": evidence, "reason": reason}
+    return Diagnosis(nature="undetermined", period=None, margin=0.0, **given)
+
+
+NOISE = 0.02 * np.random.default_rng(2).normal(size=1000)
+REPETITION = {"cycles", "residual", "residual_allowed"}
+STEP_ONE = REPETITION | {"contraction_per_cycle"}
+STEP_TWO = REPETITION | {"zero_one", "spectral_floor", "spectral_lines", "bands"}
+FIGURES = "spectral floor {spectral_floor:.1e}, 0-1 statistic {zero_one:.2f}"
+
+
+@pytest.mark.parametrize(
+    ("series", "evidence", "reason"),
+    [
+        (
+            logistic(4.0, 49),
+            STEP_TWO,
+            "does not repeat, but 49 cycles are too few to tell chaos from a torus",
+        ),
+        (
+            circle(0.3, GOLDEN, 999),
+            STEP_TWO,
+            "does not repeat and has {spectral_lines} spectral lines, but 999 cycles are fewer than the 1000 that "
+            "quasiperiodic asks for",
+        ),
+        (circle(0.3, GOLDEN, 1000) + NOISE, STEP_TWO, f"does not repeat, and step II does not decide: {FIGURES}"),
+        (
+            1.0 + 1.0 / np.sqrt(np.arange(400.0, 800.0)),
+            STEP_ONE,
+            "shrinks steadily, but only 2.5 times over the record: too slowly to tell what it ends in",
+        ),
+    ],
+)
+def test_what_is_undetermined_says_why(series, evidence, reason):
+    """Too short for chaos, too short for a torus, neither few lines nor a band, or a decay that is too slow."""
+    verdict = two_step_test(series)
+    assert verdict == _undetermined(verdict.evidence, reason.format(**verdict.evidence))
+    assert set(verdict.evidence) == evidence
+    assert verdict.evidence["cycles"] == len(series)
+
+
+@pytest.mark.parametrize(
+    ("series", "nature", "reason"),
+    [
+        (logistic(4.0, 50), "chaotic", f"does not repeat, broad spectrum: {FIGURES}"),
+        (logistic(4.0, 1000), "chaotic", f"does not repeat, broad spectrum: {FIGURES}"),
+        (logistic(3.6, 1000), "chaotic", f"does not repeat, in 2 bands, broad spectrum: {FIGURES}"),
+        (
+            circle(0.3, GOLDEN, 1000),
+            "quasiperiodic",
+            f"does not repeat, {{spectral_lines}} spectral lines and no band: {FIGURES}",
+        ),
+    ],
+)
+def test_what_does_not_repeat_says_what_it_rests_on(series, nature, reason):
+    """Bands, lines, the floor between them and the growth of the walks."""
+    verdict = two_step_test(series)
+    assert (verdict.nature, verdict.reason) == (nature, reason.format(**verdict.evidence))
+    assert set(verdict.evidence) == STEP_TWO
+
+
+@pytest.mark.parametrize(("period", "words"), [(1, "cycle"), (2, "2 cycles")])
+def test_what_repeats_says_how_well(period, words):
+    """A misfit of 2e-6 of the largest value, allowed 1e-5; before, distances shrank by 0.9 a cycle."""
+    n = np.arange(400)
+    series = 50.0 + (n % period) + 10.0 * 0.9**n + 2e-6 * 51.0 * np.sin(n)
+    verdict = two_step_test(series)
+    assert (verdict.nature, verdict.period) == ("periodic", period)
+    assert verdict.reason == f"repeats every {words} within {verdict.evidence['residual']:.1e}"
+    assert verdict.evidence["contraction_per_cycle"] == pytest.approx(0.9, abs=0.02)
+    assert set(verdict.evidence) == STEP_ONE | {"irregular_cycles"}
+    assert verdict.evidence["irregular_cycles"] == 0
+
+
+def test_a_slow_approach_says_how_fast():
+    """Distances that shrink by 1 % a cycle, of a motion whose every second cycle is another."""
+    n = np.arange(400)
+    verdict = two_step_test(50.0 + n % 2 + 0.99**n)
+    assert (verdict.nature, verdict.period, verdict.margin, verdict.horizon) == ("periodic", 2, 0.0, 400)
+    assert verdict.reason == "approaches period 2 by a factor 0.99 a cycle"
+    assert set(verdict.evidence) == STEP_ONE
+    assert verdict.evidence["contraction_per_cycle"] == pytest.approx(0.99, rel=1e-6)
+
+
+def test_step_two_can_be_left_out():
+    """What repeats is said; the rest is left open."""
+    verdict = two_step_test(logistic(4.0, 200), repeats_only=True)
+    assert verdict == _undetermined(verdict.evidence, "does not repeat")
+    assert set(verdict.evidence) == REPETITION
+    assert two_step_test(logistic(3.2, 200), repeats_only=True) == two_step_test(logistic(3.2, 200))
+
+
+@pytest.mark.parametrize(("spread", "seen"), [(1.8, False), (2.2, True)])
+def test_a_band_is_more_than_twice_the_stated_noise(spread, seen):
+    """Errors spread evenly over +-e have the power e^2 / 3; up to twice that of the stated error is no band."""
+    turns = 2.0 * np.pi * GOLDEN * np.arange(4000)
+    noise = np.random.default_rng(2).uniform(-1.0, 1.0, 4000)
+    for stated in (0.2, 3.0):
+        series = 50.0 + 10.0 * stated * np.cos(turns) + np.sqrt(spread) * stated * noise
+        floor = two_step_test(series, sensor_error=stated).evidence["spectral_floor"]
+        assert (floor > 0.0) == seen
+
+
+def test_lines_hold_all_the_power_but_the_noise():
+    """One line and noise of the stated size; if less is stated, the noise counts as lines of its own."""
+    noise = np.random.default_rng(2).uniform(-1.0, 1.0, 4000)
+    series = 100.0 + 10.0 * np.cos(2.0 * np.pi * GOLDEN * np.arange(4000)) + 2.0 * noise
+    lines = [two_step_test(series, sensor_error=error).evidence["spectral_lines"] for error in (1.0, 1.6, 2.0, 2.5)]
+    assert lines[0] > lines[1] > 16
+    assert lines[2:] == [1, 1]
+
+
+@pytest.mark.parametrize(("share", "drowned"), [(0.49, False), (0.51, True)])
+def test_noise_that_walks_as_far_as_the_motion_drowns_the_0_1_test(share, drowned):
+    """Walks of n cycles with the stated noise go n e^2 / 3: no more than half the variance of the motion."""
+    series = 50.0 + np.cos(2.0 * np.pi * GOLDEN * np.arange(1000))
+    verdict = two_step_test(series, sensor_error=np.sqrt(3.0 * share * 0.5 / 1000))
+    assert (verdict.evidence["zero_one"] is None) == drowned
+    assert ("0-1 test drowned by noise" in verdict.reason) == drowned
+
+
+@pytest.mark.parametrize(("cycles", "longest"), [(17, 1), (60, 3), (1022, 63), (1023, None)])
+def test_noise_needs_long_records_and_the_verdict_says_so(cycles, longest):
+    """A period must be seen eight times in the second half; the hint is there while some below 64 can't be."""
+    verdict = two_step_test(50.0 + 10.0 * np.cos(2.0 * np.pi * GOLDEN * np.arange(cycles)), sensor_error=1.0)
+    assert verdict.nature == "undetermined"
+    why, _, hint = verdict.reason.partition("; ")
+    assert why.startswith("does not repeat")
+    said = "" if longest is None else f"with a sensor error {cycles} cycles show periods up to {longest} only"
+    assert hint == said
+    assert ";" not in two_step_test(50.0 + 30.0 * logistic(4.0, 300), sensor_error=1.0).reason, "chaos needs no hint"
+
+
+@pytest.mark.parametrize("error", [-1e-9, np.inf, np.nan])
+def test_an_error_that_no_sensor_has_is_refused(error):
+    """Errors are finite, and none is the least."""
+    with pytest.raises(DiagnosisError, match=r"^sensor_error = .* is out of range; allowed: finite, 0 or more$"):
+        two_step_test(np.ones(20), sensor_error=error)
+
+
+@pytest.mark.parametrize("tolerance", [-0.1, 0.0, 1.0, 1.5, np.nan])
+def test_a_tolerance_is_a_share(tolerance):
+    """Nothing repeats exactly, and everything within its whole range."""
+    with pytest.raises(DiagnosisError, match=r"^tolerance = .* is out of range; allowed: above 0, below 1$"):
+        two_step_test(np.ones(20), tolerance=tolerance)
+
+
+@pytest.mark.parametrize(("cycles", "found"), [(128, True), (126, False)])
+def test_the_last_quarter_is_enough_for_exact_values(cycles, found):
+    """Chaos for two thirds, then period three: seen where the last quarter holds 32 cycles."""
+    chaos, settled = logistic(4.0, 85), logistic(3.83, cycles - 85)
+    series = np.concatenate([chaos, settled])
+    verdict = two_step_test(series, initial_transient=100)
+    assert (verdict.period == 3) == found
+    if found:
+        assert verdict.settle_cycle == pytest.approx(85, abs=3)
+        assert verdict.evidence["irregular_cycles"] == verdict.settle_cycle
+    noisy = two_step_test(series, sensor_error=1e-6, initial_transient=100)
+    assert noisy.period is None, "noise needs more"
+
+
+def test_transient_chaos_is_longer_than_the_motion_may_take():
+    """The cycles before it settles count; as many as allowed are a start, one more is transient chaos."""
+    series = np.concatenate([logistic(4.0, 300), logistic(3.83, 600)])
+    verdict = two_step_test(series)
+    cycles = verdict.evidence["irregular_cycles"]
+    assert verdict.reason == f"transient chaos: irregular for {cycles} cycles before it settled on period 3"
+    assert (verdict.margin, verdict.horizon) == (0.0, 900)
+    assert two_step_test(series, initial_transient=cycles).nature == "periodic"
+    assert two_step_test(series, initial_transient=cycles - 1).nature == "chaotic"
+
+
+def test_a_long_regular_start_is_no_chaos():
+    """A torus that gives way to a period wanders nowhere, and a slow decay dies out."""
+    torus = np.concatenate([circle(0.3, GOLDEN, 300) / 3.0, logistic(3.83, 600)])
+    n = np.arange(900)
+    decay = 1.0 + 0.5 * np.exp(-n / 40.0) * (-1.0) ** n
+    for series in (torus, decay):
+        verdict = two_step_test(series)
+        assert (verdict.nature, verdict.evidence["irregular_cycles"]) == ("periodic", 0)
+
+
+def test_a_period_that_is_longer_than_asked_for_is_not_found():
+    """Of 16 values in turn none repeats within eight cycles."""
+    assert two_step_test(logistic(3.567, 400), max_period=8).period is None
+    noisy = np.tile(np.arange(50.0, 66.0), 40)
+    assert two_step_test(noisy, sensor_error=0.1).period == 16
+    assert two_step_test(noisy, sensor_error=0.1, max_period=8).period is None
+    late = np.concatenate([logistic(4.0, 500), logistic(3.567, 400)])
+    assert two_step_test(late).period == 16
+    assert two_step_test(late, max_period=8).period is None
+    slow = 50.0 + np.tile([0.0, 3.0, 1.0, 4.0], 100) + 0.99 ** np.arange(400)
+    assert two_step_test(slow).period == 4
+    assert two_step_test(slow, max_period=3).period is None
+
+
+def _record(section, peaks):
+    """A record of a machine that moved so; peaks of two sides."""
+    section, state = np.column_stack([section, section]), MotionState(section[-1:], np.zeros(3))
+    never = np.zeros((len(section), 2))
+    moved = section[:, 0], section[:, 1]
+    return CycleRecord(ImpactBeam(), section, *moved, peaks, never.astype(int), never, never, state)
+
+
+def test_a_record_repeats_if_its_state_and_its_forces_do():
+    """With a sensor error the forces alone are seen, of the sides that touch; without contact there are none."""
+    chaos, still = logistic(4.0, 400), np.tile([1.0, 2.0], 200)
+    one_side, none = np.column_stack([0.5 * still, np.zeros(400)]), np.zeros((400, 2))
+    assert two_step_test(_record(still, one_side)).period == 2
+    assert two_step_test(_record(chaos, none)).nature == "chaotic", "the side that never touches has no say"
+    assert two_step_test(_record(still, np.column_stack([still, chaos]))).period is None
+    heard = two_step_test(_record(chaos, one_side), sensor_error=0.01)
+    assert (heard.nature, heard.period, heard.evidence["contact"]) == ("periodic", 2, True)
+    assert two_step_test(_record(still, np.column_stack([0.1 * chaos, still])), sensor_error=0.01).period is None
+    silent = _record(still, none)
+    verdict = two_step_test(silent)
+    assert verdict.evidence["contact"] is False
+    assert verdict.reason == f"repeats every 2 cycles within {verdict.evidence['residual']:.1e}; there is no contact"
+    only = "^the record has no contact, and a sensor error in newton applies to peak forces only$"
+    with pytest.raises(DiagnosisError, match=only):
+        two_step_test(silent, sensor_error=1.0)
+
+
+def test_coordinates_that_do_not_move_have_no_say():
+    """Step II looks at the first four that do."""
+    chaos, torus = logistic(4.0, 1000), circle(0.3, GOLDEN, 1000)
+    still = np.ones(1000)
+    assert two_step_test(np.column_stack([still, still, chaos])).nature == "chaotic"
+    evidence = two_step_test(np.column_stack([torus] * 4 + [chaos] * 5)).evidence
+    alone = two_step_test(torus).evidence
+    assert evidence["zero_one"] == alone["zero_one"]
+
+
 def test_a_dead_contact_is_not_judged():
     """A contact that never carries force has no nature."""
-    verdict = two_step_test(np.zeros(100))
-    assert verdict.nature == "undetermined"
-    assert "no contact" in verdict.reason
+    reason = "the series is zero throughout: there is no contact to judge"
+    assert two_step_test(np.zeros(100)) == _undetermined({"cycles": 100}, reason)
 
 
 def test_a_constant_response_has_period_one():

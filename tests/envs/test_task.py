@@ -1,6 +1,5 @@
 """What a job costs, by hand: damage, status and the terms of the reward."""
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -136,15 +135,3 @@ def test_keywords_go_to_the_task_or_to_the_machine():
             split(TASK, PLAIN_BEAM, {wrong: 0.02})
     with pytest.raises(UnknownKeywordError, match=r"known: action, steps, .* and the fields of impact-beam"):
         split(TASK, PLAIN_BEAM, {"zzz": 0.02})
-
-
-def test_kicks_in_one_call_move_a_crank_as_kicks_cycle_by_cycle():
-    """Observations, rewards and forces are equal bit for bit, whether a step is one call or one for each cycle."""
-
-    def played(traced):
-        env = gym.make("chaosgym/SliderCrank-v1").unwrapped
-        env._job.traced = traced
-        steps = [env.reset(seed=3), *(env.step(7 * k % 6) for k in range(12))]
-        return [(step[0].tobytes(), *step[1:]) for step in steps]
-
-    assert played(0) == played(1)

@@ -106,14 +106,7 @@ def two_step_test(
     if isinstance(x, CycleRecord):
         evidence["contact"] = bool(np.any(x.peak_force > 0.0))
     elif not np.any(samples):
-        return Diagnosis(
-            nature="undetermined",
-            period=None,
-            margin=0.0,
-            horizon=len(samples),
-            evidence=evidence,
-            reason="the series is zero throughout: there is no contact to judge",
-        )
+        return _undetermined(evidence, "the series is zero throughout: there is no contact to judge")
     scale = scales(samples)
     scaled = samples / scale
     allowed = tolerance + sensor_error / scale
@@ -126,10 +119,7 @@ def two_step_test(
     if decay is not None:
         return _approaching(decay, evidence)
     if repeats_only:
-        reason = "does not repeat"
-        return Diagnosis(
-            nature="undetermined", period=None, margin=0.0, horizon=len(samples), evidence=evidence, reason=reason
-        )
+        return _undetermined(evidence, "does not repeat")
     verdict = _step_two(series, evidence, sensor_error)
     longest = (len(samples) - len(samples) // 2) // NOISY_REPEATS
     if verdict.nature == "undetermined" and sensor_error > 0.0 and longest < max_period:
@@ -157,8 +147,8 @@ def _recurrence(scaled: Array, allowed: Array, max_period: int, sensor_error: fl
     half = len(scaled) // 2
     if found.period is None and sensor_error == 0.0 and half >= 64:
         later = find_recurrence(scaled[half:], allowed, max_period)
-        if later.period is not None and later.settle_cycle is not None:
-            return Recurrence(later.period, later.residual, half + later.settle_cycle, later.contraction)
+        if later.settle_cycle is not None:
+            return replace(later, settle_cycle=half + later.settle_cycle)
     return found
 
 
@@ -190,12 +180,31 @@ def _repeating(
 
 def _approaching(decay: Decay, evidence: dict[str, Any]) -> Diagnosis:
     evidence["contraction_per_cycle"] = decay.contraction
-    common: dict[str, Any] = {"margin": 0.0, "evidence": evidence, "horizon": evidence["cycles"]}
-    if decay.factor >= DECAY_FACTOR:
-        reason = f"approaches period {decay.period} by a factor {decay.contraction:.4g} a cycle"
-        return Diagnosis(nature="periodic", period=decay.period, reason=reason, **common)
-    reason = f"shrinks steadily, but only {decay.factor:.3g} times over the record: too slowly to tell what it ends in"
-    return Diagnosis(nature="undetermined", period=None, reason=reason, **common)
+    if decay.factor < DECAY_FACTOR:
+        return _undetermined(
+            evidence,
+            f"shrinks steadily, but only {decay.factor:.3g} times over the record: too slowly to tell what it ends in",
+        )
+    reason = f"approaches period {decay.period} by a factor {decay.contraction:.4g} a cycle"
+    return Diagnosis(
+        nature="periodic",
+        period=decay.period,
+        margin=0.0,
+        reason=reason,
+        horizon=evidence["cycles"],
+        evidence=evidence,
+    )
+
+
+def _undetermined(evidence: dict[str, Any], reason: str) -> Diagnosis:
+    return Diagnosis(
+        nature="undetermined",
+        period=None,
+        margin=0.0,
+        reason=reason,
+        horizon=evidence["cycles"],
+        evidence=evidence,
+    )
 
 
 def _irregular_cycles(scaled: Array, series: list[Array], period: int, settle: int) -> int:
@@ -231,36 +240,33 @@ def _step_two(series: list[Array], evidence: dict[str, Any], sensor_error: float
     if floor > threshold and diffuses > 0.0:
         if cycles < CHAOTIC_CYCLES:
             reason = f"does not repeat, but {cycles} cycles are too few to tell chaos from a torus"
-            return Diagnosis(nature="undetermined", margin=0.0, reason=reason, **common)
+            return _undetermined(evidence, reason)
         margin = min(broad, diffuses, _decades(evidence["residual"], evidence["residual_allowed"]))
         kind = f"in {bands} bands, " if bands > 1 else ""
         reason = f"does not repeat, {kind}broad spectrum: {figures_shown}"
         return Diagnosis(nature="chaotic", margin=float(margin), reason=reason, **common)
     if statistic is not None and statistic < REGULAR_STATISTIC and floor < LINE_FLOOR and lines <= MAX_LINES:
         if cycles < QUASIPERIODIC_CYCLES:
-            reason = (
+            return _undetermined(
+                evidence,
                 f"does not repeat and has {lines} spectral lines, but {cycles} cycles are fewer than the "
-                f"{QUASIPERIODIC_CYCLES} that quasiperiodic asks for"
+                f"{QUASIPERIODIC_CYCLES} that quasiperiodic asks for",
             )
-            return Diagnosis(nature="undetermined", margin=0.0, reason=reason, **common)
         slack = (REGULAR_STATISTIC - statistic) / REGULAR_STATISTIC
-        margin = min(_decades(LINE_FLOOR, floor, over=1.0), slack, 1.0)
+        margin = min(_decades(LINE_FLOOR, floor, over=1.0), slack)
         reason = f"does not repeat, {lines} spectral lines and no band: {figures_shown}"
         return Diagnosis(nature="quasiperiodic", margin=float(margin), reason=reason, **common)
-    reason = f"does not repeat, and step II does not decide: {figures_shown}"
-    return Diagnosis(nature="undetermined", margin=0.0, reason=reason, **common)
+    return _undetermined(evidence, f"does not repeat, and step II does not decide: {figures_shown}")
 
 
 def _step_two_figures(series: Array, sensor_error: float) -> tuple[float | None, float, int, int]:
     """(0-1 statistic or None if noise drowns it, spectral floor beyond the sensor error, bands, lines)."""
     rest, bands = subtract_bands(series)
-    spectrum = power_spectrum(rest, sensor_error**2 / 3.0)
+    noise = sensor_error**2 / 3.0
+    spectrum = power_spectrum(rest, noise)
     variance = float(spectrum.power.sum())
-    if variance == 0.0:
-        return 0.0, 0.0, bands, 0
-    noise = min(1.0, sensor_error**2 / 3.0 / variance)
-    floor = spectrum.floor if spectrum.floor > NOISE_ALLOWANCE * np.log(2.0) * noise else 0.0
-    drowned = noise * len(series) / 10.0 > 0.05
+    floor = spectrum.floor if spectrum.floor * variance > NOISE_ALLOWANCE * np.log(2.0) * noise else 0.0
+    drowned = noise * len(series) > 0.5 * variance
     return None if drowned else zero_one_statistic(series), floor, bands, spectrum.lines
 
 
