@@ -64,6 +64,13 @@ def test_types_of_written_neighbourhoods(nature, neighbours, coexisting, expecte
     assert judge_type(nature, 100.0, neighbours, coexisting) == (expected, reason)
 
 
+def test_a_tenth_more_is_not_more_than_a_tenth():
+    """At the threshold itself the force does not matter; above it does, however small the force is."""
+    assert judge_type("periodic", 10.0, [Neighbour("speed", 1, "periodic", 11.0)])[0] == "I"
+    kind, why = judge_type("periodic", 0.5, [Neighbour("speed", 1, "periodic", 1.0)])
+    assert (kind, why) == ("II", "peak force 100% higher above the nominal speed")
+
+
 def test_a_contact_that_only_a_neighbour_has_is_infinitely_higher():
     """No force at the centre, some beside it."""
     kind, why = judge_type("periodic", 0.0, [Neighbour("speed", 1, "periodic", 3.0)])

@@ -153,7 +153,7 @@ def test_types_reach_one_tolerance_far():
         ("clearance", "not of the form"),
         ("clearance=1e-5", "not of the form"),
         ("clearance=a:b:3", "not of the form"),
-        ("clearance=3e-5:1e-5:4", "empty or reversed"),
+        ("clearance=3e-5:1e-5:4", "^axis clearance = 3e-05:1e-05 is empty or reversed"),
         ("clearance=0:1e-5:4:log", "can't be logarithmic"),
         ("clearance=0:1e-5:1", "1 points; allowed: 2 to 1000000"),
         ("clearance=0:1e-5:1000001", "1000001 points; allowed: 2 to 1000000"),

@@ -47,7 +47,7 @@ class Strength(NamedTuple):
     def exceeds(self, stress: ArrayLike) -> Array:
         """Probability that the strength exceeds each stress [Pa]; the inner integral of eq. 5.8."""
         if self.deviation == 0.0:
-            return np.less(stress, self.mean).astype(float)
+            return np.where(np.less(stress, self.mean), 1.0, 0.0)
         return _normal_cdf(np.subtract(self.mean, stress) / self.deviation)
 
 

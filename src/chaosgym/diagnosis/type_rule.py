@@ -34,6 +34,11 @@ class Neighbour(NamedTuple):
     nature: str
     largest_peak: float
 
+    @property
+    def place(self) -> str:
+        """Where it lies, for people."""
+        return f"{'above' if self.side > 0 else 'below'} the nominal {self.parameter}"
+
 
 def judge_type(
     nature: str, largest_peak: float, neighbours: Iterable[Neighbour], coexisting_peaks: Sequence[float] = ()
@@ -62,13 +67,11 @@ def judge_type(
         if len({point.side for point in restless if point.parameter == name}) == 2:
             return "III", f"not periodic on both sides along {name}"
     if restless:
-        first = restless[0]
-        return "II", f"{first.nature} {'above' if first.side > 0 else 'below'} the nominal {first.parameter}"
+        return "II", f"{restless[0].nature} {restless[0].place}"
     for point in neighbours:
         if point.largest_peak > (1.0 + FORCE_CHANGE) * largest_peak:
             more = point.largest_peak / largest_peak - 1.0 if largest_peak > 0.0 else np.inf
-            side = "above" if point.side > 0 else "below"
-            return "II", f"peak force {more:.0%} higher {side} the nominal {point.parameter}"
+            return "II", f"peak force {more:.0%} higher {point.place}"
     return "I", "periodic throughout the neighbourhood, peak force less than 10 % higher"
 
 

@@ -168,7 +168,7 @@ def split(task: Task, machine: Machine, keywords: Mapping[str, Any]) -> tuple[Ta
         if name not in own and name not in theirs and name != "fidelity":
             from difflib import get_close_matches
 
-            near = get_close_matches(name, [*own, *theirs, "fidelity", "model_fidelity", "tolerances"], n=1)
+            near = get_close_matches(name, [*own, *theirs, "fidelity", "model_fidelity", "tolerances"])
             hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(own)}, and the fields of {machine.name}"
             raise UnknownKeywordError(f"unexpected keyword argument {name!r}; {hint}")
     mine = {name: value for name, value in keywords.items() if name in own}
@@ -193,4 +193,4 @@ def demand_of(task: Task, generator: np.random.Generator) -> Array:
         now = now + change if low <= now + change <= high else now - change
         now = min(max(now, low), high)
     grid = low + task.trim_step * np.rint((asked - low) / task.trim_step)
-    return np.asarray(np.clip(grid, low, high))
+    return np.asarray(np.minimum(grid, high))
