@@ -96,9 +96,10 @@ def test_interval_is_reproducible_and_degenerate_for_a_constant():
     assert mean_interval(time_blocks(values)) == mean_interval(time_blocks(values), seed=0)
     assert mean_interval(time_blocks(values)) != mean_interval(time_blocks(values), seed=1)
     assert mean_interval([np.array([2.0])]) == (2.0, 2.0)
+    assert mean_interval([0.0, 1.0]) == (0.0, 1.0)
 
 
-@pytest.mark.parametrize("confidence", [0.5, 0.95])
+@pytest.mark.parametrize("confidence", [0.5, 0.95, 0.98])
 def test_interval_ends_at_percentiles_of_all_ways_to_draw_the_blocks(confidence):
     """Of four blocks, one of them far off, 256 draws with replacement are possible, and all are known."""
     blocks = [0.0, 1.0, 2.0, 10.0]

@@ -27,12 +27,10 @@ def bootstrap_interval(count: int, statistic: Callable[[NDArray[np.int64]], Arra
     count
         Number of things; of one alone nothing is known, and the interval is that one value.
     statistic
-        Of places (resamples, count) or (count,) to (resamples,) or a number; draws of which it is NaN are left out.
+        Of places (resamples, count) to (resamples,); draws of which it is NaN are left out.
     seed
         Of the draws.
     """
-    if count == 1:
-        return np.full(2, float(statistic(np.zeros(1, dtype=np.int64))))
     generator = np.random.default_rng(seed)
     drawn = [statistic(generator.integers(0, count, (BATCH, count))) for _ in range(RESAMPLES // BATCH)]
     tail = 50.0 * (1.0 - CONFIDENCE)
