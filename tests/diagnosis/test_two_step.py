@@ -157,6 +157,25 @@ def test_noise_within_the_stated_error_does_not_hide_a_period(seed):
         assert two_step_test(peaks + noise).nature != "periodic"
 
 
+@pytest.mark.parametrize("error", [0.3, 30.0])
+def test_a_period_is_seen_through_any_length_of_noise(error):
+    """Half ranges of normal noise grow beyond three deviations; its scatter does not."""
+    peaks = error * (np.tile([50.0, 57.0, 66.0], 3000) + np.random.default_rng(0).normal(size=9000) / 3.0)
+    verdict = two_step_test(peaks, sensor_error=error)
+    assert (verdict.nature, verdict.period) == ("periodic", 3)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e7])
+def test_what_needs_exact_values_is_not_asked_of_a_sensor(unit):
+    """Noise walks as chaos does and hides slow decays: neither transient chaos nor an approach is claimed."""
+    transient = unit * np.concatenate([logistic(4.0, 300), logistic(3.83, 600)])
+    assert two_step_test(transient).transient
+    assert not two_step_test(transient, sensor_error=1e-6 * unit).transient
+    slow = unit * (50.0 + 0.99 ** np.arange(400))
+    assert two_step_test(slow).nature == "periodic"
+    assert not two_step_test(slow, sensor_error=1e-6 * unit).reason.startswith("approaches")
+
+
 def test_chaos_shows_through_noise_and_a_noisy_torus_is_not_called_chaotic():
     """30 N of logistic chaos exceeds 3 N of sensor error; one line with noise has no band beyond that noise."""
     noise = np.random.default_rng(1).uniform(-3.0, 3.0, 1000)
@@ -404,9 +423,9 @@ def test_coordinates_that_do_not_move_have_no_say():
     chaos, torus = logistic(4.0, 1000), circle(0.3, GOLDEN, 1000)
     still = np.ones(1000)
     assert two_step_test(np.column_stack([still, still, chaos])).nature == "chaotic"
-    evidence = two_step_test(np.column_stack([torus] * 4 + [chaos] * 5)).evidence
-    alone = two_step_test(torus).evidence
-    assert evidence["zero_one"] == alone["zero_one"]
+    both = two_step_test(np.column_stack([torus] * 2 + [still] + [chaos] * 3)).evidence["zero_one"]
+    each = [two_step_test(series).evidence["zero_one"] for series in (torus, chaos)]
+    assert both == pytest.approx(np.mean(each), rel=1e-12), "the median of two and two"
 
 
 def test_a_dead_contact_is_not_judged():
