@@ -365,6 +365,8 @@ def test_transient_chaos_is_longer_than_the_motion_may_take():
     assert (verdict.margin, verdict.horizon) == (0.0, 900)
     assert two_step_test(series, initial_transient=cycles).nature == "periodic"
     assert two_step_test(series, initial_transient=cycles - 1).nature == "chaotic"
+    shortest = np.concatenate([logistic(4.0, 50, start=0.2), logistic(3.83, 600)])
+    assert two_step_test(shortest).evidence["irregular_cycles"] == 50, "fewer are too few for the 0-1 test"
 
 
 def test_a_long_regular_start_is_no_chaos():
