@@ -89,13 +89,14 @@ class LagrangianPPO(PPO):
     cost_limit
         Largest mean cost of a step.
     multiplier_rate
-        Increase of the multiplier in one update for each unit of cost above the limit.
+        Increase of the multiplier in one update for each unit of mean cost above the limit. At 4 it reaches 1 in some
+        five updates if a twentieth of the steps is too much.
     keywords
         Those of PPO; ``env`` must contain a ``CostRecorder``.
     """
 
     def __init__(
-        self, *positional: Any, cost_limit: float = 0.05, multiplier_rate: float = 0.1, **keywords: Any
+        self, *positional: Any, cost_limit: float = 0.05, multiplier_rate: float = 4.0, **keywords: Any
     ) -> None:
         self.cost_limit, self.multiplier_rate = cost_limit, multiplier_rate
         super().__init__(*positional, **keywords)
