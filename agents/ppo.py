@@ -7,6 +7,7 @@ The same command goes on with a run that was interrupted, and ends as if it had 
 """
 
 import argparse
+import json
 import sys
 import time
 from pathlib import Path
@@ -33,6 +34,11 @@ HOLD_BIAS = 2.0
 ROW = ("step", "return", "type_iii", "deviation", "processor_seconds")
 
 
+def keywords(text: str) -> dict[str, Any]:
+    """Keywords that an object of JSON names."""
+    return dict(json.loads(text))
+
+
 def arguments() -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -42,6 +48,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, default=Path("runs/ppo"))
     parser.add_argument("--start", type=Path, default=None, help="Run folder whose policy this training begins with.")
     parser.add_argument("--fidelity", default=None, help="Rung of the machines in training; default: the task's.")
+    parser.add_argument("--keywords", type=keywords, default={}, help="Of the environment in training, as JSON.")
     parser.add_argument("--envs", type=int, default=64)
     parser.add_argument("--every", type=int, default=10_000, help="Steps between rows and checkpoints.")
     parser.add_argument("--rollout", type=int, default=60)
@@ -115,7 +122,7 @@ def main() -> None:
 
 def environments(env: str, asked: argparse.Namespace) -> VecNormalize:
     """Machines side by side, with a memory of visited speeds, normalised."""
-    native = VecMonitor(SB3VecEnv(env, asked.envs, fidelity=asked.fidelity))
+    native = VecMonitor(SB3VecEnv(env, asked.envs, **{"fidelity": asked.fidelity} | asked.keywords))
     return VecNormalize(SB3VisitedSpeeds(native), gamma=asked.gamma)
 
 

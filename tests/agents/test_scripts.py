@@ -68,3 +68,13 @@ def test_minari_export_is_read_back(tmp_path, monkeypatch):
     code = "import minari; d = minari.load_dataset('chaosgym/ImpactBeamTolerance/random-v1'); print(d.total_steps)"
     told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert told.stdout.split()[-1] == "240"
+
+
+@pytest.mark.parametrize("text", ["{", "[1]", '{"tolerancs": 1}'])
+def test_keywords_that_are_none_end_in_one_line(text, tmp_path):
+    """No JSON, no object, no keyword of the environment: exit code 2 and one line that says so."""
+    command = [sys.executable, AGENTS / "ppo.py", "--keywords", text, "--out", tmp_path / "run"]
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "keyword" in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from chaosgym.cli import ABORTED, GRACE_SECONDS, heard_at_once
+from chaosgym.cli.interrupt import ABORTED, GRACE_SECONDS, heard_at_once
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processor time is read from /proc")
 
@@ -54,7 +54,7 @@ def _processor_seconds(process):
 def test_compiled_code_is_left_and_python_ends_by_itself(work, code, says):
     """A call that looks at no signal ends half a second later; what Python can end goes its own way before."""
     program = (
-        "import hashlib, time\nfrom chaosgym.cli import heard_at_once\n"
+        "import hashlib, time\nfrom chaosgym.cli.interrupt import heard_at_once\n"
         f"with heard_at_once():\n    print('on', flush=True)\n    {work}\n"
     )
     with _started("-c", program) as process:

@@ -7,17 +7,13 @@ output. Nothing is coloured, so NO_COLOR holds.
 
 import errno
 import os
-import signal
 import sys
-import threading
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib import import_module
 from typing import NoReturn
 
 import click
 
+from chaosgym.cli.interrupt import ABORTED, heard_at_once
 from chaosgym.errors import ChaosgymError, SimulationError, UnfinishedError
 from chaosgym.version import __version__
 
@@ -105,37 +101,3 @@ def _use_one_blas_thread() -> None:
 def _end(message: object, code: int) -> NoReturn:
     click.echo(f"Error: {message}", err=True)
     sys.exit(code)
-
-
-GRACE_SECONDS = 0.5
-"""Time for Python to end the command by itself, which it can't while a kernel computes."""
-
-ABORTED = 130
-"""Exit code of a command that Ctrl-C ended."""
-
-
-@contextmanager
-def heard_at_once() -> Iterator[None]:
-    """Let a thread end the process if Ctrl-C has not done so half a second later.
-
-    That loses nothing: files are whole or not there, and what was kept before goes on with the same command.
-    """
-    reading, writing = os.pipe()
-    os.set_blocking(writing, False)
-    before = signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
-    threading.Thread(target=_end_after_interrupt, args=(reading,), daemon=True).start()
-    try:
-        yield
-    finally:
-        signal.set_wakeup_fd(before)
-        os.close(writing)
-
-
-def _end_after_interrupt(reading: int) -> None:
-    """Read the numbers of signals until the pipe is closed."""
-    while number := os.read(reading, 1):
-        if number[0] == signal.SIGINT:
-            time.sleep(GRACE_SECONDS)
-            os.write(2, b"Aborted.\n")
-            os._exit(ABORTED)
-    os.close(reading)
