@@ -3,6 +3,8 @@
 Arguments are those of the compiled operations, which the library documents.
 """
 
+import math
+
 import numpy as np
 
 from chaosgym.core.lanes import LANES, TAYLOR_TERMS
@@ -90,29 +92,57 @@ def combine(free, free_at, own, driven_at, constant_at, u_at, blocks, lanes, har
 
 
 @operation
-def dot(own, at, u_at, width):
+def dot(table, at, own, u_at, width):
     """Scalar product."""
-    return own[at : at + width] @ own[u_at : u_at + width]
+    return table[at : at + width] @ own[u_at : u_at + width]
 
 
 @operation
-def dot_of_sizes(own, at, u_at, width):
+def dot_of_sizes(table, at, own, u_at, width):
     """Scalar product with absolute values."""
-    return own[at : at + width] @ abs(own[u_at : u_at + width])
+    return table[at : at + width] @ abs(own[u_at : u_at + width])
 
 
 @operation
-def add_columns(table, at, width, count, factors, factors_at, out, out_at):
+def add_columns(table, at, width, count, factors, factors_at, out, out_at, stride):
     """Columns times factors."""
-    out[out_at : out_at + width] = factors[factors_at : factors_at + count] @ _taken(table, at, count, width)
+    answer = factors[factors_at : factors_at + count] @ _taken(table, at, count, width)
+    for k, eight in enumerate(answer.reshape(-1, LANES)):
+        out[out_at + k * stride :][:LANES] = eight
 
 
 @operation
-def next_term(table, at, width, count, series, older_at, old_at, weight, share, out_at):
+def next_term(table, older, old, width, count, factors, by_older, by_old, weight, share, out, out_at):
     """A term of a series from the two before it."""
-    older, old = series[older_at : older_at + count], series[old_at : old_at + count]
-    known = series[out_at : out_at + width] + older @ _taken(table, at, count, width)
-    series[out_at : out_at + width] = share * (known + weight * (old @ _taken(table, at + count * width, count, width)))
+    known = out[out_at : out_at + width] + factors[by_older : by_older + count] @ _taken(table, older, count, width)
+    new = factors[by_old : by_old + count] @ _taken(table, old, count, width)
+    out[out_at : out_at + width] = share * (known + weight * new)
+
+
+@operation
+def taylor(own, at, width, last, time, out_at):
+    """A polynomial and three derivatives of it."""
+    for k in range(4):
+        powers = [math.perm(i, k) * time ** (i - k) if i >= k else 0.0 for i in range(last + 1)]
+        own[out_at + k * width :][:width] = np.array(powers) @ _taken(own, at, last + 1, width)
+
+
+@operation
+def add_tops(own, values_at, slopes_at, h, sign, weight, more, totals_at):
+    """Largest values of cubics."""
+    values, slopes = sign * own[values_at : values_at + 9], sign * own[slopes_at : slopes_at + 9]
+    rise = np.maximum(slopes[:-1], 0.0) - np.minimum(slopes[1:], 0.0)
+    own[totals_at : totals_at + LANES] += weight * (
+        np.maximum(values[:-1], values[1:]) + 4.0 / 27.0 * h * rise
+    ) + more
+
+
+@operation
+def first_above(own, at, limit, start):
+    """First value that is not below a limit."""
+    above = ~(own[at : at + LANES] < limit)
+    above[:start] = False
+    return int(np.argmax(above)) if above.any() else LANES
 
 
 @operation

@@ -25,9 +25,6 @@ from numba.extending import intrinsic, register_jitable
 LANES = 8
 """Doubles of one vector."""
 
-GROUP = 4
-"""Doubles of one vector where rows are short."""
-
 _DOUBLE, _INT, _INDEX = ir.DoubleType(), ir.IntType(32), ir.IntType(64)
 _OVERSHOOT = 4.0 / 27.0
 
@@ -282,34 +279,32 @@ def combine(e, free, free_at, own, driven_at, constant_at, u_at, blocks, lanes, 
             e.store(e.total(*sums[2 * q : 2 * q + 2]), own, b.add(out_at, rows[q]))
 
 
-def _dot(e, own, at, u_at, width, of_sizes):
+def _dot(e, table, at, own, u_at, width, of_sizes):
     b = e.builder
     total = e.accumulator(e.constant(0.0))
     with e.vectors(width) as loop:
         offset = e.times(loop.index, LANES)
         u = e.load(own, b.add(u_at, offset))
-        e.add_product(total, e.load(own, b.add(at, offset)), e.intrinsic("fabs", [u]) if of_sizes else u)
+        e.add_product(total, e.load(table, b.add(at, offset)), e.intrinsic("fabs", [u]) if of_sizes else u)
     return e.folded(b.load(total), b.fadd)
 
 
 @_operation(types.float64)
-def dot(e, own, at, u_at, width):
-    """Scalar product of two parts of an array, (width,), a multiple of 8."""
-    return _dot(e, own, at, u_at, width, of_sizes=False)
+def dot(e, table, at, own, u_at, width):
+    """Scalar product of parts of two arrays, (width,), a multiple of 8."""
+    return _dot(e, table, at, own, u_at, width, of_sizes=False)
 
 
 @_operation(types.float64)
-def dot_of_sizes(e, own, at, u_at, width):
-    """Scalar product of one part of an array and the absolute values of another, (width,), a multiple of 8."""
-    return _dot(e, own, at, u_at, width, of_sizes=True)
+def dot_of_sizes(e, table, at, own, u_at, width):
+    """Scalar product of a part of one array and the absolute values of another, (width,), a multiple of 8."""
+    return _dot(e, table, at, own, u_at, width, of_sizes=True)
 
 
 def _columns(e, table, at, width, count, factors, factors_at):
     """Sum over c < ``count`` of factor c times column c, whose lanes begin at ``at`` + c ``width``; pairs alternate."""
     b = e.builder
     sums = [e.accumulator(e.constant(0.0)) for _ in range(2)]
-    for one in sums:
-        b.store(e.constant(0.0), one)
 
     def add(c, one):
         factor = e.spread(e.number(factors, b.add(factors_at, c)))
@@ -324,27 +319,77 @@ def _columns(e, table, at, width, count, factors, factors_at):
     return e.total(*sums)
 
 
-@_operation(lanes=GROUP)
-def add_columns(e, table, at, width, count, factors, factors_at, out, out_at):
-    """Write the sum over c < ``count`` of factor c times column c of a table (columns, width), a multiple of 4."""
+@_operation()
+def add_columns(e, table, at, width, count, factors, factors_at, out, out_at, stride):
+    """Write the sum over c < ``count`` of factor c times column c of a table (columns, width), a multiple of 8.
+
+    Each eight numbers begin ``stride`` after the eight before them.
+    """
+    b = e.builder
     with e.vectors(width) as rows:
-        first = e.times(rows.index, GROUP)
-        answer = _columns(e, table, e.builder.add(at, first), width, count, factors, factors_at)
-        e.store(answer, out, e.builder.add(out_at, first))
+        answer = _columns(e, table, b.add(at, e.times(rows.index, LANES)), width, count, factors, factors_at)
+        e.store(answer, out, b.add(out_at, b.mul(rows.index, stride)))
 
 
-@_operation(lanes=GROUP)
-def next_term(e, table, at, width, count, series, older_at, old_at, weight, share, out_at):
-    """Add to the series from ``out_at`` on ``count`` columns times what is older and ``weight`` times ``count`` more
-    times what is old; then multiply all of it by ``share``."""
+@_operation()
+def next_term(e, table, older, old, width, count, factors, by_older, by_old, weight, share, out, out_at):
+    """Add ``count`` columns from ``older`` on times their factors and ``weight`` times those from ``old`` on times
+    theirs; then multiply all of it by ``share``."""
     b = e.builder
     weights, shares = e.spread(weight), e.spread(share)
     with e.vectors(width) as rows:
-        first = e.times(rows.index, GROUP)
-        begin, place = b.add(at, first), b.add(out_at, first)
-        known = b.fadd(e.load(series, place), _columns(e, table, begin, width, count, series, older_at))
-        new = _columns(e, table, b.add(begin, b.mul(count, width)), width, count, series, old_at)
-        e.store(b.fmul(shares, e.fma(weights, new, known)), series, place)
+        first = e.times(rows.index, LANES)
+        place = b.add(out_at, first)
+        known = b.fadd(e.load(out, place), _columns(e, table, b.add(older, first), width, count, factors, by_older))
+        new = _columns(e, table, b.add(old, first), width, count, factors, by_old)
+        e.store(b.fmul(shares, e.fma(weights, new, known)), out, place)
+
+
+@_operation()
+def taylor(e, own, at, width, last, time, out_at):
+    """Value and first three derivatives at ``time`` of a series whose coefficients (last + 1, width) begin at ``at``.
+
+    They are written from ``out_at`` on, ``width`` numbers each.
+    """
+    b = e.builder
+    times = e.spread(time)
+    with e.vectors(width) as rows:
+        first = e.times(rows.index, LANES)
+        value, slope, bend, third = (e.accumulator(e.constant(0.0)) for _ in range(4))
+        with cgutils.for_range(b, b.add(last, e.index(1))) as loop:
+            coefficient = e.load(own, b.add(b.add(at, first), b.mul(b.sub(last, loop.index), width)))
+            for higher, lower in ((third, bend), (bend, slope), (slope, value)):
+                b.store(e.fma(b.load(higher), times, b.load(lower)), higher)
+            b.store(e.fma(b.load(value), times, coefficient), value)
+        for k, (derivative, factor) in enumerate(((value, 1.0), (slope, 1.0), (bend, 2.0), (third, 6.0))):
+            answer = b.fmul(b.load(derivative), e.constant(factor))
+            e.store(answer, own, b.add(b.add(out_at, first), e.times(width, k)))
+
+
+@_operation()
+def add_tops(e, own, values_at, slopes_at, h, sign, weight, more, totals_at):
+    """Add to eight totals what ``sign`` times a quantity reaches at most in each interval, times ``weight``, + ``more``.
+
+    Values and slopes (9,) and what the cubic through them reaches are those of ``first_doubt``.
+    """
+    b = e.builder
+    signs = e.spread(sign)
+    right, after = (e.load(own, b.add(at, e.index(1))) for at in (values_at, slopes_at))
+    left, before = e.shifted(right, e.number(own, values_at)), e.shifted(after, e.number(own, slopes_at))
+    right, after, left, before = (b.fmul(signs, one) for one in (right, after, left, before))
+    rise = b.fsub(e.larger(before, e.constant(0.0)), e.smaller(after, e.constant(0.0)))
+    top = e.fma(b.fmul(e.spread(h), e.constant(_OVERSHOOT)), rise, e.larger(left, right))
+    total = b.fadd(e.load(own, totals_at), e.spread(more))
+    e.store(e.fma(e.spread(weight), top, total), own, totals_at)
+
+
+@_operation(types.int64)
+def first_above(e, own, at, limit, start):
+    """Number of the first of eight values, from ``start`` on, that is not below a limit; 8 if all are."""
+    b = e.builder
+    below = b.or_(b.fcmp_ordered("<", e.load(own, at), e.spread(limit)), e.lanes_below(start))
+    bits = b.zext(b.bitcast(b.not_(below), ir.IntType(LANES)), _INDEX)
+    return b.cttz(b.or_(bits, e.index(1 << LANES)), ir.Constant(ir.IntType(1), 1))
 
 
 @_operation(types.float64)

@@ -331,13 +331,13 @@ def number(run, g, which):
 @part
 def read(here, quantity, u):
     """What coordinates show, by row of ``now``, without what the numbers add."""
-    return dot(here.own, here.now + quantity * here.width, u, here.width)
+    return dot(here.own, here.now + quantity * here.width, here.own, u, here.width)
 
 
 @part
 def size_of(here, which):
     """Bound of a derivative from now on, by row of ``bounds``."""
-    return dot_of_sizes(here.own, here.bounds + which * here.width, here.u, here.width)
+    return dot_of_sizes(here.own, here.bounds + which * here.width, here.own, here.u, here.width)
 
 
 @leaf

@@ -20,11 +20,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.core.lanes import GROUP, padded
+from chaosgym.core.lanes import LANES
 from chaosgym.machines.slider_crank.equations import Equations, equations, loads, rod_of
 from chaosgym.machines.slider_crank.joints import Channels, channels_of, display_of, gaps_of, hertz_constants, joints_of
 from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
-from chaosgym.machines.slider_crank.kernels.propagator import FORCING_TERMS, TICKS, series_order, tables
+from chaosgym.machines.slider_crank.kernels.propagator import tables
+from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, series_order
 from chaosgym.machines.slider_crank.kernels.stepped import HERTZ, LINEAR, SteppedCrankModel
 from chaosgym.machines.slider_crank.kinematics import slider_rate
 from chaosgym.machines.slider_crank.spatial_equations import spatial_equations, spatial_loads
@@ -38,7 +39,7 @@ STABLE_PHASE = 2.0
 """Longest Runge-Kutta step times largest eigenvalue; the method is stable up to 2.7."""
 
 STEP_PHASE = 0.5
-"""Angle [rad] by which the fastest motion turns in the shortest step, by default."""
+"""Angle [rad] by which the fastest motion turns in half an interval of a look, by default."""
 
 MAX_SETS = 32
 """Contact sets for which propagators are made; a machine with more is left to the stepper."""
@@ -49,48 +50,33 @@ KEPT = 128
 KEPT_STRUCTURES = 1024
 """Machines whose models are looked up by speed alone."""
 
-TABLES = ("acceleration", "propagator", "bound")
-"""Large arrays of a model."""
-
 KEPT_BYTES = 256_000_000
 """Memory for the propagators of machines at one speed; those used longest ago go first."""
 
 _NOT_IN_THE_MATRICES = ("crank_speed", "slider_clearance", "ball_clearance")
 
 
-class KeptModel(NamedTuple):
-    """A model without its clearances, and the addresses of its large ``TABLES``, which live as long as it does."""
-
-    model: SliderCrankModel
-    addresses: tuple[int, ...]
-
-
 class _RecentModels:
     """Models by key within ``KEPT_BYTES``; several threads may ask at once."""
 
     def __init__(self) -> None:
-        self._models: OrderedDict[Hashable, KeptModel] = OrderedDict()
+        self._models: OrderedDict[Hashable, SliderCrankModel] = OrderedDict()
         self._bytes = 0
         self._lock = Lock()
 
-    def get(self, key: Hashable, make: Callable[[], SliderCrankModel]) -> KeptModel:
+    def get(self, key: Hashable, make: Callable[[], SliderCrankModel]) -> SliderCrankModel:
         with self._lock:
             if key in self._models:
                 self._models.move_to_end(key)
                 return self._models[key]
         model = make()
-        kept = KeptModel(model, tuple(getattr(model, name).ctypes.data for name in TABLES))
         with self._lock:
             if key not in self._models:
-                self._models[key] = kept
-                self._bytes += _size(model)
+                self._models[key] = model
+                self._bytes += model.table.nbytes
             while self._bytes > KEPT_BYTES and len(self._models) > 1:
-                self._bytes -= _size(self._models.popitem(last=False)[1].model)
-        return kept
-
-
-def _size(model: SliderCrankModel) -> int:
-    return sum(int(getattr(model, name).nbytes) for name in TABLES)
+                self._bytes -= self._models.popitem(last=False)[1].table.nbytes
+        return model
 
 
 _recent = _RecentModels()
@@ -109,7 +95,7 @@ class ModelsBySpeed:
     def __init__(self, step_phase: float, structure: tuple[Any, ...]) -> None:
         self._step_phase, self._structure = step_phase, structure
 
-    def at(self, crank_speed: float) -> KeptModel:
+    def at(self, crank_speed: float) -> SliderCrankModel:
         """Return the model at a speed [rpm]; its gaps are zero."""
         return _recent.get(
             (crank_speed, self), lambda: _at_speed(crank_speed, self._step_phase, _structure(*self._structure))
@@ -122,13 +108,13 @@ def _models_by_speed(step_phase: float, *structure: Any) -> ModelsBySpeed:
 
 
 def models_by_speed(machine: "SliderCrank", step_phase: float = STEP_PHASE) -> ModelsBySpeed:
-    """Models of a machine that ``has_propagators``; the fastest motion turns by ``step_phase`` [rad] in a tick."""
+    """Models of a machine that ``has_propagators``; the fastest motion turns by ``step_phase`` [rad] in half an interval."""
     return _models_by_speed(step_phase, *_key(machine))
 
 
 def exact_model(machine: "SliderCrank", step_phase: float) -> SliderCrankModel:
-    """Model of a machine that ``has_propagators``; the fastest motion turns by ``step_phase`` [rad] in a tick."""
-    return models_by_speed(machine, step_phase).at(machine.crank_speed).model._replace(gap=gaps_of(machine))
+    """Model of a machine that ``has_propagators``; the fastest motion turns by ``step_phase`` [rad] in half an interval."""
+    return models_by_speed(machine, step_phase).at(machine.crank_speed)._replace(gap=gaps_of(machine))
 
 
 def _radix(machine: "SliderCrank") -> int:
@@ -237,11 +223,9 @@ def fastest_rate(machine: "SliderCrank", model: SteppedCrankModel) -> float:
 class _Structure(NamedTuple):
     """Accelerations of all bins by powers of the crank rate, whatever the speed and the clearance.
 
-    ``free`` (3, bins, 2n, lanes) per unit p and p'; ``forcing`` (2, bins, 4, lanes) of gravity and of squared crank
-    rate; ``push`` (sets, bins, 2n + m, lanes) what closed contacts add per unit p, p' and clearance; lanes as in
-    ``SliderCrankModel.acceleration``. ``lag`` (sets, m) [s] damping over stiffness of the closed channels; ``anchor``
-    as in the model; ``contact`` [rad/s] angular frequency of the masses next to the closed contacts; ``spectrum``
-    [1/s] largest modulus of an eigenvalue.
+    ``free`` (3, bins, 2n, n), ``forcing`` (2, bins, 4, n) and ``push`` (sets, bins, 2n + m, n) as ``tables`` takes them;
+    ``lag`` (sets, m) [s] damping over stiffness of the closed channels; ``anchor`` as in the model; ``contact`` [rad/s]
+    angular frequency of the masses next to the closed contacts; ``spectrum`` [1/s] largest modulus of an eigenvalue.
     """
 
     channels: Channels
@@ -305,18 +289,8 @@ def _structure(kind: type, *structure: Any) -> _Structure:
     push = _push(inverse_mass, channels, radix, friction)
     some = [0, len(inverse_mass) // 4]
     contact, spectrum = _rates(free[0, some], push[-1, some, : 2 * n], channels.row)
-    free, forcing, push = (_with_channels(part, channels.row) for part in (free, forcing, push))
     lag, anchor = _closed(channels, radix)
     return _Structure(channels, radix, display_of(machine), free, forcing, push, lag, anchor, contact, spectrum)
-
-
-def _with_channels(accelerations: Array, row: Array) -> Array:
-    """Accelerations (..., n) followed by those of the channels' displacements and by what fills up the lanes."""
-    m, n = row.shape
-    lanes = np.zeros((*accelerations.shape[:-1], padded(n + m, GROUP)))
-    lanes[..., :n] = accelerations
-    lanes[..., n : n + m] = accelerations @ row.T
-    return lanes
 
 
 def _closed(channels: Channels, radix: int) -> tuple[Array, Array]:
@@ -338,27 +312,20 @@ def _friction(machine: "SliderCrank", crank_angle: Array) -> Array:
 
 
 def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> SliderCrankModel:
-    m, n = parts.channels.row.shape
-    sets, bins, _, lanes = parts.push.shape
-    rate = crank_speed * math.pi / 30.0
+    rate, bins = crank_speed * math.pi / 30.0, parts.free.shape[1]
     duration = 2.0 * math.pi / (bins * rate)
-    moving, size = 2 * n, 2 * n + FORCING_TERMS + m
-    acceleration = np.zeros((sets, bins, size + size % 2, lanes))
-    acceleration[:, :, : moving + FORCING_TERMS] = _free_motion(parts.free, parts.forcing, rate)
-    acceleration[:, :, :moving] += parts.push[:, :, :moving]
-    acceleration[:, :, moving + FORCING_TERMS : size] = parts.push[:, :, moving:]
-    steps = max(1, math.ceil(duration * parts.spectrum / (TICKS * step_phase)))
-    step = duration / steps
-    order = series_order(parts.spectrum * step / TICKS)
-    propagator, bound = tables(acceleration, parts.channels.row, parts.lag, parts.anchor, duration, step, order)
+    steps = max(1, math.ceil(duration * parts.spectrum / (2.0 * LANES * step_phase)))
+    order = series_order(parts.spectrum * duration / (LANES * steps))
+    accelerations = (parts.free, parts.forcing, parts.push, rate)
     return SliderCrankModel(
         bin_duration=duration,
+        bins=bins,
         steps=steps,
         contact_rate=parts.contact,
         order=order,
         spectrum=parts.spectrum,
         row=parts.channels.row,
-        gap=np.zeros(m),
+        gap=np.zeros(len(parts.channels.row)),
         stiffness=parts.channels.stiffness,
         damping=parts.channels.damping,
         two_sided=parts.channels.two_sided,
@@ -367,7 +334,5 @@ def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> Slide
         reach=np.linalg.norm(parts.channels.reading, axis=1),
         display=parts.display,
         anchor=parts.anchor,
-        acceleration=acceleration,
-        propagator=propagator,
-        bound=bound,
+        table=tables(*accelerations, parts.channels.row, parts.lag, parts.anchor, duration, steps, order),
     )

@@ -14,14 +14,12 @@ from chaosgym.machines.batch import CompiledBatch, Cycles, one_call_at_a_time, p
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.slider_crank.joints import gaps_of, sensor_peaks
 from chaosgym.machines.slider_crank.kernels.batch import advance_cranks, advance_kicked_cranks, advance_stepped_cranks
-from chaosgym.machines.slider_crank.kernels.exact import advance
+from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel, advance
 from chaosgym.machines.slider_crank.kernels.fixed_step import advance_crank_fixed_step
 from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
 from chaosgym.machines.slider_crank.kernels.stepped import advance as advance_stepped
 from chaosgym.machines.slider_crank.model import (
     STEP_PHASE,
-    TABLES,
-    KeptModel,
     ModelsBySpeed,
     fastest_rate,
     models_by_speed,
@@ -109,7 +107,7 @@ def force_bound(crank: "SliderCrank") -> float:
 Indices = NDArray[np.int64]
 
 SPEED_FIELDS = ("bin_duration", "steps", "order")
-"""Fields of a slider crank's model that change with its speed, apart from the tables."""
+"""Fields of a slider crank's model that change with its speed, apart from the table."""
 
 
 class CrankBatch(CompiledBatch):
@@ -118,13 +116,12 @@ class CrankBatch(CompiledBatch):
     def __init__(self, machine: Any, count: int) -> None:
         super().__init__(machine, count)
         model = machine.reduce()
-        self._bins = model.acceleration.shape[1]
-        self._batch = stacked([model._replace(**dict.fromkeys(TABLES, 0))] * count)
+        self._batch = stacked([model._replace(table=0)] * count)
         self._machines = [machine] * count
         self._models = [models_by_speed(machine)] * count
         self._speeds = np.full(count, np.nan)
-        # the tables live as long as the batch holds their addresses
-        self._kept: list[KeptModel | None] = [None] * count
+        # a table lives as long as the batch holds its address
+        self._kept: list[SliderCrankModel | None] = [None] * count
 
     def __getstate__(self) -> dict[str, Any]:
         """State without models: addresses mean nothing in another process."""
@@ -141,7 +138,7 @@ class CrankBatch(CompiledBatch):
 
     def change(self, i: int, machine: Any) -> None:
         """Put another machine into place i, whose motion goes on."""
-        put(self._batch, i, machine.reduce()._replace(**dict.fromkeys(TABLES, 0)))
+        put(self._batch, i, machine.reduce()._replace(table=0))
         self._machines[i] = machine
         self._models[i] = models_by_speed(machine)
         self._speeds[i] = np.nan
@@ -160,9 +157,8 @@ class CrankBatch(CompiledBatch):
         row = [distinct.setdefault((self._models[i], speed), len(distinct)) for i, speed in pairs]
         kept = [models.at(speed) for models, speed in distinct]
         for name in SPEED_FIELDS:
-            getattr(self._batch, name)[which] = np.array([getattr(each.model, name) for each in kept])[row]
-        for k, name in enumerate(TABLES):
-            getattr(self._batch, name)[which] = np.array([each.addresses[k] for each in kept])[row]
+            getattr(self._batch, name)[which] = np.array([getattr(each, name) for each in kept])[row]
+        self._batch.table[which] = np.array([each.table.ctypes.data for each in kept])[row]
         for i, place in zip(which.tolist(), row, strict=True):
             self._kept[i] = kept[place]
 
@@ -175,13 +171,13 @@ class CrankBatch(CompiledBatch):
     def run_kicked(self, which: Indices, kicks: Array) -> Cycles:
         """``kick`` the machines ``which`` (k,) by each of the shares (k, cycles, n_states / 2) and run them a cycle."""
         arrays, outcome = self._empty(*kicks.shape[:2])
-        given = (self._batch, self._bins, which, kicks, self._motions, self._scale, arrays, self._settings, outcome)
+        given = (self._batch, which, kicks, self._motions, self._scale, arrays, self._settings, outcome)
         with one_call_at_a_time:
             call(advance_kicked_cranks, *given)
         return self._cycles(arrays, outcome)
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
-        call(advance_cranks, self._batch, self._bins, which, self._motions, arrays, self._settings, outcome)
+        call(advance_cranks, self._batch, which, self._motions, arrays, self._settings, outcome)
 
 
 class SteppedCrankBatch(CompiledBatch):

@@ -1,7 +1,7 @@
 """Many slider cranks at once: each by its own ``advance``, side by side on all threads.
 
-The large tables of a slider crank stay where they are, and its batch holds their addresses: machines at equal speeds
-share them.
+The large table of a slider crank stays where it is, and its batch holds the address: machines at equal speeds share
+it.
 """
 
 import numpy as np
@@ -10,12 +10,11 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from chaosgym.core.batch import episode_of, rows_of
-from chaosgym.core.lanes import GROUP, padded
 from chaosgym.core.tangent import no_tangents
 from chaosgym.core.varied import cycle_of
 from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
 from chaosgym.machines.slider_crank.kernels.exact import advance as advance_crank
-from chaosgym.machines.slider_crank.kernels.propagator import FORCING_TERMS, RUNGS
+from chaosgym.machines.slider_crank.kernels.propagator import table_places
 from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
 from chaosgym.machines.slider_crank.kernels.stepped import advance as advance_stepped_crank
 
@@ -31,14 +30,13 @@ def pointer(typing_context, address):
 
 
 @njit(cache=True, inline="always")
-def crank_of(batch, bins, i):
+def crank_of(batch, i):
     """Model of machine i of a batch that holds the addresses of the tables."""
     m, n = batch.row.shape[1:]
-    columns = 2 * n + FORCING_TERMS + m
-    columns += columns % 2
-    sets = batch.radix[i] ** m
+    size = batch.radix[i] ** m * batch.bins[i] * table_places(n, m)[6]
     return SliderCrankModel(
         batch.bin_duration[i],
+        batch.bins[i],
         batch.steps[i],
         batch.contact_rate[i],
         batch.order[i],
@@ -53,19 +51,17 @@ def crank_of(batch, bins, i):
         batch.reach[i],
         batch.display[i],
         batch.anchor[i],
-        carray(pointer(batch.acceleration[i]), (sets, bins, columns, padded(n + m, GROUP)), np.float64),
-        carray(pointer(batch.propagator[i]), (sets, bins, RUNGS, columns, padded(2 * (n + m), GROUP)), np.float64),
-        carray(pointer(batch.bound[i]), (sets, bins, m, columns), np.float64),
+        carray(pointer(batch.table[i]), (size,), np.float64),
     )
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def advance_cranks(batch, bins, which, motions, arrays, settings, outcome):
-    """As ``advance_beams``, for slider cranks with ``bins`` bins of crank angle."""
+def advance_cranks(batch, which, motions, arrays, settings, outcome):
+    """As ``advance_beams``, for slider cranks."""
     for k in prange(which.shape[0]):
         i = which[k]
         outcome[k] = advance_crank(
-            crank_of(batch, bins, i),
+            crank_of(batch, i),
             motions.coordinates[i],
             episode_of(motions, i),
             rows_of(arrays, k),
@@ -99,14 +95,14 @@ def _kick_crank(model, kicks, coordinates, scale, episode, arrays, settings, k):
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def advance_kicked_cranks(batch, bins, which, kicks, motions, scale, arrays, settings, outcome):
+def advance_kicked_cranks(batch, which, kicks, motions, scale, arrays, settings, outcome):
     """As ``advance_cranks``; before each cycle velocities change by ``kicks`` (k, cycles, n_states / 2).
 
     These are shares of the largest velocities so far, which ``scale`` (N, n_states) keeps.
     """
     for k in prange(which.shape[0]):
         i = which[k]
-        model, episode = crank_of(batch, bins, i), episode_of(motions, i)
+        model, episode = crank_of(batch, i), episode_of(motions, i)
         outcome[k] = _kick_crank(model, kicks, motions.coordinates[i], scale[i], episode, arrays, settings, k)
 
 

@@ -21,6 +21,7 @@ from numba import njit
 
 from chaosgym.core.cubic import cubic
 from chaosgym.core.kernel import leaf
+from chaosgym.core.lanes import fma, item
 
 GAP, STIFFNESS, LAG, TWO_SIDED, ALONG, UP, SIDEWAYS, REACH = range(8)
 """Columns of ``surfaces``."""
@@ -94,11 +95,11 @@ def trend(h, e0, d0, e1, d1, fourth):
 
 
 @leaf
-def fourth_of(series, column, last, lag, h):
+def fourth_of(own, series, lanes, last, lag, h):
     """Bound of the fourth derivative of y + lag y' over h, by the Taylor coefficients of y."""
     total, power = 0.0, 1.0
     for k in range(4, last + 1):
-        size = abs(series[k, column]) * (k * (k - 1) * (k - 2) * (k - 3))
+        size = abs(own[series + k * lanes]) * (k * (k - 1) * (k - 2) * (k - 3))
         total += power * size
         if lag != 0.0 and k > 4:
             total += lag * (k - 4) * size * power / h
@@ -121,26 +122,26 @@ def judge(h, e0, d0, e1, d1, fourth):
 
 
 @leaf
-def reading_at(series, column, last, t):
-    """Value and first three derivatives at t of a column of Taylor coefficients up to order ``last``."""
-    value, slope, bend, third = series[last, column], 0.0, 0.0, 0.0
-    for k in range(last - 1, -1, -1):
-        third = third * t + bend
-        bend = bend * t + slope
-        slope = slope * t + value
-        value = value * t + series[k, column]
+def reading_at(own, series, lanes, last, t):
+    """Value and first three derivatives at t of Taylor coefficients up to order ``last``, every ``lanes`` numbers."""
+    value, slope, bend, third = 0.0, 0.0, 0.0, 0.0
+    for k in range(last, -1, -1):
+        third = fma(third, t, bend)
+        bend = fma(bend, t, slope)
+        slope = fma(slope, t, value)
+        value = fma(value, t, item(own, series + k * lanes))
     return value, slope, 2.0 * bend, 6.0 * third
 
 
 @leaf
-def crossing(series, column, last, side, gap, lag, low, high, tolerance):
+def crossing(own, series, lanes, last, side, gap, lag, low, high, tolerance):
     """Instant in [low, high] at which side (y + lag y') - gap, which changes its sign there once, is zero.
 
     Halley's method from the root of the cubic through both ends, kept inside by bisection.
     """
-    y, v, a, _ = reading_at(series, column, last, low)
+    y, v, a, _ = reading_at(own, series, lanes, last, low)
     e0, d0 = side * (y + lag * v) - gap, side * (v + lag * a)
-    y, v, a, _ = reading_at(series, column, last, high)
+    y, v, a, _ = reading_at(own, series, lanes, last, high)
     e1, d1 = side * (y + lag * v) - gap, side * (v + lag * a)
     h, begin = high - low, low
     t = h * e0 / (e0 - e1) if e0 != e1 else 0.5 * h
@@ -150,7 +151,7 @@ def crossing(series, column, last, side, gap, lag, low, high, tolerance):
             t = min(max(t - value / slope, 0.0), h)
     t += begin
     for _ in range(POLISH):
-        y, v, a, third = reading_at(series, column, last, t)
+        y, v, a, third = reading_at(own, series, lanes, last, t)
         value, slope, bend = side * (y + lag * v) - gap, side * (v + lag * a), side * (a + lag * third)
         if (value > 0.0) == (e1 > 0.0):
             high = t
@@ -165,25 +166,23 @@ def crossing(series, column, last, side, gap, lag, low, high, tolerance):
 
 
 @leaf
-def settled(surface, j, side, start, end, h, fourth):
-    """What channel j does over h by what it reads at both ends: (KEEPS, CROSSES or UNSURE, side of a crossing)."""
+def settled(surface, j, side, e0, d0, e1, d1, h, fourth):
+    """What channel j does over h by readings and slopes at both ends: (KEEPS, CROSSES or UNSURE, side of a crossing)."""
     gap = surface[j, GAP]
     if side != 0.0:
-        return judge(
-            h, side * start[0, j] - gap, side * start[1, j], side * end[0, j] - gap, side * end[1, j], fourth
-        ), 0.0
-    if gap - start[0, j] < 0.0:
+        return judge(h, side * e0 - gap, side * d0, side * e1 - gap, side * d1, fourth), 0.0
+    if gap - e0 < 0.0:
         return UNSURE, 1.0
-    verdict = judge(h, gap - start[0, j], -start[1, j], gap - end[0, j], -end[1, j], fourth)
+    verdict = judge(h, gap - e0, -d0, gap - e1, -d1, fourth)
     if verdict != KEEPS or surface[j, TWO_SIDED] == 0.0:
         return verdict, 1.0
-    if gap + start[0, j] < 0.0:
+    if gap + e0 < 0.0:
         return UNSURE, -1.0
-    return judge(h, gap + start[0, j], start[1, j], gap + end[0, j], end[1, j], fourth), -1.0
+    return judge(h, gap + e0, d0, gap + e1, d1, fourth), -1.0
 
 
 @leaf
-def opening(surface, j, side, series, column, last, h, tolerance):
+def opening(surface, j, side, own, series, lanes, last, h, tolerance):
     """First instant in [0, h] at which closed channel j opens, or inf.
 
     A force that is zero by rounding and grows does not open it; likewise in ``closing``. Else two channels that open at
@@ -192,17 +191,17 @@ def opening(surface, j, side, series, column, last, h, tolerance):
     if h <= 0.0:
         return math.inf
     gap, lag = surface[j, GAP], surface[j, LAG]
-    fourth = fourth_of(series, column, last, lag, h)
-    y, v, a, _ = reading_at(series, column, last, 0.0)
+    fourth = fourth_of(own, series, lanes, last, lag, h)
+    y, v, a, _ = reading_at(own, series, lanes, last, 0.0)
     low, length = 0.0, h
     e0, d0 = side * (y + lag * v) - gap, side * (v + lag * a)
     while low < h:
         high = min(low + length, h)
-        y, v, a, _ = reading_at(series, column, last, high)
+        y, v, a, _ = reading_at(own, series, lanes, last, high)
         e1, d1 = side * (y + lag * v) - gap, side * (v + lag * a)
         verdict = judge(high - low, e0, d0, e1, d1, fourth)
         if verdict == CROSSES:
-            return crossing(series, column, last, side, gap, lag, low, high, tolerance)
+            return crossing(own, series, lanes, last, side, gap, lag, low, high, tolerance)
         if verdict == UNSURE:
             if length > tolerance:
                 length *= 0.5
@@ -215,7 +214,7 @@ def opening(surface, j, side, series, column, last, h, tolerance):
 
 
 @leaf
-def closing(surface, j, side, series, column, last, h, tolerance):
+def closing(surface, j, side, own, series, lanes, last, h, tolerance):
     """First instant in [0, h] at which open channel j closes on ``side``, or inf.
 
     Depth and pressure count from below here: what must become positive is looked at with its sign changed.
@@ -223,26 +222,26 @@ def closing(surface, j, side, series, column, last, h, tolerance):
     if h <= 0.0:
         return math.inf
     gap, lag = surface[j, GAP], surface[j, LAG]
-    place_fourth = fourth_of(series, column, last, 0.0, h)
-    fourth = fourth_of(series, column, last, lag, h)
-    y, v, a, _ = reading_at(series, column, last, 0.0)
+    place_fourth = fourth_of(own, series, lanes, last, 0.0, h)
+    fourth = fourth_of(own, series, lanes, last, lag, h)
+    y, v, a, _ = reading_at(own, series, lanes, last, 0.0)
     low, length = 0.0, h
     p0, q0, e0, d0 = gap - side * y, -side * v, gap - side * (y + lag * v), -side * (v + lag * a)
     while low < h:
         high = min(low + length, h)
-        y, v, a, _ = reading_at(series, column, last, high)
+        y, v, a, _ = reading_at(own, series, lanes, last, high)
         p1, q1, e1, d1 = gap - side * y, -side * v, gap - side * (y + lag * v), -side * (v + lag * a)
         # outside, or inside without pressure: within rounding where the contact has just opened
         slack = ROUNDING * (gap + abs(y) + lag * abs(v))
         span = high - low
         place = judge(span, p0, q0, p1, q1, place_fourth) if p0 >= -slack else UNSURE
         if place == CROSSES:
-            return crossing(series, column, last, side, gap, 0.0, low, high, tolerance)
+            return crossing(own, series, lanes, last, side, gap, 0.0, low, high, tolerance)
         force = KEEPS
         if place != KEEPS:
             force = judge(span, e0, d0, e1, d1, fourth) if e0 >= -slack else UNSURE
         if force == CROSSES and p0 < 0.0 and p1 < 0.0 and trend(span, p0, q0, p1, q1, place_fourth) != 0:
-            return crossing(series, column, last, side, gap, lag, low, high, tolerance)
+            return crossing(own, series, lanes, last, side, gap, lag, low, high, tolerance)
         if force != KEEPS:
             if length > tolerance:
                 length *= 0.5

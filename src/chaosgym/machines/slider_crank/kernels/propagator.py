@@ -1,4 +1,4 @@
-r"""Exact propagation of a mechanism with held matrices while its contacts stay as they are.
+r"""Tables of the exact motion of a mechanism with held matrices while its contacts stay as they are.
 
 Over one bin of crank angle, and for one set of closed contacts, the n coordinates obey
 
@@ -6,370 +6,294 @@ Over one bin of crank angle, and for one set of closed contacts, the n coordinat
 
 with constant A_p, A_v, F_k (a cubic: the inertia forces of the nominal motion) and one column B_j for each contact
 channel j, closed on side s_j = +-1 with clearance c_j. With z = (p, p', 1, x, x^2, x^3, s_1 c_1, ...) this is
-p'' = A z, and the Taylor series of p follows from A alone. Summed to round-off at any time it gives the state there,
-with no other error.
+p'' = A z, and the Taylor series of p follows from A alone.
 
-Steps are halves of halves of a bin. The propagator of the shortest, a tick, is the series for all columns of z at
-once; squared again and again it is that of longer steps, of which every second is kept: a ladder of ``RUNGS`` steps,
-each four times as long as the next.
-
-The file is long because the tables, their layout in memory and the bounds of what they leave out go together.
+A bin is cut into looks of eight intervals. The propagator of an interval is the series for all columns of z at once,
+summed to round-off; squared three times it is that of a look. Matrices here are stored by rows of z's length, padded to
+a multiple of 8, in one array of work space.
 """
 
 import math
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
-from chaosgym.core.kernel import leaf, part
-from chaosgym.core.lanes import GROUP, add_columns, next_term, padded
-
-FORCING_TERMS = 4
-"""Coefficients of the forcing polynomial: a cubic."""
-
-RUNGS = 3
-"""Lengths of step for which there are propagators."""
-
-TICKS = 4 ** (RUNGS - 1)
-"""Ticks in the longest step."""
-
-SERIES_PHASE = np.array(
-    [0.0] * 3 + [math.exp((math.lgamma(order) + math.log(1e-17)) / (order - 1)) for order in range(3, 65)]
-)
-"""Largest w t, by order, at which the Taylor series of a motion with angular frequency w over a time t is summed to
-round-off, and so are those of its velocity and acceleration: (w t)^k / k! < 1e-17 for k = order - 1."""
-
-SHARES = np.array([1.0 / ((k + 1) * (k + 2)) for k in range(len(SERIES_PHASE))])
-"""Factorial of k over that of k + 2."""
+from chaosgym.core.kernel import leaf
+from chaosgym.core.lanes import LANES, add_columns, aligned, next_term, padded
+from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, SHARES
 
 BOUND_TERMS = 16
-"""Terms of the series that bounds a propagator over an eighth of the longest step."""
+"""Terms of the series that bounds a propagator over half an interval."""
 
 
-def series_order(phase: float) -> int:
-    """Order that sums the Taylor series of a motion over an angle ``phase`` [rad] to round-off."""
-    return min(int(np.searchsorted(SERIES_PHASE, phase)), len(SERIES_PHASE) - 1)
+@register_jitable
+def table_places(n: int, m: int) -> tuple[int, ...]:
+    """Where the tables of a bin and a contact set begin in their row, and its length.
 
-
-@leaf
-def order_for(phase, most):
-    """``series_order`` of a phase in a kernel, at most ``most``."""
-    order = 4
-    while order < most and SERIES_PHASE[order] < phase:
-        order += 1
-    return order
-
-
-@part
-def combine(table, count, factors, answer):
-    """Write the sum over c < ``count`` of ``factors[c] * table[c]`` into the first ``table.shape[1]`` of ``answer``."""
-    add_columns(table, 0, table.shape[1], count, factors, 0, answer, 0)
-
-
-@leaf
-def expand(a, n, z, duration, last, factors, series):
-    """Taylor coefficients about the instant of z, in seconds, up to the order ``last``.
-
-    ``series[k]`` holds p^(k) / k! of the n coordinates, then that of the channels' displacements, whose first two rows
-    the caller writes. ``a`` (columns, lanes) is the acceleration of one bin and contact set; ``factors`` (columns,) is
-    work space.
+    ahead (columns, m, 2, 8)
+        Reading and slope of every channel after 1 to 8 intervals per unit z: y + lag y' where it is closed, else y.
+    look, interval (columns, 2n or more)
+        p and p' after a look, and after an interval.
+    acceleration (columns, n + m or more)
+        p'' and the second derivatives of the channels' displacements.
+    now (m, 2, columns or more)
+        Reading and slope of every channel.
+    bound (m, columns or more)
+        Largest fourth derivative of each reading over a look per unit of |z|, places from the anchor.
     """
-    for i in range(n):
-        series[0, i] = z[i]
-        series[1, i] = z[n + i]
-    forcing, row = a[2 * n :], series.shape[1]
-    scale = 1.0
-    for k in range(last - 1):
-        new = series[k + 2]
-        if k < FORCING_TERMS:
-            # coefficient of t^k of sum_j F_j (x + t / duration)^j
-            for c in range(FORCING_TERMS, forcing.shape[0]):
-                factors[c] = z[2 * n + c]
-            binomial = scale
-            for j in range(k, FORCING_TERMS):
-                factors[j] = binomial * z[2 * n + j - k]
-                binomial *= (j + 1.0) / (j + 1 - k)
-            if k == 0:
-                combine(forcing, forcing.shape[0], factors, new)
-            else:
-                combine(forcing[k:], FORCING_TERMS - k, factors[k:], new)
-            scale /= duration
-        else:
-            for i in range(new.shape[0]):
-                new[i] = 0.0
-        next_term(a, 0, a.shape[1], n, series, k * row, (k + 1) * row, k + 1.0, SHARES[k], (k + 2) * row)
+    columns = 2 * n + FORCING_TERMS + m
+    look = columns * 2 * LANES * m
+    interval = look + columns * padded(2 * n)
+    acceleration = interval + columns * padded(2 * n)
+    now = acceleration + columns * padded(n + m)
+    bound = now + 2 * m * padded(columns)
+    return 0, look, interval, acceleration, now, bound, bound + m * padded(columns)
 
 
 @leaf
-def evaluate(series, last, time, powers, values):
-    """Write value and first two derivatives at ``time`` of all columns of a series into ``values`` (3, lanes)."""
-    power = 1.0
-    for k in range(last + 1):
-        powers[0, k] = power
-        powers[1, k] = (k + 1.0) * power
-        powers[2, k] = (k + 2.0) * (k + 1.0) * power
-        power *= time
-    combine(series, last + 1, powers[0], values[0])
-    combine(series[1:], last, powers[1], values[1])
-    combine(series[2:], last - 1, powers[2], values[2])
+def _short_propagator(work, held, n, columns, duration, time, order, terms, answer):
+    """Write the propagator (2n, width) over a time for which ``order`` terms of the series suffice.
 
-
-@leaf
-def put_time(z, n, x):
-    """Write the forcing columns of z for time x as a share of the bin."""
-    z[2 * n] = 1.0
-    for k in range(1, FORCING_TERMS):
-        z[2 * n + k] = z[2 * n + k - 1] * x
-
-
-@leaf
-def _next_term(a, n, older, old, by_place, by_velocity, new):
-    """Write by_place A_p older + by_velocity A_v old, two rows at a time: sums are then stored half as often."""
-    width = new.shape[1]
-    for i in range(n):
-        x0, v0 = by_place * a[0, i], by_velocity * a[n, i]
-        if n % 2 == 1:
-            for c in range(width):
-                new[i, c] = x0 * older[0, c] + v0 * old[0, c]
-        else:
-            x1, v1 = by_place * a[1, i], by_velocity * a[n + 1, i]
-            for c in range(width):
-                new[i, c] = (x0 * older[0, c] + v0 * old[0, c]) + (x1 * older[1, c] + v1 * old[1, c])
-        for j in range(2 - n % 2, n, 2):
-            x0, v0 = by_place * a[j, i], by_velocity * a[n + j, i]
-            x1, v1 = by_place * a[j + 1, i], by_velocity * a[n + j + 1, i]
-            for c in range(width):
-                new[i, c] += (x0 * older[j, c] + v0 * old[j, c]) + (x1 * older[j + 1, c] + v1 * old[j + 1, c])
-
-
-@leaf
-def _short_propagator(a, n, size, duration, time, order, terms, table):
-    """Propagator (2n, width), by rows, over a time for which ``order`` terms of the series suffice.
-
-    ``terms`` (3, n, width) is work space for three successive terms; ``size`` is 2n + 4 + channels.
+    ``held`` (n, width) is the acceleration; ``terms`` (order + 1, n, width) is work space.
     """
-    width = table.shape[1]
+    width = padded(columns)
+    size = n * width
+    for i in range(size):
+        work[terms + i], work[terms + size + i] = 0.0, 0.0
     for i in range(n):
-        for c in range(width):
-            terms[0, i, c] = 1.0 if c == i else 0.0
-            terms[1, i, c] = time if c == n + i else 0.0
-            table[i, c] = terms[0, i, c] + terms[1, i, c]
-            table[n + i, c] = terms[1, i, c] / time
+        work[terms + i * width + i], work[terms + size + i * width + n + i] = 1.0, time
     scale = 1.0
     for k in range(order - 1):
-        new = terms[(k + 2) % 3]
-        by_place = time * time / ((k + 1) * (k + 2))
-        _next_term(a, n, terms[k % 3], terms[(k + 1) % 3], by_place, time / (k + 2), new)
-        if k < FORCING_TERMS:
-            for i in range(n):
-                binomial = by_place * scale
-                for j in range(k, FORCING_TERMS):
-                    new[i, 2 * n + j - k] += binomial * a[2 * n + j, i]
-                    binomial *= (j + 1.0) / (j + 1 - k)
-                if k == 0:
-                    for c in range(2 * n + FORCING_TERMS, size):
-                        new[i, c] += by_place * a[c, i]
-        slope = (k + 2) / time
+        older, old, new = terms + k * size, terms + (k + 1) * size, terms + (k + 2) * size
+        share = time * time * SHARES[k]
         for i in range(n):
+            row, own = new + i * width, held + i * width
             for c in range(width):
-                table[i, c] += new[i, c]
-                table[n + i, c] += slope * new[i, c]
+                work[row + c] = 0.0
+            if k < FORCING_TERMS:
+                binomial = scale
+                for j in range(k, FORCING_TERMS):
+                    work[row + 2 * n + j - k] = binomial * work[own + 2 * n + j]
+                    binomial *= (j + 1.0) / (j + 1 - k)
+            if k == 0:
+                for c in range(2 * n + FORCING_TERMS, columns):
+                    work[row + c] = work[own + c]
+            next_term(work, older, old, width, n, work, own, own + n, (k + 1.0) / time, share, work, row)
         scale *= time / duration
+    for i in range(size):
+        work[answer + i], work[answer + size + i] = work[terms + i], 0.0
+    for k in range(1, order + 1):
+        slope = k / time
+        for i in range(size):
+            work[answer + i] += work[terms + k * size + i]
+            work[answer + size + i] += slope * work[terms + k * size + i]
 
 
 @leaf
-def _shift(row, states, size, share, answer):
-    """Add to ``answer`` what a row over z one step earlier gives for the columns that go on without a propagator.
+def _through(work, propagator, n, columns, share, row, answer):
+    """Write a row over z one step earlier: row P.
 
-    The powers of x become those of x + share; the clearances stay.
+    The powers of x become those of x + ``share``, the step over the duration of the bin; the clearances stay.
     """
+    width, states = padded(columns), 2 * n
+    add_columns(work, propagator, width, states, work, row, work, answer, LANES)
     for k in range(FORCING_TERMS):
-        binomial = row[states + k]
+        binomial = work[row + states + k]
         for c in range(k, -1, -1):
-            answer[states + c] += binomial
+            work[answer + states + c] += binomial
             binomial *= share * c / (k - c + 1)
-    for c in range(states + FORCING_TERMS, size):
-        answer[c] += row[c]
+    for c in range(states + FORCING_TERMS, columns):
+        work[answer + c] += work[row + c]
 
 
 @leaf
-def _square(table, share, size, twice):
-    """Write the propagator of twice the time; ``share`` is the time over the duration of the bin."""
-    states = table.shape[0]
-    for i in range(states):
-        combine(table, states, table[i], twice[i])
-        _shift(table[i], states, size, share, twice[i])
-
-
-@leaf
-def _add(factor, row, size, answer):
-    """Add ``factor`` times a row to another."""
-    for c in range(size):
-        answer[c] += factor * row[c]
-
-
-@leaf
-def _store(table, held, n, m, size, lag, row, share, rows, answer):
-    """Write a propagator by columns, and below the states what the channels read: see ``SliderCrankModel``.
-
-    ``held`` (n, size) is the acceleration by rows, ``rows`` (4, size) work space.
-    """
-    for c in range(size):
-        for i in range(2 * n):
-            answer[c, i] = table[i, c]
-    for j in range(m):
-        reading, slope, bend, here = rows[0], rows[1], rows[2], rows[3]
-        for c in range(size):
-            reading[c], slope[c] = 0.0, 0.0
-        for i in range(n):
-            if row[j, i] != 0.0:
-                _add(row[j, i], table[i], size, reading)
-                _add(row[j, i], table[n + i], size, slope)
-        if lag[j] != 0.0:
-            _add(lag[j], slope, size, reading)
-            for c in range(size):
-                here[c] = 0.0
-            for i in range(n):
-                if row[j, i] != 0.0:
-                    _add(row[j, i], held[i], size, here)
-            _through(here, table, size, share, bend)
-            _add(lag[j], bend, size, slope)
-        for c in range(size):
-            answer[c, 2 * n + 2 * j] = reading[c]
-            answer[c, 2 * n + 2 * j + 1] = slope[c]
-
-
-@leaf
-def _derivative(held, n, size, duration, row, answer):
-    """Write the time derivative of a row over z: row B, with z' = B z; ``held`` (n, size) is the acceleration."""
-    for c in range(size):
-        answer[c] = 0.0
+def _derivative(work, held, n, columns, duration, row, answer):
+    """Write the time derivative of a row over z: row B, with z' = B z; ``held`` (n, width) is the acceleration."""
+    add_columns(work, held, padded(columns), n, work, row + n, work, answer, LANES)
     for i in range(n):
-        _add(row[n + i], held[i], size, answer)
-    for i in range(n):
-        answer[n + i] += row[i]
+        work[answer + n + i] += work[row + i]
     for k in range(1, FORCING_TERMS):
-        answer[2 * n + k - 1] += row[2 * n + k] * k / duration
+        work[answer + 2 * n + k - 1] += work[row + 2 * n + k] * k / duration
 
 
 @leaf
-def _through(row, table, size, share, answer):
-    """Write a row over z one step earlier: row P."""
-    states = table.shape[0]
-    for c in range(size):
-        answer[c] = 0.0
-    for i in range(states):
-        _add(row[i], table[i], size, answer)
-    _shift(row, states, size, share, answer)
+def _from_anchor(work, anchor, n, row):
+    """Let the columns of the clearances of a row count places from the anchor (n, m)."""
+    for j in range(anchor.shape[1]):
+        for i in range(n):
+            work[row + 2 * n + FORCING_TERMS + j] += work[row + i] * anchor[i, j]
 
 
 @leaf
-def _bound(held, n, m, size, duration, lag, row, anchor, quarter, step, rows, answer):
-    """Bounds (m, columns) of the fourth derivative of what the channels read, over the longest step, per unit |z|.
+def _keep_largest(work, anchor, n, columns, row, spare, largest):
+    """Raise ``largest`` to the absolute values of a row, places from the anchor."""
+    for c in range(columns):
+        work[spare + c] = work[row + c]
+    _from_anchor(work, anchor, n, spare)
+    for c in range(columns):
+        work[largest + c] = max(work[largest + c], abs(work[spare + c]))
 
-    With z' = B z and the row e of a reading, the derivative is e B^4 exp(B t) z. Its row is computed at the ends of
-    the four quarters of the step, and between them differs from the nearer of them by exp(B t), |t| up to an eighth,
-    whose elements those of exp(|B| t) bound. Closed channels pull the state to where they just touch: places count
-    from ``anchor`` (n, m), per unit of clearance, so that what cancels does not count.
 
-    ``held`` (n, size) and ``quarter`` (2n, size or more), the acceleration and the propagator of a quarter, are
-    overwritten.
+@leaf
+def _spread_bound(work, sizes, n, columns, duration, time, rows, bound):
+    """Multiply a bound (columns,) at an instant by exp(|B| time), which makes it one for all times up to there."""
+    width = padded(columns)
+    term, derived = rows, rows + width
+    for c in range(columns):
+        work[term + c] = work[bound + c]
+    for k in range(1, BOUND_TERMS):
+        _derivative(work, sizes, n, columns, duration, term, derived)
+        for c in range(columns):
+            work[derived + c] *= time / k
+            work[bound + c] += work[derived + c]
+        term, derived = derived, term
+    # the terms left out shrink at least by half each
+    for c in range(columns):
+        work[bound + c] += work[term + c]
+
+
+@leaf
+def _put_channels(work, held, propagator, row, lag, anchor, n, columns, duration, interval, rows, table, at):
+    """Fill ``ahead``, ``now`` and ``bound`` of a row of tables: what the channels read in a look.
+
+    With z' = B z and the row e of a reading, its fourth derivative is e B^4 exp(B t) z. The row of that is computed
+    at the ends of all intervals, and between them differs from the nearer of them by exp(B t), |t| up to half an
+    interval, whose elements those of exp(|B| |t|) bound. Closed channels pull the state to where they just touch:
+    places count from the anchor, so that what cancels does not count.
+
+    ``propagator`` is that of an interval; ``rows`` (8, width) is work space. Overwrites ``held`` (n, width).
     """
-    share = 0.25 * step / duration
+    m = row.shape[0]
+    width, share = padded(columns), interval / duration
+    ahead, now, bound = table_places(n, m)[0] + at, table_places(n, m)[4] + at, table_places(n, m)[5] + at
+    spare, largest = rows + 6 * width, rows + 7 * width
+    for i in range(8 * width):
+        work[rows + i] = 0.0
     for j in range(m):
-        c = 2 * n + FORCING_TERMS + j
+        # reading, slope and fourth derivative, and the same one interval later
+        first, then = rows, rows + 3 * width
+        for c in range(6 * width):
+            work[rows + c] = 0.0
         for i in range(n):
-            for k in range(n):
-                if anchor[k, j] != 0.0:
-                    held[i, c] += held[i, k] * anchor[k, j]
-                    quarter[i, c] += quarter[i, k] * anchor[k, j]
-                    quarter[n + i, c] += quarter[n + i, k] * anchor[k, j]
-            quarter[i, c] -= anchor[i, j]
-    for j in range(m):
-        now, then, largest = rows[0], rows[1], rows[2]
-        for c in range(size):
-            now[c] = 0.0
-        for i in range(n):
-            now[i], now[n + i] = row[j, i], lag[j] * row[j, i]
-        for _ in range(4):
-            _derivative(held, n, size, duration, now, then)
-            now, then = then, now
-        for c in range(size):
-            largest[c] = abs(now[c])
-        for _ in range(4):
-            _through(now, quarter, size, share, then)
-            now, then = then, now
-            for c in range(size):
-                largest[c] = max(largest[c], abs(now[c]))
-        for c in range(size):
-            answer[j, c] = largest[c]
+            work[first + i], work[first + n + i] = row[j, i], lag[j] * row[j, i]
+        _derivative(work, held, n, columns, duration, first, first + width)
+        _derivative(work, held, n, columns, duration, first + width, then)
+        _derivative(work, held, n, columns, duration, then, then + width)
+        _derivative(work, held, n, columns, duration, then + width, first + 2 * width)
+        for c in range(columns):
+            table[now + 2 * j * width + c] = work[first + c]
+            table[now + (2 * j + 1) * width + c] = work[first + width + c]
+            work[largest + c] = 0.0
+        _keep_largest(work, anchor, n, columns, first + 2 * width, spare, largest)
+        for k in range(LANES):
+            for q in range(3):
+                _through(work, propagator, n, columns, share, first + q * width, then + q * width)
+            first, then = then, first
+            for c in range(columns):
+                place = ahead + (c * m + j) * 2 * LANES + k
+                table[place], table[place + LANES] = work[first + c], work[first + width + c]
+            _keep_largest(work, anchor, n, columns, first + 2 * width, spare, largest)
+        for c in range(columns):
+            table[bound + j * width + c] = work[largest + c]
     for i in range(n):
-        for c in range(size):
-            held[i, c] = abs(held[i, c])
+        _from_anchor(work, anchor, n, held + i * width)
+        for c in range(columns):
+            work[held + i * width + c] = abs(work[held + i * width + c])
     for j in range(m):
-        now, then = rows[0], rows[1]
-        for c in range(size):
-            now[c] = answer[j, c]
-        for k in range(1, BOUND_TERMS):
-            _derivative(held, n, size, duration, now, then)
-            for c in range(size):
-                then[c] *= 0.125 * step / k
-                answer[j, c] += then[c]
-            now, then = then, now
-        # the terms left out shrink at least by half each
-        for c in range(size):
-            answer[j, c] += now[c]
+        for c in range(columns):
+            work[largest + c] = table[bound + j * width + c]
+        _spread_bound(work, held, n, columns, duration, 0.5 * interval, rows, largest)
+        for c in range(columns):
+            table[bound + j * width + c] = work[largest + c]
+
+
+@leaf
+def _put_states(work, propagator, n, columns, table, at):
+    """Store a propagator by columns."""
+    states, width = padded(2 * n), padded(columns)
+    for c in range(columns):
+        for i in range(2 * n):
+            table[at + c * states + i] = work[propagator + i * width + c]
+
+
+@leaf
+def _put_acceleration(free, forcing, push, rate, row, s, b, work, held, table, at):
+    """Sum the acceleration of a bin and contact set at a crank rate: by rows in ``held``, by columns in the table."""
+    m, n = row.shape
+    columns, lanes = 2 * n + FORCING_TERMS + m, padded(n + m)
+    width = padded(columns)
+    for i in range(n):
+        for c in range(2 * n):
+            total = free[0, b, c, i] + rate * free[1, b, c, i] + rate * rate * free[2, b, c, i]
+            work[held + i * width + c] = total + push[s, b, c, i]
+        for k in range(FORCING_TERMS):
+            work[held + i * width + 2 * n + k] = forcing[0, b, k, i] + rate * rate * forcing[1, b, k, i]
+        for j in range(m):
+            work[held + i * width + 2 * n + FORCING_TERMS + j] = push[s, b, 2 * n + j, i]
+    for c in range(columns):
+        for i in range(n):
+            table[at + c * lanes + i] = work[held + i * width + c]
+        for j in range(m):
+            total = 0.0
+            for i in range(n):
+                total += row[j, i] * work[held + i * width + c]
+            table[at + c * lanes + n + j] = total
 
 
 @njit(cache=True, nogil=True)
-def tables(acceleration, row, lag, anchor, duration, step, order):
-    """Propagators and bounds for every contact set and bin.
+def tables(free, forcing, push, rate, row, lag, anchor, duration, steps, order):
+    """Tables of every contact set and bin.
 
     Parameters
     ----------
-    acceleration : (sets, bins, columns, lanes)
-        See ``SliderCrankModel``.
+    free : (3, bins, 2n, n)
+        Accelerations per unit p and p' without contact, by powers of the crank rate.
+    forcing : (2, bins, 4, n)
+        Accelerations per unit 1, x, x^2, x^3, and per squared crank rate.
+    push : (sets, bins, 2n + m, n)
+        What closed contacts add per unit p, p' and clearance.
+    rate
+        Of the crank [rad/s].
     row : (m, n)
         Displacement of each channel per unit coordinate.
     lag : (sets, m)
         Damping over stiffness [s] of the channels that are closed, 0 for the others.
     anchor : (sets, n, m)
         Places per unit of clearance at which the closed channels just touch.
-    duration, step
-        Of a bin, and of the longest step [s].
+    duration
+        Of a bin [s].
+    steps
+        Looks in a bin.
     order
-        Of the series over a tick.
+        Of the series over an interval.
 
     Returns
     -------
-    (propagator, bound) : (sets, bins, RUNGS, columns, 2n + 2m or more) and (sets, bins, m, columns)
+    (sets * bins * length of ``table_places``,)
     """
-    sets, bins, columns, _ = acceleration.shape
+    sets, bins = push.shape[:2]
     m, n = row.shape
-    size = 2 * n + FORCING_TERMS + m
-    propagator = np.zeros((sets, bins, RUNGS, columns, padded(2 * (n + m), GROUP)))
-    bound = np.zeros((sets, bins, m, columns))
-    width = size + (-size) % 8
-    terms, table, twice = np.empty((3, n, width)), np.empty((2 * n, width)), np.empty((2 * n, width))
-    held, spare, rows = np.empty((n, size)), np.empty((2 * n, width)), np.empty((4, size))
+    columns = 2 * n + FORCING_TERMS + m
+    width, interval = padded(columns), duration / (LANES * steps)
+    _, look, step, acceleration, _, _, length = table_places(n, m)
+    table = aligned(sets * bins * length)
+    held, rows = 0, n * width
+    one, twice, terms = rows + 8 * width, rows + (8 + 2 * n) * width, rows + (8 + 4 * n) * width
+    work = aligned(terms + (order + 1) * n * width)
     for s in range(sets):
         for b in range(bins):
-            a = acceleration[s, b]
-            for i in range(n):
-                for c in range(size):
-                    held[i, c] = a[c, i]
-            time = step / TICKS
-            _short_propagator(a, n, size, duration, time, order, terms, table)
-            for rung in range(RUNGS - 1, -1, -1):
-                _store(table, held, n, m, size, lag[s], row, time / duration, rows, propagator[s, b, rung])
-                if rung == 1:
-                    for i in range(2 * n):
-                        for c in range(size):
-                            spare[i, c] = table[i, c]
-                if rung > 0:
-                    for _ in range(2):
-                        _square(table, time / duration, size, twice)
-                        table, twice = twice, table
-                        time *= 2.0
-            _bound(held, n, m, size, duration, lag[s], row, anchor[s], spare, step, rows, bound[s, b])
-    return propagator, bound
+            at = (s * bins + b) * length
+            _put_acceleration(free, forcing, push, rate, row, s, b, work, held, table, at + acceleration)
+            _short_propagator(work, held, n, columns, duration, interval, order, terms, one)
+            _put_states(work, one, n, columns, table, at + step)
+            _put_channels(
+                work, held, one, row, lag[s], anchor[s], n, columns, duration, interval, rows, table, at
+            )
+            before, after, share = one, twice, interval / duration
+            for _ in range(3):
+                for i in range(2 * n):
+                    _through(work, before, n, columns, share, before + i * width, after + i * width)
+                before, after, share = after, before, 2.0 * share
+            _put_states(work, before, n, columns, table, at + look)
+    return table

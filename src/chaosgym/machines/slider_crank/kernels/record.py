@@ -1,7 +1,7 @@
 """Records of the joints of a slider crank.
 
 The resultant of the monitored joint is a tuple (upward part, size, rate of the size, along, sideways). Channels are
-rows of ``crank_contact.surfaces``.
+rows of ``contact.surfaces``.
 """
 
 import math
@@ -9,7 +9,7 @@ import math
 from chaosgym.core.cubic import cubic, cubic_extremum
 from chaosgym.core.cycle import LOWER, UPPER
 from chaosgym.core.kernel import leaf
-from chaosgym.machines.slider_crank.kernels.contact import ALONG, GAP, REACH, SIDEWAYS, STIFFNESS, UP
+from chaosgym.machines.slider_crank.kernels.contact import GAP, REACH, STIFFNESS, UP
 
 
 @leaf
@@ -62,10 +62,10 @@ def write_peaks(peak, arrays, cycle):
 
 
 @leaf
-def channel_force(surface, s, reading, j):
-    """Force of channel j, closed on side s, and its rate, from what it reads (2, m)."""
+def channel_force(surface, s, j, value, slope):
+    """Force of channel j, closed on side s, and its rate, from what it reads."""
     stiffness = surface[j, STIFFNESS]
-    return stiffness * (s * reading[0, j] - surface[j, GAP]), stiffness * s * reading[1, j]
+    return stiffness * (s * value - surface[j, GAP]), stiffness * s * slope
 
 
 @leaf
@@ -86,23 +86,6 @@ def crest_instant(h, start, end):
     if crest <= 0.0:
         return -1.0, 0.0
     return crest, cubic(start[1], start[2], end[1], end[2], h, crest)[0]
-
-
-@leaf
-def joint_force(surface, side, reading):
-    """``resultant`` of the monitored joint."""
-    fx, fy, fz, rx, ry, rz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(side.shape[0]):
-        if side[j] != 0.0:
-            force = surface[j, STIFFNESS] * (reading[0, j] - side[j] * surface[j, GAP])
-            rate = surface[j, STIFFNESS] * reading[1, j]
-            fx += surface[j, ALONG] * force
-            fy += surface[j, UP] * force
-            fz += surface[j, SIDEWAYS] * force
-            rx += surface[j, ALONG] * rate
-            ry += surface[j, UP] * rate
-            rz += surface[j, SIDEWAYS] * rate
-    return resultant(fx, fy, fz, rx, ry, rz)
 
 
 @leaf

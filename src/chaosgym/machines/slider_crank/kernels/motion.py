@@ -1,0 +1,221 @@
+"""Where the motion of a slider crank is, what its channels read, and how tables and series take it on."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from chaosgym.core.kernel import leaf, part
+from chaosgym.core.lanes import LANES, add_columns, aligned, dot, dot_of_sizes, padded, taylor
+from chaosgym.machines.slider_crank.kernels.contact import GAP, LAG
+from chaosgym.machines.slider_crank.kernels.propagator import table_places
+from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, expand, put_time
+
+READINGS = 4 * LANES
+"""Numbers kept of a channel: eight readings that serve as work space and for now, eight ahead, and as many slopes."""
+
+SLOPES = 2 * LANES
+"""How far the slope of a channel lies behind its reading."""
+
+SPARE, NOW = 0, LANES - 1
+"""Which of a channel's readings are those of any state, and of now; those after k intervals are ``NOW`` + k."""
+
+
+class Motion(NamedTuple):
+    """Rows of ``table_places``, state and work space of ``places``, and how many coordinates and channels there are.
+
+    It is handed on by value: the fewer its fields the faster.
+    """
+
+    table: np.ndarray
+    own: np.ndarray
+    n: int
+    m: int
+
+
+class Places(NamedTuple):
+    """Where what belongs to n coordinates and m channels begins, and how long it is.
+
+    Attributes
+    ----------
+    columns, width, states, lanes : int
+        Numbers of z, the same padded, 2n padded, n + m padded.
+    z, rest, away : int
+        The augmented state (width,) of ``propagator``; the part of its places that the anchors of closed channels
+        make up; and the difference.
+    sampled : int
+        Another state (width,).
+    moved : int
+        State (states,) after a step.
+    readings : int
+        ``READINGS`` numbers of each channel.
+    totals : int
+        Of ``add_tops``.
+    lags, fourth : int
+        Damping over stiffness of the closed channels (m,), 0 for the others; bounds (m,) of the readings' fourth
+        derivatives.
+    factors, derived, series : int
+        Of ``expand`` and ``taylor``: (4 + m,), (4, lanes), (order + 1, lanes).
+    """
+
+    columns: int
+    width: int
+    states: int
+    lanes: int
+    z: int
+    rest: int
+    away: int
+    sampled: int
+    moved: int
+    readings: int
+    totals: int
+    lags: int
+    fourth: int
+    factors: int
+    derived: int
+    series: int
+
+
+@part
+def places(n, m):
+    """Places for n coordinates and m channels."""
+    columns = 2 * n + FORCING_TERMS + m
+    width, states, lanes, channels = padded(columns), padded(2 * n), padded(n + m), padded(m)
+    readings = 4 * width + states
+    totals = readings + READINGS * m
+    lags = totals + LANES
+    fourth = lags + channels
+    factors = fourth + channels
+    derived = factors + padded(FORCING_TERMS + m)
+    series = derived + 4 * lanes
+    return Places(
+        columns,
+        width,
+        states,
+        lanes,
+        0,
+        width,
+        2 * width,
+        3 * width,
+        4 * width,
+        readings,
+        totals,
+        lags,
+        fourth,
+        factors,
+        derived,
+        series,
+    )
+
+
+@njit(cache=True)
+def motion_of(model):
+    """Space for a motion."""
+    m, n = model.row.shape
+    here = places(n, m)
+    return Motion(model.table, aligned(here.series + (model.order + 1) * here.lanes), n, m)
+
+
+@leaf
+def put_sides(motion, surface, side, anchor):
+    """Write what depends on a contact set with an ``anchor`` (n, m): lags, clearances of z, ``rest`` of the places."""
+    own, here = motion.own, places(motion.n, motion.m)
+    clearances = here.z + 2 * motion.n + FORCING_TERMS
+    for j in range(motion.m):
+        own[clearances + j] = side[j] * surface[j, GAP]
+        own[here.lags + j] = surface[j, LAG] if side[j] != 0.0 else 0.0
+    for i in range(motion.n):
+        own[here.rest + i] = 0.0
+        for j in range(motion.m):
+            own[here.rest + i] += anchor[i, j] * own[clearances + j]
+
+
+@part
+def read_now(motion, at):
+    """Write what every channel reads in z; the row of tables of its bin and contact set begins at ``at``."""
+    own, here = motion.own, places(motion.n, motion.m)
+    rows = at + table_places(motion.n, motion.m)[4]
+    for j in range(motion.m):
+        place, row = here.readings + j * READINGS + NOW, rows + 2 * j * here.width
+        own[place] = dot(motion.table, row, own, here.z, here.width)
+        own[place + SLOPES] = dot(motion.table, row + here.width, own, here.z, here.width)
+
+
+@part
+def look_ahead(motion, at):
+    """Write what every channel reads after 1 to 8 intervals."""
+    own, here, width = motion.own, places(motion.n, motion.m), 2 * LANES * motion.m
+    add_columns(motion.table, at, width, here.columns, own, here.z, own, here.readings + NOW + 1, 2 * LANES)
+
+
+@part
+def bound_fourth(motion, at):
+    """Write bounds of the readings' fourth derivatives over a look from z on."""
+    own, here = motion.own, places(motion.n, motion.m)
+    rows = at + table_places(motion.n, motion.m)[5]
+    for c in range(here.width):
+        own[here.away + c] = own[here.z + c] - own[here.rest + c]
+    for j in range(motion.m):
+        own[here.fourth + j] = dot_of_sizes(motion.table, rows + j * here.width, own, here.away, here.width)
+
+
+@part
+def read_after(motion, intervals):
+    """Take over what the channels read after some intervals of a look as what they read now."""
+    own, first = motion.own, places(motion.n, motion.m).readings + NOW
+    for j in range(motion.m):
+        place = first + j * READINGS
+        own[place], own[place + SLOPES] = own[place + intervals], own[place + SLOPES + intervals]
+
+
+@part
+def step(motion, propagator, z, x):
+    """Move a state by a step whose propagator begins at a place in the table; ``x`` is the share of the bin then."""
+    own, n, here = motion.own, motion.n, places(motion.n, motion.m)
+    add_columns(motion.table, propagator, here.states, here.columns, own, z, own, here.moved, LANES)
+    for i in range(2 * n):
+        own[z + i] = own[here.moved + i]
+    put_time(own, z + 2 * n, x)
+
+
+@part
+def move(motion, at, z, intervals, x, share):
+    """Move a state at share ``x`` of the bin by 1 to 8 intervals, each of which is ``share`` of it."""
+    tables = table_places(motion.n, motion.m)
+    steps, propagator, length = (1, at + tables[1], LANES) if intervals == LANES else (intervals, at + tables[2], 1)
+    for k in range(steps):
+        step(motion, propagator, z, x + (k + 1) * length * share)
+
+
+@leaf
+def expand_from(motion, at, row, z, duration, last):
+    """Expand coordinates and channels (``row``) about a state of a bin of some duration."""
+    own, n, m, here = motion.own, motion.n, motion.m, places(motion.n, motion.m)
+    for j in range(m):
+        y, v = 0.0, 0.0
+        for i in range(n):
+            y += row[j, i] * own[z + i]
+            v += row[j, i] * own[z + n + i]
+        own[here.series + n + j], own[here.series + here.lanes + n + j] = y, v
+    a = at + table_places(n, m)[3]
+    expand(motion.table, a, own, z, n, m, here.lanes, duration, last, here.factors, here.series)
+
+
+@leaf
+def evaluate(motion, last, time, which):
+    """Evaluate the series at a time, and write what every channel reads there as one of its readings."""
+    own, here = motion.own, places(motion.n, motion.m)
+    taylor(own, here.series, here.lanes, last, time, here.derived)
+    for j in range(motion.m):
+        value, place = here.derived + motion.n + j, here.readings + j * READINGS + which
+        lag = own[here.lags + j]
+        own[place] = own[value] + lag * own[value + here.lanes]
+        own[place + SLOPES] = own[value + here.lanes] + lag * own[value + 2 * here.lanes]
+
+
+@part
+def put_evaluated(motion, z):
+    """Take over the coordinates of ``evaluate`` into a state."""
+    own, n, here = motion.own, motion.n, places(motion.n, motion.m)
+    for i in range(n):
+        own[z + i], own[z + n + i] = own[here.derived + i], own[here.derived + here.lanes + i]

@@ -1,0 +1,77 @@
+"""Taylor series of the motion of a mechanism with held matrices, whose equations are those of ``propagator``."""
+
+import math
+
+import numpy as np
+
+from chaosgym.core.kernel import leaf
+from chaosgym.core.lanes import LANES, add_columns, next_term
+
+FORCING_TERMS = 4
+"""Coefficients of the forcing polynomial: a cubic."""
+
+SERIES_PHASE = np.array(
+    [0.0] * 3 + [math.exp((math.lgamma(order) + math.log(1e-17)) / (order - 1)) for order in range(3, 65)]
+)
+"""Largest w t, by order, at which the Taylor series of a motion with angular frequency w over a time t is summed to
+round-off, and so are those of its velocity and acceleration: (w t)^k / k! < 1e-17 for k = order - 1."""
+
+SHARES = np.array([1.0 / ((k + 1) * (k + 2)) for k in range(len(SERIES_PHASE))])
+"""Factorial of k over that of k + 2."""
+
+
+def series_order(phase: float) -> int:
+    """Order that sums the Taylor series of a motion over an angle ``phase`` [rad] to round-off."""
+    return min(int(np.searchsorted(SERIES_PHASE, phase)), len(SERIES_PHASE) - 1)
+
+
+@leaf
+def order_for(phase, most):
+    """``series_order`` of a phase in a kernel, at most ``most``."""
+    order = 4
+    while order < most and SERIES_PHASE[order] < phase:
+        order += 1
+    return order
+
+
+@leaf
+def expand(table, at, own, z, n, m, lanes, duration, last, factors, series):
+    """Taylor coefficients about the instant of z, in seconds, up to the order ``last``.
+
+    The acceleration (columns, lanes) of the bin and contact set begins at ``at`` in the table, all else in ``own``:
+    from ``series`` on, ``lanes`` numbers an order, p^(k) / k! of the n coordinates and then that of the displacements
+    of the m channels, whose first two orders the caller writes; ``factors`` (4 + m,) is work space.
+    """
+    time, forcing = z + 2 * n, at + 2 * n * lanes
+    for i in range(n):
+        own[series + i], own[series + lanes + i] = own[z + i], own[z + n + i]
+    scale = 1.0
+    for k in range(last - 1):
+        older = series + k * lanes
+        new = older + 2 * lanes
+        if k < FORCING_TERMS:
+            # coefficient of t^k of sum_j F_j (x + t / duration)^j
+            binomial, count = scale, FORCING_TERMS - k
+            for j in range(k, FORCING_TERMS):
+                own[factors + j] = binomial * own[time + j - k]
+                binomial *= (j + 1.0) / (j + 1 - k)
+            if k == 0:
+                for c in range(FORCING_TERMS, FORCING_TERMS + m):
+                    own[factors + c] = own[time + c]
+                count += m
+            add_columns(table, forcing + k * lanes, lanes, count, own, factors + k, own, new, LANES)
+            scale /= duration
+        else:
+            for i in range(lanes):
+                own[new + i] = 0.0
+        next_term(
+            table, at, at + n * lanes, lanes, n, own, older, older + lanes, k + 1.0, SHARES[k], own, new
+        )
+
+
+@leaf
+def put_time(own, at, x):
+    """Write the forcing columns of z, which begin at ``at``, for time x as a share of the bin."""
+    own[at] = 1.0
+    for k in range(1, FORCING_TERMS):
+        own[at + k] = own[at + k - 1] * x
