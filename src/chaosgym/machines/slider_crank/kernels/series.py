@@ -42,31 +42,27 @@ def expand(table, at, own, z, n, m, lanes, duration, last, factors, series):
     from ``series`` on, ``lanes`` numbers an order, p^(k) / k! of the n coordinates and then that of the displacements
     of the m channels, whose first two orders the caller writes; ``factors`` (4 + m,) is work space.
     """
-    time, forcing = z + 2 * n, at + 2 * n * lanes
+    time, forcing, first = z + 2 * n, at + 2 * n * lanes, series + 2 * lanes
     for i in range(n):
         own[series + i], own[series + lanes + i] = own[z + i], own[z + n + i]
+    for i in range(first, series + (last + 1) * lanes):
+        own[i] = 0.0
+    for j in range(m):
+        own[factors + FORCING_TERMS + j] = own[time + FORCING_TERMS + j]
     scale = 1.0
+    for k in range(FORCING_TERMS):
+        # coefficient of t^k of sum_j F_j (x + t / duration)^j
+        binomial, count = scale, FORCING_TERMS - k
+        for j in range(k, FORCING_TERMS):
+            own[factors + j] = binomial * own[time + j - k]
+            binomial *= (j + 1.0) / (j + 1 - k)
+        count += m if k == 0 else 0
+        add_columns(table, forcing + k * lanes, lanes, count, own, factors + k, own, first + k * lanes, LANES)
+        scale /= duration
     for k in range(last - 1):
-        older = series + k * lanes
-        new = older + 2 * lanes
-        if k < FORCING_TERMS:
-            # coefficient of t^k of sum_j F_j (x + t / duration)^j
-            binomial, count = scale, FORCING_TERMS - k
-            for j in range(k, FORCING_TERMS):
-                own[factors + j] = binomial * own[time + j - k]
-                binomial *= (j + 1.0) / (j + 1 - k)
-            if k == 0:
-                for c in range(FORCING_TERMS, FORCING_TERMS + m):
-                    own[factors + c] = own[time + c]
-                count += m
-            add_columns(table, forcing + k * lanes, lanes, count, own, factors + k, own, new, LANES)
-            scale /= duration
-        else:
-            for i in range(lanes):
-                own[new + i] = 0.0
-        next_term(
-            table, at, at + n * lanes, lanes, n, own, older, older + lanes, k + 1.0, SHARES[k], own, new
-        )
+        new = first + k * lanes
+        older, old = new - 2 * lanes, new - lanes
+        next_term(table, at, at + n * lanes, lanes, n, own, older, old, k + 1.0, SHARES[k], own, new)
 
 
 @leaf
