@@ -112,11 +112,23 @@ def add_columns(table, at, width, count, factors, factors_at, out, out_at, strid
 
 
 @operation
-def next_term(table, older, old, width, count, factors, by_older, by_old, weight, share, out, out_at):
+def next_term(table, older, old, width, count, factors, by_older, by_old, more_at, weight, share, out_at):
     """A term of a series from the two before it."""
-    known = out[out_at : out_at + width] + factors[by_older : by_older + count] @ _taken(table, older, count, width)
+    known = factors[by_older : by_older + count] @ _taken(table, older, count, width)
     new = factors[by_old : by_old + count] @ _taken(table, old, count, width)
-    out[out_at : out_at + width] = share * (known + weight * new)
+    factors[out_at : out_at + width] = share * (known + weight * new + factors[more_at : more_at + width])
+
+
+@operation
+def copy(own, at, out_at, count):
+    """Numbers copied."""
+    own[out_at : out_at + count] = own[at : at + count]
+
+
+@operation
+def dot_of_distances(table, at, own, u_at, v_at, width):
+    """Scalar product with absolute differences."""
+    return table[at : at + width] @ abs(own[u_at : u_at + width] - own[v_at : v_at + width])
 
 
 @operation
@@ -132,9 +144,7 @@ def add_tops(own, values_at, slopes_at, h, sign, weight, more, totals_at):
     """Largest values of cubics."""
     values, slopes = sign * own[values_at : values_at + 9], sign * own[slopes_at : slopes_at + 9]
     rise = np.maximum(slopes[:-1], 0.0) - np.minimum(slopes[1:], 0.0)
-    own[totals_at : totals_at + LANES] += weight * (
-        np.maximum(values[:-1], values[1:]) + 4.0 / 27.0 * h * rise
-    ) + more
+    own[totals_at : totals_at + LANES] += weight * (np.maximum(values[:-1], values[1:]) + 4.0 / 27.0 * h * rise) + more
 
 
 @operation

@@ -279,26 +279,50 @@ def combine(e, free, free_at, own, driven_at, constant_at, u_at, blocks, lanes, 
             e.store(e.total(*sums[2 * q : 2 * q + 2]), own, b.add(out_at, rows[q]))
 
 
-def _dot(e, table, at, own, u_at, width, of_sizes):
+def _dot(e, table, at, width, other):
+    """Scalar product of a part of an array, (width,), and of vectors that a function of their beginning gives."""
     b = e.builder
     total = e.accumulator(e.constant(0.0))
     with e.vectors(width) as loop:
         offset = e.times(loop.index, LANES)
-        u = e.load(own, b.add(u_at, offset))
-        e.add_product(total, e.load(table, b.add(at, offset)), e.intrinsic("fabs", [u]) if of_sizes else u)
+        e.add_product(total, e.load(table, b.add(at, offset)), other(offset))
     return e.folded(b.load(total), b.fadd)
 
 
 @_operation(types.float64)
 def dot(e, table, at, own, u_at, width):
     """Scalar product of parts of two arrays, (width,), a multiple of 8."""
-    return _dot(e, table, at, own, u_at, width, of_sizes=False)
+    return _dot(e, table, at, width, lambda offset: e.load(own, e.builder.add(u_at, offset)))
 
 
 @_operation(types.float64)
 def dot_of_sizes(e, table, at, own, u_at, width):
     """Scalar product of a part of one array and the absolute values of another, (width,), a multiple of 8."""
-    return _dot(e, table, at, own, u_at, width, of_sizes=True)
+    return _dot(e, table, at, width, lambda offset: e.intrinsic("fabs", [e.load(own, e.builder.add(u_at, offset))]))
+
+
+@_operation(types.float64)
+def dot_of_distances(e, table, at, own, u_at, v_at, width):
+    """As ``dot_of_sizes``, of the differences of two parts of an array."""
+
+    def other(offset):
+        u, v = (e.load(own, e.builder.add(at, offset)) for at in (u_at, v_at))
+        return e.intrinsic("fabs", [e.builder.fsub(u, v)])
+
+    return _dot(e, table, at, width, other)
+
+
+@_operation()
+def copy(e, own, at, out_at, count):
+    """Copy some numbers within an array, whose parts must not overlap: numba's own indexing asks for every sign."""
+    b = e.builder
+    name, size = f"llvm.masked.store.v{e.lanes}f64.p0v{e.lanes}f64", ir.IntType(1)
+    kinds = [e.kind, e.kind.as_pointer(), _INT, ir.VectorType(size, e.lanes)]
+    store = cgutils.get_or_insert_function(b.module, ir.FunctionType(ir.VoidType(), kinds), name)
+    with e.vectors(b.add(count, e.index(e.lanes - 1))) as loop:
+        first = e.times(loop.index, e.lanes)
+        target, left = e.address(own, b.add(out_at, first)), e.lanes_below(b.sub(count, first))
+        b.call(store, [e.load(own, b.add(at, first)), target, ir.Constant(_INT, 8), left])
 
 
 def _columns(e, table, at, width, count, factors, factors_at):
@@ -332,17 +356,17 @@ def add_columns(e, table, at, width, count, factors, factors_at, out, out_at, st
 
 
 @_operation()
-def next_term(e, table, older, old, width, count, factors, by_older, by_old, weight, share, out, out_at):
-    """Add ``count`` columns from ``older`` on times their factors and ``weight`` times those from ``old`` on times
-    theirs; then multiply all of it by ``share``."""
+def next_term(e, table, older, old, width, count, factors, by_older, by_old, more_at, weight, share, out_at):
+    """Write ``share`` times all of: ``count`` columns from ``older`` on times their factors, ``weight`` times those from
+    ``old`` on times theirs, and what lies at ``more_at``. Factors, what is more and what is written are in one array."""
     b = e.builder
     weights, shares = e.spread(weight), e.spread(share)
     with e.vectors(width) as rows:
         first = e.times(rows.index, LANES)
-        place = b.add(out_at, first)
-        known = b.fadd(e.load(out, place), _columns(e, table, b.add(older, first), width, count, factors, by_older))
+        known = _columns(e, table, b.add(older, first), width, count, factors, by_older)
+        known = b.fadd(e.load(factors, b.add(more_at, first)), known)
         new = _columns(e, table, b.add(old, first), width, count, factors, by_old)
-        e.store(b.fmul(shares, e.fma(weights, new, known)), out, place)
+        e.store(b.fmul(shares, e.fma(weights, new, known)), factors, b.add(out_at, first))
 
 
 @_operation()

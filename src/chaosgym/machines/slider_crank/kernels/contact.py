@@ -16,15 +16,9 @@ G. Birkhoff, A. Priver, Hermite interpolation errors for derivatives, J. Math. a
 
 import math
 
-import numpy as np
-from numba import njit
-
 from chaosgym.core.cubic import cubic
-from chaosgym.core.kernel import leaf
+from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import fma, item
-
-GAP, STIFFNESS, LAG, TWO_SIDED, ALONG, UP, SIDEWAYS, REACH = range(8)
-"""Columns of ``surfaces``."""
 
 VALUE_DOUBT, SLOPE_DOUBT = 1.0 / 384.0, math.sqrt(3.0) / 216.0
 """What h^4 and h^3 times the fourth derivative are multiplied by to bound the error of the cubic and of its slope."""
@@ -37,42 +31,6 @@ POLISH = 60
 
 KEEPS, CROSSES, UNSURE = range(3)
 """What a reading does between two instants: not reach zero, cross it once, or what can't be told."""
-
-
-@njit(cache=True)
-def surfaces(model):
-    """All that is known of the m channels of a model, (m, 8): fewer arrays to hand on make a faster kernel."""
-    surface = np.empty((model.gap.shape[0], 8))
-    for j in range(surface.shape[0]):
-        surface[j, GAP], surface[j, STIFFNESS] = model.gap[j], model.stiffness[j]
-        surface[j, LAG] = model.damping[j] / model.stiffness[j]
-        surface[j, TWO_SIDED] = 1.0 if model.two_sided[j] else 0.0
-        surface[j, ALONG:REACH] = model.reading[j]
-        surface[j, REACH] = model.reach[j]
-    return surface
-
-
-@leaf
-def closes(surface, j, side, y, v):
-    """True if channel j at displacement y and velocity v presses on ``side``."""
-    depth = side * y - surface[j, GAP]
-    return depth > 0.0 and depth + surface[j, LAG] * side * v > 0.0
-
-
-@leaf
-def find_sides(surface, row, z, side):
-    """Write which side of every channel is closed in the state z."""
-    m, n = row.shape
-    for j in range(m):
-        y, v = 0.0, 0.0
-        for i in range(n):
-            y += row[j, i] * z[i]
-            v += row[j, i] * z[n + i]
-        side[j] = 0.0
-        if closes(surface, j, 1.0, y, v):
-            side[j] = 1.0
-        elif surface[j, TWO_SIDED] != 0.0 and closes(surface, j, -1.0, y, v):
-            side[j] = -1.0
 
 
 @leaf
@@ -121,7 +79,7 @@ def judge(h, e0, d0, e1, d1, fourth):
     return KEEPS if way < 0 else UNSURE
 
 
-@leaf
+@part
 def reading_at(own, series, lanes, last, t):
     """Value and first three derivatives at t of Taylor coefficients up to order ``last``, every ``lanes`` numbers."""
     value, slope, bend, third = 0.0, 0.0, 0.0, 0.0
@@ -134,15 +92,12 @@ def reading_at(own, series, lanes, last, t):
 
 
 @leaf
-def crossing(own, series, lanes, last, side, gap, lag, low, high, tolerance):
+def crossing(own, series, lanes, last, side, gap, lag, low, high, e0, d0, e1, d1, tolerance):
     """Instant in [low, high] at which side (y + lag y') - gap, which changes its sign there once, is zero.
 
-    Halley's method from the root of the cubic through both ends, kept inside by bisection.
+    It is ``e0`` and ``e1`` at both ends, with slopes ``d0`` and ``d1``. Halley's method from the root of the cubic
+    through these, kept inside by bisection.
     """
-    y, v, a, _ = reading_at(own, series, lanes, last, low)
-    e0, d0 = side * (y + lag * v) - gap, side * (v + lag * a)
-    y, v, a, _ = reading_at(own, series, lanes, last, high)
-    e1, d1 = side * (y + lag * v) - gap, side * (v + lag * a)
     h, begin = high - low, low
     t = h * e0 / (e0 - e1) if e0 != e1 else 0.5 * h
     for _ in range(3):
@@ -165,16 +120,15 @@ def crossing(own, series, lanes, last, side, gap, lag, low, high, tolerance):
     return t
 
 
-@leaf
-def settled(surface, j, side, e0, d0, e1, d1, h, fourth):
-    """What channel j does over h by readings and slopes at both ends: (KEEPS, CROSSES or UNSURE, side of a crossing)."""
-    gap = surface[j, GAP]
+@part
+def settled(side, gap, two_sided, e0, d0, e1, d1, h, fourth):
+    """What a channel does over h by readings and slopes at both ends: (KEEPS, CROSSES or UNSURE, side of a crossing)."""
     if side != 0.0:
         return judge(h, side * e0 - gap, side * d0, side * e1 - gap, side * d1, fourth), 0.0
     if gap - e0 < 0.0:
         return UNSURE, 1.0
     verdict = judge(h, gap - e0, -d0, gap - e1, -d1, fourth)
-    if verdict != KEEPS or surface[j, TWO_SIDED] == 0.0:
+    if verdict != KEEPS or two_sided == 0.0:
         return verdict, 1.0
     if gap + e0 < 0.0:
         return UNSURE, -1.0
@@ -182,15 +136,14 @@ def settled(surface, j, side, e0, d0, e1, d1, h, fourth):
 
 
 @leaf
-def opening(surface, j, side, own, series, lanes, last, h, tolerance):
-    """First instant in [0, h] at which closed channel j opens, or inf.
+def opening(own, series, lanes, last, side, gap, lag, h, tolerance):
+    """First instant in [0, h] at which a closed channel opens, or inf.
 
     A force that is zero by rounding and grows does not open it; likewise in ``closing``. Else two channels that open at
     one instant open and close each other without end.
     """
     if h <= 0.0:
         return math.inf
-    gap, lag = surface[j, GAP], surface[j, LAG]
     fourth = fourth_of(own, series, lanes, last, lag, h)
     y, v, a, _ = reading_at(own, series, lanes, last, 0.0)
     low, length = 0.0, h
@@ -201,7 +154,7 @@ def opening(surface, j, side, own, series, lanes, last, h, tolerance):
         e1, d1 = side * (y + lag * v) - gap, side * (v + lag * a)
         verdict = judge(high - low, e0, d0, e1, d1, fourth)
         if verdict == CROSSES:
-            return crossing(own, series, lanes, last, side, gap, lag, low, high, tolerance)
+            return crossing(own, series, lanes, last, side, gap, lag, low, high, e0, d0, e1, d1, tolerance)
         if verdict == UNSURE:
             if length > tolerance:
                 length *= 0.5
@@ -214,14 +167,13 @@ def opening(surface, j, side, own, series, lanes, last, h, tolerance):
 
 
 @leaf
-def closing(surface, j, side, own, series, lanes, last, h, tolerance):
-    """First instant in [0, h] at which open channel j closes on ``side``, or inf.
+def closing(own, series, lanes, last, side, gap, lag, h, tolerance):
+    """First instant in [0, h] at which an open channel closes on ``side``, or inf.
 
     Depth and pressure count from below here: what must become positive is looked at with its sign changed.
     """
     if h <= 0.0:
         return math.inf
-    gap, lag = surface[j, GAP], surface[j, LAG]
     place_fourth = fourth_of(own, series, lanes, last, 0.0, h)
     fourth = fourth_of(own, series, lanes, last, lag, h)
     y, v, a, _ = reading_at(own, series, lanes, last, 0.0)
@@ -236,12 +188,12 @@ def closing(surface, j, side, own, series, lanes, last, h, tolerance):
         span = high - low
         place = judge(span, p0, q0, p1, q1, place_fourth) if p0 >= -slack else UNSURE
         if place == CROSSES:
-            return crossing(own, series, lanes, last, side, gap, 0.0, low, high, tolerance)
+            return crossing(own, series, lanes, last, side, gap, 0.0, low, high, -p0, -q0, -p1, -q1, tolerance)
         force = KEEPS
         if place != KEEPS:
             force = judge(span, e0, d0, e1, d1, fourth) if e0 >= -slack else UNSURE
         if force == CROSSES and p0 < 0.0 and p1 < 0.0 and trend(span, p0, q0, p1, q1, place_fourth) != 0:
-            return crossing(own, series, lanes, last, side, gap, lag, low, high, tolerance)
+            return crossing(own, series, lanes, last, side, gap, lag, low, high, -e0, -d0, -e1, -d1, tolerance)
         if force != KEEPS:
             if length > tolerance:
                 length *= 0.5

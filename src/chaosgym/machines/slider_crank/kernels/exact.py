@@ -25,18 +25,7 @@ from chaosgym.core.cycle import LOWER, UPPER, note_touch
 from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import LANES, add_columns
 from chaosgym.core.tangent import orthonormalise
-from chaosgym.machines.slider_crank.kernels.contact import (
-    CROSSES,
-    GAP,
-    KEEPS,
-    TWO_SIDED,
-    closing,
-    crossing,
-    find_sides,
-    opening,
-    settled,
-    surfaces,
-)
+from chaosgym.machines.slider_crank.kernels.contact import CROSSES, KEEPS, closing, crossing, opening, settled
 from chaosgym.machines.slider_crank.kernels.look import (
     force_at,
     joint_force,
@@ -45,13 +34,21 @@ from chaosgym.machines.slider_crank.kernels.look import (
     quiet_intervals,
 )
 from chaosgym.machines.slider_crank.kernels.motion import (
+    GAP,
+    LAG,
     NOW,
+    REACH,
     READINGS,
     SLOPES,
     SPARE,
+    TWO_SIDED,
+    UP,
     bound_fourth,
+    contact_set,
     evaluate,
     expand_from,
+    find_sides,
+    known,
     look_ahead,
     motion_of,
     move,
@@ -60,14 +57,13 @@ from chaosgym.machines.slider_crank.kernels.motion import (
     put_sides,
     read_after,
     read_now,
+    side_of,
 )
 from chaosgym.machines.slider_crank.kernels.propagator import table_places
 from chaosgym.machines.slider_crank.kernels.record import (
     begin_cycle,
     channel_crest,
-    column_of,
     crest_instant,
-    monitored,
     note_peak,
     note_share,
     write_peaks,
@@ -148,21 +144,8 @@ class SliderCrankModel(NamedTuple):
     table: np.ndarray
 
 
-@leaf
-def contact_set(side, radix):
-    """Index of the matrices of a contact set: closed sides as digits."""
-    index, place = 0, 1
-    for j in range(side.shape[0]):
-        if side[j] > 0.0:
-            index += place
-        elif side[j] < 0.0:
-            index += place * (radix - 1)
-        place *= radix
-    return index
-
-
-@leaf
-def first_change(motion, surface, side, last, h, tolerance):
+@part
+def first_change(motion, last, h, tolerance):
     """(Channel or -1, its new side, instant) of the first change of contact within h, which is expanded.
 
     ``NOW`` and the reading after it are those at both ends.
@@ -171,34 +154,36 @@ def first_change(motion, surface, side, last, h, tolerance):
     lanes = here.lanes
     first, towards, instant = -1, 0.0, h
     for j in range(motion.m):
-        place, s = here.readings + j * READINGS + NOW, side[j]
+        place, side = here.readings + j * READINGS + NOW, side_of(motion, j)
+        gap, lag, two_sided = known(motion, j, GAP), known(motion, j, LAG), known(motion, j, TWO_SIDED)
         e0, d0, e1, d1 = own[place], own[place + SLOPES], own[place + 1], own[place + SLOPES + 1]
-        verdict, to = settled(surface, j, s, e0, d0, e1, d1, h, own[here.fourth + j])
+        verdict, to = settled(side, gap, two_sided, e0, d0, e1, d1, h, own[here.fourth + j])
         series = here.series + motion.n + j
         if verdict == KEEPS:
             continue
         if verdict == CROSSES:
-            facing = s if s != 0.0 else to
-            found = crossing(own, series, lanes, last, facing, surface[j, GAP], own[here.lags + j], 0.0, h, tolerance)
+            to_lag, facing = own[here.lags + j], side if side != 0.0 else to
+            e0, d0, e1, d1 = facing * e0 - gap, facing * d0, facing * e1 - gap, facing * d1
+            found = crossing(own, series, lanes, last, facing, gap, to_lag, 0.0, h, e0, d0, e1, d1, tolerance)
             if found <= instant:
                 first, towards, instant = j, to, found
-        elif s != 0.0:
-            found = opening(surface, j, s, own, series, lanes, last, instant, tolerance)
+        elif side != 0.0:
+            found = opening(own, series, lanes, last, side, gap, lag, instant, tolerance)
             if found <= instant:
                 first, towards, instant = j, 0.0, found
         else:
-            found = closing(surface, j, 1.0, own, series, lanes, last, instant, tolerance)
+            found = closing(own, series, lanes, last, 1.0, gap, lag, instant, tolerance)
             if found <= instant:
                 first, towards, instant = j, 1.0, found
-            if surface[j, TWO_SIDED] != 0.0:
-                found = closing(surface, j, -1.0, own, series, lanes, last, instant, tolerance)
+            if two_sided != 0.0:
+                found = closing(own, series, lanes, last, -1.0, gap, lag, instant, tolerance)
                 if found <= instant:
                     first, towards, instant = j, -1.0, found
     return first, towards, instant
 
 
 @leaf
-def note_crest(motion, surface, side, last, now, h, before, after, peak):
+def note_crest(motion, last, now, h, before, after, peak):
     """Raise the peaks (2, 5) to the crest of the resultant within h, which is expanded, from ``before`` to ``after``."""
     since, length = 0.0, h
     for _ in range(CREST_SEARCHES):
@@ -206,7 +191,7 @@ def note_crest(motion, surface, side, last, now, h, before, after, peak):
         if size <= NEAR_PEAK * peak[UPPER if after[0] > 0.0 else LOWER, 0]:
             return
         evaluate(motion, last, since + crest, SPARE)
-        there = joint_force(motion, surface, side, SPARE)
+        there = joint_force(motion, SPARE)
         note_peak(peak, now + since + crest, there)
         if there[2] > 0.0:
             before, since, length = there, since + crest, length - crest
@@ -215,14 +200,15 @@ def note_crest(motion, surface, side, last, now, h, before, after, peak):
 
 
 @leaf
-def note_channel_crests(motion, surface, side, last, h, channel_peak):
+def note_channel_crests(motion, last, h, channel_peak):
     """Raise the peaks (m, 2) of the closed channels to their crests within h, which is expanded, and at its ends."""
     for j in range(channel_peak.shape[0]):
-        s, column = side[j], 0 if side[j] > 0.0 else 1
-        if s == 0.0:
+        side = side_of(motion, j)
+        column = 0 if side > 0.0 else 1
+        if side == 0.0:
             continue
-        f0, r0 = force_at(motion, surface, s, j, NOW)
-        f1, r1 = force_at(motion, surface, s, j, NOW + 1)
+        f0, r0 = force_at(motion, j, NOW)
+        f1, r1 = force_at(motion, j, NOW + 1)
         channel_peak[j, column] = max(channel_peak[j, column], max(f0, f1))
         since, length = 0.0, h
         for _ in range(CREST_SEARCHES):
@@ -230,7 +216,7 @@ def note_channel_crests(motion, surface, side, last, h, channel_peak):
             if crest <= 0.0 or top <= NEAR_PEAK * channel_peak[j, column]:
                 break
             evaluate(motion, last, since + crest, SPARE)
-            force, rate = force_at(motion, surface, s, j, SPARE)
+            force, rate = force_at(motion, j, SPARE)
             channel_peak[j, column] = max(channel_peak[j, column], force)
             if rate > 0.0:
                 f0, r0, since, length = force, rate, since + crest, length - crest
@@ -239,10 +225,10 @@ def note_channel_crests(motion, surface, side, last, h, channel_peak):
 
 
 @part
-def careful_step(motion, at, row, duration, surface, side, last, now, h, tolerance, peak, channel_peak, contact_time):
+def careful_step(motion, at, closed, row, duration, last, now, h, tolerance, peak, channel_peak, contact_time):
     """Follow the motion for at most h, up to the first change of contact, and record what happens.
 
-    ``now`` is the time in the revolution. Moves the state, puts the readings at its end after those of ``NOW``, and
+    ``closed`` tells if a contact is; ``now`` is the time in the revolution. Moves the state, puts the readings at its end after those of ``NOW``, and
     leaves the series.
 
     Returns
@@ -252,31 +238,33 @@ def careful_step(motion, at, row, duration, surface, side, last, now, h, toleran
     z = places(motion.n, motion.m).z
     expand_from(motion, at, row, z, duration, last)
     evaluate(motion, last, h, NOW + 1)
-    changed, towards, h = first_change(motion, surface, side, last, h, tolerance)
+    changed, towards, h = first_change(motion, last, h, tolerance)
     if changed >= 0:
         evaluate(motion, last, h, NOW + 1)
     put_evaluated(motion, z)
-    before, after = joint_force(motion, surface, side, NOW), joint_force(motion, surface, side, NOW + 1)
-    if before[1] + after[1] > 0.0:
+    if closed:
+        before, after = joint_force(motion, NOW), joint_force(motion, NOW + 1)
         note_share(before, after, h, contact_time)
         note_peak(peak, now + h, after)
-        note_crest(motion, surface, side, last, now, h, before, after, peak)
-    note_channel_crests(motion, surface, side, last, h, channel_peak)
+        if before[2] > 0.0 and after[2] < 0.0:
+            note_crest(motion, last, now, h, before, after, peak)
+        if channel_peak.shape[0] > 0:
+            note_channel_crests(motion, last, h, channel_peak)
     return changed, towards, h
 
 
 @part
-def change_side(surface, side, changed, towards, now, episode, impacts, bounce_time):
+def change_side(motion, changed, towards, now, episode, impacts, bounce_time):
     """Close a channel on the side ``towards`` or open it at ``now`` in the revolution, and record a touch."""
-    side[changed] = towards
-    if towards != 0.0 and monitored(surface, changed):
-        column = column_of(surface, changed, towards)
-        impacts[column] += 1
-        note_touch(episode, 1.0 if column == UPPER else -1.0, now, bounce_time)
+    motion.own[places(motion.n, motion.m).sides + changed] = towards
+    if towards != 0.0 and known(motion, changed, REACH) > 0.0:
+        up = known(motion, changed, UP) * towards > 0.0
+        impacts[UPPER if up else LOWER] += 1
+        note_touch(episode, 1.0 if up else -1.0, now, bounce_time)
 
 
 @leaf
-def write_expanded(motion, surface, side, display, last, since, h, spacing, sample, history):
+def write_expanded(motion, display, last, since, h, spacing, sample, history):
     """Write the samples of a revolution that fall into the expanded step [since, since + h); the number of the next.
 
     ``history`` (samples, 3) is that of the revolution.
@@ -286,13 +274,13 @@ def write_expanded(motion, surface, side, display, last, since, h, spacing, samp
         evaluate(motion, last, max(sample * spacing - since, 0.0), SPARE)
         put_evaluated(motion, z)
         state = motion.own[z : z + 2 * motion.n]
-        write_sample(display, state, joint_force(motion, surface, side, SPARE), history[sample])
+        write_sample(display, state, joint_force(motion, SPARE), history[sample])
         sample += 1
     return sample
 
 
 @leaf
-def write_samples(model, motion, at, surface, side, begin, done, count, spacing, sample, history):
+def write_samples(model, motion, at, begin, done, count, spacing, sample, history):
     """As ``write_expanded``, for ``count`` intervals of the bin that starts at ``begin``, of which some are ``done``."""
     own, here, duration = motion.own, places(motion.n, motion.m), model.bin_duration
     z = here.sampled
@@ -309,9 +297,7 @@ def write_samples(model, motion, at, surface, side, begin, done, count, spacing,
             for i in range(k):
                 move(motion, at, z, 1, (done + i) * share, share)
             expand_from(motion, at, model.row, z, duration, model.order)
-            sample = write_expanded(
-                motion, surface, side, model.display, model.order, since, interval, spacing, sample, history
-            )
+            sample = write_expanded(motion, model.display, model.order, since, interval, spacing, sample, history)
     return sample
 
 
@@ -362,7 +348,7 @@ def jump(motion, before, after, vectors):
 
 
 @leaf
-def turn(model, surface, motion, side, peak, episode, arrays, cycle, tolerance, budget, vectors):
+def turn(model, motion, peak, episode, arrays, cycle, tolerance, budget, vectors):
     """Move through one revolution; how many changes of contact it had.
 
     Looks begin at the ends of intervals; what is left of one after a change of contact is a careful step.
@@ -378,8 +364,8 @@ def turn(model, surface, motion, side, peak, episode, arrays, cycle, tolerance, 
     interval = share * duration
     spacing = bins * duration / max(history.shape[0], 1)
     events, sample, carries = 0, 0, vectors.shape[0] > 0
-    chosen = contact_set(side, model.radix)
-    put_sides(motion, surface, side, anchors[chosen])
+    chosen = contact_set(motion, model.radix)
+    put_sides(motion, anchors[chosen])
     for b in range(bins):
         begin = b * duration
         at = (chosen * bins + b) * length
@@ -388,7 +374,7 @@ def turn(model, surface, motion, side, peak, episode, arrays, cycle, tolerance, 
             # damping reads the acceleration, which jumps with the matrices
             read_now(motion, at)
         if b == 0:
-            note_peak(peak, 0.0, joint_force(motion, surface, side, NOW))
+            note_peak(peak, 0.0, joint_force(motion, NOW))
         done, since = 0, 0.0
         while done < most:
             # ``since``: what has passed of the interval, where a contact has changed in it
@@ -396,17 +382,15 @@ def turn(model, surface, motion, side, peak, episode, arrays, cycle, tolerance, 
                 look_ahead(motion, at)
                 bound_fourth(motion, at)
                 most_now = min(LANES, most - done)
-                count = quiet_intervals(motion, surface, side, interval, most_now)
+                count = quiet_intervals(motion, interval, most_now)
                 if chosen > 0 and count > 0:
                     if channel_peak.shape[0] > 0:
-                        count = note_channels(motion, surface, side, interval, count, channel_peak)
+                        count = note_channels(motion, interval, count, channel_peak)
                     now = begin + done * interval
-                    count = note_joint(motion, surface, side, now, interval, count, peak, contact_time)
+                    count = note_joint(motion, now, interval, count, peak, contact_time)
                 if count > 0:
                     if sample < history.shape[0]:
-                        sample = write_samples(
-                            model, motion, at, surface, side, begin, done, count, spacing, sample, history
-                        )
+                        sample = write_samples(model, motion, at, begin, done, count, spacing, sample, history)
                     move(motion, at, z, count, done * share, share)
                     if carries:
                         if count == LANES:
@@ -426,10 +410,9 @@ def turn(model, surface, motion, side, peak, episode, arrays, cycle, tolerance, 
             changed, towards, h = careful_step(
                 motion,
                 at,
+                chosen > 0,
                 row,
                 duration,
-                surface,
-                side,
                 last,
                 time,
                 h,
@@ -439,9 +422,7 @@ def turn(model, surface, motion, side, peak, episode, arrays, cycle, tolerance, 
                 contact_time,
             )
             if sample < history.shape[0]:
-                sample = write_expanded(
-                    motion, surface, side, model.display, last, time, h, spacing, sample, history
-                )
+                sample = write_expanded(motion, model.display, last, time, h, spacing, sample, history)
             if carries:
                 carry_expanded(motion, at, row, duration, last, h, vectors)
             if changed >= 0:
@@ -450,16 +431,16 @@ def turn(model, surface, motion, side, peak, episode, arrays, cycle, tolerance, 
                     return events
                 since += h
                 time += h
-                change_side(surface, side, changed, towards, time, episode, impacts, bounce_time)
+                change_side(motion, changed, towards, time, episode, impacts, bounce_time)
                 touches = towards * own[here.readings + changed * READINGS + NOW + 1 + SLOPES] > 0.0
-                chosen, before = contact_set(side, model.radix), at
+                chosen, before = contact_set(motion, model.radix), at
                 at = (chosen * bins + b) * length
-                put_sides(motion, surface, side, anchors[chosen])
+                put_sides(motion, anchors[chosen])
                 if carries and touches:
                     jump(motion, before + tables[3], at + tables[3], vectors)
                 put_time(own, time_at, (time - begin) / duration)
                 read_now(motion, at)
-                note_peak(peak, time, joint_force(motion, surface, side, NOW))
+                note_peak(peak, time, joint_force(motion, NOW))
                 if since < interval * (1.0 - NOTHING):
                     continue
             else:
@@ -486,18 +467,16 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget, tangen
         return status.STEP_BUDGET, 0
     period = model.bins * model.bin_duration
     m, n = model.row.shape
-    motion, surface, z = motion_of(model), surfaces(model), places(n, m).z
-    side, peak, metric = np.zeros(m), np.zeros((2, 5)), np.full(n, model.contact_rate**2)
+    motion, z = motion_of(model), places(n, m).z
+    peak, metric = np.zeros((2, 5)), np.full(n, model.contact_rate**2)
     for cycle in range(arrays.section.shape[0]):
         begin_cycle(model, state, arrays, cycle)
         for i in range(2 * n):
             motion.own[z + i] = state[i]
-        find_sides(surface, model.row, state, side)
+        find_sides(motion, model.row)
         arrays.events[cycle] = turn(
             model,
-            surface,
             motion,
-            side,
             peak,
             episode,
             arrays,

@@ -6,8 +6,7 @@ import numpy as np
 from numba import njit
 
 from chaosgym.core.kernel import leaf, part
-from chaosgym.core.lanes import LANES, add_columns, aligned, dot, dot_of_sizes, padded, taylor
-from chaosgym.machines.slider_crank.kernels.contact import GAP, LAG
+from chaosgym.core.lanes import LANES, add_columns, aligned, copy, dot, dot_of_distances, padded, taylor
 from chaosgym.machines.slider_crank.kernels.propagator import table_places
 from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, expand, put_time
 
@@ -19,6 +18,11 @@ SLOPES = 2 * LANES
 
 SPARE, NOW = 0, LANES - 1
 """Which of a channel's readings are those of any state, and of now; those after k intervals are ``NOW`` + k."""
+
+
+GAP, STIFFNESS, LAG, TWO_SIDED, ALONG, UP, SIDEWAYS, REACH, SURFACE = range(9)
+"""What is known of a channel: clearance [m], stiffness [N/m], damping over stiffness [s], 1 if it has two surfaces, and
+the reading of the model with its length; how many numbers these are."""
 
 
 class Motion(NamedTuple):
@@ -40,9 +44,9 @@ class Places(NamedTuple):
     ----------
     columns, width, states, lanes : int
         Numbers of z, the same padded, 2n padded, n + m padded.
-    z, rest, away : int
+    z, rest : int
         The augmented state (width,) of ``propagator``; the part of its places that the anchors of closed channels
-        make up; and the difference.
+        make up.
     sampled : int
         Another state (width,).
     moved : int
@@ -51,11 +55,14 @@ class Places(NamedTuple):
         ``READINGS`` numbers of each channel.
     totals : int
         Of ``add_tops``.
-    lags, fourth : int
-        Damping over stiffness of the closed channels (m,), 0 for the others; bounds (m,) of the readings' fourth
-        derivatives.
-    factors, derived, series : int
-        Of ``expand`` and ``taylor``: (4 + m,), (4, lanes), (order + 1, lanes).
+    surfaces : int
+        ``SURFACE`` numbers of each channel.
+    sides, lags : int
+        Closed side of each channel (m,), +1 or -1, or 0; damping over stiffness of the closed ones, 0 for the others.
+    fourth : int
+        Bounds (m,) of the readings' fourth derivatives.
+    factors, loads, derived, series : int
+        Of ``expand`` and ``taylor``: (4 + m,), (5, lanes), (4, lanes), (order + 1, lanes).
     """
 
     columns: int
@@ -64,14 +71,16 @@ class Places(NamedTuple):
     lanes: int
     z: int
     rest: int
-    away: int
     sampled: int
     moved: int
     readings: int
     totals: int
+    surfaces: int
+    sides: int
     lags: int
     fourth: int
     factors: int
+    loads: int
     derived: int
     series: int
 
@@ -81,12 +90,15 @@ def places(n, m):
     """Places for n coordinates and m channels."""
     columns = 2 * n + FORCING_TERMS + m
     width, states, lanes, channels = padded(columns), padded(2 * n), padded(n + m), padded(m)
-    readings = 4 * width + states
+    readings = 3 * width + states
     totals = readings + READINGS * m
-    lags = totals + LANES
+    surfaces = totals + LANES
+    sides = surfaces + SURFACE * m
+    lags = sides + channels
     fourth = lags + channels
     factors = fourth + channels
-    derived = factors + padded(FORCING_TERMS + m)
+    loads = factors + padded(FORCING_TERMS + m)
+    derived = loads + (FORCING_TERMS + 1) * lanes
     series = derived + 4 * lanes
     return Places(
         columns,
@@ -97,12 +109,14 @@ def places(n, m):
         width,
         2 * width,
         3 * width,
-        4 * width,
         readings,
         totals,
+        surfaces,
+        sides,
         lags,
         fourth,
         factors,
+        loads,
         derived,
         series,
     )
@@ -113,17 +127,76 @@ def motion_of(model):
     """Space for a motion."""
     m, n = model.row.shape
     here = places(n, m)
-    return Motion(model.table, aligned(here.series + (model.order + 1) * here.lanes), n, m)
+    own = aligned(here.series + (model.order + 1) * here.lanes)
+    for j in range(m):
+        surface = own[here.surfaces + j * SURFACE : here.surfaces + (j + 1) * SURFACE]
+        surface[GAP], surface[STIFFNESS] = model.gap[j], model.stiffness[j]
+        surface[LAG] = model.damping[j] / model.stiffness[j]
+        surface[TWO_SIDED] = 1.0 if model.two_sided[j] else 0.0
+        surface[ALONG:REACH] = model.reading[j]
+        surface[REACH] = model.reach[j]
+    return Motion(model.table, own, n, m)
+
+
+@part
+def known(motion, j, what):
+    """One of the ``SURFACE`` numbers of channel j."""
+    return motion.own[places(motion.n, motion.m).surfaces + j * SURFACE + what]
+
+
+@part
+def side_of(motion, j):
+    """Closed side of channel j, or 0."""
+    return motion.own[places(motion.n, motion.m).sides + j]
+
+
+@part
+def presses(motion, j, side, y, v):
+    """True if channel j at displacement y and velocity v presses on ``side``."""
+    depth = side * y - known(motion, j, GAP)
+    return depth > 0.0 and depth + known(motion, j, LAG) * side * v > 0.0
 
 
 @leaf
-def put_sides(motion, surface, side, anchor):
+def find_sides(motion, row):
+    """Write which side of every channel is closed in z."""
+    own, n, here = motion.own, motion.n, places(motion.n, motion.m)
+    for j in range(motion.m):
+        y, v = 0.0, 0.0
+        for i in range(n):
+            y += row[j, i] * own[here.z + i]
+            v += row[j, i] * own[here.z + n + i]
+        side = 0.0
+        if presses(motion, j, 1.0, y, v):
+            side = 1.0
+        elif known(motion, j, TWO_SIDED) != 0.0 and presses(motion, j, -1.0, y, v):
+            side = -1.0
+        own[here.sides + j] = side
+
+
+@leaf
+def contact_set(motion, radix):
+    """Index of the matrices of a contact set: closed sides as digits."""
+    index, place = 0, 1
+    for j in range(motion.m):
+        side = side_of(motion, j)
+        if side > 0.0:
+            index += place
+        elif side < 0.0:
+            index += place * (radix - 1)
+        place *= radix
+    return index
+
+
+@leaf
+def put_sides(motion, anchor):
     """Write what depends on a contact set with an ``anchor`` (n, m): lags, clearances of z, ``rest`` of the places."""
     own, here = motion.own, places(motion.n, motion.m)
     clearances = here.z + 2 * motion.n + FORCING_TERMS
     for j in range(motion.m):
-        own[clearances + j] = side[j] * surface[j, GAP]
-        own[here.lags + j] = surface[j, LAG] if side[j] != 0.0 else 0.0
+        side = side_of(motion, j)
+        own[clearances + j] = side * known(motion, j, GAP)
+        own[here.lags + j] = known(motion, j, LAG) if side != 0.0 else 0.0
     for i in range(motion.n):
         own[here.rest + i] = 0.0
         for j in range(motion.m):
@@ -153,10 +226,8 @@ def bound_fourth(motion, at):
     """Write bounds of the readings' fourth derivatives over a look from z on."""
     own, here = motion.own, places(motion.n, motion.m)
     rows = at + table_places(motion.n, motion.m)[5]
-    for c in range(here.width):
-        own[here.away + c] = own[here.z + c] - own[here.rest + c]
     for j in range(motion.m):
-        own[here.fourth + j] = dot_of_sizes(motion.table, rows + j * here.width, own, here.away, here.width)
+        own[here.fourth + j] = dot_of_distances(motion.table, rows + j * here.width, own, here.z, here.rest, here.width)
 
 
 @part
@@ -173,8 +244,7 @@ def step(motion, propagator, z, x):
     """Move a state by a step whose propagator begins at a place in the table; ``x`` is the share of the bin then."""
     own, n, here = motion.own, motion.n, places(motion.n, motion.m)
     add_columns(motion.table, propagator, here.states, here.columns, own, z, own, here.moved, LANES)
-    for i in range(2 * n):
-        own[z + i] = own[here.moved + i]
+    copy(own, here.moved, z, 2 * n)
     put_time(own, z + 2 * n, x)
 
 
@@ -198,7 +268,7 @@ def expand_from(motion, at, row, z, duration, last):
             v += row[j, i] * own[z + n + i]
         own[here.series + n + j], own[here.series + here.lanes + n + j] = y, v
     a = at + table_places(n, m)[3]
-    expand(motion.table, a, own, z, n, m, here.lanes, duration, last, here.factors, here.series)
+    expand(motion.table, a, own, z, n, m, here.lanes, duration, last, here.factors, here.loads, here.series)
 
 
 @leaf
@@ -217,5 +287,5 @@ def evaluate(motion, last, time, which):
 def put_evaluated(motion, z):
     """Take over the coordinates of ``evaluate`` into a state."""
     own, n, here = motion.own, motion.n, places(motion.n, motion.m)
-    for i in range(n):
-        own[z + i], own[z + n + i] = own[here.derived + i], own[here.derived + here.lanes + i]
+    copy(own, here.derived, z, n)
+    copy(own, here.derived + here.lanes, z + n, n)

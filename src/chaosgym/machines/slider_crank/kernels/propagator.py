@@ -52,10 +52,10 @@ def table_places(n: int, m: int) -> tuple[int, ...]:
 
 
 @leaf
-def _short_propagator(work, held, n, columns, duration, time, order, terms, answer):
+def _short_propagator(work, held, n, columns, duration, time, order, loads, terms, answer):
     """Write the propagator (2n, width) over a time for which ``order`` terms of the series suffice.
 
-    ``held`` (n, width) is the acceleration; ``terms`` (order + 1, n, width) is work space.
+    ``held`` (n, width) is the acceleration; ``loads`` (width,) and ``terms`` (order + 1, n, width) are work space.
     """
     width = padded(columns)
     size = n * width
@@ -70,16 +70,16 @@ def _short_propagator(work, held, n, columns, duration, time, order, terms, answ
         for i in range(n):
             row, own = new + i * width, held + i * width
             for c in range(width):
-                work[row + c] = 0.0
+                work[loads + c] = 0.0
             if k < FORCING_TERMS:
                 binomial = scale
                 for j in range(k, FORCING_TERMS):
-                    work[row + 2 * n + j - k] = binomial * work[own + 2 * n + j]
+                    work[loads + 2 * n + j - k] = binomial * work[own + 2 * n + j]
                     binomial *= (j + 1.0) / (j + 1 - k)
             if k == 0:
                 for c in range(2 * n + FORCING_TERMS, columns):
-                    work[row + c] = work[own + c]
-            next_term(work, older, old, width, n, work, own, own + n, (k + 1.0) / time, share, work, row)
+                    work[loads + c] = work[own + c]
+            next_term(work, older, old, width, n, work, own, own + n, loads, (k + 1.0) / time, share, row)
         scale *= time / duration
     for i in range(size):
         work[answer + i], work[answer + size + i] = work[terms + i], 0.0
@@ -285,11 +285,9 @@ def tables(free, forcing, push, rate, row, lag, anchor, duration, steps, order):
         for b in range(bins):
             at = (s * bins + b) * length
             _put_acceleration(free, forcing, push, rate, row, s, b, work, held, table, at + acceleration)
-            _short_propagator(work, held, n, columns, duration, interval, order, terms, one)
+            _short_propagator(work, held, n, columns, duration, interval, order, rows, terms, one)
             _put_states(work, one, n, columns, table, at + step)
-            _put_channels(
-                work, held, one, row, lag[s], anchor[s], n, columns, duration, interval, rows, table, at
-            )
+            _put_channels(work, held, one, row, lag[s], anchor[s], n, columns, duration, interval, rows, table, at)
             before, after, share = one, twice, interval / duration
             for _ in range(3):
                 for i in range(2 * n):

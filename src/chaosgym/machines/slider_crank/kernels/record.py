@@ -1,7 +1,6 @@
 """Records of the joints of a slider crank.
 
-The resultant of the monitored joint is a tuple (upward part, size, rate of the size, along, sideways). Channels are
-rows of ``contact.surfaces``.
+The resultant of the monitored joint is a tuple (upward part, size, rate of the size, along, sideways).
 """
 
 import math
@@ -9,19 +8,6 @@ import math
 from chaosgym.core.cubic import cubic, cubic_extremum
 from chaosgym.core.cycle import LOWER, UPPER
 from chaosgym.core.kernel import leaf
-from chaosgym.machines.slider_crank.kernels.contact import GAP, REACH, STIFFNESS, UP
-
-
-@leaf
-def monitored(surface, j):
-    """True if channel j belongs to the joint that is recorded."""
-    return surface[j, REACH] > 0.0
-
-
-@leaf
-def column_of(surface, j, side):
-    """Side of the record on which a touch of channel j counts: UPPER where the force points up."""
-    return UPPER if surface[j, UP] * side > 0.0 else LOWER
 
 
 @leaf
@@ -59,13 +45,6 @@ def write_peaks(peak, arrays, cycle):
         arrays.peak_instant[cycle, column] = peak[column, 1]
         for axis in range(3):
             arrays.peak_vector[cycle, column, axis] = peak[column, 2 + axis]
-
-
-@leaf
-def channel_force(surface, s, j, value, slope):
-    """Force of channel j, closed on side s, and its rate, from what it reads."""
-    stiffness = surface[j, STIFFNESS]
-    return stiffness * (s * value - surface[j, GAP]), stiffness * s * slope
 
 
 @leaf

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from chaosgym.core.kernel import leaf
-from chaosgym.core.lanes import LANES, add_columns, next_term
+from chaosgym.core.lanes import LANES, add_columns, copy, next_term
 
 FORCING_TERMS = 4
 """Coefficients of the forcing polynomial: a cubic."""
@@ -35,20 +35,18 @@ def order_for(phase, most):
 
 
 @leaf
-def expand(table, at, own, z, n, m, lanes, duration, last, factors, series):
+def expand(table, at, own, z, n, m, lanes, duration, last, factors, loads, series):
     """Taylor coefficients about the instant of z, in seconds, up to the order ``last``.
 
     The acceleration (columns, lanes) of the bin and contact set begins at ``at`` in the table, all else in ``own``:
     from ``series`` on, ``lanes`` numbers an order, p^(k) / k! of the n coordinates and then that of the displacements
-    of the m channels, whose first two orders the caller writes; ``factors`` (4 + m,) is work space.
+    of the m channels, whose first two orders the caller writes. Work space is ``factors`` (4 + m,) and ``loads``
+    (5, lanes), whose last row is zero.
     """
-    time, forcing, first = z + 2 * n, at + 2 * n * lanes, series + 2 * lanes
-    for i in range(n):
-        own[series + i], own[series + lanes + i] = own[z + i], own[z + n + i]
-    for i in range(first, series + (last + 1) * lanes):
-        own[i] = 0.0
-    for j in range(m):
-        own[factors + FORCING_TERMS + j] = own[time + FORCING_TERMS + j]
+    time, forcing = z + 2 * n, at + 2 * n * lanes
+    copy(own, z, series, n)
+    copy(own, z + n, series + lanes, n)
+    copy(own, time + FORCING_TERMS, factors + FORCING_TERMS, m)
     scale = 1.0
     for k in range(FORCING_TERMS):
         # coefficient of t^k of sum_j F_j (x + t / duration)^j
@@ -57,12 +55,25 @@ def expand(table, at, own, z, n, m, lanes, duration, last, factors, series):
             own[factors + j] = binomial * own[time + j - k]
             binomial *= (j + 1.0) / (j + 1 - k)
         count += m if k == 0 else 0
-        add_columns(table, forcing + k * lanes, lanes, count, own, factors + k, own, first + k * lanes, LANES)
+        add_columns(table, forcing + k * lanes, lanes, count, own, factors + k, own, loads + k * lanes, LANES)
         scale /= duration
     for k in range(last - 1):
-        new = first + k * lanes
-        older, old = new - 2 * lanes, new - lanes
-        next_term(table, at, at + n * lanes, lanes, n, own, older, old, k + 1.0, SHARES[k], own, new)
+        older = series + k * lanes
+        more = loads + min(k, FORCING_TERMS) * lanes
+        next_term(
+            table,
+            at,
+            at + n * lanes,
+            lanes,
+            n,
+            own,
+            older,
+            older + lanes,
+            more,
+            k + 1.0,
+            SHARES[k],
+            older + 2 * lanes,
+        )
 
 
 @leaf
