@@ -360,13 +360,14 @@ def next_term(e, table, older, old, width, count, factors, by_older, by_old, mor
     """Write ``share`` times all of: ``count`` columns from ``older`` on times their factors, ``weight`` times those from
     ``old`` on times theirs, and what lies at ``more_at``. Factors, what is more and what is written are in one array."""
     b = e.builder
-    weights, shares = e.spread(weight), e.spread(share)
+    shares, weights = e.spread(share), e.spread(b.fmul(weight, share))
     with e.vectors(width) as rows:
         first = e.times(rows.index, LANES)
         known = _columns(e, table, b.add(older, first), width, count, factors, by_older)
-        known = b.fadd(e.load(factors, b.add(more_at, first)), known)
+        known = b.fmul(shares, b.fadd(e.load(factors, b.add(more_at, first)), known))
+        # what is old was written last: as little as possible waits for it
         new = _columns(e, table, b.add(old, first), width, count, factors, by_old)
-        e.store(b.fmul(shares, e.fma(weights, new, known)), factors, b.add(out_at, first))
+        e.store(e.fma(weights, new, known), factors, b.add(out_at, first))
 
 
 @_operation()

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from chaosgym.core.kernel import leaf
+from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import LANES, add_columns, copy, next_term
 
 FORCING_TERMS = 4
@@ -22,16 +22,20 @@ SHARES = np.array([1.0 / ((k + 1) * (k + 2)) for k in range(len(SERIES_PHASE))])
 
 def series_order(phase: float) -> int:
     """Order that sums the Taylor series of a motion over an angle ``phase`` [rad] to round-off."""
-    return min(int(np.searchsorted(SERIES_PHASE, phase)), len(SERIES_PHASE) - 1)
+    return max(FORCING_TERMS + 1, min(int(np.searchsorted(SERIES_PHASE, phase)), len(SERIES_PHASE) - 1))
 
 
-@leaf
+FINENESS = 16
+"""Parts of a radian for each of which ``ORDERS`` has an entry."""
+
+ORDERS = np.array([series_order((k + 1) / FINENESS) for k in range(2 * FINENESS)])
+"""``series_order`` at the ends of parts of a radian, up to the longest interval."""
+
+
+@part
 def order_for(phase, most):
-    """``series_order`` of a phase in a kernel, at most ``most``."""
-    order = 4
-    while order < most and SERIES_PHASE[order] < phase:
-        order += 1
-    return order
+    """``series_order`` of a phase up to 2, at least, looked up; at most ``most``."""
+    return min(ORDERS[min(int(phase * FINENESS), 2 * FINENESS - 1)], most)
 
 
 @leaf
