@@ -132,6 +132,19 @@ def dot_of_distances(table, at, own, u_at, v_at, width):
 
 
 @operation
+def scale_and_add(own, at, factor, sum_at, width):
+    """Numbers times a factor, and added to others."""
+    own[at : at + width] *= factor
+    own[sum_at : sum_at + width] += own[at : at + width]
+
+
+@operation
+def keep_largest(own, at, largest_at, width):
+    """Largest absolute values."""
+    own[largest_at : largest_at + width] = np.maximum(own[largest_at : largest_at + width], abs(own[at : at + width]))
+
+
+@operation
 def taylor(own, at, width, last, time, out_at):
     """A polynomial and three derivatives of it."""
     for k in range(4):
@@ -159,6 +172,12 @@ def first_above(own, at, limit, start):
 def item(own, at):
     """Number at a place."""
     return own[at]
+
+
+@operation
+def put(own, at, value):
+    """Number put at a place."""
+    own[at] = value
 
 
 @operation

@@ -371,6 +371,29 @@ def next_term(e, table, older, old, width, count, factors, by_older, by_old, mor
 
 
 @_operation()
+def scale_and_add(e, own, at, factor, sum_at, width):
+    """Multiply a part of an array, (width,), a multiple of 8, by a factor, and add it to another part."""
+    b = e.builder
+    with e.vectors(width) as loop:
+        offset = e.times(loop.index, LANES)
+        place, total = b.add(at, offset), b.add(sum_at, offset)
+        scaled = b.fmul(e.spread(factor), e.load(own, place))
+        e.store(scaled, own, place)
+        e.store(b.fadd(e.load(own, total), scaled), own, total)
+
+
+@_operation()
+def keep_largest(e, own, at, largest_at, width):
+    """Raise a part of an array, (width,), a multiple of 8, to the absolute values of another."""
+    b = e.builder
+    with e.vectors(width) as loop:
+        offset = e.times(loop.index, LANES)
+        place = b.add(largest_at, offset)
+        size = e.intrinsic("fabs", [e.load(own, b.add(at, offset))])
+        e.store(e.larger(e.load(own, place), size), own, place)
+
+
+@_operation()
 def taylor(e, own, at, width, last, time, out_at):
     """Value and first three derivatives at ``time`` of a series whose coefficients (last + 1, width) begin at ``at``.
 
@@ -421,6 +444,12 @@ def first_above(e, own, at, limit, start):
 def item(e, own, at):
     """Number at a place that is not negative: numba's own indexing first asks for that."""
     return e.number(own, at)
+
+
+@_operation()
+def put(e, own, at, value):
+    """Write a number at a place that is not negative."""
+    e.builder.store(value, e.builder.gep(own, [at]))
 
 
 @_operation(types.float64)

@@ -9,18 +9,28 @@ channel j, closed on side s_j = +-1 with clearance c_j. With z = (p, p', 1, x, x
 p'' = A z, and the Taylor series of p follows from A alone.
 
 A bin is cut into looks of eight intervals. The propagator of an interval is the series for all columns of z at once,
-summed to round-off; squared three times it is that of a look. Matrices here are stored by rows of z's length, padded to
-a multiple of 8, in one array of work space.
+summed to round-off; squared three times it is that of a look.
 """
 
-import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from chaosgym.core.kernel import leaf
-from chaosgym.core.lanes import LANES, add_columns, aligned, next_term, padded
+from chaosgym.core.kernel import leaf, part
+from chaosgym.core.lanes import (
+    LANES,
+    add_columns,
+    aligned,
+    copy,
+    item,
+    keep_largest,
+    next_term,
+    padded,
+    put,
+    scale_and_add,
+)
 from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, SHARES
 
 BOUND_TERMS = 16
@@ -51,110 +61,137 @@ def table_places(n: int, m: int) -> tuple[int, ...]:
     return 0, look, interval, acceleration, now, bound, bound + m * padded(columns)
 
 
-@leaf
-def _short_propagator(work, held, n, columns, duration, time, order, loads, terms, answer):
-    """Write the propagator (2n, width) over a time for which ``order`` terms of the series suffice.
+class _Space(NamedTuple):
+    """Work space for the tables of one bin and contact set, as rows of ``width`` in one array.
 
-    ``held`` (n, width) is the acceleration; ``loads`` (width,) and ``terms`` (order + 1, n, width) are work space.
+    Attributes
+    ----------
+    n, columns, width : int
+        Coordinates, numbers of z, the same padded.
+    held : int
+        Acceleration (n, width).
+    nothing, loads : int
+        A row that stays zero, and one for the forcing.
+    rows : int
+        Eight rows.
+    one, twice : int
+        Propagators (2n, width).
+    terms : int
+        Terms (order + 1, n, width) of a series.
+    sums : int
+        Factors (2, order + 1) that sum them to a place and to a velocity.
     """
+
+    own: np.ndarray
+    n: int
+    columns: int
+    width: int
+    held: int
+    nothing: int
+    loads: int
+    rows: int
+    one: int
+    twice: int
+    terms: int
+    sums: int
+
+
+@njit(cache=True)
+def _space_of(n, m, interval, order):
+    columns = 2 * n + FORCING_TERMS + m
     width = padded(columns)
-    size = n * width
-    for i in range(size):
-        work[terms + i], work[terms + size + i] = 0.0, 0.0
+    nothing = n * width
+    one = nothing + 10 * width
+    twice = one + 2 * n * width
+    terms = twice + 2 * n * width
+    sums = terms + (order + 1) * n * width
+    own = aligned(sums + 2 * (order + 1))
+    for k in range(order + 1):
+        own[sums + k], own[sums + order + 1 + k] = 1.0, k / interval
+    return _Space(own, n, columns, width, 0, nothing, nothing + width, nothing + 2 * width, one, twice, terms, sums)
+
+
+@part
+def _clear(space, at, width):
+    """Write zeros: the sum of no columns."""
+    add_columns(space.own, at, width, 0, space.own, at, space.own, at, LANES)
+
+
+@leaf
+def _short_propagator(space, duration, time, order):
+    """Write the propagator ``one`` over a time for which ``order`` terms of the series suffice."""
+    own, n, width, terms, loads = space.own, space.n, space.width, space.terms, space.loads
+    size, forcing = n * width, 2 * n
+    _clear(space, terms, 2 * size)
     for i in range(n):
-        work[terms + i * width + i], work[terms + size + i * width + n + i] = 1.0, time
+        own[terms + i * width + i], own[terms + size + i * width + n + i] = 1.0, time
     scale = 1.0
     for k in range(order - 1):
         older, old, new = terms + k * size, terms + (k + 1) * size, terms + (k + 2) * size
-        share = time * time * SHARES[k]
+        weight, share, more = (k + 1.0) / time, time * time * SHARES[k], space.nothing
         for i in range(n):
-            row, own = new + i * width, held + i * width
-            for c in range(width):
-                work[loads + c] = 0.0
+            row = space.held + i * width
             if k < FORCING_TERMS:
-                binomial = scale
+                more, binomial = loads, scale
+                _clear(space, loads, width)
                 for j in range(k, FORCING_TERMS):
-                    work[loads + 2 * n + j - k] = binomial * work[own + 2 * n + j]
+                    own[loads + forcing + j - k] = binomial * own[row + forcing + j]
                     binomial *= (j + 1.0) / (j + 1 - k)
-            if k == 0:
-                for c in range(2 * n + FORCING_TERMS, columns):
-                    work[loads + c] = work[own + c]
-            next_term(work, older, old, width, n, work, own, own + n, loads, (k + 1.0) / time, share, row)
+                if k == 0:
+                    for c in range(forcing + FORCING_TERMS, space.columns):
+                        own[loads + c] = own[row + c]
+            next_term(own, older, old, width, n, own, row, row + n, more, weight, share, new + i * width)
         scale *= time / duration
-    for i in range(size):
-        work[answer + i], work[answer + size + i] = work[terms + i], 0.0
-    for k in range(1, order + 1):
-        slope = k / time
-        for i in range(size):
-            work[answer + i] += work[terms + k * size + i]
-            work[answer + size + i] += slope * work[terms + k * size + i]
+    add_columns(own, terms, size, order + 1, own, space.sums, own, space.one, LANES)
+    add_columns(own, terms, size, order + 1, own, space.sums + order + 1, own, space.one + size, LANES)
 
 
 @leaf
-def _through(work, propagator, n, columns, share, row, answer):
+def _through(space, propagator, share, row, answer):
     """Write a row over z one step earlier: row P.
 
     The powers of x become those of x + ``share``, the step over the duration of the bin; the clearances stay.
     """
-    width, states = padded(columns), 2 * n
-    add_columns(work, propagator, width, states, work, row, work, answer, LANES)
+    own, states = space.own, 2 * space.n
+    add_columns(own, propagator, space.width, states, own, row, own, answer, LANES)
     for k in range(FORCING_TERMS):
-        binomial = work[row + states + k]
+        binomial = own[row + states + k]
         for c in range(k, -1, -1):
-            work[answer + states + c] += binomial
+            own[answer + states + c] += binomial
             binomial *= share * c / (k - c + 1)
-    for c in range(states + FORCING_TERMS, columns):
-        work[answer + c] += work[row + c]
+    for c in range(states + FORCING_TERMS, space.columns):
+        own[answer + c] += own[row + c]
 
 
 @leaf
-def _derivative(work, held, n, columns, duration, row, answer):
-    """Write the time derivative of a row over z: row B, with z' = B z; ``held`` (n, width) is the acceleration."""
-    add_columns(work, held, padded(columns), n, work, row + n, work, answer, LANES)
+def _derivative(space, duration, row, answer):
+    """Write the time derivative of a row over z: row B, with z' = B z."""
+    own, n = space.own, space.n
+    add_columns(own, space.held, space.width, n, own, row + n, own, answer, LANES)
     for i in range(n):
-        work[answer + n + i] += work[row + i]
+        own[answer + n + i] += own[row + i]
     for k in range(1, FORCING_TERMS):
-        work[answer + 2 * n + k - 1] += work[row + 2 * n + k] * k / duration
+        own[answer + 2 * n + k - 1] += own[row + 2 * n + k] * k / duration
 
 
-@leaf
-def _from_anchor(work, anchor, n, row):
+@part
+def _from_anchor(space, anchor, row):
     """Let the columns of the clearances of a row count places from the anchor (n, m)."""
     for j in range(anchor.shape[1]):
-        for i in range(n):
-            work[row + 2 * n + FORCING_TERMS + j] += work[row + i] * anchor[i, j]
+        for i in range(space.n):
+            space.own[row + 2 * space.n + FORCING_TERMS + j] += space.own[row + i] * anchor[i, j]
 
 
 @leaf
-def _keep_largest(work, anchor, n, columns, row, spare, largest):
+def _note_largest(space, anchor, row, spare, largest):
     """Raise ``largest`` to the absolute values of a row, places from the anchor."""
-    for c in range(columns):
-        work[spare + c] = work[row + c]
-    _from_anchor(work, anchor, n, spare)
-    for c in range(columns):
-        work[largest + c] = max(work[largest + c], abs(work[spare + c]))
+    copy(space.own, row, spare, space.width)
+    _from_anchor(space, anchor, spare)
+    keep_largest(space.own, spare, largest, space.width)
 
 
 @leaf
-def _spread_bound(work, sizes, n, columns, duration, time, rows, bound):
-    """Multiply a bound (columns,) at an instant by exp(|B| time), which makes it one for all times up to there."""
-    width = padded(columns)
-    term, derived = rows, rows + width
-    for c in range(columns):
-        work[term + c] = work[bound + c]
-    for k in range(1, BOUND_TERMS):
-        _derivative(work, sizes, n, columns, duration, term, derived)
-        for c in range(columns):
-            work[derived + c] *= time / k
-            work[bound + c] += work[derived + c]
-        term, derived = derived, term
-    # the terms left out shrink at least by half each
-    for c in range(columns):
-        work[bound + c] += work[term + c]
-
-
-@leaf
-def _put_channels(work, held, propagator, row, lag, anchor, n, columns, duration, interval, rows, table, at):
+def _put_channels(space, row, lag, anchor, duration, interval, table, at):
     """Fill ``ahead``, ``now`` and ``bound`` of a row of tables: what the channels read in a look.
 
     With z' = B z and the row e of a reading, its fourth derivative is e B^4 exp(B t) z. The row of that is computed
@@ -162,83 +199,88 @@ def _put_channels(work, held, propagator, row, lag, anchor, n, columns, duration
     interval, whose elements those of exp(|B| |t|) bound. Closed channels pull the state to where they just touch:
     places count from the anchor, so that what cancels does not count.
 
-    ``propagator`` is that of an interval; ``rows`` (8, width) is work space. Overwrites ``held`` (n, width).
+    Overwrites the acceleration.
     """
-    m = row.shape[0]
-    width, share = padded(columns), interval / duration
-    ahead, now, bound = table_places(n, m)[0] + at, table_places(n, m)[4] + at, table_places(n, m)[5] + at
-    spare, largest = rows + 6 * width, rows + 7 * width
-    for i in range(8 * width):
-        work[rows + i] = 0.0
+    own, n, width = space.own, space.n, space.width
+    m, share = row.shape[0], interval / duration
+    places = table_places(n, m)
+    now, bound = at + places[4], at + places[5]
+    spare, largest = space.rows + 6 * width, space.rows + 7 * width
     for j in range(m):
         # reading, slope and fourth derivative, and the same one interval later
-        first, then = rows, rows + 3 * width
-        for c in range(6 * width):
-            work[rows + c] = 0.0
+        first, then = space.rows, space.rows + 3 * width
+        _clear(space, space.rows, 8 * width)
         for i in range(n):
-            work[first + i], work[first + n + i] = row[j, i], lag[j] * row[j, i]
-        _derivative(work, held, n, columns, duration, first, first + width)
-        _derivative(work, held, n, columns, duration, first + width, then)
-        _derivative(work, held, n, columns, duration, then, then + width)
-        _derivative(work, held, n, columns, duration, then + width, first + 2 * width)
-        for c in range(columns):
-            table[now + 2 * j * width + c] = work[first + c]
-            table[now + (2 * j + 1) * width + c] = work[first + width + c]
-            work[largest + c] = 0.0
-        _keep_largest(work, anchor, n, columns, first + 2 * width, spare, largest)
+            own[first + i], own[first + n + i] = row[j, i], lag[j] * row[j, i]
+        _derivative(space, duration, first, first + width)
+        _derivative(space, duration, first + width, then)
+        _derivative(space, duration, then, then + width)
+        _derivative(space, duration, then + width, first + 2 * width)
+        _note_largest(space, anchor, first + 2 * width, spare, largest)
+        for c in range(width):
+            put(table, now + 2 * j * width + c, item(own, first + c))
+            put(table, now + (2 * j + 1) * width + c, item(own, first + width + c))
         for k in range(LANES):
             for q in range(3):
-                _through(work, propagator, n, columns, share, first + q * width, then + q * width)
+                _through(space, space.one, share, first + q * width, then + q * width)
             first, then = then, first
-            for c in range(columns):
-                place = ahead + (c * m + j) * 2 * LANES + k
-                table[place], table[place + LANES] = work[first + c], work[first + width + c]
-            _keep_largest(work, anchor, n, columns, first + 2 * width, spare, largest)
-        for c in range(columns):
-            table[bound + j * width + c] = work[largest + c]
+            for c in range(space.columns):
+                place = at + (c * m + j) * 2 * LANES + k
+                put(table, place, item(own, first + c))
+                put(table, place + LANES, item(own, first + width + c))
+            _note_largest(space, anchor, first + 2 * width, spare, largest)
+        for c in range(width):
+            put(table, bound + j * width + c, item(own, largest + c))
     for i in range(n):
-        _from_anchor(work, anchor, n, held + i * width)
-        for c in range(columns):
-            work[held + i * width + c] = abs(work[held + i * width + c])
+        _from_anchor(space, anchor, space.held + i * width)
+        copy(own, space.held + i * width, spare, width)
+        keep_largest(own, spare, space.held + i * width, width)
+    term, derived = space.rows, space.rows + width
     for j in range(m):
-        for c in range(columns):
-            work[largest + c] = table[bound + j * width + c]
-        _spread_bound(work, held, n, columns, duration, 0.5 * interval, rows, largest)
-        for c in range(columns):
-            table[bound + j * width + c] = work[largest + c]
+        for c in range(width):
+            put(own, term + c, item(table, bound + j * width + c))
+        copy(own, term, largest, width)
+        for k in range(1, BOUND_TERMS):
+            _derivative(space, duration, term, derived)
+            scale_and_add(own, derived, 0.5 * interval / k, largest, width)
+            term, derived = derived, term
+        # the terms left out shrink at least by half each
+        scale_and_add(own, term, 1.0, largest, width)
+        for c in range(width):
+            put(table, bound + j * width + c, item(own, largest + c))
 
 
 @leaf
-def _put_states(work, propagator, n, columns, table, at):
+def _put_states(space, propagator, table, at):
     """Store a propagator by columns."""
-    states, width = padded(2 * n), padded(columns)
-    for c in range(columns):
-        for i in range(2 * n):
-            table[at + c * states + i] = work[propagator + i * width + c]
+    states = padded(2 * space.n)
+    for c in range(space.columns):
+        for i in range(2 * space.n):
+            put(table, at + c * states + i, item(space.own, propagator + i * space.width + c))
 
 
 @leaf
-def _put_acceleration(free, forcing, push, rate, row, s, b, work, held, table, at):
+def _put_acceleration(space, free, forcing, push, rate, row, s, b, table, at):
     """Sum the acceleration of a bin and contact set at a crank rate: by rows in ``held``, by columns in the table."""
     m, n = row.shape
-    columns, lanes = 2 * n + FORCING_TERMS + m, padded(n + m)
-    width = padded(columns)
+    own, width, lanes = space.own, space.width, padded(n + m)
     for i in range(n):
+        held = space.held + i * width
         for c in range(2 * n):
             total = free[0, b, c, i] + rate * free[1, b, c, i] + rate * rate * free[2, b, c, i]
-            work[held + i * width + c] = total + push[s, b, c, i]
+            put(own, held + c, total + push[s, b, c, i])
         for k in range(FORCING_TERMS):
-            work[held + i * width + 2 * n + k] = forcing[0, b, k, i] + rate * rate * forcing[1, b, k, i]
+            put(own, held + 2 * n + k, forcing[0, b, k, i] + rate * rate * forcing[1, b, k, i])
         for j in range(m):
-            work[held + i * width + 2 * n + FORCING_TERMS + j] = push[s, b, 2 * n + j, i]
-    for c in range(columns):
+            put(own, held + 2 * n + FORCING_TERMS + j, push[s, b, 2 * n + j, i])
+    for c in range(space.columns):
         for i in range(n):
-            table[at + c * lanes + i] = work[held + i * width + c]
+            put(table, at + c * lanes + i, item(own, space.held + i * width + c))
         for j in range(m):
             total = 0.0
             for i in range(n):
-                total += row[j, i] * work[held + i * width + c]
-            table[at + c * lanes + n + j] = total
+                total += row[j, i] * item(own, space.held + i * width + c)
+            put(table, at + c * lanes + n + j, total)
 
 
 @njit(cache=True, nogil=True)
@@ -274,24 +316,22 @@ def tables(free, forcing, push, rate, row, lag, anchor, duration, steps, order):
     """
     sets, bins = push.shape[:2]
     m, n = row.shape
-    columns = 2 * n + FORCING_TERMS + m
-    width, interval = padded(columns), duration / (LANES * steps)
-    _, look, step, acceleration, _, _, length = table_places(n, m)
+    interval = duration / (LANES * steps)
+    places = table_places(n, m)
+    length = places[6]
     table = aligned(sets * bins * length)
-    held, rows = 0, n * width
-    one, twice, terms = rows + 8 * width, rows + (8 + 2 * n) * width, rows + (8 + 4 * n) * width
-    work = aligned(terms + (order + 1) * n * width)
+    space = _space_of(n, m, interval, order)
     for s in range(sets):
         for b in range(bins):
             at = (s * bins + b) * length
-            _put_acceleration(free, forcing, push, rate, row, s, b, work, held, table, at + acceleration)
-            _short_propagator(work, held, n, columns, duration, interval, order, rows, terms, one)
-            _put_states(work, one, n, columns, table, at + step)
-            _put_channels(work, held, one, row, lag[s], anchor[s], n, columns, duration, interval, rows, table, at)
-            before, after, share = one, twice, interval / duration
+            _put_acceleration(space, free, forcing, push, rate, row, s, b, table, at + places[3])
+            _short_propagator(space, duration, interval, order)
+            _put_states(space, space.one, table, at + places[2])
+            _put_channels(space, row, lag[s], anchor[s], duration, interval, table, at)
+            before, after, share = space.one, space.twice, interval / duration
             for _ in range(3):
                 for i in range(2 * n):
-                    _through(work, before, n, columns, share, before + i * width, after + i * width)
+                    _through(space, before, share, before + i * space.width, after + i * space.width)
                 before, after, share = after, before, 2.0 * share
-            _put_states(work, before, n, columns, table, at + look)
+            _put_states(space, before, table, at + places[1])
     return table
