@@ -132,10 +132,26 @@ def dot_of_distances(table, at, own, u_at, v_at, width):
 
 
 @operation
-def scale_and_add(own, at, factor, sum_at, width):
-    """Numbers times a factor, and added to others."""
-    own[at : at + width] *= factor
-    own[sum_at : sum_at + width] += own[at : at + width]
+def add_rows(own, at, factor, sum_at, width):
+    """Numbers times a factor, added to others."""
+    own[sum_at : sum_at + width] += factor * own[at : at + width]
+
+
+@operation
+def multiply_eight(own, row, matrix, width, count, out_at):
+    """Eight products of a row and a matrix."""
+    columns = _taken(own, matrix, count, width // LANES, LANES)
+    answer = np.einsum("kl,kcl->cl", _taken(own, row, count, LANES), columns)
+    own[out_at : out_at + width] = answer.ravel()
+
+
+@operation
+def next_terms_of_eight(own, row, older, old, width, count, weight, share, out_at):
+    """Terms of eight series from the two before them."""
+    factors = _taken(own, row, 2, count, LANES)
+    before = [_taken(own, at, count, width // LANES, LANES) for at in (older, old)]
+    known, new = (np.einsum("kl,kcl->cl", *pair) for pair in zip(factors, before, strict=True))
+    own[out_at : out_at + width] = share * (known + weight * new).ravel()
 
 
 @operation

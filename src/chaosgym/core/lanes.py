@@ -371,15 +371,66 @@ def next_term(e, table, older, old, width, count, factors, by_older, by_old, mor
 
 
 @_operation()
-def scale_and_add(e, own, at, factor, sum_at, width):
-    """Multiply a part of an array, (width,), a multiple of 8, by a factor, and add it to another part."""
+def add_rows(e, own, at, factor, sum_at, width):
+    """Add a part of an array, (width,), a multiple of 8, times a factor to another part."""
     b = e.builder
     with e.vectors(width) as loop:
         offset = e.times(loop.index, LANES)
-        place, total = b.add(at, offset), b.add(sum_at, offset)
-        scaled = b.fmul(e.spread(factor), e.load(own, place))
-        e.store(scaled, own, place)
-        e.store(b.fadd(e.load(own, total), scaled), own, total)
+        total = b.add(sum_at, offset)
+        product = e.fma(e.spread(factor), e.load(own, b.add(at, offset)), e.load(own, total))
+        e.store(product, own, total)
+
+
+def _products(e, own, row, matrix, width, count, columns):
+    """Sums over k < ``count`` of vector k from ``row`` on times vectors of a matrix (count, width), adjacent columns."""
+    b = e.builder
+    totals = [e.accumulator(e.constant(0.0)) for _ in range(columns)]
+    with cgutils.for_range(b, count) as loop:
+        factor, begin = e.load(own, b.add(row, e.times(loop.index, LANES))), b.add(matrix, b.mul(loop.index, width))
+        for k, total in enumerate(totals):
+            e.add_product(total, factor, e.load(own, b.add(begin, e.index(k * LANES))))
+    return [b.load(total) for total in totals]
+
+
+def _in_columns(e, width, write):
+    """Call a function of a number of columns and where the first begins, for columns at once, then for single ones."""
+    b, at_once = e.builder, 5
+    several = b.udiv(width, e.index(at_once * LANES))
+    with cgutils.for_range(b, several) as loop:
+        write(at_once, e.times(loop.index, at_once * LANES))
+    done = e.times(several, at_once * LANES)
+    with e.vectors(b.sub(width, done)) as loop:
+        write(1, b.add(done, e.times(loop.index, LANES)))
+
+
+@_operation()
+def multiply_eight(e, own, row, matrix, width, count, out_at):
+    """Write a row times a matrix (count, width) / 8, for eight pairs of them: every number is a vector."""
+    b = e.builder
+
+    def write(columns, begin):
+        answers = _products(e, own, row, b.add(matrix, begin), width, count, columns)
+        for k, answer in enumerate(answers):
+            e.store(answer, own, b.add(b.add(out_at, begin), e.index(k * LANES)))
+
+    _in_columns(e, width, write)
+
+
+@_operation()
+def next_terms_of_eight(e, own, row, older, old, width, count, weight, share, out_at):
+    """As ``next_term`` for eight series at once: the row holds factors of ``older`` and then of ``old``, (count, width)."""
+    b = e.builder
+    shares, weights = e.spread(share), e.spread(b.fmul(weight, share))
+    second = b.add(row, e.times(count, LANES))
+
+    def write(columns, begin):
+        known = _products(e, own, row, b.add(older, begin), width, count, columns)
+        new = _products(e, own, second, b.add(old, begin), width, count, columns)
+        for k, pair in enumerate(zip(known, new, strict=True)):
+            answer = e.fma(weights, pair[1], b.fmul(shares, pair[0]))
+            e.store(answer, own, b.add(b.add(out_at, begin), e.index(k * LANES)))
+
+    _in_columns(e, width, write)
 
 
 @_operation()

@@ -9,7 +9,7 @@ channel j, closed on side s_j = +-1 with clearance c_j. With z = (p, p', 1, x, x
 p'' = A z, and the Taylor series of p follows from A alone.
 
 A bin is cut into looks of eight intervals. The propagator of an interval is the series for all columns of z at once,
-summed to round-off; squared three times it is that of a look.
+summed to round-off; squared three times it is that of a look. Eight bins are worked on side by side.
 """
 
 from typing import NamedTuple
@@ -21,15 +21,15 @@ from numba.extending import register_jitable
 from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import (
     LANES,
-    add_columns,
+    add_rows,
     aligned,
     copy,
     item,
     keep_largest,
-    next_term,
+    multiply_eight,
+    next_terms_of_eight,
     padded,
     put,
-    scale_and_add,
 )
 from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, SHARES
 
@@ -62,24 +62,20 @@ def table_places(n: int, m: int) -> tuple[int, ...]:
 
 
 class _Space(NamedTuple):
-    """Work space for the tables of one bin and contact set, as rows of ``width`` in one array.
+    """Work space for the tables of eight bins at once: each of its numbers is a vector.
 
     Attributes
     ----------
     n, columns, width : int
-        Coordinates, numbers of z, the same padded.
+        Coordinates, numbers of z, the same times 8.
     held : int
         Acceleration (n, width).
-    nothing, loads : int
-        A row that stays zero, and one for the forcing.
     rows : int
-        Eight rows.
+        Eight rows (width,).
     one, twice : int
         Propagators (2n, width).
     terms : int
-        Terms (order + 1, n, width) of a series.
-    sums : int
-        Factors (2, order + 1) that sum them to a place and to a velocity.
+        Three successive terms (3, n, width) of a series.
     """
 
     own: np.ndarray
@@ -87,63 +83,63 @@ class _Space(NamedTuple):
     columns: int
     width: int
     held: int
-    nothing: int
-    loads: int
     rows: int
     one: int
     twice: int
     terms: int
-    sums: int
 
 
 @njit(cache=True)
-def _space_of(n, m, interval, order):
+def _space_of(n, m):
     columns = 2 * n + FORCING_TERMS + m
-    width = padded(columns)
-    nothing = n * width
-    one = nothing + 10 * width
+    width = LANES * columns
+    rows = n * width
+    one = rows + 8 * width
     twice = one + 2 * n * width
     terms = twice + 2 * n * width
-    sums = terms + (order + 1) * n * width
-    own = aligned(sums + 2 * (order + 1))
-    for k in range(order + 1):
-        own[sums + k], own[sums + order + 1 + k] = 1.0, k / interval
-    return _Space(own, n, columns, width, 0, nothing, nothing + width, nothing + 2 * width, one, twice, terms, sums)
+    return _Space(aligned(terms + 3 * n * width), n, columns, width, 0, rows, one, twice, terms)
 
 
 @part
-def _clear(space, at, width):
-    """Write zeros: the sum of no columns."""
-    add_columns(space.own, at, width, 0, space.own, at, space.own, at, LANES)
+def _fill(space, at, width, value):
+    """Write a value (width,) times."""
+    for i in range(width):
+        put(space.own, at + i, value)
 
 
 @leaf
 def _short_propagator(space, duration, time, order):
     """Write the propagator ``one`` over a time for which ``order`` terms of the series suffice."""
-    own, n, width, terms, loads = space.own, space.n, space.width, space.terms, space.loads
-    size, forcing = n * width, 2 * n
-    _clear(space, terms, 2 * size)
+    own, n, width, one = space.own, space.n, space.width, space.one
+    size, forcing = n * width, 2 * n * LANES
+    _fill(space, space.terms, 2 * size, 0.0)
+    _fill(space, one, 2 * size, 0.0)
     for i in range(n):
-        own[terms + i * width + i], own[terms + size + i * width + n + i] = 1.0, time
+        row = i * (width + LANES)
+        _fill(space, space.terms + row, LANES, 1.0)
+        _fill(space, space.terms + size + row + n * LANES, LANES, time)
+        _fill(space, one + row, LANES, 1.0)
+        _fill(space, one + row + n * LANES, LANES, time)
+        _fill(space, one + size + row + n * LANES, LANES, 1.0)
     scale = 1.0
     for k in range(order - 1):
-        older, old, new = terms + k * size, terms + (k + 1) * size, terms + (k + 2) * size
-        weight, share, more = (k + 1.0) / time, time * time * SHARES[k], space.nothing
+        older, old = space.terms + k % 3 * size, space.terms + (k + 1) % 3 * size
+        new = space.terms + (k + 2) % 3 * size
+        share = time * time * SHARES[k]
         for i in range(n):
-            row = space.held + i * width
+            row, term = space.held + i * width, new + i * width
+            next_terms_of_eight(own, row, older, old, width, n, (k + 1.0) / time, share, term)
             if k < FORCING_TERMS:
-                more, binomial = loads, scale
-                _clear(space, loads, width)
+                binomial = share * scale
                 for j in range(k, FORCING_TERMS):
-                    own[loads + forcing + j - k] = binomial * own[row + forcing + j]
+                    add_rows(own, row + forcing + j * LANES, binomial, term + forcing + (j - k) * LANES, LANES)
                     binomial *= (j + 1.0) / (j + 1 - k)
-                if k == 0:
-                    for c in range(forcing + FORCING_TERMS, space.columns):
-                        own[loads + c] = own[row + c]
-            next_term(own, older, old, width, n, own, row, row + n, more, weight, share, new + i * width)
+            if k == 0:
+                clearances = forcing + FORCING_TERMS * LANES
+                add_rows(own, row + clearances, share, term + clearances, width - clearances)
+        add_rows(own, new, 1.0, one, size)
+        add_rows(own, new, (k + 2) / time, one + size, size)
         scale *= time / duration
-    add_columns(own, terms, size, order + 1, own, space.sums, own, space.one, LANES)
-    add_columns(own, terms, size, order + 1, own, space.sums + order + 1, own, space.one + size, LANES)
 
 
 @leaf
@@ -152,34 +148,35 @@ def _through(space, propagator, share, row, answer):
 
     The powers of x become those of x + ``share``, the step over the duration of the bin; the clearances stay.
     """
-    own, states = space.own, 2 * space.n
-    add_columns(own, propagator, space.width, states, own, row, own, answer, LANES)
+    own, width, states = space.own, space.width, 2 * space.n
+    multiply_eight(own, row, propagator, width, states, answer)
+    forcing, clearances = states * LANES, (states + FORCING_TERMS) * LANES
     for k in range(FORCING_TERMS):
-        binomial = own[row + states + k]
+        binomial = 1.0
         for c in range(k, -1, -1):
-            own[answer + states + c] += binomial
+            add_rows(own, row + forcing + k * LANES, binomial, answer + forcing + c * LANES, LANES)
             binomial *= share * c / (k - c + 1)
-    for c in range(states + FORCING_TERMS, space.columns):
-        own[answer + c] += own[row + c]
+    add_rows(own, row + clearances, 1.0, answer + clearances, width - clearances)
 
 
 @leaf
 def _derivative(space, duration, row, answer):
     """Write the time derivative of a row over z: row B, with z' = B z."""
     own, n = space.own, space.n
-    add_columns(own, space.held, space.width, n, own, row + n, own, answer, LANES)
-    for i in range(n):
-        own[answer + n + i] += own[row + i]
+    multiply_eight(own, row + n * LANES, space.held, space.width, n, answer)
+    add_rows(own, row, 1.0, answer + n * LANES, n * LANES)
+    forcing = 2 * n * LANES
     for k in range(1, FORCING_TERMS):
-        own[answer + 2 * n + k - 1] += own[row + 2 * n + k] * k / duration
+        add_rows(own, row + forcing + k * LANES, k / duration, answer + forcing + (k - 1) * LANES, LANES)
 
 
-@part
+@leaf
 def _from_anchor(space, anchor, row):
     """Let the columns of the clearances of a row count places from the anchor (n, m)."""
     for j in range(anchor.shape[1]):
+        clearance = row + (2 * space.n + FORCING_TERMS + j) * LANES
         for i in range(space.n):
-            space.own[row + 2 * space.n + FORCING_TERMS + j] += space.own[row + i] * anchor[i, j]
+            add_rows(space.own, row + i * LANES, anchor[i, j], clearance, LANES)
 
 
 @leaf
@@ -190,9 +187,16 @@ def _note_largest(space, anchor, row, spare, largest):
     keep_largest(space.own, spare, largest, space.width)
 
 
+@part
+def _deal(space, at, count, table, place, length):
+    """Write a vector into as many rows of tables as there are bins."""
+    for q in range(count):
+        put(table, place + q * length, item(space.own, at + q))
+
+
 @leaf
-def _put_channels(space, row, lag, anchor, duration, interval, table, at):
-    """Fill ``ahead``, ``now`` and ``bound`` of a row of tables: what the channels read in a look.
+def _put_channels(space, row, lag, anchor, s, duration, interval, count, table, at, length):
+    """Fill ``ahead``, ``now`` and ``bound``: what the channels read in a look, with contact set s.
 
     With z' = B z and the row e of a reading, its fourth derivative is e B^4 exp(B t) z. The row of that is computed
     at the ends of all intervals, and between them differs from the nearer of them by exp(B t), |t| up to half an
@@ -201,7 +205,7 @@ def _put_channels(space, row, lag, anchor, duration, interval, table, at):
 
     Overwrites the acceleration.
     """
-    own, n, width = space.own, space.n, space.width
+    own, n, width, columns = space.own, space.n, space.width, space.columns
     m, share = row.shape[0], interval / duration
     places = table_places(n, m)
     now, bound = at + places[4], at + places[5]
@@ -209,78 +213,87 @@ def _put_channels(space, row, lag, anchor, duration, interval, table, at):
     for j in range(m):
         # reading, slope and fourth derivative, and the same one interval later
         first, then = space.rows, space.rows + 3 * width
-        _clear(space, space.rows, 8 * width)
+        _fill(space, space.rows, 8 * width, 0.0)
         for i in range(n):
-            own[first + i], own[first + n + i] = row[j, i], lag[j] * row[j, i]
+            _fill(space, first + i * LANES, LANES, row[j, i])
+            _fill(space, first + (n + i) * LANES, LANES, lag[s, j] * row[j, i])
         _derivative(space, duration, first, first + width)
         _derivative(space, duration, first + width, then)
         _derivative(space, duration, then, then + width)
         _derivative(space, duration, then + width, first + 2 * width)
-        _note_largest(space, anchor, first + 2 * width, spare, largest)
-        for c in range(width):
-            put(table, now + 2 * j * width + c, item(own, first + c))
-            put(table, now + (2 * j + 1) * width + c, item(own, first + width + c))
+        _note_largest(space, anchor[s], first + 2 * width, spare, largest)
+        for c in range(columns):
+            for q in range(2):
+                place = now + (2 * j + q) * padded(columns) + c
+                _deal(space, first + q * width + c * LANES, count, table, place, length)
         for k in range(LANES):
             for q in range(3):
                 _through(space, space.one, share, first + q * width, then + q * width)
             first, then = then, first
-            for c in range(space.columns):
-                place = at + (c * m + j) * 2 * LANES + k
-                put(table, place, item(own, first + c))
-                put(table, place + LANES, item(own, first + width + c))
-            _note_largest(space, anchor, first + 2 * width, spare, largest)
-        for c in range(width):
-            put(table, bound + j * width + c, item(own, largest + c))
+            for c in range(columns):
+                for q in range(2):
+                    place = at + ((c * m + j) * 2 + q) * LANES + k
+                    _deal(space, first + q * width + c * LANES, count, table, place, length)
+            _note_largest(space, anchor[s], first + 2 * width, spare, largest)
+        for c in range(columns):
+            _deal(space, largest + c * LANES, count, table, bound + j * padded(columns) + c, length)
     for i in range(n):
-        _from_anchor(space, anchor, space.held + i * width)
-        copy(own, space.held + i * width, spare, width)
-        keep_largest(own, spare, space.held + i * width, width)
-    term, derived = space.rows, space.rows + width
+        _from_anchor(space, anchor[s], space.held + i * width)
+    keep_largest(own, space.held, space.held, n * width)
     for j in range(m):
-        for c in range(width):
-            put(own, term + c, item(table, bound + j * width + c))
+        term, derived = space.rows, space.rows + width
+        for c in range(columns):
+            for q in range(count):
+                put(own, term + c * LANES + q, item(table, bound + j * padded(columns) + c + q * length))
         copy(own, term, largest, width)
+        share = 1.0
         for k in range(1, BOUND_TERMS):
             _derivative(space, duration, term, derived)
-            scale_and_add(own, derived, 0.5 * interval / k, largest, width)
+            share *= 0.5 * interval / k
+            add_rows(own, derived, share, largest, width)
             term, derived = derived, term
         # the terms left out shrink at least by half each
-        scale_and_add(own, term, 1.0, largest, width)
-        for c in range(width):
-            put(table, bound + j * width + c, item(own, largest + c))
+        add_rows(own, term, share, largest, width)
+        for c in range(columns):
+            _deal(space, largest + c * LANES, count, table, bound + j * padded(columns) + c, length)
 
 
 @leaf
-def _put_states(space, propagator, table, at):
+def _put_states(space, propagator, count, table, at, length):
     """Store a propagator by columns."""
     states = padded(2 * space.n)
     for c in range(space.columns):
         for i in range(2 * space.n):
-            put(table, at + c * states + i, item(space.own, propagator + i * space.width + c))
+            _deal(space, propagator + i * space.width + c * LANES, count, table, at + c * states + i, length)
 
 
 @leaf
-def _put_acceleration(space, free, forcing, push, rate, row, s, b, table, at):
-    """Sum the acceleration of a bin and contact set at a crank rate: by rows in ``held``, by columns in the table."""
+def _put_acceleration(space, free, forcing, push, rate, row, s, first, count, table, at, length):
+    """Sum accelerations of some bins at a crank rate: by rows in ``held``, by columns in their tables."""
     m, n = row.shape
-    own, width, lanes = space.own, space.width, padded(n + m)
-    for i in range(n):
-        held = space.held + i * width
-        for c in range(2 * n):
-            total = free[0, b, c, i] + rate * free[1, b, c, i] + rate * rate * free[2, b, c, i]
-            put(own, held + c, total + push[s, b, c, i])
-        for k in range(FORCING_TERMS):
-            put(own, held + 2 * n + k, forcing[0, b, k, i] + rate * rate * forcing[1, b, k, i])
-        for j in range(m):
-            put(own, held + 2 * n + FORCING_TERMS + j, push[s, b, 2 * n + j, i])
-    for c in range(space.columns):
+    own, columns, lanes = space.own, space.columns, padded(n + m)
+    for q in range(LANES):
+        # vectors that are not full repeat the last bin
+        b = first + min(q, count - 1)
         for i in range(n):
-            put(table, at + c * lanes + i, item(own, space.held + i * width + c))
-        for j in range(m):
-            total = 0.0
+            held = space.held + i * space.width + q
+            for c in range(2 * n):
+                total = free[0, b, c, i] + rate * free[1, b, c, i] + rate * rate * free[2, b, c, i]
+                put(own, held + c * LANES, total + push[s, b, c, i])
+            for k in range(FORCING_TERMS):
+                put(own, held + (2 * n + k) * LANES, forcing[0, b, k, i] + rate * rate * forcing[1, b, k, i])
+            for j in range(m):
+                put(own, held + (2 * n + FORCING_TERMS + j) * LANES, push[s, b, 2 * n + j, i])
+    for q in range(count):
+        place = at + q * length
+        for c in range(columns):
             for i in range(n):
-                total += row[j, i] * item(own, space.held + i * width + c)
-            put(table, at + c * lanes + n + j, total)
+                put(table, place + c * lanes + i, item(own, space.held + i * space.width + c * LANES + q))
+            for j in range(m):
+                total = 0.0
+                for i in range(n):
+                    total += row[j, i] * item(own, space.held + i * space.width + c * LANES + q)
+                put(table, place + c * lanes + n + j, total)
 
 
 @njit(cache=True, nogil=True)
@@ -319,19 +332,18 @@ def tables(free, forcing, push, rate, row, lag, anchor, duration, steps, order):
     interval = duration / (LANES * steps)
     places = table_places(n, m)
     length = places[6]
-    table = aligned(sets * bins * length)
-    space = _space_of(n, m, interval, order)
+    table, space = aligned(sets * bins * length), _space_of(n, m)
     for s in range(sets):
-        for b in range(bins):
-            at = (s * bins + b) * length
-            _put_acceleration(space, free, forcing, push, rate, row, s, b, table, at + places[3])
+        for first in range(0, bins, LANES):
+            at, count = (s * bins + first) * length, min(LANES, bins - first)
+            _put_acceleration(space, free, forcing, push, rate, row, s, first, count, table, at + places[3], length)
             _short_propagator(space, duration, interval, order)
-            _put_states(space, space.one, table, at + places[2])
-            _put_channels(space, row, lag[s], anchor[s], duration, interval, table, at)
+            _put_states(space, space.one, count, table, at + places[2], length)
+            _put_channels(space, row, lag, anchor, s, duration, interval, count, table, at, length)
             before, after, share = space.one, space.twice, interval / duration
             for _ in range(3):
                 for i in range(2 * n):
                     _through(space, before, share, before + i * space.width, after + i * space.width)
                 before, after, share = after, before, 2.0 * share
-            _put_states(space, before, table, at + places[1])
+            _put_states(space, before, count, table, at + places[1], length)
     return table
