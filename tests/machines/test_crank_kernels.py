@@ -9,12 +9,14 @@ import pytest
 from chaosgym import SliderCrank
 from chaosgym.core.cubic import cubic
 from chaosgym.core.cycle import Episode, cycle_arrays
+from chaosgym.core.lanes import LANES, padded
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import SimulationError
 from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.kernels.contact import KEEPS, UNSURE, judge
 from chaosgym.machines.slider_crank.kernels.exact import advance
-from chaosgym.machines.slider_crank.kernels.propagator import TICKS, series_order, tables
+from chaosgym.machines.slider_crank.kernels.propagator import table_places, tables
+from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, series_order
 from chaosgym.simulation import ExactEvents, simulate, simulate_with_deviations
 from tests.machines.crank_twin import continuous_twin, rigid_twin
 from tests.plain_modes import PLAIN_CRANK
@@ -67,24 +69,20 @@ def frozen_model(machine, duration):
     """
     model = machine.reduce()
     place = round(40.0 / machine.matrix_update_interval)
-    acceleration = np.ascontiguousarray(model.acceleration[:, [place, place]])
-    n = model.row.shape[1]
-    acceleration[:, :, n : 2 * n + 4] = 0.0
+    m, n = model.row.shape
+    at = table_places(n, m)
+    row = model.table.reshape(2, model.bins, at[6])[:, place, at[3] : at[4]]
+    acceleration = row.reshape(2, 2 * n + FORCING_TERMS + m, padded(n + m))[:, :, :n]
+    free, forcing, push = np.zeros((3, 2, 2 * n, n)), np.zeros((2, 2, FORCING_TERMS, n)), np.zeros((2, 2, 2 * n + m, n))
+    free[0, :, :n] = acceleration[0, :n]
+    push[1, :, :n] = acceleration[1, :n] - acceleration[0, :n]
+    push[1, :, 2 * n :] = acceleration[1, 2 * n + FORCING_TERMS :]
     spectrum = 2.0 * model.contact_rate
-    steps = math.ceil(duration / 2 * spectrum / (TICKS * 0.5))
-    step = duration / 2 / steps
-    order = series_order(spectrum * step / TICKS)
+    steps = math.ceil(duration / 2 * spectrum / LANES)
+    order = series_order(duration / 2 * spectrum / (LANES * steps))
     undamped = np.zeros((2, 1))
-    propagator, bound = tables(acceleration, model.row, undamped, model.anchor, duration / 2, step, order)
-    return model._replace(
-        bin_duration=duration / 2,
-        steps=steps,
-        order=order,
-        spectrum=spectrum,
-        acceleration=acceleration,
-        propagator=propagator,
-        bound=bound,
-    )
+    table = tables(free, forcing, push, 0.0, model.row, undamped, model.anchor, duration / 2, steps, order)
+    return model._replace(bin_duration=duration / 2, bins=2, steps=steps, order=order, spectrum=spectrum, table=table)
 
 
 def test_energy_is_conserved_without_damping():

@@ -218,9 +218,9 @@ def test_only_the_required_coordinates_are_integrated():
 
 
 def test_clearance_shares_the_cached_propagators():
-    """Machines that differ in clearance use the same arrays, so a sweep over clearance costs no assembly."""
+    """Machines that differ in clearance use the same tables, so a sweep over clearance costs no assembly."""
     one, other = CRANK.reduce(), replace(CRANK, slider_clearance=0.1e-3).reduce()
-    assert one.propagator is other.propagator
+    assert one.table is other.table
     assert one.gap[0] == 0.254e-3
     assert other.gap[0] == 0.1e-3
 
