@@ -116,6 +116,15 @@ def next_term(table, at, width, count, series, older_at, old_at, weight, share, 
 
 
 @operation
+def sum_series(series, at, stride, last, time, out, out_at, width):
+    """Value and first two derivatives of the columns of a series."""
+    columns = _taken(series, at, last + 1, stride)[::-1, :width]
+    for k in range(3):
+        of_power = [np.polyval(np.polyder(column, k), time) for column in columns.T]
+        out[out_at + k * width : out_at + (k + 1) * width] = of_power
+
+
+@operation
 def item(own, at):
     """Number at a place."""
     return own[at]

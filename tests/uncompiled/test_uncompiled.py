@@ -23,6 +23,7 @@ CALLS = {
     "dot_of_sizes": lambda call, table, own: call(own, 0, 100, 24),
     "add_columns": lambda call, table, own: call(table, 0, 16, 5, own, 700, own, 900),
     "next_term": lambda call, table, own: call(table, 0, 16, 5, own, 512, 540, 2.0, 0.25, 600),
+    "sum_series": lambda call, table, own: call(table, 3, 20, 6, 0.7, own, 900, 16),
     "item": lambda call, table, own: call(own, 7),
     "fma": lambda call, table, own: call(own[0], own[1], own[2]),
 }

@@ -347,6 +347,29 @@ def next_term(e, table, at, width, count, series, older_at, old_at, weight, shar
         e.store(b.fmul(shares, e.fma(weights, new, known)), series, place)
 
 
+@_operation(lanes=GROUP)
+def sum_series(e, series, at, stride, last, time, out, out_at, width):
+    """Write value and first two derivatives at ``time`` of ``width`` columns, a multiple of 4, into ``out`` (3, width).
+
+    The series has a row of ``stride`` coefficients for each power of time up to ``last``.
+    """
+    b, times = e.builder, e.spread(time)
+    sums = [e.accumulator(e.constant(0.0)) for _ in range(3)]
+    with e.vectors(width) as columns:
+        first = e.times(columns.index, GROUP)
+        begin = b.add(at, first)
+        for one in sums:
+            b.store(e.constant(0.0), one)
+        with cgutils.for_range(b, b.add(last, e.index(1))) as terms:
+            coefficient = e.load(series, b.add(begin, b.mul(b.sub(last, terms.index), stride)))
+            value, slope, bend = (b.load(one) for one in sums)
+            for one, sum_so_far, new in zip(sums, (value, slope, bend), (coefficient, value, slope), strict=True):
+                b.store(e.fma(sum_so_far, times, new), one)
+        for q, factor in enumerate((1.0, 1.0, 2.0)):
+            place = b.add(b.add(out_at, first), b.mul(e.index(q), width))
+            e.store(b.fmul(b.load(sums[q]), e.constant(factor)), out, place)
+
+
 @_operation(types.float64)
 def item(e, own, at):
     """Number at a place that is not negative: numba's own indexing first asks for that."""
