@@ -67,6 +67,18 @@ def combine(table, count, factors, answer):
 
 
 @leaf
+def shift_forcing(powers, k, scale, factors):
+    """Write the factors of F_j in coefficient k of sum_j F_j (x + t / duration)^j; ``powers`` are those of x.
+
+    ``scale`` is duration^-k.
+    """
+    binomial = scale
+    for j in range(k, FORCING_TERMS):
+        factors[j] = binomial * powers[j - k]
+        binomial *= (j + 1.0) / (j + 1 - k)
+
+
+@leaf
 def expand(a, n, z, duration, last, factors, series):
     """Taylor coefficients about the instant of z, in seconds, up to the order ``last``.
 
@@ -82,13 +94,9 @@ def expand(a, n, z, duration, last, factors, series):
     for k in range(last - 1):
         new = series[k + 2]
         if k < FORCING_TERMS:
-            # coefficient of t^k of sum_j F_j (x + t / duration)^j
             for c in range(FORCING_TERMS, forcing.shape[0]):
                 factors[c] = z[2 * n + c]
-            binomial = scale
-            for j in range(k, FORCING_TERMS):
-                factors[j] = binomial * z[2 * n + j - k]
-                binomial *= (j + 1.0) / (j + 1 - k)
+            shift_forcing(z[2 * n :], k, scale, factors)
             if k == 0:
                 combine(forcing, forcing.shape[0], factors, new)
             else:
