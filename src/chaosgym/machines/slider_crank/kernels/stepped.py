@@ -53,6 +53,12 @@ ORDER = 16
 POLISH = 50
 """Instants tried to locate one event; the secant method needs three to six."""
 
+CLOSER = 1e-3
+"""Share of the tolerance within which an event is placed: a series is read fast, and chaos magnifies what is left."""
+
+ROUNDING = 1e-15
+"""Least share of a time within which an event in it can be placed."""
+
 SHORTEST = 1e-9
 """Shortest span, as a share of a piece: a motion that runs away must come to its end."""
 
@@ -422,6 +428,7 @@ def first_change(model, series, low, until, closed, view, f_low, tolerance):
 
     Regula falsi on the series, an end halved when it was kept twice (Illinois). Leaves ``view`` at that instant.
     """
+    tolerance = max(CLOSER * tolerance, ROUNDING * until)
     f_low = max(f_low, 0.0)
     high, f_high = until, 0.0
     t, kept = until, 0
