@@ -38,7 +38,7 @@ SCENES: Mapping[str, Mapping[str, Any]] = {
 class SceneCost:
     """What a scene of the slider crank requires.
 
-    ``scene``; ``degrees_of_freedom`` names of what is integrated; ``method`` "exact" or "Runge-Kutta"; ``setup`` [s]
+    ``scene``; ``degrees_of_freedom`` names of what is integrated; ``method`` "exact" or "Taylor"; ``setup`` [s]
     until a machine is ready that was never seen; ``revolution`` [s] to compute a settled revolution. Both are
     processor time, which other load on the computer hardly changes.
     """
@@ -65,6 +65,6 @@ def scene_costs(revolutions: int = 10) -> list[SceneCost]:
         start = time.thread_time()
         simulate(crank, revolutions, state)
         revolution = (time.thread_time() - start) / revolutions
-        method = "Runge-Kutta" if isinstance(model, SteppedCrankModel) else "exact"
+        method = "Taylor" if isinstance(model, SteppedCrankModel) else "exact"
         costs.append(SceneCost(scene, crank.degrees_of_freedom, method, setup, revolution))
     return costs

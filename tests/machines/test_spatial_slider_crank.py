@@ -259,7 +259,7 @@ def test_sensors_off_the_middle_keep_the_slider_from_rolling():
 
 
 def test_a_scene_with_many_contact_sets_is_left_to_the_stepper():
-    """Both joints instrumented or gapped in space: six channels, 64 contact sets, run by Runge-Kutta all the same."""
+    """Both joints instrumented or gapped in space: six channels, 64 contact sets, run by Taylor series all the same."""
     machine = replace(CRANK, motor_angle=10.0, ball_joint="instrumented", rod="rigid", ball_clearance=0.05e-3)
     assert isinstance(machine.reduce(), SteppedCrankModel)
     assert isinstance(replace(machine, ball_joint="ideal").reduce(), SliderCrankModel)

@@ -3,8 +3,6 @@
 Arguments are those of the compiled operations, which the library documents.
 """
 
-import math
-
 import numpy as np
 
 from chaosgym.core.lanes import LANES, TAYLOR_TERMS
@@ -161,14 +159,6 @@ def keep_largest(own, at, largest_at, width):
 
 
 @operation
-def taylor(own, at, width, last, time, out_at):
-    """A polynomial and three derivatives of it."""
-    for k in range(4):
-        powers = [math.perm(i, k) * time ** (i - k) if i >= k else 0.0 for i in range(last + 1)]
-        own[out_at + k * width :][:width] = np.array(powers) @ _taken(own, at, last + 1, width)
-
-
-@operation
 def add_tops(own, values_at, slopes_at, h, sign, weight, more, totals_at):
     """Largest values of cubics."""
     values, slopes = sign * own[values_at : values_at + 9], sign * own[slopes_at : slopes_at + 9]
@@ -182,6 +172,15 @@ def first_above(own, at, limit, start):
     above = ~(own[at : at + LANES] < limit)
     above[:start] = False
     return int(np.argmax(above)) if above.any() else LANES
+
+
+@operation
+def sum_series(series, at, stride, last, time, out, out_at, width):
+    """Value and first two derivatives of the columns of a series."""
+    columns = _taken(series, at, last + 1, stride)[::-1, :width]
+    for k in range(3):
+        of_power = [np.polyval(np.polyder(column, k), time) for column in columns.T]
+        out[out_at + k * width : out_at + (k + 1) * width] = of_power
 
 
 @operation

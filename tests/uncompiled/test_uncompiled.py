@@ -30,7 +30,7 @@ CALLS = {
     "next_terms_of_eight": lambda call, table, own: call(own, 0, 100, 240, 24, 5, 2.0, 0.25, 600),
     "keep_largest": lambda call, table, own: call(own, 3, 600, 16),
     "put": lambda call, table, own: call(own, 3, 0.3),
-    "taylor": lambda call, table, own: call(own, 0, 16, 9, 0.3, 600),
+    "sum_series": lambda call, table, own: call(table, 3, 24, 6, 0.7, own, 900, 16),
     "add_tops": lambda call, table, own: call(own, 0, 20, 0.1, -1.0, 0.7, 0.2, 600),
     "first_above": lambda call, table, own: call(own, 3, 0.4, 2),
     "item": lambda call, table, own: call(own, 7),

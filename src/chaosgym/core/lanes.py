@@ -30,9 +30,9 @@ _OVERSHOOT = 4.0 / 27.0
 
 
 @register_jitable
-def padded(count: int, lanes: int = LANES) -> int:
-    """Count, rounded up to a multiple of the lanes."""
-    return lanes * ((count + lanes - 1) // lanes)
+def padded(count: int) -> int:
+    """Count, rounded up to a multiple of 8."""
+    return LANES * ((count + LANES - 1) // LANES)
 
 
 @register_jitable
@@ -44,22 +44,23 @@ def aligned(size: int) -> Any:
 
 
 class _Emitter:
-    """Instructions of vectors of some lanes."""
+    """Instructions of vectors."""
 
-    def __init__(self, builder: Any, lanes: int) -> None:
-        self.builder, self.lanes = builder, lanes
-        self.kind = ir.VectorType(_DOUBLE, lanes)
+    kind = ir.VectorType(_DOUBLE, LANES)
+
+    def __init__(self, builder: Any) -> None:
+        self.builder = builder
 
     def intrinsic(self, name: str, operands: list[Any]) -> Any:
         kind = ir.FunctionType(self.kind, [self.kind] * len(operands))
-        function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.{name}.v{self.lanes}f64")
+        function = cgutils.get_or_insert_function(self.builder.module, kind, f"llvm.{name}.v{LANES}f64")
         return self.builder.call(function, operands)
 
     def fma(self, a: Any, b: Any, c: Any) -> Any:
         return self.intrinsic("fma", [a, b, c])
 
     def constant(self, value: float) -> Any:
-        return ir.Constant(self.kind, [value] * self.lanes)
+        return ir.Constant(self.kind, [value] * LANES)
 
     def index(self, value: int) -> Any:
         return ir.Constant(_INDEX, value)
@@ -82,15 +83,15 @@ class _Emitter:
         self.builder.store(vector, self.address(pointer, at)).align = 8
 
     def spread(self, scalar: Any) -> Any:
-        kind = ir.VectorType(scalar.type, self.lanes)
+        kind = ir.VectorType(scalar.type, LANES)
         nothing = ir.Constant(kind, ir.Undefined)
         first = self.builder.insert_element(nothing, scalar, ir.Constant(_INT, 0))
-        zeros = ir.Constant(ir.VectorType(_INT, self.lanes), [0] * self.lanes)
+        zeros = ir.Constant(ir.VectorType(_INT, LANES), [0] * LANES)
         return self.builder.shuffle_vector(first, nothing, zeros)
 
     def shifted(self, vector: Any, first: Any) -> Any:
         """A number and all lanes but the last: a load across what was just stored would wait for it."""
-        mask = ir.Constant(ir.VectorType(_INT, self.lanes), [self.lanes, *range(self.lanes - 1)])
+        mask = ir.Constant(ir.VectorType(_INT, LANES), [LANES, *range(LANES - 1)])
         return self.builder.shuffle_vector(vector, self.spread(first), mask)
 
     def larger(self, a: Any, b: Any) -> Any:
@@ -101,10 +102,10 @@ class _Emitter:
 
     def folded(self, vector: Any, combine: Any) -> Any:
         """All lanes combined, halves first."""
-        shift = self.lanes // 2
+        shift = LANES // 2
         while shift:
-            lanes = [(i + shift) % self.lanes for i in range(self.lanes)]
-            mask = ir.Constant(ir.VectorType(_INT, self.lanes), lanes)
+            lanes = [(i + shift) % LANES for i in range(LANES)]
+            mask = ir.Constant(ir.VectorType(_INT, LANES), lanes)
             vector = combine(vector, self.builder.shuffle_vector(vector, ir.Constant(self.kind, ir.Undefined), mask))
             shift //= 2
         return self.builder.extract_element(vector, ir.Constant(_INT, 0))
@@ -120,11 +121,11 @@ class _Emitter:
 
     def vectors(self, width: Any, at_once: int = 1) -> Any:
         """Loop over the vectors of a width, some at once; its index times their lanes is where each begins."""
-        return cgutils.for_range(self.builder, self.builder.udiv(width, self.index(at_once * self.lanes)))
+        return cgutils.for_range(self.builder, self.builder.udiv(width, self.index(at_once * LANES)))
 
     def lanes_below(self, count: Any) -> Any:
         """Mask of the lanes whose number is below a count."""
-        numbers = ir.Constant(ir.VectorType(_INDEX, self.lanes), list(range(self.lanes)))
+        numbers = ir.Constant(ir.VectorType(_INDEX, LANES), list(range(LANES)))
         return self.builder.icmp_signed("<", numbers, self.spread(count))
 
 
@@ -132,7 +133,7 @@ def _argument_type(kind: Any) -> Any:
     return kind if isinstance(kind, types.Array) else types.int64 if isinstance(kind, types.Integer) else types.float64
 
 
-def _operation(returns: Any = types.void, lanes: int = LANES) -> Callable[[Callable[..., Any]], Any]:
+def _operation(returns: Any = types.void) -> Callable[[Callable[..., Any]], Any]:
     """Intrinsic whose instructions a function of an emitter and the arguments writes; an array comes as a pointer."""
 
     def decorate(write: Callable[..., Any]) -> Any:
@@ -142,7 +143,7 @@ def _operation(returns: Any = types.void, lanes: int = LANES) -> Callable[[Calla
                     context.make_array(kind)(context, builder, value).data if isinstance(kind, types.Array) else value
                     for kind, value in zip(signature.args, arguments, strict=True)
                 ]
-                result = write(_Emitter(builder, lanes), *values)
+                result = write(_Emitter(builder), *values)
                 return context.get_dummy_value() if result is None else result
 
             return returns(*map(_argument_type, given)), build
@@ -316,11 +317,11 @@ def dot_of_distances(e, table, at, own, u_at, v_at, width):
 def copy(e, own, at, out_at, count):
     """Copy some numbers within an array, whose parts must not overlap: numba's own indexing asks for every sign."""
     b = e.builder
-    name, size = f"llvm.masked.store.v{e.lanes}f64.p0v{e.lanes}f64", ir.IntType(1)
-    kinds = [e.kind, e.kind.as_pointer(), _INT, ir.VectorType(size, e.lanes)]
+    name, size = f"llvm.masked.store.v{LANES}f64.p0v{LANES}f64", ir.IntType(1)
+    kinds = [e.kind, e.kind.as_pointer(), _INT, ir.VectorType(size, LANES)]
     store = cgutils.get_or_insert_function(b.module, ir.FunctionType(ir.VoidType(), kinds), name)
-    with e.vectors(b.add(count, e.index(e.lanes - 1))) as loop:
-        first = e.times(loop.index, e.lanes)
+    with e.vectors(b.add(count, e.index(LANES - 1))) as loop:
+        first = e.times(loop.index, LANES)
         target, left = e.address(own, b.add(out_at, first)), e.lanes_below(b.sub(count, first))
         b.call(store, [e.load(own, b.add(at, first)), target, ir.Constant(_INT, 8), left])
 
@@ -357,8 +358,8 @@ def add_columns(e, table, at, width, count, factors, factors_at, out, out_at, st
 
 @_operation()
 def next_term(e, table, older, old, width, count, factors, by_older, by_old, more_at, weight, share, out_at):
-    """Write ``share`` times all of: ``count`` columns from ``older`` on times their factors, ``weight`` times those from
-    ``old`` on times theirs, and what lies at ``more_at``. Factors, what is more and what is written are in one array."""
+    """Write ``share`` times all of: ``count`` columns from ``older`` on times their factors, ``weight`` times those
+    from ``old`` on times theirs, and what lies at ``more_at``, in the array of the factors and of the answer."""
     b = e.builder
     shares, weights = e.spread(share), e.spread(b.fmul(weight, share))
     with e.vectors(width) as rows:
@@ -382,7 +383,7 @@ def add_rows(e, own, at, factor, sum_at, width):
 
 
 def _products(e, own, row, matrix, width, count, columns):
-    """Sums over k < ``count`` of vector k from ``row`` on times vectors of a matrix (count, width), adjacent columns."""
+    """Sums over k < ``count`` of vector k of a row times those of adjacent columns of a matrix (count, width)."""
     b = e.builder
     totals = [e.accumulator(e.constant(0.0)) for _ in range(columns)]
     with cgutils.for_range(b, count) as loop:
@@ -418,7 +419,7 @@ def multiply_eight(e, own, row, matrix, width, count, out_at):
 
 @_operation()
 def next_terms_of_eight(e, own, row, older, old, width, count, weight, share, out_at):
-    """As ``next_term`` for eight series at once: the row holds factors of ``older`` and then of ``old``, (count, width)."""
+    """As ``next_term`` for eight series at once: the row holds factors of ``older`` and ``old``, (count, width)."""
     b = e.builder
     shares, weights = e.spread(share), e.spread(b.fmul(weight, share))
     second = b.add(row, e.times(count, LANES))
@@ -445,29 +446,8 @@ def keep_largest(e, own, at, largest_at, width):
 
 
 @_operation()
-def taylor(e, own, at, width, last, time, out_at):
-    """Value and first three derivatives at ``time`` of a series whose coefficients (last + 1, width) begin at ``at``.
-
-    They are written from ``out_at`` on, ``width`` numbers each.
-    """
-    b = e.builder
-    times = e.spread(time)
-    with e.vectors(width) as rows:
-        first = e.times(rows.index, LANES)
-        value, slope, bend, third = (e.accumulator(e.constant(0.0)) for _ in range(4))
-        with cgutils.for_range(b, b.add(last, e.index(1))) as loop:
-            coefficient = e.load(own, b.add(b.add(at, first), b.mul(b.sub(last, loop.index), width)))
-            for higher, lower in ((third, bend), (bend, slope), (slope, value)):
-                b.store(e.fma(b.load(higher), times, b.load(lower)), higher)
-            b.store(e.fma(b.load(value), times, coefficient), value)
-        for k, (derivative, factor) in enumerate(((value, 1.0), (slope, 1.0), (bend, 2.0), (third, 6.0))):
-            answer = b.fmul(b.load(derivative), e.constant(factor))
-            e.store(answer, own, b.add(b.add(out_at, first), e.times(width, k)))
-
-
-@_operation()
 def add_tops(e, own, values_at, slopes_at, h, sign, weight, more, totals_at):
-    """Add to eight totals what ``sign`` times a quantity reaches at most in each interval, times ``weight``, + ``more``.
+    """Add to eight totals what ``sign`` times a quantity is at most in each interval, times ``weight``, + ``more``.
 
     Values and slopes (9,) and what the cubic through them reaches are those of ``first_doubt``.
     """
@@ -489,6 +469,29 @@ def first_above(e, own, at, limit, start):
     below = b.or_(b.fcmp_ordered("<", e.load(own, at), e.spread(limit)), e.lanes_below(start))
     bits = b.zext(b.bitcast(b.not_(below), ir.IntType(LANES)), _INDEX)
     return b.cttz(b.or_(bits, e.index(1 << LANES)), ir.Constant(ir.IntType(1), 1))
+
+
+@_operation()
+def sum_series(e, series, at, stride, last, time, out, out_at, width):
+    """Write value and first two derivatives at ``time`` of ``width`` columns, a multiple of 8, into ``out`` (3, width).
+
+    The series has a row of ``stride`` coefficients for each power of time up to ``last``.
+    """
+    b, times = e.builder, e.spread(time)
+    sums = [e.accumulator(e.constant(0.0)) for _ in range(3)]
+    with e.vectors(width) as columns:
+        first = e.times(columns.index, LANES)
+        begin = b.add(at, first)
+        for one in sums:
+            b.store(e.constant(0.0), one)
+        with cgutils.for_range(b, b.add(last, e.index(1))) as terms:
+            coefficient = e.load(series, b.add(begin, b.mul(b.sub(last, terms.index), stride)))
+            value, slope, bend = (b.load(one) for one in sums)
+            for one, sum_so_far, new in zip(sums, (value, slope, bend), (coefficient, value, slope), strict=True):
+                b.store(e.fma(sum_so_far, times, new), one)
+        for q, factor in enumerate((1.0, 1.0, 2.0)):
+            place = b.add(b.add(out_at, first), b.mul(e.index(q), width))
+            e.store(b.fmul(b.load(sums[q]), e.constant(factor)), out, place)
 
 
 @_operation(types.float64)

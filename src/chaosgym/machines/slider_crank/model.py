@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.core.lanes import LANES
+from chaosgym.core.lanes import LANES, padded
 from chaosgym.machines.slider_crank.equations import Equations, equations, loads, rod_of
 from chaosgym.machines.slider_crank.joints import Channels, channels_of, display_of, gaps_of, hertz_constants, joints_of
 from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
@@ -35,8 +35,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-STABLE_PHASE = 2.0
-"""Longest Runge-Kutta step times largest eigenvalue; the method is stable up to 2.7."""
+PIECE_PHASE = 2.0
+"""Longest piece of a Taylor series times largest eigenvalue without contact."""
+
+SPAN_PHASE = 5.0
+"""Longest span of a Taylor series times largest eigenvalue without contact: stable for modes damped by 0.1 %."""
+
+SPAN_ERROR = 1e-10
+"""Last terms [m/s] of the Taylor series of velocities at the end of a span, by default."""
 
 STEP_PHASE = 0.5
 """Angle [rad] by which the fastest motion turns in half an interval of a look, by default."""
@@ -108,12 +114,12 @@ def _models_by_speed(step_phase: float, *structure: Any) -> ModelsBySpeed:
 
 
 def models_by_speed(machine: "SliderCrank", step_phase: float = STEP_PHASE) -> ModelsBySpeed:
-    """Models of a machine that ``has_propagators``; the fastest motion turns by ``step_phase`` [rad] in half an interval."""
+    """Models of a machine that ``has_propagators``; ``step_phase`` is that of ``SliderCrank.reduce``."""
     return _models_by_speed(step_phase, *_key(machine))
 
 
 def exact_model(machine: "SliderCrank", step_phase: float) -> SliderCrankModel:
-    """Model of a machine that ``has_propagators``; the fastest motion turns by ``step_phase`` [rad] in half an interval."""
+    """Model of a machine that ``has_propagators``; ``step_phase`` is that of ``SliderCrank.reduce``."""
     return models_by_speed(machine, step_phase).at(machine.crank_speed)._replace(gap=gaps_of(machine))
 
 
@@ -170,7 +176,10 @@ def _free_motion(free: Array, forcing: Array, rate: float) -> Array:
 
 
 def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankModel:
-    """Model of any machine for the Runge-Kutta stepper, a closed contact turning by ``step_phase`` / 4 in a step."""
+    """Model of any machine for the stepper.
+
+    A closed contact turns by ``step_phase`` / 4 in a piece of a series; half of it leaves a sixteenth of the error.
+    """
     inverse_mass, free, forcing, friction = _held(*_key(machine))
     joints = joints_of(machine)
     row = np.concatenate([joint.row for joint in joints])
@@ -179,7 +188,7 @@ def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankMode
     first = np.cumsum([0] + [len(joint.row) for joint in joints])
     linear = machine.contact_law == "linear"
     stiffness, damping = (machine.contact_stiffness, machine.contact_damping) if linear else hertz_constants(machine)
-    answer = np.ascontiguousarray(np.swapaxes(inverse_mass @ row.T, -1, -2))
+    answer = np.swapaxes(inverse_mass @ row.T, -1, -2)
     slide = -np.einsum("bij,bj->bi", inverse_mass, friction)
     contact = math.sqrt(machine.contact_stiffness * np.max(np.einsum("brn,rn->br", answer, row)))
     bins = len(inverse_mass)
@@ -191,17 +200,18 @@ def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankMode
     spectrum = float(np.max(np.abs(np.linalg.eigvals(system[[0, bins // 4]]))))
     return SteppedCrankModel(
         bin_duration=duration,
-        steps=max(1, math.ceil(duration * max(4.0 * contact / step_phase, spectrum / STABLE_PHASE))),
+        steps=max(1, math.ceil(duration * max(4.0 * contact / step_phase, spectrum / PIECE_PHASE))),
+        longest=duration / max(1.0, duration * spectrum / SPAN_PHASE),
+        tolerance=SPAN_ERROR * step_phase**4,
         contact_rate=contact,
-        acceleration=np.ascontiguousarray(np.swapaxes(acceleration, -1, -2)),
+        acceleration=_with_readings(np.concatenate([acceleration, -answer, slide[:, None]], axis=1), row),
         first=first,
         row=row,
-        answer=answer,
-        friction=np.stack([slide * joint.slides for joint in joints], axis=1),
         gap=np.array([joint.gap for joint in joints]),
         stiffness=stiffness * scale,
         damping=damping * np.array([joint.damping for joint in joints]) if linear else np.full(len(joints), damping),
         law=LINEAR if linear else HERTZ,
+        slides=np.array([float(joint.slides) for joint in joints]),
         two_sided=np.array([joint.two_sided for joint in joints]),
         reading=np.concatenate([joint.reading for joint in joints]),
         monitored=np.array([bool(np.any(joint.reading)) for joint in joints]),
@@ -209,21 +219,31 @@ def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankMode
     )
 
 
+def _with_readings(accelerations: Array, row: Array) -> Array:
+    """Lanes of ``SteppedCrankModel`` of accelerations (..., n)."""
+    rows, n = row.shape
+    lanes = np.zeros((*accelerations.shape[:-1], padded(rows + n)))
+    lanes[..., :rows] = accelerations @ row.T
+    lanes[..., rows : rows + n] = accelerations
+    return lanes
+
+
 def fastest_rate(machine: "SliderCrank", model: SteppedCrankModel) -> float:
     """Largest modulus [1/s] of an eigenvalue with every contact closed."""
-    some = [0, len(model.answer) // 4]
-    n = model.row.shape[1]
+    rows, n = model.row.shape
+    some = model.acceleration[[0, len(model.acceleration) // 4], :, rows : rows + n]
+    pushes = slice(2 * n + FORCING_TERMS, 2 * n + FORCING_TERMS + rows)
     system = np.zeros((len(some), 2 * n, 2 * n))
-    system[:, :n, n:] = np.eye(n)
-    system[:, n:] = model.acceleration[some][:, :, : 2 * n]
-    system[:, n:, :n] -= machine.contact_stiffness * np.swapaxes(model.answer[some], -1, -2) @ model.row
+    system[:, n:, :n] = np.eye(n)
+    system[:, :, n:] = some[:, : 2 * n]
+    system[:, :n, n:] += machine.contact_stiffness * model.row.T @ some[:, pushes]
     return float(np.max(np.abs(np.linalg.eigvals(system))))
 
 
 class _Structure(NamedTuple):
     """Accelerations of all bins by powers of the crank rate, whatever the speed and the clearance.
 
-    ``free`` (3, bins, 2n, n), ``forcing`` (2, bins, 4, n) and ``push`` (sets, bins, 2n + m, n) as ``tables`` takes them;
+    ``free`` (3, bins, 2n, n), ``forcing`` (2, bins, 4, n) and ``push`` (sets, bins, 2n + m, n) are those of ``tables``;
     ``lag`` (sets, m) [s] damping over stiffness of the closed channels; ``anchor`` as in the model; ``contact`` [rad/s]
     angular frequency of the masses next to the closed contacts; ``spectrum`` [1/s] largest modulus of an eigenvalue.
     """

@@ -378,7 +378,7 @@ class SliderCrank(Machine):
     def reduce(self, step_phase: float = STEP_PHASE) -> SliderCrankModel | SteppedCrankModel:
         """Return the model in whose shortest steps the fastest motion turns by ``step_phase`` [rad].
 
-        With exact propagators if contact is linear and does not turn with the ball, for the Runge-Kutta stepper
+        With exact propagators if contact is linear and does not turn with the ball, for the stepper
         otherwise. Machines that differ in clearance alone share all of it; those that differ in speed
         share the assembly.
         """

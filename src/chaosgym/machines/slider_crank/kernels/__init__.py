@@ -10,7 +10,10 @@ with cached_by_content(Path(__file__).parent):
         contact,
         exact,
         fixed_step,
+        look,
+        motion,
         propagator,
         record,
+        series,
         stepped,
     )

@@ -122,7 +122,7 @@ def crossing(own, series, lanes, last, side, gap, lag, low, high, e0, d0, e1, d1
 
 @part
 def settled(side, gap, two_sided, e0, d0, e1, d1, h, fourth):
-    """What a channel does over h by readings and slopes at both ends: (KEEPS, CROSSES or UNSURE, side of a crossing)."""
+    """What a channel does over h by what it reads at both ends: (KEEPS, CROSSES or UNSURE, side of a crossing)."""
     if side != 0.0:
         return judge(h, side * e0 - gap, side * d0, side * e1 - gap, side * d1, fourth), 0.0
     if gap - e0 < 0.0:

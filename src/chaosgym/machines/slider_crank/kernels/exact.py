@@ -52,8 +52,8 @@ from chaosgym.machines.slider_crank.kernels.motion import (
     look_ahead,
     motion_of,
     move,
-    put_evaluated,
     places,
+    put_evaluated,
     put_sides,
     read_after,
     read_now,
@@ -184,7 +184,7 @@ def first_change(motion, last, h, tolerance):
 
 @leaf
 def note_crest(motion, last, now, h, before, after, peak):
-    """Raise the peaks (2, 5) to the crest of the resultant within h, which is expanded, from ``before`` to ``after``."""
+    """Raise the peaks (2, 5) to the crest of the resultant within h, which is expanded: ``before`` to ``after``."""
     since, length = 0.0, h
     for _ in range(CREST_SEARCHES):
         crest, size = crest_instant(length, before, after)
@@ -228,8 +228,8 @@ def note_channel_crests(motion, last, h, channel_peak):
 def careful_step(motion, at, closed, row, duration, last, now, h, tolerance, peak, channel_peak, contact_time):
     """Follow the motion for at most h, up to the first change of contact, and record what happens.
 
-    ``closed`` tells if a contact is; ``now`` is the time in the revolution. Moves the state, puts the readings at its end after those of ``NOW``, and
-    leaves the series.
+    ``closed`` tells if a contact is; ``now`` is the time in the revolution. Moves the state, puts the readings at its
+    end after those of ``NOW``, and leaves the series.
 
     Returns
     -------
@@ -281,7 +281,7 @@ def write_expanded(motion, display, last, since, h, spacing, sample, history):
 
 @leaf
 def write_samples(model, motion, at, begin, done, count, spacing, sample, history):
-    """As ``write_expanded``, for ``count`` intervals of the bin that starts at ``begin``, of which some are ``done``."""
+    """As ``write_expanded``, for ``count`` intervals of the bin that starts at ``begin``, after those ``done``."""
     own, here, duration = motion.own, places(motion.n, motion.m), model.bin_duration
     z = here.sampled
     share = 1.0 / (model.steps * LANES)

@@ -1,6 +1,6 @@
 r"""Fixed steps of Runge-Kutta for the slider crank: the comparison for exact propagation.
 
-The classical Runge-Kutta method of order four on the equations of ``crank_stepper``, any joint and contact law, without
+The classical Runge-Kutta method of order four on the equations of ``stepped``, any joint and contact law, without
 event location: which joints push is judged at every stage, so touch and release are placed to O(h). Matrices are those
 of the bin of crank angle in which a stage falls.
 """
@@ -9,53 +9,52 @@ import numpy as np
 from numba import njit
 
 from chaosgym.core import status
-from chaosgym.core.cycle import LOWER, UPPER, note_touch
+from chaosgym.core.cycle import LOWER, UPPER
 from chaosgym.core.fixed_step import STABILITY_LIMIT
+from chaosgym.core.kernel import leaf
 from chaosgym.machines.slider_crank.kernels.exact import RUNAWAY, STEP_BUDGET
 from chaosgym.machines.slider_crank.kernels.record import begin_cycle, note_peak, note_share, write_peaks, write_sample
-from chaosgym.machines.slider_crank.kernels.stepped import joint_force, margin, measure, push_of, slope
+from chaosgym.machines.slider_crank.kernels.stepped import (
+    FORCE,
+    begin,
+    expand,
+    judge,
+    look_first,
+    new_series,
+    new_view,
+    note_touch_of,
+)
 
 
-@njit(cache=True)
-def judge(model, z, closed, direction):
-    """Write which joints push in the state z."""
-    for j in range(closed.shape[0]):
-        depth, rate = measure(model, j, z, direction)
-        closed[j] = margin(model, j, False, depth, rate) < 0.0
-
-
-@njit(cache=True)
-def slope_at(model, instant, z, closed, direction, dz):
+@leaf
+def slope_at(model, instant, z, closed, series, view, dz):
     """dz = (p', p'') at an instant of the revolution; judges the contacts."""
-    bins = model.acceleration.shape[0]
+    bins, n = model.acceleration.shape[0], model.row.shape[1]
     b = min(int(instant / model.bin_duration), bins - 1)
-    judge(model, z, closed, direction)
-    slope(model, b, instant - b * model.bin_duration, z, closed, direction, dz)
+    begin(model, z, series)
+    judge(model, series, closed, view)
+    expand(model, b, instant - b * model.bin_duration, closed, 2, series)
+    for i in range(n):
+        dz[i], dz[n + i] = z[n + i], 2.0 * series.lanes[2, model.row.shape[0] + i]
 
 
-@njit(cache=True)
-def note_touches(model, z, before, closed, direction, episode, instant, impacts, bounce_time):
-    """Record the monitored joints that push now and did not ``before``."""
+@leaf
+def note_touches(model, before, closed, direction, episode, instant, impacts, bounce_time):
+    """Record the joints that push now and did not ``before``."""
     for j in range(closed.shape[0]):
-        if closed[j] and not before[j] and model.monitored[j]:
-            measure(model, j, z, direction)
-            up = 0.0
-            for r in range(model.first[j], model.first[j + 1]):
-                up += model.reading[r, 1] * direction[r]
-            impacts[UPPER if up > 0.0 else LOWER] += 1
-            note_touch(episode, 1.0 if up > 0.0 else -1.0, instant, bounce_time)
+        if closed[j] and not before[j]:
+            note_touch_of(model, j, direction, episode, instant, impacts, bounce_time)
         before[j] = closed[j]
 
 
-@njit(cache=True)
-def note_joint_peaks(model, z, dz, closed, direction, channel_peak):
-    """Raise the peaks (J, 2) of the joints to their forces in the state z."""
+@leaf
+def note_joint_peaks(model, closed, view, channel_peak):
+    """Raise the peaks (J, 2) of the joints to their forces."""
     for j in range(channel_peak.shape[0]):
         if closed[j]:
-            force, _ = push_of(model, j, z, dz, direction)
-            positive = not model.two_sided[j] or direction[model.first[j]] > 0.0
+            positive = not model.two_sided[j] or view.direction[model.first[j]] > 0.0
             column = UPPER if positive else LOWER
-            channel_peak[j, column] = max(channel_peak[j, column], force)
+            channel_peak[j, column] = max(channel_peak[j, column], view.joint[j, FORCE])
 
 
 @njit(cache=True, nogil=True)
@@ -75,13 +74,13 @@ def advance_crank_fixed_step(model, state, episode, arrays, steps, fastest):
     samples = arrays.history.shape[1]
     k, inner = np.empty((4, n2)), np.empty(n2)
     closed, before = np.zeros(joints, dtype=np.bool_), np.zeros(joints, dtype=np.bool_)
-    direction, peak = np.empty(model.row.shape[0]), np.zeros((2, 5))
+    series, view, peak = new_series(model), new_view(model, model.acceleration.shape[2]), np.zeros((2, 5))
     for cycle in range(arrays.section.shape[0]):
         begin_cycle(model, state, arrays, cycle)
         peak[:] = 0.0
-        slope_at(model, 0.0, state, closed, direction, k[0])
+        slope_at(model, 0.0, state, closed, series, view, k[0])
         before[:] = closed
-        force = joint_force(model, state, k[0], closed, direction)
+        force = look_first(model, series, closed, view)
         sample = 0
         for step in range(steps):
             now = step * h
@@ -92,18 +91,17 @@ def advance_crank_fixed_step(model, state, episode, arrays, steps, fastest):
                 share = h if stage == 3 else 0.5 * h
                 for i in range(n2):
                     inner[i] = state[i] + share * k[stage - 1, i]
-                slope_at(model, now + share, inner, closed, direction, k[stage])
+                slope_at(model, now + share, inner, closed, series, view, k[stage])
             for i in range(n2):
                 state[i] += h / 6.0 * (k[0, i] + 2.0 * (k[1, i] + k[2, i]) + k[3, i])
             now = (step + 1) * h
-            slope_at(model, min(now, period), state, closed, direction, k[0])
-            earlier, force = force, joint_force(model, state, k[0], closed, direction)
+            slope_at(model, min(now, period), state, closed, series, view, k[0])
+            earlier, force = force, look_first(model, series, closed, view)
             note_share(earlier, force, h, arrays.contact_time[cycle])
             note_peak(peak, now, force)
-            note_joint_peaks(model, state, k[0], closed, direction, arrays.channel_peak[cycle])
-            note_touches(
-                model, state, before, closed, direction, episode, now, arrays.impacts[cycle], arrays.bounce_time[cycle]
-            )
+            note_joint_peaks(model, closed, view, arrays.channel_peak[cycle])
+            impacts, bounce_time = arrays.impacts[cycle], arrays.bounce_time[cycle]
+            note_touches(model, before, closed, view.direction, episode, now, impacts, bounce_time)
         write_peaks(peak, arrays, cycle)
         arrays.events[cycle] = 0
         for i in range(n2):

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from chaosgym.core.kernel import leaf, part
-from chaosgym.core.lanes import LANES, add_columns, aligned, copy, dot, dot_of_distances, padded, taylor
+from chaosgym.core.lanes import LANES, add_columns, aligned, copy, dot, dot_of_distances, padded, sum_series
 from chaosgym.machines.slider_crank.kernels.propagator import table_places
 from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, expand, put_time
 
@@ -62,7 +62,7 @@ class Places(NamedTuple):
     fourth : int
         Bounds (m,) of the readings' fourth derivatives.
     factors, loads, derived, series : int
-        Of ``expand`` and ``taylor``: (4 + m,), (5, lanes), (4, lanes), (order + 1, lanes).
+        Of ``expand`` and ``sum_series``: (4 + m,), (5, lanes), (3, lanes), (order + 1, lanes).
     """
 
     columns: int
@@ -99,7 +99,7 @@ def places(n, m):
     factors = fourth + channels
     loads = factors + padded(FORCING_TERMS + m)
     derived = loads + (FORCING_TERMS + 1) * lanes
-    series = derived + 4 * lanes
+    series = derived + 3 * lanes
     return Places(
         columns,
         width,
@@ -275,7 +275,7 @@ def expand_from(motion, at, row, z, duration, last):
 def evaluate(motion, last, time, which):
     """Evaluate the series at a time, and write what every channel reads there as one of its readings."""
     own, here = motion.own, places(motion.n, motion.m)
-    taylor(own, here.series, here.lanes, last, time, here.derived)
+    sum_series(own, here.series, here.lanes, last, time, own, here.derived, here.lanes)
     for j in range(motion.m):
         value, place = here.derived + motion.n + j, here.readings + j * READINGS + which
         lag = own[here.lags + j]

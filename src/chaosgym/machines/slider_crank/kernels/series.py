@@ -38,6 +38,18 @@ def order_for(phase, most):
     return min(ORDERS[min(int(phase * FINENESS), 2 * FINENESS - 1)], most)
 
 
+@part
+def shift_forcing(powers, at, k, scale, factors, out_at):
+    """Write the factors of F_j in coefficient k of sum_j F_j (x + t / duration)^j; those of x^j begin at ``at``.
+
+    ``scale`` is duration^-k.
+    """
+    binomial = scale
+    for j in range(k, FORCING_TERMS):
+        factors[out_at + j] = binomial * powers[at + j - k]
+        binomial *= (j + 1.0) / (j + 1 - k)
+
+
 @leaf
 def expand(table, at, own, z, n, m, lanes, duration, last, factors, loads, series):
     """Taylor coefficients about the instant of z, in seconds, up to the order ``last``.
@@ -53,12 +65,8 @@ def expand(table, at, own, z, n, m, lanes, duration, last, factors, loads, serie
     copy(own, time + FORCING_TERMS, factors + FORCING_TERMS, m)
     scale = 1.0
     for k in range(FORCING_TERMS):
-        # coefficient of t^k of sum_j F_j (x + t / duration)^j
-        binomial, count = scale, FORCING_TERMS - k
-        for j in range(k, FORCING_TERMS):
-            own[factors + j] = binomial * own[time + j - k]
-            binomial *= (j + 1.0) / (j + 1 - k)
-        count += m if k == 0 else 0
+        shift_forcing(own, time, k, scale, own, factors)
+        count = FORCING_TERMS - k + (m if k == 0 else 0)
         add_columns(table, forcing + k * lanes, lanes, count, own, factors + k, own, loads + k * lanes, LANES)
         scale /= duration
     for k in range(last - 1):

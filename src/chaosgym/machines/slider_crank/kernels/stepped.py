@@ -1,17 +1,23 @@
-r"""Motion of a slider crank whose contact force turns or is not linear, by steps.
+r"""Motion of a slider crank without a table of propagators, by its Taylor series.
 
-The equations of ``slider_crank`` between contacts, and joints whose force no propagator knows: a ball in a spherical
-shell, whose force turns with the ball, and Hertzian contact. Joint j measures e = (row_1 . p, row_2 . p, ...) and
-pushes along e / |e| with a force N of penetration x = |e| - c:
+The equations of ``exact`` between contacts, and joints for which there is no table: a ball in a spherical shell, whose
+force turns with the ball; Hertzian contact; contacts too many for a table of all sets. Joint j reads
+e = (row_1 . p, row_2 . p, ...) and pushes along e / |e| with a force N of penetration x = |e| - c:
 
     linear                     N = k x + d x'
     Hertz with dissipation     N = K x^(3/2) (1 + chi x')          (Hunt and Crossley, 1975)
 
-as long as x and N are positive. The classical Runge-Kutta method steps from change to change of contact: which joints
-push is fixed within a step, and the instant of a change is found by repeating the step with the right length. Matrices
-are held over each bin of crank angle, the forcing is continuous.
+as long as x and N are positive. Until a contact changes, p is its Taylor series: each coefficient follows from those
+before it, the force's by the recurrences of products, quotients and powers (Jorba and Zou, 2005). A series serves for
+a span, whose length its last coefficients tell. Contacts and forces are read from it piece by piece, and the instant
+of a change is found on it. Matrices are held over each bin of crank angle, the forcing is continuous.
 
 The file is long because it is a whole second way to run the machine, from the force of a joint to the revolution.
+
+References
+----------
+A. Jorba, M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods,
+Experimental Mathematics 14 (2005) 99-117.
 """
 
 import math
@@ -19,10 +25,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from chaosgym.core import status
 from chaosgym.core.cubic import cubic, cubic_extremum
 from chaosgym.core.cycle import LOWER, UPPER, note_touch
+from chaosgym.core.kernel import leaf, part
+from chaosgym.core.lanes import LANES, add_columns, next_term, padded, sum_series
 from chaosgym.machines.slider_crank.kernels.exact import RUNAWAY, STEP_BUDGET
 from chaosgym.machines.slider_crank.kernels.record import (
     begin_cycle,
@@ -34,38 +43,62 @@ from chaosgym.machines.slider_crank.kernels.record import (
     write_peaks,
     write_sample,
 )
+from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, SHARES, shift_forcing
 
 LINEAR, HERTZ = 0, 1
 
+ORDER = 16
+"""Last power of time in a series: fewer cost more spans, more cost more than they save."""
+
 POLISH = 50
-"""Repeated steps to locate one event; the secant method needs three to six."""
+"""Instants tried to locate one event; the secant method needs three to six."""
+
+CLOSER = 1e-3
+"""Share of the tolerance within which an event is placed: a series is read fast, and chaos magnifies what is left."""
+
+ROUNDING = 1e-15
+"""Least share of a time within which an event in it can be placed."""
+
+SHORTEST = 1e-9
+"""Shortest span, as a share of a piece: a motion that runs away must come to its end."""
+
+LEAST_DEPTH = 1e-12
+"""Least penetration [m] of the series of a Hertzian force, which has none at the surface; a force of some nN."""
+
+DEPTH, RATE, MARGIN, FORCE, CHANGE = range(5)
+"""Columns of ``View.joint``."""
 
 
 class SteppedCrankModel(NamedTuple):
     """All that the kernels know of a slider crank with n coordinates, J joints and R rows.
+
+    Lanes are what the R rows read, then the n coordinates, rounded up to a multiple of 8.
 
     Attributes
     ----------
     bin_duration : float
         Time [s] in which the crank turns through one bin.
     steps : int
-        Steps in a bin without events.
+        Length of a bin over that of the longest piece.
+    longest : float
+        Longest span [s] for which a series is stable.
+    tolerance : float
+        Last terms of the series of velocities at the end of a span [m/s].
     contact_rate : float
         Angular frequency of the masses next to the closed contacts [rad/s].
-    acceleration : (bins, n, 2n + 4)
-        p'' per unit (p, p', 1, x, x^2, x^3) without contact; x is the time in the bin over its duration.
+    acceleration : (bins, 2n + 4 + R + 1, lanes)
+        Second derivative per unit (p, p', 1, x, x^2, x^3), x being the time in the bin over its duration, per newton
+        on the surface along each row, and per newton that slides.
     first : (J + 1,) int
         Joint j owns the rows first[j] to first[j + 1] - 1.
     row : (R, n)
         Displacement in each direction of a joint per unit coordinate.
-    answer : (bins, R, n)
-        p'' per newton along each row.
-    friction : (bins, J, n)
-        p'' per newton of a joint's force, from friction.
     gap, stiffness, damping : (J,)
         Clearance [m]; k [N/m] and d [N s/m], or K [N/m^1.5] and chi [s/m].
     law : int
         LINEAR or HERTZ.
+    slides : (J,)
+        Share of a joint's force that has friction.
     two_sided : (J,) bool
         False if a joint with one row has a surface only where row . p is positive.
     reading : (R, 3)
@@ -78,60 +111,94 @@ class SteppedCrankModel(NamedTuple):
 
     bin_duration: float
     steps: int
+    longest: float
+    tolerance: float
     contact_rate: float
     acceleration: np.ndarray
     first: np.ndarray
     row: np.ndarray
-    answer: np.ndarray
-    friction: np.ndarray
     gap: np.ndarray
     stiffness: np.ndarray
     damping: np.ndarray
     law: int
+    slides: np.ndarray
     two_sided: np.ndarray
     reading: np.ndarray
     monitored: np.ndarray
     display: np.ndarray
 
 
-@njit(cache=True, inline="always")
-def measure(model, j, z, direction):
-    """Penetration and its rate of joint j; writes the unit vector of its force on the surface into ``direction``."""
-    n = model.row.shape[1]
+class Series(NamedTuple):
+    """Taylor coefficients of a motion, in seconds.
+
+    ``lanes`` (ORDER + 1, lanes) of readings and coordinates; (J, ORDER + 1) of each closed joint: ``distance`` |e|,
+    ``power`` x^(3/2), ``force`` N and ``weight`` N / |e|. ``side`` (J,) is the sign of e where the force does not turn,
+    else 0; ``factors`` (4 + R + 1,) of the columns of ``acceleration`` after those of the state; ``powers`` (4,) of x.
+    """
+
+    lanes: np.ndarray
+    distance: np.ndarray
+    power: np.ndarray
+    force: np.ndarray
+    weight: np.ndarray
+    side: np.ndarray
+    factors: np.ndarray
+    powers: np.ndarray
+
+
+class View(NamedTuple):
+    """What the joints do at an instant.
+
+    ``lanes`` (3, all or those of the readings): values and their first two derivatives; ``direction`` (R,): unit
+    vector of each joint's force on its surface; ``joint`` (J, 5): penetration and its rate, ``margin``, and of closed
+    joints the force and its rate.
+    """
+
+    lanes: np.ndarray
+    direction: np.ndarray
+    joint: np.ndarray
+
+
+@register_jitable
+def new_series(model):
+    """Return a series that begins at rest."""
+    joints, rows = model.gap.shape[0], model.row.shape[0]
+    lanes = np.zeros((ORDER + 1, model.acceleration.shape[2]))
+    distance, power, force, weight = np.zeros((4, joints, ORDER + 1))
+    factors, powers = np.zeros(FORCING_TERMS + rows + 1), np.ones(FORCING_TERMS)
+    return Series(lanes, distance, power, force, weight, np.zeros(joints), factors, powers)
+
+
+@register_jitable
+def new_view(model, width):
+    """Return a view of some lanes."""
+    return View(np.zeros((3, width)), np.zeros(model.row.shape[0]), np.zeros((model.gap.shape[0], 5)))
+
+
+@part
+def measure(model, j, view):
+    """Penetration and its rate of joint j; writes the direction of its force."""
+    lanes, direction = view.lanes, view.direction
     low, high = model.first[j], model.first[j + 1]
-    size, along, rate = 0.0, 0.0, 0.0
-    for r in range(low, high):
-        e, rate = 0.0, 0.0
-        for i in range(n):
-            e += model.row[r, i] * z[i]
-            rate += model.row[r, i] * z[n + i]
-        direction[r] = e
-        size += e * e
-        along += e * rate
     if not model.two_sided[j]:
         # one row: e counts with its sign
-        e = direction[low]
         direction[low] = 1.0
-        return e - model.gap[j], rate
+        return lanes[0, low] - model.gap[j], lanes[1, low]
+    size, along = 0.0, 0.0
+    for r in range(low, high):
+        size += lanes[0, r] * lanes[0, r]
+        along += lanes[0, r] * lanes[1, r]
     size = math.sqrt(size)
     if size == 0.0:
         for r in range(low, high):
             direction[r] = 1.0 if r == low else 0.0
         return -model.gap[j], 0.0
     for r in range(low, high):
-        direction[r] /= size
+        direction[r] = lanes[0, r] / size
     return size - model.gap[j], along / size
 
 
-@njit(cache=True, inline="always")
-def pressing(model, j, depth, rate):
-    """Force of a closed joint, continued beyond its end so that an event can be located."""
-    if model.law == LINEAR:
-        return model.stiffness[j] * depth + model.damping[j] * rate
-    return model.stiffness[j] * depth * math.sqrt(abs(depth)) * (1.0 + model.damping[j] * rate)
-
-
-@njit(cache=True, inline="always")
+@part
 def margin(model, j, closed, depth, rate):
     """What is positive as long as joint j keeps its contact state; its sign is that of the force, or of the gap."""
     if model.law == LINEAR:
@@ -141,116 +208,236 @@ def margin(model, j, closed, depth, rate):
     return force if closed else -min(depth, force)
 
 
-@njit(cache=True, inline="always")
-def slope(model, b, time, z, closed, direction, dz):
-    """dz = (p', p'') at ``time`` in bin b."""
-    n = model.row.shape[1]
-    a = model.acceleration[b]
-    x = time / model.bin_duration
-    for i in range(n):
-        dz[i] = z[n + i]
-        total = a[i, 2 * n] + x * (a[i, 2 * n + 1] + x * (a[i, 2 * n + 2] + x * a[i, 2 * n + 3]))
-        for c in range(2 * n):
-            total += a[i, c] * z[c]
-        dz[n + i] = total
-    for j in range(closed.shape[0]):
-        if closed[j]:
-            depth, rate = measure(model, j, z, direction)
-            force = pressing(model, j, depth, rate)
-            for i in range(n):
-                dz[n + i] += model.friction[b, j, i] * force
-            for r in range(model.first[j], model.first[j + 1]):
-                push = force * direction[r]
-                for i in range(n):
-                    dz[n + i] -= model.answer[b, r, i] * push
-
-
-@njit(cache=True, inline="always")
-def leap(model, b, time, h, z, closed, direction, k, inner, moved):
-    """One Runge-Kutta step from z to ``moved``; k (4, 2n) receives the slopes, k[0] must hold the first one."""
-    n2 = z.shape[0]
-    for stage in range(1, 4):
-        share = 0.5 * h if stage < 3 else h
-        for i in range(n2):
-            inner[i] = z[i] + share * k[stage - 1, i]
-        slope(model, b, time + share, inner, closed, direction, k[stage])
-    for i in range(n2):
-        moved[i] = z[i] + h / 6.0 * (k[0, i] + 2.0 * (k[1, i] + k[2, i]) + k[3, i])
-
-
-@njit(cache=True, inline="always")
-def push_of(model, j, z, dz, direction):
-    """Force of a closed joint and its rate; writes ``direction`` as ``measure`` does."""
-    n = model.row.shape[1]
-    depth, rate = measure(model, j, z, direction)
-    force = pressing(model, j, depth, rate)
+@part
+def push(model, j, view):
+    """Force of a closed joint and its rate, continued beyond its end so that an event can be located."""
+    depth, rate = view.joint[j, DEPTH], view.joint[j, RATE]
     bend = 0.0
     for r in range(model.first[j], model.first[j + 1]):
-        for i in range(n):
-            bend += direction[r] * model.row[r, i] * dz[n + i]
+        bend += view.direction[r] * view.lanes[2, r]
+    stiffness, damping = model.stiffness[j], model.damping[j]
     if model.law == LINEAR:
-        return force, model.stiffness[j] * rate + model.damping[j] * bend
-    root = math.sqrt(max(depth, 0.0))
-    growth = 1.5 * rate * (1.0 + model.damping[j] * rate) + depth * model.damping[j] * bend
-    return force, model.stiffness[j] * root * growth
+        return stiffness * depth + damping * rate, stiffness * rate + damping * bend
+    root = math.sqrt(abs(depth))
+    growth = 1.5 * rate * (1.0 + damping * rate) + max(depth, 0.0) * damping * bend
+    return stiffness * depth * root * (1.0 + damping * rate), stiffness * root * growth
 
 
-@njit(cache=True, inline="always")
-def joint_force(model, z, dz, closed, direction):
-    """``resultant`` of the monitored joint."""
+@part
+def look(model, closed, view):
+    """Write directions and joints of a view from its readings; returns the ``resultant`` of the monitored joint."""
     fx, fy, fz, rx, ry, rz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(closed.shape[0]):
+        depth, rate = measure(model, j, view)
+        view.joint[j, DEPTH], view.joint[j, RATE] = depth, rate
+        view.joint[j, MARGIN] = margin(model, j, closed[j], depth, rate)
         if not closed[j]:
             continue
-        force, change = push_of(model, j, z, dz, direction)
-        for r in range(model.first[j], model.first[j + 1]):
-            fx += model.reading[r, 0] * direction[r] * force
-            fy += model.reading[r, 1] * direction[r] * force
-            fz += model.reading[r, 2] * direction[r] * force
-            rx += model.reading[r, 0] * direction[r] * change
-            ry += model.reading[r, 1] * direction[r] * change
-            rz += model.reading[r, 2] * direction[r] * change
+        force, change = push(model, j, view)
+        view.joint[j, FORCE], view.joint[j, CHANGE] = force, change
+        if model.monitored[j]:
+            for r in range(model.first[j], model.first[j + 1]):
+                direction = view.direction[r]
+                fx += model.reading[r, 0] * direction * force
+                fy += model.reading[r, 1] * direction * force
+                fz += model.reading[r, 2] * direction * force
+                rx += model.reading[r, 0] * direction * change
+                ry += model.reading[r, 1] * direction * change
+                rz += model.reading[r, 2] * direction * change
     return resultant(fx, fy, fz, rx, ry, rz)
 
 
-@njit(cache=True, inline="always")
-def note_joints(model, h, z, dz, moved, dz_moved, closed, direction, channel_peak):
-    """Raise the peaks (J, 2) of the closed joints over a step of length h."""
-    for j in range(channel_peak.shape[0]):
+@part
+def read(series, time, view):
+    """Write the lanes of a view at a time in the span of a series."""
+    sum_series(series.lanes, 0, series.lanes.shape[1], ORDER, time, view.lanes, 0, view.lanes.shape[1])
+
+
+@part
+def look_at(model, series, time, closed, view):
+    """As ``look``, at a time in the span of a series."""
+    read(series, time, view)
+    return look(model, closed, view)
+
+
+@part
+def look_first(model, series, closed, view):
+    """As ``look_at``, at the beginning of a series."""
+    for k in range(3):
+        for i in range(view.lanes.shape[1]):
+            view.lanes[k, i] = series.lanes[k, i] if k < 2 else 2.0 * series.lanes[k, i]
+    return look(model, closed, view)
+
+
+@leaf
+def begin(model, z, series):
+    """Write the state z (2n,) into the first two terms of a series."""
+    rows, n = model.row.shape
+    for order in range(2):
+        lanes = series.lanes[order]
+        for i in range(n):
+            lanes[rows + i] = z[order * n + i]
+        for r in range(rows):
+            total = 0.0
+            for i in range(n):
+                total += model.row[r, i] * z[order * n + i]
+            lanes[r] = total
+
+
+@part
+def square(a, k, first):
+    """Coefficient k of the square of a series, of its coefficients from ``first`` on."""
+    total = 0.0
+    for i in range(first, (k + 1) // 2):
+        total += a[i] * a[k - i]
+    total *= 2.0
+    if k % 2 == 0:
+        total += a[k // 2] * a[k // 2]
+    return total
+
+
+@part
+def product(a, b, k, first):
+    """Coefficient k of the product of two series, of the coefficients of the first from ``first`` on."""
+    total = 0.0
+    for i in range(first, k + 1):
+        total += a[i] * b[k - i]
+    return total
+
+
+@part
+def extend_distance(model, j, k, series):
+    """Write coefficient k > 0 of the distance of a closed joint from the middle of its gap."""
+    low, high = model.first[j], model.first[j + 1]
+    lanes, distance = series.lanes, series.distance[j]
+    if series.side[j] != 0.0:
+        distance[k] = series.side[j] * lanes[k, low]
+        return
+    total = -square(distance, k, 1)
+    for r in range(low, high):
+        total += square(lanes[:, r], k, 0)
+    distance[k] = total * (0.5 / distance[0])
+
+
+@part
+def begin_joint(model, j, series):
+    """Write the first coefficient of the distance of a closed joint, and its side."""
+    low, high = model.first[j], model.first[j + 1]
+    size = 0.0
+    for r in range(low, high):
+        size += series.lanes[0, r] * series.lanes[0, r]
+    if high - low > 1 and size > 0.0:
+        series.side[j] = 0.0
+        series.distance[j, 0] = math.sqrt(size)
+    else:
+        series.side[j] = -1.0 if model.two_sided[j] and series.lanes[0, low] < 0.0 else 1.0
+        series.distance[j, 0] = series.side[j] * series.lanes[0, low]
+
+
+@part
+def extend_force(model, j, k, series):
+    """Write coefficient k of the force of a closed joint; its distance is known one order further."""
+    distance, force, power = series.distance[j], series.force[j], series.power[j]
+    stiffness, damping = model.stiffness[j], model.damping[j]
+    depth = distance[0] - model.gap[j]
+    if model.law == LINEAR:
+        force[k] = stiffness * (depth if k == 0 else distance[k]) + damping * (k + 1.0) * distance[k + 1]
+        return
+    depth = max(depth, LEAST_DEPTH)
+    if k == 0:
+        power[0] = depth * math.sqrt(depth)
+    else:
+        total = 0.0
+        for i in range(1, k + 1):
+            total += (2.5 * i - k) * distance[i] * power[k - i]
+        power[k] = total / (k * depth)
+    total = power[k]
+    for i in range(k + 1):
+        total += damping * power[i] * (k - i + 1.0) * distance[k - i + 1]
+    force[k] = stiffness * total
+
+
+@part
+def extend_joint(model, j, k, series):
+    """Write coefficient k of what a closed joint pushes into ``factors``."""
+    low, high = model.first[j], model.first[j + 1]
+    extend_distance(model, j, k + 1, series)
+    extend_force(model, j, k, series)
+    distance, force, weight = series.distance[j], series.force[j], series.weight[j]
+    along = series.factors[FORCING_TERMS:]
+    along[model.row.shape[0]] += model.slides[j] * force[k]
+    if series.side[j] != 0.0:
+        along[low] = series.side[j] * force[k]
+        return
+    weight[k] = (force[k] - product(distance, weight, k, 1)) * (1.0 / distance[0])
+    for r in range(low, high):
+        along[r] = product(weight, series.lanes[:, r], k, 0)
+
+
+@leaf
+def expand(model, b, time, closed, last, series):
+    """Continue a series about ``time`` in bin b from its first two terms up to the order ``last``."""
+    lanes, a, factors = series.lanes, model.acceleration[b], series.factors
+    rows, n = model.row.shape
+    width, driven = lanes.shape[1], a[2 * n :]
+    for k in range(1, FORCING_TERMS):
+        series.powers[k] = series.powers[k - 1] * time / model.bin_duration
+    for i in range(factors.shape[0]):
+        factors[i] = 0.0
+    for j in range(closed.shape[0]):
         if closed[j]:
-            f0, r0 = push_of(model, j, z, dz, direction)
-            f1, r1 = push_of(model, j, moved, dz_moved, direction)
-            positive = not model.two_sided[j] or direction[model.first[j]] > 0.0
-            column = 0 if positive else 1
-            channel_peak[j, column] = max(channel_peak[j, column], channel_crest(h, f0, r0, f1, r1)[1])
+            begin_joint(model, j, series)
+    scale = 1.0
+    for k in range(last - 1):
+        skipped = min(k, FORCING_TERMS)
+        shift_forcing(series.powers, 0, k, scale, factors, 0)
+        scale /= model.bin_duration
+        factors[FORCING_TERMS + rows] = 0.0
+        for j in range(closed.shape[0]):
+            if closed[j]:
+                extend_joint(model, j, k, series)
+        older, new = k * width + rows, (k + 2) * width
+        add_columns(driven, skipped * width, width, driven.shape[0] - skipped, factors, skipped, lanes, new, LANES)
+        next_term(a, 0, n * width, width, n, lanes, older, older + width, new, k + 1.0, SHARES[k], new)
 
 
-@njit(cache=True, inline="always")
-def lowest_margin(model, z, closed, direction):
+@part
+def span(series, tolerance, longest):
+    """Time [s] at which the last two terms of the velocity reach the tolerance, at most ``longest``."""
+    for k in range(ORDER - 1, ORDER + 1):
+        largest = 0.0
+        for i in range(series.lanes.shape[1]):
+            largest = max(largest, k * abs(series.lanes[k, i]))
+        if largest > 0.0:
+            longest = min(longest, (tolerance / largest) ** (1.0 / (k - 1)))
+    return longest
+
+
+@part
+def lowest_margin(view):
     """Smallest margin of all joints: positive as long as none changes its contact state."""
     lowest = math.inf
-    for j in range(closed.shape[0]):
-        depth, rate = measure(model, j, z, direction)
-        lowest = min(lowest, margin(model, j, closed[j], depth, rate))
+    for j in range(view.joint.shape[0]):
+        lowest = min(lowest, view.joint[j, MARGIN])
     return lowest
 
 
-@njit(cache=True)
-def first_change(model, b, time, until, z, closed, direction, k, inner, moved, tolerance):
-    """Instant in (0, until] just after which a joint changes its contact state, or ``until`` if none does.
+@leaf
+def first_change(model, series, low, until, closed, view, f_low, tolerance):
+    """Instant in (low, until] just after which a joint changes its contact state, or ``until``, and the resultant.
 
-    Regula falsi on repeated steps, an end halved when it was kept twice (Illinois). Leaves the state of that instant
-    in ``moved``.
+    Regula falsi on the series, an end halved when it was kept twice (Illinois). Leaves ``view`` at that instant.
     """
-    low, f_low = 0.0, max(lowest_margin(model, z, closed, direction), 0.0)
+    tolerance = max(CLOSER * tolerance, ROUNDING * until)
+    f_low = max(f_low, 0.0)
     high, f_high = until, 0.0
     t, kept = until, 0
     for _ in range(POLISH):
-        leap(model, b, time, t, z, closed, direction, k, inner, moved)
-        f = lowest_margin(model, moved, closed, direction)
+        force = look_at(model, series, t, closed, view)
+        f = lowest_margin(view)
         if f > 0.0:
             if t == until:
-                return until
+                break
             low, f_low = t, f
             if kept > 0:
                 f_high *= 0.5
@@ -267,51 +454,17 @@ def first_change(model, b, time, until, z, closed, direction, k, inner, moved, t
         else:
             t = (low * f_high - high * f_low) / (f_high - f_low) if f_low > 0.0 else 0.5 * (low + high)
             t = min(max(t, low + 0.01 * (high - low)), high - 0.01 * (high - low))
-    return t
+    return t, force
 
 
-@njit(cache=True, inline="always")
-def change_contacts(model, z, closed, direction, episode, time, impacts, bounce_time):
-    """Open and close the joints whose margin is used up at ``time`` in the revolution; how many."""
-    changes = 0
-    for j in range(closed.shape[0]):
-        depth, rate = measure(model, j, z, direction)
-        if margin(model, j, closed[j], depth, rate) > 0.0:
-            continue
-        changes += 1
-        closed[j] = not closed[j]
-        if closed[j]:
-            up = 0.0
-            for r in range(model.first[j], model.first[j + 1]):
-                up += model.reading[r, 1] * direction[r]
-            if model.monitored[j]:
-                impacts[UPPER if up > 0.0 else LOWER] += 1
-                note_touch(episode, 1.0 if up > 0.0 else -1.0, time, bounce_time)
-    return changes
-
-
-@njit(cache=True, inline="always")
-def state_within(h, t, z, dz, moved, dz_moved, inner):
-    """Write the state at t in a step of length h, by the cubic through both ends."""
-    for i in range(inner.shape[0]):
-        inner[i] = cubic(z[i], dz[i], moved[i], dz_moved[i], h, t)[0]
-
-
-@njit(cache=True, inline="always")
-def take_sample(model, h, t, z, dz, moved, dz_moved, inner, closed, direction, sample):
-    """Write displacement, velocity and signed resultant (positive where it points up) at t in a step of length h."""
-    state_within(h, t, z, dz, moved, dz_moved, inner)
-    write_sample(model.display, inner, joint_force(model, inner, dz, closed, direction), sample)
-
-
-@njit(cache=True, inline="always")
-def grazes(model, h, closed, direction, z, moved):
+@part
+def grazes(h, closed, before, after):
     """Instant in (0, h) at which an open joint may touch and leave again, or h."""
     instant = h
     for j in range(closed.shape[0]):
         if not closed[j]:
-            depth0, rate0 = measure(model, j, z, direction)
-            depth1, rate1 = measure(model, j, moved, direction)
+            depth0, rate0 = before.joint[j, DEPTH], before.joint[j, RATE]
+            depth1, rate1 = after.joint[j, DEPTH], after.joint[j, RATE]
             if depth1 < 0.0 and rate0 > 0.0 and rate1 < 0.0:
                 top = cubic_extremum(depth0, rate0, depth1, rate1, h, -1.0)
                 if top > 0.0 and cubic(depth0, rate0, depth1, rate1, h, top)[0] > 0.0:
@@ -319,87 +472,155 @@ def grazes(model, h, closed, direction, z, moved):
     return instant
 
 
+@leaf
+def note_touch_of(model, j, direction, episode, time, impacts, bounce_time):
+    """Record a touch of joint j at ``time`` in the revolution if it is monitored."""
+    if model.monitored[j]:
+        up = 0.0
+        for r in range(model.first[j], model.first[j + 1]):
+            up += model.reading[r, 1] * direction[r]
+        impacts[UPPER if up > 0.0 else LOWER] += 1
+        note_touch(episode, 1.0 if up > 0.0 else -1.0, time, bounce_time)
+
+
+@leaf
+def change_contacts(model, closed, view, episode, time, impacts, bounce_time):
+    """Open and close the joints whose margin is used up at ``time`` in the revolution; how many."""
+    changes = 0
+    for j in range(closed.shape[0]):
+        if view.joint[j, MARGIN] > 0.0:
+            continue
+        changes += 1
+        closed[j] = not closed[j]
+        if closed[j]:
+            note_touch_of(model, j, view.direction, episode, time, impacts, bounce_time)
+    return changes
+
+
+@part
+def note_joints(model, h, closed, before, after, channel_peak):
+    """Raise the peaks (J, 2) of the closed joints over a piece of length h."""
+    for j in range(channel_peak.shape[0]):
+        if closed[j]:
+            f0, r0 = before.joint[j, FORCE], before.joint[j, CHANGE]
+            f1, r1 = after.joint[j, FORCE], after.joint[j, CHANGE]
+            positive = not model.two_sided[j] or after.direction[model.first[j]] > 0.0
+            column = UPPER if positive else LOWER
+            channel_peak[j, column] = max(channel_peak[j, column], channel_crest(h, f0, r0, f1, r1)[1])
+
+
+@leaf
+def judge(model, series, closed, view):
+    """Write which joints push at the beginning of a series."""
+    for j in range(closed.shape[0]):
+        closed[j] = False
+    look_first(model, series, closed, view)
+    for j in range(closed.shape[0]):
+        closed[j] = view.joint[j, MARGIN] < 0.0
+
+
+@leaf
+def take_sample(model, series, time, closed, view, z, sample):
+    """Write displacement, velocity and signed resultant (positive where it points up) at a time in a span."""
+    force = look_at(model, series, time, closed, view)
+    read_state(model, view, z)
+    write_sample(model.display, z, force, sample)
+
+
+@part
+def read_state(model, view, z):
+    """Write the state of a view of all lanes into z (2n,)."""
+    rows, n = model.row.shape
+    for i in range(n):
+        z[i], z[n + i] = view.lanes[0, rows + i], view.lanes[1, rows + i]
+
+
+@leaf
+def turn(model, closed, series, views, whole, z, peak, episode, arrays, cycle, tolerance, budget):
+    """Advance a revolution from the beginning of a series; its events, or a negative status.
+
+    ``views`` are three of the readings; ``whole`` is one of all lanes, left at the end. z (2n,) is work space.
+    """
+    before, after, between = views
+    bins, duration = model.acceleration.shape[0], model.bin_duration
+    step = duration / model.steps
+    history, period = arrays.history[cycle], bins * duration
+    samples = history.shape[0]
+    impacts, channel_peak = arrays.impacts[cycle], arrays.channel_peak[cycle]
+    contact_time, bounce_time = arrays.contact_time[cycle], arrays.bounce_time[cycle]
+    events, sample, spans = 0, 0, 0
+    for b in range(bins):
+        origin, time = b * duration, 0.0
+        while duration - time > 1e-12 * duration:
+            spans += 1
+            if spans > STEP_BUDGET:
+                return -status.STEP_BUDGET
+            expand(model, b, time, closed, ORDER, series)
+            length = max(span(series, model.tolerance, model.longest), SHORTEST * step)
+            length = min(length, duration - time)
+            pieces = math.ceil(length / step)
+            start = look_first(model, series, closed, before)
+            note_peak(peak, origin + time, start)
+            piece, now, reached, found = 0, 0.0, 0.0, False
+            while piece < pieces and not found:
+                piece += 1
+                now, reached = reached, length * piece / pieces
+                end = look_at(model, series, reached, closed, after)
+                until = now + grazes(reached - now, closed, before, after)
+                if until < reached or lowest_margin(after) <= 0.0:
+                    found = True
+                    low = lowest_margin(before)
+                    reached, end = first_change(model, series, now, until, closed, after, low, tolerance)
+                h = reached - now
+                while sample < samples and sample * period < (origin + time + reached) * samples:
+                    t = max(sample * period / samples - origin - time, 0.0)
+                    take_sample(model, series, t, closed, whole, z, history[sample])
+                    sample += 1
+                note_share(start, end, h, contact_time)
+                note_peak(peak, origin + time + reached, end)
+                crest, size = crest_instant(h, start, end)
+                if size > peak[UPPER if end[0] > 0.0 else LOWER, 0]:
+                    there = look_at(model, series, now + crest, closed, between)
+                    note_peak(peak, origin + time + now + crest, there)
+                note_joints(model, h, closed, before, after, channel_peak)
+                before, after = after, before
+                start = end
+            time += reached
+            read(series, reached, whole)
+            for i in range(series.lanes.shape[1]):
+                series.lanes[0, i], series.lanes[1, i] = whole.lanes[0, i], whole.lanes[1, i]
+            if found:
+                events += change_contacts(model, closed, before, episode, origin + time, impacts, bounce_time)
+                if events > budget:
+                    return -status.EVENT_BUDGET
+    return events
+
+
 @njit(cache=True, nogil=True)
 def advance(model, state, episode, arrays, event_tolerance, event_budget):
     """Advance ``state`` (2n,) and ``episode`` in place by whole revolutions; see ``slider_crank.advance``."""
-    bins, n, _ = model.acceleration.shape
+    bins, _, lanes = model.acceleration.shape
     if model.steps * bins > STEP_BUDGET:
         return status.STEP_BUDGET, 0
-    joints, n2 = model.gap.shape[0], 2 * n
-    duration = model.bin_duration
-    step = duration / model.steps
-    period = bins * duration
-    samples = arrays.history.shape[1]
-    z, moved, inner, k = np.empty(n2), np.empty(n2), np.empty(n2), np.empty((4, n2))
-    direction = np.empty(model.row.shape[0])
-    closed = np.zeros(joints, dtype=np.bool_)
-    peak = np.zeros((2, 5))
-
+    period = bins * model.bin_duration
+    readings = padded(model.row.shape[0])
+    series, whole = new_series(model), new_view(model, lanes)
+    views = (new_view(model, readings), new_view(model, readings), new_view(model, readings))
+    z, closed, peak = np.empty(state.shape[0]), np.zeros(model.gap.shape[0], dtype=np.bool_), np.zeros((2, 5))
     for cycle in range(arrays.section.shape[0]):
-        z[:] = state
         begin_cycle(model, state, arrays, cycle)
         peak[:] = 0.0
-        impacts = arrays.impacts[cycle]
-        contact_time, bounce_time = arrays.contact_time[cycle], arrays.bounce_time[cycle]
-        for j in range(joints):
-            depth, rate = measure(model, j, z, direction)
-            closed[j] = margin(model, j, False, depth, rate) < 0.0
-        events, sample = 0, 0
-
-        for b in range(bins):
-            origin, count = 0.0, 0
-            slope(model, b, 0.0, z, closed, direction, k[0])
-            start = joint_force(model, z, k[0], closed, direction)
-            while True:
-                time = origin + count * step
-                h = min(step, duration - time)
-                if h <= 1e-12 * duration:
-                    break
-                leap(model, b, time, h, z, closed, direction, k, inner, moved)
-                until = grazes(model, h, closed, direction, z, moved)
-                if until < h or lowest_margin(model, moved, closed, direction) <= 0.0:
-                    h = first_change(model, b, time, until, z, closed, direction, k, inner, moved, event_tolerance)
-                slope(model, b, time + h, moved, closed, direction, k[3])
-                while sample < samples and sample * period < (b * duration + time + h) * samples:
-                    t = max(sample * period / samples - b * duration - time, 0.0)
-                    take_sample(
-                        model, h, t, z, k[0], moved, k[3], inner, closed, direction, arrays.history[cycle, sample]
-                    )
-                    sample += 1
-                end = joint_force(model, moved, k[3], closed, direction)
-                note_share(start, end, h, contact_time)
-                note_peak(peak, b * duration + time + h, end)
-                crest, size = crest_instant(h, start, end)
-                if size > peak[UPPER if end[0] > 0.0 else LOWER, 0]:
-                    state_within(h, crest, z, k[0], moved, k[3], inner)
-                    there = joint_force(model, inner, k[3], closed, direction)
-                    share = size / there[1] if there[1] > 0.0 else 0.0
-                    at_crest = (share * there[0], size, 0.0, share * there[3], share * there[4])
-                    note_peak(peak, b * duration + time + crest, at_crest)
-                note_joints(model, h, z, k[0], moved, k[3], closed, direction, arrays.channel_peak[cycle])
-                z, moved = moved, z
-                changes = change_contacts(
-                    model, z, closed, direction, episode, b * duration + time + h, impacts, bounce_time
-                )
-                if changes > 0:
-                    events += changes
-                    if events > event_budget:
-                        return status.EVENT_BUDGET, cycle
-                    slope(model, b, time + h, z, closed, direction, k[0])
-                    end = joint_force(model, z, k[0], closed, direction)
-                    note_peak(peak, b * duration + time + h, end)
-                else:
-                    k[0] = k[3]
-                start = end
-                if changes > 0 or h < step:
-                    origin, count = time + h, 0
-                else:
-                    count += 1
-
+        begin(model, state, series)
+        judge(model, series, closed, views[0])
+        events = turn(
+            model, closed, series, views, whole, z, peak, episode, arrays, cycle, event_tolerance, event_budget
+        )
+        if events < 0:
+            return -events, cycle
         write_peaks(peak, arrays, cycle)
         arrays.events[cycle] = events
-        state[:] = z
-        for i in range(n2):
+        read_state(model, whole, state)
+        for i in range(state.shape[0]):
             if not abs(state[i]) < RUNAWAY:
                 return status.DIVERGED, cycle
         episode.touch[0] -= period
