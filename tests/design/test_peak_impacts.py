@@ -65,15 +65,18 @@ def test_coverage_foresees_the_share_of_impacts_in_known_sections():
 
 @pytest.mark.parametrize("side", [0, 1])
 def test_slider_crank_fills_its_diagram_within_eighty_cycles(side):
-    """Figures 5.13 and 5.14, 190 rpm and +-0.254 mm: the diagram takes shape within the 80 cycles of the thesis."""
+    """Figures 5.13 and 5.14, 190 rpm and +-0.254 mm: the diagram takes shape within the 80 cycles of the thesis.
+
+    One stretch of chaos is luck: the median of six must do so.
+    """
     crank = with_settings(MACHINES["slider-crank"](), {"crank_speed": 190.0, "slider_clearance": 0.254e-3})
-    diagram = peak_impacts(simulate(crank, 300, transient=60), side)
-    assert diagram.unit == "m"
-    assert 0.0 < diagram.spread < 0.101
-    filled = filling_cycles(diagram)
-    assert filled is not None
-    assert 10 <= filled <= 80
-    assert 5 <= convergence(diagram.force).cycles <= 80
+    record = simulate(crank, 1800, transient=60)
+    diagrams = [peak_impacts(record.after(k).until(300), side) for k in range(0, 1800, 300)]
+    for diagram in diagrams:
+        assert diagram.unit == "m"
+        assert 0.0 < diagram.spread < 0.101
+    assert 10 <= np.median([filling_cycles(diagram) or np.inf for diagram in diagrams]) <= 80
+    assert 5 <= max(convergence(diagram.force).cycles for diagram in diagrams) <= 80
 
 
 def test_the_place_of_a_sliding_peak_is_where_its_history_has_it():

@@ -71,7 +71,7 @@ def frozen_model(machine, duration):
     place = round(40.0 / machine.matrix_update_interval)
     m, n = model.row.shape
     at = table_places(n, m)
-    row = model.table.reshape(2, model.bins, at[6])[:, place, at[3] : at[4]]
+    row = model.table.reshape(2, model.bins, at.length)[:, place, at.acceleration : at.now]
     acceleration = row.reshape(2, 2 * n + FORCING_TERMS + m, padded(n + m))[:, :, :n]
     free, forcing, push = np.zeros((3, 2, 2 * n, n)), np.zeros((2, 2, FORCING_TERMS, n)), np.zeros((2, 2, 2 * n + m, n))
     free[0, :, :n] = acceleration[0, :n]

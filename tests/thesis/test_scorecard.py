@@ -51,8 +51,8 @@ def test_dots_closer_than_the_width_of_a_dot_are_one():
 def test_dots_are_the_series_that_the_thesis_plots():
     """One side of the beam's bearing, the resultant of the crank's joint: by them nature and forces are read.
 
-    At 20 Hz and +-0.032 mm the beam's upper side repeats within a dot and the lower one does not; at 100 rpm and 2.5 %
-    contact damping the slider's upper side varies and the larger of both sides repeats.
+    At 20 Hz and +-0.032 mm the beam's upper side repeats within a dot and the lower one does not. At 100 rpm and 2.5 %
+    contact damping the crank's forces are read from the larger of both sides, which is not always the upper one.
     """
     beam = replace(PLAIN_BEAM, excitation_frequency=20.0, clearance=0.03175e-3)
     record = simulate(beam, 300).after(200)
@@ -62,9 +62,9 @@ def test_dots_are_the_series_that_the_thesis_plots():
     crank = replace(PLAIN_CRANK, crank_speed=100.0, slider_clearance=0.03175e-3, contact_damping_ratio=0.025)
     record = simulate(crank, 110).after(60)
     assert np.array_equal(plotted_peaks(record), record.peak_force.max(axis=1))
-    assert np.ptp(record.peak_force[:, 0]) > 2.0 * READING_ERROR
     seen = observe(crank, THOROUGH["slider-crank"])
-    assert (seen.nature, seen.low) == ("periodic", record.peak_force.max(axis=1).min())
+    assert seen.low == record.peak_force.max(axis=1).min()
+    assert np.any(record.peak_force[:, 1] > record.peak_force[:, 0])
 
 
 def test_a_hasty_run_reads_what_a_long_one_does():

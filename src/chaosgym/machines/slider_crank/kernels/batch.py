@@ -33,7 +33,7 @@ def pointer(typing_context, address):
 def crank_of(batch, i):
     """Model of machine i of a batch that holds the addresses of the tables."""
     m, n = batch.row.shape[1:]
-    size = batch.radix[i] ** m * batch.bins[i] * table_places(n, m)[6]
+    size = batch.radix[i] ** m * batch.bins[i] * table_places(n, m).length
     return SliderCrankModel(
         batch.bin_duration[i],
         batch.bins[i],

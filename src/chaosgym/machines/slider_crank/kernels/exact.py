@@ -122,7 +122,7 @@ class SliderCrankModel(NamedTuple):
     anchor : (radix^m, n, m)
         Places of the coordinates, per unit of clearance, at which the closed channels just touch.
     table : (radix^m * bins * length,)
-        Rows of ``table_places`` for every contact set and bin.
+        Rows of ``TablePlaces`` for every contact set and bin.
     """
 
     bin_duration: float
@@ -358,7 +358,7 @@ def turn(model, motion, peak, episode, arrays, cycle, tolerance, budget, vectors
     history, impacts, bounce_time = arrays.history[cycle], arrays.impacts[cycle], arrays.bounce_time[cycle]
     channel_peak, contact_time = arrays.channel_peak[cycle], arrays.contact_time[cycle]
     peak[:] = 0.0
-    time_at, length = z + 2 * motion.n, tables[6]
+    time_at, length = z + 2 * motion.n, tables.length
     duration, most = model.bin_duration, model.steps * LANES
     share = 1.0 / most
     interval = share * duration
@@ -394,9 +394,9 @@ def turn(model, motion, peak, episode, arrays, cycle, tolerance, budget, vectors
                     move(motion, at, z, count, done * share, share)
                     if carries:
                         if count == LANES:
-                            carry(motion, at + tables[1], 1, vectors)
+                            carry(motion, at + tables.look, 1, vectors)
                         else:
-                            carry(motion, at + tables[2], count, vectors)
+                            carry(motion, at + tables.interval, count, vectors)
                     read_after(motion, count)
                     done += count
                 if count == most_now:
@@ -437,7 +437,7 @@ def turn(model, motion, peak, episode, arrays, cycle, tolerance, budget, vectors
                 at = (chosen * bins + b) * length
                 put_sides(motion, anchors[chosen])
                 if carries and touches:
-                    jump(motion, before + tables[3], at + tables[3], vectors)
+                    jump(motion, before + tables.acceleration, at + tables.acceleration, vectors)
                 put_time(own, time_at, (time - begin) / duration)
                 read_now(motion, at)
                 note_peak(peak, time, joint_force(motion, NOW))

@@ -26,7 +26,7 @@ the reading of the model with its length; how many numbers these are."""
 
 
 class Motion(NamedTuple):
-    """Rows of ``table_places``, state and work space of ``places``, and how many coordinates and channels there are.
+    """Rows of ``TablePlaces``, state and work space of ``places``, and how many coordinates and channels there are.
 
     It is handed on by value: the fewer its fields the faster.
     """
@@ -207,7 +207,7 @@ def put_sides(motion, anchor):
 def read_now(motion, at):
     """Write what every channel reads in z; the row of tables of its bin and contact set begins at ``at``."""
     own, here = motion.own, places(motion.n, motion.m)
-    rows = at + table_places(motion.n, motion.m)[4]
+    rows = at + table_places(motion.n, motion.m).now
     for j in range(motion.m):
         place, row = here.readings + j * READINGS + NOW, rows + 2 * j * here.width
         own[place] = dot(motion.table, row, own, here.z, here.width)
@@ -225,7 +225,7 @@ def look_ahead(motion, at):
 def bound_fourth(motion, at):
     """Write bounds of the readings' fourth derivatives over a look from z on."""
     own, here = motion.own, places(motion.n, motion.m)
-    rows = at + table_places(motion.n, motion.m)[5]
+    rows = at + table_places(motion.n, motion.m).bound
     for j in range(motion.m):
         own[here.fourth + j] = dot_of_distances(motion.table, rows + j * here.width, own, here.z, here.rest, here.width)
 
@@ -252,7 +252,9 @@ def step(motion, propagator, z, x):
 def move(motion, at, z, intervals, x, share):
     """Move a state at share ``x`` of the bin by 1 to 8 intervals, each of which is ``share`` of it."""
     tables = table_places(motion.n, motion.m)
-    steps, propagator, length = (1, at + tables[1], LANES) if intervals == LANES else (intervals, at + tables[2], 1)
+    steps, propagator, length = (
+        (1, at + tables.look, LANES) if intervals == LANES else (intervals, at + tables.interval, 1)
+    )
     for k in range(steps):
         step(motion, propagator, z, x + (k + 1) * length * share)
 
@@ -267,7 +269,7 @@ def expand_from(motion, at, row, z, duration, last):
             y += row[j, i] * own[z + i]
             v += row[j, i] * own[z + n + i]
         own[here.series + n + j], own[here.series + here.lanes + n + j] = y, v
-    a = at + table_places(n, m)[3]
+    a = at + table_places(n, m).acceleration
     expand(motion.table, a, own, z, n, m, here.lanes, duration, last, here.factors, here.loads, here.series)
 
 

@@ -37,8 +37,7 @@ BOUND_TERMS = 16
 """Terms of the series that bounds a propagator over half an interval."""
 
 
-@register_jitable
-def table_places(n: int, m: int) -> tuple[int, ...]:
+class TablePlaces(NamedTuple):
     """Where the tables of a bin and a contact set begin in their row, and its length.
 
     ahead (columns, m, 2, 8)
@@ -52,13 +51,26 @@ def table_places(n: int, m: int) -> tuple[int, ...]:
     bound (m, columns or more)
         Largest fourth derivative of each reading over a look per unit of |z|, places from the anchor.
     """
+
+    ahead: int
+    look: int
+    interval: int
+    acceleration: int
+    now: int
+    bound: int
+    length: int
+
+
+@register_jitable
+def table_places(n: int, m: int) -> TablePlaces:
+    """Places for n coordinates and m channels."""
     columns = 2 * n + FORCING_TERMS + m
     look = columns * 2 * LANES * m
     interval = look + columns * padded(2 * n)
     acceleration = interval + columns * padded(2 * n)
     now = acceleration + columns * padded(n + m)
     bound = now + 2 * m * padded(columns)
-    return 0, look, interval, acceleration, now, bound, bound + m * padded(columns)
+    return TablePlaces(0, look, interval, acceleration, now, bound, bound + m * padded(columns))
 
 
 class _Space(NamedTuple):
@@ -208,7 +220,7 @@ def _put_channels(space, row, lag, anchor, s, duration, interval, count, table, 
     own, n, width, columns = space.own, space.n, space.width, space.columns
     m, share = row.shape[0], interval / duration
     places = table_places(n, m)
-    now, bound = at + places[4], at + places[5]
+    now, bound = at + places.now, at + places.bound
     spare, largest = space.rows + 6 * width, space.rows + 7 * width
     for j in range(m):
         # reading, slope and fourth derivative, and the same one interval later
@@ -331,19 +343,21 @@ def tables(free, forcing, push, rate, row, lag, anchor, duration, steps, order):
     m, n = row.shape
     interval = duration / (LANES * steps)
     places = table_places(n, m)
-    length = places[6]
+    length = places.length
     table, space = aligned(sets * bins * length), _space_of(n, m)
     for s in range(sets):
         for first in range(0, bins, LANES):
             at, count = (s * bins + first) * length, min(LANES, bins - first)
-            _put_acceleration(space, free, forcing, push, rate, row, s, first, count, table, at + places[3], length)
+            _put_acceleration(
+                space, free, forcing, push, rate, row, s, first, count, table, at + places.acceleration, length
+            )
             _short_propagator(space, duration, interval, order)
-            _put_states(space, space.one, count, table, at + places[2], length)
+            _put_states(space, space.one, count, table, at + places.interval, length)
             _put_channels(space, row, lag, anchor, s, duration, interval, count, table, at, length)
             before, after, share = space.one, space.twice, interval / duration
             for _ in range(3):
                 for i in range(2 * n):
                     _through(space, before, share, before + i * space.width, after + i * space.width)
                 before, after, share = after, before, 2.0 * share
-            _put_states(space, before, count, table, at + places[1], length)
+            _put_states(space, before, count, table, at + places.look, length)
     return table
