@@ -3,7 +3,7 @@
 Every joint is a small class that lists its contacts: which motion closes each, which share of the joint's stiffness it
 has, and which force it exerts on the body whose joint force is recorded (slider or housing). A contact along a single
 row is a channel: its force is piecewise linear, so there are propagators for every set of closed channels. The ball in
-a spherical shell turns its force and is left to the stepper, and so is Hertzian contact.
+a spherical shell turns its force and is left to Taylor series, and so is Hertzian contact.
 """
 
 import math
@@ -241,7 +241,7 @@ def ball_joint_of(machine: "SliderCrank") -> JointModel:
 
 
 class Joint(NamedTuple):
-    """A contact of the stepper; see ``SteppedCrankModel``. ``scale`` and ``damping`` multiply stiffness and damping."""
+    """A contact of ``stepped``; see ``SteppedCrankModel``. ``scale`` and ``damping`` multiply stiffness and damping."""
 
     row: Array
     gap: float

@@ -48,7 +48,7 @@ STEP_PHASE = 0.5
 """Angle [rad] by which the fastest motion turns in half an interval of a look, by default."""
 
 MAX_SETS = 32
-"""Contact sets for which propagators are made; a machine with more is left to the stepper."""
+"""Contact sets for which propagators are made; a machine with more is left to Taylor series."""
 
 KEPT = 128
 """Machines whose assembled equations are kept, whatever their speed and clearance."""
@@ -176,7 +176,7 @@ def _free_motion(free: Array, forcing: Array, rate: float) -> Array:
 
 
 def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankModel:
-    """Model of any machine for the stepper.
+    """Model of any machine for Taylor series.
 
     A closed contact turns by ``step_phase`` / 4 in a piece of a series; half of it leaves a sixteenth of the error.
     """

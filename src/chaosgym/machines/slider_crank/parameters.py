@@ -376,11 +376,11 @@ class SliderCrank(Machine):
         return self.motor_angle > 0.0
 
     def reduce(self, step_phase: float = STEP_PHASE) -> SliderCrankModel | SteppedCrankModel:
-        """Return the model in whose shortest steps the fastest motion turns by ``step_phase`` [rad].
+        """Return the model with exact propagators if contact is linear and does not turn with the ball.
 
-        With exact propagators if contact is linear and does not turn with the ball, for the stepper
-        otherwise. Machines that differ in clearance alone share all of it; those that differ in speed
-        share the assembly.
+        The fastest motion turns by ``step_phase`` [rad] in half an interval between two readings of the contacts. Any
+        other machine has a model for Taylor series. Machines that differ in clearance alone share all of it; those
+        that differ in speed share the assembly.
         """
         return exact_model(self, step_phase) if has_propagators(self) else stepped_model(self, 2.0 * step_phase)
 

@@ -181,7 +181,7 @@ class CrankBatch(CompiledBatch):
 
 
 class SteppedCrankBatch(CompiledBatch):
-    """Slider cranks that need the stepper."""
+    """Slider cranks that move by Taylor series."""
 
     def __init__(self, machine: Any, count: int) -> None:
         super().__init__(machine, count)
