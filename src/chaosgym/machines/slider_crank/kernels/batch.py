@@ -132,7 +132,7 @@ def stepped_crank_of(batch, i):
 
 @njit(cache=True, nogil=True, parallel=True)
 def advance_stepped_cranks(batch, which, motions, arrays, settings, outcome):
-    """As ``advance_beams``, for slider cranks that need the stepper."""
+    """As ``advance_beams``, for slider cranks that move by Taylor series."""
     for k in prange(which.shape[0]):
         i = which[k]
         outcome[k] = advance_stepped_crank(
