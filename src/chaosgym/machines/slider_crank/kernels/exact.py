@@ -13,6 +13,8 @@ Readings of the channels are looked at eight intervals ahead, and the motion goe
 that no contact changes and that no force exceeds the peak of the revolution unseen (``look``). The next one is expanded
 in its Taylor series, on which changes of contact and crests are found. Recording only reads: a time history does not
 change the motion by a bit.
+
+The file is long because one revolution decides in turn what is looked at, what is expanded, and what both record.
 """
 
 from typing import NamedTuple

@@ -10,6 +10,8 @@ p'' = A z, and the Taylor series of p follows from A alone.
 
 A bin is cut into looks of eight intervals. The propagator of an interval is the series for all columns of z at once,
 summed to round-off; squared three times it is that of a look. Eight bins are worked on side by side.
+
+The file is long because the tables, their layout in memory and the bounds of what they leave out go together.
 """
 
 from typing import NamedTuple
