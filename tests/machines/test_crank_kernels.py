@@ -17,6 +17,7 @@ from chaosgym.machines.slider_crank.kernels.contact import KEEPS, UNSURE, judge
 from chaosgym.machines.slider_crank.kernels.exact import advance
 from chaosgym.machines.slider_crank.kernels.propagator import table_places, tables
 from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, series_order
+from chaosgym.machines.slider_crank.model import side_by_side
 from chaosgym.simulation import ExactEvents, simulate, simulate_with_deviations
 from tests.machines.crank_twin import continuous_twin, rigid_twin
 from tests.plain_modes import PLAIN_CRANK
@@ -81,7 +82,8 @@ def frozen_model(machine, duration):
     steps = math.ceil(duration / 2 * spectrum / LANES)
     order = series_order(duration / 2 * spectrum / (LANES * steps))
     undamped = np.zeros((2, 1))
-    table = tables(free, forcing, push, 0.0, model.row, undamped, model.anchor, duration / 2, steps, order)
+    accelerations = map(side_by_side, (free, forcing, push))
+    table = tables(*accelerations, 2, 0.0, model.row, undamped, model.anchor, duration / 2, steps, order)
     return model._replace(bin_duration=duration / 2, bins=2, steps=steps, order=order, spectrum=spectrum, table=table)
 
 

@@ -136,20 +136,32 @@ def add_rows(own, at, factor, sum_at, width):
 
 
 @operation
-def multiply_eight(own, row, matrix, width, count, out_at):
-    """Eight products of a row and a matrix."""
+def multiply_eight(own, at, rows, matrix, width, count, out_at):
+    """Eight products of rows and a matrix."""
     columns = _taken(own, matrix, count, width // LANES, LANES)
-    answer = np.einsum("kl,kcl->cl", _taken(own, row, count, LANES), columns)
-    own[out_at : out_at + width] = answer.ravel()
+    for row in range(rows):
+        answer = np.einsum("kl,kcl->cl", _taken(own, at + row * width, count, LANES), columns)
+        own[out_at + row * width :][:width] = answer.ravel()
 
 
 @operation
-def next_terms_of_eight(own, row, older, old, width, count, weight, share, out_at):
+def next_terms_of_eight(own, at, older, old, width, count, weight, share, out_at):
     """Terms of eight series from the two before them."""
-    factors = _taken(own, row, 2, count, LANES)
-    before = [_taken(own, at, count, width // LANES, LANES) for at in (older, old)]
-    known, new = (np.einsum("kl,kcl->cl", *pair) for pair in zip(factors, before, strict=True))
-    own[out_at : out_at + width] = share * (known + weight * new).ravel()
+    before = [_taken(own, first, count, width // LANES, LANES) for first in (older, old)]
+    for row in range(count):
+        factors = _taken(own, at + row * width, 2, count, LANES)
+        known, new = (np.einsum("kl,kcl->cl", *pair) for pair in zip(factors, before, strict=True))
+        own[out_at + row * width :][:width] = share * (known + weight * new).ravel()
+
+
+@operation
+def deal(own, at, stride, count, out, out_at, length, places):
+    """Eight vectors turned into eight rows."""
+    rows = np.zeros((LANES, LANES))
+    for k in range(count):
+        rows[k] = own[at + k * stride :][:LANES]
+    for q in range(places):
+        out[out_at + q * length :][:LANES] = rows[:, q]
 
 
 @operation

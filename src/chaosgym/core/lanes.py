@@ -36,11 +36,19 @@ def padded(count: int) -> int:
 
 
 @register_jitable
+def unset(size: int) -> Any:
+    """Return memory (size,) that begins a line of the cache: a vector that lies in two takes twice as long to load."""
+    memory = np.empty(size + LANES - 1)
+    skipped = (-memory.ctypes.data % (8 * LANES)) // 8
+    return memory[skipped : skipped + size]
+
+
+@register_jitable
 def aligned(size: int) -> Any:
-    """Return zeros (size,) that begin a line of the cache: a vector that lies in two takes twice as long to load."""
-    zeros = np.zeros(size + LANES - 1)
-    skipped = (-zeros.ctypes.data % (8 * LANES)) // 8
-    return zeros[skipped : skipped + size]
+    """Return zeros (size,) that begin a line of the cache."""
+    zeros = unset(size)
+    zeros[:] = 0.0
+    return zeros
 
 
 class _Emitter:
@@ -382,56 +390,108 @@ def add_rows(e, own, at, factor, sum_at, width):
         e.store(product, own, total)
 
 
-def _products(e, own, row, matrix, width, count, columns):
-    """Sums over k < ``count`` of vector k of a row times those of adjacent columns of a matrix (count, width)."""
+def _products(e, own, rows, matrix, width, count, columns):
+    """Sums over k < ``count`` of vector k of each row times those of adjacent columns of a matrix (count, width)."""
     b = e.builder
-    totals = [e.accumulator(e.constant(0.0)) for _ in range(columns)]
+    totals = [[e.accumulator(e.constant(0.0)) for _ in range(columns)] for _ in rows]
     with cgutils.for_range(b, count) as loop:
-        factor, begin = e.load(own, b.add(row, e.times(loop.index, LANES))), b.add(matrix, b.mul(loop.index, width))
-        for k, total in enumerate(totals):
-            e.add_product(total, factor, e.load(own, b.add(begin, e.index(k * LANES))))
-    return [b.load(total) for total in totals]
+        place, begin = e.times(loop.index, LANES), b.add(matrix, b.mul(loop.index, width))
+        factors = [e.load(own, b.add(row, place)) for row in rows]
+        for k in range(columns):
+            value = e.load(own, b.add(begin, e.index(k * LANES)))
+            for factor, sums in zip(factors, totals, strict=True):
+                e.add_product(sums[k], factor, value)
+    return [[b.load(total) for total in sums] for sums in totals]
 
 
-def _in_columns(e, width, write):
-    """Call a function of a number of columns and where the first begins, for columns at once, then for single ones."""
-    b, at_once = e.builder, 5
-    several = b.udiv(width, e.index(at_once * LANES))
+def _some_at_once(e, total, at_once, write):
+    """Call a function of a number of things and the first of them, for some at once, then for single ones."""
+    b = e.builder
+    several = b.udiv(total, e.index(at_once))
     with cgutils.for_range(b, several) as loop:
-        write(at_once, e.times(loop.index, at_once * LANES))
-    done = e.times(several, at_once * LANES)
-    with e.vectors(b.sub(width, done)) as loop:
-        write(1, b.add(done, e.times(loop.index, LANES)))
+        write(at_once, e.times(loop.index, at_once))
+    done = e.times(several, at_once)
+    with cgutils.for_range(b, b.sub(total, done)) as loop:
+        write(1, b.add(done, loop.index))
 
 
-@_operation()
-def multiply_eight(e, own, row, matrix, width, count, out_at):
-    """Write a row times a matrix (count, width) / 8, for eight pairs of them: every number is a vector."""
+def _in_blocks(e, rows, width, answer_at, own, out_at):
+    """Write rows (rows, width) of vectors that a function gives, in blocks of two rows and five columns.
+
+    The function takes the numbers of adjacent rows, where the first column begins and how many there are.
+    """
     b = e.builder
 
-    def write(columns, begin):
-        answers = _products(e, own, row, b.add(matrix, begin), width, count, columns)
-        for k, answer in enumerate(answers):
-            e.store(answer, own, b.add(b.add(out_at, begin), e.index(k * LANES)))
+    def write_rows(tall, row):
+        numbers = [b.add(row, e.index(k)) for k in range(tall)]
 
-    _in_columns(e, width, write)
+        def write(wide, column):
+            begin = e.times(column, LANES)
+            for number, answers in zip(numbers, answer_at(numbers, begin, wide), strict=True):
+                place = b.add(b.add(out_at, b.mul(number, width)), begin)
+                for k, answer in enumerate(answers):
+                    e.store(answer, own, b.add(place, e.index(k * LANES)))
+
+        _some_at_once(e, b.udiv(width, e.index(LANES)), 5, write)
+
+    _some_at_once(e, rows, 2, write_rows)
 
 
 @_operation()
-def next_terms_of_eight(e, own, row, older, old, width, count, weight, share, out_at):
-    """As ``next_term`` for eight series at once: the row holds factors of ``older`` and ``old``, (count, width)."""
+def multiply_eight(e, own, at, rows, matrix, width, count, out_at):
+    """Write rows, ``width`` apart, times a matrix (count, width) / 8, for eight pairs: every number is a vector."""
+    b = e.builder
+
+    def answers(numbers, begin, columns):
+        places = [b.add(at, b.mul(number, width)) for number in numbers]
+        return _products(e, own, places, b.add(matrix, begin), width, count, columns)
+
+    _in_blocks(e, rows, width, answers, own, out_at)
+
+
+@_operation()
+def next_terms_of_eight(e, own, at, older, old, width, count, weight, share, out_at):
+    """As ``next_term`` for eight series at once: rows (count, width) hold factors of ``older`` and ``old``."""
     b = e.builder
     shares, weights = e.spread(share), e.spread(b.fmul(weight, share))
-    second = b.add(row, e.times(count, LANES))
+    second = e.times(count, LANES)
 
-    def write(columns, begin):
-        known = _products(e, own, row, b.add(older, begin), width, count, columns)
-        new = _products(e, own, second, b.add(old, begin), width, count, columns)
-        for k, pair in enumerate(zip(known, new, strict=True)):
-            answer = e.fma(weights, pair[1], b.fmul(shares, pair[0]))
-            e.store(answer, own, b.add(b.add(out_at, begin), e.index(k * LANES)))
+    def answers(numbers, begin, columns):
+        first = [b.add(at, b.mul(number, width)) for number in numbers]
+        known = _products(e, own, first, b.add(older, begin), width, count, columns)
+        places = [b.add(place, second) for place in first]
+        new = _products(e, own, places, b.add(old, begin), width, count, columns)
+        pairs = (zip(*both, strict=True) for both in zip(known, new, strict=True))
+        return [[e.fma(weights, one, b.fmul(shares, other)) for other, one in row] for row in pairs]
 
-    _in_columns(e, width, write)
+    _in_blocks(e, count, width, answers, own, out_at)
+
+
+@_operation()
+def deal(e, own, at, stride, count, out, out_at, length, places):
+    """Write lane q of ``count`` vectors, ``stride`` apart, as eight numbers at q ``length``, for q < ``places``.
+
+    Numbers beyond the count are zero.
+    """
+    b, nothing = e.builder, e.constant(0.0)
+    last, vectors = b.sub(count, e.index(1)), []
+    for k in range(LANES):
+        inside = b.icmp_signed("<", e.index(k), count)
+        value = e.load(own, b.add(at, b.mul(b.select(inside, e.index(k), last), stride)))
+        vectors.append(b.select(inside, value, nothing))
+    span = LANES // 2
+    while span:
+        # halves of ``span`` lanes change places between vectors that lie as far apart
+        low = [i if i & span == 0 else LANES + i - span for i in range(LANES)]
+        high = [i + span if i & span == 0 else LANES + i for i in range(LANES)]
+        for k in (k for k in range(LANES) if k & span == 0):
+            pair = vectors[k], vectors[k + span]
+            for place, lanes in ((k, low), (k + span, high)):
+                vectors[place] = b.shuffle_vector(*pair, ir.Constant(ir.VectorType(_INT, LANES), lanes))
+        span //= 2
+    for q, vector in enumerate(vectors):
+        with b.if_then(b.icmp_signed("<", e.index(q), places)):
+            e.store(vector, out, b.add(out_at, b.mul(e.index(q), length)))
 
 
 @_operation()

@@ -243,14 +243,15 @@ def fastest_rate(machine: "SliderCrank", model: SteppedCrankModel) -> float:
 class _Structure(NamedTuple):
     """Accelerations of all bins by powers of the crank rate, whatever the speed and the clearance.
 
-    ``free`` (3, bins, 2n, n), ``forcing`` (2, bins, 4, n) and ``push`` (sets, bins, 2n + m, n) are those of ``tables``;
-    ``lag`` (sets, m) [s] damping over stiffness of the closed channels; ``anchor`` as in the model; ``contact`` [rad/s]
-    angular frequency of the masses next to the closed contacts; ``spectrum`` [1/s] largest modulus of an eigenvalue.
+    ``free``, ``forcing`` and ``push`` are those of ``tables``, of ``bins`` bins in groups of eight; ``lag`` (sets, m)
+    [s] damping over stiffness of the closed channels; ``anchor`` as in the model; ``contact`` [rad/s] angular frequency
+    of the masses next to the closed contacts; ``spectrum`` [1/s] largest modulus of an eigenvalue.
     """
 
     channels: Channels
     radix: int
     display: Array
+    bins: int
     free: Array
     forcing: Array
     push: Array
@@ -310,7 +311,25 @@ def _structure(kind: type, *structure: Any) -> _Structure:
     some = [0, len(inverse_mass) // 4]
     contact, spectrum = _rates(free[0, some], push[-1, some, : 2 * n], channels.row)
     lag, anchor = _closed(channels, radix)
-    return _Structure(channels, radix, display_of(machine), free, forcing, push, lag, anchor, contact, spectrum)
+    return _Structure(
+        channels=channels,
+        radix=radix,
+        display=display_of(machine),
+        bins=len(inverse_mass),
+        free=side_by_side(free),
+        forcing=side_by_side(forcing),
+        push=side_by_side(push),
+        lag=lag,
+        anchor=anchor,
+        contact=contact,
+        spectrum=spectrum,
+    )
+
+
+def side_by_side(bins: Array) -> Array:
+    """Matrices (..., bins, columns, rows) of eight bins each, (..., groups, rows, columns, 8); the last one repeats."""
+    at = np.arange(padded(bins.shape[-3])).clip(max=bins.shape[-3] - 1).reshape(-1, LANES)
+    return np.ascontiguousarray(np.moveaxis(bins[..., at, :, :], (-3, -1), (-1, -3)))
 
 
 def _closed(channels: Channels, radix: int) -> tuple[Array, Array]:
@@ -332,11 +351,11 @@ def _friction(machine: "SliderCrank", crank_angle: Array) -> Array:
 
 
 def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> SliderCrankModel:
-    rate, bins = crank_speed * math.pi / 30.0, parts.free.shape[1]
+    rate, bins = crank_speed * math.pi / 30.0, parts.bins
     duration = 2.0 * math.pi / (bins * rate)
     steps = max(1, math.ceil(duration * parts.spectrum / (2.0 * LANES * step_phase)))
     order = series_order(parts.spectrum * duration / (LANES * steps))
-    accelerations = (parts.free, parts.forcing, parts.push, rate)
+    accelerations = (parts.free, parts.forcing, parts.push, bins, rate)
     return SliderCrankModel(
         bin_duration=duration,
         bins=bins,

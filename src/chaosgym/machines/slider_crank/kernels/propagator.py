@@ -26,12 +26,14 @@ from chaosgym.core.lanes import (
     add_rows,
     aligned,
     copy,
+    deal,
     item,
     keep_largest,
     multiply_eight,
     next_terms_of_eight,
     padded,
     put,
+    unset,
 )
 from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, SHARES
 
@@ -83,9 +85,13 @@ class _Space(NamedTuple):
     n, columns, width : int
         Coordinates, numbers of z, the same times 8.
     held : int
-        Acceleration (n, width).
-    rows : int
-        Eight rows (width,).
+        Acceleration, and below it the second derivatives of the channels' displacements, (n + m, width).
+    readings : int
+        Reading, slope and its second derivative, at the ends of nine successive intervals, (9, 3, width).
+    largest : int
+        Largest fourth derivative of each reading (m, width).
+    spare : int
+        Two rows (2, width).
     one, twice : int
         Propagators (2n, width).
     terms : int
@@ -97,7 +103,9 @@ class _Space(NamedTuple):
     columns: int
     width: int
     held: int
-    rows: int
+    readings: int
+    largest: int
+    spare: int
     one: int
     twice: int
     terms: int
@@ -107,11 +115,14 @@ class _Space(NamedTuple):
 def _space_of(n, m):
     columns = 2 * n + FORCING_TERMS + m
     width = LANES * columns
-    rows = n * width
-    one = rows + 8 * width
+    readings = (n + m) * width
+    largest = readings + 3 * (LANES + 1) * width
+    spare = largest + m * width
+    one = spare + 2 * width
     twice = one + 2 * n * width
     terms = twice + 2 * n * width
-    return _Space(aligned(terms + 3 * n * width), n, columns, width, 0, rows, one, twice, terms)
+    own = aligned(terms + 3 * n * width)
+    return _Space(own, n, columns, width, 0, readings, largest, spare, one, twice, terms)
 
 
 @part
@@ -140,9 +151,9 @@ def _short_propagator(space, duration, time, order):
         older, old = space.terms + k % 3 * size, space.terms + (k + 1) % 3 * size
         new = space.terms + (k + 2) % 3 * size
         share = time * time * SHARES[k]
+        next_terms_of_eight(own, space.held, older, old, width, n, (k + 1.0) / time, share, new)
         for i in range(n):
             row, term = space.held + i * width, new + i * width
-            next_terms_of_eight(own, row, older, old, width, n, (k + 1.0) / time, share, term)
             if k < FORCING_TERMS:
                 binomial = share * scale
                 for j in range(k, FORCING_TERMS):
@@ -157,27 +168,29 @@ def _short_propagator(space, duration, time, order):
 
 
 @leaf
-def _through(space, propagator, share, row, answer):
-    """Write a row over z one step earlier: row P.
+def _through(space, propagator, share, row, answer, rows):
+    """Write adjacent rows over z one step earlier: each row times P.
 
     The powers of x become those of x + ``share``, the step over the duration of the bin; the clearances stay.
     """
     own, width, states = space.own, space.width, 2 * space.n
-    multiply_eight(own, row, propagator, width, states, answer)
+    multiply_eight(own, row, rows, propagator, width, states, answer)
     forcing, clearances = states * LANES, (states + FORCING_TERMS) * LANES
-    for k in range(FORCING_TERMS):
-        binomial = 1.0
-        for c in range(k, -1, -1):
-            add_rows(own, row + forcing + k * LANES, binomial, answer + forcing + c * LANES, LANES)
-            binomial *= share * c / (k - c + 1)
-    add_rows(own, row + clearances, 1.0, answer + clearances, width - clearances)
+    for first in range(0, rows * width, width):
+        given, written = row + first, answer + first
+        for k in range(FORCING_TERMS):
+            binomial = 1.0
+            for c in range(k, -1, -1):
+                add_rows(own, given + forcing + k * LANES, binomial, written + forcing + c * LANES, LANES)
+                binomial *= share * c / (k - c + 1)
+        add_rows(own, given + clearances, 1.0, written + clearances, width - clearances)
 
 
 @leaf
 def _derivative(space, duration, row, answer):
     """Write the time derivative of a row over z: row B, with z' = B z."""
     own, n = space.own, space.n
-    multiply_eight(own, row + n * LANES, space.held, space.width, n, answer)
+    multiply_eight(own, row + n * LANES, 1, space.held, space.width, n, answer)
     add_rows(own, row, 1.0, answer + n * LANES, n * LANES)
     forcing = 2 * n * LANES
     for k in range(1, FORCING_TERMS):
@@ -194,18 +207,28 @@ def _from_anchor(space, anchor, row):
 
 
 @leaf
-def _note_largest(space, anchor, row, spare, largest):
+def _note_largest(space, anchor, row, largest):
     """Raise ``largest`` to the absolute values of a row, places from the anchor."""
-    copy(space.own, row, spare, space.width)
-    _from_anchor(space, anchor, spare)
-    keep_largest(space.own, spare, largest, space.width)
+    copy(space.own, row, space.spare, space.width)
+    _from_anchor(space, anchor, space.spare)
+    keep_largest(space.own, space.spare, largest, space.width)
 
 
 @part
-def _deal(space, at, count, table, place, length):
-    """Write a vector into as many rows of tables as there are bins."""
-    for q in range(count):
-        put(table, place + q * length, item(space.own, at + q))
+def _deal_row(space, row, table, at, length, count):
+    """Write a row over z into the tables of the bins."""
+    for c in range(0, space.columns, LANES):
+        deal(space.own, row + c * LANES, LANES, min(LANES, space.columns - c), table, at + c, length, count)
+
+
+@part
+def _deal_columns(space, matrix, rows, table, at, length, count):
+    """Write a matrix (rows, width) by columns into the tables of the bins."""
+    own, width, lanes = space.own, space.width, padded(rows)
+    for c in range(space.columns):
+        for i in range(0, rows, LANES):
+            place = at + c * lanes + i
+            deal(own, matrix + i * width + c * LANES, width, min(LANES, rows - i), table, place, length, count)
 
 
 @leaf
@@ -222,44 +245,38 @@ def _put_channels(space, row, lag, anchor, s, duration, interval, count, table, 
     own, n, width, columns = space.own, space.n, space.width, space.columns
     m, share = row.shape[0], interval / duration
     places = table_places(n, m)
-    now, bound = at + places.now, at + places.bound
-    spare, largest = space.rows + 6 * width, space.rows + 7 * width
+    _fill(space, space.largest, m * width, 0.0)
     for j in range(m):
-        # reading, slope and fourth derivative, and the same one interval later
-        first, then = space.rows, space.rows + 3 * width
-        _fill(space, space.rows, 8 * width, 0.0)
+        largest, first = space.largest + j * width, space.readings
+        slope, bend, then = first + width, first + 2 * width, first + 3 * width
+        _fill(space, first, 6 * width, 0.0)
         for i in range(n):
             _fill(space, first + i * LANES, LANES, row[j, i])
             _fill(space, first + (n + i) * LANES, LANES, lag[s, j] * row[j, i])
-        _derivative(space, duration, first, first + width)
-        _derivative(space, duration, first + width, then)
+        _derivative(space, duration, first, slope)
+        _derivative(space, duration, slope, then)
         _derivative(space, duration, then, then + width)
-        _derivative(space, duration, then + width, first + 2 * width)
-        _note_largest(space, anchor[s], first + 2 * width, spare, largest)
+        _derivative(space, duration, then + width, bend)
+        _note_largest(space, anchor[s], bend, largest)
+        now = at + places.now + 2 * j * padded(columns)
+        _deal_row(space, first, table, now, length, count)
+        _deal_row(space, slope, table, now + padded(columns), length, count)
+        for k in range(LANES):
+            given = first + 3 * k * width
+            _fill(space, given + 3 * width, 3 * width, 0.0)
+            _through(space, space.one, share, given, given + 3 * width, 3)
+            _note_largest(space, anchor[s], given + 5 * width, largest)
         for c in range(columns):
             for q in range(2):
-                place = now + (2 * j + q) * padded(columns) + c
-                _deal(space, first + q * width + c * LANES, count, table, place, length)
-        for k in range(LANES):
-            for q in range(3):
-                _through(space, space.one, share, first + q * width, then + q * width)
-            first, then = then, first
-            for c in range(columns):
-                for q in range(2):
-                    place = at + ((c * m + j) * 2 + q) * LANES + k
-                    _deal(space, first + q * width + c * LANES, count, table, place, length)
-            _note_largest(space, anchor[s], first + 2 * width, spare, largest)
-        for c in range(columns):
-            _deal(space, largest + c * LANES, count, table, bound + j * padded(columns) + c, length)
+                place = at + places.ahead + ((c * m + j) * 2 + q) * LANES
+                ends = then + q * width + c * LANES
+                deal(own, ends, 3 * width, LANES, table, place, length, count)
     for i in range(n):
         _from_anchor(space, anchor[s], space.held + i * width)
     keep_largest(own, space.held, space.held, n * width)
     for j in range(m):
-        term, derived = space.rows, space.rows + width
-        for c in range(columns):
-            for q in range(count):
-                put(own, term + c * LANES + q, item(table, bound + j * padded(columns) + c + q * length))
-        copy(own, term, largest, width)
+        largest, term, derived = space.largest + j * width, space.spare, space.spare + width
+        copy(own, largest, term, width)
         share = 1.0
         for k in range(1, BOUND_TERMS):
             _derivative(space, duration, term, derived)
@@ -268,60 +285,49 @@ def _put_channels(space, row, lag, anchor, s, duration, interval, count, table, 
             term, derived = derived, term
         # the terms left out shrink at least by half each
         add_rows(own, term, share, largest, width)
-        for c in range(columns):
-            _deal(space, largest + c * LANES, count, table, bound + j * padded(columns) + c, length)
+        _deal_row(space, largest, table, at + places.bound + j * padded(columns), length, count)
 
 
 @leaf
-def _put_states(space, propagator, count, table, at, length):
-    """Store a propagator by columns."""
-    states = padded(2 * space.n)
-    for c in range(space.columns):
-        for i in range(2 * space.n):
-            _deal(space, propagator + i * space.width + c * LANES, count, table, at + c * states + i, length)
-
-
-@leaf
-def _put_acceleration(space, free, forcing, push, rate, row, s, first, count, table, at, length):
-    """Sum accelerations of some bins at a crank rate: by rows in ``held``, by columns in their tables."""
+def _put_acceleration(space, free, forcing, push, rate, row, s, group, groups):
+    """Sum the accelerations of eight bins at a crank rate, and those of the channels."""
     m, n = row.shape
-    own, columns, lanes = space.own, space.columns, padded(n + m)
-    for q in range(LANES):
-        # vectors that are not full repeat the last bin
-        b = first + min(q, count - 1)
-        for i in range(n):
-            held = space.held + i * space.width + q
-            for c in range(2 * n):
-                total = free[0, b, c, i] + rate * free[1, b, c, i] + rate * rate * free[2, b, c, i]
-                put(own, held + c * LANES, total + push[s, b, c, i])
-            for k in range(FORCING_TERMS):
-                put(own, held + (2 * n + k) * LANES, forcing[0, b, k, i] + rate * rate * forcing[1, b, k, i])
-            for j in range(m):
-                put(own, held + (2 * n + FORCING_TERMS + j) * LANES, push[s, b, 2 * n + j, i])
-    for q in range(count):
-        place = at + q * length
-        for c in range(columns):
+    own, width = space.own, space.width
+    for i in range(n):
+        held, at = space.held + i * width, (group * n + i) * LANES
+        pushed = (s * groups * n + group * n + i) * (2 * n + m) * LANES
+        for w in range(2 * n * LANES):
+            place, power = at * 2 * n + w, groups * n * 2 * n * LANES
+            total = item(free, place) + rate * item(free, place + power)
+            total += rate * rate * item(free, place + 2 * power)
+            put(own, held + w, total + item(push, pushed + w))
+        for w in range(FORCING_TERMS * LANES):
+            place, power = at * FORCING_TERMS + w, groups * n * FORCING_TERMS * LANES
+            put(own, held + 2 * n * LANES + w, item(forcing, place) + rate * rate * item(forcing, place + power))
+        for w in range(m * LANES):
+            put(own, held + (2 * n + FORCING_TERMS) * LANES + w, item(push, pushed + 2 * n * LANES + w))
+    for j in range(m):
+        for w in range(width):
+            total = 0.0
             for i in range(n):
-                put(table, place + c * lanes + i, item(own, space.held + i * space.width + c * LANES + q))
-            for j in range(m):
-                total = 0.0
-                for i in range(n):
-                    total += row[j, i] * item(own, space.held + i * space.width + c * LANES + q)
-                put(table, place + c * lanes + n + j, total)
+                total += row[j, i] * item(own, space.held + i * width + w)
+            put(own, space.held + (n + j) * width + w, total)
 
 
 @njit(cache=True, nogil=True)
-def tables(free, forcing, push, rate, row, lag, anchor, duration, steps, order):
+def tables(free, forcing, push, bins, rate, row, lag, anchor, duration, steps, order):
     """Tables of every contact set and bin.
 
     Parameters
     ----------
-    free : (3, bins, 2n, n)
-        Accelerations per unit p and p' without contact, by powers of the crank rate.
-    forcing : (2, bins, 4, n)
+    free : (3, groups, n, 2n, 8)
+        Accelerations per unit p and p' without contact, by powers of the crank rate, of eight bins side by side.
+    forcing : (2, groups, n, 4, 8)
         Accelerations per unit 1, x, x^2, x^3, and per squared crank rate.
-    push : (sets, bins, 2n + m, n)
+    push : (sets, groups, n, 2n + m, 8)
         What closed contacts add per unit p, p' and clearance.
+    bins
+        Number of bins; the last ones of a group that is not full are left out.
     rate
         Of the crank [rad/s].
     row : (m, n)
@@ -341,25 +347,26 @@ def tables(free, forcing, push, rate, row, lag, anchor, duration, steps, order):
     -------
     (sets * bins * length of ``table_places``,)
     """
-    sets, bins = push.shape[:2]
+    sets, groups = push.shape[:2]
     m, n = row.shape
     interval = duration / (LANES * steps)
     places = table_places(n, m)
     length = places.length
-    table, space = aligned(sets * bins * length), _space_of(n, m)
+    # every number of it is written
+    table, space = unset(sets * bins * length), _space_of(n, m)
+    free, forcing, push = free.ravel(), forcing.ravel(), push.ravel()
     for s in range(sets):
-        for first in range(0, bins, LANES):
+        for group in range(groups):
+            first = LANES * group
             at, count = (s * bins + first) * length, min(LANES, bins - first)
-            _put_acceleration(
-                space, free, forcing, push, rate, row, s, first, count, table, at + places.acceleration, length
-            )
+            _put_acceleration(space, free, forcing, push, rate, row, s, group, groups)
+            _deal_columns(space, space.held, n + m, table, at + places.acceleration, length, count)
             _short_propagator(space, duration, interval, order)
-            _put_states(space, space.one, count, table, at + places.interval, length)
+            _deal_columns(space, space.one, 2 * n, table, at + places.interval, length, count)
             _put_channels(space, row, lag, anchor, s, duration, interval, count, table, at, length)
             before, after, share = space.one, space.twice, interval / duration
             for _ in range(3):
-                for i in range(2 * n):
-                    _through(space, before, share, before + i * space.width, after + i * space.width)
+                _through(space, before, share, before, after, 2 * n)
                 before, after, share = after, before, 2.0 * share
-            _put_states(space, before, count, table, at + places.look, length)
+            _deal_columns(space, before, 2 * n, table, at + places.look, length, count)
     return table
