@@ -15,6 +15,10 @@ from numpy.typing import NDArray
 
 Matrix = NDArray[np.float64]
 
+_abscissae, _weights = np.polynomial.legendre.leggauss(4)
+POINTS, WEIGHTS = 0.5 * (1.0 + _abscissae), 0.5 * _weights
+"""Integration points of an element, as shares of its length, and theirs of the whole."""
+
 
 def bending_matrices(lengths: Matrix, bending_stiffness: float, mass_per_length: float) -> tuple[Matrix, Matrix]:
     """Consistent mass and stiffness matrices of a uniform free beam.
@@ -32,28 +36,33 @@ def bending_matrices(lengths: Matrix, bending_stiffness: float, mass_per_length:
     -------
     mass, stiffness : (2 n_elements + 2, 2 n_elements + 2)
     """
-    size = 2 * len(lengths) + 2
-    mass = np.zeros((size, size))
-    stiffness = np.zeros((size, size))
-    for element, h in enumerate(lengths):
+    h, one = lengths, np.ones_like(lengths)
+    inertia = [
+        [156.0 * one, 22.0 * h, 54.0 * one, -13.0 * h],
+        [22.0 * h, 4.0 * h * h, 13.0 * h, -3.0 * h * h],
+        [54.0 * one, 13.0 * h, 156.0 * one, -22.0 * h],
+        [-13.0 * h, -3.0 * h * h, -22.0 * h, 4.0 * h * h],
+    ]
+    springs = [
+        [12.0 * one, 6.0 * h, -12.0 * one, 6.0 * h],
+        [6.0 * h, 4.0 * h * h, -6.0 * h, 2.0 * h * h],
+        [-12.0 * one, -6.0 * h, 12.0 * one, -6.0 * h],
+        [6.0 * h, 2.0 * h * h, -6.0 * h, 4.0 * h * h],
+    ]
+    mass = _assembled(mass_per_length * h / 420.0 * np.array(inertia))
+    # a power of an array is rounded otherwise on some processors than that of a number
+    cubes = np.array([each**3 for each in lengths.tolist()])
+    return mass, _assembled(bending_stiffness / cubes * np.array(springs))
+
+
+def _assembled(parts: Matrix) -> Matrix:
+    """Sum of the matrices (4, 4, n_elements) of elements that share their nodes."""
+    count = parts.shape[-1]
+    whole = np.zeros((2 * count + 2, 2 * count + 2))
+    for element in range(count):
         dofs = slice(2 * element, 2 * element + 4)
-        mass[dofs, dofs] += (mass_per_length * h / 420.0) * np.array(
-            [
-                [156.0, 22.0 * h, 54.0, -13.0 * h],
-                [22.0 * h, 4.0 * h * h, 13.0 * h, -3.0 * h * h],
-                [54.0, 13.0 * h, 156.0, -22.0 * h],
-                [-13.0 * h, -3.0 * h * h, -22.0 * h, 4.0 * h * h],
-            ]
-        )
-        stiffness[dofs, dofs] += (bending_stiffness / h**3) * np.array(
-            [
-                [12.0, 6.0 * h, -12.0, 6.0 * h],
-                [6.0 * h, 4.0 * h * h, -6.0 * h, 2.0 * h * h],
-                [-12.0, -6.0 * h, 12.0, -6.0 * h],
-                [6.0 * h, 2.0 * h * h, -6.0 * h, 4.0 * h * h],
-            ]
-        )
-    return mass, stiffness
+        whole[dofs, dofs] += parts[:, :, element]
+    return whole
 
 
 class Interpolation(NamedTuple):
@@ -77,23 +86,26 @@ def interpolation(lengths: Matrix) -> Interpolation:
     lengths : (n_elements,)
         Element lengths from the first node on [m].
     """
-    abscissa, gauss_weight = np.polynomial.legendre.leggauss(4)
-    x = 0.5 * (1.0 + abscissa)
-    count, points = len(lengths), len(x)
-    shape = np.zeros((count * points, 2 * count + 2))
+    x, count = POINTS, len(lengths)
+    h = lengths[:, None]
+    flat = np.ones_like(h)
+    deflection = [
+        flat * (1 - 3 * x**2 + 2 * x**3),
+        h * (x - 2 * x**2 + x**3),
+        flat * (3 * x**2 - 2 * x**3),
+        h * (x**3 - x**2),
+    ]
+    turn = [6 * (x**2 - x) / h, flat * (1 - 4 * x + 3 * x**2), 6 * (x - x**2) / h, flat * (3 * x**2 - 2 * x)]
+    shape = np.zeros((count, len(x), 2 * count + 2))
     slope = np.zeros_like(shape)
-    for element, h in enumerate(lengths):
-        at = slice(element * points, (element + 1) * points)
-        dofs = slice(2 * element, 2 * element + 4)
-        shape[at, dofs] = np.column_stack(
-            [1 - 3 * x**2 + 2 * x**3, h * (x - 2 * x**2 + x**3), 3 * x**2 - 2 * x**3, h * (x**3 - x**2)]
-        )
-        slope[at, dofs] = np.column_stack(
-            [6 * (x**2 - x) / h, 1 - 4 * x + 3 * x**2, 6 * (x - x**2) / h, 3 * x**2 - 2 * x]
-        )
+    elements, dofs = np.arange(count)[:, None], 2 * np.arange(count)[:, None] + np.arange(4)
+    shape[elements, :, dofs] = np.stack(deflection, axis=1)
+    slope[elements, :, dofs] = np.stack(turn, axis=1)
     start = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
     position = (start[:, None] + np.outer(lengths, x)).ravel()
-    return Interpolation(position, np.outer(lengths, 0.5 * gauss_weight).ravel(), shape, slope)
+    points = count * len(x)
+    weight = np.outer(lengths, WEIGHTS).ravel()
+    return Interpolation(position, weight, shape.reshape(points, -1), slope.reshape(points, -1))
 
 
 def graded_mesh(stations: tuple[float, ...], elements: int) -> Matrix:

@@ -247,16 +247,14 @@ def _slider_mass(machine: "SliderCrank") -> Array:
 
 def _body_load(rod: ConnectingRod, slider: Array, inertia: _Inertia) -> Array:
     """Loads (2, B, size) on the coordinates of rod and slider."""
-    n_rod = len(rod.mass)
-    load = np.zeros((2, inertia.along.shape[1], n_rod + 3))
-    load[..., :n_rod] = (
-        inertia.along[..., None] * rod.load.along
-        + inertia.across[..., None] * rod.load.across
-        + inertia.spin[..., None] * rod.load.spin
-        + inertia.centrifugal[..., None] * rod.load.centrifugal
-    )
-    load[..., n_rod:] = inertia.slider_along[..., None] * slider[0] + inertia.slider_across[..., None] * slider[1]
-    return load
+    # coordinates come first while it is summed: loops over crank angles are the long ones
+    along, across, spin, centrifugal = (part[:, None, None] for part in rod.load)
+    rod_load = along * inertia.along
+    rod_load += across * inertia.across
+    rod_load += spin * inertia.spin
+    rod_load += centrifugal * inertia.centrifugal
+    slider_load = slider[0][:, None, None] * inertia.slider_along + slider[1][:, None, None] * inertia.slider_across
+    return np.ascontiguousarray(np.moveaxis(np.concatenate([rod_load, slider_load]), 0, -1))
 
 
 def loads(machine: "SliderCrank", crank_angle: Array, rod: ConnectingRod) -> Array:

@@ -50,15 +50,16 @@ def planar_motion(crank_angle: Array, radius: float, length: float) -> PlanarMot
     sine, cosine = np.sin(crank_angle), np.cos(crank_angle)
     ratio = radius / length
     phi = np.arcsin(ratio * sine)
-    rate = ratio * cosine / np.cos(phi)
-    acceleration = (-ratio * sine + rate**2 * np.sin(phi)) / np.cos(phi)
+    tilt, lean = np.sin(phi), np.cos(phi)
+    rate = ratio * cosine / lean
+    acceleration = (-ratio * sine + rate**2 * tilt) / lean
     return PlanarMotion(
         phi=phi,
         phi_rate=rate,
         phi_acceleration=acceleration,
-        slider=radius * cosine + length * np.cos(phi),
-        slider_rate=-radius * sine - length * np.sin(phi) * rate,
-        slider_acceleration=-radius * cosine - length * (np.cos(phi) * rate**2 + np.sin(phi) * acceleration),
+        slider=radius * cosine + length * lean,
+        slider_rate=-radius * sine - length * tilt * rate,
+        slider_acceleration=-radius * cosine - length * (lean * rate**2 + tilt * acceleration),
         pin_along=-radius * np.cos(crank_angle + phi),
         pin_across=-radius * np.sin(crank_angle + phi),
     )

@@ -158,9 +158,9 @@ def _held(kind: type, *structure: Any) -> tuple[Array, Array, Array, Array]:
     machine = kind(**dict(zip(_structure_fields(kind), structure, strict=True)))
     bins = round(360.0 / machine.matrix_update_interval)
     width = 2.0 * math.pi / bins
-    middles = np.array([(b + 0.5) * width for b in range(bins)])
+    middles = (np.arange(bins) + 0.5) * width
     nodes = FORCING_TERMS - 1
-    held, loads = _assembled(machine, middles, np.array([k * width / nodes for k in range(bins * nodes)]))
+    held, loads = _assembled(machine, middles, np.arange(bins * nodes) * width / nodes)
     n = held.mass.shape[-1]
     inverse_mass = np.asarray(np.linalg.inv(held.mass), dtype=np.float64)
     free = np.zeros((3, bins, 2 * n, n))
@@ -328,8 +328,11 @@ def _structure(kind: type, *structure: Any) -> _Structure:
 
 def side_by_side(bins: Array) -> Array:
     """Matrices (..., bins, columns, rows) of eight bins each, (..., groups, rows, columns, 8); the last one repeats."""
-    at = np.arange(padded(bins.shape[-3])).clip(max=bins.shape[-3] - 1).reshape(-1, LANES)
-    return np.ascontiguousarray(np.moveaxis(bins[..., at, :, :], (-3, -1), (-1, -3)))
+    missing = -bins.shape[-3] % LANES
+    if missing:
+        bins = np.concatenate([bins, np.repeat(bins[..., -1:, :, :], missing, axis=-3)], axis=-3)
+    groups = bins.reshape(*bins.shape[:-3], -1, LANES, *bins.shape[-2:])
+    return np.ascontiguousarray(np.swapaxes(groups, -3, -1))
 
 
 def _closed(channels: Channels, radix: int) -> tuple[Array, Array]:
