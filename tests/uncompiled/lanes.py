@@ -110,11 +110,29 @@ def add_columns(table, at, width, count, factors, factors_at, out, out_at, strid
 
 
 @operation
+def add_some_columns(table, at, width, count, left_out, more, factors, factors_at, out, out_at, stride):
+    """Columns times factors, some of which are zero."""
+    given = factors.copy()
+    given[factors_at + count : factors_at + count + left_out] = 0.0
+    columns = count + left_out + more
+    OPERATIONS["add_columns"](table, at, width, columns, given, factors_at, out, out_at, stride)
+
+
+@operation
 def next_term(table, older, old, width, count, factors, by_older, by_old, more_at, weight, share, out_at):
     """A term of a series from the two before it."""
     known = factors[by_older : by_older + count] @ _taken(table, older, count, width)
     new = factors[by_old : by_old + count] @ _taken(table, old, count, width)
     factors[out_at : out_at + width] = share * (known + weight * new + factors[more_at : more_at + width])
+
+
+@operation
+def next_terms(table, older, old, count, own, first, more_at, most, shares, terms):
+    """Terms of a series from the two before them."""
+    for k in range(terms):
+        at, more = first + k * LANES, more_at + min(k, most) * LANES
+        given = (own, at, at + LANES, more, k + 1.0, shares[k], at + 2 * LANES)
+        OPERATIONS["next_term"](table, older, old, LANES, count, *given)
 
 
 @operation

@@ -97,6 +97,12 @@ class _Emitter:
         zeros = ir.Constant(ir.VectorType(_INT, LANES), [0] * LANES)
         return self.builder.shuffle_vector(first, nothing, zeros)
 
+    def each(self, vector: Any, count: int) -> list[Any]:
+        """The first lanes of a vector, each spread."""
+        nothing = ir.Constant(self.kind, ir.Undefined)
+        masks = [ir.Constant(ir.VectorType(_INT, LANES), [i] * LANES) for i in range(count)]
+        return [self.builder.shuffle_vector(vector, nothing, mask) for mask in masks]
+
     def shifted(self, vector: Any, first: Any) -> Any:
         """A number and all lanes but the last: a load across what was just stored would wait for it."""
         mask = ir.Constant(ir.VectorType(_INT, LANES), [LANES, *range(LANES - 1)])
@@ -334,22 +340,56 @@ def copy(e, own, at, out_at, count):
         b.call(store, [e.load(own, b.add(at, first)), target, ir.Constant(_INT, 8), left])
 
 
-def _columns(e, table, at, width, count, factors, factors_at):
-    """Sum over c < ``count`` of factor c times column c, whose lanes begin at ``at`` + c ``width``; pairs alternate."""
+def _some_at_once(e, total, at_once, write):
+    """Call a function of a number of things and the first of them, for some at once, then for single ones."""
     b = e.builder
-    sums = [e.accumulator(e.constant(0.0)) for _ in range(2)]
+    several = b.udiv(total, e.index(at_once))
+    with cgutils.for_range(b, several) as loop:
+        write(at_once, e.times(loop.index, at_once))
+    done = e.times(several, at_once)
+    with cgutils.for_range(b, b.sub(total, done)) as loop:
+        write(1, b.add(done, loop.index))
 
-    def add(c, one):
+
+def _columns(e, table, places, width, counts, factors, factors_at):
+    """Sums over c of factor c times column c, whose lanes begin at each of some places + c ``width``; pairs alternate.
+
+    Columns are ``counts``: (how many, how many are left out after them), an even number of both, and how many more.
+    """
+    b = e.builder
+    sums = [[e.accumulator(e.constant(0.0)) for _ in range(2)] for _ in places]
+
+    def add(c, which):
         factor = e.spread(e.number(factors, b.add(factors_at, c)))
-        e.add_product(one, e.load(table, b.add(at, b.mul(c, width))), factor)
+        for place, pair in zip(places, sums, strict=True):
+            e.add_product(pair[which], e.load(table, b.add(place, b.mul(c, width))), factor)
 
-    with cgutils.for_range(b, b.udiv(count, e.index(2))) as pairs:
-        c = e.times(pairs.index, 2)
-        add(c, sums[0])
-        add(b.add(c, e.index(1)), sums[1])
-    with b.if_then(b.trunc(count, ir.IntType(1))):
-        add(b.sub(count, e.index(1)), sums[0])
-    return e.total(*sums)
+    def add_some(first, count):
+        with cgutils.for_range(b, b.udiv(count, e.index(2))) as pairs:
+            c = b.add(first, e.times(pairs.index, 2))
+            add(c, 0)
+            add(b.add(c, e.index(1)), 1)
+        with b.if_then(b.trunc(count, ir.IntType(1))):
+            add(b.add(first, b.sub(count, e.index(1))), 0)
+
+    count, left_out, more = counts
+    add_some(e.index(0), count)
+    if more is not None:
+        add_some(b.add(count, left_out), more)
+    return [e.total(*pair) for pair in sums]
+
+
+def _write_columns(e, table, at, width, counts, factors, factors_at, out, out_at, stride):
+    """Write sums over columns, two vectors at once."""
+    b = e.builder
+
+    def write(vectors, first):
+        numbers = [b.add(first, e.index(k)) for k in range(vectors)]
+        places = [b.add(at, e.times(number, LANES)) for number in numbers]
+        for number, answer in zip(numbers, _columns(e, table, places, width, counts, factors, factors_at), strict=True):
+            e.store(answer, out, b.add(out_at, b.mul(number, stride)))
+
+    _some_at_once(e, b.udiv(width, e.index(LANES)), 2, write)
 
 
 @_operation()
@@ -358,10 +398,16 @@ def add_columns(e, table, at, width, count, factors, factors_at, out, out_at, st
 
     Each eight numbers begin ``stride`` after the eight before them.
     """
-    b = e.builder
-    with e.vectors(width) as rows:
-        answer = _columns(e, table, b.add(at, e.times(rows.index, LANES)), width, count, factors, factors_at)
-        e.store(answer, out, b.add(out_at, b.mul(rows.index, stride)))
+    _write_columns(e, table, at, width, (count, None, None), factors, factors_at, out, out_at, stride)
+
+
+@_operation()
+def add_some_columns(e, table, at, width, count, left_out, more, factors, factors_at, out, out_at, stride):
+    """As ``add_columns`` of ``count`` + ``left_out`` + ``more`` columns, the middle ones of which have the factor 0.
+
+    The first two are an even number together.
+    """
+    _write_columns(e, table, at, width, (count, left_out, more), factors, factors_at, out, out_at, stride)
 
 
 @_operation()
@@ -372,11 +418,47 @@ def next_term(e, table, older, old, width, count, factors, by_older, by_old, mor
     shares, weights = e.spread(share), e.spread(b.fmul(weight, share))
     with e.vectors(width) as rows:
         first = e.times(rows.index, LANES)
-        known = _columns(e, table, b.add(older, first), width, count, factors, by_older)
+        (known,) = _columns(e, table, [b.add(older, first)], width, (count, None, None), factors, by_older)
         known = b.fmul(shares, b.fadd(e.load(factors, b.add(more_at, first)), known))
         # what is old was written last: as little as possible waits for it
-        new = _columns(e, table, b.add(old, first), width, count, factors, by_old)
+        (new,) = _columns(e, table, [b.add(old, first)], width, (count, None, None), factors, by_old)
         e.store(e.fma(weights, new, known), factors, b.add(out_at, first))
+
+
+@_operation()
+def next_terms(e, table, older, old, count, own, first, more_at, most, shares, terms):
+    """As ``next_term`` for several terms of a series of eight lanes and ``count`` of them, up to 7, with a column each.
+
+    The first two terms lie at ``first``, the others are written behind them. Term k is weighted by k + 1 and number k
+    of ``shares``; what is added to it lies at ``more_at``, eight numbers for each k up to ``most``. Columns and the
+    last term stay in registers.
+    """
+    b = e.builder
+
+    def sum_of(columns, factors):
+        sums = [e.constant(0.0)] * 2
+        for i, (column, factor) in enumerate(zip(columns, factors, strict=True)):
+            sums[i % 2] = e.fma(column, factor, sums[i % 2])
+        return b.fadd(*sums)
+
+    def known_of(k, older_columns, factors):
+        row = b.select(b.icmp_signed("<", k, most), k, most)
+        more = e.load(own, b.add(more_at, e.times(row, LANES)))
+        return b.fmul(e.spread(e.number(shares, k)), b.fadd(more, sum_of(older_columns, factors)))
+
+    for size in range(1, LANES):
+        with b.if_then(b.icmp_signed("==", count, e.index(size))):
+            columns = [[e.load(table, b.add(at, e.index(i * LANES))) for i in range(size)] for at in (older, old)]
+            known = e.accumulator(known_of(e.index(0), columns[0], e.each(e.load(own, first), size)))
+            last = e.accumulator(e.load(own, b.add(first, e.index(LANES))))
+            with cgutils.for_range(b, terms) as loop:
+                k, after = loop.index, b.add(loop.index, e.index(1))
+                weight = b.fmul(b.sitofp(after, _DOUBLE), e.number(shares, k))
+                factors = e.each(b.load(last), size)
+                term = e.fma(e.spread(weight), sum_of(columns[1], factors), b.load(known))
+                e.store(term, own, b.add(first, e.times(b.add(after, e.index(1)), LANES)))
+                b.store(term, last)
+                b.store(known_of(after, columns[0], factors), known)
 
 
 @_operation()
@@ -402,17 +484,6 @@ def _products(e, own, rows, matrix, width, count, columns):
             for factor, sums in zip(factors, totals, strict=True):
                 e.add_product(sums[k], factor, value)
     return [[b.load(total) for total in sums] for sums in totals]
-
-
-def _some_at_once(e, total, at_once, write):
-    """Call a function of a number of things and the first of them, for some at once, then for single ones."""
-    b = e.builder
-    several = b.udiv(total, e.index(at_once))
-    with cgutils.for_range(b, several) as loop:
-        write(at_once, e.times(loop.index, at_once))
-    done = e.times(several, at_once)
-    with cgutils.for_range(b, b.sub(total, done)) as loop:
-        write(1, b.add(done, loop.index))
 
 
 def _in_blocks(e, rows, width, answer_at, own, out_at):

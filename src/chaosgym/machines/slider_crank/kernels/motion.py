@@ -6,7 +6,17 @@ import numpy as np
 from numba import njit
 
 from chaosgym.core.kernel import leaf, part
-from chaosgym.core.lanes import LANES, add_columns, aligned, copy, dot, dot_of_distances, padded, sum_series
+from chaosgym.core.lanes import (
+    LANES,
+    add_columns,
+    add_some_columns,
+    aligned,
+    copy,
+    dot,
+    dot_of_distances,
+    padded,
+    sum_series,
+)
 from chaosgym.machines.slider_crank.kernels.propagator import table_places
 from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, expand, put_time
 
@@ -215,10 +225,21 @@ def read_now(motion, at):
 
 
 @part
+def apply(motion, columns, width, z, out, stride):
+    """Write the sum of columns (columns, width) of the table times a state, as in ``add_columns``."""
+    own, n, m = motion.own, motion.n, motion.m
+    if own[z + 2 * n + 1] == 0.0:
+        # at the beginning of a bin, where the powers of x are zero
+        add_some_columns(motion.table, columns, width, 2 * n + 1, FORCING_TERMS - 1, m, own, z, own, out, stride)
+    else:
+        add_columns(motion.table, columns, width, 2 * n + FORCING_TERMS + m, own, z, own, out, stride)
+
+
+@part
 def look_ahead(motion, at):
     """Write what every channel reads after 1 to 8 intervals."""
-    own, here, width = motion.own, places(motion.n, motion.m), 2 * LANES * motion.m
-    add_columns(motion.table, at, width, here.columns, own, here.z, own, here.readings + NOW + 1, 2 * LANES)
+    here = places(motion.n, motion.m)
+    apply(motion, at, 2 * LANES * motion.m, here.z, here.readings + NOW + 1, 2 * LANES)
 
 
 @part
@@ -243,7 +264,7 @@ def read_after(motion, intervals):
 def step(motion, propagator, z, x):
     """Move a state by a step whose propagator begins at a place in the table; ``x`` is the share of the bin then."""
     own, n, here = motion.own, motion.n, places(motion.n, motion.m)
-    add_columns(motion.table, propagator, here.states, here.columns, own, z, own, here.moved, LANES)
+    apply(motion, propagator, here.states, z, here.moved, LANES)
     copy(own, here.moved, z, 2 * n)
     put_time(own, z + 2 * n, x)
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from chaosgym.core.kernel import leaf, part
-from chaosgym.core.lanes import LANES, add_columns, copy, next_term
+from chaosgym.core.lanes import LANES, add_columns, copy, next_term, next_terms
 
 FORCING_TERMS = 4
 """Coefficients of the forcing polynomial: a cubic."""
@@ -69,23 +69,14 @@ def expand(table, at, own, z, n, m, lanes, duration, last, factors, loads, serie
         count = FORCING_TERMS - k + (m if k == 0 else 0)
         add_columns(table, forcing + k * lanes, lanes, count, own, factors + k, own, loads + k * lanes, LANES)
         scale /= duration
+    old = at + n * lanes
+    if lanes == LANES:
+        next_terms(table, at, old, n, own, series, loads, FORCING_TERMS, SHARES, last - 1)
+        return
     for k in range(last - 1):
-        older = series + k * lanes
-        more = loads + min(k, FORCING_TERMS) * lanes
-        next_term(
-            table,
-            at,
-            at + n * lanes,
-            lanes,
-            n,
-            own,
-            older,
-            older + lanes,
-            more,
-            k + 1.0,
-            SHARES[k],
-            older + 2 * lanes,
-        )
+        older, more = series + k * lanes, loads + min(k, FORCING_TERMS) * lanes
+        new = older + 2 * lanes
+        next_term(table, at, old, lanes, n, own, older, older + lanes, more, k + 1.0, SHARES[k], new)
 
 
 @leaf
