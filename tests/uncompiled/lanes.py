@@ -105,7 +105,7 @@ def dot_of_sizes(table, at, own, u_at, width):
 def add_columns(table, at, width, count, factors, factors_at, out, out_at, stride):
     """Columns times factors."""
     answer = factors[factors_at : factors_at + count] @ _taken(table, at, count, width)
-    for k, eight in enumerate(answer.reshape(-1, LANES)):
+    for k, eight in enumerate(np.pad(answer, (0, -width % LANES)).reshape(-1, LANES)):
         out[out_at + k * stride :][:LANES] = eight
 
 
@@ -173,13 +173,13 @@ def next_terms_of_eight(own, at, older, old, width, count, weight, share, out_at
 
 
 @operation
-def deal(own, at, stride, count, out, out_at, length, places):
+def deal(own, at, stride, count, out, out_at, length, places, written):
     """Eight vectors turned into eight rows."""
     rows = np.zeros((LANES, LANES))
     for k in range(count):
         rows[k] = own[at + k * stride :][:LANES]
     for q in range(places):
-        out[out_at + q * length :][:LANES] = rows[:, q]
+        out[out_at + q * length :][:written] = rows[:written, q]
 
 
 @operation

@@ -30,7 +30,7 @@ CALLS = {
     "add_rows": lambda call, table, own: call(own, 3, 0.3, 600, 16),
     "multiply_eight": lambda call, table, own: call(own, 0, 3, 200, 48, 5, 600),
     "next_terms_of_eight": lambda call, table, own: call(own, 0, 250, 400, 56, 3, 2.0, 0.25, 600),
-    "deal": lambda call, table, own: call(table, 0, 24, 5, own, 600, 30, 7),
+    "deal": lambda call, table, own: call(table, 0, 24, 5, own, 600, 30, 7, 6),
     "keep_largest": lambda call, table, own: call(own, 3, 600, 16),
     "put": lambda call, table, own: call(own, 3, 0.3),
     "sum_series": lambda call, table, own: call(table, 3, 24, 6, 0.7, own, 900, 16),

@@ -90,6 +90,13 @@ class _Emitter:
     def store(self, vector: Any, pointer: Any, at: Any) -> None:
         self.builder.store(vector, self.address(pointer, at)).align = 8
 
+    def store_some(self, vector: Any, pointer: Any, at: Any, count: Any) -> None:
+        name, flags = f"llvm.masked.store.v{LANES}f64.p0v{LANES}f64", ir.VectorType(ir.IntType(1), LANES)
+        kinds = [self.kind, self.kind.as_pointer(), _INT, flags]
+        store = cgutils.get_or_insert_function(self.builder.module, ir.FunctionType(ir.VoidType(), kinds), name)
+        operands = [vector, self.address(pointer, at), ir.Constant(_INT, 8), self.lanes_below(count)]
+        self.builder.call(store, operands)
+
     def spread(self, scalar: Any) -> Any:
         kind = ir.VectorType(scalar.type, LANES)
         nothing = ir.Constant(kind, ir.Undefined)
@@ -331,13 +338,9 @@ def dot_of_distances(e, table, at, own, u_at, v_at, width):
 def copy(e, own, at, out_at, count):
     """Copy some numbers within an array, whose parts must not overlap: numba's own indexing asks for every sign."""
     b = e.builder
-    name, size = f"llvm.masked.store.v{LANES}f64.p0v{LANES}f64", ir.IntType(1)
-    kinds = [e.kind, e.kind.as_pointer(), _INT, ir.VectorType(size, LANES)]
-    store = cgutils.get_or_insert_function(b.module, ir.FunctionType(ir.VoidType(), kinds), name)
     with e.vectors(b.add(count, e.index(LANES - 1))) as loop:
         first = e.times(loop.index, LANES)
-        target, left = e.address(own, b.add(out_at, first)), e.lanes_below(b.sub(count, first))
-        b.call(store, [e.load(own, b.add(at, first)), target, ir.Constant(_INT, 8), left])
+        e.store_some(e.load(own, b.add(at, first)), own, b.add(out_at, first), b.sub(count, first))
 
 
 def _some_at_once(e, total, at_once, write):
@@ -389,14 +392,15 @@ def _write_columns(e, table, at, width, counts, factors, factors_at, out, out_at
         for number, answer in zip(numbers, _columns(e, table, places, width, counts, factors, factors_at), strict=True):
             e.store(answer, out, b.add(out_at, b.mul(number, stride)))
 
-    _some_at_once(e, b.udiv(width, e.index(LANES)), 2, write)
+    _some_at_once(e, b.udiv(b.add(width, e.index(LANES - 1)), e.index(LANES)), 2, write)
 
 
 @_operation()
 def add_columns(e, table, at, width, count, factors, factors_at, out, out_at, stride):
-    """Write the sum over c < ``count`` of factor c times column c of a table (columns, width), a multiple of 8.
+    """Write the sum over c < ``count`` of factor c times column c of a table (columns, width).
 
-    Each eight numbers begin ``stride`` after the eight before them.
+    Each eight numbers begin ``stride`` after the eight before them. Whole vectors are written: what comes after the
+    width means nothing.
     """
     _write_columns(e, table, at, width, (count, None, None), factors, factors_at, out, out_at, stride)
 
@@ -539,10 +543,10 @@ def next_terms_of_eight(e, own, at, older, old, width, count, weight, share, out
 
 
 @_operation()
-def deal(e, own, at, stride, count, out, out_at, length, places):
-    """Write lane q of ``count`` vectors, ``stride`` apart, as eight numbers at q ``length``, for q < ``places``.
+def deal(e, own, at, stride, count, out, out_at, length, places, written):
+    """Write lane q of ``count`` vectors, ``stride`` apart, at q ``length``, for q < ``places``.
 
-    Numbers beyond the count are zero.
+    Of the eight numbers of a lane the first ``written`` are, and those beyond the count are zero.
     """
     b, nothing = e.builder, e.constant(0.0)
     last, vectors = b.sub(count, e.index(1)), []
@@ -562,7 +566,7 @@ def deal(e, own, at, stride, count, out, out_at, length, places):
         span //= 2
     for q, vector in enumerate(vectors):
         with b.if_then(b.icmp_signed("<", e.index(q), places)):
-            e.store(vector, out, b.add(out_at, b.mul(e.index(q), length)))
+            e.store_some(vector, out, b.add(out_at, b.mul(e.index(q), length)), written)
 
 
 @_operation()

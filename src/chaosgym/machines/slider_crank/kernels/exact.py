@@ -312,7 +312,7 @@ def carry(motion, propagator, intervals, vectors):
         for i in range(states):
             own[z + i] = vectors[k, i]
         for _ in range(intervals):
-            add_columns(motion.table, propagator, here.states, states, own, z, own, here.moved, LANES)
+            add_columns(motion.table, propagator, states, states, own, z, own, here.moved, LANES)
             for i in range(states):
                 own[z + i] = own[here.moved + i]
         for i in range(states):

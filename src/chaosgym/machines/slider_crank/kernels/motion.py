@@ -264,7 +264,7 @@ def read_after(motion, intervals):
 def step(motion, propagator, z, x):
     """Move a state by a step whose propagator begins at a place in the table; ``x`` is the share of the bin then."""
     own, n, here = motion.own, motion.n, places(motion.n, motion.m)
-    apply(motion, propagator, here.states, z, here.moved, LANES)
+    apply(motion, propagator, 2 * n, z, here.moved, LANES)
     copy(own, here.moved, z, 2 * n)
     put_time(own, z + 2 * n, x)
 

@@ -46,7 +46,7 @@ class TablePlaces(NamedTuple):
 
     ahead (columns, m, 2, 8)
         Reading and slope of every channel after 1 to 8 intervals per unit z: y + lag y' where it is closed, else y.
-    look, interval (columns, 2n or more)
+    look, interval (columns, 2n)
         p and p' after a look, and after an interval.
     acceleration (columns, n + m or more)
         p'' and the second derivatives of the channels' displacements.
@@ -70,8 +70,8 @@ def table_places(n: int, m: int) -> TablePlaces:
     """Places for n coordinates and m channels."""
     columns = 2 * n + FORCING_TERMS + m
     look = columns * 2 * LANES * m
-    interval = look + columns * padded(2 * n)
-    acceleration = interval + columns * padded(2 * n)
+    interval = look + columns * 2 * n
+    acceleration = padded(interval + columns * 2 * n)
     now = acceleration + columns * padded(n + m)
     bound = now + 2 * m * padded(columns)
     return TablePlaces(0, look, interval, acceleration, now, bound, bound + m * padded(columns))
@@ -218,17 +218,19 @@ def _note_largest(space, anchor, row, largest):
 def _deal_row(space, row, table, at, length, count):
     """Write a row over z into the tables of the bins."""
     for c in range(0, space.columns, LANES):
-        deal(space.own, row + c * LANES, LANES, min(LANES, space.columns - c), table, at + c, length, count)
+        full = min(LANES, space.columns - c)
+        deal(space.own, row + c * LANES, LANES, full, table, at + c, length, count, LANES)
 
 
 @part
-def _deal_columns(space, matrix, rows, table, at, length, count):
-    """Write a matrix (rows, width) by columns into the tables of the bins."""
-    own, width, lanes = space.own, space.width, padded(rows)
+def _deal_columns(space, matrix, rows, lanes, table, at, length, count):
+    """Write a matrix (rows, width) by columns, ``lanes`` apart, into the tables of the bins."""
+    own, width = space.own, space.width
     for c in range(space.columns):
         for i in range(0, rows, LANES):
-            place = at + c * lanes + i
-            deal(own, matrix + i * width + c * LANES, width, min(LANES, rows - i), table, place, length, count)
+            place, full = at + c * lanes + i, min(LANES, rows - i)
+            written = min(LANES, lanes - i)
+            deal(own, matrix + i * width + c * LANES, width, full, table, place, length, count, written)
 
 
 @leaf
@@ -270,7 +272,7 @@ def _put_channels(space, row, lag, anchor, s, duration, interval, count, table, 
             for q in range(2):
                 place = at + places.ahead + ((c * m + j) * 2 + q) * LANES
                 ends = then + q * width + c * LANES
-                deal(own, ends, 3 * width, LANES, table, place, length, count)
+                deal(own, ends, 3 * width, LANES, table, place, length, count, LANES)
     for i in range(n):
         _from_anchor(space, anchor[s], space.held + i * width)
     keep_largest(own, space.held, space.held, n * width)
@@ -360,13 +362,13 @@ def tables(free, forcing, push, bins, rate, row, lag, anchor, duration, steps, o
             first = LANES * group
             at, count = (s * bins + first) * length, min(LANES, bins - first)
             _put_acceleration(space, free, forcing, push, rate, row, s, group, groups)
-            _deal_columns(space, space.held, n + m, table, at + places.acceleration, length, count)
+            _deal_columns(space, space.held, n + m, padded(n + m), table, at + places.acceleration, length, count)
             _short_propagator(space, duration, interval, order)
-            _deal_columns(space, space.one, 2 * n, table, at + places.interval, length, count)
+            _deal_columns(space, space.one, 2 * n, 2 * n, table, at + places.interval, length, count)
             _put_channels(space, row, lag, anchor, s, duration, interval, count, table, at, length)
             before, after, share = space.one, space.twice, interval / duration
             for _ in range(3):
                 _through(space, before, share, before, after, 2 * n)
                 before, after, share = after, before, 2.0 * share
-            _deal_columns(space, before, 2 * n, table, at + places.look, length, count)
+            _deal_columns(space, before, 2 * n, 2 * n, table, at + places.look, length, count)
     return table
