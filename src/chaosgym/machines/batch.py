@@ -102,7 +102,7 @@ class CompiledBatch(ABC):
     def _cycles(self, arrays: CycleArrays, outcome: Indices) -> Cycles:
         failed = outcome != status.OK
         results = Cycles(failed, arrays.peak_force, arrays.impacts, arrays.bounce_time)
-        if failed.any():
+        if True in failed.tolist():
             for values in results[1:]:
                 values[failed] = 0
         return results

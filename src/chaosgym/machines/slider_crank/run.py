@@ -146,21 +146,19 @@ class CrankBatch(CompiledBatch):
 
     def set_speeds(self, which: Indices, speeds: Array) -> None:
         """Change the speeds of the cranks [rpm]."""
-        changed = self._speeds[which] != speeds
-        if not changed.any():
-            return
-        which, speeds = which[changed], speeds[changed]
-        self._speeds[which] = speeds
         # machines of one make are often at one speed: each pair is looked up once
-        distinct: dict[tuple[ModelsBySpeed, float], int] = {}
-        pairs = zip(which.tolist(), speeds.tolist(), strict=True)
-        row = [distinct.setdefault((self._models[i], speed), len(distinct)) for i, speed in pairs]
-        kept = [models.at(speed) for models, speed in distinct]
-        for name in SPEED_FIELDS:
-            getattr(self._batch, name)[which] = np.array([getattr(each, name) for each in kept])[row]
-        self._batch.table[which] = np.array([each.table.ctypes.data for each in kept])[row]
-        for i, place in zip(which.tolist(), row, strict=True):
-            self._kept[i] = kept[place]
+        found: dict[tuple[ModelsBySpeed, float], SliderCrankModel] = {}
+        for i, speed in zip(which.tolist(), speeds.tolist(), strict=True):
+            if self._speeds[i] == speed:
+                continue
+            pair = self._models[i], speed
+            if pair not in found:
+                found[pair] = pair[0].at(speed)
+            model = self._kept[i] = found[pair]
+            self._speeds[i] = speed
+            for name in SPEED_FIELDS:
+                getattr(self._batch, name)[i] = getattr(model, name)
+            self._batch.table[i] = model.table.ctypes.data
 
     def set_clearances(self, which: Indices, clearances: Array) -> None:
         """Change the clearances of the monitored joint [m]."""
