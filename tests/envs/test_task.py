@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from chaosgym.envs.kernels.steps import TERMS, rewards_of, status_of
 from chaosgym.envs.task import Status, Task, UnknownKeywordError, demand_of, split
 from chaosgym.errors import ParameterError
 from tests.plain_modes import PLAIN_BEAM
@@ -21,10 +22,11 @@ def test_each_surface_wears_by_its_own_peaks():
 
 def test_a_job_stands_where_the_worst_puts_it():
     """A failed simulation before a fracture, a fracture before the end, the end at the last step."""
-    failed = np.array([False, False, False, True, False])
-    steps, damage = np.array([9, 10, 10, 10, 3]), np.array([0.2, 0.99, 1.0, 2.0, 1.5])
+    failed = [False, False, False, True, False]
+    steps, damage = [9, 10, 10, 10, 3], [0.2, 0.99, 1.0, 2.0, 1.5]
     expected = ["RUNNING", "JOB_DONE", "FRACTURE", "SIMULATION_FAILED", "FRACTURE"]
-    assert [Status(int(value)).name for value in TASK.status(failed, steps, damage)] == expected
+    found = [status_of(TASK.steps, *given) for given in zip(failed, steps, damage, strict=True)]
+    assert [Status(value).name for value in found] == expected
 
 
 def test_every_term_costs_its_weight():
@@ -32,16 +34,9 @@ def test_every_term_costs_its_weight():
     task = Task(
         steps=10, type_iii_weight=2.0, deviation_weight=3.0, damage_weight=5.0, time_weight=7.0, failure_weight=11.0
     )
-    given = {
-        "deviation": np.array([0.5]),
-        "type_iii": np.array([0.25]),
-        "damage": np.array([0.1]),
-        "time": np.array([0.2]),
-        "failed": np.array([True]),
-        "steps_left": np.array([4.0]),
-    }
-    terms = {name: float(value[0]) for name, value in task.rewards(**given).items()}
-    assert terms == pytest.approx(
+    given = {"deviation": 0.5, "type_iii": 0.25, "damage": 0.1, "time": 0.2, "failed": True, "steps_left": 4.0}
+    terms = rewards_of(task.numbers[0], **given)
+    assert dict(zip(TERMS, terms, strict=True)) == pytest.approx(
         {
             "reward_deviation": -1.5,
             "reward_type_iii": -0.5,
@@ -50,7 +45,7 @@ def test_every_term_costs_its_weight():
             "reward_failure": -44.0,
         }
     )
-    assert task.rewards(**{**given, "failed": np.array([False])})["reward_failure"][0] == 0.0
+    assert rewards_of(task.numbers[0], **{**given, "failed": False})[-1] == 0.0
 
 
 def test_the_speeds_of_a_task_end_at_its_highest():

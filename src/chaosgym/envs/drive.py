@@ -28,10 +28,11 @@ MOVES = np.array([0, -1, 1, -2, 2])
 BACK = len(MOVES)
 """Discrete action that goes back to the demand."""
 
+ALLOWED = frozenset(range(BACK + 1))
+"""Discrete actions."""
+
 DEAD_BAND = 0.4
 """Continuous changes below this hold the speed."""
-
-KINDS = ("trim", "continuous", "speed")
 
 
 def action_space(task: Task) -> "Box | Discrete[Any]":
@@ -43,8 +44,8 @@ def action_space(task: Task) -> "Box | Discrete[Any]":
     return Box(np.array([task.lowest_speed], np.float32), np.array([task.highest_speed], np.float32))
 
 
-def checked_actions(task: Task, actions: Any, count: int) -> NDArray[Any]:
-    """Return the actions of ``count`` machines as an array, (count,) if they are discrete, otherwise (count, n).
+def checked_actions(task: Task, actions: Any, count: int) -> Array:
+    """Return the actions of ``count`` machines as an array (count, n).
 
     Raises
     ------
@@ -54,32 +55,10 @@ def checked_actions(task: Task, actions: Any, count: int) -> NDArray[Any]:
     given = np.asarray(actions)
     if task.action == "trim":
         fits = given.shape == (count,) and given.dtype.kind in "iu"
-        if not fits or given.min() < 0 or given.max() > BACK:
+        if not fits or not ALLOWED.issuperset(given.tolist()):
             raise ParameterError(f"action = {actions!r} is not usable; allowed: whole numbers from 0 to {BACK}")
-        return given
+        return given[:, None].astype(float)
     width = 2 if task.action == "continuous" else 1
     if given.shape != (count, width) or not np.issubdtype(given.dtype, np.number) or not np.isfinite(given).all():
         raise ParameterError(f"action = {actions!r} is not usable; allowed: {width} finite numbers for each machine")
     return given.astype(float)
-
-
-def trimmed(task: Task, actions: NDArray[Any], demand: Array, trim: Array) -> Array:
-    """Return the trims (k,) that checked actions of k machines ask for, at the demand and trim before."""
-    if task.action == "speed":
-        return actions[:, 0] - demand
-    if task.action == "trim":
-        back = actions == BACK
-        change = task.trim_step * MOVES[np.where(back, 0, actions)]
-    else:
-        back = actions[:, 1] > 0.5
-        size = np.clip((np.abs(actions[:, 0]) - DEAD_BAND) / (1.0 - DEAD_BAND), 0.0, 1.0)
-        change = 2.0 * task.trim_step * np.sign(actions[:, 0]) * size
-    return np.where(back, 0.0, (trim + change).clip(-task.largest_trim, task.largest_trim))
-
-
-def approached(task: Task, speed: Array, target: Array) -> Array:
-    """Return the speeds (k,) of the next step, within the range of the drive, its rate and its grid."""
-    moved = speed + (target - speed).clip(-task.slew_limit, task.slew_limit)
-    if task.speed_grid > 0.0:
-        moved = task.speed_grid * np.rint(moved / task.speed_grid)
-    return np.asarray(moved.clip(task.lowest_speed, task.highest_speed))

@@ -68,10 +68,9 @@ class ExponentJudge:
 
     def verdict(self, which: Indices, growth: Array, peaks: Array) -> tuple[Array, Array]:
         """Share of the cycles with a positive exponent, and the exponent, (k,) each."""
-        exponents, shares = self._exponent[which], np.empty(len(which))
-        call(running_exponents, growth, exponents, MEMORY, LARGEST_GROWTH, shares)
-        self._exponent[which] = exponents
-        return shares, exponents
+        shares = np.empty(len(which))
+        call(running_exponents, growth, which, MEMORY, LARGEST_GROWTH, self._exponent, shares)
+        return shares, self._exponent[which]
 
 
 class RecurrenceJudge:
@@ -86,8 +85,10 @@ class RecurrenceJudge:
 
     def verdict(self, which: Indices, growth: Array, peaks: Array) -> tuple[Array, Array]:
         """1 where the step does not repeat, otherwise 0, and the miss, (k,) each."""
-        self._recent[which] = recent = np.concatenate([self._recent[which], peaks], axis=1)[:, -WINDOW:]
-        miss = recurrence_miss(peaks if peaks.shape[1] >= WINDOW else recent)
+        if peaks.shape[1] < WINDOW:
+            peaks = np.concatenate([self._recent[which], peaks], axis=1)[:, -WINDOW:]
+        self._recent[which] = peaks[:, -WINDOW:]
+        miss = recurrence_miss(peaks)
         return (miss > MISS).astype(float), miss
 
 

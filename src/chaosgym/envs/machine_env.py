@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from chaosgym.envs.drive import action_space, checked_actions
 from chaosgym.envs.jobs import Indices, Jobs, Rules
+from chaosgym.envs.kernels.steps import INFO
 from chaosgym.envs.observation import Observation, observation_names, observation_space
 from chaosgym.envs.setups import setup_of
 from chaosgym.envs.task import Status, Task, split
@@ -205,7 +206,7 @@ class MachineEnv(gym.Env[Observation, Any]):
             raise gym.error.ResetNeeded("no job is running; call reset() first")
         actions = checked_actions(self.task, [action], 1)
         outcome = self._job.step(THE_ONE, actions, [self.np_random])
-        info = first_of(outcome.info)
+        info = dict(zip(INFO, outcome.report.item(), strict=True))
         self._runs = info["status"] == Status.RUNNING
         if self.render_mode is not None:
             self._show().add(info, outcome.observation[0])

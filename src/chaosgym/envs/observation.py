@@ -6,10 +6,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
-from chaosgym.core.compilation import call
-from chaosgym.envs.kernels.steps import sensed
 from chaosgym.envs.task import Task
-from chaosgym.machines.batch import Cycles
 from chaosgym.monitor import HIGHEST, LIMIT
 
 Array = NDArray[np.float64]
@@ -75,23 +72,18 @@ def observation_space(task: Task) -> Box:
     return Box(np.array(low, np.float32), np.array(high, np.float32))
 
 
-def felt(task: Task, cycles: Cycles, last: int, period: Array, generators: Generators) -> tuple[Array, Array]:
-    """What sensors report of the ``last`` cycles of k machines, of a period [s] each, by generators of their own.
+def sensed(task: Task, impacts: NDArray[np.int64], generators: Generators) -> tuple[Array, NDArray[np.int64]]:
+    """Draw what sensors miss of a step of k machines, by generators of their own.
 
     Returns
     -------
-    (values, peaks)
-        (k, 8), the entries ``FELT``, and (k, last) measured peak forces [N].
+    (errors, counted)
+        (k, cycles + 1) of each cycle's peak force and of the share of bouncing, from 0 to 1, and (k,) how many of the
+        ``impacts`` (k, cycles, sides) are counted.
     """
-    count = len(generators)
-    errors = np.empty((count, last + 1))
-    for row, generator in zip(errors, generators, strict=True):
-        generator.random(out=row)
-    errors = (2.0 * errors - 1.0) * ([task.sensor_error] * last + [task.bouncing_error])
-    values, peaks = np.empty((count, len(FELT))), np.empty((count, last))
-    call(sensed, *cycles[1:], period, errors, peaks, values)
-    if task.missed_impacts > 0.0:
-        for row, generator in zip(values, generators, strict=True):
-            row[6] = generator.binomial(int(row[6]), 1.0 - task.missed_impacts)
-    values[:, 6] /= last
-    return values, peaks
+    errors, counted = np.empty((len(generators), task.cycles_per_step + 1)), impacts.sum(axis=(1, 2))
+    for k, generator in enumerate(generators):
+        generator.random(out=errors[k])
+        if task.missed_impacts > 0.0:
+            counted[k] = generator.binomial(counted[k], 1.0 - task.missed_impacts)
+    return errors, counted

@@ -20,13 +20,14 @@ ISO 281:2007, Rolling bearings - Dynamic load ratings and rating life.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.design.rating_life import damage_in_a_million
+from chaosgym.envs.kernels import steps
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameter, parameters_of, validate
@@ -40,10 +41,10 @@ _count = partial(parameter, low=1, high=1e6, provenance="assumed")
 class Status(IntEnum):
     """Where the job stands; ``info["status"]``."""
 
-    RUNNING = 0
-    JOB_DONE = 1
-    FRACTURE = 2
-    SIMULATION_FAILED = 3
+    RUNNING = steps.RUNNING
+    JOB_DONE = steps.JOB_DONE
+    FRACTURE = steps.FRACTURE
+    SIMULATION_FAILED = steps.SIMULATION_FAILED
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,22 +130,13 @@ class Task:
         shares: Array = damage_in_a_million(peak_force, self.load_rating).sum(axis=-2)
         return shares * (self.life_share / self.job_cycles)
 
-    def status(self, failed: Any, steps_done: Any, damage: Any) -> Any:
-        """Where jobs stand (...), by whether their simulation failed, steps done, and damage of the joint."""
-        done = np.where(steps_done >= self.steps, int(Status.JOB_DONE), int(Status.RUNNING))
-        return np.where(failed, int(Status.SIMULATION_FAILED), np.where(damage >= 1.0, int(Status.FRACTURE), done))
-
-    def rewards(
-        self, *, deviation: Array, type_iii: Array, damage: Array, time: Array, failed: Any, steps_left: Array
-    ) -> dict[str, Array]:
-        """Terms of the reward of a step of k jobs, (k,) each, by name; their sum is the reward."""
-        return {
-            "reward_deviation": 0.0 - self.deviation_weight * deviation,
-            "reward_type_iii": 0.0 - self.type_iii_weight * type_iii,
-            "reward_damage": 0.0 - self.damage_weight * damage,
-            "reward_time": 0.0 - self.time_weight * time,
-            "reward_failure": 0.0 - self.failure_weight * steps_left * failed,
-        }
+    @cached_property
+    def numbers(self) -> NDArray[np.void]:
+        """One record of all fields for the kernels, with a choice as its place among the choices."""
+        about = parameters_of(self)
+        given = {name: getattr(self, name) for name in about}
+        values = [about[name].choices.index(value) if about[name].choices else value for name, value in given.items()]
+        return np.array([tuple(values)], [(name, type(value)) for name, value in zip(about, values, strict=True)])
 
 
 class UnknownKeywordError(ParameterError, TypeError):

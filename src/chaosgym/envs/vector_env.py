@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from chaosgym.envs import environment
 from chaosgym.envs.drive import checked_actions
 from chaosgym.envs.jobs import Indices, Jobs
+from chaosgym.envs.kernels.steps import INFO
 from chaosgym.envs.machine_env import METADATA, Start, Workplace, start_of
 from chaosgym.envs.observation import Observation, observation_names
+from chaosgym.envs.task import Status
 from chaosgym.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -164,11 +166,12 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
             outcome = self.jobs.step(running, actions[running], self._generators_of(running))
             self._elapsed[running] += 1
             observations[running], rewards[running] = outcome.observation, outcome.reward
-            terminated[running] = outcome.terminated
+            info = {name: outcome.report[name] for name in INFO}
+            terminated[running] = info["status"] != Status.RUNNING
             if self._limit is not None:
                 truncated[running] = self._elapsed[running] >= self._limit
-            self._take_in(running, outcome.info, outcome.observation)
-            self._report(infos, observations, running, outcome.info, terminated | truncated)
+            self._take_in(running, info, outcome.observation)
+            self._report(infos, observations, running, info, terminated | truncated)
         if len(over):
             observations[over], info = self._start(over, [None] * len(over))
             self._add(infos, over, info)

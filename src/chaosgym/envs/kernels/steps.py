@@ -1,10 +1,35 @@
-"""What a step of k machines comes to: growth, recurrence and the features of measured peaks, without small arrays."""
+"""What a step of k jobs comes to: speed, growth, recurrence, cost and observation, without small arrays.
+
+``tasks`` is ``Task.numbers``, one record; ``jobs`` (N,) are records ``JOB``, ``demands`` (N, steps + 1) the speeds they
+are asked for, and ``which`` (k,) the jobs of the step.
+"""
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+RUNNING, JOB_DONE, FRACTURE, SIMULATION_FAILED = range(4)
+
+BY_TRIM, CONTINUOUS, BY_SPEED = range(3)
+"""Places of the kinds of action among the choices of a task."""
+
+JOB = np.dtype(
+    [(name, np.float64) for name in ("speed", "trim", "clearance", "worn")]
+    + [(name, np.int64) for name in ("done", "changed", "machine")]
+)
+"""Speed and trim of the last step, clearance when new and as ``worn``, steps ``done``, those done when the demand
+``changed``, and number of the machine."""
+
+TERMS = tuple(f"reward_{term}" for term in ("deviation", "type_iii", "damage", "time", "failure"))
+
+REPORT = np.dtype(
+    [(name, np.float64) for name in (*TERMS, "speed", "demand", "deviation", "type_iii", "cost", "irregularity")]
+    + [("largest_force", np.float64), ("damage", np.float64), ("status", np.int64), ("is_success", np.bool_)]
+    + [("machine", np.int64), ("clearance", np.float64)],
+    align=True,
+)
+"""Info of a step."""
+
+INFO = REPORT.names or ()
 
 LAGS = (1, 2, 4)
 """Cycles after which measured peaks are compared with themselves."""
@@ -13,21 +38,118 @@ PERIODS = 8
 """Longest period, in cycles, of a motion that repeats."""
 
 
+@njit(cache=True)
+def limited(value, low, high):
+    """Nearest number of a range."""
+    return min(max(value, low), high)
+
+
+@njit(cache=True)
+def trimmed(task, action, demand, trim, moves, dead_band):
+    """Trim that an action asks for, at the demand and trim before."""
+    if task["action"] == BY_SPEED:
+        return action[0] - demand
+    if task["action"] == BY_TRIM:
+        move = int(action[0])
+        back = move == len(moves)
+        change = task["trim_step"] * moves[0 if back else move]
+    else:
+        back = action[1] > 0.5
+        size = limited((abs(action[0]) - dead_band) / (1.0 - dead_band), 0.0, 1.0)
+        change = 2.0 * task["trim_step"] * np.sign(action[0]) * size
+    return 0.0 if back else limited(trim + change, -task["largest_trim"], task["largest_trim"])
+
+
+@njit(cache=True)
+def approached(task, speed, target):
+    """Speed of the next step, within the range of the drive, its rate and its grid."""
+    moved = speed + limited(target - speed, -task["slew_limit"], task["slew_limit"])
+    if task["speed_grid"] > 0.0:
+        moved = task["speed_grid"] * np.rint(moved / task["speed_grid"])
+    return limited(moved, task["lowest_speed"], task["highest_speed"])
+
+
 @njit(cache=True, nogil=True)
-def running_exponents(growth: Array, exponents: Array, memory: float, largest: float, shares: Array) -> None:
-    """Carry ``exponents`` (k,) through ``growth`` (k, cycles); ``shares`` (k,) of the cycles with a positive one."""
-    count, cycles = growth.shape
-    for i in range(count):
+def drive(tasks, actions, moves, dead_band, which, demands, jobs):
+    """Set trims and speeds of the next step, by actions (k, n) as in ``envs.drive``."""
+    task = tasks[0]
+    for k, i in enumerate(which):
+        job = jobs[i]
+        demand = demands[i, job["done"]]
+        job["trim"] = trimmed(task, actions[k], demand, job["trim"], moves, dead_band)
+        job["speed"] = approached(task, job["speed"], demand + job["trim"])
+
+
+@njit(cache=True)
+def status_of(steps, failed, done, damage):
+    """Where a job stands, by whether its simulation failed, steps done, and damage of the joint."""
+    if failed:
+        return SIMULATION_FAILED
+    if damage >= 1.0:
+        return FRACTURE
+    return JOB_DONE if done >= steps else RUNNING
+
+
+@njit(cache=True)
+def rewards_of(task, deviation, type_iii, damage, time, failed, steps_left):
+    """Terms of the reward of a step, as in ``TERMS``; their sum is the reward."""
+    return (
+        0.0 - task["deviation_weight"] * deviation,
+        0.0 - task["type_iii_weight"] * type_iii,
+        0.0 - task["damage_weight"] * damage,
+        0.0 - task["time_weight"] * time,
+        0.0 - task["failure_weight"] * steps_left * failed,
+    )
+
+
+@njit(cache=True, nogil=True)
+def settle(
+    tasks, job_time, which, demands, failed, peaks, wear, period, type_iii, irregularity, jobs, damage, report, rewards
+):
+    """Count a step as done, and write its ``report`` (k,), records ``REPORT``, and ``rewards`` (k,).
+
+    ``failed``, ``period`` [s], ``type_iii`` and ``irregularity`` (k,), ``peaks`` (k, cycles, sides) [N]; ``wear``
+    (k, sides) adds to ``damage`` (N, sides). ``job_time`` [s] of a job at top speed.
+    """
+    task = tasks[0]
+    for k, i in enumerate(which):
+        job, row = jobs[i], report[k]
+        demand, steps_left = demands[i, job["done"]], task["steps"] - job["done"]
+        before = damage[i].max()
+        damage[i] += wear[k]
+        job["done"] += 1
+        if demands[i, job["done"]] != demand:
+            job["changed"] = job["done"]
+        job["worn"] = job["clearance"] * (1.0 + task["wear"] * job["done"] / task["steps"])
+        row["speed"], row["demand"], row["deviation"] = job["speed"], demand, abs(job["speed"] - demand)
+        row["type_iii"] = row["cost"] = 0.0 if failed[k] else type_iii[k]
+        row["irregularity"], row["largest_force"], row["damage"] = irregularity[k], peaks[k].max(), damage[i].max()
+        row["status"] = status_of(task["steps"], failed[k], job["done"], row["damage"])
+        row["is_success"] = row["status"] == JOB_DONE
+        row["machine"], row["clearance"] = job["machine"], job["worn"]
+        worse, time = row["damage"] - before, task["cycles_per_step"] * period[k] / job_time
+        gone = row["status"] >= FRACTURE
+        terms = rewards_of(task, row["deviation"], row["type_iii"], worse, time, gone, steps_left)
+        row["reward_deviation"], row["reward_type_iii"], row["reward_damage"] = terms[:3]
+        row["reward_time"], row["reward_failure"] = terms[3:]
+        rewards[k] = terms[0] + terms[1] + terms[2] + terms[3] + terms[4]
+
+
+@njit(cache=True, nogil=True)
+def running_exponents(growth, which, memory, largest, exponents, shares):
+    """Carry ``exponents`` (N,) through ``growth`` (k, cycles); ``shares`` (k,) of the cycles with a positive one."""
+    cycles = growth.shape[1]
+    for k, i in enumerate(which):
         exponent, wild = exponents[i], 0
-        for grown in growth[i]:
-            exponent += (min(max(grown, -largest), largest) - exponent) / memory
+        for grown in growth[k]:
+            exponent += (limited(grown, -largest, largest) - exponent) / memory
             wild += exponent > 0.0
         exponents[i] = exponent
-        shares[i] = wild / cycles
+        shares[k] = wild / cycles
 
 
 @njit(cache=True, nogil=True)
-def recurrence_misses(peaks: Array, misses: Array) -> None:
+def recurrence_misses(peaks, misses):
     """Mean miss at the period that fits best, as a share of the mean peak, (k,), of peak forces (k, cycles)."""
     count, cycles = peaks.shape
     for i in range(count):
@@ -49,40 +171,42 @@ def recurrence_misses(peaks: Array, misses: Array) -> None:
 
 
 @njit(cache=True, nogil=True)
-def sensed(
-    peak_force: Array,
-    impacts: NDArray[np.int64],
-    bounce_duration: Array,
-    period: Array,
-    errors: Array,
-    measured: Array,
-    features: Array,
-) -> None:
-    """What sensors report of the last cycles of k machines: peaks ``measured`` (k, last) and ``features`` (k, 8).
+def observe(
+    tasks, which, demands, jobs, peak_force, bounce_duration, period, errors, counted, low, high, measured, values
+):
+    """Write what agents see of the last cycles: ``values`` (k, 14 or more), ``measured`` peaks (k, last).
 
-    ``peak_force``, ``impacts`` and ``bounce_duration`` (k, cycles, sides), ``period`` (k,). ``errors`` (k, last + 1)
-    are those of the peak forces of the first side, and of the share of bouncing. Features are ``observation.FELT``, but
-    with the number of all impacts.
+    ``peak_force`` and ``bounce_duration`` (k, cycles, sides), ``period`` and ``counted`` impacts (k,). ``errors``
+    (k, last + 1) from 0 to 1, of the peak forces of the first side and of the share of bouncing. ``values`` lie between
+    ``low`` and ``high``; their first 14 columns are ``observation.OBSERVATION_NAMES``.
     """
-    count, last = errors.shape[0], errors.shape[1] - 1
-    first, sides = peak_force.shape[1] - last, peak_force.shape[2]
-    for i in range(count):
-        total, largest, bouncing, contacts = 0.0, 0.0, 0.0, 0
-        for k in range(last):
-            measured[i, k] = max(peak_force[i, first + k, 0] + errors[i, k], 0.0)
-            total += measured[i, k]
-            largest = max(largest, measured[i, k])
+    task, last, sides = tasks[0], measured.shape[1], peak_force.shape[2]
+    first = peak_force.shape[1] - last
+    for k, i in enumerate(which):
+        job, peaks, seen = jobs[i], measured[k], values[k]
+        total, largest, bouncing = 0.0, 0.0, 0.0
+        for n in range(last):
+            error = (2.0 * errors[k, n] - 1.0) * task["sensor_error"]
+            peaks[n] = max(peak_force[k, first + n, 0] + error, 0.0)
+            total += peaks[n]
+            largest = max(largest, peaks[n])
             for side in range(sides):
-                bouncing += bounce_duration[i, first + k, side]
-                contacts += impacts[i, first + k, side]
+                bouncing += bounce_duration[k, first + n, side]
         mean, squares = total / last, 0.0
-        for k in range(last):
-            squares += (measured[i, k] - mean) ** 2
-        features[i, 0], features[i, 1], features[i, 2] = mean, np.sqrt(squares / last), largest
+        for n in range(last):
+            squares += (peaks[n] - mean) ** 2
+        demand = demands[i, job["done"]]
+        seen[0], seen[1], seen[2], seen[3] = job["speed"], demand, job["trim"], job["speed"] - demand
+        seen[4] = 1.0 - job["done"] / task["steps"]
+        seen[5] = min(job["done"] - job["changed"], task["shortest_hold"])
+        seen[6], seen[7], seen[8] = mean, np.sqrt(squares / last), largest
         for column, lag in enumerate(LAGS):
             missed = 0.0
-            for k in range(lag, last):
-                missed += abs(measured[i, k] - measured[i, k - lag])
-            features[i, 3 + column] = missed / max(1, last - lag)
-        features[i, 6] = contacts
-        features[i, 7] = 2.0 * bouncing / (last * sides * period[i]) + errors[i, last]
+            for n in range(lag, last):
+                missed += abs(peaks[n] - peaks[n - lag])
+            seen[9 + column] = missed / max(1, last - lag)
+        seen[12] = counted[k] / last
+        error = (2.0 * errors[k, last] - 1.0) * task["bouncing_error"]
+        seen[13] = 2.0 * bouncing / (last * sides * period[k]) + error
+        for column in range(14):
+            seen[column] = limited(seen[column], low[column], high[column])
