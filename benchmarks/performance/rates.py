@@ -6,17 +6,20 @@ ours.
 """
 
 import os
+import statistics
 import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
+import numba
 import numpy as np
 from tqdm import tqdm
 
-from benchmarks.performance.timing import Rate, rate
+from benchmarks.performance.timing import Rate, kernel_time, rate
 from chaosgym.classifier import default_classifier
 from chaosgym.machines import MACHINES, ImpactBeam, Machine, SliderCrank
 from chaosgym.simulation import ExactEvents, Integrator, RungeKutta4, simulate
@@ -65,7 +68,8 @@ def benchmark(repeats: int = 5, *, progress: bool = False) -> dict[str, Any]:
     dict
         ``range``, the mean over the beam's range and its ends, then ``cycles``, ``env_steps``, ``vector_env_steps``,
         ``sweep_points``, ``classifier_rows``: by name, how many
-        ``per_second`` and ``per_processor_second``. ``load_average``: how busy the computer was before and after.
+        ``per_second`` and ``per_processor_second``. ``step_microseconds``, see ``step_cost``. ``load_average``: how
+        busy the computer was before and after.
     """
     beam, crank = BEAM, CRANK
     environments = {name: name for name in _environments()}
@@ -83,6 +87,8 @@ def benchmark(repeats: int = 5, *, progress: bool = False) -> dict[str, Any]:
             for name, subject in subjects.items():
                 results[quantity][name] = measure(subject, repeats)._asdict()
                 bar.update()
+    ours = [name for name in environments if name not in OTHER_ENVIRONMENTS]
+    results["step_microseconds"] = {name: step_cost(name, repeats) for name in ours}
     results["load_average"]["after"] = os.getloadavg()[0]
     return results
 
@@ -157,6 +163,30 @@ def env_rate(name: str, repeats: int) -> Rate:
         return steps
 
     return rate(run, repeats)
+
+
+def step_cost(name: str, repeats: int) -> dict[str, float]:
+    """Processor time [us] of a step of a single environment, and what of it is ``python``: all but the kernel.
+
+    Medians over the steps of ``repeats`` equal runs on one thread, after one that is not counted.
+    """
+    env, steps = gym.make(name), STEPS[name.partition("/")[0]][0]
+    actions = np.random.default_rng(0).integers(0, 6, steps)
+    taken, threads = [], numba.get_num_threads()
+    numba.set_num_threads(1)
+    with kernel_time() as kernels:
+        for _ in range(1 + repeats):
+            env.reset(seed=0)
+            for action in actions:
+                kernels.seconds, start = 0.0, time.thread_time()
+                _, _, terminated, truncated, _ = env.step(action)
+                step = time.thread_time() - start
+                taken.append((1e6 * step, 1e6 * (step - kernels.seconds)))
+                if terminated or truncated:
+                    env.reset()
+    numba.set_num_threads(threads)
+    whole, python = (statistics.median(column) for column in zip(*taken[steps:], strict=True))
+    return {"step": whole, "python": python}
 
 
 def vector_env_rate(name: str, repeats: int) -> Rate:

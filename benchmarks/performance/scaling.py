@@ -15,9 +15,8 @@ import numba
 import numpy as np
 
 from benchmarks.performance.rates import SUB_ENVIRONMENTS
-from chaosgym.envs.jobs import Indices
+from benchmarks.performance.timing import kernel_time
 from chaosgym.machines import MACHINES
-from chaosgym.simulation.batch import Batch, Cycles
 
 WARM_UP_STEPS = 12
 """Steps that are not timed; the speeds have spread after them."""
@@ -42,34 +41,6 @@ class Scaling:
     efficiency: float
     physics: float
     wrapper: float
-
-
-class _TimedBatch:
-    """A batch whose runs are timed: ``seconds`` of processor time of this thread."""
-
-    def __init__(self, batch: Batch) -> None:
-        self._batch = batch
-        self.seconds = 0.0
-
-    def __len__(self) -> int:
-        return len(self._batch)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._batch, name)
-
-    def run(self, which: Indices, cycles: int) -> Cycles:
-        """As the batch's."""
-        start = time.thread_time()
-        done = self._batch.run(which, cycles)
-        self.seconds += time.thread_time() - start
-        return done
-
-    def run_varied(self, which: Indices, speeds: Any) -> Any:
-        """As the batch's."""
-        start = time.thread_time()
-        done = self._batch.run_varied(which, speeds)  # type: ignore[attr-defined]
-        self.seconds += time.thread_time() - start
-        return done
 
 
 def vector_scaling(repeats: int = 5) -> list[Scaling]:
@@ -104,17 +75,15 @@ def _timed_steps(name: str, threads: int) -> tuple[float, float, float]:
     """Wall time of a step of one machine, and this thread's processor time inside and outside the kernels [s]."""
     numba.set_num_threads(threads)
     envs: Any = gym.make_vec(name, num_envs=SUB_ENVIRONMENTS)
-    jobs = envs.unwrapped.jobs
-    jobs.batch = batch = _TimedBatch(jobs.batch)
     actions = np.random.default_rng(0).integers(0, 6, (WARM_UP_STEPS + TIMED_STEPS, SUB_ENVIRONMENTS))
     envs.reset(seed=0)
     for action in actions[:WARM_UP_STEPS]:
         envs.step(action)
-    batch.seconds = 0.0
-    wall, processor = time.perf_counter(), time.thread_time()
-    for action in actions[WARM_UP_STEPS:]:
-        envs.step(action)
-    wall, processor = time.perf_counter() - wall, time.thread_time() - processor
+    with kernel_time() as kernels:
+        wall, processor = time.perf_counter(), time.thread_time()
+        for action in actions[WARM_UP_STEPS:]:
+            envs.step(action)
+        wall, processor = time.perf_counter() - wall, time.thread_time() - processor
     envs.close()
     each = 1.0 / (TIMED_STEPS * SUB_ENVIRONMENTS)
-    return wall * each, batch.seconds * each, (processor - batch.seconds) * each
+    return wall * each, kernels.seconds * each, (processor - kernels.seconds) * each

@@ -1,13 +1,17 @@
-"""Medians of repeated runs."""
+"""Medians of repeated runs, and the time that kernels take of them."""
 
 import statistics
 import time
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 
-from chaosgym.machines import Machine
+from chaosgym.core.compilation import call
+from chaosgym.machines import Machine, batch
+from chaosgym.machines.slider_crank import run
 from chaosgym.simulation import CycleRecord, Integrator, simulate
 
 BLOCKS = 5
@@ -63,3 +67,24 @@ def processor_seconds(work: Callable[[], object]) -> float:
     start = time.process_time()
     work()
     return time.process_time() - start
+
+
+class KernelTime:
+    """Processor time of this thread in the kernels that move machines, in ``seconds``."""
+
+    seconds = 0.0
+
+    def call(self, kernel: Any, *arguments: Any) -> Any:
+        """Call a kernel and count its time."""
+        start = time.thread_time()
+        result = call(kernel, *arguments)
+        self.seconds += time.thread_time() - start
+        return result
+
+
+@contextmanager
+def kernel_time() -> Iterator[KernelTime]:
+    """Count the time of these kernels meanwhile."""
+    spent = KernelTime()
+    with patch.object(batch, "call", spent.call), patch.object(run, "call", spent.call):
+        yield spent

@@ -50,6 +50,8 @@ def test_every_rate_comes_out_positive(monkeypatch: pytest.MonkeyPatch) -> None:
     result = json.loads(run.stdout)
     assert set(result["env_steps"]) >= {"chaosgym/ImpactBeam-v1", "chaosgym/SliderCrank-v1", "CartPole-v1"}
     assert set(result["vector_env_steps"]) == set(result["env_steps"])
+    for cost in result["step_microseconds"].values():
+        assert cost["python"] < cost["step"]
     figures = [
         figure
         for quantity, named in result.items()
