@@ -124,12 +124,8 @@ class Jobs:
         if task.speed_grid > 0.0:
             speeds = task.speed_grid * np.rint(speeds / task.speed_grid)
         state = self.state[which]
-        state["speed"], state["worn"], state["machine"] = (
-            speeds,
-            state["clearance"],
-            DRAWN if numbers is None else numbers,
-        )
-        state["trim"], state["done"], state["changed"] = 0.0, 0, 0
+        state["speed"], state["trim"], state["worn"] = speeds, 0.0, state["clearance"]
+        state["done"], state["changed"], state["machine"] = 0, 0, DRAWN if numbers is None else numbers
         self.state[which], self.damage[which] = state, 0.0
         self.judge.start(which)
         if self._monitor is not None:
