@@ -63,6 +63,7 @@ class CompiledBatch(ABC):
         self._settings = Settings(integrator.step_phase, integrator.event_tolerance, integrator.event_budget)
         self._machine = machine
         self._columns = [(array.shape[1:], array.dtype, len(array)) for array in machine.arrays(1)]
+        self._arrays: CycleArrays | None = None
         self._motions = Motions(np.zeros((count, machine.n_states)), np.zeros((count, 3)))
         self._scale = np.zeros_like(self._motions.coordinates)
 
@@ -94,14 +95,16 @@ class CompiledBatch(ABC):
         return self._cycles(arrays, outcome)
 
     def _empty(self, count: int, cycles: int) -> tuple[CycleArrays, Indices]:
-        """Arrays and outcome for a number of machines and cycles."""
-        # columns that the machine doesn't write have no rows
-        arrays = (np.empty((count, cycles * rows, *shape), dtype) for shape, dtype, rows in self._columns)
-        return CycleArrays(*arrays), np.empty(count, np.int64)
+        """Arrays and outcome for a number of machines and cycles; the next run may overwrite them."""
+        if self._arrays is None or self._arrays.events.shape != (count, cycles):
+            # columns that the machine doesn't write have no rows
+            columns = (np.empty((count, cycles * rows, *shape), dtype) for shape, dtype, rows in self._columns)
+            self._arrays = CycleArrays(*columns)
+        return self._arrays, np.empty(count, np.int64)
 
     def _cycles(self, arrays: CycleArrays, outcome: Indices) -> Cycles:
         failed = outcome != status.OK
-        results = Cycles(failed, arrays.peak_force, arrays.impacts, arrays.bounce_time)
+        results = Cycles(failed, arrays.peak_force.copy(), arrays.impacts.copy(), arrays.bounce_time.copy())
         if True in failed.tolist():
             for values in results[1:]:
                 values[failed] = 0
