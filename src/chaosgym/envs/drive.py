@@ -28,9 +28,6 @@ MOVES = np.array([0, -1, 1, -2, 2])
 BACK = len(MOVES)
 """Discrete action that goes back to the demand."""
 
-ALLOWED = frozenset(range(BACK + 1))
-"""Discrete actions."""
-
 DEAD_BAND = 0.4
 """Continuous changes below this hold the speed."""
 
@@ -55,7 +52,7 @@ def checked_actions(task: Task, actions: Any, count: int) -> Array:
     given = np.asarray(actions)
     if task.action == "trim":
         fits = given.shape == (count,) and given.dtype.kind in "iu"
-        if not fits or not ALLOWED.issuperset(given.tolist()):
+        if not fits or not set(given.tolist()) <= set(range(BACK + 1)):
             raise ParameterError(f"action = {actions!r} is not usable; allowed: whole numbers from 0 to {BACK}")
         return given[:, None].astype(float)
     width = 2 if task.action == "continuous" else 1

@@ -60,24 +60,19 @@ def trimmed(task, action, demand, trim, moves, dead_band):
     return 0.0 if back else limited(trim + change, -task["largest_trim"], task["largest_trim"])
 
 
-@njit(cache=True)
-def approached(task, speed, target):
-    """Speed of the next step, within the range of the drive, its rate and its grid."""
-    moved = speed + limited(target - speed, -task["slew_limit"], task["slew_limit"])
-    if task["speed_grid"] > 0.0:
-        moved = task["speed_grid"] * np.rint(moved / task["speed_grid"])
-    return limited(moved, task["lowest_speed"], task["highest_speed"])
-
-
 @njit(cache=True, nogil=True)
 def drive(tasks, actions, moves, dead_band, which, demands, jobs):
-    """Set trims and speeds of the next step, by actions (k, n) as in ``envs.drive``."""
+    """Set trims and speeds by actions (k, n) as in ``envs.drive``, within the drive's range, its rate and its grid."""
     task = tasks[0]
     for k, i in enumerate(which):
         job = jobs[i]
         demand = demands[i, job["done"]]
         job["trim"] = trimmed(task, actions[k], demand, job["trim"], moves, dead_band)
-        job["speed"] = approached(task, job["speed"], demand + job["trim"])
+        change = limited(demand + job["trim"] - job["speed"], -task["slew_limit"], task["slew_limit"])
+        moved = job["speed"] + change
+        if task["speed_grid"] > 0.0:
+            moved = task["speed_grid"] * np.rint(moved / task["speed_grid"])
+        job["speed"] = limited(moved, task["lowest_speed"], task["highest_speed"])
 
 
 @njit(cache=True)
@@ -184,7 +179,7 @@ def observe(
     first = peak_force.shape[1] - last
     for k, i in enumerate(which):
         job, peaks, seen = jobs[i], measured[k], values[k]
-        total, largest, bouncing = 0.0, 0.0, 0.0
+        total, largest, squares, bouncing = 0.0, 0.0, 0.0, 0.0
         for n in range(last):
             error = (2.0 * errors[k, n] - 1.0) * task["sensor_error"]
             peaks[n] = max(peak_force[k, first + n, 0] + error, 0.0)
@@ -192,7 +187,7 @@ def observe(
             largest = max(largest, peaks[n])
             for side in range(sides):
                 bouncing += bounce_duration[k, first + n, side]
-        mean, squares = total / last, 0.0
+        mean = total / last
         for n in range(last):
             squares += (peaks[n] - mean) ** 2
         demand = demands[i, job["done"]]
