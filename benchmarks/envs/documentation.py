@@ -109,7 +109,7 @@ def page(name: str) -> str:
         tolerances="none" if kind == "" else ", ".join(f"`{field}` {width}" for field, width in widths.items()),
         disturbance=" ".join(noise),
         rung=nominal.rung or "none",
-        model=env.model.rung,
+        model=", ".join(f"`{name}={value!r}`" for name, value in nominal.work.model.items()),
         arguments="\n".join(_arguments(task)),
         **{
             name: getattr(task, name)

@@ -29,8 +29,8 @@ def test_every_rung_sets_its_fields_and_is_recognised(machine):
 
 def test_a_machine_keeps_its_rung_when_other_fields_change():
     """Copies and pickles keep the model; a changed field of the ladder leaves it."""
-    beam = ImpactBeam(fidelity="draft")
-    assert replace(beam, clearance=1e-4).rung == "draft"
+    beam = ImpactBeam(fidelity="fine")
+    assert replace(beam, clearance=1e-4).rung == "fine"
     assert pickle.loads(pickle.dumps(beam)) == beam
     assert replace(beam, n_modes=5).rung is None
 
@@ -41,7 +41,8 @@ def test_a_machine_keeps_its_rung_when_other_fields_change():
         (ImpactBeam, {"fidelity": "fine", "n_modes": 5}, "'fine' sets n_modes = 6, and n_modes = 5 is given too"),
         (ImpactBeam, {"fidelity": "fine", "n_modes": 6}, "'fine' sets n_modes = 6, and n_modes = 6 is given too"),
         (SliderCrank, {"fidelity": "draft", "rod": "rigid"}, "'draft' sets rod = 'flexible', and rod = 'rigid'"),
-        (ImpactBeam, {"fidelity": "flexible-1deg"}, "'flexible-1deg' is not one of draft, standard, fine, reference"),
+        (ImpactBeam, {"fidelity": "flexible-1deg"}, "'flexible-1deg' is not one of standard, fine, reference"),
+        (ImpactBeam, {"fidelity": "draft"}, "'draft' is no rung any more; allowed: fidelity='standard'"),
         (SliderCrank, {"fidelity": "finest"}, "'finest' is not one of draft, standard, fine, reference"),
         (SliderCrank, {"fidelity": "rigid"}, "'rigid' is no rung any more; allowed: rod='rigid'"),
         (SliderCrank, {"fidelity": "flexible-5deg"}, "'flexible-5deg' is no rung any more; allowed: fidelity='draft'"),
@@ -85,7 +86,7 @@ def test_finer_models_come_nearer_to_the_reference():
     models = [
         {"n_modes": 1, "fitted_modes": 0},
         {"n_modes": 5, "fitted_modes": 0},
-        {"fidelity": "draft"},
+        {"n_modes": 4, "fitted_modes": 1},
         {"fidelity": "standard"},
         {"fidelity": "fine"},
     ]
@@ -123,7 +124,7 @@ def test_the_reference_places_events_most_tightly():
     assert SliderCrank(fidelity="reference").default_integrator.event_tolerance == 1e-9
 
 
-@pytest.mark.parametrize(("env_id", "rung"), [("chaosgym/ImpactBeam-v1", "draft"), ("chaosgym/SliderCrank-v1", "fine")])
+@pytest.mark.parametrize(("env_id", "rung"), [("chaosgym/ImpactBeam-v1", "fine"), ("chaosgym/SliderCrank-v1", "draft")])
 def test_environments_take_the_keyword(env_id, rung):
     """gym.make(..., fidelity=rung) runs that model; a field that it sets may not be given too."""
     assert chaosgym.__version__
@@ -150,8 +151,8 @@ def test_the_rung_standard_is_the_default(machine):
 
 def test_the_command_line_takes_the_option():
     """--fidelity runs that model; with --set of one of its fields it ends in one line that names both."""
-    run = CliRunner().invoke(app, ["simulate", "impact-beam", "--fidelity", "draft", "--cycles", "2", "--json"])
+    run = CliRunner().invoke(app, ["simulate", "impact-beam", "--fidelity", "fine", "--cycles", "2", "--json"])
     assert run.exit_code == 0
-    both = CliRunner().invoke(app, ["simulate", "impact-beam", "--fidelity", "draft", "--set", "n_modes=2"])
+    both = CliRunner().invoke(app, ["simulate", "impact-beam", "--fidelity", "fine", "--set", "n_modes=2"])
     assert isinstance(both.exception, ParameterError)
     assert "n_modes" in str(both.exception)

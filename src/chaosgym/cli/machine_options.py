@@ -152,7 +152,7 @@ def machine_command(
         function(machine=machine and build_machine(machine, given, settings, fidelity), **others)
 
     wrapped = click.option(
-        "--fidelity", metavar="RUNG", help="Rung of the machine's ladder of models, such as draft or reference."
+        "--fidelity", metavar="RUNG", help="Rung of the machine's ladder of models, such as fine or reference."
     )(wrapped)
     wrapped = click.option(
         "--set",

@@ -104,8 +104,7 @@ class Workplace:
         for speed in (self.task.lowest_speed, self.task.highest_speed):
             nominal.at(speed)
         self.variants = Variants(nominal, setup.tolerances if tolerances is None else tolerances)
-        rung = model_fidelity or work.model_fidelity
-        self.model = nominal if rung is None else with_settings(nominal, {"fidelity": rung})
+        self.model = with_settings(nominal, work.model if model_fidelity is None else {"fidelity": model_fidelity})
         self.space = observation_space(self.task)
         self.actions = action_space(self.task)
         self.rules = Rules(self.task, self.variants, self.space)

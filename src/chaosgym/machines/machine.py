@@ -51,8 +51,8 @@ class Work(NamedTuple):
     ----------
     fields
         Of the nominal machine that differ from the machine's own defaults.
-    model_fidelity
-        Rung of the model that controllers may use; None for the machine's own.
+    model
+        Settings of the nominal machine that make it the coarser model which controllers may use; {} for the same.
     tolerances
         Half widths as shares of the nominal value; None for those of the machine.
     task
@@ -60,7 +60,7 @@ class Work(NamedTuple):
     """
 
     fields: Mapping[str, Any] = {}
-    model_fidelity: str | None = None
+    model: Mapping[str, Any] = {}
     tolerances: Mapping[str, float] | None = None
     task: Mapping[str, float] = {}
 
@@ -72,7 +72,7 @@ class Machine(ABC):
     A subclass declares its fields with ``parameter`` and defines what is abstract here. The rest has a default.
     ``ModalImpactMachine`` defines all but the fields and the model of a machine that is a few modes and one gap.
 
-    The keyword ``fidelity`` sets the fields of a rung of the ladder, as in ``ImpactBeam(fidelity="draft")``. A machine
+    The keyword ``fidelity`` sets the fields of a rung of the ladder, as in ``ImpactBeam(fidelity="fine")``. A machine
     keeps the fields, not the name, so that ``dataclasses.replace`` and ``with_settings`` may change any of them.
 
     Raises

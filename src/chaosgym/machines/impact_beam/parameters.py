@@ -44,7 +44,6 @@ class BeamParameters(ModalImpactMachine):
             "event_accuracy": accuracy,
         }
         for rung, modes, fitted, accuracy in (
-            ("draft", 4, 1, "standard"),
             ("standard", 4, 2, "standard"),
             ("fine", 6, 2, "standard"),
             ("reference", 20, 2, "tightest"),
@@ -53,7 +52,8 @@ class BeamParameters(ModalImpactMachine):
     former_rungs: ClassVar[Mapping[str, str]] = {
         "restitution": "contact_law='restitution', n_modes=1, fitted_modes=0",
         "rigid": "n_modes=1, fitted_modes=0",
-        "modes-3": "fidelity='draft'",
+        "modes-3": "fidelity='standard'",
+        "draft": "fidelity='standard', which costs no more",
         "modes-5": "fidelity='standard', or n_modes=5, fitted_modes=0",
         "modes-8": "fidelity='fine'",
     }

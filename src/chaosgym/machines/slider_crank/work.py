@@ -6,7 +6,7 @@ WORK = Work(
     # figure 4.14b, with an assumed contact damping of 6.5 %: with the printed 5 % hardly a speed is calm, with 8 %
     # backing off finds a calm one at once (docs/development/tasks.md)
     fields={"slider_clearance": 0.254e-3, "contact_damping_ratio": 0.065},
-    model_fidelity="draft",
+    model={"fidelity": "draft"},
     tolerances={"slider_clearance": 0.1},
     task={
         "cycles_per_step": 20,
