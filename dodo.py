@@ -147,7 +147,9 @@ def task_picture():
             made, run = f"{folder}/{kind}-{machine}.png", f"{RUNS}/{kind}-{machine}"
             measure = f"chaosgym {kind} {machine} {options} --out {run}"
             copy = f"cp {run}/{kind}.png {made}"
-            yield task(f"{kind}-{machine}", sources("src/chaosgym/fidelity"), [made], f"mkdir -p {run}", measure, copy)
+            rungs = f"src/chaosgym/machines/{machine.replace('-', '_')}/parameters.py"
+            used = [rungs, *sources("src/chaosgym/fidelity")]
+            yield task(f"{kind}-{machine}", used, [made], f"mkdir -p {run}", measure, copy)
 
 
 def task_sample():

@@ -2,29 +2,44 @@
 
 import statistics
 import time
+from collections.abc import Iterable
 from dataclasses import replace
+from itertools import count, islice
 
 from chaosgym.machines.slider_crank import SliderCrank
+from chaosgym.machines.slider_crank.model import KEPT_BYTES, models_by_speed
+
+CRANKS = {
+    "plain modes, 1 deg": SliderCrank(n_modes=3, fitted_modes=0, matrix_update_interval=1.0),
+    "standard": SliderCrank(),
+}
 
 
 def set_up_times(repeats: int = 5) -> dict[str, float]:
-    """Microseconds of processor time with bins of 1 and 5 deg; each is the median of 5 ``repeats``.
+    """Microseconds of processor time; each is the median of 5 ``repeats``.
 
-    A new machine differs in more than speed and clearance; its first speed is included.
+    A new machine differs in more than speed and clearance; its first speed is included. New memory costs until as many
+    tables are kept as there is room for; after that they take the place of old ones.
     """
-    result = {}
-    changes = range(1, 5 * repeats + 1)
-    for interval in (1.0, 5.0):
-        crank = SliderCrank(n_modes=3, fitted_modes=0, matrix_update_interval=interval)
-        machines = {
-            "new machine": [replace(crank, yoke_mass=0.16 + 1e-6 * k) for k in changes],
-            "new speed": [replace(crank, crank_speed=200.0 + 1e-3 * k) for k in changes],
-            "speed seen before": [replace(crank, slider_clearance=1e-6 * k) for k in changes],
-        }
-        crank.reduce()
-        for name, each in machines.items():
-            result[f"{name}, bins of {interval:g} deg"] = 1e6 * statistics.median(map(_time_to_reduce, each))
+    result: dict[str, float] = {}
+    for name, crank in CRANKS.items():
+        speeds = (replace(crank, crank_speed=200.0 + 1e-3 * k) for k in count(1))
+        seen = (replace(crank, slider_clearance=1e-6 * k) for k in count(1))
+        made = (replace(crank, yoke_mass=0.16 + 1e-6 * k) for k in count(1))
+        if not result:
+            crank.reduce()
+            result[f"{name}: new speed in new memory"] = _median_time(speeds, 5 * repeats)
+        table = models_by_speed(crank).at(crank.crank_speed).table
+        for machine in islice(speeds, KEPT_BYTES // table.nbytes):
+            machine.reduce()
+        for what, machines in (("new machine", made), ("new speed", speeds), ("speed seen before", seen)):
+            crank.reduce()
+            result[f"{name}: {what}"] = _median_time(machines, 5 * repeats)
     return result
+
+
+def _median_time(machines: Iterable[SliderCrank], repeats: int) -> float:
+    return 1e6 * statistics.median(map(_time_to_reduce, islice(machines, repeats)))
 
 
 def _time_to_reduce(crank: SliderCrank) -> float:

@@ -152,15 +152,25 @@ def _assembled(machine: "SliderCrank", middles: Array, nodes: Array) -> tuple[Eq
     return equations(machine, middles, rod), loads(machine, nodes, rod)
 
 
+def _made(kind: type, structure: tuple[Any, ...]) -> "SliderCrank":
+    """Machine at the default speed and clearance."""
+    machine: SliderCrank = kind(**dict(zip(_structure_fields(kind), structure, strict=True)))
+    return machine
+
+
 @lru_cache(maxsize=KEPT)
-def _held(kind: type, *structure: Any) -> tuple[Array, Array, Array, Array]:
+def _kept(kind: type, *structure: Any) -> tuple[Array, Array, Array, Array]:
+    """``_held``, kept for machines without a table of propagators."""
+    return _held(_made(kind, structure))
+
+
+def _held(machine: "SliderCrank") -> tuple[Array, Array, Array, Array]:
     """Inverse mass, free accelerations and forcing of all bins as in ``_Structure``, and friction per newton."""
-    machine = kind(**dict(zip(_structure_fields(kind), structure, strict=True)))
     bins = round(360.0 / machine.matrix_update_interval)
     width = 2.0 * math.pi / bins
-    middles = (np.arange(bins) + 0.5) * width
+    middles = (np.arange(bins, dtype=np.float64) + 0.5) * width
     nodes = FORCING_TERMS - 1
-    held, loads = _assembled(machine, middles, np.arange(bins * nodes) * width / nodes)
+    held, loads = _assembled(machine, middles, np.arange(bins * nodes, dtype=np.float64) * width / nodes)
     n = held.mass.shape[-1]
     inverse_mass = np.asarray(np.linalg.inv(held.mass), dtype=np.float64)
     free = np.zeros((3, bins, 2 * n, n))
@@ -180,7 +190,7 @@ def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankMode
 
     A closed contact turns by ``step_phase`` / 4 in a piece of a series; half of it leaves a sixteenth of the error.
     """
-    inverse_mass, free, forcing, friction = _held(*_key(machine))
+    inverse_mass, free, forcing, friction = _kept(*_key(machine))
     joints = joints_of(machine)
     row = np.concatenate([joint.row for joint in joints])
     acceleration = _free_motion(free, forcing, machine.crank_rate)
@@ -302,8 +312,8 @@ def _rates(free: Array, pushed: Array, row: Array) -> tuple[float, float]:
 
 @lru_cache(maxsize=KEPT)
 def _structure(kind: type, *structure: Any) -> _Structure:
-    machine = kind(**dict(zip(_structure_fields(kind), structure, strict=True)))
-    inverse_mass, free, forcing, friction = _held(kind, *structure)
+    machine = _made(kind, structure)
+    inverse_mass, free, forcing, friction = _held(machine)
     n = inverse_mass.shape[-1]
     channels = channels_of(machine)
     radix = _radix(machine)
