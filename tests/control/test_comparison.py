@@ -9,9 +9,11 @@ from chaosgym.control import comparison
 from chaosgym.control.comparison import ONE, ZERO, Scores, compare, read_comparison, table_lines
 from chaosgym.control.controllers import Follow
 from chaosgym.control.evaluation import policy_of
+from chaosgym.control.maps import model_keywords
 from chaosgym.control.policies import TrainedPolicy
 from chaosgym.control.policies.network import Dense, Network
 from chaosgym.envs import SB3VecEnv
+from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import DatasetError, ModelFileError, ParameterError
 
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
@@ -60,6 +62,14 @@ def test_one_file_holds_all_jobs(table):
     assert found["job_return"].to_numpy().max() < 0.0
     with pytest.raises(DatasetError, match="is no comparison of chaosgym/Other"):
         read_comparison(table[1], "chaosgym/Other-v1")
+
+
+@pytest.mark.parametrize("env", ["chaosgym/ImpactBeam-v1", "chaosgym/SliderCrank-v1"])
+@pytest.mark.parametrize("keywords", [{}, {"fidelity": "reference"}, {"model_fidelity": "fine"}])
+def test_maps_of_the_model_are_those_of_the_coarser_machine(env, keywords):
+    """Keywords that put the model in the place of the machine, whatever the rung of either."""
+    known = native_envs(env, **keywords)
+    assert native_envs(env, **model_keywords(env, **keywords)).nominal == known.model != known.nominal
 
 
 def test_an_unknown_controller_is_named(tmp_path):

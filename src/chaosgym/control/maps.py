@@ -14,6 +14,7 @@ from tqdm import tqdm
 
 from chaosgym.envs.observation import OBSERVATION_NAMES
 from chaosgym.envs.vector_env import native_envs
+from chaosgym.machines.parameters import parameters_of
 
 Array = NDArray[np.float64]
 
@@ -83,8 +84,13 @@ def maps_of(
 def model_keywords(env: str, **keywords: Any) -> dict[str, Any]:
     """Keywords that make the environment's machine the model that controllers may use."""
     known = native_envs(env, **keywords)
-    rung = known.model.rung
-    return keywords if rung in (None, known.nominal.rung) else keywords | {"fidelity": rung}
+    model, nominal = known.model, known.nominal
+    if model == nominal:
+        return keywords
+    fields = [name for name in parameters_of(model) if getattr(model, name) != getattr(nominal, name)]
+    fields += [name for rung in model.fidelity_ladder.values() for name in rung]
+    others = {name: value for name, value in keywords.items() if name != "fidelity"}
+    return others | {name: getattr(model, name) for name in fields}
 
 
 def fleet_maps(env: str, *, count: int = FLEET, progress: str | None = None, **keywords: Any) -> Maps:

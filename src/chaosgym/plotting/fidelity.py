@@ -97,5 +97,5 @@ def stability_figure(result: StabilityMap) -> Figure:
         Patch(color=colour, label=f"{outcome} ({result.count(outcome)})") for outcome, colour in OUTCOME_COLOURS.items()
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=9)
-    figure.suptitle(f"{result.machine}: largest contact force of three cycles at the extremes")
+    figure.suptitle(f"{result.machine} at the extremes:\nlargest contact force of three cycles")
     return figure
