@@ -30,7 +30,7 @@ def set_up_times(repeats: int = 5) -> dict[str, float]:
             crank.reduce()
             result[f"{name}: new speed in new memory"] = _median_time(speeds, 5 * repeats)
         table = models_by_speed(crank).at(crank.crank_speed).table
-        for machine in islice(speeds, KEPT_BYTES // table.nbytes):
+        for machine in islice(speeds, 2 * KEPT_BYTES // table.nbytes):
             machine.reduce()
         for what, machines in (("new machine", made), ("new speed", speeds), ("speed seen before", seen)):
             crank.reduce()

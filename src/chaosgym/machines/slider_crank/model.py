@@ -358,6 +358,8 @@ def _closed(channels: Channels, radix: int) -> tuple[Array, Array]:
 
 def _friction(machine: "SliderCrank", crank_angle: Array) -> Array:
     """Friction coefficient with the sign of the nominal slider velocity, ramped through zero."""
+    if machine.friction_coefficient == 0.0:
+        return np.zeros(len(crank_angle))
     rate = slider_rate(crank_angle, machine.crank_radius, machine.rod_length, math.radians(machine.motor_angle))
     speed = rate / (machine.friction_ramp * machine.crank_radius)
     return np.asarray(machine.friction_coefficient * np.clip(speed, -1.0, 1.0))
