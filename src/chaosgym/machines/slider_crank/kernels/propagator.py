@@ -354,7 +354,7 @@ def tables(free, forcing, push, bins, rate, row, lag, anchor, duration, steps, o
     interval = duration / (LANES * steps)
     places = table_places(n, m)
     length = places.length
-    # every number of it is written
+    # memory as it comes: every number that counts is written
     table, space = unset(sets * bins * length), _space_of(n, m)
     free, forcing, push = free.ravel(), forcing.ravel(), push.ravel()
     for s in range(sets):
