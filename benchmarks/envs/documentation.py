@@ -109,7 +109,7 @@ def page(name: str) -> str:
         tolerances="none" if kind == "" else ", ".join(f"`{field}` {width}" for field, width in widths.items()),
         disturbance=" ".join(noise),
         rung=nominal.rung or "none",
-        model=", ".join(f"`{name}={value!r}`" for name, value in nominal.work.model.items()),
+        model=_model(env),
         arguments="\n".join(_arguments(task)),
         **{
             name: getattr(task, name)
@@ -120,6 +120,15 @@ def page(name: str) -> str:
 
 def _table(head: str, rows: list[str]) -> str:
     return "\n".join([f"| {head} |", "|---" * (head.count("|") + 1) + "|", *(f"| {row} |" for row in rows)])
+
+
+def _model(env: Any) -> str:
+    """Rung of the model that controllers may use, or how it differs from the nominal machine."""
+    model, nominal = env.model, env.nominal
+    if model.rung is not None:
+        return f'"{model.rung}"'
+    values = {name: getattr(model, name) for name in parameters_of(model)}
+    return ", ".join(f"`{name}={value!r}`" for name, value in values.items() if value != getattr(nominal, name))
 
 
 def _observations(env: Any) -> list[str]:
