@@ -8,13 +8,14 @@ from pathlib import Path
 
 import pytest
 from filelock import FileLock
+from numba import types
 
 import chaosgym
 from chaosgym.core import compilation
 from chaosgym.core.compilation import is_cached
 from chaosgym.core.fixed_step import advance_fixed_step
-from chaosgym.core.modal_impact import advance
-from chaosgym.machines import ImpactBeam
+from chaosgym.core.modal_impact import advance_model
+from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.simulation import RungeKutta4, simulate, simulate_with_deviations
 
 COUNT = "; print(sum(kernel.stats.cache_misses.values()), sum(kernel.stats.cache_hits.values()))"
@@ -33,9 +34,20 @@ def test_a_call_adds_no_version_of_a_kernel():
     simulate(ImpactBeam(), 1)
     simulate_with_deviations(ImpactBeam(), 1, deviations=[[1.0] * 12])
     simulate(ImpactBeam(), 1, integrator=RungeKutta4(4000))
-    assert len(advance.signatures) == 1
+    assert len(advance_model.signatures) == 1
     assert len(advance_fixed_step.signatures) == 1
-    assert is_cached(advance)
+    assert is_cached(advance_model)
+
+
+def test_no_kernel_gives_python_a_named_tuple():
+    """Where Ctrl-C arrives while numba makes one of a kernel's result, the process crashes."""
+    for machine in (ImpactBeam(), ImpactBeam(contact_law="restitution", n_modes=1, fitted_modes=0), SliderCrank()):
+        simulate(machine, 1)
+    simulate(ImpactBeam(n_modes=1, fitted_modes=0), 1, integrator=RungeKutta4(4000))
+    called = [kernel for kernel, _ in compilation._ready]
+    given = {kernel: {signature.return_type for signature in kernel.nopython_signatures} for kernel in called}
+    assert advance_model in given
+    assert not any(isinstance(kind, types.BaseNamedTuple) for kinds in given.values() for kind in kinds)
 
 
 def _in_a_process(code, **environment):

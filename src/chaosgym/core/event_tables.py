@@ -118,10 +118,11 @@ def shown(rows, contact_stiffness, contact_damping, result):
 
 
 @njit(cache=True)
-def make_tables(regimes, contact_stiffness, contact_damping, step_phase, shortest):
-    """Tables of R regimes; ``contact_stiffness``, ``contact_damping`` (R,) of the surface that presses, 0 where none.
+def tabulate(regimes, contact_stiffness, contact_damping, shortest):
+    """``Tables.values`` of R regimes.
 
-    ``shortest`` (R,) [s] are the shortest intervals; no rate of what moves may exceed step_phase / shortest.
+    ``contact_stiffness``, ``contact_damping`` (R,) are those of the surface that presses, 0 where none.
+    ``shortest`` (R,) [s] are the shortest intervals; no rate of what moves may exceed ``Tables.step_phase`` / shortest.
     """
     count, n = regimes.generator.shape[0], regimes.generator.shape[2]
     places = table_places(n)
@@ -142,7 +143,7 @@ def make_tables(regimes, contact_stiffness, contact_damping, step_phase, shortes
                 for i in range(2 * n):
                     at = switch + 2 * lanes * column + (i // n) * lanes + i % n
                     values[r, at], values[r, at + 4 * n * lanes] = forth[i, column], back[i, column]
-    return Tables(step_phase, shortest, values)
+    return values
 
 
 @njit(cache=True)

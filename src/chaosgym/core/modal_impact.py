@@ -25,7 +25,7 @@ from chaosgym.core.cycle import LOWER, UPPER, note_touch
 from chaosgym.core.event_tables import BOUND2
 from chaosgym.core.kernel import leaf
 from chaosgym.core.modal_model import FREE, LOWER_STOP, UPPER_STOP
-from chaosgym.core.modal_run import SPARE, WEIGHTS, change, enter, leave, regime_of, size_of
+from chaosgym.core.modal_run import SPARE, WEIGHTS, change, enter, leave, make_run, regime_of, size_of
 from chaosgym.core.modal_stay import END, EXHAUSTED, FIRST, fly, hang, press
 from chaosgym.core.tangent import carry, orthonormalise, touch
 
@@ -146,3 +146,14 @@ def advance(run, model, state, episode, arrays, event_budget, tangents):
         episode.touch[0] -= run.period
         episode.touch[1] -= run.period
     return status.OK, arrays.section.shape[0]
+
+
+@njit(cache=True, nogil=True)
+def advance_model(model, step_phase, event_tolerance, state, episode, arrays, event_budget, tangents):
+    """As ``advance``, by what ``make_run`` makes of the model.
+
+    A kernel that Python calls must return plain numbers or arrays: numba has no guard against Ctrl-C while it makes a
+    named tuple.
+    """
+    run = make_run(model, step_phase, event_tolerance)
+    return advance(run, model, state, episode, arrays, event_budget, tangents)

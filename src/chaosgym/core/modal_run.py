@@ -17,13 +17,14 @@ from chaosgym.core.event_tables import (
     SHOWN,
     SHOWN_RATE,
     A,
+    Tables,
     V,
     X,
     drive_places,
-    make_tables,
     put_drive,
     shortest_intervals,
     table_places,
+    tabulate,
 )
 from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import LANES, aligned, combine, dot, dot_of_sizes, padded, sample, turn, turn_and_expand
@@ -104,7 +105,7 @@ def make_run(model, step_phase, event_tolerance):
         slowest = max(slowest, tables.shortest[r])
     if tables.step_phase != step_phase or slowest * harmonics * omega > step_phase:
         shortest = shortest_intervals(regimes, step_phase, harmonics * omega)
-        tables = make_tables(regimes, stiffness, damping, step_phase, shortest)
+        tables = Tables(step_phase, shortest, tabulate(regimes, stiffness, damping, shortest))
     at, size = _places(n, harmonics, count, model.pressed)
     own = aligned(size)
     drive = np.empty((harmonics, 2, n))

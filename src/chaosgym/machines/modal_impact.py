@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 
 from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays, Episode
-from chaosgym.core.event_tables import make_tables, shortest_intervals
+from chaosgym.core.event_tables import Tables, shortest_intervals, tabulate
 from chaosgym.core.fixed_step import advance_fixed_step
-from chaosgym.core.modal_impact import advance
+from chaosgym.core.modal_impact import advance_model
 from chaosgym.core.modal_model import ModalImpactModel
-from chaosgym.core.modal_run import make_run
 from chaosgym.core.propagator import Regimes
 from chaosgym.core.restitution import RestitutionModel, advance_restitution
 from chaosgym.core.tangent import Tangents, no_tangents
@@ -214,7 +213,7 @@ def flexible_model(
         rest=np.array(rest),
         drift=np.array(drift),
         rest_penetration=np.array(penetration),
-        tables=call(make_tables, regimes, *of_regime, step_phase, shortest),
+        tables=Tables(step_phase, shortest, call(tabulate, regimes, *of_regime, shortest)),
     )
 
 
@@ -339,16 +338,16 @@ class ModalImpactMachine(Machine):
     ) -> tuple[int, int]:
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
         model = self.reduce()
-        motion = (model, coordinates, Episode(side=bouncing[:1], touch=bouncing[1:]), arrays)
+        motion = (coordinates, Episode(side=bouncing[:1], touch=bouncing[1:]), arrays)
         along = tangents or no_tangents(len(coordinates), len(arrays.section))
         if isinstance(integrator, ExactEvents):
             step, tolerance, budget = integrator.step_phase, integrator.event_tolerance, integrator.event_budget
             if isinstance(model, ModalImpactModel):
-                outcome = call(advance, call(make_run, model, step, tolerance), *motion, budget, along)
+                outcome = call(advance_model, model, step, tolerance, *motion, budget, along)
             else:
-                outcome = call(advance_restitution, *motion, step, budget, along)
+                outcome = call(advance_restitution, model, *motion, step, budget, along)
         elif isinstance(model, ModalImpactModel):
-            outcome = call(advance_fixed_step, *motion, integrator.steps_per_cycle)
+            outcome = call(advance_fixed_step, model, *motion, integrator.steps_per_cycle)
         else:
             raise refuse_fixed_steps(integrator, self)
         status, done = outcome
