@@ -1,19 +1,82 @@
 """Every file that is computed and committed: what it is computed from, and the command that makes it.
 
 `doit list --all --status` shows what is stale (R), `doit NAME` makes it anew. What depends on the kernels depends on
-the golden set, which holds their results to the last bit. Long computations go on where they were stopped (``runs/``).
+the golden set, which holds what their results mean. Long computations go on where they were stopped (``runs/``).
 """
 
+import ast
 import hashlib
+import io
+import tokenize
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-DOIT_CONFIG = {"backend": "json", "dep_file": "artefacts.json", "default_tasks": [], "verbosity": 2}
+from doit.dependency import FileChangedChecker
+
+
+def meaning(file: str) -> str:
+    """What counts of a file: its bytes; of a source all but comments, blank lines and docstrings.
+
+    Docstrings of commands are their help, and count.
+    """
+    if not file.endswith(".py"):
+        return hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16]
+    text = Path(file).read_text()
+    lines = text.splitlines()
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type == tokenize.COMMENT:
+            lines[token.start[0] - 1] = lines[token.start[0] - 1][: token.start[1]]
+    for node in ast.walk(ast.parse(text)):
+        documents = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        if documents and "/cli/" not in file:
+            lines[node.lineno - 1 : node.end_lineno] = [""] * (node.end_lineno - node.lineno + 1)
+    return hashlib.sha256("\n".join(line.rstrip() for line in lines if line.strip()).encode()).hexdigest()[:16]
+
+
+class Meaning(FileChangedChecker):
+    """A file is another when its ``meaning`` is."""
+
+    def check_modified(self, file_path, file_stat, state):
+        """Whether a file means something else than its digest."""
+        return meaning(file_path) != state
+
+    def get_state(self, dep, current_state):
+        """Digest of a file."""
+        return meaning(dep)
+
+
+class Lines:
+    """What doit keeps, as sorted lines of text: artefact, file that it rests on, digest of that."""
+
+    def encode(self, data):
+        """Text of the digests by artefact."""
+        kept = ((name, file, known[file]) for name, known in data.items() for file in known.get("deps:", ()))
+        return "".join(sorted(f"{name}  {file}  {digest}\n" for name, file, digest in kept))
+
+    def decode(self, text):
+        """Digests by artefact, of a text."""
+        data: dict[str, dict[str, Any]] = {}
+        for line in text.splitlines():
+            name, file, digest = line.split("  ")
+            known = data.setdefault(name, {"deps:": []})
+            known["deps:"].append(file)
+            known[file] = digest
+        return data
+
+
+DOIT_CONFIG = {
+    "backend": "json",
+    "dep_file": "artefacts.txt",
+    "codec_cls": Lines,
+    "check_file_uptodate": Meaning,
+    "default_tasks": [],
+    "verbosity": 2,
+}
 
 GOLDEN = "tests/golden/golden.json"
 RUNS = "runs/" + hashlib.sha256(Path(GOLDEN).read_bytes()).hexdigest()[:8]
-"""Folder of unfinished work; another one when the kernels' results change."""
+"""Folder of unfinished work; another one when the kernels' results mean something else."""
 
 SHIPPED = Path("src/chaosgym/control/policies/shipped")
 

@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parent.parent
 
 STALE: dict[str, str] = {}
@@ -26,25 +28,32 @@ def test_nothing_shipped_is_stale():
     assert sorted(stale) == sorted(STALE), "doit NAME makes one anew, doit reset-dep NAME accepts one known to hold"
 
 
-def test_an_edit_of_what_an_artefact_is_computed_from_is_noticed(tmp_path):
-    """A changed byte makes an artefact stale; a changed date does not."""
-    (tmp_path / "source.txt").write_text("one")
-    (tmp_path / "dodo.py").write_text(
-        "DOIT_CONFIG = {'backend': 'json', 'dep_file': 'made.json'}\n"
-        "def task_part():\n    yield {'name': 'x', 'file_dep': ['source.txt'], 'actions': []}\n"
-    )
+@pytest.mark.parametrize(
+    ("edit", "letter"),
+    [
+        ("def f(x):\n    return x + 1\n", "U"),
+        ('"""A module."""\n\n\ndef f(x):\n    """Add one."""\n    return x + 1  # one more\n', "U"),
+        ("def f(x):\n    return x + 2\n", "R"),
+        ("def f(x):\n    return '# x' + 1\n", "R"),
+    ],
+)
+def test_an_artefact_is_stale_when_what_it_rests_on_means_something_else(tmp_path, edit, letter):
+    """Another date, comment or docstring of a source makes nothing stale; another statement does."""
+    config = (ROOT / "dodo.py").read_text().partition("GOLDEN =")[0]
+    task = "def task_part():\n    yield {'name': 'x', 'file_dep': ['source.py'], 'actions': []}\n"
+    (tmp_path / "dodo.py").write_text(config + task)
+    (tmp_path / "source.py").write_text("def f(x):\n    return x + 1\n")
 
-    def letter(command):
-        done = subprocess.run(
-            [sys.executable, "-m", "doit", *command], cwd=tmp_path, capture_output=True, text=True, check=True
-        )
-        return next((line.split()[0] for line in done.stdout.splitlines() if "part:x" in line), "")
+    def doit(*words):
+        command = [sys.executable, "-m", "doit", *words]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout.split()
 
-    listing = ["list", "--all", "--status"]
-    assert letter(listing) == "R"
-    letter(["run"])
-    assert letter(listing) == "U"
-    (tmp_path / "source.txt").touch()
-    assert letter(listing) == "U"
-    (tmp_path / "source.txt").write_text("two")
-    assert letter(listing) == "R"
+    assert "R" in doit("list", "--all", "--status")
+    doit("run", "part")
+    kept = (tmp_path / "artefacts.txt").read_text()
+    assert kept.startswith("part:x  source.py  ")
+    (tmp_path / "source.py").write_text(edit)
+    listed = doit("list", "--all", "--status")
+    assert listed[listed.index("part:x") - 1] == letter
+    doit("reset-dep", "part")
+    assert ((tmp_path / "artefacts.txt").read_text() == kept) == (letter == "U")

@@ -14,7 +14,7 @@ from chaosgym import ImpactBeam, SliderCrank
 from chaosgym.classifier import classifier_for
 from chaosgym.simulation import simulate_with_deviations
 from tests.classifier.made_up import record_features
-from tests.golden.golden import RECORDED, scenes
+from tests.golden.scenes import RECORDED, scenes
 from tests.uncompiled.lanes import OPERATIONS
 
 TASKS = {"chaosgym/ImpactBeamTolerance-v1": {}, "chaosgym/SliderCrankTolerance-v1": {"contact_damping_ratio": 0.3}}
