@@ -10,6 +10,7 @@ from numba import njit, prange
 
 from chaosgym.core.cycle import CycleArrays, Episode
 from chaosgym.core.event_tables import Tables
+from chaosgym.core.kernel import side_by_side
 from chaosgym.core.modal_impact import advance as advance_beam
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.core.modal_run import make_run
@@ -93,7 +94,7 @@ def beam_of(batch, regimes, tables, i):
     )
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@side_by_side
 def advance_beams(batch, regimes, tables, which, motions, arrays, settings, outcome):
     """Advance the machines ``which`` (k,) of a batch in place by whole cycles; rows of ``arrays`` in that order.
 
@@ -132,7 +133,7 @@ def rigid_beam_of(batch, regimes, i):
     )
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@side_by_side
 def advance_rigid_beams(batch, regimes, which, motions, arrays, settings, outcome):
     """As ``advance_beams``, for beams whose impacts take no time."""
     for k in prange(which.shape[0]):

@@ -26,6 +26,7 @@ from filelock import FileLock
 from numba.core import event
 
 from chaosgym.core import KERNEL_CACHE, WANTED_CACHE, source_digest
+from chaosgym.core.kernel import SideBySide
 
 logger = logging.getLogger("chaosgym")
 
@@ -39,6 +40,25 @@ def call(kernel: Any, *arguments: Any) -> Any:
         prepare(kernel, *arguments)
         _ready.add(key)
     return kernel(*arguments)
+
+
+_one_call_at_a_time = threading.Lock()
+"""Some of numba's threading layers abort the process if two threads call parallel kernels at once."""
+
+_forked = threading.Event()
+"""Set in children of a fork: GNU OpenMP ends a child that uses it if its parent did."""
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forked.set)
+
+
+def call_side_by_side(kernel: SideBySide, machines: int, *arguments: Any) -> None:
+    """Call a kernel over some of a number of machines: on all threads where there are several, and no fork."""
+    if machines == 1 or _forked.is_set():
+        call(kernel.serial, *arguments)
+    else:
+        with _one_call_at_a_time:
+            call(kernel.parallel, *arguments)
 
 
 def prepare(kernel: Any, *arguments: Any) -> None:

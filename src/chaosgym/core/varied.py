@@ -4,6 +4,7 @@ from numba import njit, prange
 
 from chaosgym.core.batch import beam_of, episode_of, rigid_beam_of
 from chaosgym.core.cycle import CycleArrays
+from chaosgym.core.kernel import side_by_side
 from chaosgym.core.modal_impact import advance as advance_beam
 from chaosgym.core.modal_run import make_run
 from chaosgym.core.restitution import advance_restitution
@@ -68,7 +69,7 @@ def _vary_rigid_beam(batch, regimes, i, speeds, motions, vectors, growth, arrays
     return 0
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@side_by_side
 def advance_varied_beams(batch, regimes, tables, which, speeds, motions, vectors, growth, arrays, settings, outcome):
     """As ``advance_beams``, for a cycle at each of the excitation frequencies ``speeds`` (k, cycles).
 
@@ -79,7 +80,7 @@ def advance_varied_beams(batch, regimes, tables, which, speeds, motions, vectors
         outcome[k] = _vary_beam(batch, regimes, tables, which[k], speeds, motions, vectors, growth, arrays, settings, k)
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@side_by_side
 def advance_varied_rigid_beams(batch, regimes, which, speeds, motions, vectors, growth, arrays, settings, outcome):
     """As ``advance_varied_beams``, for beams whose impacts take no time."""
     for k in prange(which.shape[0]):

@@ -4,7 +4,6 @@ They differ in numbers, not in their joints or in how many modes they have. Each
 """
 
 from abc import ABC, abstractmethod
-from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from chaosgym.core import status
 from chaosgym.core.batch import Motions, Settings, advance_beams, advance_rigid_beams
-from chaosgym.core.compilation import call
+from chaosgym.core.compilation import call_side_by_side
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.varied import advance_varied_beams, advance_varied_rigid_beams
 from chaosgym.machines.integrators import ExactEvents
@@ -46,10 +45,6 @@ def put(batch: Any, i: int, model: Any) -> None:
     """Write a model into place i of a batch."""
     for column, value in zip(batch, model, strict=True):
         column[i] = value
-
-
-one_call_at_a_time = Lock()
-"""Some of numba's threading layers abort the process if two threads call parallel kernels at once."""
 
 
 class CompiledBatch(ABC):
@@ -90,8 +85,7 @@ class CompiledBatch(ABC):
     def run(self, which: Indices, cycles: int) -> Cycles:
         """Run the machines ``which`` (k,) for some cycles."""
         arrays, outcome = self._empty(len(which), cycles)
-        with one_call_at_a_time:
-            self._advance(which, arrays, outcome)
+        self._advance(which, arrays, outcome)
         return self._cycles(arrays, outcome)
 
     def _empty(self, count: int, cycles: int) -> tuple[CycleArrays, Indices]:
@@ -138,7 +132,7 @@ class RestitutionBatch(CompiledBatch):
     nested: tuple[str, ...] = ("regimes",)
     """Parts of the model that are models themselves."""
 
-    _varied = staticmethod(advance_varied_rigid_beams)
+    _varied = advance_varied_rigid_beams
 
     def __init__(self, machine: "Machine", count: int) -> None:
         super().__init__(machine, count)
@@ -173,8 +167,7 @@ class RestitutionBatch(CompiledBatch):
         arrays, outcome = self._empty(len(which), speeds.shape[1])
         growth = np.zeros((*speeds.shape, 1))
         given = (self._batch, *self._parts, which, speeds, self._motions, self._deviations, growth, arrays)
-        with one_call_at_a_time:
-            call(self._varied, *given, self._settings, outcome)
+        call_side_by_side(self._varied, len(self), *given, self._settings, outcome)
         return self._cycles(arrays, outcome), growth[:, :, 0]
 
     def set_speeds(self, which: Indices, speeds: Array) -> None:
@@ -187,7 +180,7 @@ class RestitutionBatch(CompiledBatch):
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         given = (self._batch, *self._parts, which, self._motions, arrays, self._settings, outcome)
-        call(advance_rigid_beams, *given)
+        call_side_by_side(advance_rigid_beams, len(self), *given)
 
 
 class ModalImpactBatch(RestitutionBatch):
@@ -195,7 +188,7 @@ class ModalImpactBatch(RestitutionBatch):
 
     nested = ("regimes", "tables")
 
-    _varied = staticmethod(advance_varied_beams)
+    _varied = advance_varied_beams
 
     def __init__(self, machine: "Machine", count: int) -> None:
         super().__init__(machine, count)
@@ -213,4 +206,4 @@ class ModalImpactBatch(RestitutionBatch):
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         given = (self._batch, *self._parts, which, self._motions, arrays, self._settings, outcome)
-        call(advance_beams, *given)
+        call_side_by_side(advance_beams, len(self), *given)

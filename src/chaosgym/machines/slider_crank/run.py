@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.core import status
-from chaosgym.core.compilation import call
+from chaosgym.core.compilation import call, call_side_by_side
 from chaosgym.core.cycle import CycleArrays, Episode, cycle_arrays
 from chaosgym.core.tangent import Tangents, no_tangents
-from chaosgym.machines.batch import CompiledBatch, Cycles, one_call_at_a_time, put, stacked
+from chaosgym.machines.batch import CompiledBatch, Cycles, put, stacked
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.slider_crank.joints import gaps_of, sensor_peaks
 from chaosgym.machines.slider_crank.kernels.batch import advance_cranks, advance_kicked_cranks, advance_stepped_cranks
@@ -170,12 +170,12 @@ class CrankBatch(CompiledBatch):
         """``kick`` the machines ``which`` (k,) by each of the shares (k, cycles, n_states / 2) and run them a cycle."""
         arrays, outcome = self._empty(*kicks.shape[:2])
         given = (self._batch, which, kicks, self._motions, self._scale, arrays, self._settings, outcome)
-        with one_call_at_a_time:
-            call(advance_kicked_cranks, *given)
+        call_side_by_side(advance_kicked_cranks, len(self), *given)
         return self._cycles(arrays, outcome)
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
-        call(advance_cranks, self._batch, which, self._motions, arrays, self._settings, outcome)
+        given = (self._batch, which, self._motions, arrays, self._settings, outcome)
+        call_side_by_side(advance_cranks, len(self), *given)
 
 
 class SteppedCrankBatch(CompiledBatch):
@@ -203,4 +203,5 @@ class SteppedCrankBatch(CompiledBatch):
             self.change(i, self._machines[i].at(clearance=clearance))
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
-        call(advance_stepped_cranks, self._batch, which, self._motions, arrays, self._settings, outcome)
+        given = (self._batch, which, self._motions, arrays, self._settings, outcome)
+        call_side_by_side(advance_stepped_cranks, len(self), *given)

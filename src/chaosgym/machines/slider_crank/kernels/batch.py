@@ -10,6 +10,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from chaosgym.core.batch import episode_of, rows_of
+from chaosgym.core.kernel import side_by_side
 from chaosgym.core.tangent import no_tangents
 from chaosgym.core.varied import cycle_of
 from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
@@ -55,7 +56,7 @@ def crank_of(batch, i):
     )
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@side_by_side
 def advance_cranks(batch, which, motions, arrays, settings, outcome):
     """As ``advance_beams``, for slider cranks."""
     for k in prange(which.shape[0]):
@@ -94,7 +95,7 @@ def _kick_crank(model, kicks, coordinates, scale, episode, arrays, settings, k):
     return 0
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@side_by_side
 def advance_kicked_cranks(batch, which, kicks, motions, scale, arrays, settings, outcome):
     """As ``advance_cranks``; before each cycle velocities change by ``kicks`` (k, cycles, n_states / 2).
 
@@ -130,7 +131,7 @@ def stepped_crank_of(batch, i):
     )
 
 
-@njit(cache=True, nogil=True, parallel=True)
+@side_by_side
 def advance_stepped_cranks(batch, which, motions, arrays, settings, outcome):
     """As ``advance_beams``, for slider cranks that move by Taylor series."""
     for k in prange(which.shape[0]):
