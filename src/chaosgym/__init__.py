@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from chaosgym.classifier import MachineClassifier, ResponseClassifier, default_classifier
     from chaosgym.control.evaluation import evaluate
     from chaosgym.diagnosis import Diagnosis, diagnose, response_map, response_type, two_step_test
+    from chaosgym.diagnosis.bifurcation_diagram import follow
     from chaosgym.diagnosis.step_check import step_check
     from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
     from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, ImpactBeam, SliderCrank
@@ -28,6 +29,7 @@ _HOME = {
     "chaosgym.classifier": ("MachineClassifier", "ResponseClassifier", "default_classifier"),
     "chaosgym.control.evaluation": ("evaluate",),
     "chaosgym.diagnosis": ("Diagnosis", "diagnose", "response_map", "response_type", "two_step_test"),
+    "chaosgym.diagnosis.bifurcation_diagram": ("follow",),
     "chaosgym.diagnosis.step_check": ("step_check",),
     "chaosgym.errors": ("ChaosgymError", "ParameterError", "SimulationError"),
     "chaosgym.machines": ("THESIS_IMPACT_BEAM", "THESIS_SLIDER_CRANK", "ImpactBeam", "SliderCrank"),
@@ -60,6 +62,7 @@ __all__ = [
     "default_classifier",
     "diagnose",
     "evaluate",
+    "follow",
     "read_machine",
     "read_sweep",
     "response_map",

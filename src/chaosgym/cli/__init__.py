@@ -22,6 +22,7 @@ COMMANDS = {
     "show": "simulate:show",
     "new-machine": "simulate:new_machine",
     "diagnose": "diagnose:diagnose",
+    "branch": "branch:branch",
     "overlay": "diagnose:overlay",
     "explore": "demo:explore",
     "classify": "classify:classify",

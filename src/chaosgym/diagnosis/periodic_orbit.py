@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.errors import SimulationError
 from chaosgym.machines import Machine
-from chaosgym.simulation import ExactEvents, MotionState, simulate, simulate_with_deviations
+from chaosgym.simulation import CycleRecord, ExactEvents, MotionState, simulate, simulate_with_deviations
 
 Array = NDArray[np.float64]
 
@@ -104,7 +104,8 @@ def find_periodic_orbit(
     best: tuple[float, Array, Array] | None = None
     try:
         for _ in range(iterations):
-            end, monodromy = _period_map(machine, state, period, weight)
+            record, monodromy = period_map(machine, state, period, weight)
+            end = record.final_state.coordinates
             residual = _share(weight * (end - state), weight * state)
             if best is not None and residual >= best[0]:
                 break
@@ -134,14 +135,17 @@ def _share(change: Array, whole: Array) -> float:
     return size / float(np.linalg.norm(whole)) if np.any(whole) else math.inf if size else 0.0
 
 
-def _period_map(machine: Machine, state: Array, period: int, weight: Array) -> tuple[Array, Array]:
-    """State after one period, and its derivative."""
+def period_map(machine: Machine, state: Array, period: int, weight: Array) -> tuple[CycleRecord, Array]:
+    """Run over one period from a state, and the derivative (n_states, n_states) of its final state.
+
+    ``weight`` (n_states,) scales the differences that stand for the derivative where no exact deviations exist.
+    """
     if machine.carries_deviations:
         record, vectors, _ = simulate_with_deviations(
             machine, period, state, deviations=np.eye(len(state)), orthonormal=False, integrator=PRECISE
         )
-        return record.final_state.coordinates, np.ascontiguousarray(vectors.T)
-    end = simulate(machine, period, state, integrator=PRECISE).final_state.coordinates
+        return record, np.ascontiguousarray(vectors.T)
+    record = simulate(machine, period, state, integrator=PRECISE)
     derivative = np.empty((len(state), len(state)))
     for i in range(len(state)):
         step = FINITE_DIFFERENCE / weight[i]
@@ -151,4 +155,4 @@ def _period_map(machine: Machine, state: Array, period: int, weight: Array) -> t
             moved[i] += sign * step
             pair.append(simulate(machine, period, moved, integrator=PRECISE).final_state.coordinates)
         derivative[:, i] = (pair[0] - pair[1]) / (2.0 * step)
-    return end, derivative
+    return record, derivative

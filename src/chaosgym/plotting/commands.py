@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.diagnosis import Diagnosis
+from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram
 from chaosgym.diagnosis.overlay import Overlay
 from chaosgym.machines import Machine
 from chaosgym.plotting import response
+from chaosgym.plotting.branches import branches
 from chaosgym.plotting.design import axis_label, peak_record
 from chaosgym.plotting.style import ACCENT, INK, NATURE_COLOURS, STYLE, figure_of
 from chaosgym.simulation import CycleRecord, simulate
@@ -172,6 +174,17 @@ def peaks_figure(measured: MeasuredPeaks) -> Figure:
         f"Life {life} million cycles ({low} to {high})", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK
     )
     left.set_title("")
+    return figure
+
+
+@_styled
+def branch_figure(diagram: BifurcationDiagram) -> Figure:
+    """Branches of periodic orbits along a field, with their bifurcations, over the peaks of a sweep."""
+    figure = figure_of(1.6 * WIDTH, 4.2)
+    ax = branches(diagram, figure.subplots())
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8)
+    name = Path(diagram.machine.name).stem
+    figure.suptitle(f"{name}: periodic orbits", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
     return figure
 
 

@@ -1,0 +1,127 @@
+"""The command ``branch``: periodic orbits followed along a field, through folds and loss of stability."""
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.output import draw, emit, picture_path, plot_option
+
+SHOWN = 30
+"""Branches, and bifurcations, that the table shows; all are in --out and --json."""
+
+
+@machine_command
+@click.option(
+    "--along",
+    required=True,
+    metavar="FIELD=LOW:HIGH[:COUNT]",
+    help="Field, or speed or clearance, and its range in SI or with a unit; COUNT points of the sweep (41).",
+)
+@click.option(
+    "--longest-period",
+    type=click.IntRange(1, 64),
+    default=4,
+    show_default=True,
+    help="Longest period [cycles] of a branch that begins at a flip.",
+)
+@click.option(
+    "--most-unstable",
+    type=click.FloatRange(1.0, 1e6),
+    default=30.0,
+    show_default=True,
+    help="Largest multiplier up to which unstable orbits are followed.",
+)
+@click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
+@click.option("--out", type=click.Path(dir_okay=False), help="Table to write (.csv or .parquet), a row an orbit.")
+@click.option("--overwrite", is_flag=True, help="Replace the table if it exists.")
+@plot_option()
+def branch(
+    machine: Any,
+    along: str,
+    longest_period: int,
+    most_unstable: float,
+    workers: int | None,
+    out: str | None,
+    overwrite: bool,
+    plot: str | None,
+    as_json: bool,
+) -> None:
+    """Follow periodic orbits along a field: where they fold, flip and graze, stable or not."""
+    from chaosgym.diagnosis.bifurcation_diagram import SWEEP, follow
+    from chaosgym.diagnosis.orbit_family import continuous_field
+    from chaosgym.files import check_target, write_table
+    from chaosgym.machines.parameters import parameters_of
+    from chaosgym.sweeps import Axis
+
+    picture = picture_path(plot, f"branch-{Path(machine.name).stem}")
+    if out:
+        check_target(out, overwrite)
+    name = along.partition("=")[0]
+    units = {field: about.unit for field, about in parameters_of(machine).items()}
+    axis = Axis.parse(along, units | {name: units[continuous_field(machine, name)]})
+    diagram = follow(
+        machine,
+        name,
+        (axis.low, axis.high),
+        sweep=axis.count or SWEEP,
+        longest_period=longest_period,
+        most_unstable=most_unstable,
+        workers=workers,
+        progress=True,
+    )
+    result, lines = diagram.as_dict(), _lines(diagram)
+    if out:
+        write_table(_columns(diagram), out)
+        result["out"] = out
+        lines.append(f"written to {out}")
+    draw(picture, lambda plots: plots.branch_figure(diagram), result, lines)
+    emit(result, as_json, lambda: lines)
+
+
+def _columns(diagram: Any) -> dict[str, Any]:
+    """Columns of the table; empty where a bifurcation has no value."""
+    rows = list(diagram.rows())
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    return {name: np.array([row.get(name) for row in rows], dtype=object) for name in names}
+
+
+def _lines(diagram: Any) -> list[str]:
+    from chaosgym.machines.parameters import parameters_of
+
+    unit = parameters_of(diagram.machine)[diagram.field].unit
+    natures = Counter(point.nature for point in diagram.sweep)
+    told = ", ".join(f"{nature} {count}" for nature, count in sorted(natures.items()))
+    grazing = [one for one in diagram.bifurcations if one.kind == "grazing"]
+    harmless = sum(not one.loses_stability for one in grazing)
+    shown = [one for one in diagram.bifurcations if (one.kind != "grazing" or one.loses_stability) and not one.ends]
+    lines = [
+        f"{diagram.machine.name}: {len(diagram.branches)} branches over {diagram.field} {diagram.low:g} to "
+        f"{diagram.high:g} {unit}; sweep: {told}",
+        *_at_most([f"  {_branch_line(number, one, unit)}" for number, one in enumerate(diagram.branches, 1)]),
+        f"bifurcations, and {harmless} grazings that no stability depends on:",
+        *_at_most(
+            [
+                f"  {one.value:<14.9g} {one.kind:18s} period {one.period}"
+                + (", stability ends" if one.loses_stability else "")
+                for one in shown
+            ]
+        ),
+    ]
+    return lines + [f"  {line}" for line in diagram.not_followed]
+
+
+def _at_most(lines: list[str]) -> list[str]:
+    more = len(lines) - SHOWN
+    return [*lines[:SHOWN], *([f"  and {more} more: --out or --json has all"] if more > 0 else [])]
+
+
+def _branch_line(number: int, one: Any, unit: str) -> str:
+    share = "stable" if one.stable.all() else "unstable" if not one.stable.any() else "stable in parts"
+    return (
+        f"branch {number}: period {one.period}, {one.values.min():.6g} to {one.values.max():.6g} {unit}, {share}, "
+        f"{len(one)} orbits, from {one.begins}"
+    )

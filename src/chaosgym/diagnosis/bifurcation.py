@@ -1,0 +1,352 @@
+r"""Bifurcations between two orbits of a branch: which there are, where, and what they are called.
+
+    grazing            the contacts of a period change: a surface is touched at zero speed, or a contact parts
+    fold               a multiplier is 1 and the branch turns back
+    flip               a multiplier is -1: a motion of twice the period begins
+    Neimark-Sacker     a pair of complex multipliers is on the unit circle: a torus begins
+    symmetry breaking  a multiplier is 1, the branch goes on: two motions begin that mirror each other
+    branch point       the same of a motion without symmetry
+
+Roots are those of det(M - I), of det(M + I) and of the product of all (m_i m_j - 1) along the branch, by Brent's
+method; a change of the contacts is halved in. Where multipliers leave the circle and no root tells how, the interval is
+halved.
+
+References
+----------
+Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., Springer 2004, chapter 10.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.diagnosis.orbit_family import CLOSED, CLOSELY, NotFollowedError, OrbitFamily, OrbitPoint
+
+Array = NDArray[np.float64]
+
+Kind = Literal["grazing", "fold", "flip", "Neimark-Sacker", "symmetry breaking", "branch point"]
+
+PLACED = 1e-9
+"""Length of the branch within which a change of contacts is placed, in scaled unknowns."""
+
+FIRST_DOUBT, MOST_ROUNDS = 1e-3, 40
+"""Share of an interval by which the first guess of a change of contacts may err, and rounds of guessing at the most."""
+
+NEAREST = 1e-6
+"""Shortest piece of a branch that is searched for multipliers that cross unseen."""
+
+ASIDE = 0.02
+"""Share of the chord at which a crossing of branches is looked at from either side."""
+
+ROOT_ERROR = 1e-9
+"""Error of a root, as a share of the field or of the range."""
+
+SAME_ORBIT = 1e-3
+"""Distance, relative to the size of the motion, below which an orbit closes after half its period too."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bifurcation:
+    """Where the motion of a branch changes in kind.
+
+    Attributes
+    ----------
+    kind
+        See the module.
+    value
+        Of the field.
+    error
+        Half width of the interval of the field in which it lies.
+    period
+        Of the branch, in cycles.
+    multipliers : (n_states,) complex
+        Of the orbit; of a grazing orbit those on the side that comes first.
+    state : (n_states,)
+        At the start of a cycle.
+    impacts
+        Contacts of each side in a period, before and after.
+    largest_peak
+        Of the period [N].
+    loses_stability
+        True if the orbits are stable on one side and not on the other.
+    ends
+        True if the branch ends here: beyond, its orbits are those before once more.
+    """
+
+    kind: Kind
+    value: float
+    error: float
+    period: int
+    multipliers: NDArray[np.complex128]
+    state: Array
+    impacts: tuple[tuple[int, ...], tuple[int, ...]]
+    largest_peak: float
+    loses_stability: bool
+    ends: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {
+            "kind": self.kind,
+            "value": self.value,
+            "error": self.error,
+            "period": self.period,
+            "largest_multiplier": float(np.abs(self.multipliers[0])),
+            "impacts": [list(side) for side in self.impacts],
+            "largest_peak_N": self.largest_peak,
+            "loses_stability": self.loses_stability,
+            "ends": self.ends,
+            "state": self.state.tolist(),
+        }
+
+
+class Found(NamedTuple):
+    """A bifurcation, and the orbit there."""
+
+    bifurcation: Bifurcation
+    point: OrbitPoint
+
+
+def between(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, share: float, closed: float = CLOSED) -> OrbitPoint:
+    """The orbit of a branch between two of its orbits, at a share of the chord."""
+    chord = b.x - a.x
+    slope = (1.0 - share) * a.slope + share * b.slope
+    unit = chord / np.linalg.norm(chord)
+    return family.solve(_interpolated(a, b, share), unit, slope, closed=closed, exact=False)
+
+
+def _interpolated(a: OrbitPoint, b: OrbitPoint, share: float) -> Array:
+    """Unknowns on the cubic through two orbits and their tangents."""
+    chord = b.x - a.x
+    rise, run = share * share * (3.0 - 2.0 * share), share * (1.0 - share)
+    bend = run * ((1.0 - share) * _along(a.tangent, chord) - share * _along(b.tangent, chord))
+    return np.asarray(a.x + rise * chord + bend * np.linalg.norm(chord))
+
+
+def _along(tangent: Array, chord: Array) -> Array:
+    """A tangent scaled to grow by one chord along the chord; the chord's direction where they are nearly normal."""
+    unit = chord / np.linalg.norm(chord)
+    part = float(tangent @ unit)
+    return tangent / part if part > 0.1 else unit
+
+
+def bifurcations_between(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> Iterator[Found]:
+    """All bifurcations between two neighbouring orbits of a branch, in their order.
+
+    Raises
+    ------
+    NotFollowedError
+        If an orbit between them can't be found.
+    """
+    if a.impacts == b.impacts:
+        yield from _smooth(family, a, b)
+        return
+    before, after = _change_of_contacts(family, a, b)
+    yield from _smooth(family, a, before)
+    yield _grazing(family, before, after)
+    yield from bifurcations_between(family, after, b)
+
+
+def _change_of_contacts(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> tuple[OrbitPoint, OrbitPoint]:
+    """Neighbours before and after a change of contacts.
+
+    States on the cubic between both are run for a cheap guess of where it is. Then an orbit is found on either side of
+    the guess, as far from it as it may err; one that lies on the wrong side brackets the change too.
+    """
+    doubt = FIRST_DOUBT
+    for _ in range(MOST_ROUNDS):
+        length = float(np.linalg.norm(b.x - a.x))
+        if length < PLACED:
+            break
+        doubt = min(max(doubt, 0.1 * PLACED / length), 0.25)
+        guess = float(np.clip(_guess(family, a, b, doubt), 1.01 * doubt, 1.0 - 1.01 * doubt))
+        try:
+            below = between(family, a, b, guess - doubt, CLOSELY)
+            above = between(family, a, b, guess + doubt, CLOSELY) if below.impacts == a.impacts else below
+        except NotFollowedError:
+            if length > 1e3 * PLACED:
+                raise
+            break
+        if below.impacts != a.impacts:
+            b, doubt = below, 8.0 * doubt
+        elif above.impacts == a.impacts:
+            a, doubt = above, 8.0 * doubt
+        else:
+            a, b, doubt = below, above, max(0.25 * doubt, FIRST_DOUBT)
+    return a, b
+
+
+def _guess(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, resolution: float) -> float:
+    """Share of the chord at which states between two orbits change their contacts, by halving."""
+    low, high = 0.0, 1.0
+    while high - low > resolution:
+        middle = 0.5 * (low + high)
+        if family.impacts(_interpolated(a, b, middle)) == a.impacts:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+def _grazing(family: OrbitFamily, before: OrbitPoint, after: OrbitPoint) -> Found:
+    values = [family.value(point.x[-1]) for point in (before, after)]
+    found = _bifurcation(family, "grazing", (before, after), before)
+    return Found(replace(found, value=0.5 * sum(values), error=0.5 * abs(values[1] - values[0])), before)
+
+
+def _one(point: OrbitPoint) -> float:
+    return float(np.linalg.det(point.matrix - np.eye(len(point.matrix))))
+
+
+def _minus_one(point: OrbitPoint) -> float:
+    return float(np.linalg.det(point.matrix + np.eye(len(point.matrix))))
+
+
+def _circle(point: OrbitPoint) -> float:
+    first, second = np.triu_indices(len(point.multipliers), 1)
+    return float(np.real(np.prod(point.multipliers[first] * point.multipliers[second] - 1.0)))
+
+
+Test = Callable[[OrbitPoint], float]
+
+TESTS: dict[str, Test] = {"one": _one, "minus one": _minus_one, "circle": _circle}
+"""Functions that change their sign where a multiplier is 1 or -1, or where two have the product 1."""
+
+
+def _smooth(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> Iterator[Found]:
+    """Bifurcations between two orbits with the same contacts."""
+    signs = {name: test(a) * test(b) < 0.0 for name, test in TESTS.items()}
+    turns = a.tangent[-1] * b.tangent[-1] < 0.0
+    if turns and not signs["one"]:
+        end = _end_on_another(family, a, b)
+        if end is not None:
+            yield end
+            return
+    explained = abs(b.unstable - a.unstable) in {abs(change) for change in _changes(signs)}
+    if (explained and turns <= signs["one"]) or float(np.linalg.norm(b.x - a.x)) < NEAREST:
+        found = []
+        for name in (name for name, changes in signs.items() if changes):
+            share, s, point = _root(family, a, b, name, turns)
+            kind = _kind(name, turns, (a, b), point)
+            if kind is not None:
+                named = replace(_bifurcation(family, kind, (a, b), point), value=family.value(s))
+                found.append((share, Found(named, point)))
+        yield from (each for _, each in sorted(found, key=lambda pair: pair[0]))
+        return
+    middle = between(family, a, b, 0.5)
+    for one, other in ((a, middle), (middle, b)):
+        yield from bifurcations_between(family, one, other)
+
+
+def _end_on_another(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> Found | None:
+    """Where a branch turns without a multiplier that passes 1: it began at another branch there, and comes back."""
+    from scipy.optimize import minimize_scalar
+
+    side = np.sign(a.tangent[-1])
+
+    @cache
+    def orbit(share: float) -> OrbitPoint:
+        return between(family, a, b, share, CLOSELY)
+
+    turning = minimize_scalar(
+        lambda share: -float(side * orbit(share).x[-1]), bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-4}
+    )
+    point = orbit(float(turning.x))
+    if _closes_earlier(family, point):
+        kind: Kind = "flip"
+    elif not a.symmetric and abs(point.peaks[0] - point.peaks[-1]) < SAME_ORBIT * point.peaks.max():
+        kind = "symmetry breaking"
+    else:
+        return None
+    s = _seen_from_aside(orbit, float(turning.x), None)
+    return Found(replace(_bifurcation(family, kind, (a, a), point, ends=True), value=family.value(s)), point)
+
+
+def _seen_from_aside(points: Callable[[float], OrbitPoint], share: float, test: Test | None) -> float:
+    """s near a share of the chord where a test function vanishes, or without one where s itself turns back.
+
+    By cubics through four neighbours: where branches cross, the orbit itself is badly determined.
+    """
+    width = min(ASIDE, 0.45 * min(share, 1.0 - share))
+    places = width * np.array([-2.0, -1.0, 1.0, 2.0])
+    found = [points(share + place) for place in places]
+
+    def cubic(values: list[float]) -> Any:
+        return np.polynomial.Polynomial.fit(places, values, 3, domain=[-1.0, 1.0])
+
+    s = cubic([point.x[-1] for point in found])
+    roots = (s.deriv() if test is None else cubic([test(point) for point in found])).roots()
+    return float(s(np.real(roots[np.argmin(np.abs(roots))])))
+
+
+def _changes(signs: dict[str, bool]) -> set[int]:
+    """Changes of the number of unstable multipliers that some changes of sign explain."""
+    reachable = {0}
+    for name, size in (("one", 1), ("minus one", 1), ("circle", 2)):
+        if signs[name]:
+            # two real multipliers whose product passes 1 do not cross the circle
+            steps = (size, -size, 0) if name == "circle" else (size, -size)
+            reachable = {total + step for total in reachable for step in steps}
+    return reachable
+
+
+def _root(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, name: str, turns: bool) -> tuple[float, float, OrbitPoint]:
+    """Share of the chord at which a test function vanishes, s there, and the orbit."""
+    from scipy.optimize import brentq
+
+    test, ends = TESTS[name], {0.0: a, 1.0: b}
+
+    @cache
+    def orbit(share: float) -> OrbitPoint:
+        return ends.get(share) or between(family, a, b, share, CLOSELY)
+
+    share = float(brentq(lambda one: test(orbit(one)), 0.0, 1.0, xtol=1e-13, rtol=1e-14, maxiter=60))
+    point = orbit(share)
+    crosses = name == "one" and not turns and 0.0 < share < 1.0
+    return share, _seen_from_aside(orbit, share, test) if crosses else float(point.x[-1]), point
+
+
+def _kind(name: str, turns: bool, sides: tuple[OrbitPoint, OrbitPoint], point: OrbitPoint) -> Kind | None:
+    """What a root of a test function is; None if two real multipliers only have the product 1."""
+    if name == "one":
+        alike = all(side.symmetric for side in sides)
+        return "fold" if turns else "symmetry breaking" if alike else "branch point"
+    if name == "minus one":
+        return "flip"
+    on_circle = np.abs(np.abs(point.multipliers) - 1.0) < 1e-5
+    return "Neimark-Sacker" if np.any(on_circle & (np.abs(point.multipliers.imag) > 1e-6)) else None
+
+
+def _bifurcation(
+    family: OrbitFamily, kind: Kind, sides: tuple[OrbitPoint, OrbitPoint], point: OrbitPoint, ends: bool = False
+) -> Bifurcation:
+    before, after = sides
+    return Bifurcation(
+        kind=kind,
+        value=family.value(point.x[-1]),
+        error=ROOT_ERROR * max(abs(family.value(point.x[-1])), abs(family.high - family.low)),
+        period=family.period // 2 if kind == "flip" and ends else family.period,
+        multipliers=point.multipliers,
+        state=family.state(point.x),
+        impacts=(before.impacts, after.impacts),
+        largest_peak=float(point.peaks.max()),
+        loses_stability=(before.unstable == 0) != (after.unstable == 0),
+        ends=ends,
+    )
+
+
+def _closes_earlier(family: OrbitFamily, point: OrbitPoint) -> bool:
+    """True if an orbit of even period closes after half of it."""
+    if family.period % 2:
+        return False
+    half = family.with_period(family.period // 2)
+    return float(np.linalg.norm(half.miss(point.x))) < SAME_ORBIT * float(np.linalg.norm(point.x[:-1]))
+
+
+def direction_of(point: OrbitPoint, multiplier: float) -> Array:
+    """Direction (n,) in which the orbits of a new branch differ: the null vector of M - multiplier I."""
+    return np.asarray(np.linalg.svd(point.matrix - multiplier * np.eye(len(point.matrix)))[2][-1])

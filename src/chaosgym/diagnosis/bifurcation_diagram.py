@@ -1,0 +1,426 @@
+"""All branches of periodic orbits that a sweep along one field meets, with their bifurcations.
+
+Every periodic point of the sweep seeds a branch, unless a branch passes through it already. Where a
+stable orbit flips the doubled branch is followed too, and where it loses its symmetry one of the two new ones, which
+mirror each other.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from chaosgym.diagnosis.bifurcation import Bifurcation, Found, direction_of
+from chaosgym.diagnosis.branch import MOST_UNSTABLE, Stretch, stretch
+from chaosgym.diagnosis.diagnose import diagnose
+from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily, OrbitPoint, continuous_field, family_of
+from chaosgym.diagnosis.periodic_orbit import find_periodic_orbit
+from chaosgym.errors import ParameterError
+from chaosgym.machines import Machine
+from chaosgym.machines.parameters import parameters_of, with_settings
+from chaosgym.simulation import parallel_map
+
+Array = NDArray[np.float64]
+
+SWEEP = 41
+"""Points of the sweep."""
+
+SWEEP_BUDGET = 400
+"""Cycles that each of them may take."""
+
+SHOWN_PEAKS = 60
+"""Peak forces of a point of the sweep that does not repeat."""
+
+LONGEST_PERIOD = 4
+"""Longest period of a doubled branch."""
+
+AMPLITUDES = (1e-3, 4e-3, 2e-4)
+"""Distances from a bifurcation, relative to the size of the motion, at which a new branch is looked for."""
+
+SAME = 1e-5
+"""Relative difference of peaks and multipliers below which two orbits are one, or mirror each other."""
+
+FAR_PEAKS = 1.3
+"""Ratio of peaks beyond which an orbit is not looked for between two others."""
+
+SAME_PLACE = 1e-6
+"""Relative difference of two values at which branches meet."""
+
+PATIENCE = 2.0
+"""Time [s] after which a progress bar appears."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Branch:
+    """A branch of periodic orbits, in the order in which it is passed.
+
+    Attributes
+    ----------
+    period
+        Cycles.
+    begins
+        Where it comes from: the seed, or the bifurcation of another branch.
+    ends
+        Why it was not followed further, at either end.
+    values : (n,)
+        Of the field.
+    states : (n, n_states)
+        At the start of a cycle.
+    multipliers : (n, n_states) complex
+        Floquet multipliers, largest modulus first.
+    peaks : (n, sides)
+        Largest contact force of the period [N].
+    impacts : (n, sides) int
+        Contacts of a period.
+    bifurcations
+        In the same order.
+    at
+        For each bifurcation, the number of the orbit before it.
+    """
+
+    period: int
+    begins: str
+    ends: tuple[str, str]
+    values: Array
+    states: Array
+    multipliers: NDArray[np.complex128]
+    peaks: Array
+    impacts: NDArray[np.int64]
+    bifurcations: tuple[Bifurcation, ...]
+    at: tuple[int, ...]
+    _family: OrbitFamily = field(repr=False)
+    _points: tuple[OrbitPoint, ...] = field(repr=False)
+    _found: tuple[Found, ...] = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def largest_multiplier(self) -> Array:
+        """Largest modulus of the multipliers, (n,)."""
+        return np.asarray(np.abs(self.multipliers[:, 0]))
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Where the orbits attract, (n,)."""
+        return np.asarray(self.largest_multiplier < 1.0)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {
+            "period": self.period,
+            "begins": self.begins,
+            "ends": list(self.ends),
+            "values": self.values.tolist(),
+            "largest_multiplier": self.largest_multiplier.tolist(),
+            "stable": self.stable.tolist(),
+            "peaks_N": self.peaks.tolist(),
+            "impacts": self.impacts.tolist(),
+            "bifurcations": [
+                {**one.as_dict(), "after_orbit": place} for one, place in zip(self.bifurcations, self.at, strict=True)
+            ],
+        }
+
+
+class SweepPoint(NamedTuple):
+    """What a machine does at one value from rest: its nature, its period if it has one, and its peak forces [N]."""
+
+    value: float
+    nature: str
+    period: int | None
+    peaks: Array
+    state: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class BifurcationDiagram:
+    """Branches of periodic orbits of a machine along one field, and the sweep that seeded them.
+
+    Attributes
+    ----------
+    machine, field, low, high
+        What was varied, and how far.
+    branches
+        In the order in which they were found.
+    sweep
+        Points of the sweep, by value.
+    """
+
+    machine: Machine
+    field: str
+    low: float
+    high: float
+    branches: tuple[Branch, ...]
+    sweep: tuple[SweepPoint, ...]
+
+    @property
+    def bifurcations(self) -> tuple[Bifurcation, ...]:
+        """Those of all branches, by value."""
+        return tuple(sorted((each for one in self.branches for each in one.bifurcations), key=lambda b: b.value))
+
+    @property
+    def not_followed(self) -> tuple[str, ...]:
+        """One line for each end of a branch that is neither an end of the range nor a bifurcation."""
+        return tuple(end for branch in self.branches for end in branch.ends if "not followed" in end)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {
+            "machine": self.machine.name,
+            "field": self.field,
+            "unit": parameters_of(self.machine)[self.field].unit,
+            "low": self.low,
+            "high": self.high,
+            "branches": [branch.as_dict() for branch in self.branches],
+            "sweep": [
+                {"value": p.value, "nature": p.nature, "period": p.period, "peaks_N": p.peaks.tolist()}
+                for p in self.sweep
+            ],
+            "not_followed": list(self.not_followed),
+        }
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """One row for each orbit, and for each bifurcation where it lies, for a table."""
+        for number, branch in enumerate(self.branches, 1):
+            for i in range(len(branch)):
+                yield {
+                    "branch": number,
+                    "period": branch.period,
+                    self.field: float(branch.values[i]),
+                    "kind": "orbit",
+                    "largest_multiplier": float(branch.largest_multiplier[i]),
+                    "stable": bool(branch.stable[i]),
+                    **{f"peak_{side}_N": float(branch.peaks[i, j]) for j, side in enumerate(self.machine.sides)},
+                    **{f"impacts_{side}": int(branch.impacts[i, j]) for j, side in enumerate(self.machine.sides)},
+                }
+                for one, place in zip(branch.bifurcations, branch.at, strict=True):
+                    if place == i:
+                        yield {
+                            "branch": number,
+                            "period": one.period,
+                            self.field: one.value,
+                            "kind": one.kind,
+                            "largest_multiplier": float(np.abs(one.multipliers[0])),
+                            "largest_peak_N": one.largest_peak,
+                        }
+
+
+def follow(
+    machine: Machine,
+    along: str,
+    span: tuple[float, float],
+    *,
+    sweep: int = SWEEP,
+    states: Sequence[tuple[float, Array, int]] = (),
+    longest_period: int = LONGEST_PERIOD,
+    most_unstable: float = MOST_UNSTABLE,
+    workers: int | None = None,
+    progress: bool = False,
+) -> BifurcationDiagram:
+    """Follow all branches of periodic orbits that a sweep along a field meets.
+
+    Parameters
+    ----------
+    machine
+        What runs; its own value of the field does not matter.
+    along
+        A field that varies continuously, or "speed" or "clearance".
+    span
+        Lowest and highest value, in the field's unit.
+    sweep
+        Points of the sweep from rest that seeds branches; 0 for none.
+    states
+        Further seeds: (value, state (n_states,) near a periodic orbit, period in cycles).
+    longest_period
+        Longest period of a branch that begins at a flip.
+    most_unstable
+        Largest multiplier up to which unstable orbits are followed.
+    workers
+        Threads of the sweep; all processors by default.
+    progress
+        Show a progress bar on standard error if it takes more than two seconds.
+
+    Raises
+    ------
+    ParameterError
+        If the field is unknown or does not vary continuously, or the span is empty or leaves the field's range.
+
+    Examples
+    --------
+    >>> import chaosgym
+    >>> diagram = chaosgym.follow(chaosgym.ImpactBeam(), "speed", (24.0, 26.0), sweep=3)  # doctest: +SKIP
+    >>> [(one.kind, one.value) for one in diagram.bifurcations if one.loses_stability]  # doctest: +SKIP
+    """
+    name, (low, high) = continuous_field(machine, along), span
+    if not low < high:
+        raise ParameterError(f"{name} = {low:g} to {high:g} is empty or reversed; allowed: the lower value first")
+    for value in (low, high):
+        with_settings(machine, {name: value})
+    points = _swept(machine, name, np.linspace(low, high, sweep), workers) if sweep else []
+    seeds = [(p.value, p.state, p.period) for p in points if p.period is not None] + list(states)
+    found = _Branches(machine, name, low, high, longest_period, most_unstable)
+    for value, state, period in tqdm(seeds, desc="branch", unit="seed", delay=PATIENCE, disable=not progress):
+        found.seed(value, np.asarray(state, dtype=float), period)
+    return BifurcationDiagram(
+        machine=machine, field=name, low=low, high=high, branches=tuple(found.branches), sweep=tuple(points)
+    )
+
+
+def _swept(machine: Machine, name: str, values: Array, workers: int | None) -> list[SweepPoint]:
+    def one(value: float) -> SweepPoint:
+        verdict = diagnose(with_settings(machine, {name: value}), budget=SWEEP_BUDGET)
+        repeats = verdict.period if verdict.status == "certified" else None
+        peaks = verdict.run.peak_force.max(axis=1)[-(repeats or SHOWN_PEAKS) :]
+        state = np.asarray(verdict.evidence["final_state"])
+        return SweepPoint(float(value), verdict.nature, repeats, peaks, state)
+
+    return parallel_map(one, values, workers=workers)
+
+
+class _Branches:
+    """Branches found so far, and how to find more."""
+
+    def __init__(
+        self, machine: Machine, name: str, low: float, high: float, longest: int, most_unstable: float
+    ) -> None:
+        self.branches: list[Branch] = []
+        self._machine, self._name, self._low, self._high = machine, name, low, high
+        self._longest, self._most_unstable = longest, most_unstable
+
+    def seed(self, value: float, state: Array, period: int) -> None:
+        """Follow the branch through a state, and all that begin on it, unless it is known."""
+        orbit = find_periodic_orbit(with_settings(self._machine, {self._name: value}), state, period)
+        if orbit is None:
+            return
+        family = family_of(self._machine, self._name, self._low, self._high, orbit.state, period)
+        s = (value - self._low) / (self._high - self._low)
+        try:
+            start = family.solve(np.append(family.weight * orbit.state, s), _upwards(family, orbit.state))
+        except NotFollowedError:
+            return
+        if self._known(family, start):
+            return
+        seed = f"seed at {self._name} = {value:.6g}"
+        ahead = back = Stretch([start], [], [], seed)
+        if s < 1.0:
+            ahead = stretch(family, start, most_unstable=self._most_unstable)
+        if s > 0.0 and not ahead.end.startswith("closed"):
+            back = stretch(family, _turned(start, -1.0), most_unstable=self._most_unstable)
+        self._add(_joined(family, back, ahead, seed))
+
+    def _add(self, branch: Branch) -> None:
+        self.branches.append(branch)
+        for each in branch._found:
+            if each.bifurcation.ends or not each.bifurcation.loses_stability:
+                continue
+            if each.bifurcation.kind == "flip" and 2 * branch.period <= self._longest:
+                self._switch(branch._family, branch._family.with_period(2 * branch.period), each, -1.0)
+            elif each.bifurcation.kind == "symmetry breaking":
+                self._switch(branch._family, branch._family, each, 1.0)
+
+    def _switch(self, parent: OrbitFamily, family: OrbitFamily, at: Found, multiplier: float) -> None:
+        """Follow the branch that begins at a bifurcation of another one, unless one ends there."""
+        kind, value = at.bifurcation.kind, at.bifurcation.value
+        if any(
+            each.ends and each.kind == kind and abs(each.value - value) < SAME_PLACE * abs(value)
+            for branch in self.branches
+            if branch.period == family.period
+            for each in branch.bifurcations
+        ):
+            return
+        normal = np.append(direction_of(at.point, multiplier), 0.0)
+        for amplitude in AMPLITUDES:
+            try:
+                start = family.solve(at.point.x + amplitude * normal, normal)
+            except NotFollowedError:
+                continue
+            apart = np.linalg.norm(parent.miss(start.x)) if family.period > parent.period else np.inf
+            if apart > 0.1 * amplitude and not start.symmetric:
+                break
+        else:
+            return
+        if not 0.0 <= start.x[-1] <= 1.0 or self._known(family, start):
+            return
+        ahead = stretch(family, start, first_step=0.01, most_unstable=self._most_unstable)
+        named = f"{at.bifurcation.kind} at {self._name} = {at.bifurcation.value:.8g}"
+        self._add(_joined(family, Stretch([start], [], [], named), ahead, named))
+
+    def _known(self, family: OrbitFamily, point: OrbitPoint) -> bool:
+        """True if a branch passes through an orbit, or through its mirror image."""
+        return any(
+            _alike(found, point)
+            for branch in self.branches
+            if branch.period == family.period
+            for found in _orbits_at(branch, float(point.x[-1]), point)
+        )
+
+
+def _upwards(family: OrbitFamily, state: Array) -> Array:
+    normal = np.zeros(len(state) + 1)
+    normal[-1] = 1.0
+    return normal
+
+
+def _turned(point: OrbitPoint, sign: float) -> OrbitPoint:
+    """The orbit with its tangent the other way, if the sign is negative."""
+    return replace(point, tangent=sign * point.tangent)
+
+
+def _joined(family: OrbitFamily, back: Stretch, ahead: Stretch, begins: str) -> Branch:
+    """One branch of two stretches that begin at the same orbit."""
+    points = [*reversed(back.points), *ahead.points[1:]]
+    first = len(back.points) - 1
+    reverse = [
+        Found(replace(each.bifurcation, impacts=each.bifurcation.impacts[::-1]), each.point)
+        for each in reversed(back.found)
+    ]
+    found = [*reverse, *ahead.found]
+    at = [*(first - 1 - place for place in reversed(back.at)), *(first + place for place in ahead.at)]
+    return Branch(
+        period=family.period,
+        begins=begins,
+        ends=(back.end, ahead.end),
+        values=np.array([family.value(point.x[-1]) for point in points]),
+        states=np.array([family.state(point.x) for point in points]),
+        multipliers=np.array([point.multipliers for point in points]),
+        peaks=np.array([point.peaks for point in points]),
+        impacts=np.array([point.impacts for point in points]),
+        bifurcations=tuple(each.bifurcation for each in found),
+        at=tuple(at),
+        _family=family,
+        _points=tuple(points),
+        _found=tuple(found),
+    )
+
+
+def _orbits_at(branch: Branch, s: float, like: OrbitPoint) -> Iterator[OrbitPoint]:
+    """Orbits of a branch at s that may be the one sought."""
+    places = np.array([point.x[-1] for point in branch._points])
+    normal = np.zeros(len(like.x))
+    normal[-1] = 1.0
+    for i in np.flatnonzero((places[:-1] - s) * (places[1:] - s) <= 0.0):
+        a, b = branch._points[i], branch._points[i + 1]
+        near = np.sort([a.peaks, b.peaks], axis=1)
+        sought = np.sort(like.peaks)
+        if np.any(sought > FAR_PEAKS * near.max(axis=0)) or np.any(FAR_PEAKS * sought < near.min(axis=0)):
+            continue
+        share = (s - places[i]) / (places[i + 1] - places[i]) if places[i + 1] != places[i] else 0.0
+        guess = a.x + share * (b.x - a.x)
+        guess[-1] = s
+        try:
+            yield branch._family.solve(guess, normal)
+        except NotFollowedError:
+            continue
+
+
+def _alike(one: OrbitPoint, other: OrbitPoint) -> bool:
+    """True if two orbits have the same multipliers and, on whichever sides, the same peaks."""
+    peaks = np.sort(one.peaks), np.sort(other.peaks)
+    leading = np.abs(one.multipliers[:2]), np.abs(other.multipliers[:2])
+    return bool(
+        np.allclose(*peaks, rtol=SAME, atol=SAME * max(float(peaks[0].max()), 1e-300))
+        and np.allclose(*leading, rtol=1e2 * SAME, atol=1e2 * SAME)
+    )

@@ -1,0 +1,291 @@
+r"""Periodic orbits of a machine along one of its fields: the equations that continuation solves, and Newton's method.
+
+    F(y, p) = P(y, p) - y = 0        P: the motion over k cycles, p: the field, M = dP/dy carried through contacts
+
+Unknowns are scaled: z = W y / |W y_0| with the weights of energy, s = (p - low) / (high - low). What a machine must
+offer is its stroboscopic map with its derivative (``periodic_orbit.period_map``), nothing else.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.diagnosis.periodic_orbit import PRECISE, period_map
+from chaosgym.errors import ParameterError, SimulationError
+from chaosgym.machines import Machine
+from chaosgym.machines.parameters import check_parameter, parameters_of, suggestion, with_settings
+from chaosgym.simulation import CycleRecord, simulate
+
+Array = NDArray[np.float64]
+
+CLOSED, CLOSELY = 1e-10, 1e-12
+"""Miss of an orbit, relative to its size, at which Newton's method stops, and at which it does at a bifurcation."""
+
+MOST_ITERATIONS = 8
+
+SLOPE_STEPS = (1e-6, 1e-7, 1e-8)
+"""Steps in s of the difference that stands for dP/ds, the next one where the map bends too much, as near grazing.
+
+It errs by 1e-7 or more, which steers the steps; it moves no orbit that is found, and no multiplier."""
+
+BENT = 0.01
+"""Share of such a difference by which its two halves may differ."""
+
+NOISE = 1e-12
+"""Change of s that tells nothing of dP/ds."""
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitPoint:
+    """One periodic orbit of a family.
+
+    Attributes
+    ----------
+    x : (n + 1,)
+        Scaled state z at the start of a cycle, and s.
+    matrix : (n, n)
+        Derivative of the map of one period in scaled coordinates; its eigenvalues are the Floquet multipliers.
+    slope : (n,)
+        dP/ds.
+    tangent : (n + 1,)
+        Unit tangent of the branch, turned the way that it is followed.
+    impacts : (sides,) of int
+        Contacts that begin in one period, of each side: the contact sequence as far as it is told apart.
+    peaks : (sides,)
+        Largest contact force of the period [N].
+    symmetric
+        True if both sides do the same, and something.
+    """
+
+    x: Array
+    matrix: Array
+    slope: Array
+    tangent: Array
+    impacts: tuple[int, ...]
+    peaks: Array
+    symmetric: bool
+
+    @cached_property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers (n,), largest modulus first."""
+        values = np.asarray(np.linalg.eigvals(self.matrix), dtype=complex)
+        return values[np.argsort(-np.abs(values))]
+
+    @property
+    def largest_multiplier(self) -> float:
+        """Largest modulus of the multipliers."""
+        return float(np.abs(self.multipliers[0]))
+
+    @property
+    def unstable(self) -> int:
+        """How many multipliers lie outside the unit circle."""
+        return int(np.sum(np.abs(self.multipliers) > 1.0))
+
+
+class NotFollowedError(Exception):
+    """Newton's method did not reach an orbit; says why."""
+
+
+@dataclass(frozen=True)
+class OrbitFamily:
+    """Periodic orbits of ``period`` cycles of a machine whose ``field`` lies between ``low`` and ``high``.
+
+    ``weight`` (n,) turns a state into scaled coordinates.
+    """
+
+    machine: Machine
+    field: str
+    low: float
+    high: float
+    period: int
+    weight: Array
+
+    def value(self, s: float) -> float:
+        """The field's value at s."""
+        return float(self.low + (self.high - self.low) * s)
+
+    def machine_at(self, s: float) -> Machine:
+        """The machine at s.
+
+        Raises
+        ------
+        ParameterError
+            If the field's own range ends before.
+        """
+        value = self.value(s)
+        if self.field == self.machine.speed_field:
+            return self.machine.at(speed=value)
+        if self.field == self.machine.clearance_field:
+            return self.machine.at(clearance=value)
+        return with_settings(self.machine, {self.field: value})
+
+    def state(self, x: Array) -> Array:
+        """Physical state (n_states,) of scaled unknowns."""
+        return np.asarray(x[:-1] / self.weight)
+
+    def solve(
+        self, guess: Array, normal: Array, slope: Array | None = None, *, closed: float = CLOSED, exact: bool = True
+    ) -> OrbitPoint:
+        """The orbit nearest to a guess on the plane through it that is normal to ``normal`` (n + 1,).
+
+        The tangent of the point is turned along ``normal``.
+
+        Parameters
+        ----------
+        slope : (n,)
+            dP/ds as far as it is known.
+        closed
+            Miss that suffices, relative to the size of the motion.
+        exact
+            Measure dP/ds at the orbit; otherwise what Newton's method learned of it serves.
+
+        Raises
+        ------
+        NotFollowedError
+            If there is none near, or the motion can't be followed.
+        """
+        try:
+            x, miss, matrix, slope, record = self._solve(guess, normal, slope, closed)
+            return self._point(x, matrix, self.slope(x, miss) if exact else slope, record, normal)
+        except (SimulationError, ParameterError) as error:
+            raise NotFollowedError(str(error).split(";")[0]) from error
+        except np.linalg.LinAlgError as error:
+            raise NotFollowedError("the equations have no single solution there") from error
+
+    def _solve(
+        self, guess: Array, normal: Array, slope: Array | None, closed: float
+    ) -> tuple[Array, Array, Array, Array, CycleRecord]:
+        """(x, miss, matrix, slope, record) of an orbit."""
+        x, last = guess, np.inf
+        miss, matrix, record = self._map(x)
+        slope = self._rough_slope(x, miss) if slope is None else slope
+        for _ in range(MOST_ITERATIONS):
+            size = float(np.linalg.norm(miss)) / max(float(np.linalg.norm(x[:-1])), 1e-300)
+            if not np.isfinite(size) or size > 2.0 * max(last, 1e-2):
+                break
+            if size < closed or (size < CLOSED and size > 0.1 * last):
+                return x, miss, matrix, slope, record
+            last, before = size, matrix
+            change = np.linalg.solve(_bordered(matrix, slope, normal), -np.append(miss, normal @ (x - guess)))
+            x = x + change
+            miss, matrix, record = self._map(x)
+            if abs(change[-1]) > NOISE:
+                # the new miss tells more of dP/ds than a difference does near grazing
+                slope = slope + (miss - 0.5 * (matrix - before) @ change[:-1]) / change[-1]
+        raise NotFollowedError("Newton's method does not converge")
+
+    def _point(self, x: Array, matrix: Array, slope: Array, record: CycleRecord, along: Array) -> OrbitPoint:
+        tangent = np.linalg.solve(_bordered(matrix, slope, along), np.append(np.zeros(len(matrix)), 1.0))
+        force, share = record.peak_force.max(axis=0), record.contact_fraction.sum(axis=0)
+        alike = all(abs(both[0] - both[-1]) <= 1e-7 * max(both.max(), 1e-300) for both in (force, share))
+        return OrbitPoint(
+            x=x,
+            matrix=matrix,
+            slope=slope,
+            tangent=tangent / np.linalg.norm(tangent),
+            impacts=_contacts(record),
+            peaks=force,
+            symmetric=alike and self.period % 2 == 1 and float(force.max()) > 0.0,
+        )
+
+    def _map(self, x: Array) -> tuple[Array, Array, CycleRecord]:
+        """Miss of a scaled state, derivative of the map and the run."""
+        record, matrix = period_map(self.machine_at(x[-1]), self.state(x), self.period, self.weight)
+        miss = self.weight * record.final_state.coordinates - x[:-1]
+        return miss, matrix * self.weight[:, None] / self.weight, record
+
+    def _rough_slope(self, x: Array, miss: Array) -> Array:
+        """dP/ds (n,) where the map misses by ``miss``, by a difference towards the middle of the range."""
+        step = SLOPE_STEPS[0] if x[-1] < 0.5 else -SLOPE_STEPS[0]
+        return np.asarray((self.end(x, x[-1] + step) - x[:-1] - miss) / step)
+
+    def slope(self, x: Array, miss: Array) -> Array:
+        """dP/ds (n,) where the map misses by ``miss``, by a central difference; at an end of the range just inside."""
+        for step in SLOPE_STEPS:
+            middle = float(np.clip(x[-1], step, 1.0 - step))
+            low, high = (self.end(x, middle + side) for side in (-step, step))
+            bend = np.linalg.norm(low + high - 2.0 * (x[:-1] + miss)) if middle == x[-1] else 0.0
+            if bend < BENT * np.linalg.norm(high - low):
+                break
+        return np.asarray((high - low) / (2.0 * step))
+
+    def end(self, x: Array, s: float) -> Array:
+        """Scaled state (n,) after one period from that of ``x``, with the field at s."""
+        record = simulate(self.machine_at(s), self.period, self.state(x), integrator=PRECISE)
+        return np.asarray(self.weight * record.final_state.coordinates)
+
+    def impacts(self, x: Array) -> tuple[int, ...]:
+        """Contacts that begin in one period from scaled unknowns, of each side.
+
+        Raises
+        ------
+        NotFollowedError
+            If the motion can't be followed.
+        """
+        try:
+            record = simulate(self.machine_at(x[-1]), self.period, self.state(x), integrator=PRECISE)
+        except (SimulationError, ParameterError) as error:
+            raise NotFollowedError(str(error).split(";")[0]) from error
+        return _contacts(record)
+
+    def miss(self, x: Array) -> Array:
+        """Miss (n,) of scaled unknowns after one period."""
+        return self._map(x)[0]
+
+    def with_period(self, period: int) -> "OrbitFamily":
+        """The family of another period."""
+        return OrbitFamily(self.machine, self.field, self.low, self.high, period, self.weight)
+
+
+def _bordered(matrix: Array, slope: Array, normal: Array) -> Array:
+    """Derivative of the equations of an orbit on a plane, (n + 1, n + 1)."""
+    n = len(matrix)
+    system = np.empty((n + 1, n + 1))
+    system[:n, :n] = matrix
+    system.flat[: n * (n + 1) : n + 2] -= 1.0
+    system[:n, n], system[n] = slope, normal
+    return system
+
+
+def _contacts(record: CycleRecord) -> tuple[int, ...]:
+    return tuple(record.impacts.sum(axis=0).tolist())
+
+
+def family_of(machine: Machine, field: str, low: float, high: float, state: Array, period: int) -> OrbitFamily:
+    """Family of the orbit through a state, along a field between two values.
+
+    Raises
+    ------
+    ParameterError
+        If the field is unknown, is no number that varies continuously, or does not reach so far.
+    """
+    for value in (low, high):
+        check_parameter(machine, field, value)
+    weight = machine.state_weights(state)
+    size = float(np.linalg.norm(weight * state)) or 1.0
+    return OrbitFamily(machine, field, low, high, period, np.asarray(weight / size))
+
+
+def continuous_field(machine: Machine, name: str) -> str:
+    """Field of a machine by its name, or by "speed" or "clearance".
+
+    Raises
+    ------
+    ParameterError
+        If there is none, or none that varies continuously.
+    """
+    usual = {"speed": machine.speed_field, "clearance": machine.clearance_field}
+    known = parameters_of(machine)
+    field = name if name in known else usual.get(name, name)
+    numbers: list[str] = [key for key, about in known.items() if not about.choices and _continuous(machine, key)]
+    if field not in numbers:
+        hint = suggestion(name, [*usual, *numbers])
+        raise ParameterError(f"{type(machine).__name__} has no field {name!r} that varies continuously{hint}")
+    return field
+
+
+def _continuous(machine: Any, name: str) -> bool:
+    return not isinstance(getattr(machine, name), int | str)
