@@ -9,11 +9,11 @@ import pytest
 from chaosgym import SliderCrank
 from chaosgym.core.cubic import cubic
 from chaosgym.core.cycle import Episode, cycle_arrays
+from chaosgym.core.events import KEEPS, UNSURE, judge
 from chaosgym.core.lanes import LANES, padded
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import SimulationError
 from chaosgym.machines.slider_crank.equations import equations
-from chaosgym.machines.slider_crank.kernels.contact import KEEPS, UNSURE, judge
 from chaosgym.machines.slider_crank.kernels.exact import advance
 from chaosgym.machines.slider_crank.kernels.propagator import table_places, tables
 from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, series_order

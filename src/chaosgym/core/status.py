@@ -5,6 +5,7 @@ DIVERGED = 1
 EVENT_BUDGET = 2
 STEP_TOO_COARSE = 3
 STEP_BUDGET = 4
+NEEDS_SET = 5
 
 MESSAGES = {
     DIVERGED: "the motion grew beyond every bound",
@@ -12,4 +13,5 @@ MESSAGES = {
     STEP_BUDGET: "one cycle needs more steps than its budget allows (less stiffness, less damping, fewer modes "
     "or a higher speed need fewer)",
     STEP_TOO_COARSE: "the step is too coarse for the fastest mode in contact",
+    NEEDS_SET: "one cycle visits more sets of pressed surfaces than the memory holds (fewer joints or modes need less)",
 }

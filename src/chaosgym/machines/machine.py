@@ -169,7 +169,7 @@ class Machine(ABC):
         integrator: Integrator,
         tangents: Tangents | None = None,
     ) -> tuple[int, int]:
-        """Run as many cycles as ``arrays`` has rows; ``coordinates`` (n_states,), ``bouncing`` (3,) change in place.
+        """Run as many cycles as ``arrays`` has rows; ``coordinates`` (n_states,), ``bouncing`` (3m,) change in place.
 
         Parameters
         ----------
@@ -202,6 +202,11 @@ class Machine(ABC):
     @property
     def sensors(self) -> tuple[str, ...]:
         """Names of the force sensors; ``CycleRecord.sensor_peak`` has their columns."""
+        return ()
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints whose surfaces ``sides`` are, two each; empty for a machine with one monitored joint."""
         return ()
 
     @property
@@ -251,6 +256,10 @@ class Machine(ABC):
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__, **fields)
         return other
+
+    def room_of(self, joint: int) -> tuple[float, float]:
+        """That of one of the ``joints``, by its number."""
+        return self.room
 
     @property
     def room(self) -> tuple[float, float]:

@@ -60,7 +60,7 @@ class Stop(NamedTuple):
     damping: float
 
 
-def _modal_blocks(stiffness: Array, damping: Array, rigid: bool) -> tuple[Array, Array]:
+def modal_blocks(stiffness: Array, damping: Array, rigid: bool) -> tuple[Array, Array]:
     """Real 2 x 2 blocks of q'' + damping q' + stiffness q = 0: generator (4, n) and from_modal (2n, 2n).
 
     Where the machine can move as a ``rigid`` body, a direction that neither spring nor damper resists drifts, in a
@@ -122,7 +122,7 @@ def _regimes(modes: Modes, *systems: tuple[Array, Array]) -> Regimes:
     n, rigid = len(modes.tip_shape), bool(np.any(modes.angular_frequency == 0.0))
     parts = []
     for matrices in systems:
-        generator, from_modal = _modal_blocks(*matrices, rigid)
+        generator, from_modal = modal_blocks(*matrices, rigid)
         # the modulus of a pair is the root of its determinant, of two real eigenvalues the larger one
         turns = generator[2] != 0.0
         modulus = np.where(turns, np.hypot(generator[0], generator[2]), np.max(np.abs(generator[[0, 3]]), axis=0))
@@ -131,7 +131,7 @@ def _regimes(modes: Modes, *systems: tuple[Array, Array]) -> Regimes:
     return Regimes(*(np.ascontiguousarray(np.stack(part)) for part in zip(*parts, strict=True)))
 
 
-def _settled(generator: Array, force: Array) -> tuple[Array, Array]:
+def settled(generator: Array, force: Array) -> tuple[Array, Array]:
     """Position of rest (2n,) of modal coordinates under a constant force (2n,), and the rate of those without one."""
     n = generator.shape[1]
     rest, drift = np.zeros(2 * n), np.zeros(2 * n)
@@ -188,7 +188,7 @@ def flexible_model(
         parts = []
         for force in (stop.stiffness * tip, static):
             load = regimes.to_modal[r] @ np.concatenate([np.zeros(n), force])
-            parts.append(_settled(regimes.generator[r], load))
+            parts.append(settled(regimes.generator[r], load))
         rest.append([part[0] for part in parts])
         drift.append([part[1] for part in parts])
         # (K + k p p') q = k c p at rest, so the tip rests at x with x - c = -c / (1 + k p' K^-1 p)

@@ -96,7 +96,8 @@ class SerialBatch:
 
     def run(self, which: Indices, cycles: int) -> Cycles:
         """Run the machines ``which`` (k,) for some cycles."""
-        shape = (len(which), cycles, 2)
+        sides = len(self._machines[which[0]].sides) if len(which) else 2
+        shape = (len(which), cycles, sides)
         results = Cycles(np.zeros(len(which), np.bool_), np.zeros(shape), np.zeros(shape, np.int64), np.zeros(shape))
         for k, i in enumerate(which.tolist()):
             try:

@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.errors import SimulationError
+from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines.machine import Machine
+from chaosgym.machines.parameters import suggestion
 
 Array = NDArray[np.float64]
 
@@ -17,7 +18,7 @@ class MotionState(NamedTuple):
     """All that a run needs to go on, bit for bit, from the end of a cycle.
 
     ``coordinates`` (n_states,) are the states of the equations of motion, ``bouncing`` (3,) the side of the current
-    episode of bouncing and the instants of its first and last touch [s] before now.
+    episode of bouncing and the instants of its first and last touch [s] before now; (3m,) of m joints, all sides first.
     """
 
     coordinates: Array
@@ -27,6 +28,10 @@ class MotionState(NamedTuple):
 @dataclass(frozen=True)
 class CycleRecord:
     """What happened in each operating cycle; two columns are the two sides of the monitored joint.
+
+    A machine with m joints has 2m columns, which its ``sides`` name. Displacement, velocity and history are those of
+    one joint: the one that the machine monitors, or the one with the largest force of the record; ``of_joint`` gives
+    those of another.
 
     Attributes
     ----------
@@ -57,6 +62,14 @@ class CycleRecord:
         joint: along the rod towards the slider, across it in its plane of swing, sideways.
     sensor_peak : (n_cycles, n_sensors) or None
         Largest force of the cycle [N] on each of the machine's ``sensors``; None for a machine without any.
+    joint : int
+        Number of the joint that is shown; 0 for a machine with one.
+    chosen : str or None
+        Its name, if ``of_joint`` chose it.
+    motions : (n_cycles, 2m) or None
+        Stroboscopic displacement and velocity of each of m joints; None for a machine with one.
+    histories : (n_cycles, samples_per_cycle, 3m) or None
+        ``history`` of each of m joints.
     """
 
     machine: Machine
@@ -72,6 +85,10 @@ class CycleRecord:
     peak_phase: Array | None = None
     peak_vector: Array | None = None
     sensor_peak: Array | None = None
+    joint: int = 0
+    chosen: str | None = None
+    motions: Array | None = None
+    histories: Array | None = None
 
     def __len__(self) -> int:
         return len(self.section)
@@ -84,6 +101,46 @@ class CycleRecord:
         cycles, samples, _ = self.history.shape
         instants: Array = np.arange(cycles * samples) * (self.machine.cycle_period / samples)
         return instants
+
+    @property
+    def surface(self) -> int:
+        """Column of the surface that is shown: the one of ``joint`` with the largest force; 0 with one joint."""
+        if self.motions is None or not len(self):
+            return 0
+        return 2 * self.joint + int(np.argmax(self.peak_force[:, 2 * self.joint : 2 * self.joint + 2].max(axis=0)))
+
+    @property
+    def peaks(self) -> Array:
+        """Peak force [N] of each cycle on the ``surface`` that is shown, (n_cycles,)."""
+        return np.asarray(self.peak_force[:, self.surface])
+
+    def of_joint(self, name: str | None = None) -> "CycleRecord":
+        """Return the record with displacement, velocity and history of a joint.
+
+        Without a name it is the joint that the machine monitors or, where that is left open, the one with the largest
+        force of the record.
+
+        Raises
+        ------
+        ParameterError
+            If the machine has no joint of that name.
+        """
+        names = self.machine.joints
+        if name is not None and name not in names:
+            raise ParameterError(f"there is no joint {name!r}{suggestion(name, names)}")
+        if self.motions is None:
+            return self
+        chosen, name = name, name or getattr(self.machine, "monitored", None)
+        largest = int(np.argmax(self.peak_force.max(axis=0))) // 2 if len(self) else 0
+        j = names.index(name) if name in names else largest
+        return replace(
+            self,
+            joint=j,
+            chosen=chosen,
+            displacement=self.motions[:, 2 * j],
+            velocity=self.motions[:, 2 * j + 1],
+            history=None if self.histories is None else self.histories[:, :, 3 * j : 3 * j + 3],
+        )
 
     def after(self, cycles: int) -> "CycleRecord":
         """Return the record without its first cycles."""
@@ -99,7 +156,9 @@ class CycleRecord:
 
     def _with_rows(self, rows: Callable[[str], Any]) -> "CycleRecord":
         changes: dict[str, Any] = {name: rows(name) for name in _PER_CYCLE if getattr(self, name) is not None}
-        return replace(self, **changes)
+        return replace(self, **changes).of_joint(self.chosen)
 
 
-_PER_CYCLE = tuple(field.name for field in fields(CycleRecord) if field.name not in ("machine", "final_state"))
+_PER_CYCLE = tuple(
+    field.name for field in fields(CycleRecord) if field.name not in ("machine", "final_state", "joint", "chosen")
+)

@@ -61,7 +61,7 @@ def _run(
         history=arrays.history if samples else None,
         **machine.further_results(arrays),
     )
-    return outcome, done, record
+    return outcome, done, record.of_joint()
 
 
 def _in_slices(
@@ -90,7 +90,7 @@ def _in_slices(
 
 def rest_state(machine: Machine) -> MotionState:
     """Return the state of rest in the middle of the gap."""
-    return MotionState(np.zeros(machine.n_states), np.zeros(3))
+    return MotionState(np.zeros(machine.n_states), np.zeros(3 * max(1, len(machine.joints))))
 
 
 def _initial(machine: Machine, given: MotionState | ArrayLike | None) -> MotionState:

@@ -13,8 +13,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.machine import Work
+from chaosgym.machines.machine import Machine, Work
 from chaosgym.machines.modal_machine.drive import KINDS, Drive
+from chaosgym.machines.modal_machine.jointed import Joint, machine_with_joints
 from chaosgym.machines.modal_machine.keys import REQUIRED, TABLES, checked_table, schema
 from chaosgym.machines.modal_machine.machine import ModalMachine
 from chaosgym.machines.modal_machine.structure import BASE, Structure
@@ -27,10 +28,10 @@ FIELDS = {"stiffness": "contact_stiffness", "damping": "contact_damping"}
 MOST_SAMPLED = 16
 """Harmonics of a sampled cycle by default, at most."""
 
-_classes: dict[str, type[ModalMachine]] = {}
+_classes: dict[str, type[Machine]] = {}
 
 
-def machine_class(path: str | Path) -> type[ModalMachine]:
+def machine_class(path: str | Path) -> type[Machine]:
     """Class of the machines that a file describes; calling it without arguments gives the one that is stated.
 
     Raises
@@ -59,7 +60,7 @@ def machine_class(path: str | Path) -> type[ModalMachine]:
         raise ParameterError(f"{path}: {error}") from None
 
 
-def read_machine(path: str | Path) -> ModalMachine:
+def read_machine(path: str | Path) -> Machine:
     """Machine that a file describes, at the speed and clearance that it states.
 
     Raises
@@ -68,7 +69,7 @@ def read_machine(path: str | Path) -> ModalMachine:
         As ``machine_class``.
     """
     kind: Any = machine_class(path)
-    machine: ModalMachine = kind()
+    machine: Machine = kind()
     return machine
 
 
@@ -97,13 +98,27 @@ def _tables(values: Mapping[str, Any]) -> dict[str, Any]:
             raise ParameterError(f"[[{name}]] is missing" if name == "drive" else f"[{name}] is missing")
     for path in TABLES:
         outer, _, inner = path.rpartition(".")
+        if outer == "joint":
+            continue
         given = values.get(outer, {}).get(inner, {}) if outer else values.get(path, {}) if path else values
         if path == "drive":
             rows = given if isinstance(given, list) else [given]
             data[path] = [checked_table(path, row) for row in rows]
         else:
-            data[path] = checked_table(path, given)
+            data[path] = checked_table(path, given) if path != "joint" else _joints(given)
     return data
+
+
+def _joints(given: Any) -> list[dict[str, Any]]:
+    """Values of each [joint] or [[joint]], those of its lower stop as "lower"."""
+    rows = given if isinstance(given, list) else [given]
+    if not rows:
+        raise ParameterError("[[joint]] is missing")
+    found = []
+    for row in rows:
+        values = checked_table("joint", row)
+        found.append({**values, "lower": checked_table("joint.lower", row.get("lower", {}))})
+    return found
 
 
 def _needed(table: str, values: Mapping[str, Any], *names: str) -> list[Any]:
@@ -113,45 +128,92 @@ def _needed(table: str, values: Mapping[str, Any], *names: str) -> list[Any]:
     return [values[name] for name in names]
 
 
-def _built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type[ModalMachine]:
+def _built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type[Machine]:
     """Make the class: its fields have the file's values as defaults, and one more names the file's content."""
     structure = structure_of(data, folder)
-    joint: dict[str, Any] = data["joint"]
     operation: dict[str, Any] = data["operation"]
-    at, clearance, stiffness, damping = _needed("joint", joint, "at", "clearance", "stiffness", "damping")
     speed, *ranges = _needed("operation", operation, "speed", "speed_range", "clearance_range")
-    stated = {"speed": speed} | {FIELDS.get(name, name): value for name, value in joint.items() if name != "at"}
-    for name, upper in (("stiffness", stiffness), ("damping", damping)):
-        lower = data["joint.lower"].get(name, upper)
-        if lower != upper:
-            if not upper > 0.0:
-                raise ParameterError(f"joint.lower.{name} needs joint.{name} above 0")
-            stated[f"lower_{name}_factor"] = lower / upper
-    if not clearance >= 0.0:
-        raise ParameterError(f"joint.clearance = {clearance:g} m is a gap of negative width; allowed: 0 or more")
-    drives = tuple(_drive(row) for row in data["drive"])
-    fields: dict[str, Any] = {
-        "modes": structure,
-        "joint": at,
-        "drives": drives,
-        "definition": parameter(digest, choices=(digest,), provenance="stated", source=path),
-    }
-    known = parameters_of(ModalMachine)
-    for field, value in stated.items():
-        about = {**vars(known[field]), "provenance": "stated", "source": path}
-        fields[field] = parameter(check_parameter(ModalMachine, field, value), **about)
     usual = dict(zip(("speed", "clearance"), map(_range, ("speed_range", "clearance_range"), ranges), strict=True))
-    types: dict[str, Any] = {"name": path, "usual_ranges": usual}
-    annotations: dict[str, Any] = dict.fromkeys(fields, Any) | dict.fromkeys(types, ClassVar[Any])
-    described = {"__module__": __name__, "__doc__": data[""].get("title", path), "__annotations__": annotations}
-    namespace = {**described, "__reduce__": _reduced}
-    made: Any = dataclass(frozen=True, kw_only=True)(
-        type("ModalMachine", (ModalMachine,), {**namespace, **fields, **types})
-    )
+    definition = parameter(digest, choices=(digest,), provenance="stated", source=path)
+    drives, title = tuple(_drive(row) for row in data["drive"]), data[""].get("title", path)
+    types: dict[str, Any] = {"name": path, "__doc__": title, "__reduce__": _reduced}
+    made: Any
+    if len(data["joint"]) > 1:
+        about = {"provenance": "stated", "source": path}
+        watched = {"monitored": operation["monitored"]} if "monitored" in operation else {}
+        made = machine_with_joints(
+            structure,
+            _several_joints(data["joint"]),
+            drives,
+            about=about,
+            usual_ranges=usual,
+            namespace=types,
+            definition=definition,
+            speed=speed,
+            **watched,
+        )
+    else:
+        if "monitored" in operation:
+            raise ParameterError("operation.monitored needs several [[joint]]; allowed with one: leave it out")
+        made = _with_one_joint(structure, data["joint"][0], drives, speed, usual, types, definition, path)
     made.tolerances = _tolerances(data["tolerances"], made())
     made.work = Work(task=data["job"])
-    kind: type[ModalMachine] = made
+    kind: type[Machine] = made
     return kind
+
+
+def _stated_of(joint: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """What a file states of a joint, with factors of the lower stop."""
+    _, clearance, *upper = _needed(name, joint, "at", "clearance", "stiffness", "damping")
+    stated = {key: value for key, value in joint.items() if key not in ("lower", "name")}
+    for key, above in zip(("stiffness", "damping"), upper, strict=True):
+        lower = joint["lower"].get(key, above)
+        if lower != above:
+            if not above > 0.0:
+                raise ParameterError(f"{name}.lower.{key} needs {name}.{key} above 0")
+            stated[f"lower_{key}_factor"] = lower / above
+    if not clearance >= 0.0:
+        raise ParameterError(f"{name}.clearance = {clearance:g} m is a gap of negative width; allowed: 0 or more")
+    return stated
+
+
+def _several_joints(tables: list[dict[str, Any]]) -> dict[str, Joint]:
+    """Joints by their names: the stated ones, or joint_1, joint_2 ..."""
+    joints: dict[str, Joint] = {}
+    for number, table in enumerate(tables, 1):
+        name = table.get("name", f"joint_{number}")
+        if name in joints:
+            raise ParameterError(f"two [[joint]] have the name {name!r}; allowed: a name of its own for each")
+        joints[name] = Joint(**_stated_of(table, name if "name" in table else "joint"))
+    return joints
+
+
+def _with_one_joint(
+    structure: Structure,
+    joint: Mapping[str, Any],
+    drives: tuple[Drive, ...],
+    speed: float,
+    usual: Mapping[str, Any],
+    types: Mapping[str, Any],
+    definition: Any,
+    path: str,
+) -> Any:
+    stated = _stated_of(joint, "joint")
+    fields: dict[str, Any] = {
+        "modes": structure,
+        "joint": stated.pop("at"),
+        "drives": drives,
+        "definition": definition,
+    }
+    known = parameters_of(ModalMachine)
+    for field, value in {"speed": speed, **{FIELDS.get(name, name): value for name, value in stated.items()}}.items():
+        about = {**vars(known[field]), "provenance": "stated", "source": path}
+        fields[field] = parameter(check_parameter(ModalMachine, field, value), **about)
+    types = {**types, "usual_ranges": usual}
+    annotations: dict[str, Any] = dict.fromkeys(fields, Any)
+    annotations |= {name: ClassVar[Any] for name in types if not name.startswith("__")}
+    namespace = {"__module__": __name__, "__annotations__": annotations, **fields, **types}
+    return dataclass(frozen=True, kw_only=True)(type("ModalMachine", (ModalMachine,), namespace))
 
 
 def _reduced(machine: Any) -> Any:
@@ -159,11 +221,11 @@ def _reduced(machine: Any) -> Any:
     return _restored, (machine.name, {each.name: getattr(machine, each.name) for each in fields(machine)})
 
 
-def _restored(path: str, values: Mapping[str, Any]) -> ModalMachine:
+def _restored(path: str, values: Mapping[str, Any]) -> Machine:
     kind: Any = machine_class(path)
     if kind.definition != values["definition"]:
         raise ParameterError(f"{path} has changed: it is not the machine that was kept")
-    machine: ModalMachine = kind(**values)
+    machine: Machine = kind(**values)
     return machine
 
 
@@ -173,11 +235,12 @@ def _range(name: str, values: Any) -> tuple[float, float]:
     return float(values[0]), float(values[1])
 
 
-def _tolerances(given: Mapping[str, Any], machine: ModalMachine) -> dict[str, tuple[float, bool]]:
+def _tolerances(given: Mapping[str, Any], machine: Machine) -> dict[str, tuple[float, bool]]:
     """Half widths by field, and whether they are shares of the value."""
     known = {name: about for name, about in parameters_of(machine).items() if not about.choices}
     found = {}
-    for name, text in given.items():
+    for key, text in _flat(given).items():
+        name = key if key in known else key.replace(".", "_")
         if name not in known:
             raise ParameterError(f"[tolerances] has no key {name!r}{suggestion(name, known)}")
         relative = isinstance(text, str) and text.strip().endswith("%")
@@ -186,6 +249,15 @@ def _tolerances(given: Mapping[str, Any], machine: ModalMachine) -> dict[str, tu
             raise ParameterError(f"tolerances.{name} = {text!r} is out of range; allowed: above 0, no share of 0")
         found[name] = (value, relative)
     return found
+
+
+def _flat(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Entries of a table with those of tables in it, such as left.clearance, by their dotted keys."""
+    flat: dict[str, Any] = {}
+    for key, value in given.items():
+        inner = _flat(value) if isinstance(value, dict) else {"": value}
+        flat |= {f"{key}.{name}" if name else key: each for name, each in inner.items()}
+    return flat
 
 
 def _drive(row: Mapping[str, Any]) -> Drive:
@@ -256,7 +328,7 @@ def _of_matrices(table: Mapping[str, Any], data: Mapping[str, Any], folder: Path
             if name not in points:
                 raise ParameterError(f"structure.base names no degree of freedom {name!r}{suggestion(name, points)}")
             base[points[name]] = 1.0
-    joint = str(data["joint"].get("at", "")).lstrip("-+ ")
+    joints = [str(joint.get("at", "")).lstrip("-+ ") for joint in data["joint"]]
     (modes,) = _needed("structure", table, "modes")
     return Structure.of_matrices(
         matrices["M"],
@@ -265,7 +337,7 @@ def _of_matrices(table: Mapping[str, Any], data: Mapping[str, Any], folder: Path
         points,
         modes=modes,
         base=base,
-        residual_at=joint if table.get("residual_mode", True) and joint in points else None,
+        residual_at=[name for name in joints if table.get("residual_mode", True) and name in points],
         scale=1e3 if table.get("units") == "t mm N" else 1.0,
     )
 

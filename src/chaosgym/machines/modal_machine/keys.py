@@ -57,6 +57,7 @@ TABLES: Mapping[str, Mapping[str, Key]] = {
         "frequency": Key("of the one mode that stands for them; twice the highest by default", "Hz"),
     },
     "joint": {
+        "name": Key("of one of several joints: its fields begin with it, as in left_clearance", kind=TEXT),
         "at": Key("point that moves in the gap, '-tip', or 'pinion - wheel'", kind=TEXT),
         "clearance": Key("half the gap; with one stop its distance", "m"),
         "offset": Key("middle of the gap, from where the joint rests unloaded", "m"),
@@ -82,12 +83,14 @@ TABLES: Mapping[str, Mapping[str, Key]] = {
     "operation": {
         "speed": Key("operating cycles a second", "Hz"),
         "speed_range": Key("lowest and highest", "Hz", "row"),
-        "clearance_range": Key("lowest and highest", "m", "row"),
+        "clearance_range": Key("lowest and highest, of the monitored or the first joint", "m", "row"),
+        "monitored": Key("joint that is shown and judged; if open, the one with the largest force", kind=TEXT),
     },
     "tolerances": {"*": Key("half width of a field of the machine, with its unit or as a share in %")},
     "job": {"*": Key("number of the environments' task, as a keyword of gymnasium.make")},
 }
-"""Tables of the file by their path; "*" is a name that the user chooses. ``drive`` is a list of tables."""
+"""Tables of the file by their path; "*" is a name that the user chooses. ``drive`` is a list of tables, and ``joint``
+may be."""
 
 REQUIRED = ("structure", "joint", "drive", "operation")
 
@@ -155,7 +158,8 @@ def _table_schema(path: str) -> dict[str, Any]:
             properties[name] = _key_schema(path, key)
     for inner in _inner(path):
         table = _table_schema(f"{prefix}{inner}")
-        properties[inner] = {"type": "array", "items": table} if inner == "drive" else table
+        several = {"type": "array", "items": table}
+        properties[inner] = several if inner == "drive" else {"anyOf": [table, several]} if inner == "joint" else table
     return {"type": "object", "properties": properties, "additionalProperties": False if free is None else free}
 
 

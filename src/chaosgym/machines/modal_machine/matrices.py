@@ -1,6 +1,7 @@
 """Matrices of a finite element model: what is wrong with them, their slowest modes, and a static deflection."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -98,22 +99,39 @@ def _slowest_dense(mass: Array, stiffness: Array, count: int) -> tuple[Array, Ar
     return squares, vectors
 
 
-def with_deflection(mass: Any, stiffness: Any, rates: Array, vectors: Array, row: int) -> tuple[Array, Array]:
-    """Modes with one more: the static deflection by a force at a degree of freedom, less what the modes deflect."""
+NOTHING_LEFT = 1e-10
+"""Share of a deflection that is rounding once the modes are taken off."""
+
+
+def with_deflections(
+    mass: Any, stiffness: Any, rates: Array, vectors: Array, rows: Sequence[int]
+) -> tuple[Array, Array]:
+    """Modes with more: the static deflection by a force at each of some degrees of freedom, less what modes deflect."""
+    from scipy.linalg import eigh
     from scipy.sparse import csc_matrix
     from scipy.sparse.linalg import splu
 
-    load = np.zeros(len(vectors))
-    load[row] = 1.0
     held = csc_matrix(stiffness)
     if rates[0] == 0.0:
         held = held + SHIFT * csc_matrix(mass)
-    deflection = splu(held).solve(load)
-    for _ in range(2):
-        deflection = deflection - vectors @ (vectors.T @ (mass @ deflection))
-    size = math.sqrt(deflection @ (mass @ deflection))
-    if not size > 0.0:
+    factors, kept, added = splu(held), vectors, []
+    for row in rows:
+        load = np.zeros(len(vectors))
+        load[row] = 1.0
+        deflection = factors.solve(load)
+        whole = math.sqrt(deflection @ (mass @ deflection))
+        for _ in range(2):
+            deflection = deflection - kept @ (kept.T @ (mass @ deflection))
+        size = math.sqrt(deflection @ (mass @ deflection))
+        if not size > NOTHING_LEFT * whole:
+            continue
+        added.append(deflection / size)
+        kept = np.column_stack([kept, added[-1]])
+    if not added:
         return rates, vectors
-    shape = deflection / size
-    rate = math.sqrt(shape @ (stiffness @ shape))
-    return np.append(rates, rate), np.column_stack([vectors, shape])
+    shapes = np.column_stack(added)
+    if len(added) > 1:
+        _, turned = eigh(shapes.T @ (stiffness @ shapes))
+        shapes = shapes @ turned
+    more = [math.sqrt(shape @ (stiffness @ shape)) for shape in shapes.T]
+    return np.append(rates, more), np.column_stack([vectors, shapes])

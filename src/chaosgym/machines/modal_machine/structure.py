@@ -9,7 +9,7 @@ freedom when the base moves by one: "base" is a point whose shape is phi' M r.
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.modal_machine.matrices import slowest_modes, symmetric, with_deflection
+from chaosgym.machines.modal_machine.matrices import slowest_modes, symmetric, with_deflections
 from chaosgym.machines.parameters import suggestion
 
 Array = NDArray[np.float64]
@@ -107,7 +107,7 @@ class Structure:
         *,
         modes: int,
         base: ArrayLike | None = None,
-        residual_at: str | None = None,
+        residual_at: str | Sequence[str] | None = None,
         scale: float = 1.0,
     ) -> "Structure":
         """Structure of a finite element model.
@@ -125,7 +125,8 @@ class Structure:
         base : (N,)
             Displacement of every degree of freedom when the base moves by one.
         residual_at
-            Point, such as the joint, whose static deflection by all other modes is kept too, as one more mode.
+            Point or points, such as the joints, whose static deflection by all other modes is kept too, as one more
+            mode each.
         scale
             What the unit of mass is in kg, for models whose lengths are not metres but whose unit of force is N.
 
@@ -156,10 +157,10 @@ class Structure:
         if not 1 <= modes <= size:
             raise ParameterError(f"modes = {modes} is out of range; allowed: 1 to {size}")
         rates, vectors = slowest_modes(matrices["mass"], matrices["stiffness"], modes)
-        if residual_at is not None and modes < size:
-            rates, vectors = with_deflection(
-                matrices["mass"], matrices["stiffness"], rates, vectors, points[residual_at]
-            )
+        residual = [residual_at] if isinstance(residual_at, str) else list(residual_at or ())
+        if modes < size:
+            rows = [points[name] for name in residual]
+            rates, vectors = with_deflections(matrices["mass"], matrices["stiffness"], rates, vectors, rows)
         if rates[-1] > 2.0 * math.pi * HIGHEST:
             raise ParameterError(
                 f"mode {len(rates)} has {rates[-1] / (2 * math.pi):g} Hz; allowed: up to {HIGHEST:g} Hz; {CURED}, "
@@ -169,8 +170,8 @@ class Structure:
             matrix = vectors.T @ (matrices["damping"] @ vectors)
         else:
             ratios = np.asarray(damping, dtype=float)
-            if ratios.ndim == 1 and len(ratios) == len(rates) - 1 and residual_at is not None:
-                ratios = np.append(ratios, ratios[-1])
+            if ratios.ndim == 1 and len(ratios) == modes:
+                ratios = np.append(ratios, np.full(len(rates) - modes, ratios[-1]))
             matrix = _damping_matrix(ratios, rates)
         shapes = {name: vectors[row] / math.sqrt(scale) for name, row in points.items()}
         if base is not None:

@@ -7,7 +7,6 @@ from chaosgym.core.compilation import cached_by_content
 with cached_by_content(Path(__file__).parent):
     from chaosgym.machines.slider_crank.kernels import (  # noqa: F401
         batch,
-        contact,
         exact,
         fixed_step,
         look,

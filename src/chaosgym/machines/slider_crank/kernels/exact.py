@@ -24,10 +24,10 @@ from numba import njit
 
 from chaosgym.core import status
 from chaosgym.core.cycle import LOWER, UPPER, note_touch
+from chaosgym.core.events import CROSSES, KEEPS, closing, crossing, opening, settled
 from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import LANES, add_columns
 from chaosgym.core.tangent import orthonormalise
-from chaosgym.machines.slider_crank.kernels.contact import CROSSES, KEEPS, closing, crossing, opening, settled
 from chaosgym.machines.slider_crank.kernels.look import (
     force_at,
     joint_force,

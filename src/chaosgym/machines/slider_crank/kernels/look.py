@@ -7,9 +7,9 @@ Between two ends a reading lies within 4/27 of the interval times the slopes tha
 import math
 
 from chaosgym.core.cycle import LOWER, UPPER
+from chaosgym.core.events import VALUE_DOUBT, trend
 from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import LANES, add_tops, first_above, first_doubt
-from chaosgym.machines.slider_crank.kernels.contact import VALUE_DOUBT, trend
 from chaosgym.machines.slider_crank.kernels.motion import (
     ALONG,
     GAP,

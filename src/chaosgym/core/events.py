@@ -1,4 +1,4 @@
-r"""Contacts of the slider crank: when they begin and end.
+r"""Contacts of surfaces along one row of displacement: when they begin and end.
 
 A channel has displacement y and velocity v. On side s = +-1 its depth is s y - c beyond the clearance c, and it presses
 with k times the pressure s (y + lag v) - c, lag = d / k. A closed channel opens when its pressure falls to zero, an

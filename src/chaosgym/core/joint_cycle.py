@@ -1,0 +1,291 @@
+r"""Exact motion of a few modes whose joints, any number, rattle between two surfaces each.
+
+Between contact events the machine is linear (``joint_tables``). A surface presses with N = k p + d p', p the
+penetration, while p and N are positive; beyond a surface that would pull, a joint is open like one in its gap. Sets of
+pressed surfaces have tables of their own. They are made outside, when a set is first visited: ``advance`` then stops
+before the cycle with NEEDS_SET and tells which.
+
+From one event to the next the motion goes on by eight intervals, as long as proofs allow (``joint_events``); where they
+fail intervals become shorter, and in the shortest one the first change of contact is found on Taylor series. Recording
+only reads: a time history does not change the motion by a bit.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from chaosgym.core import status
+from chaosgym.core.cycle import LOWER, UPPER
+from chaosgym.core.joint_events import (
+    choose_level,
+    first_change,
+    note_crests,
+    note_now,
+    note_peaks,
+    place_of,
+    quiet_intervals,
+    read_series,
+)
+from chaosgym.core.joint_run import (
+    JOINT,
+    NUMBERS,
+    RATES,
+    SIDE,
+    SPARE,
+    STATE,
+    U,
+    bound_fourth,
+    enter,
+    expand,
+    find_sides,
+    joint_motion,
+    jump,
+    known,
+    leave,
+    look,
+    place,
+    prepare,
+    pressed_set,
+    read_after,
+    read_now,
+    travel,
+    write_samples,
+)
+from chaosgym.core.joint_tables import FROM, GENERATOR, HARMONICS, JOINTS, MODES, SHORTEST, STATES, TO, WIDTH
+from chaosgym.core.kernel import leaf, part
+from chaosgym.core.lanes import LANES, add_columns
+from chaosgym.core.tangent import MAX_CONTRACTION, orthonormalise
+
+STEPS_PER_EVENT = 1000
+"""Looks ahead that one cycle may take for each event that it may have."""
+
+MOST_LEVEL, ZOOM = 63, 3
+"""No limit of the level; levels from an interval to the eight into which it is cut."""
+
+
+@leaf
+def begin_cycle(run, state, arrays, cycle):
+    """Write the section of a cycle and clear its row."""
+    for i in range(state.shape[0]):
+        arrays.section[cycle, i] = state[i]
+    for j in range(run.at[JOINTS]):
+        arrays.tip[cycle, 2 * j], arrays.tip[cycle, 2 * j + 1] = joint_motion(run, state, j)
+    for column in range(2 * run.at[JOINTS]):
+        arrays.peak_force[cycle, column] = 0.0
+        arrays.impacts[cycle, column] = 0
+        arrays.contact_time[cycle, column] = 0.0
+        arrays.bounce_time[cycle, column] = 0.0
+
+
+@leaf
+def begin_state(run, state):
+    """Write a state at phase zero of the drive, and which surfaces press in it."""
+    own, first = run.own, run.at[STATE]
+    for i in range(state.shape[0]):
+        own[first + i] = state[i]
+    for h in range(run.at[HARMONICS]):
+        own[first + state.shape[0] + h], own[first + state.shape[0] + run.at[HARMONICS] + h] = 1.0, 0.0
+    find_sides(run, state)
+
+
+@part
+def add_contact_time(run, span, contact_time):
+    """Add a span to the time in contact (2m,) of the surfaces that press."""
+    for j in range(run.at[JOINTS]):
+        side = known(run, j, SIDE)
+        if side != 0.0:
+            contact_time[2 * j + (UPPER if side > 0.0 else LOWER)] += span
+
+
+@leaf
+def note_touch(bouncing, joints, j, side, time, bounce_time):
+    """As ``cycle.note_touch`` for joint j: ``bouncing`` (3m,) are all sides, then first and last touch of each."""
+    first = joints + 2 * j
+    if bouncing[j] != side:
+        if bouncing[j] != 0.0:
+            column = 2 * j + (UPPER if bouncing[j] > 0.0 else LOWER)
+            bounce_time[column] = max(bounce_time[column], bouncing[first + 1] - bouncing[first])
+        bouncing[j] = side
+        bouncing[first] = time
+    bouncing[first + 1] = time
+
+
+@leaf
+def carry(run, row, elapsed, tangents, cycle):
+    """Advance deviations (k, 2n) by ``elapsed`` seconds in a set; see ``tangent.carry``."""
+    own, at, vectors = run.own, run.at, tangents.vectors
+    n, width, states, spare = at[MODES], at[WIDTH], 2 * at[MODES], at[SPARE]
+    several = tangents.log_growth.shape[1] > 1
+    pieces, steepest = 1, 0.0
+    if several:
+        for j in range(n):
+            first = row + at[GENERATOR] + j
+            steepest = min(steepest, run.tables[first], run.tables[first + 3 * width])
+        pieces += int(-steepest * elapsed / MAX_CONTRACTION)
+    for _ in range(pieces):
+        for k in range(vectors.shape[0]):
+            for i in range(states):
+                own[at[STATE] + i] = vectors[k, i]
+            add_columns(run.tables, row + at[TO], 2 * width, states, own, at[STATE], own, spare, LANES)
+            travel(run, row, elapsed / pieces, spare, spare)
+            add_columns(run.tables, row + at[FROM], at[STATES], 2 * width, own, spare, own, at[STATE], LANES)
+            for i in range(states):
+                vectors[k, i] = own[at[STATE] + i]
+        if several:
+            orthonormalise(run.weights, tangents, cycle)
+
+
+@leaf
+def touch(shape, damping, vectors):
+    """Saltation of deviations (k, 2n) at the touch of a surface: its damper acts at once, for each at its own time."""
+    n = shape.shape[0]
+    for k in range(vectors.shape[0]):
+        shift = 0.0
+        for i in range(n):
+            shift += shape[i] * vectors[k, i]
+        for i in range(n):
+            vectors[k, n + i] -= damping * shape[i] * shift
+
+
+@leaf
+def run_cycle(run, bouncing, arrays, cycle, event_budget, tangents):
+    """Move through one cycle: (status, set that is needed). The state is in the work space, as at the end."""
+    own, at = run.own, run.at
+    m, history, peak = at[JOINTS], arrays.history[cycle], arrays.peak_force[cycle]
+    contact_time, bounce_time = arrays.contact_time[cycle], arrays.bounce_time[cycle]
+    carries = tangents.vectors.shape[0] > 0
+    code = pressed_set(run)
+    row = run.rows[code]
+    if row < 0:
+        return status.NEEDS_SET, code
+    enter(run, row)
+    read_now(run, row)
+    note_now(run, peak)
+    for j in range(m):
+        if not math.isfinite(own[place_of(run, j)]):
+            return status.DIVERGED, code
+    events, sample, steps, most = 0, np.int64(0), STEPS_PER_EVENT * event_budget, MOST_LEVEL
+    time, carried, unfinished = 0.0, 0.0, True
+    while unfinished:
+        steps -= 1
+        if steps < 0:
+            return status.STEP_BUDGET, code
+        left = run.period - time
+        if left <= 0.0:
+            break
+        bound_fourth(run, row)
+        level, h = choose_level(run, row, most, left, peak)
+        if h < left:
+            look(run, row, level, h)
+            whole = int(min(8.0, left / h))
+            count = quiet_intervals(run, h, whole)
+            if code > 0 and count > 0:
+                count = note_peaks(run, h, count, peak)
+            if count > 0:
+                if sample < history.shape[0]:
+                    sample = write_samples(run, row, time, count * h, sample, history)
+                if code > 0:
+                    add_contact_time(run, count * h, contact_time)
+                jump(run, row, level, count, h)
+                read_after(run, count)
+                time += count * h
+            if count == whole:
+                most = MOST_LEVEL
+                continue
+            if level > 0:
+                most = max(level - ZOOM, 0)
+                continue
+            left = run.period - time
+        most = MOST_LEVEL
+        shortest = run.tables[row + SHORTEST]
+        span = min(shortest, left)
+        expand(run, row)
+        read_series(run, span)
+        changed, towards, instant = first_change(run, span, run.resolution * shortest)
+        if changed >= 0:
+            read_series(run, instant)
+        if code > 0:
+            note_crests(run, instant, peak)
+            add_contact_time(run, instant, contact_time)
+        if sample < history.shape[0]:
+            sample = write_samples(run, row, time, instant, sample, history)
+        place(run, row, instant)
+        unfinished = changed >= 0 or span < left
+        time += instant
+        if changed < 0:
+            read_after(run, 1)
+            continue
+        events += 1
+        if events > event_budget:
+            return status.EVENT_BUDGET, code
+        touches = towards * own[place_of(run, changed) + 1 + RATES] > 0.0
+        if carries:
+            carry(run, row, time - carried, tangents, cycle)
+            carried = time
+        leave(run, row)
+        own[at[JOINT] + changed * NUMBERS + SIDE] = towards
+        code = pressed_set(run)
+        row = run.rows[code]
+        if row < 0:
+            return status.NEEDS_SET, code
+        if towards != 0.0:
+            which = UPPER if towards > 0.0 else LOWER
+            arrays.impacts[cycle, 2 * changed + which] += 1
+            note_touch(bouncing, m, changed, towards, time, bounce_time)
+            if carries and touches:
+                touch(run.shape[changed], run.damping[changed, which], tangents.vectors)
+        enter(run, row)
+        read_now(run, row)
+        note_now(run, peak)
+    if sample < history.shape[0]:
+        write_samples(run, row, time, run.period, sample, history)
+    leave(run, row)
+    arrays.events[cycle] = events
+    if carries:
+        for i in range(2 * at[MODES]):
+            own[at[U] + i] = own[at[STATE] + i]
+        carry(run, row, time - carried, tangents, cycle)
+        for i in range(2 * at[MODES]):
+            own[at[STATE] + i] = own[at[U] + i]
+        if tangents.log_growth.shape[1] > 0:
+            orthonormalise(run.weights, tangents, cycle)
+    return status.OK, code
+
+
+@njit(cache=True, nogil=True)
+def advance_joints(run, state, bouncing, arrays, event_budget, tangents):
+    """Advance ``state`` (2n,) and ``bouncing`` (3m,) in place by whole cycles, one for each row of ``arrays``.
+
+    Every cycle starts at phase zero of the drive; ``tangents`` travel with the motion, and there may be none.
+
+    Returns
+    -------
+    (status, cycle, set) : the cycle is the first one not finished, before which state, bouncing and tangents are; with
+    NEEDS_SET, the number of the set of pressed surfaces whose tables it needs.
+    """
+    prepare(run)
+    bounced, vectors = bouncing.copy(), tangents.vectors.copy()
+    for cycle in range(arrays.section.shape[0]):
+        for i in range(bouncing.shape[0]):
+            bounced[i] = bouncing[i]
+        vectors[:] = tangents.vectors
+        begin_cycle(run, state, arrays, cycle)
+        for k in range(tangents.log_growth.shape[1]):
+            tangents.log_growth[cycle, k] = 0.0
+        begin_state(run, state)
+        outcome, code = run_cycle(run, bouncing, arrays, cycle, event_budget, tangents)
+        if outcome == status.OK:
+            for i in range(state.shape[0]):
+                if not math.isfinite(run.own[run.at[STATE] + i]):
+                    outcome = status.DIVERGED
+        if outcome != status.OK:
+            for i in range(bouncing.shape[0]):
+                bouncing[i] = bounced[i]
+            tangents.vectors[:] = vectors
+            return outcome, cycle, code
+        for i in range(state.shape[0]):
+            state[i] = run.own[run.at[STATE] + i]
+        for i in range(run.at[JOINTS], bouncing.shape[0]):
+            bouncing[i] -= run.period
+    return status.OK, arrays.section.shape[0], 0

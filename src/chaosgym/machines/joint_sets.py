@@ -1,0 +1,262 @@
+"""Machines of a few modes and several joints: tables of each set of pressed surfaces, made when it is first visited.
+
+sets = PressedSets(stiffness, damping, shape, springs, dampers)     # of a structure, whatever drives it
+tables = JointTables(sets, frequency, drive, static_force)          # at one speed
+outcome, done = tables.advance(stops, state, bouncing, arrays, ExactEvents())
+"""
+
+import math
+from threading import Lock
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.core import status
+from chaosgym.core.compilation import call
+from chaosgym.core.cycle import CycleArrays
+from chaosgym.core.joint_cycle import advance_joints
+from chaosgym.core.joint_run import JointRun, new_space, work_space
+from chaosgym.core.joint_tables import ROW, layout, tabulate
+from chaosgym.core.tangent import Tangents
+from chaosgym.errors import ParameterError
+from chaosgym.machines.integrators import ExactEvents
+from chaosgym.machines.modal_impact import modal_blocks, settled
+
+Array = NDArray[np.float64]
+
+MOST_SETS = 1_000_000
+"""Sets of pressed surfaces that a machine may have."""
+
+MOST_BYTES = 500_000_000
+"""Memory for the tables of a machine at one speed; when it is full they are made anew as they are visited."""
+
+MOST_LEVELS = 16
+"""Lengths of an interval."""
+
+
+class PressedSet(NamedTuple):
+    """A structure with some surfaces pressed: blocks as in ``Regimes``, and where it rests per position of each.
+
+    ``rest``, ``drift`` (m, 2n) are those of ``settled``; ``constants`` (m, m) what each joint reads then, counted from
+    its surface where it presses; ``springs``, ``dampers`` (m,) those that act.
+    """
+
+    generator: Array
+    to_modal: Array
+    from_modal: Array
+    fastest: float
+    rest: Array
+    drift: Array
+    constants: Array
+    springs: Array
+    dampers: Array
+
+
+class PressedSets:
+    """The sets of pressed surfaces of a structure, by number; each is made once.
+
+    Parameters
+    ----------
+    stiffness : (n,)
+        Squared natural angular frequencies of the structure free of contact [1/s^2]; 0 for the motion of a rigid body.
+    damping : (n, n)
+        Modal damping [1/s].
+    shape : (m, n)
+        Mass-normalised displacement of each joint [kg^-1/2].
+    springs, dampers : (m, 2)
+        Of the upper and the lower surface [N/m], [N s/m].
+    two_sided : (m,) bool
+        False for joints with an upper surface only.
+
+    Raises
+    ------
+    ParameterError
+        If there are more than ``MOST_SETS`` sets.
+    """
+
+    def __init__(
+        self, stiffness: Array, damping: Array, shape: Array, springs: Array, dampers: Array, two_sided: Array
+    ) -> None:
+        self.stiffness, self.damping, self.shape = stiffness, damping, np.ascontiguousarray(shape)
+        self.springs, self.dampers = springs, dampers
+        differs = two_sided & ((springs[:, 0] != springs[:, 1]) | (dampers[:, 0] != dampers[:, 1]))
+        self.radix = np.where(differs, 3, 2).astype(np.int64)
+        self.count = math.prod(self.radix.tolist())
+        if self.count > MOST_SETS:
+            raise ParameterError(
+                f"{len(shape)} joints have {self.count:,} sets of pressed surfaces; allowed: {MOST_SETS:,} (fewer "
+                "joints, or the same springs on both sides)"
+            )
+        self._made: dict[int, PressedSet] = {}
+
+    def digits(self, code: int) -> list[int]:
+        """Digit of each joint in the number of a set: 0 for none; 1 for the upper surface, or for either."""
+        digits = []
+        for radix in self.radix.tolist():
+            digits.append(code % radix)
+            code //= radix
+        return digits
+
+    def of(self, code: int) -> PressedSet:
+        """Return the set of a number."""
+        if code not in self._made:
+            self._made[code] = self._make(code)
+        return self._made[code]
+
+    @property
+    def fastest(self) -> float:
+        """Largest modulus [1/s] of an eigenvalue, the upper surfaces pressed."""
+        every = sum(math.prod(self.radix[:j].tolist()) for j in range(len(self.radix)))
+        return self.of(every).fastest
+
+    def _make(self, code: int) -> PressedSet:
+        m, n = self.shape.shape
+        digits = self.digits(code)
+        pressed = [j for j in range(m) if digits[j]]
+        springs, dampers = np.zeros(m), np.zeros(m)
+        for j in pressed:
+            springs[j], dampers[j] = self.springs[j, digits[j] - 1], self.dampers[j, digits[j] - 1]
+        stiffness = np.diag(self.stiffness) + (self.shape.T * springs) @ self.shape
+        damping = self.damping + (self.shape.T * dampers) @ self.shape
+        rigid = bool(np.any(self.stiffness == 0.0))
+        generator, from_modal = modal_blocks(stiffness, damping, rigid)
+        to_modal: Array = np.asarray(np.linalg.inv(from_modal), dtype=np.float64)
+        turns = generator[2] != 0.0
+        modulus = np.where(turns, np.hypot(generator[0], generator[2]), np.max(np.abs(generator[[0, 3]]), axis=0))
+        rest, drift = np.zeros((m, 2 * n)), np.zeros((m, 2 * n))
+        for j in pressed:
+            rest[j], drift[j] = settled(generator, to_modal[:, n:] @ (springs[j] * self.shape[j]))
+        constants = (self.shape @ from_modal[:n]) @ rest.T
+        if rigid:
+            constants[pressed, pressed] -= 1.0
+        elif pressed:
+            # how far a joint rests beyond its surface is small against how far the surface is away
+            some = self.shape[pressed]
+            compliance = (some / self.stiffness) @ some.T
+            constants[np.ix_(pressed, pressed)] = -np.linalg.inv(np.eye(len(pressed)) + compliance * springs[pressed])
+        return PressedSet(
+            generator, to_modal, from_modal, float(modulus.max()), rest, drift, constants, springs, dampers
+        )
+
+
+class JointTables:
+    """Tables of a structure under one drive, and runs by them; several threads may run at once.
+
+    Parameters
+    ----------
+    sets
+        Of the structure.
+    frequency
+        Of the cycle [Hz].
+    drive : (H, 2, n)
+        Modal forces that go with cosine and sine of each harmonic of the cycle.
+    static_force : (n,)
+        Constant modal force.
+    step_phase
+        Angle [rad] by which the fastest mode turns in the shortest interval.
+    """
+
+    def __init__(
+        self, sets: PressedSets, frequency: float, drive: Array, static_force: Array, step_phase: float
+    ) -> None:
+        self._sets, self._drive, self._static, self._step_phase = sets, drive, static_force, step_phase
+        self._omega, self._period = 2.0 * math.pi * frequency, 1.0 / frequency
+        m, n = sets.shape.shape
+        shortest = self._shortest(sets.fastest)
+        levels = min(max(math.ceil(math.log2(self._period / (4.0 * shortest))), 1), MOST_LEVELS)
+        self._layout = call(layout, n, len(drive), m, levels)
+        self._at = call(work_space, self._layout)
+        self._length = int(self._layout[ROW])
+        self._most = max(1, MOST_BYTES // (8 * self._length))
+        self._lock = Lock()
+        self._forget()
+        stiffness = sets.stiffness
+        self._weights = np.where(stiffness != 0.0, stiffness, self._omega**2)
+
+    def _forget(self) -> None:
+        self._tables = np.empty(0)
+        self._rows = np.full(self._sets.count, -1, np.int64)
+        self._kept = 0
+
+    def _shortest(self, fastest: float) -> float:
+        return self._step_phase / max(fastest, len(self._drive) * self._omega)
+
+    def _make(self, code: int) -> None:
+        """Make the tables of a set; arrays in which a run may still be are left as they are."""
+        found = self._sets.of(code)
+        n = len(self._static)
+        rest, drift = settled(found.generator, found.to_modal[:, n:] @ self._static)
+        under_load = (self._sets.shape @ found.from_modal[:n]) @ rest
+        lag = np.divide(found.dampers, found.springs, out=np.zeros(len(found.springs)), where=found.springs > 0.0)
+        row = call(
+            tabulate,
+            self._at[: len(self._layout)],
+            found.generator,
+            found.to_modal,
+            found.from_modal,
+            self._sets.shape,
+            lag,
+            self._shortest(found.fastest),
+            self._omega,
+            self._drive,
+            np.vstack([rest, found.rest]),
+            np.vstack([drift, found.drift]),
+            np.column_stack([under_load, found.constants]),
+        )
+        with self._lock:
+            if self._rows[code] >= 0:
+                return
+            if self._kept == self._most:
+                self._forget()
+            begin = self._kept * self._length
+            if begin == len(self._tables):
+                room = min(max(2 * self._kept, 8), self._most)
+                self._tables = np.concatenate([self._tables, np.empty(room * self._length - begin)])
+            self._tables[begin : begin + self._length] = row
+            rows = self._rows.copy()
+            rows[code] = begin
+            self._rows = rows
+            self._kept += 1
+
+    def _run(self, stops: Array, event_tolerance: float) -> JointRun:
+        with self._lock:
+            tables, rows = self._tables, self._rows
+        return JointRun(
+            tables=tables,
+            rows=rows,
+            radix=self._sets.radix,
+            shape=self._sets.shape,
+            stops=stops,
+            stiffness=self._sets.springs,
+            damping=self._sets.dampers,
+            weights=self._weights,
+            own=call(new_space, self._at),
+            at=self._at,
+            period=self._period,
+            resolution=event_tolerance / self._step_phase,
+        )
+
+    def advance(
+        self,
+        stops: Array,
+        state: Array,
+        bouncing: Array,
+        arrays: CycleArrays,
+        integrator: ExactEvents,
+        tangents: Tangents,
+    ) -> tuple[int, int]:
+        """Run as many cycles as ``arrays`` has rows; see ``Machine.run``. ``stops`` (m, 2) are positions [m]."""
+        done, cycles, made = 0, len(arrays.section), 0
+        while True:
+            part = CycleArrays(*(values[done:] for values in arrays))
+            along = tangents._replace(log_growth=tangents.log_growth[done:])
+            run = self._run(stops, integrator.event_tolerance)
+            outcome, finished, code = call(advance_joints, run, state, bouncing, part, integrator.event_budget, along)
+            done += finished
+            if outcome != status.NEEDS_SET:
+                return outcome, min(done, cycles)
+            made = 1 if finished else made + 1
+            if made > self._most:
+                return outcome, done
+            self._make(code)

@@ -1,0 +1,378 @@
+"""Your own machine with several joints: the modes of a structure, any number of joints, and a periodic drive.
+
+kind = machine_with_joints(
+    Structure.of_modes([9.0, 61.0], 0.01, {"middle": [2.1, -1.9], "end": [1.2, 0.8]}),
+    {"left": Joint("middle", 1e-4, 1e6, 20.0), "right": Joint("end", 2e-4, 1e6, 20.0)},
+    (Drive.sine("force", "end", 8.9),),
+)
+machine = kind(speed=19.0, left_clearance=2e-4)
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, ClassVar, NamedTuple, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.core.cycle import CycleArrays, cycle_arrays
+from chaosgym.core.tangent import Tangents, no_tangents
+from chaosgym.errors import ParameterError
+from chaosgym.machines.integrators import ExactEvents, Integrator
+from chaosgym.machines.joint_sets import JointTables, PressedSets
+from chaosgym.machines.machine import Machine, Number, Option, refuse_fixed_steps
+from chaosgym.machines.modal_machine.drive import Drive, checked, modal_drive
+from chaosgym.machines.modal_machine.machine import ModalMachine
+from chaosgym.machines.modal_machine.structure import Structure
+from chaosgym.machines.parameters import parameter, parameters_of
+
+Array = NDArray[np.float64]
+
+LARGEST = "largest"
+"""Word for the joint with the largest force."""
+
+FIELDS = {
+    "clearance": "clearance",
+    "offset": "offset",
+    "stops": "stops",
+    "stiffness": "contact_stiffness",
+    "damping": "contact_damping",
+    "lower_stiffness_factor": "lower_stiffness_factor",
+    "lower_damping_factor": "lower_damping_factor",
+    "preload": "preload",
+}
+"""What is known of a joint, and the field of ``ModalMachine`` that is the same of its only joint."""
+
+
+class Joint(NamedTuple):
+    """A joint of a structure; see the fields of ``ModalMachine``.
+
+    ``at`` is the point that moves in the gap, such as "tip", "-tip" or "pinion - wheel"; ``clearance`` [m] half the
+    gap; ``stiffness`` [N/m] and ``damping`` [N s/m] of the upper stop, and factors of the lower one's; ``offset`` [m]
+    of the middle of the gap; ``stops`` "two" or "one"; ``preload`` [N] towards the upper stop.
+    """
+
+    at: str
+    clearance: float
+    stiffness: float
+    damping: float
+    offset: float = 0.0
+    stops: str = "two"
+    lower_stiffness_factor: float = 1.0
+    lower_damping_factor: float = 1.0
+    preload: float = 0.0
+
+
+def _as_there(name: str) -> Any:
+    """Field of the same name and default as that of ``ModalMachine``."""
+    return parameter(getattr(ModalMachine, name), **vars(parameters_of(ModalMachine)[name]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointedMachine(Machine):
+    """A structure of a few modes with several joints and a periodic drive; made by ``machine_with_joints``.
+
+    What is known of a joint is a field each: ``left_clearance`` of the joint "left", and so on.
+
+    Attributes
+    ----------
+    modes
+        Of the structure between the stops.
+    drives
+        What drives it, by harmonics of the speed.
+
+    Raises
+    ------
+    ParameterError
+        On construction, if a field is outside its range or a point does not exist; names it and what is allowed.
+    """
+
+    name: ClassVar[str] = "jointed-machine"
+    speed_field: ClassVar[str] = "speed"
+    options: ClassVar[Mapping[str, Option]] = {"--speed-hz": Number("speed", "Hz")}
+    places: ClassVar[Mapping[str, str]] = {}
+    """Point that moves in the gap of each joint, by the joint's name."""
+
+    modes: Structure
+    drives: tuple[Drive, ...] = field(default=())
+    speed: float = _as_there("speed")
+    """Operating cycles a second [Hz]."""
+    drive_level: float = _as_there("drive_level")
+    """Factor of all harmonics of the drive."""
+    damping_factor: float = _as_there("damping_factor")
+    """Factor of the structure's damping."""
+    frequency_factor: float = _as_there("frequency_factor")
+    """Factor of all natural frequencies."""
+    monitored: str = parameter(LARGEST, choices=(LARGEST,), provenance="assumed", source="default")
+    """Joint whose motion is shown and whose force is judged; "largest": the one with the largest force of a run."""
+
+    def __post_init__(self, fidelity: str | None) -> None:
+        super().__post_init__(fidelity)
+        modal_drive(self.modes, map(checked, self.drives))
+        for name, row in zip(self.joints, self.joint_shapes, strict=True):
+            if not row.any():
+                raise ParameterError(f"{name}.at = {self.places[name]!r} never moves: every shape is 0 there")
+        _refuse_same_place(self.joints, self.places, self.joint_shapes)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        return tuple(self.places)
+
+    @property
+    def sides(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Names of all surfaces, the upper and the lower one of each joint."""
+        return tuple(f"{name} {side}" for name in self.joints for side in ("upper", "lower"))
+
+    @property
+    def clearance_field(self) -> str:
+        """Field of the clearance of the monitored joint, or of the first one."""
+        return f"{self.joints[0] if self.monitored == LARGEST else self.monitored}_clearance"
+
+    @staticmethod
+    def period_at(speed: Any) -> Any:
+        """Duration of one operating cycle [s] at a speed [Hz], or at many."""
+        return 1.0 / speed
+
+    def of_joints(self, what: str) -> Array:
+        """Values of a field of all joints, such as "clearance", (m,)."""
+        return np.array([getattr(self, f"{name}_{what}") for name in self.joints])
+
+    @property
+    def joint_shapes(self) -> Array:
+        """Mass-normalised displacement of each joint per modal coordinate, (m, n) [kg^-1/2]."""
+        return np.array([self.modes.shape(self.places[name]) for name in self.joints])
+
+    @property
+    def stops(self) -> Array:
+        """Positions of the upper and the lower stop of each joint [m], infinite where there is none, (m, 2)."""
+        gap, middle = self.of_joints("clearance"), self.of_joints("offset")
+        lower = np.where(self.of_joints("stops") == "two", middle - gap, -math.inf)
+        return np.stack([middle + gap, lower], axis=1)
+
+    def room_of(self, joint: int) -> tuple[float, float]:
+        """Displacement [m] of a joint at its lower and its upper stop, infinite where there is none."""
+        upper, lower = self.stops[joint].tolist()
+        return lower, upper
+
+    @property
+    def room(self) -> tuple[float, float]:
+        """That of the joint behind ``clearance_field``."""
+        return self.room_of(self.joints.index(self.clearance_field.removesuffix("_clearance")))
+
+    @property
+    def sets(self) -> PressedSets:
+        """The structure with each set of pressed surfaces; machines that differ in what drives them share them."""
+        springs, dampers = self.of_joints("stiffness"), self.of_joints("damping")
+        lower = self.of_joints("lower_stiffness_factor"), self.of_joints("lower_damping_factor")
+        key = (self.frequency_factor, self.damping_factor, tuple(springs), tuple(dampers), *map(tuple, lower))
+        return _sets(self.modes, tuple(self.places.values()), tuple(self.of_joints("stops") == "two"), *key)
+
+    def reduce(self) -> PressedSets:
+        """Return what the kernels integrate between contact events."""
+        return self.sets
+
+    @property
+    def natural_frequencies(self) -> Array:
+        """Natural frequencies [Hz] between the surfaces, (n_modes,)."""
+        return np.asarray(self.frequency_factor * self.modes.angular_frequency / (2.0 * math.pi))
+
+    @property
+    def n_states(self) -> int:
+        """Displacement and velocity of every mode."""
+        return 2 * len(self.modes.angular_frequency)
+
+    @property
+    def fastest_rate(self) -> float:
+        """Largest modulus [1/s] of an eigenvalue, all contacts closed."""
+        return self.sets.fastest
+
+    @property
+    def carries_deviations(self) -> bool:
+        """Always: deviations cross every contact exactly."""
+        return True
+
+    @property
+    def runs_fixed_steps(self) -> bool:
+        """Never: a machine with several joints is run exactly."""
+        return False
+
+    def state_weights(self, state: Array) -> Array:
+        """Weights (n_states,) by which the squared norm of a deviation is its energy."""
+        rates = self.frequency_factor * self.modes.angular_frequency
+        return np.concatenate([rates, np.ones(len(rates))])
+
+    def contraction(self, contact_time: Array, impacts: float) -> float:
+        """Sum of all Lyapunov exponents of a cycle with so much contact on each surface [s], (2m,).
+
+        It is -tr(D) T - sum of d |phi|^2 t_contact: damping of the structure, and of each contact while it lasts.
+        """
+        sets = self.sets
+        structure = -float(np.trace(sets.damping)) * self.cycle_period
+        return structure - float((sets.dampers * np.sum(sets.shape**2, axis=1)[:, None]).ravel() @ contact_time)
+
+    def _drive(self) -> tuple[Array, Array]:
+        """Modal forces of cosine and sine of each harmonic, (H, 2, n), and constant ones, (n,)."""
+        harmonics, static = modal_drive(self.modes, self.drives)
+        omega = 2.0 * math.pi * self.speed
+        force = self.drive_level * (harmonics[0] + omega**2 * harmonics[1])
+        return np.ascontiguousarray(force), static + self.of_joints("preload") @ self.joint_shapes
+
+    def run(
+        self,
+        coordinates: Array,
+        bouncing: Array,
+        arrays: CycleArrays,
+        integrator: Integrator,
+        tangents: Tangents | None = None,
+    ) -> tuple[int, int]:
+        """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
+        if not isinstance(integrator, ExactEvents):
+            raise refuse_fixed_steps(integrator, self)
+        # gaps are no part of the tables
+        gaps = {f"{name}_{what}": 0.0 for name in self.joints for what in ("clearance", "offset")}
+        tables = _tables(self._with_unchecked(**gaps, monitored=LARGEST), integrator.step_phase)
+        along = tangents or no_tangents(len(coordinates), len(arrays.section))
+        return tables.advance(self.stops, coordinates, bouncing, arrays, integrator, along)
+
+    def arrays(self, cycles: int, samples: int = 0) -> CycleArrays:
+        """Return the arrays into which ``run`` writes."""
+        return cycle_arrays(cycles, self.n_states, samples, joints=len(self.joints))
+
+    def further_results(self, arrays: CycleArrays) -> dict[str, Any]:
+        """Motion of every joint."""
+        return {"motions": arrays.tip, "histories": arrays.history if arrays.history.shape[1] else None}
+
+    def share_of_bound(self, states: Array, peak_force: Array) -> float:
+        """Share of the bound of passivity: only the drive gives energy, and what preloads or offsets have stored."""
+        sets, n = self.sets, self.n_states // 2
+        energy = np.sum(states[:, n:] ** 2 + sets.stiffness * states[:, :n] ** 2, axis=1)
+        force, static = self._drive()
+        load = float(np.sum(np.linalg.norm(force, axis=(1, 2)))) + float(np.linalg.norm(static))
+        stops = self.stops
+        inside = np.maximum(np.stack([-stops[:, 0], stops[:, 1]], axis=1), 0.0)
+        stored = math.sqrt(float(np.sum(sets.springs * inside**2)))
+        speed = stored + load * np.arange(1, len(states)) * self.cycle_period
+        if not speed.any():
+            return 0.0 if not energy.any() and not peak_force.any() else math.inf
+        surface = np.sqrt(sets.springs) + sets.dampers * np.linalg.norm(sets.shape, axis=1)[:, None]
+        forces = peak_force / (surface.ravel() * speed[:, None])
+        return max(float(np.max(np.sqrt(energy[1:]) / speed)), float(np.max(forces)))
+
+
+@lru_cache(maxsize=64)
+def _sets(
+    modes: Structure,
+    places: tuple[str, ...],
+    two_sided: tuple[bool, ...],
+    frequency_factor: float,
+    damping_factor: float,
+    springs: tuple[float, ...],
+    dampers: tuple[float, ...],
+    spring_factors: tuple[float, ...],
+    damper_factors: tuple[float, ...],
+) -> PressedSets:
+    shape = np.array([modes.shape(place) for place in places])
+    upper, damper = np.array(springs), np.array(dampers)
+    return PressedSets(
+        (frequency_factor * modes.angular_frequency) ** 2,
+        damping_factor * modes.damping,
+        shape,
+        np.stack([upper, upper * spring_factors], axis=1),
+        np.stack([damper, damper * damper_factors], axis=1),
+        np.array(two_sided),
+    )
+
+
+@lru_cache(maxsize=8)
+def _tables(machine: JointedMachine, step_phase: float) -> JointTables:
+    """Tables of a machine at its speed and drive; few are kept, since they are large."""
+    return JointTables(machine.sets, machine.speed, *machine._drive(), step_phase)
+
+
+def _refuse_same_place(names: tuple[str, ...], places: Mapping[str, str], shapes: Array) -> None:
+    """Refuse joints that move alike: two stops at one place are one joint."""
+    lengths = np.linalg.norm(shapes, axis=1)
+    for j, name in enumerate(names):
+        for i in range(j):
+            if abs(float(shapes[i] @ shapes[j])) > (1.0 - 1e-9) * lengths[i] * lengths[j]:
+                raise ParameterError(
+                    f"{name}.at = {places[name]!r} moves as {names[i]}.at = {places[names[i]]!r} does; allowed: one "
+                    "joint at each place (its two stops may differ: [joint.lower])"
+                )
+
+
+def machine_with_joints(
+    structure: Structure,
+    joints: Mapping[str, Joint],
+    drives: tuple[Drive, ...] = (),
+    *,
+    about: Mapping[str, Any] | None = None,
+    usual_ranges: Mapping[str, tuple[float, float]] | None = None,
+    namespace: Mapping[str, Any] | None = None,
+    definition: Any = None,
+    **stated: Any,
+) -> Any:
+    """Class of machines with several joints, whose fields default to what is given.
+
+    Parameters
+    ----------
+    structure, drives
+        As of ``ModalMachine``.
+    joints
+        By their names, which begin the names of their fields.
+    about
+        Provenance and source of what is given.
+    usual_ranges
+        Of the speed, as "speed", and of the clearance of the first or monitored joint, as "clearance".
+    namespace
+        More attributes of the class.
+    definition
+        Field that tells the class from others.
+    stated
+        Other fields of ``JointedMachine``, such as ``speed`` or ``monitored``.
+
+    Raises
+    ------
+    ParameterError
+        If there is no joint, a name can't begin that of a field, or a value is out of range.
+    """
+    if not joints:
+        raise ParameterError("a machine has no joint; allowed: one or more")
+    about = {"provenance": "assumed", "source": "default", **(about or {})}
+    defaults: dict[str, Any] = {"modes": structure, "drives": drives}
+    known = parameters_of(ModalMachine)
+    for name, joint in joints.items():
+        if not name.isidentifier() or name.startswith("_"):
+            raise ParameterError(f"joint name {name!r} is out of range; allowed: letters, digits and _, as in left_1")
+        for what, same in FIELDS.items():
+            defaults[f"{name}_{what}"] = parameter(getattr(joint, what), **{**vars(known[same]), **about})
+    own = parameters_of(JointedMachine)
+    defaults["monitored"] = parameter(
+        stated.pop("monitored", LARGEST), **{**vars(own["monitored"]), "choices": (LARGEST, *joints)}
+    )
+    if definition is not None:
+        defaults["definition"] = definition
+    for name, value in stated.items():
+        defaults[name] = parameter(value, **{**vars(own[name]), **about})
+    usual = {"speed": (4.0, 30.0), "clearance": (2e-5, 2e-4), **(usual_ranges or {})}
+    watched = defaults["monitored"].default
+    first = next(iter(joints)) if watched == LARGEST else watched
+    types: dict[str, Any] = {
+        "places": {name: joint.at for name, joint in joints.items()},
+        "usual_ranges": {"speed": usual["speed"], f"{first}_clearance": usual["clearance"]},
+        "options": {
+            "--speed-hz": Number("speed", "Hz"),
+            "--clearance-mm": Number(f"{first}_clearance", "mm", 1e-3),
+        },
+        **(namespace or {}),
+    }
+    hints = get_type_hints(JointedMachine)
+    annotations = {name: hints.get(name, Any) for name in defaults}
+    annotations |= {name: ClassVar[Any] for name in types if not name.startswith("__")}
+    body = {"__module__": __name__, "__annotations__": annotations, **defaults, **types}
+    made: Any = dataclass(frozen=True, kw_only=True)(type("JointedMachine", (JointedMachine,), body))
+    made()  # its defaults are checked
+    return made
