@@ -117,25 +117,25 @@ def test_no_floor_above_the_machines_reaches_into_the_folder_of_one():
 
 def test_compiled_kernels_are_cached_by_their_sources():
     """An edit in any kernel source changes the cache folder, so that stale machine code is never served."""
-    from chaosgym.core import KERNEL_CACHE, source_digest
+    from chaosgym.core.kernel_cache import KERNEL_CACHE, kernel_digest
+    from chaosgym.core.modal_impact import advance_model
 
-    assert Path(KERNEL_CACHE).name == source_digest(Path(ROOT / "src/chaosgym/core"))
+    assert Path(KERNEL_CACHE).name == kernel_digest()
+    assert Path(advance_model.stats.cache_path) == Path(KERNEL_CACHE, "core")
 
 
 def test_kernels_of_the_classifier_are_cached_by_their_content():
     """The same holds for the classifier's kernels, in a folder beside that of the core."""
     from chaosgym.classifier.kernels.trees import walk_rows
-    from chaosgym.core import KERNEL_CACHE, source_digest
+    from chaosgym.core.kernel_cache import KERNEL_CACHE, kernel_digest
 
-    folder = Path(KERNEL_CACHE).with_name(
-        source_digest(*(ROOT / "src/chaosgym" / part for part in ("core", "classifier/kernels")))
-    )
+    folder = Path(KERNEL_CACHE).with_name(kernel_digest(ROOT / "src/chaosgym/classifier/kernels"))
     assert Path(walk_rows.stats.cache_path).is_relative_to(folder)
 
 
 def test_editing_a_kernel_source_changes_the_digest(tmp_path):
     """The digest depends on every byte of every source."""
-    from chaosgym.core import source_digest
+    from chaosgym.core.kernel_cache import source_digest
 
     (tmp_path / "a.py").write_text("x = 1\n")
     before = source_digest(tmp_path)

@@ -93,6 +93,28 @@ def test_an_edit_in_a_helper_reaches_the_kernels_of_other_files(tmp_path):
 
 
 @pytest.mark.slow
+def test_installations_with_equal_sources_share_their_kernels(tmp_path):
+    """A copy in another folder, of another date, compiles nothing; an edited one leaves the others' kernels alone."""
+    source, ignored = Path(chaosgym.__file__).parent, shutil.ignore_patterns("__pycache__", "weights")
+
+    def counts(folder):
+        environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(tmp_path / folder)}
+        out, err = _in_a_process(ONE_MACHINE, **environment).communicate()
+        return out.decode().split(), err.decode().count("compiling")
+
+    for name in ("one", "other", "edited"):
+        shutil.copytree(source, tmp_path / name / "chaosgym", ignore=ignored, copy_function=shutil.copyfile)
+    edited = tmp_path / "edited" / "chaosgym" / "core" / "contact.py"
+    edited.write_text(edited.read_text() + "\nNOTHING = 0\n")
+    (compiled, loaded), said = counts("one")
+    assert (compiled, loaded) == ("1", "0")
+    assert said > 0
+    assert counts("other") == (["0", "1"], 0)
+    assert counts("edited")[0] == ["1", "0"]
+    assert counts("one") == counts("other") == (["0", "1"], 0)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("ending", "damage"), [("nbi", "empty"), ("nbi", "half"), ("nbc", "bit")])
 def test_damaged_machine_code_is_compiled_anew(tmp_path, ending, damage):
     """An index that is empty or cut, or code with one bit flipped, is named in a line, and the answer is right."""

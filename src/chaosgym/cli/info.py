@@ -14,7 +14,7 @@ def info(as_json: bool) -> None:
     import platform
     from importlib import metadata
 
-    from chaosgym.core import KERNEL_CACHE
+    from chaosgym.core.kernel_cache import KERNEL_CACHE
 
     packages: dict[str, str | None] = {}
     for package in ("numpy", "scipy", "numba", "gymnasium", "pyarrow", "matplotlib", "torch", "stable-baselines3"):

@@ -16,8 +16,7 @@ import os
 import shutil
 import tempfile
 import threading
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +24,8 @@ import numba
 from filelock import FileLock
 from numba.core import event
 
-from chaosgym.core import KERNEL_CACHE, WANTED_CACHE, source_digest
 from chaosgym.core.kernel import SideBySide
+from chaosgym.core.kernel_cache import KERNEL_CACHE, WANTED_CACHE
 
 logger = logging.getLogger("chaosgym")
 
@@ -133,20 +132,6 @@ def name_of(kernel: Any) -> str:
     """Module and name of a kernel."""
     function = kernel.py_func
     return f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
-
-
-@contextmanager
-def cached_by_content(folder: Path) -> Iterator[None]:
-    """Kernels imported meanwhile are cached, as those of ``core``, in a folder named by the hash of their sources.
-
-    Kernels outside ``core`` call those inside, so that the sources of both count.
-    """
-    previous = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(Path(KERNEL_CACHE).with_name(source_digest(Path(__file__).parent, folder)))
-    try:
-        yield
-    finally:
-        numba.config.CACHE_DIR = previous
 
 
 def _lock_file() -> str:

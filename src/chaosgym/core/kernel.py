@@ -31,7 +31,7 @@ class SideBySide(NamedTuple):
     serial: Callable[..., Any]
 
 
-def side_by_side(function: FunctionType) -> SideBySide:
+def side_by_side(function: Any) -> SideBySide:
     """Compile a kernel whose ``prange`` goes over machines for all threads, and for one.
 
     A process that has used GNU OpenMP, as all threads do, can't be forked by one that uses it too.

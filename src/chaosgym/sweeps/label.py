@@ -12,7 +12,7 @@ import llvmlite.binding
 import numpy as np
 import pyarrow as pa
 
-from chaosgym.core import source_digest
+from chaosgym.core.kernel_cache import source_digest
 from chaosgym.diagnosis import bounce_fraction, response_type
 from chaosgym.diagnosis.diagnose import diagnose_alone
 from chaosgym.diagnosis.stroboscopic import irregularity

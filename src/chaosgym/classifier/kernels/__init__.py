@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from chaosgym.core.compilation import cached_by_content
+from chaosgym.core.kernel_cache import cached_by_content
 
 with cached_by_content(Path(__file__).parent):
     from chaosgym.classifier.kernels import parameters, records, trees  # noqa: F401
