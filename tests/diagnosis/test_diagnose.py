@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from benchmarks.agreement import agreement, random_machines
+from chaosgym import Drive, ModalMachine, Structure
 from chaosgym.diagnosis import diagnose
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.machines.parameters import with_settings
-from chaosgym.simulation import RungeKutta4
+from chaosgym.simulation import RungeKutta4, simulate
 from tests.plain_modes import PLAIN_BEAM
 
 
@@ -33,6 +34,30 @@ def test_what_soon_repeats_is_proven_at_once():
     assert (late.nature, late.period, late.horizon) == ("periodic", 1, 100)
     assert early.evidence["largest_peak"] == pytest.approx(late.evidence["largest_peak"], rel=1e-3)
     assert early.votes == {"two_step": "periodic", "lyapunov": "periodic", "newton": "periodic"}
+
+
+def two_masses(speed, preload):
+    """Masses of 1 and 3 kg, each on 2 kN/m, with a gap between them; a force of 20 N shakes the larger."""
+    structure = Structure.of_matrices(
+        np.diag([1.0, 3.0]), np.diag([2000.0, 2000.0]), 0.02, {"load": 0, "motor": 1}, modes=2
+    )
+    drives = (Drive.sine("force", "motor", 20.0),)
+    joint = {"contact_stiffness": 5e5, "contact_damping": 30.0, "clearance": 0.2e-3, "preload": preload}
+    return ModalMachine(modes=structure, joint="load - motor", drives=drives, speed=speed, **joint)
+
+
+@pytest.mark.parametrize(("speed", "preload"), [(20.0, 0.0), (30.0, 0.0), (30.0, 3.0), (45.0, 2.0)])
+def test_forces_of_a_proven_orbit_are_those_of_a_run_that_has_settled(speed, preload):
+    """A proof needs no settled run; what the verdict shows on each surface is the motion after 3,000 more cycles."""
+    machine = two_masses(speed, preload)
+    verdict = diagnose(machine)
+    assert verdict.status == "certified"
+    settled = simulate(machine, verdict.period, verdict.evidence["final_state"], transient=3000 * verdict.period)
+    reached = verdict.judged.peak_force
+    assert len(reached) % verdict.period == 0
+    np.testing.assert_allclose(np.sort(np.unique(reached[:, 0].round(6))), np.unique(settled.peak_force[:, 0].round(6)))
+    np.testing.assert_allclose(reached.max(axis=0), settled.peak_force.max(axis=0), rtol=1e-6)
+    assert verdict.evidence["largest_peak"] == reached.max()
 
 
 def test_step_two_runs_where_the_exponent_does_not_decide():

@@ -34,6 +34,9 @@ Array = NDArray[np.float64]
 EARLY = (16, 32)
 """Cycles after which a motion that repeats is tried for a proof, before any deviation travels along."""
 
+ORBIT_CYCLES = 8
+"""Cycles at least that are recorded on a proven orbit."""
+
 FIRST_STAGE = 100
 """Cycles of the first stage."""
 
@@ -125,9 +128,19 @@ def diagnose_alone(
     record = stage.record
     verdict = _periodic(stage) or _periodic_within(stage, sensor_error) or _not_periodic(stage)
     evidence = _evidence(stage, verdict, initial_state)
-    if stage.orbit is not None:
-        evidence["largest_peak"] = float(np.max(simulate(machine, stage.orbit.period, stage.orbit.state).peak_force))
-    return replace(verdict, votes=_votes(stage), horizon=len(record), evidence=evidence, record=record)
+    settled = None
+    if stage.orbit is not None and verdict.status == "certified":
+        settled = _on_orbit(machine, stage.orbit)
+        evidence["largest_peak"] = float(np.max(settled.peak_force))
+    return replace(
+        verdict, votes=_votes(stage), horizon=len(record), evidence=evidence, record=record, orbit_record=settled
+    )
+
+
+def _on_orbit(machine: Machine, orbit: PeriodicOrbit) -> CycleRecord:
+    """Whole periods of a proven orbit, after one that tells which surface was touched last."""
+    cycles = orbit.period * -(-ORBIT_CYCLES // orbit.period)
+    return simulate(machine, cycles, orbit.state, transient=orbit.period)
 
 
 def _proven_early(

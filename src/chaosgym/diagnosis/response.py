@@ -56,6 +56,8 @@ class Diagnosis:
         Nature according to each test.
     record
         The run that was judged; None where a plain series was.
+    orbit_record
+        The motion on the proven orbit, whole periods of it; None where none was proven.
     """
 
     nature: Nature
@@ -69,6 +71,7 @@ class Diagnosis:
     settle_cycle: int | None = None
     votes: Mapping[str, Nature] = field(default_factory=lambda: _EMPTY)
     record: "CycleRecord | None" = field(default=None, repr=False, compare=False)
+    orbit_record: "CycleRecord | None" = field(default=None, repr=False, compare=False)
 
     @property
     def words(self) -> str:
@@ -90,10 +93,14 @@ class Diagnosis:
 
     @property
     def judged(self) -> "CycleRecord":
-        """The last half of the run, whose cycles count as settled; raises as ``run`` does."""
-        return self.run.after(len(self.run) // 2)
+        """The settled motion that the verdict speaks of; raises as ``run`` does.
+
+        The proven orbit where there is one, since a proof needs no run that has settled; else the last half of the run.
+        """
+        return self.orbit_record or self.run.after(len(self.run) // 2)
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        plain = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "record"}
+        runs = ("record", "orbit_record")
+        plain = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in runs}
         return {**plain, "evidence": dict(self.evidence), "votes": dict(self.votes)}
