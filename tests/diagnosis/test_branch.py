@@ -1,4 +1,5 @@
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -227,7 +228,7 @@ def test_a_branch_is_the_same_from_either_end():
     assert bifurcations(back, *kinds)[::-1] == pytest.approx(bifurcations(forth, *kinds), rel=1e-8)
     assert len(bifurcations(forth, *kinds)) == 6
     for found in (forth, back):
-        for a, b in zip(found.points, found.points[1:], strict=False):
+        for a, b in pairwise(found.points):
             assert np.linalg.norm(b.x - a.x) < 0.06 * max(1.0, np.linalg.norm(a.x[:-1]))
 
 

@@ -21,6 +21,17 @@ from chaosgym.machines import MACHINES
 )
 @click.option("--budget", type=click.IntRange(100, 10**7), default=3200, show_default=True, help="Cycles at the most.")
 @click.option("--types", is_flag=True, help="Also tell the response type (I, II, III) over the tolerances.")
+@click.option("--margins", is_flag=True, help="Also tell how far each tolerance is from a loss of stability.")
+@click.option(
+    "--reach",
+    type=click.FloatRange(0.0, 10.0, min_open=True),
+    default=1.0,
+    show_default=True,
+    help="Tolerances up to which margins are looked for.",
+)
+@click.option(
+    "--kicks", type=click.IntRange(1, 10**5), help="With --margins: kicks of the state, and the motions they lead to."
+)
 @click.option("--step-check", is_flag=True, help="Repeat with a finer step and say whether the verdict stays.")
 @measured_options
 @plot_option()
@@ -29,6 +40,9 @@ def diagnose(
     test: str,
     budget: int,
     types: bool,
+    margins: bool,
+    reach: float,
+    kicks: int | None,
     step_check: bool,
     measured: Measured,
     plot: str | None,
@@ -36,9 +50,11 @@ def diagnose(
 ) -> None:
     """Tell periodic from chaotic: a machine by simulation, or a measured signal."""
     picture = picture_path(plot, f"diagnose-{machine.name if machine else 'measured'}")
+    if kicks and not margins:
+        raise click.UsageError("--kicks belongs to --margins")
     if measured:
-        if machine or types or step_check:
-            raise click.UsageError("--peaks and --series go without a machine, --types and --step-check")
+        if machine or types or margins or step_check:
+            raise click.UsageError("--peaks and --series go without a machine, --types, --margins and --step-check")
         (run,) = measured_runs(measured)
         result, lines = run_as_dict(run), run_lines(run.source, run)
         name = f"{Path(run.source).name}, {run.name}"
@@ -54,6 +70,8 @@ def diagnose(
             raise click.UsageError("--sensor-sigma belongs to --peaks or --series")
         with patience("diagnose"):
             result, lines, verdict = _diagnose_machine(machine, budget, types, step_check, measured.sensor_error or 0.0)
+            if margins:
+                _add_margins(machine, verdict, reach, kicks or 0, result, lines)
         draw(picture, lambda plots: plots.diagnosis_figure(verdict), result, lines)
     emit(result, as_json, lambda: lines)
 
@@ -102,6 +120,51 @@ def _diagnose_machine(
         result["step_check"] = compared.as_dict()
         lines.append(f"  {compared.summary}")
     return result, lines, verdict
+
+
+def _add_margins(
+    machine: Any, verdict: Any, reach: float, kicks: int, result: dict[str, Any], lines: list[str]
+) -> None:
+    """Add the margins of a certified orbit, or why there are none."""
+    from chaosgym.diagnosis import find_periodic_orbit
+    from chaosgym.diagnosis.margins import margins as margins_of
+
+    result["margins"] = None
+    orbit = None
+    if verdict.status == "certified":
+        orbit = find_periodic_orbit(machine, verdict.evidence["final_state"], verdict.period)
+    if orbit is None or not orbit.certified:
+        lines.append(f"  no margins: they need a periodic response that is proven, this one is {verdict.words}")
+        return
+    found = margins_of(machine, orbit, reach=reach, kicks=kicks)
+    result["margins"] = found.as_dict()
+    lines.append(f"  largest multiplier {found.largest_multiplier:.3g}; stability ends, in tolerances:")
+    lines += [f"    {line}" for line in _margin_lines(machine, found, reach)]
+    if found.kicks is not None:
+        lines += [f"  {line}" for line in _kick_lines(found.kicks)]
+
+
+def _margin_lines(machine: Any, found: Any, reach: float) -> list[str]:
+    told: dict[str, list[str]] = {}
+    for margin in found.margins:
+        sign, nominal = "-" if margin.side < 0 else "+", getattr(machine, margin.parameter)
+        change = f" ({margin.value / nominal - 1.0:+.2%})" if nominal else ""
+        if margin.kind is not None:
+            text = f"{sign}{margin.share:.2f} {margin.kind} at {margin.value:.8g}{change}"
+        else:
+            text = f"{sign}{margin.share:.2f} {margin.end}" if margin.end else f"{sign} none within {reach:g}"
+        told.setdefault(margin.parameter, []).append(text)
+    return [f"{name:22s} {'; '.join(texts)}" for name, texts in told.items()]
+
+
+def _kick_lines(kicks: Any) -> list[str]:
+    if kicks.smallest_leaving is None:
+        return [f"all of {kicks.tried} kicks of up to the size of the motion come back"]
+    rows = [f"smallest of {kicks.tried} kicks that leads elsewhere: {kicks.smallest_leaving:.2g} of the motion's size"]
+    for one in kicks.coexisting:
+        period = f", period {one.period}" if one.period else ""
+        rows.append(f"  {one.kicks} to {one.nature}{period}, largest peak {one.largest_peak:.2f} N")
+    return rows
 
 
 @machine_command

@@ -42,8 +42,8 @@ NEAREST = 1e-6
 ASIDE = 0.02
 """Share of the chord at which a crossing of branches is looked at from either side."""
 
-ROOT_ERROR = 1e-9
-"""Error of a root, as a share of the field or of the range."""
+ROOT_ERROR, NOISY = 1e-9, 100.0
+"""Error of a root, as a share of the field or of the range, and what the noise of a family adds to the latter."""
 
 SAME_ORBIT = 1e-3
 """Distance, relative to the size of the motion, below which an orbit closes after half its period too."""
@@ -160,15 +160,16 @@ def _change_of_contacts(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> tu
     doubt = FIRST_DOUBT
     for _ in range(MOST_ROUNDS):
         length = float(np.linalg.norm(b.x - a.x))
-        if length < PLACED:
+        placed = max(PLACED, NOISY * family.noise)
+        if length < placed:
             break
-        doubt = min(max(doubt, 0.1 * PLACED / length), 0.25)
+        doubt = min(max(doubt, 0.1 * placed / length), 0.25)
         guess = float(np.clip(_guess(family, a, b, doubt), 1.01 * doubt, 1.0 - 1.01 * doubt))
         try:
             below = between(family, a, b, guess - doubt, CLOSELY)
             above = between(family, a, b, guess + doubt, CLOSELY) if below.impacts == a.impacts else below
         except NotFollowedError:
-            if length > 1e3 * PLACED:
+            if length > 1e3 * placed:
                 raise
             break
         if below.impacts != a.impacts:
@@ -324,11 +325,11 @@ def _kind(name: str, turns: bool, sides: tuple[OrbitPoint, OrbitPoint], point: O
 def _bifurcation(
     family: OrbitFamily, kind: Kind, sides: tuple[OrbitPoint, OrbitPoint], point: OrbitPoint, ends: bool = False
 ) -> Bifurcation:
-    before, after = sides
+    (before, after), value = sides, family.value(point.x[-1])
     return Bifurcation(
         kind=kind,
-        value=family.value(point.x[-1]),
-        error=ROOT_ERROR * max(abs(family.value(point.x[-1])), abs(family.high - family.low)),
+        value=value,
+        error=max(ROOT_ERROR * abs(value), (ROOT_ERROR + NOISY * family.noise) * abs(family.high - family.low)),
         period=family.period // 2 if kind == "flip" and ends else family.period,
         multipliers=point.multipliers,
         state=family.state(point.x),

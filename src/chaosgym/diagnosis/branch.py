@@ -157,7 +157,7 @@ def _next(family: OrbitFamily, here: OrbitPoint, step: float, bend: "Bend") -> t
             reason = "another branch crosses"
             step = 0.3 * min(step, length)
             continue
-        off = max(float(np.linalg.norm(there.x - here.x - ahead)) - ROUNDING, 0.0)
+        off = max(float(np.linalg.norm(there.x - here.x - ahead)) - max(ROUNDING, 10.0 * family.noise), 0.0)
         turned = float(there.tangent @ here.tangent)
         if step > 3.0 * LEAST_STEP and (off > FAR * length or turned < LEAST_COSINE):
             reason = "the branch turns too sharply"

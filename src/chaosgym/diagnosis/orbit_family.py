@@ -6,8 +6,9 @@ Unknowns are scaled: z = W y / |W y_0| with the weights of energy, s = (p - low)
 offer is its stroboscopic map with its derivative (``periodic_orbit.period_map``), nothing else.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,9 @@ It errs by 1e-7 or more, which steers the steps; it moves no orbit that is found
 
 BENT = 0.01
 """Share of such a difference by which its two halves may differ."""
+
+UNMOVED = 1e-13
+"""Change of s that changes nothing but the rounding of a model."""
 
 NOISE = 1e-12
 """Change of s that tells nothing of dP/ds."""
@@ -93,7 +97,8 @@ class NotFollowedError(Exception):
 class OrbitFamily:
     """Periodic orbits of ``period`` cycles of a machine whose ``field`` lies between ``low`` and ``high``.
 
-    ``weight`` (n,) turns a state into scaled coordinates.
+    ``weight`` (n,) turns a state into scaled coordinates. ``noise`` is how much the map jumps, in these, when the field
+    moves by nothing to speak of: rounding of a model that is computed anew for each value.
     """
 
     machine: Machine
@@ -102,6 +107,7 @@ class OrbitFamily:
     high: float
     period: int
     weight: Array
+    noise: float = 0.0
 
     def value(self, s: float) -> float:
         """The field's value at s."""
@@ -160,19 +166,20 @@ class OrbitFamily:
     ) -> tuple[Array, Array, Array, Array, CycleRecord]:
         """(x, miss, matrix, slope, record) of an orbit."""
         x, last = guess, np.inf
+        enough, closed = max(CLOSED, 4.0 * self.noise), max(closed, 4.0 * self.noise)
         miss, matrix, record = self._map(x)
         slope = self._rough_slope(x, miss) if slope is None else slope
         for _ in range(MOST_ITERATIONS):
             size = float(np.linalg.norm(miss)) / max(float(np.linalg.norm(x[:-1])), 1e-300)
             if not np.isfinite(size) or size > 2.0 * max(last, 1e-2):
                 break
-            if size < closed or (size < CLOSED and size > 0.1 * last):
+            if size < closed or (size < enough and size > 0.1 * last):
                 return x, miss, matrix, slope, record
             last, before = size, matrix
             change = np.linalg.solve(_bordered(matrix, slope, normal), -np.append(miss, normal @ (x - guess)))
             x = x + change
             miss, matrix, record = self._map(x)
-            if abs(change[-1]) > NOISE:
+            if abs(change[-1]) > max(NOISE, 100.0 * self.noise):
                 # the new miss tells more of dP/ds than a difference does near grazing
                 slope = slope + (miss - 0.5 * (matrix - before) @ change[:-1]) / change[-1]
         raise NotFollowedError("Newton's method does not converge")
@@ -199,12 +206,13 @@ class OrbitFamily:
 
     def _rough_slope(self, x: Array, miss: Array) -> Array:
         """dP/ds (n,) where the map misses by ``miss``, by a difference towards the middle of the range."""
-        step = SLOPE_STEPS[0] if x[-1] < 0.5 else -SLOPE_STEPS[0]
+        step = max(SLOPE_STEPS[0], np.sqrt(self.noise)) * (1.0 if x[-1] < 0.5 else -1.0)
         return np.asarray((self.end(x, x[-1] + step) - x[:-1] - miss) / step)
 
     def slope(self, x: Array, miss: Array) -> Array:
         """dP/ds (n,) where the map misses by ``miss``, by a central difference; at an end of the range just inside."""
-        for step in SLOPE_STEPS:
+        least = np.cbrt(self.noise)
+        for step in (max(step, least) for step in SLOPE_STEPS):
             middle = float(np.clip(x[-1], step, 1.0 - step))
             low, high = (self.end(x, middle + side) for side in (-step, step))
             bend = np.linalg.norm(low + high - 2.0 * (x[:-1] + miss)) if middle == x[-1] else 0.0
@@ -237,7 +245,7 @@ class OrbitFamily:
 
     def with_period(self, period: int) -> "OrbitFamily":
         """The family of another period."""
-        return OrbitFamily(self.machine, self.field, self.low, self.high, period, self.weight)
+        return replace(self, period=period)
 
 
 def _bordered(matrix: Array, slope: Array, normal: Array) -> Array:
@@ -266,7 +274,17 @@ def family_of(machine: Machine, field: str, low: float, high: float, state: Arra
         check_parameter(machine, field, value)
     weight = machine.state_weights(state)
     size = float(np.linalg.norm(weight * state)) or 1.0
-    return OrbitFamily(machine, field, low, high, period, np.asarray(weight / size))
+    family = OrbitFamily(machine, field, low, high, period, np.asarray(weight / size))
+    if field in (machine.speed_field, machine.clearance_field):
+        return family  # these reach the model without computing it anew
+    s = float(np.clip((getattr(machine, field) - low) / (high - low), 0.01, 0.99))
+    x = np.append(family.weight * state, s)
+    try:
+        ends = [family.end(x, s + k * UNMOVED) for k in range(4)]
+    except SimulationError:
+        return family
+    jumps = [float(np.linalg.norm(b - a)) for a, b in pairwise(ends)]
+    return replace(family, noise=max(max(jumps) - CLOSELY, 0.0))
 
 
 def continuous_field(machine: Machine, name: str) -> str:

@@ -1,0 +1,290 @@
+"""Margins of a periodic response: how far each parameter may move until the motion loses its stability, and how.
+
+Each parameter that has a tolerance is varied alone, to either side, up to some tolerances away. Where the orbits at
+both ends are stable, have the same contacts and lie nearly in a line with the nominal one, nothing happens between
+them; elsewhere the branch is followed until stability ends.
+
+A margin follows this motion. Another attractor may coexist, which a kick reaches: ``kicks`` samples how large.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.diagnosis.bifurcation import Kind
+from chaosgym.diagnosis.branch import stretch
+from chaosgym.diagnosis.diagnose import diagnose_alone
+from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily, OrbitPoint, family_of
+from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit
+from chaosgym.diagnosis.response_type import Tolerance, default_tolerances
+from chaosgym.errors import DiagnosisError
+from chaosgym.machines import Machine
+from chaosgym.machines.parameters import parameters_of
+from chaosgym.simulation import parallel_map, simulate
+
+Array = NDArray[np.float64]
+
+REACH = 1.0
+"""Tolerances up to which stability is followed."""
+
+CALM = 0.9
+"""Largest multiplier of orbits between which nothing is looked for."""
+
+BENT = 0.3
+"""Share of the way from one end to the other by which the nominal orbit may lie beside its middle, so that the ends
+decide."""
+
+KICK_CYCLES = 200
+"""Cycles after which a motion that was kicked must be back."""
+
+BACK = 1e-3
+"""Distance from the orbit, relative to its size, at which it is."""
+
+SMALLEST_KICK, LARGEST_KICK = 1e-3, 1.0
+"""Sizes of kicks, relative to the size of the motion, in energy for machines of modes."""
+
+
+class Margin(NamedTuple):
+    """How far one parameter may move to one side.
+
+    Attributes
+    ----------
+    parameter, side
+        Which, and -1 or +1.
+    share
+        Distance in tolerances: to where stability ends, or as far as it was followed.
+    value
+        The parameter's value there.
+    kind
+        Bifurcation at which stability ends; None if it does not so far.
+    end
+        Why it was not followed further; empty if stability ends or the reach is reached.
+    """
+
+    parameter: str
+    side: int
+    share: float
+    value: float
+    kind: Kind | None
+    end: str = ""
+
+
+class Attractor(NamedTuple):
+    """A motion that kicks led to: its nature, period, largest peak force [N], and how many of the kicks."""
+
+    nature: str
+    period: int | None
+    largest_peak: float
+    kicks: int
+
+
+class Kicks(NamedTuple):
+    """What random kicks of the state do.
+
+    Attributes
+    ----------
+    tried
+        How many there were, of sizes evenly spread over a logarithmic scale.
+    smallest_leaving
+        Smallest of those that did not come back within 200 periods, relative to the size of the motion; None if all
+        came back.
+    coexisting
+        Where those ended.
+    """
+
+    tried: int
+    smallest_leaving: float | None
+    coexisting: tuple[Attractor, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Margins:
+    """Margins of a periodic response.
+
+    Attributes
+    ----------
+    largest_multiplier
+        Of the orbit.
+    margins
+        Below and above for each parameter.
+    tolerances
+        By field.
+    kicks
+        What kicks do, if they were asked for.
+    """
+
+    largest_multiplier: float
+    margins: tuple[Margin, ...]
+    tolerances: Mapping[str, Tolerance]
+    kicks: Kicks | None = None
+
+    @property
+    def nearest(self) -> Margin | None:
+        """The loss of stability that is the fewest tolerances away, or None."""
+        ends = [margin for margin in self.margins if margin.kind is not None]
+        return min(ends, key=lambda margin: margin.share, default=None)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {
+            "largest_multiplier": self.largest_multiplier,
+            "margins": [margin._asdict() for margin in self.margins],
+            "nearest": self.nearest._asdict() if self.nearest else None,
+            "tolerances": {name: tolerance._asdict() for name, tolerance in self.tolerances.items()},
+            "kicks": None
+            if self.kicks is None
+            else {**self.kicks._asdict(), "coexisting": [one._asdict() for one in self.kicks.coexisting]},
+        }
+
+
+def margins(
+    machine: Machine,
+    orbit: PeriodicOrbit,
+    tolerances: Mapping[str, Tolerance] | None = None,
+    *,
+    reach: float = REACH,
+    kicks: int = 0,
+    seed: int = 0,
+    workers: int | None = None,
+) -> Margins:
+    """Distance of a periodic orbit to the nearest loss of stability along each tolerance.
+
+    Parameters
+    ----------
+    machine
+        The nominal machine.
+    orbit
+        A certified orbit of it; ``find_periodic_orbit`` gives it from a settled state.
+    tolerances
+        By field; ``default_tolerances(machine)`` by default.
+    reach
+        Tolerances up to which stability is followed.
+    kicks
+        Random kicks of the state to try; none by default.
+    seed
+        Of the kicks.
+    workers
+        Threads of the kicks; all processors by default.
+
+    Raises
+    ------
+    DiagnosisError
+        If the orbit is not certified, or ``reach`` is not above 0.
+    """
+    if not orbit.certified:
+        raise DiagnosisError("margins need a periodic orbit that is certified; allowed: one that closes and attracts")
+    if not reach > 0.0:
+        raise DiagnosisError(f"reach = {reach:g} tolerances is out of range; allowed: above 0")
+    chosen = default_tolerances(machine) if tolerances is None else dict(tolerances)
+    found = tuple(
+        margin for name, tolerance in chosen.items() for margin in _along(machine, orbit, name, tolerance, reach)
+    )
+    return Margins(
+        largest_multiplier=orbit.largest_multiplier,
+        margins=found,
+        tolerances=chosen,
+        kicks=_kicked(machine, orbit, kicks, seed, workers) if kicks else None,
+    )
+
+
+def _along(machine: Machine, orbit: PeriodicOrbit, name: str, tolerance: Tolerance, reach: float) -> list[Margin]:
+    """Margins of one parameter, below and above."""
+    nominal, allowed = float(getattr(machine, name)), parameters_of(machine)[name]
+    low, high = (float(np.clip(tolerance.at(nominal, side * reach), allowed.low, allowed.high)) for side in (-1, 1))
+    if not low < high:
+        return []
+    family = family_of(machine, name, low, high, orbit.state, orbit.period)
+    here = np.append(family.weight * orbit.state, (nominal - low) / (high - low))
+    normal = np.append(np.zeros(len(orbit.state)), 1.0)
+    ends = [_calm_end(family, here, normal, border) for border in (0.0, 1.0)]
+    straight = all(ends) and _straight(here, *(end for end in ends if end is not None))
+    found = []
+    for side, end, value in ((-1, ends[0], low), (1, ends[1], high)):
+        if value == nominal:
+            found.append(Margin(name, side, 0.0, value, None, "end of the field's range"))
+        elif end is not None and straight:
+            found.append(Margin(name, side, _share(tolerance, nominal, value), value, None))
+        else:
+            found.append(_followed(family, here, side, name, tolerance, nominal))
+    return found
+
+
+def _calm_end(family: OrbitFamily, here: Array, normal: Array, border: float) -> OrbitPoint | None:
+    """The orbit at an end of the range if Newton's method leads there and it is far from losing its stability."""
+    guess = np.append(here[:-1], border)
+    try:
+        point = family.solve(guess, normal, np.zeros(len(here) - 1), exact=False)
+    except NotFollowedError:
+        return None
+    same = point.impacts == family.impacts(here)
+    return point if same and point.largest_multiplier < CALM else None
+
+
+def _straight(here: Array, below: OrbitPoint, above: OrbitPoint) -> bool:
+    way = above.x[:-1] - below.x[:-1]
+    share = here[-1]
+    beside = here[:-1] - below.x[:-1] - share * way
+    return float(np.linalg.norm(beside)) <= BENT * max(float(np.linalg.norm(way)), 1e-12)
+
+
+def _followed(family: OrbitFamily, here: Array, side: int, name: str, tolerance: Tolerance, nominal: float) -> Margin:
+    normal = np.append(np.zeros(len(here) - 1), float(side))
+    try:
+        start = family.solve(here, normal)
+        ahead = stretch(family, start, longest_step=0.25, first_step=0.1, until=lambda one: one.loses_stability)
+    except NotFollowedError as reason:
+        return Margin(name, side, 0.0, nominal, None, f"not followed: {reason}")
+    lost = [each.bifurcation for each in ahead.found if each.bifurcation.loses_stability]
+    if lost:
+        return Margin(name, side, _share(tolerance, nominal, lost[0].value), lost[0].value, lost[0].kind)
+    value = family.value(ahead.points[-1].x[-1])
+    end = "" if ahead.end.startswith("end of the range") else ahead.end
+    return Margin(name, side, _share(tolerance, nominal, value), value, None, end)
+
+
+def _share(tolerance: Tolerance, nominal: float, value: float) -> float:
+    """Distance of a value from the nominal one in tolerances."""
+    if tolerance.relative:
+        return float(abs(np.log(value / nominal)) / np.log1p(tolerance.value))
+    return abs(value - nominal) / tolerance.value
+
+
+def _kicked(machine: Machine, orbit: PeriodicOrbit, count: int, seed: int, workers: int | None) -> Kicks:
+    """What ``count`` kicks of random directions and sizes lead to."""
+    weight = machine.state_weights(orbit.state)
+    size = float(np.linalg.norm(weight * orbit.state)) or 1.0
+    random = np.random.default_rng(seed)
+    directions = random.standard_normal((count, len(orbit.state)))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    sizes = np.geomspace(SMALLEST_KICK, LARGEST_KICK, count)
+    starts = orbit.state + size * sizes[:, None] * directions / weight
+
+    def end_of(start: Array) -> Array:
+        return simulate(machine, KICK_CYCLES * orbit.period, start).final_state.coordinates
+
+    ends = parallel_map(end_of, starts, workers=workers)
+    phases = [orbit.state, *simulate(machine, orbit.period, orbit.state).section[1:]]
+    distance = [min(float(np.linalg.norm(weight * (end - phase))) for phase in phases) for end in ends]
+    left = np.flatnonzero(np.array(distance) > BACK * size)
+    smallest = float(sizes[left[0]]) if len(left) else None
+    return Kicks(count, smallest, _attractors(machine, [ends[i] for i in left], workers))
+
+
+def _attractors(machine: Machine, states: list[Array], workers: int | None) -> tuple[Attractor, ...]:
+    """Motions that settle from some states; two count as one if nature, period and largest peak agree to 0.1 %."""
+    found: list[Attractor] = []
+    for verdict in parallel_map(
+        lambda state: diagnose_alone(machine, initial_state=state, budget=2 * KICK_CYCLES), states, workers=workers
+    ):
+        peak = float(verdict.evidence["largest_peak"])
+        for place, one in enumerate(found):
+            alike = abs(one.largest_peak - peak) <= 1e-3 * peak or verdict.nature != "periodic"
+            if (one.nature, one.period) == (verdict.nature, verdict.period) and alike:
+                found[place] = one._replace(kicks=one.kicks + 1, largest_peak=max(peak, one.largest_peak))
+                break
+        else:
+            found.append(Attractor(verdict.nature, verdict.period, peak, 1))
+    return tuple(sorted(found, key=lambda one: -one.kicks))
