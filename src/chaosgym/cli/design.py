@@ -7,7 +7,7 @@ import click
 
 from chaosgym.cli.machine_options import Quantity
 from chaosgym.cli.measured_options import Measured, measured_options, measured_runs
-from chaosgym.cli.output import draw, emit, picture_path, plot_option
+from chaosgym.cli.output import draw, emit, note_machine, picture_path, plot_option
 
 
 @click.command()
@@ -52,6 +52,8 @@ def design(
     if out is not None:
         report.report_paths(out, overwrite)
     asked = briefs.read_brief(brief) if brief is not None else None
+    if asked is not None:
+        note_machine(asked.machine)
     if measured:
         criteria = asked.criteria if asked is not None else Criteria(load_rating=load_rating or 0.0)
         (run,) = measured_runs(measured)

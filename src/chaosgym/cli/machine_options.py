@@ -12,6 +12,7 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
+from chaosgym.cli.output import note_machine
 from chaosgym.errors import ParameterError
 from chaosgym.machines import FILE_ENDING, MACHINES
 from chaosgym.machines.machine import Choice, Number, Option
@@ -149,7 +150,10 @@ def machine_command(
         given = {name: value for name, value in given.items() if value is not None}
         if machine is None and (settings or given or fidelity):
             raise click.UsageError(f"these options need a machine: {', '.join(MACHINES)}")
-        function(machine=machine and build_machine(machine, given, settings, fidelity), **others)
+        built = machine and build_machine(machine, given, settings, fidelity)
+        if built:
+            note_machine(built)
+        function(machine=built, **others)
 
     wrapped = click.option(
         "--fidelity", metavar="RUNG", help="Rung of the machine's ladder of models, such as fine or reference."

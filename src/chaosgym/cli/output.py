@@ -21,11 +21,28 @@ NOBODY_READS = 141
 PATIENCE_SECONDS = 2.0
 """Time after which a computation says that it goes on."""
 
+NOTES = "chaosgym.notes"
+"""Where a command keeps the notes on its machines."""
+
+
+def note_machine(machine: Any) -> None:
+    """Let the command's answer end with what a user should know of a machine."""
+    kept = click.get_current_context().meta.setdefault(NOTES, [])
+    kept += [note for note in machine.notes if note not in kept]
+
 
 def emit(result: Mapping[str, Any], as_json: bool, lines: Callable[[], list[str]]) -> None:
-    """Print the result as JSON, or the lines for people; end quietly if nobody reads them."""
+    """Print the result as JSON, or the lines for people; end quietly if nobody reads them.
+
+    Both end with the notes on the machines of the command, if there are any.
+    """
+    context = click.get_current_context(silent=True)
+    notes = context.meta.get(NOTES, ()) if context else ()
     try:
-        for line in [json.dumps(result, allow_nan=False)] if as_json else lines():
+        told = {**result, "notes": list(notes)} if notes else result
+        for line in (
+            [json.dumps(told, allow_nan=False)] if as_json else [*lines(), *(f"note: {note}" for note in notes)]
+        ):
             click.echo(line, nl=False)  # Python overlooks that a single large write was cut off; the next one is not
             click.echo()
         sys.stdout.flush()

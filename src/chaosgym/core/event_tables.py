@@ -287,8 +287,13 @@ def _put_switch(table, switch, places, n, harmonics, values, r):
 
 @njit(cache=True)
 def shortest_intervals(regimes, step_phase, drive_rate):
-    """Shortest interval of each regime [s], in which neither its fastest mode nor the drive turns by more."""
+    """Shortest interval of each regime [s], in which neither its fastest mode nor the drive turns by more.
+
+    Where neither turns, as of a rigid body alone, it is that of the fastest regime.
+    """
+    fastest = np.max(regimes.fastest)
     shortest = np.empty(regimes.fastest.shape[0])
     for r in range(shortest.shape[0]):
-        shortest[r] = step_phase / max(regimes.fastest[r], drive_rate)
+        rate = max(regimes.fastest[r], drive_rate)
+        shortest[r] = step_phase / (rate if rate > 0.0 else fastest if fastest > 0.0 else 1.0)
     return shortest

@@ -200,6 +200,11 @@ class Machine(ABC):
         return float(self.period_at(getattr(self, self.speed_field)))
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know of this machine beside every result of it, a line each."""
+        return ()
+
+    @property
     def sensors(self) -> tuple[str, ...]:
         """Names of the force sensors; ``CycleRecord.sensor_peak`` has their columns."""
         return ()

@@ -23,6 +23,7 @@ from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.core.propagator import Regimes
 from chaosgym.core.restitution import RestitutionModel, advance_restitution
 from chaosgym.core.tangent import Tangents, no_tangents
+from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.linear_impact import linear_impact
 from chaosgym.machines.machine import Machine, refuse_fixed_steps
@@ -32,8 +33,18 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-MAX_CONDITION = 1e8
-"""Largest condition number of a usable set of eigenvectors."""
+MAX_CONDITION = 1e6
+"""Condition number of a set of eigenvectors below which no better one is looked for."""
+
+HOPELESS_CONDITION = 1e12
+"""Condition number beyond which a motion would keep less than four digits."""
+
+RIGID_SHARE = 1e-6
+"""Natural frequency, as a share of the fastest one, below which a mode is the motion of a rigid body.
+
+Programs of finite elements print rigid bodies so, at the rounding of their stiffness. A static force would push such a
+mode so far away that the gap drowns in the rounding of that distance.
+"""
 
 NEGLIGIBLE = 1e-13
 """Stiffness and damping, against the largest, of a direction that neither springs nor dampers resist."""
@@ -58,6 +69,23 @@ class Stop(NamedTuple):
 
     stiffness: float
     damping: float
+
+
+def nearly_rigid(angular_frequency: Array) -> NDArray[np.bool_]:
+    """Which modes (n,) are so slow that they count as motions of a rigid body, though their frequency is not 0."""
+    return (angular_frequency > 0.0) & (angular_frequency < RIGID_SHARE * np.max(angular_frequency))
+
+
+def with_rigid_bodies(modes: Modes) -> Modes:
+    """Modes without the springs of those that are ``nearly_rigid``, and without their dampers if these are as slow."""
+    slow = nearly_rigid(modes.angular_frequency)
+    if not slow.any():
+        return modes
+    damping = modes.damping.copy()
+    for i in np.flatnonzero(slow):
+        if np.max(np.abs(damping[i])) < RIGID_SHARE * np.max(modes.angular_frequency):
+            damping[i], damping[:, i] = 0.0, 0.0
+    return modes._replace(angular_frequency=np.where(slow, 0.0, modes.angular_frequency), damping=damping)
 
 
 def modal_blocks(stiffness: Array, damping: Array, rigid: bool) -> tuple[Array, Array]:
@@ -93,16 +121,30 @@ def _add_damped(
     """Add the blocks of coordinates, columns of ``basis``, that all have a spring or a damper.
 
     A mode that is critically damped to the last digit has one eigenvector instead of two. Its damping is then moved by
-    a billionth, which separates the pair.
+    a billionth, which separates the pair; where that leaves equal modes entangled, that of each by another amount. The
+    best set of eigenvectors that was found serves, unless it would leave no digits.
     """
     n = len(stiffness)
     scale = math.sqrt(np.linalg.norm(stiffness, 2)) or 1.0
-    for nudged in (1.0, 1.0 + 1e-9, 1.0 + 1e-8):
-        system = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -nudged * damping]])
+    # a displacement weighs as much as the velocity that belongs to it, in slow modes as in fast ones
+    rates, directions = np.linalg.eigh(stiffness + damping @ damping)
+    weight = directions * np.sqrt(np.maximum(rates, 0.0)) @ directions.T
+    found, one, graded = [], np.ones(n), np.arange(1.0, n + 1.0)
+    for moved in (0.0 * one, 1e-9 * one, 1e-8 * one, 1e-9 * graded, 1e-8 * graded):
+        roots = np.sqrt(1.0 + moved)
+        system = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -(np.outer(roots, roots) * damping)]])
         values, vectors = np.linalg.eig(system)
-        balanced = vectors * np.concatenate([np.full(n, scale), np.ones(n)])[:, None]
-        if np.linalg.cond(balanced / np.linalg.norm(balanced, axis=0)) < MAX_CONDITION:
+        balanced = np.concatenate([weight @ vectors[:n], vectors[n:]])
+        condition = float(np.linalg.cond(balanced / np.linalg.norm(balanced, axis=0)))
+        found.append((condition, values, vectors))
+        if condition < MAX_CONDITION:
             break
+    condition, values, vectors = min(found, key=lambda each: each[0])
+    if not condition < HOPELESS_CONDITION:
+        raise ParameterError(
+            "modes that are equal and critically damped can't be told apart; allowed: damping ratios that differ from "
+            "1 by a millionth or more"
+        )
     resting = int(np.sum(np.linalg.eigvalsh(stiffness) < NEGLIGIBLE * scale**2)) if rigid else 0
     values[np.argsort(np.abs(values))[:resting]] = 0.0
     vectors = np.concatenate([basis @ vectors[:n], basis @ vectors[n:]])
@@ -172,6 +214,7 @@ def flexible_model(
     step_phase
         For which the tables are made; see ``ExactEvents``.
     """
+    modes = with_rigid_bodies(modes)
     n, tip, stiffness = len(modes.tip_shape), modes.tip_shape, modes.angular_frequency**2
     upper = Stop(contact_stiffness, contact_damping)
     stops = [upper] if lower in (None, upper) else [upper, lower]
@@ -307,9 +350,12 @@ class ModalImpactMachine(Machine):
         return True
 
     def state_weights(self, state: Array) -> Array:
-        """Weights (n_states,) by which the squared norm of a deviation is its energy."""
-        stiffness = self.structure.stiffness
-        return np.concatenate([np.sqrt(stiffness), np.ones(len(stiffness))])
+        """Weights (n_states,) by which the squared norm of a deviation is its energy.
+
+        A rigid body, which stores none, counts as if it swung once a cycle.
+        """
+        rates = np.sqrt(self.structure.stiffness)
+        return np.concatenate([np.where(rates > 0.0, rates, 2.0 * math.pi / self.cycle_period), np.ones(len(rates))])
 
     def contraction(self, contact_time: Array, impacts: float) -> float:
         """Sum of all Lyapunov exponents of a cycle with so much contact on each side [s] and so many impacts.

@@ -16,12 +16,25 @@ from numpy.typing import NDArray
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Number, Option
-from chaosgym.machines.modal_impact import ModalImpactMachine, Modes, Stop, flexible_model
+from chaosgym.machines.modal_impact import (
+    RIGID_SHARE,
+    ModalImpactMachine,
+    Modes,
+    Stop,
+    flexible_model,
+    nearly_rigid,
+)
 from chaosgym.machines.modal_machine.drive import Drive, checked, modal_drive
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import parameter
 
 Array = NDArray[np.float64]
+
+ROUNDING = 2.0**-52
+"""Relative distance of neighbouring numbers."""
+
+FEWEST_DIGITS = 1e-9
+"""Share of the clearance that rounding may cost unsaid."""
 
 
 def _assumed(default: Any, unit: str, low: float, high: float) -> Any:
@@ -126,6 +139,23 @@ class ModalMachine(ModalImpactMachine):
         return model._replace(
             excitation_frequency=self.speed, drive=self.drive_level * model.drive, stops=self.stops_at(self.clearance)
         )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Modes that count as rigid, and digits that a static force costs."""
+        hertz = self.frequency_factor * self.modes.angular_frequency / (2.0 * math.pi)
+        slow = ", ".join(f"{rate:.3g}" for rate in hertz[nearly_rigid(hertz)])
+        rigid = f"modes of {slow} Hz count as motions of a rigid body: below {RIGID_SHARE:g} of the fastest mode"
+        model, far = self.structure, ""
+        held = (model.stiffness > 0.0) & (model.tip_shape * model.static_force != 0.0)
+        away = np.abs(model.tip_shape * model.static_force)[held] / model.stiffness[held]
+        farthest = float(np.max(away, initial=0.0))
+        if ROUNDING * farthest > FEWEST_DIGITS * max(self.clearance, 1e-6):
+            far = (
+                f"the static force would push a mode of {hertz[held][np.argmax(away)]:.3g} Hz {farthest:.2g} m away: "
+                f"positions are good to {ROUNDING * farthest:.1g} m only; write 0 Hz if the body is free"
+            )
+        return tuple(note for note in (rigid if slow else "", far) if note)
 
     def share_of_bound(self, states: Array, peak_force: Array) -> float:
         """Share of the bound of passivity: only the drive gives energy, and what a preload or offset has stored."""

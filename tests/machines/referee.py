@@ -1,0 +1,181 @@
+"""A machine of modes by other means: matrix exponentials and bisection, with the work of every force on the way.
+
+The augmented coordinates z = (q, q', 1, cos and sin of each harmonic) of a machine between two changes of contact obey
+z' = A z, and every power is a quadratic form z' Q z. So a step is expm(A h), the work done in it is z' G z with
+G = int expm(A s)' Q expm(A s) ds by Van Loan's exponential, and an event is found by halving the step. No modes of the
+machine in contact, no rest positions, no bounds: nothing is shared with the kernel but the matrices.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.linalg import expm
+
+HALVINGS = 36
+PHASE = 0.1
+MOST_STAYS = 20_000
+GAP, CONTACT, DETACHED = range(3)
+
+
+@dataclass
+class Balance:
+    """Work of the loads, what is dissipated, and the sum of both without signs [J]."""
+
+    work: float = 0.0
+    dissipated: float = 0.0
+    through: float = 0.0
+
+
+class _Regime:
+    """Steps of h / 2^k in one regime, and the integrals of work and dissipation over them."""
+
+    def __init__(self, a, power, loss, h):
+        self.a, self.h, size = a, h, len(a)
+        block = np.zeros((2 * size, 2 * size))
+        block[:size, :size], block[size:, size:] = -a.T, a
+        self.steps, self.works, self.losses = [], [], []
+        for k in range(HALVINGS):
+            step = expm(a * h / 2**k)
+            self.steps.append(step)
+            for form, kept in ((power, self.works), (loss, self.losses)):
+                block[:size, size:] = form
+                kept.append(step.T @ expm(block * h / 2**k)[:size, size:])
+
+
+class Referee:
+    """Follows a ``ModalImpactModel`` cycle by cycle."""
+
+    def __init__(self, model):
+        self.model, self.n = model, len(model.tip_shape)
+        n, tip = self.n, model.tip_shape
+        self.omega = 2.0 * np.pi * model.excitation_frequency
+        drive = model.drive[0] + self.omega**2 * model.drive[1]
+        harmonics = len(drive)
+        size = 2 * n + 1 + 2 * harmonics
+        base = np.zeros((size, size))
+        base[:n, n : 2 * n] = np.eye(n)
+        base[n : 2 * n, :n], base[n : 2 * n, n : 2 * n] = -np.diag(model.stiffness), -model.damping
+        load = np.zeros((n, size))
+        load[:, 2 * n] = model.static_force
+        for g in range(harmonics):
+            c, s = 2 * n + 1 + 2 * g, 2 * n + 2 + 2 * g
+            load[:, c], load[:, s] = drive[g]
+            base[c, s], base[s, c] = -(g + 1) * self.omega, (g + 1) * self.omega
+        base[n : 2 * n] += load
+        power = np.zeros((size, size))
+        power[n : 2 * n] = load
+        loss = np.zeros((size, size))
+        loss[n : 2 * n, n : 2 * n] = model.damping
+        self.x_row, self.v_row = np.zeros(size), np.zeros(size)
+        self.x_row[:n], self.v_row[n : 2 * n] = tip, tip
+        self.regimes = {}
+        for side in (0, 1, -1):
+            if side and not np.isfinite(model.stops[(1 - side) // 2]):
+                continue
+            for state in (GAP,) if side == 0 else (CONTACT, DETACHED):
+                a, lost = base.copy(), loss.copy()
+                if side:
+                    k, d, depth, force = self.contact(side)
+                    if state == CONTACT:
+                        a[n : 2 * n] -= side * np.outer(tip, force)
+                        lost += d * np.outer(self.v_row, self.v_row)
+                    else:
+                        lost -= k * np.outer(depth, side * self.v_row)
+                rate = max(np.max(np.abs(np.linalg.eigvals(a))), harmonics * self.omega)
+                self.regimes[state, side] = _Regime(a, power, lost, PHASE / rate)
+
+    def contact(self, side):
+        """Spring, damper, and the rows of penetration and force of a stop."""
+        i = (1 - side) // 2
+        k, d = self.model.contact_stiffness[i], self.model.contact_damping[i]
+        depth = side * self.x_row
+        depth[2 * self.n] -= side * self.model.stops[i]
+        return k, d, depth, k * depth + d * side * self.v_row
+
+    def energy(self, state):
+        """Energy [J] of modes and springs of the stops."""
+        q, v = np.split(np.asarray(state), 2)
+        total = 0.5 * float(v @ v + self.model.stiffness @ q**2)
+        for side in (1, -1):
+            if np.isfinite(self.model.stops[(1 - side) // 2]):
+                k, _, depth, _ = self.contact(side)
+                beyond = max(0.0, float(depth[: self.n] @ q + depth[2 * self.n]))
+                total += 0.5 * k * beyond**2
+        return total
+
+    def start(self, state):
+        """Augmented coordinates of a state at the start of a cycle."""
+        z = np.zeros(len(self.x_row))
+        z[: 2 * self.n], z[2 * self.n] = state, 1.0
+        z[2 * self.n + 1 :: 2] = 1.0
+        return z
+
+    leaving: ClassVar = {
+        GAP: lambda self, side: [(-self.contact(s)[2], s) for s in (1, -1) if (CONTACT, s) in self.regimes],
+        CONTACT: lambda self, side: [(self.contact(side)[3], 0)],
+        DETACHED: lambda self, side: [(self.contact(side)[2], 0), (-self.contact(side)[3], side)],
+    }
+
+    def cycle(self, state):
+        """(State after one cycle, ``Balance``, largest force, number of touches)."""
+        z, balance, peak, touches, stays = self.start(state), Balance(), 0.0, 0, 0
+        where, side = GAP, 0
+        for s in (1, -1):
+            if (CONTACT, s) in self.regimes:
+                _, _, depth, force = self.contact(s)
+                if depth @ z > 0.0:
+                    where, side = (CONTACT if force @ z > 0.0 else DETACHED), s
+        left = 1.0 / self.model.excitation_frequency
+        while True:
+            regime, ends = self.regimes[where, side], self.leaving[where](self, side)
+            rows = np.array([row for row, _ in ends]).reshape(len(ends), len(z))
+            z, spent, fired = self._until(regime, rows, z, left, balance)
+            if where == CONTACT:
+                peak = max(peak, fired[1])
+            left, stays = left - spent, stays + 1
+            assert stays < MOST_STAYS
+            if fired[0] is None:
+                break
+            target = ends[fired[0]][1]
+            if where == GAP or (where == DETACHED and target):
+                where, side, touches = CONTACT, target, touches + 1
+            elif where == CONTACT:
+                where = DETACHED
+            else:
+                where, side = GAP, 0
+        return z[: 2 * self.n], balance, peak, touches
+
+    def _until(self, regime, rows, z, left, balance):
+        """Follow z until a row falls through zero or the time is up: (z, time, (row or None, largest first row)).
+
+        A row that starts at zero or just below and rises, as after the event that began the stay, waits until it is
+        above; one that falls ends the stay at once.
+        """
+        spent, values, slopes = 0.0, rows @ z, rows @ (regime.a @ z)
+        largest, waits = max([0.0, *values[:1]]), (values <= 0.0) & (slopes > 0.0)
+        if np.any((values < 0.0) & ~waits):
+            return z, 0.0, (int(np.argmax((values < 0.0) & ~waits)), largest)
+        while True:
+            # the longest of the halved steps that fits, and then the longest in which nothing ends
+            k = 0
+            while k < HALVINGS and regime.h / 2**k > left - spent:
+                k += 1
+            if k == HALVINGS or spent + regime.h / 2**k == spent:
+                return z, spent, (None, largest)
+            while True:
+                ahead = regime.steps[k] @ z
+                values, middle = rows @ ahead, rows @ (regime.steps[min(k + 1, HALVINGS - 1)] @ z)
+                fallen = ((values < 0.0) | (middle < 0.0)) & ~waits
+                if k == HALVINGS - 1 or not fallen.any():
+                    break
+                k += 1
+            work, loss = float(z @ regime.works[k] @ z), float(z @ regime.losses[k] @ z)
+            balance.work += work
+            balance.dissipated += loss
+            balance.through += abs(work) + abs(loss)
+            z, spent = ahead, spent + regime.h / 2**k
+            largest = max([largest, *values[:1]])
+            if fallen.any():
+                return z, spent, (int(np.argmax(fallen)), largest)
+            waits &= values <= 0.0
