@@ -5,16 +5,19 @@ import json
 import re
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import chaosgym
 from chaosgym.cli import main
-from chaosgym.design import Criteria
+from chaosgym.design import Criteria, assess
 from chaosgym.design.brief import brief_from, template
 from chaosgym.design.measured import evaluate_peaks
-from chaosgym.design.study import study
+from chaosgym.design.study import contradictions, study
+from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import DesignError
 from chaosgym.plotting.design_report import design_report, measured_report, write_report
 from tests.browser import CHROMIUM, Browser
@@ -44,6 +47,34 @@ clearance = ["0.0635 mm"]
 def answered():
     """A study of the calm beam, which misses its life until its clearance is reduced."""
     return study(brief_from(tomllib.loads(CALM)))
+
+
+def test_a_report_that_denies_its_own_machines_is_not_written(answered):
+    """Type, largest force and verdict are held against every machine that was built."""
+    assert contradictions(answered) == []
+    found = answered.assessment
+    wild = replace(found.series, runs=(replace(found.series.runs[0], nature="chaotic"), *found.series.runs[1:]))
+    low = replace(found.evaluation, largest_force=1.0)
+    for name, changed in {
+        "not periodic": replace(found, response=replace(found.response, type="I"), series=wild),
+        "largest peak": replace(found, response=replace(found.response, type="II"), evaluation=low),
+        "does not follow": replace(found, verdict="meets"),
+        "nominal machine": replace(found, nominal=replace(found.nominal, nature="chaotic")),
+    }.items():
+        assert any(name in line for line in contradictions(replace(answered, assessment=changed))), name
+
+
+@pytest.mark.parametrize("speed", [30.0, 35.0, 45.0])
+def test_the_type_of_a_tube_is_that_of_the_worst_machine_within_its_tolerances(speed):
+    """A tube in a loose baffle: no Type I beside a machine that is not periodic, and no force above the largest."""
+    tube = chaosgym.read_machine("docs/machines/heat-exchanger-tube.toml").at(speed, 0.3e-3)
+    region = {"speed": Tolerance(0.02), "clearance": Tolerance(0.1), "damping_factor": Tolerance(0.2)}
+    found = assess(tube, region, Criteria(load_rating=500.0), series_size=16)
+    wild = [run.nature for run in found.series.runs if run.nature != "periodic"]
+    assert found.type != "I" or not wild
+    assert all(f"{wild.count(nature)} {nature}" in found.series.told for nature in set(wild))
+    if found.type == "II":
+        assert found.evaluation.largest_force >= max(run.largest_peak for run in found.series.runs)
 
 
 @pytest.fixture(scope="module")

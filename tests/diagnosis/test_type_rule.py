@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
-from chaosgym.diagnosis.type_rule import Neighbour, judge_type, type_of_cross, types_on_grid
+from chaosgym.diagnosis.type_rule import Built, Neighbour, judge_type, surrounded, type_of_cross, types_on_grid
 from chaosgym.errors import DiagnosisError
 
 CALM_THROUGHOUT = "periodic throughout the neighbourhood, peak force less than 10 % higher"
@@ -112,3 +113,44 @@ def test_each_axis_of_a_grid_has_two_sides():
     expected = [["II", "III", "II", "I"], ["II", "III", "III", "II"], ["III", "III", "II", "I"]]
     assert types_on_grid(natures, np.ones((3, 4)), reach=1).tolist() == expected
     assert types_on_grid(["periodic"] * 3, [100.0, 120.0, 100.0]).tolist() == ["II", "I", "II"]
+
+
+def machines(*natures, peak=100.0):
+    """Machines of a region with speed and clearance above and below nominal, in turn."""
+    corners = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
+    return [
+        Built(dict(zip(("speed", "gap"), corner, strict=True)), nature, peak)
+        for corner, nature in zip(corners, natures, strict=True)
+    ]
+
+
+def test_machines_that_are_not_periodic_on_all_sides_make_type_iii():
+    """Two opposite corners of the region hold the nominal machine between them (thesis 5.5.1, case III)."""
+    kind, why = judge_type("periodic", 100.0, CALM, built=machines("chaotic", "periodic", "periodic", "undetermined"))
+    assert kind == "III"
+    assert why == "2 of 4 machines in the tolerances are not periodic (1 undetermined), on all sides of the nominal one"
+
+
+def test_machines_that_are_not_periodic_on_one_side_make_type_ii():
+    """Chaos at high speed alone fills a part of the region, beside which the nominal machine lies (case II)."""
+    assert judge_type("periodic", 100.0, CALM, built=machines("chaotic", "periodic", "chaotic", "periodic"))[0] == "II"
+
+
+def test_no_machine_of_the_region_is_overlooked():
+    """Whatever the one-parameter neighbours do, one machine off its period or 10 % higher is no Type I."""
+    assert judge_type("periodic", 100.0, CALM, built=machines(*["periodic"] * 4))[0] == "I"
+    for odd in range(4):
+        natures = ["periodic"] * 4
+        natures[odd] = "undetermined"
+        assert judge_type("periodic", 100.0, CALM, built=machines(*natures))[0] == "II"
+    assert judge_type("periodic", 100.0, CALM, built=machines(*["periodic"] * 4, peak=111.0))[0] == "II"
+
+
+def test_a_hull_is_that_of_a_linear_program():
+    """Whether random points surround the origin, against scipy's linear programming."""
+    rng = np.random.default_rng(2)
+    for _ in range(50):
+        places = rng.uniform(-1.0, 1.0, (rng.integers(1, 12), 3)) + rng.uniform(-0.5, 0.5, 3)
+        equal = np.vstack([places.T, np.ones(len(places))])
+        feasible = linprog(np.zeros(len(places)), A_eq=equal, b_eq=[0.0, 0.0, 0.0, 1.0]).status == 0
+        assert surrounded([dict(zip("xyz", place, strict=True)) for place in places]) == feasible

@@ -9,16 +9,17 @@ r"""The design methodology of thesis 5.6: does a machine meet its criteria, what
     VII  verdict             against the criteria; if it fails, change and go back to I       ``improve``
 
 Type I: peak forces follow a trend, log F = log F_0 + sum b_i d_i with deviations d_i in tolerances; the evaluation
-takes the trend to the unfavourable corner of the region. With no tolerances it is the classical answer for the nominal
-machine. Type II: the largest peak found anywhere in the region. Type III: the peaks of all machines of the region
-together, each machine equally likely; the verdict takes the unfavourable end of the confidence interval.
+takes the trend to the unfavourable corner of the region, or to the worst machine found if that is worse. With no
+tolerances it is the classical answer for the nominal machine. Type II: the largest peak found anywhere in the region.
+Type III: the peaks of all machines of the region together, each machine equally likely; the verdict takes the
+unfavourable end of the confidence interval.
 
 Together is not one by one: in a region of Type III some machines live much longer than others. So a share of the
 machines must meet the criteria by their own statistics too, whatever the type.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -30,7 +31,7 @@ from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.reliability import time_blocks
 from chaosgym.design.runs import DIAGNOSIS_BUDGET, NOMINAL_BUDGET, Series, SettledRun, build_series, settled_run
 from chaosgym.design.statistics import Convergence, convergence
-from chaosgym.diagnosis import ResponseType, Tolerance, Type, default_tolerances, response_type
+from chaosgym.diagnosis import Built, ResponseType, Tolerance, Type, default_tolerances, diagnose, response_type
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
 
@@ -189,6 +190,7 @@ def assess(
     criteria: Criteria | None = None,
     *,
     series_size: int = SERIES_SIZE,
+    further: Sequence[Built] = (),
     seed: int = 0,
     workers: int | None = None,
     progress: bool = False,
@@ -205,6 +207,8 @@ def assess(
         Bearing data and requirements; the defaults of ``Criteria`` if None.
     series_size
         Machines that represent the region.
+    further
+        Machines of the region that were run already: they count for the type and for the largest force.
     seed
         Of the series and the bootstrap.
     workers
@@ -222,14 +226,16 @@ def assess(
     region = default_tolerances(machine) if tolerances is None else dict(tolerances)
     criteria = criteria or Criteria()
     exponent = criteria.life_exponent
-    response = response_type(machine, region, budget=DIAGNOSIS_BUDGET, workers=workers)
-    nominal = settled_run(machine, until_converged=True, budget=NOMINAL_BUDGET)
+    centre = diagnose(machine, budget=NOMINAL_BUDGET)
+    nominal = settled_run(machine, verdict=centre, until_converged=True, budget=NOMINAL_BUDGET)
     series = build_series(machine, region, series_size, seed=seed, workers=workers, progress=progress)
+    built = [*series.built, *further]
+    response = response_type(machine, region, budget=DIAGNOSIS_BUDGET, centre=centre, workers=workers).over(built)
     force = equivalent_force(nominal.worse_side(exponent), exponent)
     forces = np.array([equivalent_force(run.worse_side(exponent), exponent) for run in series.runs])
     trend = fit_trend(series.parameters, series.shares, forces, force)
     own = evaluate(time_blocks(nominal.worse_side(exponent)), criteria, "statistics of the nominal machine", seed)
-    evaluation = _by_type(response, nominal, series, trend, criteria, seed)
+    evaluation = _by_type(response, built, nominal, series, trend, criteria, seed)
     share = _share_that_meets(series.runs or (nominal,), criteria, seed)
     checks = _checks(response.type, evaluation, share, criteria)
     return Assessment(
@@ -250,19 +256,27 @@ def assess(
 
 
 def _by_type(
-    response: ResponseType, nominal: SettledRun, series: Series, trend: Trend, criteria: Criteria, seed: int
+    response: ResponseType,
+    built: Sequence[Built],
+    nominal: SettledRun,
+    series: Series,
+    trend: Trend,
+    criteria: Criteria,
+    seed: int,
 ) -> Evaluation:
     exponent = criteria.life_exponent
+    found = [one.largest_peak for one in built] + [point.largest_peak for point in response.neighbours]
+    worst = float(np.nanmax([nominal.largest_peak, *found, *response.coexisting_peaks]))
     if response.type == "I":
-        peaks = trend.worst_factor * nominal.worse_side(exponent)
+        own = nominal.worse_side(exponent)
+        factor = max(trend.worst_factor, worst / own.max()) if own.any() else 1.0
+        peaks = factor * own
         return evaluate(
             [peaks], criteria, "Type I: the trend, taken to the unfavourable corner of the tolerances", seed
         )
     if response.type == "II":
-        found = [run.largest_peak for run in (nominal, *series.runs)]
-        found += [point.largest_peak for point in response.neighbours] + list(response.coexisting_peaks)
         method = "Type II: the largest peak force found in the tolerances, in every cycle"
-        return evaluate([np.array([np.nanmax(found)])], criteria, method, seed)
+        return evaluate([np.array([worst])], criteria, method, seed)
     blocks = [run.worse_side(exponent) for run in (nominal, *series.runs)]
     if len(blocks) == 1:
         return evaluate(time_blocks(blocks[0]), criteria, "Type III: statistics of the nominal machine", seed)

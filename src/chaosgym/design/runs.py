@@ -1,5 +1,6 @@
 """Settled runs of one machine, or of a series built to its tolerances."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.design.statistics import convergence
-from chaosgym.diagnosis import Nature, Tolerance, diagnose
+from chaosgym.diagnosis import Built, Diagnosis, Nature, Tolerance, diagnose
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import MotionState, parallel_map, rest_state, simulate
@@ -21,6 +22,9 @@ SERIES_CYCLES = 200
 
 DIAGNOSIS_BUDGET = 400
 """Cycles that the diagnosis of one machine of a series may take."""
+
+RETRY = 8
+"""Budgets that a machine may take which is undetermined after one."""
 
 NOMINAL_BUDGET = 1600
 """Cycles that the diagnosis of the nominal machine may take."""
@@ -65,7 +69,12 @@ class SettledRun:
 
 
 def settled_run(
-    machine: Machine, *, cycles: int = SERIES_CYCLES, until_converged: bool = False, budget: int = DIAGNOSIS_BUDGET
+    machine: Machine,
+    *,
+    verdict: Diagnosis | None = None,
+    cycles: int = SERIES_CYCLES,
+    until_converged: bool = False,
+    budget: int = DIAGNOSIS_BUDGET,
 ) -> SettledRun:
     """Run a machine from rest until it has settled, and record its peak forces.
 
@@ -73,19 +82,23 @@ def settled_run(
     ----------
     machine
         What to run.
+    verdict
+        On the machine from rest, if it is known already.
     cycles
         Cycles to record of a response that does not repeat; of one that does, its period.
     until_converged
         Go on, doubling the record, until mean and deviation have converged on the worse surface.
     budget
-        Cycles that the diagnosis may take.
+        Cycles that the diagnosis may take; eight times as many where it stays undetermined.
 
     Raises
     ------
     SimulationError
         If the run can't be finished.
     """
-    verdict = diagnose(machine, budget=budget)
+    verdict = verdict or diagnose(machine, budget=budget)
+    if verdict.nature == "undetermined":
+        verdict = diagnose(machine, budget=RETRY * budget)
     state = MotionState(np.asarray(verdict.evidence["final_state"]), rest_state(machine).bouncing)
     repeats = verdict.nature == "periodic" and verdict.period is not None
     record = simulate(machine, verdict.period if repeats and verdict.period else cycles, state)
@@ -117,6 +130,21 @@ class Series:
     parameters: tuple[str, ...]
     shares: Array
     runs: tuple[SettledRun, ...]
+
+    @property
+    def told(self) -> str:
+        """How many of its machines are of each nature, for people."""
+        counts = Counter(run.nature for run in self.runs).most_common()
+        natures = ", ".join(f"{n} {nature}" for nature, n in counts) or "none built"
+        return f"{natures} of {len(self.runs)} machines in the tolerances"
+
+    @property
+    def built(self) -> tuple[Built, ...]:
+        """Deviations, nature and largest peak of each machine."""
+        return tuple(
+            Built(dict(zip(self.parameters, row.tolist(), strict=True)), run.nature, run.largest_peak)
+            for row, run in zip(self.shares, self.runs, strict=True)
+        )
 
 
 def build_series(

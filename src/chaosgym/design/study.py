@@ -12,7 +12,8 @@ from chaosgym.design.methodology import Assessment, assess
 from chaosgym.design.peak_impacts import PeakImpactDiagram, filling_cycles, peak_impacts, worn_side
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
 from chaosgym.design.trends import HISTORY_SAMPLES, LifeTrend, life_against
-from chaosgym.diagnosis import ResponseMap, response_map
+from chaosgym.diagnosis import Built, ResponseMap, response_map
+from chaosgym.diagnosis.type_rule import FORCE_CHANGE
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, simulate
@@ -20,6 +21,9 @@ from chaosgym.version import __version__
 
 MAP_SHARES = np.arange(-4, 5) / 2.0
 """Points of the map along speed and clearance, in tolerances."""
+
+MIDDLE = len(MAP_SHARES) // 2
+"""Place of the nominal machine along each axis of the map."""
 
 TREND_POINTS = 53
 """Speeds of the life trend."""
@@ -72,6 +76,7 @@ class DesignStudy:
         lines = [
             f"{found.machine.name}: {found.verdict}",
             f"  Type {found.type}: {found.response.reason}; {found.evaluation.method.partition(': ')[2]}",
+            f"  {found.series.told}",
             *(
                 f"  {check.name:19s} {check.reached:.6g} of {check.required:g} {check.unit}".rstrip()
                 + (" met" if check.met else " NOT met")
@@ -145,13 +150,17 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
         If a tolerance leads out of its field's range.
     SimulationError
         If a run of the nominal machine or its series can't be finished.
+    DesignError
+        If the study contradicts itself, see ``contradictions``.
     """
     machine = brief.machine
+    around = _map(brief, workers, progress)
     assessment = assess(
         machine,
         brief.region,
         brief.criteria,
         series_size=brief.series_size,
+        further=_in_tolerance(around),
         seed=seed,
         workers=workers,
         progress=progress,
@@ -169,15 +178,68 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
         )
     record = simulate(machine, DIAGRAM_CYCLES, transient=DIAGRAM_CYCLES, samples_per_cycle=HISTORY_SAMPLES)
     side = int(np.argmax(np.sum(record.peak_force**brief.criteria.life_exponent, axis=0)))
-    return DesignStudy(
+    answer = DesignStudy(
         brief,
         assessment,
         improvement,
-        _map(brief, workers, progress),
+        around,
         _life_over_speed(machine, workers, progress),
         peak_impacts(record, worn_side(record, brief.criteria.life_exponent)),
         _every_impact(record, side, brief),
         seed,
+    )
+    if found := contradictions(answer):
+        raise DesignError(f"the report contradicts itself, which is a fault of this program: {'; '.join(found)}")
+    return answer
+
+
+def contradictions(answer: DesignStudy) -> list[str]:
+    """Statements of a study that its own machines deny; none of a study that ``study`` returns.
+
+    The type is held against every machine of the series, of the neighbourhood and of the map within the tolerances,
+    the largest force against theirs, the verdict against its checks, and map and life over speed against the nominal
+    machine.
+    """
+    found, trend = answer.assessment, answer.life_over_speed
+    region = [(one.nature, one.largest_peak) for one in (*found.series.built, *_in_tolerance(answer.map))]
+    region += [(point.nature, point.largest_peak) for point in found.response.neighbours]
+    said = []
+    if found.type == "I" and any(nature != "periodic" for nature, _ in region):
+        said.append("Type I, with machines in the tolerances that are not periodic")
+    largest = max([found.nominal.largest_peak, *(peak for _, peak in region)])
+    if found.type == "I" and largest > (1.0 + FORCE_CHANGE) * found.response.largest_peak:
+        said.append(f"Type I, with {largest:.4g} N in the tolerances and {found.response.largest_peak:.4g} N nominally")
+    if found.type in ("I", "II") and found.evaluation.largest_force < largest * (1.0 - 1e-9):
+        said.append(f"largest peak {found.evaluation.largest_force:.4g} N, with {largest:.4g} N in the tolerances")
+    if (found.verdict == "meets") != (found.type != "undetermined" and all(check.met for check in found.checks)):
+        said.append(f"the verdict {found.verdict!r} does not follow from type and checks")
+    elsewhere: dict[str, str] = {"the response type": found.response.centre.nature}
+    if answer.map is not None:
+        elsewhere["the map"] = str(answer.map.nature[MIDDLE, MIDDLE])
+    if trend is not None:
+        at = np.flatnonzero(trend.values == getattr(found.machine, trend.field))
+        elsewhere["life over speed"] = trend.nature[int(at[0])] if len(at) else "undetermined"
+    for where, nature in elsewhere.items():
+        if nature != found.nominal.nature and "undetermined" not in (nature, found.nominal.nature):
+            said.append(f"the nominal machine is {found.nominal.nature}, and {nature} in {where}")
+    return said
+
+
+def _in_tolerance(around: ResponseMap | None) -> tuple[Built, ...]:
+    """Machines of the map within the tolerances of speed and clearance, but for the nominal one."""
+    if around is None:
+        return ()
+    inside = np.flatnonzero(np.abs(MAP_SHARES) <= 1.0)
+    fields = (around.machine.speed_field, around.machine.clearance_field)
+    return tuple(
+        Built(
+            dict(zip(fields, (float(MAP_SHARES[i]), float(MAP_SHARES[j])), strict=True)),
+            str(around.nature[i, j]),
+            float(np.nan_to_num(around.largest_peak[i, j])),
+        )
+        for i in inside
+        for j in inside
+        if MAP_SHARES[i] or MAP_SHARES[j]
     )
 
 

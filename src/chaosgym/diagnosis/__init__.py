@@ -15,11 +15,12 @@ from chaosgym.diagnosis.response_map import ResponseMap, geometric_grid, respons
 from chaosgym.diagnosis.response_type import ResponseType, Tolerance, default_tolerances, response_type
 from chaosgym.diagnosis.spectrum import power_spectrum
 from chaosgym.diagnosis.two_step import two_step_test
-from chaosgym.diagnosis.type_rule import Neighbour, judge_type, types_on_grid
+from chaosgym.diagnosis.type_rule import Built, Neighbour, judge_type, types_on_grid
 from chaosgym.diagnosis.zero_one import zero_one_statistic
 
 __all__ = [
     "TYPES",
+    "Built",
     "Diagnosis",
     "LyapunovExponent",
     "Nature",

@@ -6,15 +6,15 @@ the tolerance and all of it, each from rest. The statistic is the largest peak f
 What follows from that is the rule of ``type_rule``. Window, statistic and initial states are part of the label.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.response import Diagnosis, Type
-from chaosgym.diagnosis.type_rule import FORCE_CHANGE, Neighbour, judge_type
+from chaosgym.diagnosis.type_rule import FORCE_CHANGE, Built, Neighbour, judge_type
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
@@ -93,6 +93,12 @@ class ResponseType:
     neighbours: tuple[Neighbour, ...]
     coexisting_peaks: tuple[float, ...]
     definition: Mapping[str, Any]
+
+    def over(self, built: Sequence[Built]) -> "ResponseType":
+        """Return the type over machines that deviate in several parameters at once, too."""
+        centre = self.centre.nature, self.largest_peak
+        kind, reason = judge_type(*centre, self.neighbours, self.coexisting_peaks, built)
+        return replace(self, type=kind, reason=reason)
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""

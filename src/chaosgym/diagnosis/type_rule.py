@@ -1,15 +1,19 @@
 r"""The rule of thesis 5.5: which type follows from what a response and its neighbourhood do.
 
-    III           the centre is not periodic; or points that are not periodic lie on both sides along one parameter;
-                  or attractors that coexist at the centre have largest peaks more than 10 % apart
+    III           the centre is not periodic; or points that are not periodic surround it; or attractors that coexist
+                  at the centre have largest peaks more than 10 % apart
     II            otherwise, if some point exceeds the centre's largest peak by 10 % or is not periodic
     I             the rest
     undetermined  if the centre is
 
+Points surround the centre if it lies in their convex hull: on both sides along one parameter, or, of machines that
+deviate in several parameters at once, on no one side of it. So periodic and chaotic responses are mixed around it (case
+III of 5.5.1); otherwise the chaotic ones fill a part of the region that the centre is beside (case II).
+
 A point that is undetermined is not known to be periodic, and counts as not periodic.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -40,8 +44,20 @@ class Neighbour(NamedTuple):
         return f"{'above' if self.side > 0 else 'below'} the nominal {self.parameter}"
 
 
+class Built(NamedTuple):
+    """A machine of the region: its deviation in each parameter, in tolerances, and what it does."""
+
+    shares: Mapping[str, float]
+    nature: str
+    largest_peak: float
+
+
 def judge_type(
-    nature: str, largest_peak: float, neighbours: Iterable[Neighbour], coexisting_peaks: Sequence[float] = ()
+    nature: str,
+    largest_peak: float,
+    neighbours: Iterable[Neighbour],
+    coexisting_peaks: Sequence[float] = (),
+    built: Sequence[Built] = (),
 ) -> tuple[Type, str]:
     """Type of a response and its reason, from what the centre and its neighbourhood do.
 
@@ -53,6 +69,13 @@ def judge_type(
         Points of the neighbourhood.
     coexisting_peaks
         Largest peaks at the centre from other initial states.
+    built
+        Machines that deviate in several parameters at once.
+
+    Examples
+    --------
+    >>> judge_type("periodic", 50.0, [Neighbour("speed", 1, "chaotic", 60.0)])
+    ('II', 'chaotic above the nominal speed')
     """
     neighbours = list(neighbours)
     if nature == "undetermined":
@@ -66,13 +89,41 @@ def judge_type(
     for name in dict.fromkeys(point.parameter for point in restless):
         if len({point.side for point in restless if point.parameter == name}) == 2:
             return "III", f"not periodic on both sides along {name}"
+    wild = [one for one in built if one.nature != "periodic"]
+    found = f"{len(wild)} of {len(built)} machines in the tolerances are not periodic"
+    found += f" ({sum(one.nature == 'undetermined' for one in wild)} undetermined)" if wild else ""
+    if wild and surrounded([one.shares for one in wild] + [{point.parameter: point.side} for point in restless]):
+        return "III", f"{found}, on all sides of the nominal one"
     if restless:
         return "II", f"{restless[0].nature} {restless[0].place}"
+    if wild:
+        return "II", found
     for point in neighbours:
         if point.largest_peak > (1.0 + FORCE_CHANGE) * largest_peak:
             more = point.largest_peak / largest_peak - 1.0 if largest_peak > 0.0 else np.inf
             return "II", f"peak force {more:.0%} higher {point.place}"
+    worst = max((one.largest_peak for one in built), default=0.0)
+    if worst > (1.0 + FORCE_CHANGE) * largest_peak:
+        return "II", f"peak force up to {worst:.4g} N in the tolerances, nominal {largest_peak:.4g} N"
     return "I", "periodic throughout the neighbourhood, peak force less than 10 % higher"
+
+
+def surrounded(points: Sequence[Mapping[str, float]]) -> bool:
+    """Whether the origin lies in the convex hull of points, each given by its coordinates that are not zero.
+
+    Examples
+    --------
+    >>> surrounded([{"speed": -1.0}, {"speed": 0.5}])
+    True
+    >>> surrounded([{"speed": 1.0, "gap": 0.2}, {"speed": 0.5, "gap": -1.0}])
+    False
+    """
+    from scipy.optimize import nnls  # slow to import, and few questions need it
+
+    names = sorted({name for point in points for name in point})
+    places = np.array([[point.get(name, 0.0) for name in names] for point in points])
+    equations = np.vstack([places.T, np.ones(len(places))])  # weights of sum 1 whose mean place is the origin
+    return float(nnls(equations, np.append(np.zeros(len(names)), 1.0))[1]) < 1e-9
 
 
 def type_of_cross(
