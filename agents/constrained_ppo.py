@@ -22,12 +22,12 @@ from torch import nn
 from tqdm import tqdm
 
 from chaosgym.control.policies import save_policy
-from chaosgym.control.policies.checkpoint import load_checkpoint, save_checkpoint
+from chaosgym.control.policies.checkpoint import load_checkpoint, run_folder, save_checkpoint
 from chaosgym.control.policies.export import exported
 from chaosgym.envs import SB3VecEnv
 from chaosgym.envs.sb3 import SB3VisitedSpeeds
 from chaosgym.errors import ChaosgymError
-from chaosgym.files import held, write_atomically
+from chaosgym.files import write_atomically
 
 Array = NDArray[np.float32]
 
@@ -211,7 +211,7 @@ def main() -> None:
     asked = arguments()
     torch.set_num_threads(1)
     try:
-        with held(asked.out):
+        with run_folder(asked.out):
             train(asked)
     except ChaosgymError as error:
         print(f"Error: {error}", file=sys.stderr)

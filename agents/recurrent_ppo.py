@@ -20,11 +20,11 @@ from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 from tqdm import tqdm
 
 from chaosgym.control.policies import save_policy
-from chaosgym.control.policies.checkpoint import load_checkpoint, save_checkpoint
+from chaosgym.control.policies.checkpoint import load_checkpoint, run_folder, save_checkpoint
 from chaosgym.control.policies.export import exported
 from chaosgym.envs import SB3VecEnv
 from chaosgym.errors import ChaosgymError
-from chaosgym.files import held, write_atomically
+from chaosgym.files import write_atomically
 
 HOLD_BIAS = 2.0
 """Logit of holding the speed at the start: motion settles only at a speed that is held."""
@@ -104,7 +104,7 @@ def main() -> None:
     asked = arguments()
     torch.set_num_threads(1)
     try:
-        with held(asked.out):
+        with run_folder(asked.out):
             train(asked)
     except ChaosgymError as error:
         print(f"Error: {error}", file=sys.stderr)

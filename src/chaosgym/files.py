@@ -1,13 +1,15 @@
 """Files that are either whole or not there, also after a crash, and folders that one process at a time writes into.
 
-Archives of arrays are read without pickle, and only as far as a bound on their unpacked size allows. Tables are CSV or
-Parquet by the end of the name.
+What comes from outside is read here: files of a bounded size, no devices; arrays without pickle, and only as large as
+their bytes and a bound on the unpacked size allow. Tables are CSV or Parquet by the end of the name.
 """
 
 import io
+import math
 import os
+import stat
+import tomllib
 import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,30 +19,107 @@ import numpy as np
 from filelock import FileLock, Timeout
 from numpy.typing import ArrayLike
 
-from chaosgym.errors import DatasetError, UnfinishedError
+from chaosgym.errors import ChaosgymError, DatasetError, UnfinishedError
 
 LOCK_FILE = ".lock"
-TEMPORARY = ".*.tmp"
-"""Pattern of temporary files; a process that was killed may leave one."""
+OWN_END = "chaosgym.tmp"
+TEMPORARY = f".*.{OWN_END}"
+"""Pattern of this package's temporary files; a process that was killed may leave one."""
 
-DAMAGE = (
-    *(OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, EOFError, RecursionError),
-    *(zipfile.BadZipFile, zlib.error),
-)
-"""What the reading of a damaged archive raises, and of a description in JSON."""
+DAMAGE = (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, EOFError, RecursionError, OverflowError)
+"""What the reading of a damaged description in JSON, or of its arrays, raises."""
 
 
 def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
-    """Let ``write`` fill a temporary file beside ``path``, then rename it; both reach the disk before this returns."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    """Let ``write`` fill a temporary file beside ``path``, then rename it; both reach the disk before this returns.
+
+    A link stays one: the file that it names is replaced. The new file has the mode of the old one.
+
+    Raises
+    ------
+    ChaosgymError
+        If there is something under the name that is no file, such as a pipe or a device.
+    """
+    target = replaceable(path)
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.{OWN_END}")
     try:
+        if target.exists():  # never readable by more people than before, not even while it is written
+            temporary.unlink(missing_ok=True)
+            mode = stat.S_IMODE(target.stat().st_mode)
+            os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
+            os.chmod(temporary, mode | stat.S_IWUSR)
         write(temporary)
         _flush(temporary)
-        os.replace(temporary, path)
+        if target.exists():
+            os.chmod(temporary, mode)
+        os.replace(temporary, target)
         if os.name == "posix":
-            _flush(path.parent)
+            _flush(target.parent)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def replaceable(path: str | Path) -> Path:
+    """Return the file that a name stands for, links resolved, whether it exists or not.
+
+    Raises
+    ------
+    ChaosgymError
+        If there is something under the name that is no file.
+    """
+    target = Path(os.path.realpath(path))
+    if target.exists() and not target.is_file():
+        raise ChaosgymError(f"{path} is {_kind(target.stat().st_mode)}; allowed: a file, or a name that is free")
+    return target
+
+
+def _kind(mode: int) -> str:
+    kinds = ((stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
+    return next((word for test, word in kinds if test(mode)), "a device")
+
+
+def contents(path: str | Path, largest: int, *, pipes: bool = False) -> bytes:
+    """Bytes of a file.
+
+    Parameters
+    ----------
+    path
+        Of a file; of a pipe too, if ``pipes``.
+    largest
+        Bytes that it may have.
+
+    Raises
+    ------
+    ValueError
+        If it is missing, no file, or larger; the message goes on after the name of the file.
+    """
+    try:
+        about = os.stat(path)
+        if not (stat.S_ISREG(about.st_mode) or (pipes and stat.S_ISFIFO(about.st_mode))):
+            raise ValueError(f"can't be read: it is {_kind(about.st_mode)}, not a file")
+        if about.st_size > largest:
+            raise ValueError(f"can't be read: it has {about.st_size} bytes; allowed: up to {largest}")
+        with open(path, "rb") as file:
+            return bounded(file, largest)
+    except OSError as error:
+        raise ValueError(f"can't be read: {error.strerror or error}") from None
+
+
+def bounded(stream: Any, largest: int) -> bytes:
+    """Bytes of a stream, read as far as the bound.
+
+    Raises
+    ------
+    ValueError
+        If it has more, or more than the computer can hold.
+    """
+    try:
+        read: bytes = stream.read(largest + 1)
+    except MemoryError:
+        raise ValueError("can't be read: it needs more memory than there is") from None
+    if len(read) > largest:
+        raise ValueError(f"can't be read: it has more than {largest} bytes")
+    return read
 
 
 def _flush(path: Path) -> None:
@@ -53,8 +132,15 @@ def _flush(path: Path) -> None:
 
 
 @contextmanager
-def held(folder: Path) -> Iterator[None]:
-    """Keep a folder for this process, and remove temporary files that a killed one left in it.
+def held(folder: Path, *inner: str) -> Iterator[None]:
+    """Keep a folder for this process, and remove temporary files of this package that a killed one left in it.
+
+    Parameters
+    ----------
+    folder
+        Made if it does not exist.
+    inner
+        Names of folders in it that are written into too.
 
     Raises
     ------
@@ -64,8 +150,9 @@ def held(folder: Path) -> Iterator[None]:
     folder.mkdir(parents=True, exist_ok=True)
     try:
         with FileLock(folder / LOCK_FILE, timeout=0):
-            for path in folder.rglob(TEMPORARY):
-                path.unlink(missing_ok=True)
+            for place in (folder, *(folder / name for name in inner)):
+                for path in place.glob(TEMPORARY):
+                    path.unlink(missing_ok=True)
             yield
     except Timeout:
         raise UnfinishedError(
@@ -73,9 +160,86 @@ def held(folder: Path) -> Iterator[None]:
         ) from None
 
 
+def claimed(folder: str | Path, *marks: str, what: str) -> Path:
+    """Return a folder that may be written into: new, empty, or holding one of the files that mark it as begun.
+
+    Raises
+    ------
+    DatasetError
+        If it holds anything else. Nothing in it is touched.
+    """
+    path = Path(folder)
+    begun = path.is_dir() and (any((path / mark).is_file() for mark in marks) or is_empty(path))
+    if os.path.lexists(path) and not begun:
+        raise DatasetError(f"{path} exists and is no {what}; choose another folder")
+    return path
+
+
 def is_empty(folder: Path) -> bool:
     """True if a folder holds nothing but a lock and temporary files."""
     return all(path.name == LOCK_FILE or path.match(TEMPORARY) for path in folder.iterdir())
+
+
+LARGEST_TOML = 1_000_000
+"""Bytes that a file which people write may have."""
+
+
+def toml_of(path: str | Path) -> tuple[str, dict[str, Any]]:
+    """Text and values of a TOML file.
+
+    Raises
+    ------
+    ValueError
+        If it can't be read, or is no TOML; the message goes on after the name of the file.
+    """
+    content = contents(path, LARGEST_TOML)
+    try:
+        text = content.decode("utf-8")
+        return text, tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("is not valid TOML: too many brackets") from None
+    except ValueError as error:  # of tomllib, of the encoding, and of whole numbers with thousands of digits
+        raise ValueError(f"is not valid TOML: {first_line(error).split(';')[0]}") from None
+
+
+MOST_CELLS = 500_000_000
+"""Rows times columns that a Parquet file may have: a small one may claim many."""
+
+
+def parquet_of(source: Any, columns: list[str] | None = None) -> Any:
+    """Table of a Parquet file, or some columns of it.
+
+    Parameters
+    ----------
+    source
+        Path or stream.
+    columns
+        Names; all by default.
+
+    Raises
+    ------
+    ValueError
+        If it can't be read, or claims more cells than ``MOST_CELLS``; the message goes on after the name of the file.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        with pq.ParquetFile(source, page_checksum_verification=True) as file:
+            about = file.metadata
+            cells = about.num_rows * (about.num_columns if columns is None else len(columns))
+            if cells > MOST_CELLS:
+                raise ValueError(f"it claims {cells} cells; allowed: up to {MOST_CELLS}")
+            return file.read(columns)
+    except OSError as error:
+        raise ValueError(f"can't be read as Parquet: {error.strerror or first_line(error)}") from None
+    except (pa.ArrowException, MemoryError, ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"can't be read as Parquet: {first_line(error)}") from None
+
+
+def first_line(error: BaseException) -> str:
+    """First line of what an error says, or its kind; no more than two hundred letters."""
+    return (str(error).strip().split("\n")[0] or type(error).__name__)[:200]
 
 
 def unpacked(archive: bytes, largest: int) -> dict[str, Any]:
@@ -91,22 +255,50 @@ def unpacked(archive: bytes, largest: int) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If they have more, an array claims more than its member holds, or holds Python objects.
-    zipfile.BadZipFile, EOFError
-        If the file is damaged.
+        If they have more, the file is damaged, or an array is.
     """
-    with zipfile.ZipFile(io.BytesIO(archive)) as members:
-        size = sum(member.file_size for member in members.infolist())
-        if size > largest:
-            raise ValueError(f"unpacked it has {size} bytes; allowed: up to {largest}")
-        return {member.filename.removesuffix(".npy"): _array(members.read(member)) for member in members.infolist()}
-
-
-def _array(member: bytes) -> Any:
     try:
-        return np.load(io.BytesIO(member), allow_pickle=False)
-    except MemoryError:
-        raise ValueError("an array claims more bytes than the computer has") from None
+        with zipfile.ZipFile(io.BytesIO(archive)) as members:
+            size = sum(member.file_size for member in members.infolist())
+            if size > largest:
+                raise ValueError(f"unpacked it has {size} bytes; allowed: up to {largest}")
+            found = {member.filename.removesuffix(".npy"): members.read(member) for member in members.infolist()}
+    except ValueError:
+        raise
+    except Exception as error:  # zipfile lets through whatever its decompressors raise
+        raise ValueError(f"the archive is damaged: {first_line(error)}") from None
+    return {name: array_of(member) for name, member in found.items()}
+
+
+HEADS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+"""Readers of the head of a ``.npy`` file, by its version."""
+
+
+def array_of(content: bytes) -> Any:
+    """Array of a ``.npy`` file, which has as many bytes as its head says; no Python objects.
+
+    Raises
+    ------
+    ValueError
+        If the file is damaged, or claims more than it holds.
+    """
+    stream = io.BytesIO(content)
+    try:
+        version = np.lib.format.read_magic(stream)
+        if version not in HEADS:
+            raise ValueError(f"an array has format {version}; allowed: {', '.join(map(str, HEADS))}")
+        shape, _, kind = HEADS[version](stream)
+        if kind.hasobject:
+            raise ValueError("an array holds objects, which only pickle reads")
+        claimed, held = math.prod(shape) * kind.itemsize, len(content) - stream.tell()
+        if any(side < 0 for side in shape) or claimed != held:
+            raise ValueError(f"an array claims {claimed} bytes and has {held}")
+        stream.seek(0)
+        return np.load(stream, allow_pickle=False)
+    except ValueError:
+        raise
+    except Exception as error:  # numpy reads the head with Python's own parser
+        raise ValueError(f"an array is damaged: {first_line(error)}") from None
 
 
 def check_target(path: str | Path, overwrite: bool) -> None:
@@ -122,8 +314,9 @@ def check_target(path: str | Path, overwrite: bool) -> None:
         raise DatasetError(f"{path} ends in {target.suffix or 'nothing'}; allowed: .csv, .parquet")
     if not target.absolute().parent.is_dir():
         raise DatasetError(f"{target.absolute().parent} is no folder; choose another file")
-    if target.exists() and not overwrite:
+    if os.path.lexists(target) and not overwrite:
         raise DatasetError(f"{path} exists; use --overwrite or another name")
+    replaceable(target)
 
 
 def write_table(columns: Mapping[str, ArrayLike], path: str | Path) -> None:

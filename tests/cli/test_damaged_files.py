@@ -54,7 +54,7 @@ def test_a_bomb_is_not_unpacked(tmp_path):
 @pytest.mark.parametrize("shape", [(2,), (2**40,), (2**60,)])
 def test_an_array_that_claims_more_than_there_is_is_refused(shape, tmp_path):
     """Whether the computer has that much memory or not."""
-    with pytest.raises(ValueError, match=r"claims more|EOF|cannot reshape|too big"):
+    with pytest.raises(ValueError, match=r"claims [0-9]+ bytes and has 8"):
         unpacked(_liar(shape), LARGEST)
     (tmp_path / "liar.npz").write_bytes(_liar(shape))
     with pytest.raises(ModelFileError):

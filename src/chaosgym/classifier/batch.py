@@ -16,7 +16,7 @@ from tqdm import tqdm
 from chaosgym.classifier.features import MAX_CYCLES
 from chaosgym.classifier.machine_classifier import MachineClassifier
 from chaosgym.errors import DatasetError, ParameterError
-from chaosgym.files import write_atomically
+from chaosgym.files import parquet_of, write_atomically
 from chaosgym.machines.parameters import parameters_of, with_settings
 
 RECORDS, SENSOR_ERROR = "peak_force", "sensor_error"
@@ -54,9 +54,9 @@ def classify_file(
         If the file can't be read, or lacks a column, or ``out`` exists or has no folder.
     """
     try:
-        table = pq.read_table(source)
-    except (pa.ArrowException, OSError) as error:
-        raise DatasetError(f"{source} can't be read as Parquet: {error}") from error
+        table = parquet_of(source)
+    except ValueError as error:
+        raise DatasetError(f"{source} {error}") from None
     target = Path(out)
     if target.exists() or not target.absolute().parent.is_dir():
         raise DatasetError(f"{out} exists already, or its folder does not; choose another file")

@@ -15,7 +15,7 @@ import numpy as np
 from chaosgym.classifier.parameter_features import ParameterScaling, SwingTable
 from chaosgym.classifier.trees import Forest
 from chaosgym.errors import ModelFileError
-from chaosgym.files import DAMAGE, unpacked, write_atomically
+from chaosgym.files import DAMAGE, contents, unpacked, write_atomically
 
 FORMAT = 4
 """Version of the model file."""
@@ -51,10 +51,7 @@ def read_model(path: str | Path) -> tuple[dict[str, Any], dict[str, dict[str, An
         If the file is missing, damaged, of another version, or does not match its hash.
     """
     try:
-        content = Path(path).read_bytes()
-        if len(content) > LARGEST:
-            raise ModelFileError(f"{path} has {len(content)} bytes; allowed: up to {LARGEST}")
-        arrays = unpacked(content, LARGEST)
+        arrays = unpacked(contents(path, LARGEST), LARGEST)
         card = arrays.pop("card", None)
         head = json.loads((arrays.pop("head") if "head" in arrays else card).tobytes())
         if head["format"] != FORMAT:

@@ -26,7 +26,7 @@ from chaosgym.control.statistics import bootstrap_interval, performance_profile
 from chaosgym.envs.task import Status
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import DatasetError, ParameterError
-from chaosgym.files import write_atomically
+from chaosgym.files import parquet_of, write_atomically
 
 Array = NDArray[np.float64]
 
@@ -229,9 +229,9 @@ def read_comparison(path: Path, env: str | None = None) -> pa.Table:
         If the file can't be read, or is of another environment.
     """
     try:
-        table = pq.read_table(path)
-    except (OSError, pa.ArrowInvalid) as error:
-        raise DatasetError(f"{path} can't be read as a comparison: {error}") from None
+        table = parquet_of(path)
+    except ValueError as error:
+        raise DatasetError(f"{path} is no comparison: it {error}") from None
     missing = [name for name in COLUMNS if name not in table.column_names]
     of = (table.schema.metadata or {}).get(b"env", b"").decode()
     if missing or (env is not None and of != env):

@@ -1,6 +1,5 @@
 """The design brief: machine, tolerances, criteria and changes in one TOML file."""
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ from chaosgym.design.improve import default_changes
 from chaosgym.design.methodology import SERIES_SIZE
 from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError
+from chaosgym.files import toml_of
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
 from chaosgym.machines.parameters import parameters_of, suggestion, with_settings
 from chaosgym.machines.units import parse_quantity
@@ -63,12 +63,9 @@ def read_brief(path: str | Path) -> DesignBrief:
         If a parameter, tolerance or criterion is out of its range.
     """
     try:
-        with open(path, "rb") as file:
-            values = tomllib.load(file)
-    except OSError as error:
-        raise DesignError(f"{path} can't be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DesignError(f"{path} is not valid TOML: {error}") from None
+        _, values = toml_of(path)
+    except ValueError as error:
+        raise DesignError(f"{path} {error}") from None
     beside = Path(path).parent / str(values.get("machine"))
     if beside.suffix == FILE_ENDING and beside.is_file():
         values["machine"] = str(beside)

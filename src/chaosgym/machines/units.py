@@ -4,11 +4,13 @@ Each unit of a field has its alternatives and what one of them is in the field's
 rotation differ by 60, never by 2 pi. Units that are not listed are written as the field states them. µ is u.
 """
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Any
 
 from chaosgym.errors import ParameterError
+from chaosgym.machines.numbers import shown
 
 ALTERNATIVES: Mapping[str, Mapping[str, float]] = {
     "m": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 25.4e-3},
@@ -55,23 +57,31 @@ def parse_quantity(name: str, given: Any, unit: str) -> float:
     allowed = units_of(unit)
     listed = ", ".join(each or "no unit" for each in allowed)
     if isinstance(given, bool) or not isinstance(given, int | float | str):
-        raise ParameterError(f"{name} = {given!r} is not a quantity; allowed: a number with a unit ({listed})")
+        raise ParameterError(f"{name} = {shown(given)} is not a quantity; allowed: a number with a unit ({listed})")
     if not isinstance(given, str):
         if unit != "-":
-            best = next(iter(allowed))
-            raise ParameterError(
-                f'{name} = {given:g} has no unit; write {name} = "{given:g} {best}" (allowed: {listed})'
-            )
-        return float(given)
+            best, least = next(iter(allowed)), shown(given)
+            raise ParameterError(f'{name} = {least} has no unit; write {name} = "{least} {best}" (allowed: {listed})')
+        return _finite(name, given, given, 1.0)
     number, written = _split(given)
     try:
-        value = float(number)
+        float(number)
     except ValueError:
-        raise ParameterError(f"{name} = {given!r} does not begin with a number") from None
+        raise ParameterError(f"{name} = {shown(given)} does not begin with a number") from None
     if written not in allowed:
-        what = f"has the unknown unit {written!r}" if written else "has no unit"
-        raise ParameterError(f"{name} = {given!r} {what} (allowed: {listed})")
-    return value * allowed[written]
+        what = f"has the unknown unit {shown(written)}" if written else "has no unit"
+        raise ParameterError(f"{name} = {shown(given)} {what} (allowed: {listed})")
+    return _finite(name, given, number, allowed[written])
+
+
+def _finite(name: str, given: Any, number: Any, size: float) -> float:
+    try:
+        value = float(number) * size
+    except OverflowError:
+        value = math.inf
+    if not math.isfinite(value):
+        raise ParameterError(f"{name} = {shown(given)} is no finite number that a computer holds")
+    return value
 
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -87,6 +97,8 @@ def parse_row(name: str, given: Any, unit: str) -> list[float]:
         As ``parse_quantity``.
     """
     if isinstance(given, list):
+        if not given or any(isinstance(one, list) for one in given):
+            raise ParameterError(f"{name} = {shown(given)} is no row; allowed: one number or more")
         return [value for one in given for value in parse_row(name, one, unit)]
     if not isinstance(given, str):
         return [parse_quantity(name, given, unit)]

@@ -11,10 +11,10 @@ import numpy as np
 
 from chaosgym.diagnosis import TYPES, default_tolerances
 from chaosgym.errors import DatasetError
-from chaosgym.files import write_atomically
+from chaosgym.files import contents, write_atomically
 from chaosgym.machines.parameters import changes_of, parameters_of
 from chaosgym.sweeps.dataset import DAMAGE, DATA_FILE, LabelledSweep, read_sweep
-from chaosgym.sweeps.folder import CHUNK_FOLDER, PLAN_FILE, read_plan_file
+from chaosgym.sweeps.folder import CHUNK_FOLDER, LARGEST_PLAN, PLAN_FILE, read_plan_file
 from chaosgym.sweeps.plan import SweepPlan
 
 CLASSES = ("nature", "response_type", "full_response_type", "status", "split")
@@ -250,8 +250,8 @@ def read_noise(folder: str | Path) -> dict[str, Any] | None:
     if not file.is_file():
         return None
     try:
-        found: dict[str, Any] = json.loads(file.read_text())
-    except (OSError, ValueError) as error:
+        found: dict[str, Any] = json.loads(contents(file, LARGEST_PLAN))
+    except (RecursionError, ValueError) as error:
         raise _damaged_noise(folder, error) from error
     return found
 

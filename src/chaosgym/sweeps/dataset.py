@@ -14,7 +14,9 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from chaosgym import files
 from chaosgym.errors import DatasetError
+from chaosgym.files import first_line, parquet_of
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps.plan import SweepPlan
 
@@ -148,7 +150,7 @@ def schema(plan: SweepPlan, settings: Mapping[str, Any]) -> pa.Schema:
 
 DATA_FILE = "sweep.parquet"
 
-DAMAGE = (pa.ArrowException, AttributeError, KeyError, RecursionError, TypeError, ValueError, OSError)
+DAMAGE = (pa.ArrowException, *files.DAMAGE)
 """What a damaged file raises."""
 
 
@@ -214,11 +216,9 @@ def read_sweep(folder: str | Path, columns: list[str] | None = None) -> Labelled
             f"{folder} holds no finished sweep (no {DATA_FILE}); run `chaosgym sweep` again to finish it"
         )
     try:
-        table = pq.read_table(path, columns=columns, page_checksum_verification=True)
-        return _understood(table)
+        return _understood(parquet_of(path, columns))
     except DAMAGE as error:
-        why, _, _ = str(error).partition("\n")
-        raise DatasetError(f"{path} can't be read as a chaosgym sweep: {why}") from error
+        raise DatasetError(f"{path} can't be read as a chaosgym sweep: {first_line(error)}") from error
 
 
 def _understood(table: pa.Table) -> LabelledSweep:

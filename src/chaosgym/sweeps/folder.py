@@ -16,13 +16,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from chaosgym.errors import DatasetError, UnfinishedError
-from chaosgym.files import is_empty, write_atomically
+from chaosgym.files import contents, write_atomically
 from chaosgym.sweeps.dataset import DAMAGE, DATA_FILE, parquet_writer, schema
 from chaosgym.sweeps.label import with_response_types
 from chaosgym.sweeps.plan import SweepPlan
 
 PLAN_FILE = "plan.json"
 CHUNK_FOLDER = "chunks"
+
+LARGEST_PLAN = 10_000_000
+"""Bytes that a plan may have."""
 
 
 class SweepFolder:
@@ -185,20 +188,6 @@ class SweepFolder:
             ) from error
 
 
-def claimed(folder: str | Path) -> Path:
-    """Folder of a sweep: new, empty, or begun.
-
-    Raises
-    ------
-    DatasetError
-        If it holds anything else. Nothing in it is touched.
-    """
-    path = Path(folder)
-    if path.exists() and not (path.is_dir() and ((path / PLAN_FILE).is_file() or is_empty(path))):
-        raise DatasetError(f"{path} exists and is no run of this sweep; choose another folder")
-    return path
-
-
 def _as_list(value: Any) -> list[Any]:
     return value if isinstance(value, list) else [value]
 
@@ -212,8 +201,8 @@ def read_plan_file(path: Path) -> dict[str, Any]:
         If the file can't be read.
     """
     try:
-        held = json.loads(path.read_text())
-    except (OSError, RecursionError, ValueError) as error:
+        held = json.loads(contents(path, LARGEST_PLAN))
+    except (RecursionError, ValueError) as error:
         raise DatasetError(f"{path} is damaged: {error}; choose another folder") from error
     if not isinstance(held, dict):
         raise DatasetError(f"{path} is damaged: no settings; choose another folder")

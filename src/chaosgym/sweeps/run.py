@@ -13,9 +13,9 @@ import pyarrow as pa
 from tqdm import tqdm
 
 from chaosgym.errors import DatasetError, UnfinishedError
-from chaosgym.files import held
+from chaosgym.files import claimed, held
 from chaosgym.sweeps.dataset import LabelledSweep, read_sweep
-from chaosgym.sweeps.folder import SweepFolder, claimed
+from chaosgym.sweeps.folder import CHUNK_FOLDER, PLAN_FILE, SweepFolder
 from chaosgym.sweeps.label import label_rows
 from chaosgym.sweeps.plan import SweepPlan
 from chaosgym.version import __version__
@@ -122,7 +122,7 @@ def run_sweep(
         If the disk is full, the cluster is lost, or another process writes into the folder. What was kept stays; the
         same call goes on.
     """
-    with held(claimed(folder)):
+    with held(claimed(folder, PLAN_FILE, what="run of this sweep"), CHUNK_FOLDER):
         store = SweepFolder(folder, plan, __version__)
         missing = store.missing(repair=repair)
         if missing:

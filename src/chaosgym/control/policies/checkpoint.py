@@ -13,15 +13,19 @@ import pickle
 import random
 import secrets
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from chaosgym.errors import ModelFileError
-from chaosgym.files import write_atomically
+from chaosgym.files import claimed, contents, held, write_atomically
 
 CHECKPOINT = "checkpoint.bin"
+
+LARGEST = 4_000_000_000
+"""Bytes that a checkpoint may have, replay buffer included."""
 
 DIGEST = "sha256"
 
@@ -33,6 +37,21 @@ BY_CLASS = ("venv", "class_attributes")
 
 UNSAVED = ("_last_lstm_states", "replay_buffer")
 """Attributes of a model that ``save`` leaves out, of those algorithms that have them."""
+
+
+@contextmanager
+def run_folder(folder: Path) -> Iterator[None]:
+    """Keep the folder of a training run for this process: new, empty, or begun by a run before.
+
+    Raises
+    ------
+    DatasetError
+        If it holds anything else. Nothing in it is touched.
+    UnfinishedError
+        If another process writes into it.
+    """
+    with held(claimed(folder, CHECKPOINT, "policy.json", what="folder of a training run")):
+        yield
 
 
 def save_checkpoint(folder: Path, model: Any, kept: Any = None) -> None:
@@ -85,7 +104,10 @@ def load_checkpoint(folder: Path, kind: Any, envs: Any) -> tuple[Any, Any] | Non
     path = folder / CHECKPOINT
     if not path.exists():
         return None
-    signed = path.read_bytes()
+    try:
+        signed = contents(path, LARGEST)
+    except ValueError as error:
+        raise ModelFileError(f"{path} {error}") from None
     if not hmac.compare_digest(signed[:SIZE], _keyed_hash(signed[SIZE:])):
         raise ModelFileError(
             f"{path} is damaged, or was not written by this user on this computer; it is a pickle and may hold "

@@ -21,7 +21,7 @@ from chaosgym.envs.memory import SpeedMemory, Usual
 from chaosgym.envs.observation import OBSERVATION_NAMES
 from chaosgym.envs.task import Task
 from chaosgym.errors import ModelFileError, ParameterError
-from chaosgym.files import DAMAGE, unpacked, write_atomically
+from chaosgym.files import DAMAGE, contents, unpacked, write_atomically
 
 Array = NDArray[Any]
 
@@ -207,7 +207,7 @@ def load_policy(folder: str | Path) -> TrainedPolicy:
         if not (folder / name).is_file():
             raise ModelFileError(f"{folder} holds no {name}; a policy is a folder with {DESCRIPTION} and {WEIGHTS}")
     try:
-        description = json.loads((folder / DESCRIPTION).read_text(encoding="utf-8"))
+        description = json.loads(contents(folder / DESCRIPTION, LARGEST).decode("utf-8"))
         if description["format"] != FORMAT:
             raise ModelFileError(
                 f"{folder} has format {description['format']}; this version reads format {FORMAT}: train it again"
@@ -245,10 +245,7 @@ def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPol
 
 
 def _arrays(path: Path, digest: str) -> dict[str, Array]:
-    size = path.stat().st_size
-    if size > LARGEST:
-        raise ModelFileError(f"{WEIGHTS} has {size} bytes; allowed: up to {LARGEST}")
-    content = path.read_bytes()
+    content = contents(path, LARGEST)
     if sha256(content).hexdigest() != digest:
         raise ModelFileError(f"{WEIGHTS} is damaged: its content does not match the hash in {DESCRIPTION}")
     return unpacked(content, LARGEST)

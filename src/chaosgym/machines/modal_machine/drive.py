@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_machine.structure import BASE, Structure
+from chaosgym.machines.numbers import numbers, shown
 
 Array = NDArray[np.float64]
 
@@ -17,6 +18,9 @@ KINDS = {"force": "N", "unbalance": "kg m", "displacement": "m", "acceleration":
 harmonic's frequency; a motion of the base, with which the stops move."""
 
 MOST_HARMONICS = 64
+
+LARGEST = 1e12
+"""Largest amplitude, in the kind's unit."""
 
 
 class Drive(NamedTuple):
@@ -45,8 +49,10 @@ class Drive(NamedTuple):
         ParameterError
             If there are too few values for so many harmonics.
         """
-        cycle = np.asarray(values, dtype=float)
-        if cycle.ndim != 1 or len(cycle) < 2 * harmonics + 1:
+        cycle = numbers(f"samples of {kind}", values, -LARGEST, LARGEST, KINDS.get(kind, ""))
+        if not 1 <= harmonics <= MOST_HARMONICS:
+            raise ParameterError(f"harmonics = {shown(harmonics)} is out of range; allowed: 1 to {MOST_HARMONICS}")
+        if len(cycle) < 2 * harmonics + 1:
             raise ParameterError(f"{harmonics} harmonics need {2 * harmonics + 1} samples of a cycle, not {cycle.size}")
         parts = np.fft.rfft(cycle) / len(cycle)
         rows = tuple((k, 2.0 * float(parts[k].real), -2.0 * float(parts[k].imag)) for k in range(1, harmonics + 1))
@@ -67,8 +73,9 @@ def checked(drive: Drive) -> Drive:
         rule = f"'{BASE}'" if drive.at != BASE else f"a point other than '{BASE}'"
         raise ParameterError(f"{drive.kind} at {drive.at!r}: allowed: at {rule}")
     for order, *amplitudes in drive.harmonics:
-        if not 1 <= order <= MOST_HARMONICS or not np.all(np.isfinite(amplitudes)):
-            raise ParameterError(f"harmonic {order} is out of range; allowed: 1 to {MOST_HARMONICS}, finite amplitudes")
+        if not 1 <= order <= MOST_HARMONICS:
+            raise ParameterError(f"harmonic = {shown(order)} is out of range; allowed: 1 to {MOST_HARMONICS}")
+        numbers(drive.kind, amplitudes, -LARGEST, LARGEST, KINDS[drive.kind])
     if drive.mean and drive.kind != "force":
         raise ParameterError(f"the mean of {drive.kind} at {drive.at!r} is not 0; allowed: for a force only")
     return drive

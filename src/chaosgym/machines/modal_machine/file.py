@@ -3,7 +3,6 @@
 import hashlib
 import json
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from importlib import resources
@@ -13,7 +12,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from chaosgym.errors import ParameterError
+from chaosgym.files import contents, toml_of
 from chaosgym.machines.machine import Machine, Work
+from chaosgym.machines.modal_machine.archives import LARGEST, read_archive, read_matrix
 from chaosgym.machines.modal_machine.drive import KINDS, Drive
 from chaosgym.machines.modal_machine.jointed import Joint, machine_with_joints
 from chaosgym.machines.modal_machine.keys import REQUIRED, TABLES, checked_table, schema
@@ -40,12 +41,9 @@ def machine_class(path: str | Path) -> type[Machine]:
         If the file can't be read, a key is unknown, a unit missing, or a value not allowed; one line that says where.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
-        values = tomllib.loads(text)
-    except OSError as error:
-        raise ParameterError(f"{path} can't be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ParameterError(f"{path} is not valid TOML: {error}") from None
+        text, values = toml_of(path)
+    except ValueError as error:
+        raise ParameterError(f"{path} {error}") from None
     try:
         data, folder = _tables(values), Path(path).parent
         digest = hashlib.sha256(text.encode())
@@ -85,9 +83,9 @@ def schema_text() -> str:
 
 def _bytes(path: Path) -> bytes:
     try:
-        return path.read_bytes()
-    except OSError as error:
-        raise ParameterError(f"{path} can't be read: {error.strerror}") from None
+        return contents(path, LARGEST)
+    except ValueError as error:
+        raise ParameterError(f"{path} {error}") from None
 
 
 def _tables(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -132,8 +130,8 @@ def _built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> typ
     """Make the class: its fields have the file's values as defaults, and one more names the file's content."""
     structure = structure_of(data, folder)
     operation: dict[str, Any] = data["operation"]
-    speed, *ranges = _needed("operation", operation, "speed", "speed_range", "clearance_range")
-    usual = dict(zip(("speed", "clearance"), map(_range, ("speed_range", "clearance_range"), ranges), strict=True))
+    speed, *ends = _needed("operation", operation, "speed", "speed_range", "clearance_range")
+    usual = {name: _range(name, given) for name, given in zip(("speed", "clearance"), ends, strict=True)}
     definition = parameter(digest, choices=(digest,), provenance="stated", source=path)
     drives, title = tuple(_drive(row) for row in data["drive"]), data[""].get("title", path)
     types: dict[str, Any] = {"name": path, "__doc__": title, "__reduce__": _reduced}
@@ -231,8 +229,11 @@ def _restored(path: str, values: Mapping[str, Any]) -> Machine:
 
 def _range(name: str, values: Any) -> tuple[float, float]:
     if len(values) != 2 or not values[0] < values[1]:
-        raise ParameterError(f"operation.{name} is no range; allowed: a text such as '4 to 30 Hz', the lower one first")
-    return float(values[0]), float(values[1])
+        raise ParameterError(
+            f"operation.{name}_range is no range; allowed: a text such as '4 to 30 Hz', the lower one first"
+        )
+    low, high = (check_parameter(ModalMachine, name, end) for end in values)
+    return low, high
 
 
 def _tolerances(given: Mapping[str, Any], machine: Machine) -> dict[str, tuple[float, bool]]:
@@ -247,6 +248,9 @@ def _tolerances(given: Mapping[str, Any], machine: Machine) -> dict[str, tuple[f
         value = parse_quantity(f"tolerances.{name}", text, "-" if relative else known[name].unit)
         if not value > 0.0 or (relative and getattr(machine, name) == 0.0):
             raise ParameterError(f"tolerances.{name} = {text!r} is out of range; allowed: above 0, no share of 0")
+        nominal = getattr(machine, name)
+        for side in (-1.0, 1.0):
+            check_parameter(machine, name, nominal + side * value * (abs(nominal) if relative else 1.0))
         found[name] = (value, relative)
     return found
 
@@ -271,20 +275,48 @@ def _drive(row: Mapping[str, Any]) -> Drive:
     if not at:
         raise ParameterError(f"a [[drive]] of a {kind} lacks at, the point where it acts")
     values = row[kind]
+    for name in ("harmonics",) if len(values) == 1 else ("harmonic", "angle"):
+        if name in row:
+            what = "one amplitude" if len(values) == 1 else "samples of a cycle"
+            raise ParameterError(f"drive.{name} has no meaning beside {what}; leave it out")
     if len(values) == 1:
         return Drive.sine(kind, at, float(values[0]), row.get("harmonic", 1), math.radians(row.get("angle", 0.0)))
     return Drive.sampled(kind, at, values, row.get("harmonics", min(MOST_SAMPLED, (len(values) - 1) // 2)))
 
 
+_DAMPED = ("damping_ratios", "modal_damping")
+_MESH = (*_DAMPED, "units", "modes", "residual_mode", "base", "degrees_of_freedom")
+
+WAYS = {
+    "frequencies": (*_DAMPED, "modal_masses", "shapes", "residual"),
+    "matrices": _MESH,
+    "mass": (*_MESH, "stiffness", "damping"),
+    "universal_file": (*_DAMPED, "points", "residual"),
+}
+"""Ways to give a structure, and the keys and tables of [structure] that mean something beside each."""
+
+
+def _refuse_two(table: str, given: Mapping[str, Any], *names: str) -> None:
+    """Refuse keys of which only one would be read."""
+    both = [name for name in names if name in given]
+    if len(both) > 1:
+        raise ParameterError(f"[{table}] has {' and '.join(both)}; allowed: one of them")
+
+
 def structure_of(data: Mapping[str, Any], folder: Path) -> Structure:
     """Modes by one of the three ways that [structure] offers."""
     table = data["structure"]
-    ways = [name for name in ("frequencies", "matrices", "mass", "universal_file") if name in table]
+    ways = [name for name in WAYS if name in table]
     if len(ways) != 1:
         raise ParameterError(
             f"[structure] has {' and '.join(ways) or 'no modes'}; allowed: one of frequencies, matrices (.npz), mass "
             "with stiffness, universal_file"
         )
+    stated = [*table, *(path.partition(".")[2] for path in data if path.startswith("structure.") and data[path])]
+    for name in stated:
+        if name not in (*ways, *WAYS[ways[0]]):
+            raise ParameterError(f"structure.{name} has no meaning beside {ways[0]}; leave one of them out")
+    _refuse_two("structure", table, "damping_ratios", "modal_damping")
     if ways == ["frequencies"]:
         return _of_modes(table, data["structure.shapes"], data["structure.residual"])
     if ways == ["universal_file"]:
@@ -328,6 +360,8 @@ def _of_matrices(table: Mapping[str, Any], data: Mapping[str, Any], folder: Path
             if name not in points:
                 raise ParameterError(f"structure.base names no degree of freedom {name!r}{suggestion(name, points)}")
             base[points[name]] = 1.0
+    if "C" in matrices:
+        _refuse_two("structure", {**table, "the damping matrix C": 0}, "the damping matrix C", *_DAMPED)
     joints = [str(joint.get("at", "")).lstrip("-+ ") for joint in data["joint"]]
     (modes,) = _needed("structure", table, "modes")
     return Structure.of_matrices(
@@ -345,28 +379,7 @@ def _of_matrices(table: Mapping[str, Any], data: Mapping[str, Any], folder: Path
 def _matrices(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Matrices M, K and, if they are there, C, base and names."""
     if "matrices" in table:
-        return _archive(folder / table["matrices"])
+        return read_archive(folder / table["matrices"])
     mass, stiffness = _needed("structure", table, "mass", "stiffness")
     files = {"M": mass, "K": stiffness, **({"C": table["damping"]} if "damping" in table else {})}
-    return {name: _one_matrix(folder / file) for name, file in files.items()}
-
-
-def _archive(path: Path) -> dict[str, Any]:
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            found = {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, AttributeError, TypeError) as error:
-        raise ParameterError(f"{path} can't be read as .npz: {str(error).splitlines()[0]}") from None
-    for name in ("M", "K"):
-        if name not in found:
-            raise ParameterError(f"{path} holds no array {name}; it has {', '.join(found) or 'none'}")
-    return {name: found[name] for name in ("M", "K", "C", "base", "names") if name in found}
-
-
-def _one_matrix(path: Path) -> Any:
-    from scipy.io import mmread
-
-    try:
-        return np.load(path, allow_pickle=False) if path.suffix == ".npy" else mmread(path, spmatrix=False)
-    except (OSError, ValueError) as error:
-        raise ParameterError(f"{path} can't be read as a matrix: {str(error).splitlines()[0]}") from None
+    return {name: read_matrix(folder / file) for name, file in files.items()}

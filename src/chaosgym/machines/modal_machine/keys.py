@@ -7,6 +7,7 @@ import numpy as np
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_machine.drive import KINDS
+from chaosgym.machines.numbers import shown
 from chaosgym.machines.parameters import suggestion
 from chaosgym.machines.units import parse_quantity, parse_row, units_of
 
@@ -109,7 +110,7 @@ def checked_table(path: str, given: Any) -> dict[str, Any]:
         If a key is unknown (the nearest one is suggested), a unit is missing, or a value has the wrong form.
     """
     if not isinstance(given, dict):
-        raise ParameterError(f"{path} = {given!r} is not a table; write [{path}] and one line a value below it")
+        raise ParameterError(f"{path} = {shown(given)} is not a table; write [{path}] and one line a value below it")
     known, prefix = TABLES[path], f"{path}." if path else ""
     inner = _inner(path)
     values = {}
@@ -128,16 +129,20 @@ def _value(name: str, given: Any, key: Key) -> Any:
     if key.kind in ("row", "rows"):
         unit = "kg^1/2" if name == "structure.shapes.base" else key.unit
         if key.kind == "rows":
-            return np.array([parse_row(name, row, unit) for row in given])
+            if not isinstance(given, list):
+                raise ParameterError(f"{name} = {shown(given)} is out of range; allowed: a list of rows")
+            return [parse_row(name, row, unit) for row in given]
         return np.array(parse_row(name, given, unit))
     if key.kind == "quantity":
         return parse_quantity(name, given, key.unit)
     kind: Any = {"text": str, "texts": list, "count": int, "flag": bool}[key.kind]
     if not isinstance(given, kind) or (key.kind == "count" and isinstance(given, bool)):
         what = {"text": "a text", "texts": "a list of texts", "count": "a whole number", "flag": "true or false"}
-        raise ParameterError(f"{name} = {given!r} is out of range; allowed: {what[key.kind]}")
+        raise ParameterError(f"{name} = {shown(given)} is out of range; allowed: {what[key.kind]}")
+    if key.kind == "texts" and not all(isinstance(one, str) for one in given):
+        raise ParameterError(f"{name} = {shown(given)} is out of range; allowed: a list of texts")
     if key.choices and given not in key.choices:
-        raise ParameterError(f"{name} = {given!r} is not one of {', '.join(key.choices)}")
+        raise ParameterError(f"{name} = {shown(given)} is not one of {', '.join(key.choices)}")
     return given
 
 

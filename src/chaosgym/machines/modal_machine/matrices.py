@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.errors import ParameterError
+from chaosgym.files import first_line
+from chaosgym.machines.numbers import numbers
 
 Array = NDArray[np.float64]
 
@@ -20,17 +22,25 @@ SHIFT = 100.0
 SYMMETRIC = 1e-9
 """Largest difference of a matrix from its transpose, against its largest entry."""
 
-DENSE = 600
-"""Degrees of freedom up to which all modes are computed at once."""
+LARGEST_ENTRY = 1e20
+"""Largest entry of a matrix: of a stiffness far beyond any structure's, of which products stay finite."""
+
+DENSE, MOST_DENSE = 600, 6000
+"""Degrees of freedom up to which all modes are computed at once: always, and where a third of them is kept."""
 
 
 def symmetric(name: str, matrix: Any) -> Any:
     """Matrix in a form that multiplies, refused unless it is square, finite, symmetric and not negative."""
-    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
-        raise ParameterError(f"{name} has shape {matrix.shape}; allowed: square")
-    values = matrix.data if hasattr(matrix, "tocsc") else matrix
-    if not np.all(np.isfinite(values)):
-        raise ParameterError(f"{name} holds entries that are not finite numbers")
+    if np.ndim(matrix) != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.shape[0]:
+        raise ParameterError(f"{name} has shape {np.shape(matrix)}; allowed: square")
+    if hasattr(matrix, "tocsc"):
+        from scipy.sparse import csc_array
+
+        if matrix.nnz:
+            numbers(name, matrix.data, -LARGEST_ENTRY, LARGEST_ENTRY)
+        matrix = csc_array(matrix, dtype=np.float64)
+    else:
+        matrix = numbers(name, matrix, -LARGEST_ENTRY, LARGEST_ENTRY, shape=matrix.shape)
     largest, apart = float(abs(matrix).max()), abs(matrix - matrix.T)
     if float(apart.max()) > SYMMETRIC * largest:
         from scipy.sparse import coo_matrix
@@ -59,16 +69,19 @@ def _full(matrix: Any) -> Array:
 def slowest_modes(mass: Any, stiffness: Any, count: int) -> tuple[Array, Array]:
     """Angular frequencies (count,) and mass-normalised shapes (N, count) of the slowest modes."""
     size = mass.shape[0]
-    if size <= DENSE or count > size // 3:
-        squares, vectors = _slowest_dense(_full(mass), _full(stiffness), count)
-    else:
-        from scipy.sparse import csc_matrix
-        from scipy.sparse.linalg import eigsh
+    try:
+        if size <= DENSE or (count > size // 3 and size <= MOST_DENSE):
+            squares, vectors = _slowest_dense(_full(mass), _full(stiffness), count)
+        else:
+            from scipy.sparse import csc_matrix
+            from scipy.sparse.linalg import eigsh
 
-        start = np.cos(1.0 + np.arange(size))
-        found = eigsh(csc_matrix(stiffness), count, csc_matrix(mass), sigma=-SHIFT, v0=start)
-        order = np.argsort(found[0])
-        squares, vectors = found[0][order], found[1][:, order]
+            start = np.cos(1.0 + np.arange(size))
+            found = eigsh(csc_matrix(stiffness), count, csc_matrix(mass), sigma=-SHIFT, v0=start)
+            order = np.argsort(found[0])
+            squares, vectors = found[0][order], found[1][:, order]
+    except (np.linalg.LinAlgError, RuntimeError, MemoryError, TypeError) as error:
+        raise ParameterError(f"the modes of mass and stiffness can't be computed: {first_line(error)}") from None
     energy = np.einsum("ij,ij->j", vectors, stiffness @ vectors)
     cancelled = np.einsum("ij,ij->j", np.abs(vectors), abs(stiffness) @ np.abs(vectors))
     if np.any(energy < -1e-9 * cancelled):
@@ -114,7 +127,11 @@ def with_deflections(
     held = csc_matrix(stiffness)
     if rates[0] == 0.0:
         held = held + SHIFT * csc_matrix(mass)
-    factors, kept, added = splu(held), vectors, []
+    try:
+        factors = splu(held)
+    except (RuntimeError, MemoryError) as error:
+        raise ParameterError(f"the deflection of the joint can't be computed: {first_line(error)}") from None
+    kept, added = vectors, []
     for row in rows:
         load = np.zeros(len(vectors))
         load[row] = 1.0
@@ -133,5 +150,5 @@ def with_deflections(
     if len(added) > 1:
         _, turned = eigh(shapes.T @ (stiffness @ shapes))
         shapes = shapes @ turned
-    more = [math.sqrt(shape @ (stiffness @ shape)) for shape in shapes.T]
+    more = [math.sqrt(max(0.0, shape @ (stiffness @ shape))) for shape in shapes.T]
     return np.append(rates, more), np.column_stack([vectors, shapes])

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_machine.matrices import slowest_modes, symmetric, with_deflections
+from chaosgym.machines.numbers import number, numbers, shown
 from chaosgym.machines.parameters import suggestion
 
 Array = NDArray[np.float64]
@@ -27,6 +28,11 @@ BASE = "base"
 
 HIGHEST = 1e5
 """Highest natural frequency [Hz] that a machine with clearance is believed to have."""
+
+MOST_MODES = 1000
+MASSES, COMPLIANCES = (1e-12, 1e12), (1e-18, 1e3)
+LARGEST_SHAPE, LARGEST_RATE = 1e6, 1e9
+"""Ranges of modal masses [kg], of a residual compliance [m/N], of shapes [kg^-1/2] and of damping [1/s]."""
 
 CURED = 'a unit is likely wrong (a model in mm, t and N? then units = "t mm N")'
 
@@ -80,15 +86,16 @@ class Structure:
         ParameterError
             If lengths differ, a value is out of range, or shapes are not mass-normalised.
         """
-        rates = 2.0 * math.pi * _vector("frequencies", frequencies)
-        if not (np.all(rates >= 0.0) and np.all(rates <= 2.0 * math.pi * HIGHEST)):
-            worst = float(np.max(np.abs(rates))) / (2.0 * math.pi)
-            raise ParameterError(f"frequencies of {worst:g} Hz are out of range; allowed: 0 to {HIGHEST:g} Hz; {CURED}")
-        given = {name: _vector(f"shapes.{name}", values, len(rates)) for name, values in shapes.items()}
+        try:
+            rates = 2.0 * math.pi * numbers("frequencies", np.atleast_1d(frequencies), 0.0, HIGHEST, "Hz")
+        except ParameterError as error:
+            raise ParameterError(f"{error}; {CURED}") from None
+        n = len(rates)
+        if n > MOST_MODES:
+            raise ParameterError(f"frequencies has {n} entries; allowed: up to {MOST_MODES}")
+        given = {name: _shape(f"shapes.{name}", values, n) for name, values in shapes.items()}
         if modal_masses is not None:
-            masses = _vector("modal_masses", modal_masses, len(rates))
-            if not np.all(masses > 0.0):
-                raise ParameterError(f"modal_masses = {masses.min():g} kg is out of range; allowed: above 0")
+            masses = numbers("modal_masses", np.atleast_1d(modal_masses), *MASSES, "kg", shape=(n,))
             given = {name: values / np.sqrt(masses) for name, values in given.items()}
         else:
             _refuse_unit_shapes([values for name, values in given.items() if name != BASE])
@@ -146,6 +153,7 @@ class Structure:
         given = {"mass": mass, "stiffness": stiffness}
         if np.ndim(damping) == 2 or hasattr(damping, "tocsc"):
             given["damping"] = damping
+        modes = int(number("modes", modes, 1, MOST_MODES))
         matrices = {name: symmetric(name, matrix) for name, matrix in given.items()}
         size = matrices["mass"].shape[0]
         for name, matrix in matrices.items():
@@ -153,7 +161,9 @@ class Structure:
                 raise ParameterError(f"{name} has {matrix.shape[0]} rows and mass {size}; allowed: as many")
         for name, row in points.items():
             if not 0 <= row < size:
-                raise ParameterError(f"degree of freedom {name} = {row} does not exist; allowed: 0 to {size - 1}")
+                raise ParameterError(
+                    f"degree of freedom {name} = {shown(row)} does not exist; allowed: 0 to {size - 1}"
+                )
         if not 1 <= modes <= size:
             raise ParameterError(f"modes = {modes} is out of range; allowed: 1 to {size}")
         rates, vectors = slowest_modes(matrices["mass"], matrices["stiffness"], modes)
@@ -169,15 +179,16 @@ class Structure:
         if "damping" in matrices:
             matrix = vectors.T @ (matrices["damping"] @ vectors)
         else:
-            ratios = np.asarray(damping, dtype=float)
+            ratios = np.asarray(damping)
             if ratios.ndim == 1 and len(ratios) == modes:
                 ratios = np.append(ratios, np.full(len(rates) - modes, ratios[-1]))
             matrix = _damping_matrix(ratios, rates)
         shapes = {name: vectors[row] / math.sqrt(scale) for name, row in points.items()}
         if base is not None:
-            reach = matrices["mass"] @ _vector("base", base, size)
+            reach = matrices["mass"] @ numbers("base", base, -1e6, 1e6, shape=(size,))
             shapes[BASE] = vectors.T @ reach * math.sqrt(scale)
-        return cls(rates, 0.5 * (matrix + matrix.T), shapes)
+        shapes = {name: _shape(name, values, len(rates)) for name, values in shapes.items()}
+        return cls(rates, _damping_matrix(0.5 * (matrix + matrix.T), rates), shapes)
 
     def shape(self, place: str) -> Array:
         """Shape at a point, with a sign such as ``-tip``, or of a motion between two, such as ``pinion - wheel``.
@@ -211,13 +222,8 @@ class Structure:
         return hash(self.digest)
 
 
-def _vector(name: str, values: Any, length: int | None = None) -> Array:
-    vector = np.atleast_1d(np.asarray(values, dtype=float))
-    if vector.ndim != 1 or not len(vector) or not np.all(np.isfinite(vector)):
-        raise ParameterError(f"{name} holds no row of finite numbers")
-    if length is not None and len(vector) != length:
-        raise ParameterError(f"{name} has {len(vector)} entries; allowed: {length}, one for each of the others")
-    return vector
+def _shape(name: str, values: Any, modes: int) -> Array:
+    return numbers(name, np.atleast_1d(values), -LARGEST_SHAPE, LARGEST_SHAPE, "kg^-1/2", shape=(modes,))
 
 
 def _refuse_unit_shapes(shapes: list[Array]) -> None:
@@ -232,17 +238,15 @@ def _refuse_unit_shapes(shapes: list[Array]) -> None:
 
 def _damping_matrix(damping: Any, rates: Array) -> Array:
     """Modal damping (n, n) [1/s], of ratios () or (n,), or as it is given."""
-    given = np.asarray(damping, dtype=float)
+    n = len(rates)
+    try:
+        given = np.asarray(damping)
+    except ValueError:
+        raise ParameterError(f"modal_damping has rows of different lengths; allowed: {n} rows of {n}") from None
     if given.ndim == 2:
-        matrix = np.asarray(symmetric("modal_damping", given))
-        if len(matrix) != len(rates):
-            raise ParameterError(f"modal_damping has {len(matrix)} rows; allowed: {len(rates)}, one for each mode")
-        return matrix
-    ratios = np.full(len(rates), float(given)) if given.ndim == 0 else _vector("damping_ratios", given, len(rates))
-    if not np.all((ratios >= 0.0) & (ratios <= 100.0)):
-        raise ParameterError(
-            f"damping_ratios = {ratios.min():g} to {ratios.max():g} is out of range; allowed: 0 to 100"
-        )
+        given = numbers("modal_damping", given, -LARGEST_RATE, LARGEST_RATE, "1/s", shape=(n, n))
+        return np.asarray(symmetric("modal_damping", given))
+    ratios = numbers("damping_ratios", np.full(n, given) if given.ndim == 0 else given, 0.0, 100.0, shape=(n,))
     return np.diag(2.0 * ratios * rates)
 
 
@@ -252,9 +256,8 @@ def _with_residual(
     """Modes with one more that has a compliance [m/N] at one point and moves no other; damped as the last mode."""
     if at not in shapes:
         raise ParameterError(f"there is no point {at!r}{suggestion(at, shapes)}")
-    if not compliance > 0.0 or not frequency > 0.0:
-        raise ParameterError("residual compliance and frequency are out of range; allowed: above 0")
-    rate = 2.0 * math.pi * frequency
+    number("residual compliance", compliance, *COMPLIANCES, "m/N")
+    rate = 2.0 * math.pi * number("residual frequency", frequency, 1e-3, HIGHEST, "Hz")
     ratio = damping[-1, -1] / (2.0 * rates[-1]) if rates[-1] > 0.0 else 0.0
     matrix = np.zeros((len(rates) + 1, len(rates) + 1))
     matrix[:-1, :-1], matrix[-1, -1] = damping, 2.0 * ratio * rate
