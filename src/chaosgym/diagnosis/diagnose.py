@@ -7,6 +7,8 @@ periodic, certified. All others start again with a deviation that travels along.
                              largest exponent below zero confirms the recurrence: periodic, agreed
     it does not              go on. At the end of the budget an exponent above three standard errors makes it chaotic,
                              one within them, with the figures of step II, quasiperiodic
+    it never touches         the machine is linear there and the response can't be chaotic: it settles on the drive's
+                             period, or is a sum of the drive's lines and those of undamped modes
 
 Tests that cost much run where they can change the verdict: step II, with the 0-1 test, where the exponent does not
 decide, and the Matrix Update Test (flow chart of figure 5.5), on machines whose matrices depend on their
@@ -49,6 +51,9 @@ UPDATE_CYCLES = 50
 MAX_SEARCHED_PERIOD = 128
 """Longest period that Newton's method is tried on where the motion contracts but does not repeat."""
 
+GROWS = 1.05
+"""Ratio of the largest displacements of the last quarter and of the one before it, above which a motion grows."""
+
 NEAR = 0.05
 """How far Newton's method may move, relative to the size of the motion, to find the orbit that the motion nears."""
 
@@ -63,6 +68,11 @@ class _Stage:
     exponent: LyapunovExponent
     orbit: PeriodicOrbit | None
     cycles_used: int
+
+    @property
+    def linear(self) -> bool:
+        """True if nothing touches in the last half of the run, so that the machine was linear there."""
+        return not self.record.peak_force[len(self.record) // 2 :].any()
 
 
 def diagnose(
@@ -93,8 +103,9 @@ def diagnose(
     -------
     Diagnosis
         With status, horizon, settle cycle, the votes of all tests and the run itself. ``evidence`` holds the figures
-        of the Two-Step Test, ``largest_lyapunov_exponent_per_cycle``, the ``orbit`` if one was found, ``largest_peak``
-        [N] of the settled cycles, ``cycles_used`` (Newton's method included) and ``final_state``.
+        of the Two-Step Test, whether the machine was ``linear`` (nothing touched in the last half of the run),
+        ``largest_lyapunov_exponent_per_cycle``, the ``orbit`` if one was found, ``largest_peak`` [N] of the settled
+        cycles, ``cycles_used`` (Newton's method included) and ``final_state``.
 
     Raises
     ------
@@ -126,7 +137,8 @@ def diagnose_alone(
     if stage is None:
         stage = _last_stage(machine, Deviation(machine, initial_state, integrator), budget, sensor_error)
     record = stage.record
-    verdict = _periodic(stage) or _periodic_within(stage, sensor_error) or _not_periodic(stage)
+    verdict = _periodic(stage) or _periodic_within(stage, sensor_error)
+    verdict = verdict or (_without_contact(stage) if stage.linear else _not_periodic(stage))
     evidence = _evidence(stage, verdict, initial_state)
     settled = None
     if stage.orbit is not None and verdict.status == "certified":
@@ -171,13 +183,13 @@ def _last_stage(machine: Machine, deviation: Deviation, budget: int, sensor_erro
     record, growth = deviation.run(FIRST_STAGE)
     searched = 0
     while True:
-        stage = _stage(machine, record, growth, searched)
+        stage = _stage(machine, record, growth, searched, deviation.round_off)
         if 2 * len(record) > budget or _periodic(stage) or _periodic_within(stage, sensor_error):
             break
         searched = stage.cycles_used - len(record)
         more, more_growth = deviation.run(len(record))
         record, growth = record.followed_by(more), np.concatenate([growth, more_growth])
-    if stage.verdict.nature == "undetermined" and stage.exponent.sign <= 0:
+    if stage.verdict.nature == "undetermined" and stage.exponent.sign <= 0 and not stage.linear:
         return replace(stage, verdict=two_step_test(record))
     return stage
 
@@ -198,9 +210,9 @@ def _with_update_test(machine: Machine, verdict: Diagnosis) -> Diagnosis:
     return replace(verdict, status=status, votes={**verdict.votes, "matrix_update": update.nature}, evidence=evidence)
 
 
-def _stage(machine: Machine, record: CycleRecord, growth: Array, searched: int) -> _Stage:
+def _stage(machine: Machine, record: CycleRecord, growth: Array, searched: int, round_off: float) -> _Stage:
     verdict = two_step_test(record, repeats_only=True)
-    exponent = average_growth(growth[len(growth) // 2 :], machine.cycle_period)
+    exponent = average_growth(growth[len(growth) // 2 :], machine.cycle_period, round_off)
     orbit, spent = None, 0
     if verdict.period is not None or exponent.sign < 0:
         period = verdict.period or returning_period(record.section, MAX_SEARCHED_PERIOD)
@@ -266,6 +278,8 @@ def _periodic(stage: _Stage) -> Diagnosis | None:
         margin, status = verdict.margin, "agreed"
     else:
         return None
+    if stage.linear:
+        reason = f"no contact: the machine is linear, and its response periodic; {reason}"
     transient = _was_chaotic(stage)
     if transient:
         reason = f"transient chaos for {verdict.evidence['irregular_cycles']} cycles; then {reason}"
@@ -297,6 +311,23 @@ def _was_chaotic(stage: _Stage) -> bool:
     """True if the irregular cycles before a recurrence were chaotic by the exponent too."""
     irregular = stage.verdict.evidence.get("irregular_cycles", 0)
     return stage.verdict.transient and float(np.mean(stage.growth[:irregular])) > 0.0
+
+
+def _without_contact(stage: _Stage) -> Diagnosis:
+    """Verdict on a run that does not repeat and whose last half has no contact: never chaotic, as it is linear."""
+    exponent, record = stage.exponent, stage.record
+    lead = "no contact: the machine is linear"
+    last, before = (
+        float(np.max(np.abs(part))) for part in np.split(record.displacement[-4 * (len(record) // 4) :], 4)[:1:-1]
+    )
+    if last > GROWS * before or exponent.sign > 0:
+        reason = f"{lead}, but its motion still grows after {len(record)} cycles, so that contact may come later"
+        return Diagnosis(nature="undetermined", margin=0.0, status="unresolved", reason=reason)
+    if exponent.sign < 0:
+        reason = f"{lead}, and its response nears the period of the drive; exponent {exponent.per_cycle:.3g} a cycle"
+        return Diagnosis(nature="periodic", period=1, margin=0.0, status="agreed", reason=reason)
+    reason = f"{lead}, and its response a sum of lines: those of the drive and of undamped modes"
+    return Diagnosis(nature="quasiperiodic", margin=1.0, status="agreed", reason=reason)
 
 
 def _not_periodic(stage: _Stage) -> Diagnosis:
@@ -346,6 +377,7 @@ def _evidence(stage: _Stage, verdict: Diagnosis, initial_state: MotionState | Ar
     given = initial_state.coordinates if isinstance(initial_state, MotionState) else initial_state
     return {
         **stage.verdict.evidence,
+        "linear": stage.linear,
         "largest_lyapunov_exponent_per_cycle": exponent,
         "orbit": stage.orbit.as_dict() if stage.orbit is not None else None,
         "largest_peak": float(np.max(record.peak_force[settled:])),

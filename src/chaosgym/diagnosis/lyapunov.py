@@ -44,6 +44,12 @@ DISTANCE = 1e-7
 ROUNDING = 1e-15
 """Distance below which two trajectories have met; the second one then starts anew."""
 
+ROUND_OFF = 1e-12
+"""Exponent per cycle that rounding alone may give to a deviation that is carried exactly."""
+
+POLYNOMIAL = float(np.log(4.0))
+"""Logarithm of the growth of a deviation that goes with the square of time, while the time doubles."""
+
 BLOCKS = 20
 """Blocks whose scatter gives the standard error."""
 
@@ -64,6 +70,8 @@ class LyapunovExponent:
         Means of successive blocks: they show a drift that the standard error hides.
     cycles
         Number of cycles averaged.
+    round_off
+        Value that rounding alone may give.
     """
 
     per_cycle: float
@@ -71,6 +79,7 @@ class LyapunovExponent:
     cycle_period: float
     history: tuple[float, ...]
     cycles: int
+    round_off: float = ROUND_OFF
 
     @property
     def per_second(self) -> float:
@@ -79,8 +88,13 @@ class LyapunovExponent:
 
     @property
     def sign(self) -> int:
-        """+1 or -1 where the exponent differs from zero by more than three standard errors, else 0."""
-        return int(np.sign(self.per_cycle)) if abs(self.per_cycle) > 3.0 * self.standard_error else 0
+        """+1 or -1 where the exponent differs from zero by more than three standard errors and rounding, else 0.
+
+        A positive one must also make more of a deviation than the square of time does, as in conserved motions.
+        """
+        certain = abs(self.per_cycle) > max(3.0 * self.standard_error, self.round_off)
+        grows = self.per_cycle * self.cycles > POLYNOMIAL
+        return int(np.sign(self.per_cycle)) if certain and (grows or self.per_cycle < 0.0) else 0
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
@@ -93,8 +107,8 @@ class LyapunovExponent:
         }
 
 
-def average_growth(log_growth: ArrayLike, cycle_period: float = 1.0) -> LyapunovExponent:
-    """Exponent from the logarithms of the growth in successive cycles, (cycles,)."""
+def average_growth(log_growth: ArrayLike, cycle_period: float = 1.0, round_off: float = ROUND_OFF) -> LyapunovExponent:
+    """Exponent from the logarithms of the growth in successive cycles, (cycles,); ``round_off`` as in the result."""
     growth = as_samples(log_growth, minimum=2 * BLOCKS)[:, 0]
 
     def means(blocks: int) -> Array:
@@ -108,6 +122,7 @@ def average_growth(log_growth: ArrayLike, cycle_period: float = 1.0) -> Lyapunov
         cycle_period=cycle_period,
         history=tuple(float(value) for value in means(BLOCKS)),
         cycles=len(growth),
+        round_off=round_off,
     )
 
 
@@ -138,10 +153,19 @@ class Deviation:
         self._direction: Array = _any_direction(len(rest.coordinates))
         self._scale: Array | None = None
 
+    @property
+    def round_off(self) -> float:
+        """Exponent per cycle that rounding alone may give: of a second trajectory, its distance holds few digits."""
+        return ROUND_OFF if self._exact else ROUNDING / DISTANCE
+
+    @property
+    def _exact(self) -> bool:
+        exact = self._integrator is None or isinstance(self._integrator, ExactEvents)
+        return self._machine.carries_deviations and exact
+
     def run(self, cycles: int) -> tuple[CycleRecord, Array]:
         """Run on; return the record and the logarithm of the deviation's growth in each cycle, (cycles,)."""
-        exact = self._integrator is None or isinstance(self._integrator, ExactEvents)
-        if self._machine.carries_deviations and exact:
+        if self._exact:
             integrator = self._integrator if isinstance(self._integrator, ExactEvents) else None
             record, vectors, growth = simulate_with_deviations(
                 self._machine, cycles, self.state, deviations=self._direction, integrator=integrator
@@ -196,7 +220,7 @@ def largest_lyapunov_exponent(
     deviation = Deviation(machine, initial_state, integrator)
     if transient:
         deviation.run(transient)
-    return average_growth(deviation.run(cycles)[1], machine.cycle_period)
+    return average_growth(deviation.run(cycles)[1], machine.cycle_period, deviation.round_off)
 
 
 def lyapunov_spectrum(
