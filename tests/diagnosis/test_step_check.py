@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from chaosgym import ImpactBeam, diagnose
+from chaosgym import Drive, ImpactBeam, ModalMachine, Structure, diagnose
 from chaosgym.diagnosis import step_check as module
-from chaosgym.diagnosis.step_check import step_check
+from chaosgym.diagnosis.step_check import StepCheck, agree, step_check
 from chaosgym.simulation import RungeKutta4
 from tests.plain_modes import PLAIN_BEAM
 
@@ -52,3 +52,29 @@ def test_steps_that_never_agree_leave_the_verdict_undetermined(monkeypatch):
     assert check.given.nature == check.finer.nature == "chaotic"
     assert not check.settled
     assert check.summary.startswith("undetermined")
+
+
+@pytest.mark.parametrize(("stiffness", "damping"), [(1e5, 10.0), (1e5, 12.0), (1e6, 15.0)])
+def test_a_finer_step_does_not_contradict_a_proof(stiffness, damping):
+    """A ball in a shaken box comes to one proven orbit by either step, soon or, as the last digit wants, after chaos."""
+    ball = ModalMachine(
+        modes=Structure.of_modes([0.0], [[0.05]], {"ball": [1.0], "base": [1.0]}),
+        joint="ball",
+        drives=(Drive.sine("displacement", "base", 30e-3),),
+        speed=2.0,
+        clearance=22e-3,
+        contact_stiffness=stiffness,
+        contact_damping=damping,
+    )
+    check = step_check(ball)
+    for one in (check.given, check.finer):
+        assert (one.period, one.evidence["orbit"]["certified"]) == (1, True)
+    assert check.settled
+    assert check.nature_stays
+    assert check.period_stays
+    assert check.spread_stays
+    late = replace(check.given, nature="chaotic", transient=True, settle_cycle=1)
+    told = StepCheck(replace(check.given, nature="periodic", transient=False), late, settled=True)
+    assert agree(told.given, late)
+    assert "keeps the verdict (periodic with period 1)" in told.summary
+    assert f"it settles after {check.given.settle_cycle} cycles, finer 1:" in told.summary

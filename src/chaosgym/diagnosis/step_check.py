@@ -5,6 +5,9 @@ periodic responses into chaos and the reverse. A verdict that a finer step chang
 
 Two steps may be wrong alike: both call a periodic motion chaotic. Chaos of the step shrinks with it, that of the
 machine does not. So the step is refined until two successive steps agree in nature, period and exponent of chaos.
+
+Like is compared with like: what the motion settles on with what it settles on. How long transient chaos lasts before
+that depends on the last digit of the start, and so on the step; it is told beside.
 """
 
 from dataclasses import dataclass
@@ -13,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from chaosgym.diagnosis.diagnose import DEFAULT_BUDGET, diagnose
-from chaosgym.diagnosis.response import Diagnosis
+from chaosgym.diagnosis.response import Diagnosis, Nature
 from chaosgym.machines import Machine
-from chaosgym.simulation import Integrator
+from chaosgym.simulation import CycleRecord, Integrator
 
 SPREAD_CHANGE = 0.05
 """Largest change of the spread of the peak force, as a share of the largest peak, that counts as none."""
@@ -46,13 +49,13 @@ class StepCheck:
     @property
     def spreads(self) -> tuple[float, float]:
         """Largest minus smallest peak force [N] of the settled cycles, given and finer."""
-        given, finer = (float(np.ptp(one.judged.peak_force[:, 0])) for one in (self.given, self.finer))
+        given, finer = (float(np.ptp(_settled(one).peak_force[:, 0])) for one in (self.given, self.finer))
         return given, finer
 
     @property
     def nature_stays(self) -> bool:
-        """True if both runs have the same nature."""
-        return self.given.nature == self.finer.nature
+        """True if both runs settle on the same nature."""
+        return _end(self.given)[0] == _end(self.finer)[0]
 
     @property
     def period_stays(self) -> bool:
@@ -62,20 +65,32 @@ class StepCheck:
     @property
     def spread_stays(self) -> bool:
         """True if the spread of the peak force changes by less than 5 % of the largest peak."""
-        largest = max(float(one.judged.peak_force.max()) for one in (self.given, self.finer))
+        largest = max(float(_settled(one).peak_force.max()) for one in (self.given, self.finer))
         return abs(self.spreads[0] - self.spreads[1]) <= SPREAD_CHANGE * largest
+
+    @property
+    def settle_cycles(self) -> tuple[int | None, int | None]:
+        """Cycles after which the motion settles, given and finer; None where it does not."""
+        return self.given.settle_cycle, self.finer.settle_cycle
 
     @property
     def summary(self) -> str:
         """One line for people."""
-        finer = self.finer.nature + (f" with period {self.finer.period}" if self.finer.period else "")
+        nature, period = _end(self.finer)
+        finer = nature + (f" with period {period}" if period else "")
         if not self.settled:
             return f"undetermined: no two steps agree; the finest says {finer}"
         kept = "keeps" if self.nature_stays and self.period_stays else "CHANGES"
-        return (
+        line = (
             f"a finer step {kept} the verdict ({finer}); spread of the peak force {self.spreads[0]:.2f} N, "
             f"finer {self.spreads[1]:.2f} N"
         )
+        if self.given.transient or self.finer.transient:
+            before, after = self.settle_cycles
+            line += (
+                f"; irregular first, it settles after {before} cycles, finer {after}: that depends on the last digit"
+            )
+        return line
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
@@ -85,20 +100,34 @@ class StepCheck:
             "spread_stays": self.spread_stays,
             "spread_N": self.spreads[0],
             "finer_spread_N": self.spreads[1],
-            "finer_nature": self.finer.nature,
+            "finer_nature": _end(self.finer)[0],
             "finer_period": self.finer.period,
+            "settle_cycle": self.settle_cycles[0],
+            "finer_settle_cycle": self.settle_cycles[1],
             "settled": self.settled,
             "summary": self.summary,
         }
 
 
+def _end(verdict: Diagnosis) -> tuple[Nature, int | None]:
+    """Nature and period of what the motion settles on."""
+    return ("periodic" if verdict.transient else verdict.nature), verdict.period
+
+
+def _settled(verdict: Diagnosis) -> CycleRecord:
+    """Cycles of what the motion settles on."""
+    run = verdict.run
+    settle = verdict.settle_cycle if verdict.transient and verdict.settle_cycle is not None else 0
+    return run.after(min(settle, len(run) - 1)) if settle > len(run) // 2 else verdict.judged
+
+
 def agree(one: Diagnosis, other: Diagnosis) -> bool:
-    """True if two verdicts have the same nature and period, and about the same exponent where they are chaotic."""
-    if (one.nature, one.period) != (other.nature, other.period):
+    """True if two motions settle on the same nature and period, and about the same exponent where they are chaotic."""
+    if _end(one) != _end(other):
         return False
     exponents = [verdict.evidence["largest_lyapunov_exponent_per_cycle"] for verdict in (one, other)]
     values, errors = ([exponent[name] for exponent in exponents] for name in ("value", "standard_error"))
-    if one.nature != "chaotic" or min(values) <= 0.0:  # chaos that died out has an exponent below zero
+    if _end(one)[0] != "chaotic" or min(values) <= 0.0:
         return True
     return bool(abs(values[0] - values[1]) <= max(EXPONENT_CHANGE * max(values), 3.0 * np.hypot(*errors)))
 
