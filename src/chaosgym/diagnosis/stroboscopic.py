@@ -94,8 +94,13 @@ def class_residuals(samples: Array, max_period: int) -> Array:
     """Half range of the worst class for the periods 1 ... max_period, (max_period,)."""
     residuals = np.empty(max_period)
     for k in range(1, max_period + 1):
-        residuals[k - 1] = 0.5 * np.max(np.ptp(_classes(samples, k), axis=0))
+        residuals[k - 1] = 0.5 * _widest(_classes(samples, k))
     return residuals
+
+
+def _widest(classes: Array) -> float:
+    """Largest range of a class over its repeats."""
+    return float((np.maximum.reduce(classes) - np.minimum.reduce(classes)).max())
 
 
 def irregularity(peaks: ArrayLike, max_period: int = MAX_DECAY_PERIOD) -> float:
@@ -119,7 +124,7 @@ def noisy_class_residuals(samples: Array, max_period: int) -> Array:
         freedom = (len(classes) - 1) * k
         scatter = np.sqrt(3.0 * np.sum((classes - classes.mean(axis=0)) ** 2, axis=(0, 1)) / freedom)
         scatter /= 1.0 + np.sqrt(2.0 / freedom)
-        residuals[k - 1] = max(np.max(scatter), 0.5 * np.max(np.ptp(classes, axis=0)) / 1.5)
+        residuals[k - 1] = max(np.max(scatter), 0.5 * _widest(classes) / 1.5)
     return residuals
 
 

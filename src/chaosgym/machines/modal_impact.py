@@ -180,7 +180,11 @@ def settled(generator: Array, force: Array) -> tuple[Array, Array]:
     for j, (p, q, r, s) in enumerate(generator.T):
         pair = [j, n + j]
         if r != 0.0:
-            rest[pair] = -np.linalg.solve([[p, q], [r, s]], force[pair])
+            determinant = p * s - q * r
+            rest[pair] = (
+                (q * force[n + j] - s * force[j]) / determinant,
+                (r * force[j] - p * force[n + j]) / determinant,
+            )
         elif q != 0.0:
             drift[pair] = force[pair]
         else:

@@ -8,6 +8,7 @@ import os
 import time
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import numpy as np
@@ -78,7 +79,7 @@ def _in_slices(
         part = slice(done, done + count)
         along = None if tangents is None else tangents._replace(log_growth=tangents.log_growth[part])
         began = time.perf_counter()
-        rows = CycleArrays(*(array[part] for array in arrays))
+        rows = arrays if cycles <= count else CycleArrays(*(array[part] for array in arrays))
         outcome, finished = machine.run(*motion, rows, integrator, along)
         spent = max(time.perf_counter() - began, 1e-9)
         done += finished
@@ -109,6 +110,11 @@ def _count(name: str, value: int, low: int) -> int:
     if isinstance(value, bool) or int(value) != value or value < low:
         raise ParameterError(f"{name} = {value!r} is out of range; allowed: whole numbers from {low} on")
     return int(value)
+
+
+def _bar(cycles: int, progress: bool) -> AbstractContextManager[Any]:
+    """Progress bar or None. Even a bar that is never shown takes as long as a cycle."""
+    return tqdm(total=cycles, desc="simulate", unit="cycle", delay=PATIENCE) if progress else nullcontext()
 
 
 def simulate(
@@ -157,10 +163,10 @@ def simulate(
     integrator = integrator or machine.default_integrator
     state = _initial(machine, initial_state)
     first = 0
-    with tqdm(total=transient + cycles, desc="simulate", unit="cycle", delay=PATIENCE, disable=not progress) as bar:
+    with _bar(transient + cycles, progress) as bar:
         for count, samples in ((transient, 0), (cycles, samples_per_cycle)):
             if count:
-                outcome, done, record = _run(machine, state, count, samples, integrator, bar=bar if progress else None)
+                outcome, done, record = _run(machine, state, count, samples, integrator, bar=bar)
                 if outcome != status.OK:
                     raise _failure(machine, outcome, first + done, integrator)
                 state = record.final_state
