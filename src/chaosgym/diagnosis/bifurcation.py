@@ -147,7 +147,7 @@ def bifurcations_between(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> I
         return
     before, after = _change_of_contacts(family, a, b)
     yield from _smooth(family, a, before)
-    yield _grazing(family, before, after)
+    yield grazing(family, before, after)
     yield from bifurcations_between(family, after, b)
 
 
@@ -193,7 +193,8 @@ def _guess(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, resolution: float)
     return 0.5 * (low + high)
 
 
-def _grazing(family: OrbitFamily, before: OrbitPoint, after: OrbitPoint) -> Found:
+def grazing(family: OrbitFamily, before: OrbitPoint, after: OrbitPoint) -> Found:
+    """The change of contacts between two orbits on either side of it."""
     values = [family.value(point.x[-1]) for point in (before, after)]
     found = _bifurcation(family, "grazing", (before, after), before)
     return Found(replace(found, value=0.5 * sum(values), error=0.5 * abs(values[1] - values[0])), before)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.diagnosis.bifurcation import Bifurcation, Found, between, bifurcations_between
+from chaosgym.diagnosis.bifurcation import Bifurcation, Found, between, bifurcations_between, grazing
 from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily, OrbitPoint
 
 Array = NDArray[np.float64]
@@ -36,6 +36,9 @@ LEAST_COSINE = 0.8
 
 NEAR, FAR = 0.05, 0.3
 """Share of a step by which the orbit should, and by which it may lie away from where it is expected."""
+
+BEYOND, FIRST_BEYOND = (1e-7, 1e-6, 1e-5, 1e-4), 1e-5
+"""Distances at which a grazing ahead is looked for, and the orbit beyond it; and the first step after it."""
 
 MOST_UNSTABLE = 30.0
 """Largest multiplier up to which a branch is followed."""
@@ -94,6 +97,13 @@ def stretch(
         try:
             there, step = _next(family, here, step, bend)
         except NotFollowedError as reason:
+            beyond = _beyond_grazing(family, here)
+            if beyond is not None:
+                found.append(grazing(family, here, beyond))
+                at.append(len(points) - 1)
+                points.append(beyond)
+                here, step, bend = beyond, FIRST_BEYOND, Bend(np.zeros_like(start.x), np.zeros_like(start.slope))
+                continue
             return Stretch(points, found, at, f"not followed beyond {_place(family, here)}: {reason}")
         leaves = not 0.0 <= there.x[-1] <= 1.0
         try:
@@ -166,6 +176,26 @@ def _next(family: OrbitFamily, here: OrbitPoint, step: float, bend: "Bend") -> t
         grows = float(np.clip(np.sqrt(NEAR * length / max(off, 1e-12)), 0.5, 2.0))
         return there, max(grows * step, 2.0 * LEAST_STEP)
     raise NotFollowedError(reason or "no step is short enough")
+
+
+def _beyond_grazing(family: OrbitFamily, here: OrbitPoint) -> OrbitPoint | None:
+    """The orbit on the other side of a grazing that is just ahead, where the branch may turn back at a sharp angle."""
+    for reach in BEYOND:
+        ahead = here.x + reach * here.tangent
+        try:
+            if family.impacts(ahead) == here.impacts:
+                continue
+            tangent = family.tangent(ahead, here.tangent)
+        except NotFollowedError:
+            continue
+        for sign, distance in ((sign, distance) for distance in BEYOND for sign in (1.0, -1.0)):
+            try:
+                there = family.solve(here.x + sign * distance * tangent, sign * tangent)
+            except NotFollowedError:
+                continue
+            if there.impacts != here.impacts and float(np.linalg.norm(there.x - here.x)) < 10.0 * distance:
+                return there
+    return None
 
 
 def _at_end(family: OrbitFamily, here: OrbitPoint, beyond: OrbitPoint) -> OrbitPoint:

@@ -25,7 +25,10 @@ Array = NDArray[np.float64]
 CLOSED, CLOSELY = 1e-10, 1e-12
 """Miss of an orbit, relative to its size, at which Newton's method stops, and at which it does at a bifurcation."""
 
-MOST_ITERATIONS = 8
+MOST_ITERATIONS = 14
+
+MOST_HALVINGS, ROUGH = 3, 1e-2
+"""Halvings of a step of Newton's method that makes the miss larger, and the miss above which it is not worth them."""
 
 SLOPE_STEPS = (1e-6, 1e-7, 1e-8)
 """Steps in s of the difference that stands for dP/ds, the next one where the map bends too much, as near grazing.
@@ -176,13 +179,26 @@ class OrbitFamily:
             if size < closed or (size < enough and size > 0.1 * last):
                 return x, miss, matrix, slope, record
             last, before = size, matrix
-            change = np.linalg.solve(_bordered(matrix, slope, normal), -np.append(miss, normal @ (x - guess)))
-            x = x + change
-            miss, matrix, record = self._map(x)
+            wanted = -np.append(miss, normal @ (x - guess))
+            step = np.asarray(np.linalg.solve(_bordered(matrix, slope, normal), wanted), dtype=float)
+            x, change, (miss, matrix, record) = self._damped(x, step, size)
             if abs(change[-1]) > max(NOISE, 100.0 * self.noise):
                 # the new miss tells more of dP/ds than a difference does near grazing
                 slope = slope + (miss - 0.5 * (matrix - before) @ change[:-1]) / change[-1]
         raise NotFollowedError("Newton's method does not converge")
+
+    def _damped(self, x: Array, change: Array, size: float) -> tuple[Array, Array, tuple[Array, Array, CycleRecord]]:
+        """x after a step of Newton's method, the step, and the map there.
+
+        The step is halved while it makes the miss larger: at grazing it overshoots from one side to the other.
+        """
+        found = self._map(x + change)
+        for _ in range(MOST_HALVINGS):
+            if float(np.linalg.norm(found[0])) < size * max(float(np.linalg.norm(x[:-1])), 1e-300) or size > ROUGH:
+                break
+            change = 0.5 * change
+            found = self._map(x + change)
+        return x + change, change, found
 
     def _point(self, x: Array, matrix: Array, slope: Array, record: CycleRecord, along: Array) -> OrbitPoint:
         tangent = np.linalg.solve(_bordered(matrix, slope, along), np.append(np.zeros(len(matrix)), 1.0))
@@ -238,6 +254,23 @@ class OrbitFamily:
         except (SimulationError, ParameterError) as error:
             raise NotFollowedError(str(error).split(";")[0]) from error
         return _contacts(record)
+
+    def tangent(self, x: Array, along: Array) -> Array:
+        """Unit tangent (n + 1,) of the orbits of the map as it is at x, near an orbit, turned along ``along``.
+
+        Raises
+        ------
+        NotFollowedError
+            If the motion can't be followed, or the tangent is not determined.
+        """
+        try:
+            miss, matrix, _ = self._map(x)
+            tangent = np.linalg.solve(
+                _bordered(matrix, self.slope(x, miss), along), np.append(np.zeros(len(matrix)), 1.0)
+            )
+        except (SimulationError, ParameterError, np.linalg.LinAlgError) as error:
+            raise NotFollowedError(str(error).split(";")[0]) from error
+        return np.asarray(tangent / np.linalg.norm(tangent))
 
     def miss(self, x: Array) -> Array:
         """Miss (n,) of scaled unknowns after one period."""
