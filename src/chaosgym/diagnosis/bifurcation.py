@@ -33,6 +33,9 @@ Kind = Literal["grazing", "fold", "flip", "Neimark-Sacker", "symmetry breaking",
 PLACED = 1e-9
 """Length of the branch within which a change of contacts is placed, in scaled unknowns."""
 
+ROUGHLY_PLACED = 1e-4
+"""Length at which that is given up where Newton's method fails so near grazing; ``error`` of the bifurcation tells."""
+
 FIRST_DOUBT, MOST_ROUNDS = 1e-3, 40
 """Share of an interval by which the first guess of a change of contacts may err, and rounds of guessing at the most."""
 
@@ -169,7 +172,7 @@ def _change_of_contacts(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> tu
             below = between(family, a, b, guess - doubt, CLOSELY)
             above = between(family, a, b, guess + doubt, CLOSELY) if below.impacts == a.impacts else below
         except NotFollowedError:
-            if length > 1e3 * placed:
+            if length > ROUGHLY_PLACED:
                 raise
             break
         if below.impacts != a.impacts:
@@ -235,7 +238,9 @@ def _smooth(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> Iterator[Found
             share, s, point = _root(family, a, b, name, turns)
             kind = _kind(name, turns, (a, b), point)
             if kind is not None:
-                named = replace(_bifurcation(family, kind, (a, b), point), value=family.value(s))
+                named = _bifurcation(family, kind, (a, b), point)
+                doubt = abs(family.value(b.x[-1]) - family.value(a.x[-1])) if point is a or point is b else 0.0
+                named = replace(named, value=family.value(s), error=max(named.error, doubt))
                 found.append((share, Found(named, point)))
         yield from (each for _, each in sorted(found, key=lambda pair: pair[0]))
         return
@@ -297,7 +302,10 @@ def _changes(signs: dict[str, bool]) -> set[int]:
 
 
 def _root(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, name: str, turns: bool) -> tuple[float, float, OrbitPoint]:
-    """Share of the chord at which a test function vanishes, s there, and the orbit."""
+    """Share of the chord at which a test function vanishes, s there, and the orbit.
+
+    Where Newton's method fails on a short chord, as where branches cross near grazing, its nearer end stands for it.
+    """
     from scipy.optimize import brentq
 
     test, ends = TESTS[name], {0.0: a, 1.0: b}
@@ -306,7 +314,13 @@ def _root(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, name: str, turns: b
     def orbit(share: float) -> OrbitPoint:
         return ends.get(share) or between(family, a, b, share, CLOSELY)
 
-    share = float(brentq(lambda one: test(orbit(one)), 0.0, 1.0, xtol=1e-13, rtol=1e-14, maxiter=60))
+    try:
+        share = float(brentq(lambda one: test(orbit(one)), 0.0, 1.0, xtol=1e-13, rtol=1e-14, maxiter=60))
+    except NotFollowedError:
+        if float(np.linalg.norm(b.x - a.x)) > ROUGHLY_PLACED:
+            raise
+        share = abs(test(a)) / (abs(test(a)) + abs(test(b)))
+        return share, float(a.x[-1] + share * (b.x[-1] - a.x[-1])), a if share < 0.5 else b
     point = orbit(share)
     crosses = name == "one" and not turns and 0.0 < share < 1.0
     return share, _seen_from_aside(orbit, share, test) if crosses else float(point.x[-1]), point
