@@ -90,3 +90,16 @@ def test_files_named_in_the_documentation_exist():
         and not any((base / name).exists() for base in bases)
     }
     assert missing == set()
+
+
+def test_cards_of_shipped_policies_say_what_the_pages_say():
+    """A score with its interval that a policy's card states stands in the documentation too, and no other."""
+    pages = " ".join(Path("docs", name).read_text(encoding="utf-8") for name in ("agents.md", "controllers.md"))
+    pages = " ".join(pages.split())
+    cards = list(Path("src/chaosgym/control/policies/shipped").glob("*/card.md"))
+    assert len(cards) == 3
+    for card in cards:
+        text = " ".join(card.read_text(encoding="utf-8").replace("95 % over machines ", "").split())
+        for score in re.findall(r"\d\.\d\d \(-?\d\.\d\d to \d\.\d\d\)", text):
+            low, high = re.findall(r"\((.*) to (.*)\)", score)[0]
+            assert score in pages or f"{score.split()[0]} | {low} to {high}" in pages, (card.parent.name, score)

@@ -141,3 +141,16 @@ def test_lines_of_a_stream_are_read_as_those_of_a_file():
     for text in ("abc", "nan", "1;2"):
         with pytest.raises(DiagnosisError, match="line 4"):
             parse_reading(text, 4, first=False)
+
+
+@pytest.mark.parametrize(("row", "count"), [('"{}', 180), ('"{},1', 180), ('{},"1', 180)])
+@pytest.mark.parametrize("every", [1, 3, 180])
+def test_no_reading_is_dropped_for_a_quote(tmp_path, row, count, every):
+    """A line with a quote that is not closed is counted and said, wherever it stands and however many there are."""
+    plain = row.replace('"', "")
+    lines = [(row if i % every == 0 else plain).format(100 + i % 3) for i in range(count)]
+    path = tmp_path / "torn.csv"
+    path.write_text("force [N]" + ",b" * plain.count(",") + "\n" + "\n".join(lines) + "\n")
+    torn = len(range(0, count, every))
+    with pytest.raises(DiagnosisError, match=f"line 2: a quote is not closed, as in {torn} of {count} lines"):
+        choose_force(read_recording(path), "force")

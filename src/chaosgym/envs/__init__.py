@@ -51,10 +51,6 @@ def _register(name: str, keywords: dict[str, Any]) -> None:
         vector_entry_point="chaosgym.envs.vector_env:MachineVectorEnv",
         kwargs=keywords,
     )
-    if name in ENVIRONMENTS:
-        gone = f"{__name__}:{_refuse.__name__}"
-        old = name.replace("-v1", "-v0")
-        register(id=old, entry_point=gone, vector_entry_point=gone, kwargs={"successor": name})
 
 
 def environment(env: str) -> EnvSpec:
@@ -74,13 +70,6 @@ def environment(env: str) -> EnvSpec:
         known = [name for name, spec in ours.items() if "machine" in spec.kwargs]
         raise ParameterError(f"env = {env!r} is unknown; known: {', '.join(known)}, or a file my-machine.toml")
     return found
-
-
-def _refuse(successor: str, **_: Any) -> NoReturn:
-    """Refuse to make an environment of version 0; names the id to use instead."""
-    raise ParameterError(
-        f"{successor.replace('-v1', '-v0')} is gone: its Type III was a table's, not the motion's; use {successor}"
-    )
 
 
 register_environments()

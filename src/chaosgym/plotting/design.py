@@ -53,9 +53,9 @@ def peak_record(peaks: Array, exponent: float, left: Axes, right: Axes) -> None:
     top = 1.15 * float(np.max(peaks)) or 1.0
     left.set(xlabel="cycle", ylabel="peak force [N]", ylim=(0.0, top), title="Peak force of every cycle")
     right.set(
-        xlabel="share of cycles",
+        xlabel=f"share of cycles ({len(found.modes)} mode{'s' * (len(found.modes) > 1)})",
         ylim=(0.0, top),
-        title=f"How often ({len(found.modes)} mode{'s' * (len(found.modes) > 1)})",
+        title="How often",
     )
     right.tick_params(labelleft=False)
     handles = [

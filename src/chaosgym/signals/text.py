@@ -23,6 +23,12 @@ HEADING = 500
 """Lines among which a heading ends."""
 
 COMMENT = re.compile(r"\s*(#|%|//|\")")
+QUOTED = re.compile(r'\s*"[^"]*"\s*($|[,;\t|])')
+"""A line whose first entry is in quotes."""
+
+TORN = re.compile(r'\s*"\s*[+-]?[\d.,]')
+"""A line that begins with a quote and a number."""
+
 NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.IGNORECASE)
 
 
@@ -34,7 +40,7 @@ def read_text(data: bytes) -> dict[str, Any]:
     kept = [
         (number, line.rstrip("\r"))
         for number, line in enumerate(text.split("\n"), start=1)
-        if line.strip(" ,;|\t\r") and not (COMMENT.match(line) and not re.match(r'\s*"[^"]*"\s*($|[,;\t|])', line))
+        if line.strip(" ,;|\t\r") and not (COMMENT.match(line) and not QUOTED.match(line) and not TORN.match(line))
     ]
     if not kept:
         raise DiagnosisError("holds no numbers")
@@ -51,13 +57,18 @@ def read_text(data: bytes) -> dict[str, Any]:
     titles = names or [f"column {place + 1}" for place in range(width)]
     if len(set(titles)) != len(titles):
         raise DiagnosisError(f"names two columns alike: {', '.join(titles)}")
-    table, lines = _table(kept[start:], titles, mark), tuple(number for number, _ in kept[start:])
+    body = kept[start:]
+    lines = tuple(number for number, _ in body)
+    torn = [number for number, line in body if line.count('"') % 2]
+    table = _table([(number, line.replace('"', "")) for number, line in body] if torn else body, titles, mark)
     comma = delimiter != "," and any(
         "," in (value or "") for column in table.columns for value in column[:50].to_pylist()
     )
     columns, problems = {}, {}
     for title, column in zip(titles, table.columns, strict=True):
         columns[title], problem = _numbers(column, comma, lines)
+        if torn:
+            problem = f"line {torn[0]}: a quote is not closed, as in {len(torn)} of {len(lines)} lines"
         if problem:
             problems[title] = problem
     columns = {title: values for title, values in columns.items() if values is not None}
