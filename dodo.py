@@ -152,6 +152,14 @@ def task_classifier():
         yield task(machine, used, [made], f"rm -rf {run}", train, f"cp {run}/*.npz {made}")
 
 
+def task_signs():
+    """How often the signs of chaos of thesis 5.3 were right on the datasets."""
+    used = [f"datasets/{machine}/sweep.parquet" for machine in SWEEPS]
+    used += ["src/chaosgym/diagnosis/precursors.py", "benchmarks/sweeps/signs.py"]
+    count = "python -m benchmarks.sweeps.signs " + " ".join(f"datasets/{machine}" for machine in SWEEPS)
+    yield task("rates", used, ["src/chaosgym/diagnosis/signs.json"], count)
+
+
 def task_policy():
     """Shipped policies; each command goes on where it was stopped."""
     for name, (*before, command) in POLICIES.items():

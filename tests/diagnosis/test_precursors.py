@@ -1,10 +1,17 @@
+import json
+
 import pytest
 
 from chaosgym.diagnosis import (
     bounce_fraction,
+    diagnose,
     precursors,
     predictive_criteria,
+    signs_of_chaos,
+    two_step_test,
 )
+from chaosgym.diagnosis.precursors import measured_rates
+from chaosgym.errors import DiagnosisError
 from chaosgym.machines import ImpactBeam
 from chaosgym.simulation import simulate
 
@@ -46,3 +53,33 @@ def test_predictive_criteria_of_the_beam():
     assert not predictive_criteria(ImpactBeam(clearance=0.06e-3)).chaos_possible
     assert not predictive_criteria(ImpactBeam(damping_ratio=0.081)).chaos_possible
     assert "clearance" in predictive_criteria(ImpactBeam(clearance=0.06e-3)).reason
+
+
+def test_signs_of_a_periodic_response_say_how_often_they_are_right():
+    """At 12 Hz criteria and precursors are silent, each in one line with its rates on the dataset (5.3)."""
+    signs = signs_of_chaos(diagnose(ImpactBeam(excitation_frequency=12.0)))
+    assert [(sign.name, sign.present) for sign in signs] == [
+        ("criteria", False),
+        ("period doubling", False),
+        ("period three", False),
+        ("long bouncing", False),
+    ]
+    assert all(sign.line.count("\n") == 0 and "% of those" in sign.line for sign in signs)
+    assert json.loads(json.dumps(signs[0].as_dict()))["rate"]["points"] > 10_000
+
+
+def test_signs_of_a_chaotic_response_are_the_criteria_alone():
+    """A precursor comes before chaos, so only the printed criteria speak of a response that is chaotic."""
+    verdict = diagnose(ImpactBeam(), budget=400)
+    assert verdict.nature == "chaotic"
+    assert [(sign.name, sign.present) for sign in signs_of_chaos(verdict)] == [("criteria", True)]
+    with pytest.raises(DiagnosisError, match="plain series"):
+        signs_of_chaos(two_step_test([1.0, 2.0] * 20))
+
+
+def test_subharmonics_announce_chaos_more_surely_than_bouncing():
+    """On the shipped datasets of both machines, periods of order three and doublings are right three times in four."""
+    for rates in measured_rates().values():
+        assert min(rates["period three"].precision, rates["period doubling"].precision) > 0.75
+        assert rates["long bouncing"].precision < 0.5
+        assert rates["long bouncing"].recall > rates["period three"].recall

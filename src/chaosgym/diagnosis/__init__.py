@@ -9,7 +9,7 @@ from chaosgym.diagnosis.lyapunov import (
 )
 from chaosgym.diagnosis.matrix_update import compare_attractors, compare_outcomes, matrix_update_test
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
-from chaosgym.diagnosis.precursors import bounce_fraction, precursors, predictive_criteria
+from chaosgym.diagnosis.precursors import bounce_fraction, precursors, predictive_criteria, signs_of_chaos
 from chaosgym.diagnosis.response import TYPES, Diagnosis, Nature, Type
 from chaosgym.diagnosis.response_map import ResponseMap, geometric_grid, response_map
 from chaosgym.diagnosis.response_type import ResponseType, Tolerance, default_tolerances, response_type
@@ -47,6 +47,7 @@ __all__ = [
     "predictive_criteria",
     "response_map",
     "response_type",
+    "signs_of_chaos",
     "two_step_test",
     "types_on_grid",
     "zero_one_statistic",

@@ -6,13 +6,21 @@ inside. Precursors of a periodic response are
 period doubling     the period is 2, 4, 8 ...
 period three        the period is a multiple of three that is no doubling: 3, 6, 12 ...
 long bouncing       bouncing on a surface lasts until the end of the half cycle
+
+How often each was right on the shipped datasets is kept in ``signs.json``; ``python -m benchmarks.sweeps.signs`` counts
+anew.
 """
 
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib import resources
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from chaosgym.diagnosis.response import Diagnosis
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord
@@ -97,3 +105,120 @@ def precursors(period: int | None, bounce_fraction: float = 0.0) -> Precursors:
 def bounce_fraction(record: CycleRecord) -> float:
     """Longest bouncing of a record, from the first touch of a surface to its last, in half cycles."""
     return float(record.bounce_duration.max()) / (0.5 * record.machine.cycle_period)
+
+
+class Rate(NamedTuple):
+    """How often a sign was right on a dataset.
+
+    ``precision``: share of the points with the sign that had chaos; ``recall``: share of the points with chaos that had
+    the sign; ``points``: how many were judged. None where there was none to take a share of.
+    """
+
+    precision: float | None
+    recall: float | None
+    points: int
+
+
+@cache
+def measured_rates() -> Mapping[str, Mapping[str, Rate]]:
+    """Rates by machine and by sign, as counted on the shipped datasets."""
+    kept = json.loads((resources.files("chaosgym.diagnosis") / "signs.json").read_text(encoding="utf-8"))
+    return {machine: {name: Rate(**rate) for name, rate in signs.items()} for machine, signs in kept.items()}
+
+
+MEANT = {
+    "criteria": "chaos at such a point",
+    "period doubling": "chaos within the tolerances of speed and clearance",
+    "period three": "chaos within the tolerances of speed and clearance",
+    "long bouncing": "chaos within the tolerances of speed and clearance",
+}
+"""What each sign announces."""
+
+
+@dataclass(frozen=True)
+class Sign:
+    """One sign of chaos on one response.
+
+    Attributes
+    ----------
+    name
+        "criteria" (thesis 5.3.1), "period doubling", "period three" or "long bouncing" (5.3.2).
+    present
+        Whether it is there.
+    why
+        What was found.
+    rate
+        How often it was right; None for a machine without a shipped dataset.
+    """
+
+    name: str
+    present: bool
+    why: str
+    rate: Rate | None
+
+    @property
+    def line(self) -> str:
+        """The sign in one line."""
+        section = "5.3.1" if self.name == "criteria" else "5.3.2"
+        told = f"{self.name} ({section}): {'yes' if self.present else 'no'}, {self.why}"
+        if self.rate is None:
+            return f"{told}; how often it is right was not measured on this machine"
+        return (
+            f"{told}; {_share(self.rate.precision)} of those with it had {MEANT[self.name]}, "
+            f"and {_share(self.rate.recall)} of those with chaos had it"
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {**asdict(self), "rate": self.rate._asdict() if self.rate else None}
+
+
+def _share(share: float | None) -> str:
+    return "none" if share is None else f"{share:.0%}"
+
+
+def signs_of_chaos(verdict: Diagnosis) -> tuple[Sign, ...]:
+    """Signs of chaos on a machine's response, with how often each was right on the dataset of its kind.
+
+    Parameters
+    ----------
+    verdict
+        Of ``diagnose``: it carries the run and the machine. Precursors are looked for on periodic responses only.
+
+    Returns
+    -------
+    tuple of Sign
+        The printed criteria, if the thesis gives any for the machine; then the precursors.
+
+    Raises
+    ------
+    DiagnosisError
+        If the verdict was reached on a plain series.
+
+    Examples
+    --------
+    >>> from chaosgym import diagnose
+    >>> from chaosgym.diagnosis import signs_of_chaos
+    >>> from chaosgym.machines import ImpactBeam
+    >>> verdict = diagnose(ImpactBeam(excitation_frequency=12.0))
+    >>> [(sign.name, sign.present) for sign in signs_of_chaos(verdict)]
+    [('criteria', False), ('period doubling', False), ('period three', False), ('long bouncing', False)]
+    """
+    machine = verdict.run.machine
+    rates = measured_rates().get(machine.name, {})
+    found = list[Sign]()
+    if machine.chaos_thresholds:
+        criterion = predictive_criteria(machine)
+        found.append(Sign("criteria", criterion.chaos_possible, criterion.reason, rates.get("criteria")))
+    if verdict.nature != "periodic":
+        return tuple(found)
+    early = precursors(verdict.period, bounce_fraction(verdict.judged))
+    period = f"period {verdict.period}"
+    bouncing = f"bounces for {early.bounce_fraction:.0%} of a half cycle"
+    for name, present, why in (
+        ("period doubling", early.period_doubling, period),
+        ("period three", early.period_three, period),
+        ("long bouncing", early.long_bouncing, bouncing),
+    ):
+        found.append(Sign(name, present, why, rates.get(name)))
+    return tuple(found)
