@@ -76,7 +76,7 @@ def cluster(tmp_path):
         for number in range(2)
     ]
     wait_until(lambda: scheduler_workers(address) == 2)
-    yield address, workers
+    yield address, workers, scheduler
     for process in (*workers, scheduler):
         process.kill()
         process.wait()
@@ -92,7 +92,7 @@ def scheduler_workers(address):
 @pytest.mark.slow
 def test_rows_of_a_cluster_that_loses_a_worker_are_those_of_one_process(cluster, tmp_path):
     """One of two workers is killed half way: nothing is lost, nothing twice, and every row is the local run's."""
-    address, workers = cluster
+    address, workers, _ = cluster
     run = subprocess.Popen(
         [*COMMAND, "--scheduler", address, "--out", str(tmp_path / "c")], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
@@ -113,3 +113,23 @@ def test_a_missing_scheduler_is_one_line(tmp_path):
     assert run.returncode == 2
     assert "no Dask scheduler answers at tcp://127.0.0.1:1" in run.stderr
     assert "Traceback" not in run.stderr
+    assert not (tmp_path / "c").exists()
+
+
+@pytest.mark.slow
+def test_a_dead_scheduler_is_one_line(cluster, tmp_path):
+    """Killed while its workers compute: exit code 1, one line beside the progress, the plan stays."""
+    address, _, scheduler = cluster
+    run = subprocess.Popen(
+        [*COMMAND, "--scheduler", address, "--out", str(tmp_path / "c")], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    wait_until((tmp_path / "c" / "chunks").is_dir)
+    time.sleep(1.0)
+    scheduler.kill()
+    _, errors = run.communicate(timeout=120)
+    told = [line for line in errors.decode().replace("\r", "\n").split("\n") if line and not line.startswith("sweep:")]
+    assert run.returncode == 1
+    assert len(told) == 1, "\n".join(told[-16:])
+    assert "gave up" in told[0]
+    assert "run the same command again" in told[0]
+    assert (tmp_path / "c" / "plan.json").is_file()

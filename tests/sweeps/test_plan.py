@@ -1,6 +1,7 @@
 """Plans of sweeps: axes, sampling, validation."""
 
 import json
+import time
 
 import numpy as np
 import pytest
@@ -100,6 +101,12 @@ def test_the_split_of_a_machine_does_not_depend_on_how_many_there_are():
     for name, column in small.points(rows).items():
         np.testing.assert_array_equal(column, large.points(rows)[name])
     parts = large.splits(range(len(large)))
+    assert large.splits(range(1000, 1300)) == parts[1000:1300]
+    huge = SweepPlan(PLAIN_BEAM, CROSS_AXES, "crosses", 10**8, 2)
+    began = time.process_time()
+    assert huge.splits(rows) == small.splits(rows)
+    assert set(huge.splits(range(len(huge) - 255, len(huge)))) <= {"train", "validation", "test"}
+    assert time.process_time() - began < 0.5, "the cost of a chunk does not grow with the plan"
     assert 0.6 < parts.count("train") / len(parts) < 0.8
 
 

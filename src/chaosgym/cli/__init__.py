@@ -39,7 +39,7 @@ COMMANDS = {
 }
 """Module in this folder and function of every command."""
 
-BEYOND_THE_USER = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS)
+BEYOND_THE_USER = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EFBIG)
 """Errors of a disk that no other way of asking would have avoided."""
 
 

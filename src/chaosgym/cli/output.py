@@ -45,7 +45,8 @@ def emit(result: Mapping[str, Any], as_json: bool, lines: Callable[[], list[str]
         ):
             click.echo(line, nl=False)  # Python overlooks that a single large write was cut off; the next one is not
             click.echo()
-        sys.stdout.flush()
+        if sys.stdout is not None:  # None where it was closed before the start
+            sys.stdout.flush()
     except BrokenPipeError:
         # what is left in the buffer goes nowhere at the end of the process
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

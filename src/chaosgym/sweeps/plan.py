@@ -203,9 +203,13 @@ class SweepPlan:
 
     def splits(self, rows: range) -> list[str]:
         """Part of the split that each row of crosses belongs to: whole machines, by seed and number alone."""
-        drawn = np.random.default_rng([self.seed, 1]).random(self.size)
+        machines = self.machine_numbers(rows)
+        first, generator = int(machines.min(initial=self.size)), np.random.default_rng([self.seed, 1])
+        bits: Any = generator.bit_generator
+        bits.advance(first)
+        drawn = generator.random(int(machines.max(initial=first)) + 1 - first)
         parts = np.searchsorted(np.cumsum([share for _, share in SPLIT]), drawn, side="right").clip(max=len(SPLIT) - 1)
-        return [SPLIT[part][0] for part in parts[self.machine_numbers(rows)]]
+        return [SPLIT[part][0] for part in parts[machines - first]]
 
     def with_signals(self, rows: range) -> NDArray[np.bool_]:
         """Which rows keep their signals, (n_rows,)."""

@@ -1,8 +1,10 @@
 """The run of a sweep: in chunks, in parallel, each kept at once, so that a stopped run goes on."""
 
 import json
+import logging
 from collections.abc import Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager, nullcontext
 from itertools import islice
 from os import cpu_count
 from pathlib import Path
@@ -46,8 +48,9 @@ def on_threads(plan: SweepPlan, chunks: Iterable[range], workers: int | None = N
         pool.shutdown(cancel_futures=True)
 
 
-def on_cluster(plan: SweepPlan, chunks: Iterable[range], scheduler: str) -> Iterator[Finished]:
-    """Label chunks on the workers of a Dask scheduler, which need this version of chaosgym.
+@contextmanager
+def cluster_at(scheduler: str) -> Iterator[Any]:
+    """Client of a Dask scheduler.
 
     Raises
     ------
@@ -57,7 +60,7 @@ def on_cluster(plan: SweepPlan, chunks: Iterable[range], scheduler: str) -> Iter
         If the cluster gives up: the scheduler is gone, or several workers were lost over one chunk.
     """
     try:
-        from distributed import Client, KilledWorker, as_completed
+        from distributed import Client, KilledWorker
         from distributed.comm import CommClosedError
     except ImportError as error:
         raise DatasetError(f"--scheduler needs the extra [cluster]: {error}") from None
@@ -65,24 +68,37 @@ def on_cluster(plan: SweepPlan, chunks: Iterable[range], scheduler: str) -> Iter
         client = Client(scheduler, timeout=CONNECT_SECONDS)
     except (OSError, ValueError) as error:
         raise DatasetError(f"no Dask scheduler answers at {scheduler}: {error}") from None
-    with client:
-        waiting = iter(chunks)
-        threads = max(1, sum(client.nthreads().values()))
-        running: dict[Any, range] = {}
+    for name in [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]:
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what they say of a lost scheduler is told in one line
+    try:
+        yield client
+    except (KilledWorker, CommClosedError, CancelledError) as error:
+        raise UnfinishedError(
+            f"the cluster at {scheduler} gave up ({type(error).__name__}); finished chunks are kept: run the same "
+            "command again when it is back"
+        ) from None
+    finally:
+        client.close(timeout=CONNECT_SECONDS)
 
-        def submit(count: int) -> list[Any]:
-            futures = [(client.submit(label_rows, plan, rows, pure=False), rows) for rows in islice(waiting, count)]
-            running.update(futures)
-            return [future for future, _ in futures]
 
-        try:
-            completed = as_completed(submit(AHEAD * threads), raise_errors=False)
-            for future in completed:
-                for more in submit(1):
-                    completed.add(more)
-                yield running.pop(future), future.result()
-        except (KilledWorker, CommClosedError, OSError) as error:
-            raise UnfinishedError(f"the cluster at {scheduler} gave up: {error}") from None
+def on_cluster(plan: SweepPlan, chunks: Iterable[range], client: Any) -> Iterator[Finished]:
+    """Label chunks on the workers of a Dask client, which need this version of chaosgym."""
+    from distributed import as_completed
+
+    waiting = iter(chunks)
+    threads = max(1, sum(client.nthreads().values()))
+    running: dict[Any, range] = {}
+
+    def submit(count: int) -> list[Any]:
+        futures = [(client.submit(label_rows, plan, rows, pure=False), rows) for rows in islice(waiting, count)]
+        running.update(futures)
+        return [future for future, _ in futures]
+
+    completed = as_completed(submit(AHEAD * threads), raise_errors=False)
+    for future in completed:
+        for more in submit(1):
+            completed.add(more)
+        yield running.pop(future), future.result()
 
 
 def run_sweep(
@@ -122,11 +138,14 @@ def run_sweep(
         If the disk is full, the cluster is lost, or another process writes into the folder. What was kept stays; the
         same call goes on.
     """
-    with held(claimed(folder, PLAN_FILE, what="run of this sweep"), CHUNK_FOLDER):
+    with (
+        cluster_at(scheduler) if scheduler else nullcontext() as client,
+        held(claimed(folder, PLAN_FILE, what="run of this sweep"), CHUNK_FOLDER),
+    ):
         store = SweepFolder(folder, plan, __version__)
         missing = store.missing(repair=repair)
         if missing:
-            done = on_cluster(plan, missing, scheduler) if scheduler else on_threads(plan, missing, workers)
+            done = on_cluster(plan, missing, client) if client else on_threads(plan, missing, workers)
             _keep(store, missing, done, progress)
         if not store.data.is_file():
             store.finish()
