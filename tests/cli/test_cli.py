@@ -4,8 +4,12 @@ import json
 import subprocess
 import sys
 
+import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from chaosgym import read_machine
+from chaosgym.cli import app
 from chaosgym.machines import ImpactBeam
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.simulation import simulate
@@ -25,10 +29,11 @@ def run_json(*arguments, module="chaosgym"):
 
 
 def test_simulate_prints_the_peaks_of_simulate():
-    """The numbers are those of the library, upper side, one a cycle from rest."""
+    """The numbers are those of the library, of the surface with the largest, one a cycle from rest."""
     result = run_json("simulate", "impact-beam", "--frequency-hz", "19", "--clearance-mm", "0.1", "--cycles", "30")
     record = simulate(ImpactBeam(excitation_frequency=19.0, clearance=0.1e-3), 30)
-    assert result["peak_force_N"] == record.peak_force[:, 0].tolist()
+    assert result["peak_force_N"] == record.peak_force[:, record.worst_side].tolist()
+    assert result["surfaces_peak_force_N"] == dict(zip(("upper", "lower"), record.peak_force.T.tolist(), strict=True))
     assert result["impacts"] == record.impacts.sum(axis=1).tolist()
     assert 0.0 < result["seconds_per_cycle"] < 1.0
 
@@ -41,6 +46,58 @@ def test_diagnose_tells_the_printed_natures(frequency, nature):
     assert (result["period"] == 1) == (nature == "periodic")
     assert set(result["peak_force_summary_N"]) == {"min", "max", "mean", "std"}
     assert result["evidence"]
+
+
+TWO_MASSES = """
+[structure]
+matrices = "two.npz"
+modes = 2
+damping_ratios = "2 %"
+[joint]
+at = "load - motor"
+clearance = "0.2 mm"
+stiffness = "0.5 N/um"
+damping = "30 N s/m"
+[[drive]]
+at = "motor"
+force = "20 N"
+[operation]
+speed = "30 Hz"
+speed_range = "10 to 60 Hz"
+clearance_range = "0.05 to 0.5 mm"
+"""
+
+
+@pytest.fixture(scope="module")
+def two_masses(tmp_path_factory):
+    """File of masses of 3 and 1 kg, each on 2 kN/m, with a gap between them."""
+    folder = tmp_path_factory.mktemp("machine")
+    np.savez(folder / "two.npz", M=np.diag([3.0, 1.0]), K=np.diag([2000.0, 2000.0]), names=["load", "motor"])
+    path = folder / "two.toml"
+    path.write_text(TWO_MASSES)
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("machine", "lower", "upper"),
+    [("two_masses", 74.1986, 36.5763), ("docs/machines/kahraman-singh-1990.toml", None, None)],
+)
+def test_forces_that_are_printed_are_the_settled_motions_on_every_surface(machine, lower, upper, request):
+    """Those of a proven orbit are the forces after 3,000 more cycles, unlike those of the run that led to it."""
+    path = request.getfixturevalue(machine) if machine == "two_masses" else machine
+    told = json.loads(CliRunner().invoke(app, ["diagnose", path, "--json"]).stdout)
+    shown = CliRunner().invoke(app, ["diagnose", path]).stdout
+    settled = simulate(read_machine(path), told["period"], transient=3000 * told["period"]).peak_force.max(axis=0)
+    assert told["status"] == "certified"
+    for side, reached in zip(("upper", "lower"), settled, strict=True):
+        assert told["surfaces_peak_force_N"][side]["max"] == pytest.approx(reached, rel=1e-6)
+        assert f"{side}: {told['surfaces_peak_force_N'][side]['min']:.2f} to {reached:.2f} N" in shown or not reached
+        assert f"{told['transient_largest_peak_force_N'][side]:.2f} N {side}" in shown.partition("transient")[2]
+    assert told["peak_force_summary_N"]["max"] == pytest.approx(settled.max(), rel=1e-6)
+    assert told["worst_surface"] == ("upper", "lower")[int(settled.argmax())]
+    if lower is not None:
+        assert settled.tolist() == pytest.approx([upper, lower], rel=1e-5)
+        assert max(told["transient_largest_peak_force_N"].values()) > 90.0
 
 
 def test_diagnose_can_check_the_step():

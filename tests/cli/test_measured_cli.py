@@ -96,7 +96,7 @@ def test_simulated_peaks_are_read_back(tmp_path):
             "--json",
         )
         assert code == 0, err
-        peaks = json.loads(out)["peak_force_N"]
+        peaks = json.loads(out)["surfaces_peak_force_N"]["upper"]
         code, _, err = run("diagnose", "--peaks", path)
         assert code == 2
         assert "'upper', 'lower'; use --column NAME" in err

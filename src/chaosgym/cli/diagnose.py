@@ -7,7 +7,7 @@ import click
 
 from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, run_lines
-from chaosgym.cli.output import draw, emit, patience, picture_path, plot_option, verdict_lines
+from chaosgym.cli.output import draw, emit, force_line, patience, picture_path, plot_option, verdict_lines
 from chaosgym.machines import MACHINES
 
 
@@ -77,29 +77,51 @@ def diagnose(
 
 
 def _matrix_update(machine: Any) -> tuple[dict[str, Any], list[str], Any]:
-    from chaosgym.design.statistics import summary as summarize
     from chaosgym.diagnosis import matrix_update_test
 
     verdict = matrix_update_test(machine)
-    summary = summarize(verdict.judged.peak_force[:, 0])
-    result = {"machine": machine.name, **verdict.as_dict(), "peak_force_summary_N": summary, "warnings": []}
-    return result, verdict_lines(f"{machine.name}, Matrix Update Test", verdict, summary), verdict
+    told, forces = _forces(machine, verdict)
+    result = {"machine": machine.name, **verdict.as_dict(), **told, "warnings": []}
+    return result, verdict_lines(f"{machine.name}, Matrix Update Test", verdict, forces), verdict
+
+
+def _forces(machine: Any, verdict: Any) -> tuple[dict[str, Any], list[str]]:
+    """Settled peak forces of every surface, and the largest of the transient: for JSON, and as lines."""
+    from chaosgym.design.statistics import summary
+
+    settled, before = verdict.judged.peak_force, verdict.transient_run.peak_force
+    worst = machine.sides[verdict.judged.worst_side]
+    surfaces = {side: summary(settled[:, place]) for place, side in enumerate(machine.sides)}
+    transient = {side: float(before[:, place].max()) for place, side in enumerate(machine.sides)}
+    told = {
+        "peak_force_summary_N": surfaces[worst],
+        "worst_surface": worst,
+        "surfaces_peak_force_N": surfaces,
+        "transient_largest_peak_force_N": transient,
+    }
+    touched = {side: found for side, found in surfaces.items() if found["max"] > 0.0}
+    lines = [f"{side}: {force_line(found)}" for side, found in touched.items()]
+    if min(found["max"] for found in surfaces.values()) < (1.0 - 1e-9) * surfaces[worst]["max"] and len(touched) > 1:
+        lines.append(f"worst surface: {worst}, {surfaces[worst]['max']:.2f} N")
+    if 0 < len(touched) < len(surfaces):
+        lines.append(f"never touched once settled: {', '.join(side for side in surfaces if side not in touched)}")
+    lines.append("transient: up to " + ", ".join(f"{peak:.2f} N {side}" for side, peak in transient.items()))
+    return told, lines
 
 
 def _diagnose_machine(
     machine: Any, budget: int, types: bool, check: bool, sensor_error: float
 ) -> tuple[dict[str, Any], list[str], Any]:
-    from chaosgym.design.statistics import summary as summarize
     from chaosgym.diagnosis import diagnose, response_type
     from chaosgym.diagnosis.step_check import step_check
 
     verdict = diagnose(machine, budget=budget, sensor_error=sensor_error)
-    summary = summarize(verdict.judged.peak_force[:, 0])
+    told, forces = _forces(machine, verdict)
     exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
     result = {
         "machine": machine.name,
         **verdict.as_dict(),
-        "peak_force_summary_N": summary,
+        **told,
         "largest_lyapunov_exponent_per_cycle": {key: exponent[key] for key in ("value", "standard_error")},
         "cycles_used": verdict.evidence["cycles_used"],
         "warnings": [verdict.reason] if verdict.status in ("disputed", "transient", "unresolved") else [],
@@ -107,7 +129,7 @@ def _diagnose_machine(
     if not verdict.judged.peak_force.any():
         result["warnings"].append("no contact at all: the gap is never closed")
     votes = ", ".join(f"{test} {vote}" for test, vote in verdict.votes.items())
-    lines = verdict_lines(machine.name, verdict, summary)
+    lines = verdict_lines(machine.name, verdict, forces)
     lines.append(f"  {result['cycles_used']} cycles used; votes: {votes}")
     if not verdict.judged.peak_force.any():
         lines.append(f"  {result['warnings'][-1]}")

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import click
 
 from chaosgym.cli.machine_options import Quantity
-from chaosgym.cli.output import verdict_lines
+from chaosgym.cli.output import force_line, verdict_lines
 
 OPTIONS = (
     click.option("--peaks", metavar="FILE", help="Peak forces, one a cycle: CSV, Parquet, .npy, .mat; - is stdin."),
@@ -128,7 +128,7 @@ def run_lines(subject: str, run: Run) -> list[str]:
     """Lines for people: nature, why, what was left out, how the readings lie, and what was read."""
     from chaosgym.design.statistics import summary
 
-    lines = verdict_lines(subject, run.verdict.diagnosis, summary(run.peaks), run.verdict.notes)
+    lines = verdict_lines(subject, run.verdict.diagnosis, [force_line(summary(run.peaks))], run.verdict.notes)
     return [*lines, *(f"  {note}" for note in run.notes)]
 
 

@@ -53,16 +53,22 @@ def emit(result: Mapping[str, Any], as_json: bool, lines: Callable[[], list[str]
         sys.exit(NOBODY_READS)
 
 
-def verdict_lines(subject: str, verdict: Any, summary: Mapping[str, float], notes: Iterable[str] = ()) -> list[str]:
-    """Lines on a ``Diagnosis``: nature, why, some notes, and how the peak forces [N] lie."""
+def verdict_lines(subject: str, verdict: Any, forces: Iterable[str], notes: Iterable[str] = ()) -> list[str]:
+    """Lines on a ``Diagnosis``: nature, why, some notes, and how the peak forces lie."""
     status = f"{verdict.status}, " if verdict.status else ""
     return [
         f"{subject}: {verdict.words} ({status}margin {verdict.margin:.2f})",
         f"  {verdict.reason}",
-        *(f"  {note}" for note in notes),
-        f"  {summary['min']:.2f} to {summary['max']:.2f} N, mean {summary['mean']:.2f} N, "
-        f"standard deviation {summary['std']:.2f} N",
+        *(f"  {line}" for line in (*notes, *forces)),
     ]
+
+
+def force_line(summary: Mapping[str, float]) -> str:
+    """How peak forces [N] lie."""
+    return (
+        f"{summary['min']:.2f} to {summary['max']:.2f} N, mean {summary['mean']:.2f} N, "
+        f"standard deviation {summary['std']:.2f} N"
+    )
 
 
 @contextmanager

@@ -43,10 +43,13 @@ def simulate(
     start = time.process_time()
     record = run(machine, cycles, transient=transient, samples_per_cycle=samples if series_out else 0, progress=True)
     seconds_per_cycle = (time.process_time() - start) / (transient + cycles)
-    peaks = record.peak_force[:, 0]
+    surfaces = {side: record.peak_force[:, place] for place, side in enumerate(machine.sides)}
+    worst = machine.sides[record.worst_side]
     result = {
         "machine": machine.name,
-        "peak_force_N": peaks.tolist(),
+        "peak_force_N": surfaces[worst].tolist(),
+        "worst_surface": worst,
+        "surfaces_peak_force_N": {side: peaks.tolist() for side, peaks in surfaces.items()},
         "impacts": record.impacts.sum(axis=1).tolist(),
         "contact_fraction": record.contact_fraction.sum(axis=1).tolist(),
         "seconds_per_cycle": seconds_per_cycle,
@@ -54,8 +57,9 @@ def simulate(
     no_contact = not record.peak_force.any()
     result["warnings"] = ["no contact at all: the gap is never closed"] if no_contact else []
     if out:
-        sides = {f"{side} [N]": record.peak_force[:, place] for place, side in enumerate(machine.sides)}
-        write_table({"cycle": np.arange(1, cycles + 1), **sides}, out)
+        write_table(
+            {"cycle": np.arange(1, cycles + 1), **{f"{side} [N]": peaks for side, peaks in surfaces.items()}}, out
+        )
     if series_out and record.history is not None:
         motion = record.history.reshape(-1, record.history.shape[2]).T
         names = ("displacement [m]", "velocity [m/s]", "force [N]")
@@ -66,8 +70,11 @@ def simulate(
         result["largest_sensor_force_N"] = sensors
     lines = [
         f"{machine.name}: {cycles} cycles after {transient}",
-        f"peak force, {machine.sides[0]} side   {peaks.min():.2f} to {peaks.max():.2f} N, mean {peaks.mean():.2f} N",
-        f"last peaks                {' '.join(f'{peak:.2f}' for peak in peaks[-8:])}",
+        *(
+            f"{f'peak force, {side}':25s} {peaks.min():.2f} to {peaks.max():.2f} N, mean {peaks.mean():.2f} N"
+            for side, peaks in surfaces.items()
+        ),
+        f"{f'last peaks, {worst}':25s} {' '.join(f'{peak:.2f}' for peak in surfaces[worst][-8:])}",
         f"impacts per cycle         {record.impacts.sum(axis=1).mean():.1f}",
         f"share in contact          {record.contact_fraction.sum(axis=1).mean():.2f}",
         *(f"largest force, {name:16s} {force:.2f} N" for name, force in sensors.items()),

@@ -99,6 +99,14 @@ class Diagnosis:
         """
         return self.orbit_record or self.run.after(len(self.run) // 2)
 
+    @property
+    def transient_run(self) -> "CycleRecord":
+        """The run before the settled motion; raises as ``run`` does.
+
+        All of it where an orbit is proven, since such a run may still be on its way; else its first half.
+        """
+        return self.run if self.orbit_record is not None else self.run.until(len(self.run) // 2)
+
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         runs = ("record", "orbit_record")

@@ -48,8 +48,9 @@ class StepCheck:
 
     @property
     def spreads(self) -> tuple[float, float]:
-        """Largest minus smallest peak force [N] of the settled cycles, given and finer."""
-        given, finer = (float(np.ptp(_settled(one).peak_force[:, 0])) for one in (self.given, self.finer))
+        """Largest minus smallest peak force [N] of the settled cycles on the worst surface, given and finer."""
+        side = _settled(self.given).worst_side
+        given, finer = (float(np.ptp(_settled(one).peak_force[:, side])) for one in (self.given, self.finer))
         return given, finer
 
     @property

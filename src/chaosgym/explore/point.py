@@ -156,14 +156,14 @@ def view_of(machine: Machine) -> View:
     last = simulate(machine, cycles, judged.section[-cycles], samples_per_cycle=SAMPLES)
     assert last.history is not None
     motion = last.history.reshape(-1, 3)
-    heard = simulate(machine, MONITORED_CYCLES, judged.section[-1]).peak_force[:, 0]
+    heard = simulate(machine, MONITORED_CYCLES, judged.section[-1]).peak_force[:, judged.worst_side]
     return View(
         time=last.time,
         displacement=motion[:, 0],
         velocity=motion[:, 1],
         force=motion[:, 2],
         section=np.column_stack([judged.displacement, judged.velocity]),
-        peaks=judged.peak_force[:, 0],
+        peaks=judged.peak_force[:, judged.worst_side],
         room=room,
         nature=verdict.nature,
         headline=f"{verdict.words} ({verdict.status})",
@@ -176,7 +176,10 @@ def _votes(verdict: Diagnosis) -> str:
     if not peaks.any():
         return "no contact at all: the gap is never closed"
     votes = ", ".join(f"{test.replace('_', ' ')} {vote}" for test, vote in verdict.votes.items())
-    return f"peak forces {peaks[:, 0].min():.1f} to {peaks[:, 0].max():.1f} N; votes: {votes}"
+    machine = verdict.judged.machine
+    surfaces = zip(machine.sides, peaks.T, strict=True)
+    forces = ", ".join(f"{side} {own.min():.1f} to {own.max():.1f} N" for side, own in surfaces if own.any())
+    return f"peak forces {forces}; votes: {votes}"
 
 
 def _classified(machine: Machine) -> str:
@@ -205,4 +208,4 @@ def orbit_diagram(machine: Machine, slider: Slider) -> Iterator[tuple[float, Arr
             record = simulate(machine.at(speed), DIAGRAM_CYCLES, transient=DIAGRAM_TRANSIENT)
         except SimulationError:
             continue
-        yield speed, np.unique(np.round(record.peak_force[:, 0], 3))
+        yield speed, np.unique(np.round(record.peak_force[:, record.worst_side], 3))

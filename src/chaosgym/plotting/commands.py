@@ -109,8 +109,9 @@ def diagnosis_figure(verdict: Diagnosis) -> Figure:
     response.stops(machine.room, portrait)
     portrait.set_title("Motion between the stops; dots: once a cycle", fontweight="normal", fontsize=9.5)
     first = (verdict.horizon or len(judged)) - len(judged) + 1
-    response.cycle_points(judged.peak_force[:, 0], peaks, first=first, color=colour)
-    peaks.set_ylabel(f"peak force, {machine.sides[0]} [N]")
+    worst = judged.worst_side
+    response.cycle_points(judged.peak_force[:, worst], peaks, first=first, color=colour)
+    peaks.set_ylabel(f"peak force, {machine.sides[worst]} [N]")
     figure.suptitle(
         f"{point_of(machine)}\n{_told(verdict)}", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK
     )

@@ -142,6 +142,12 @@ class CycleRecord:
             history=None if self.histories is None else self.histories[:, :, 3 * j : 3 * j + 3],
         )
 
+    @property
+    def worst_side(self) -> int:
+        """Column of the surface with the largest peak force; the first of those that are equal but for rounding."""
+        largest = self.peak_force.max(axis=0)
+        return int(np.argmax(largest >= (1.0 - 1e-9) * largest.max()))
+
     def after(self, cycles: int) -> "CycleRecord":
         """Return the record without its first cycles."""
         return self._with_rows(lambda name: getattr(self, name)[cycles:])
