@@ -138,6 +138,9 @@ def test_lines_of_a_stream_are_read_as_those_of_a_file():
     assert parse_reading("48,5\n", 3, first=False) == 48.5
     assert parse_reading("force [N]\n", 1, first=True) is None
     assert parse_reading("# pause\n", 5, first=False) is None
+    assert parse_reading('"48,5"\n', 5, first=False) == 48.5
+    with pytest.raises(DiagnosisError, match="line 4"):
+        parse_reading('"48.5\n', 4, first=False)
     for text in ("abc", "nan", "1;2"):
         with pytest.raises(DiagnosisError, match="line 4"):
             parse_reading(text, 4, first=False)

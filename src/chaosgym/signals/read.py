@@ -18,7 +18,7 @@ import pyarrow.csv
 from numpy.typing import NDArray
 
 from chaosgym.errors import DiagnosisError
-from chaosgym.signals.text import COMMENT, NUMBER, read_text, split_unit
+from chaosgym.signals.text import COMMENT, NUMBER, QUOTED, TORN, read_text, split_unit
 
 Array = NDArray[np.float64]
 
@@ -109,7 +109,8 @@ def parse_reading(line: str, number: int, *, first: bool) -> float | None:
         If the line is no finite number, or holds several.
     """
     text = line.lstrip("\ufeff").strip().rstrip(",;")
-    if not text or COMMENT.match(text):
+    text = text.strip('"') if QUOTED.match(text) else text
+    if not text or (COMMENT.match(text) and (first or not TORN.match(text))):
         return None
     if not NUMBER.fullmatch(text):
         if first:
