@@ -39,6 +39,15 @@ def test_a_call_adds_no_version_of_a_kernel():
     assert is_cached(advance_model)
 
 
+def test_the_functions_that_are_counted_are_those_that_are_compiled():
+    """A bar over the functions that a kernel calls ends full: each of them has machine code then."""
+    simulate(ImpactBeam(), 1)
+    functions = compilation._functions_of(advance_model)
+    assert advance_model in functions
+    assert len(functions) > 10
+    assert all(map(is_cached, functions))
+
+
 def test_no_kernel_gives_python_a_named_tuple():
     """Where Ctrl-C arrives while numba makes one of a kernel's result, the process crashes."""
     for machine in (ImpactBeam(), ImpactBeam(contact_law="restitution", n_modes=1, fitted_modes=0), SliderCrank()):

@@ -56,7 +56,7 @@ def test_steps_that_never_agree_leave_the_verdict_undetermined(monkeypatch):
 
 @pytest.mark.parametrize(("stiffness", "damping"), [(1e5, 10.0), (1e5, 12.0), (1e6, 15.0)])
 def test_a_finer_step_does_not_contradict_a_proof(stiffness, damping):
-    """A ball in a shaken box comes to one proven orbit by either step, soon or, as the last digit wants, after chaos."""
+    """A ball in a shaken box comes to one proven orbit by either step, soon or, as a last digit wants, after chaos."""
     ball = ModalMachine(
         modes=Structure.of_modes([0.0], [[0.05]], {"ball": [1.0], "base": [1.0]}),
         joint="ball",

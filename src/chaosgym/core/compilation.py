@@ -2,7 +2,7 @@
 
 The first call of a kernel in a process loads its machine code from the disk, or compiles it, which takes seconds, and
 keeps it there. A lock lets one process compile while others that need a kernel not there yet wait and then load it;
-what is there already is loaded without the lock. A message says what takes so long.
+what is there already is loaded without the lock. A message says what takes so long, and a bar how much is left.
 
 The machine code has a checksum beside it: a damaged file is compiled anew. Machine code, numba's index of it and
 checksums change under the lock alone. So a reader without the lock that finds them in disagreement can have met a
@@ -16,18 +16,24 @@ import os
 import shutil
 import tempfile
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numba
 from filelock import FileLock
 from numba.core import event
+from numba.core.dispatcher import Dispatcher
+from tqdm import tqdm
 
 from chaosgym.core.kernel import SideBySide
 from chaosgym.core.kernel_cache import KERNEL_CACHE, WANTED_CACHE
 
 logger = logging.getLogger("chaosgym")
+
+PATIENCE = 2.0
+"""Seconds after which a bar appears."""
 
 _ready: set[tuple[Any, int]] = set()
 
@@ -71,10 +77,12 @@ def prepare(kernel: Any, *arguments: Any) -> None:
     with FileLock(_lock_file()):
         _discard_damaged(kernel)
         cached = is_cached(kernel)
+        functions = set() if cached else {one for one in _functions_of(kernel) if not is_cached(one)}
         if not cached:
-            logger.warning("compiling %s: %s", name_of(kernel), _how_often())
+            logger.warning("compiling %s: %d functions, %s", name_of(kernel), len(functions), _how_often())
         try:
-            kernel.compile(signature)
+            with _shown(functions):
+                kernel.compile(signature)
         except numba.core.errors.NumbaError:
             raise
         except Exception as error:  # whatever reading a damaged pickle raises
@@ -117,10 +125,49 @@ def _loaded(kernel: Any, signature: tuple[Any, ...]) -> bool:
     return True
 
 
+class _Count(event.Listener):  # type: ignore[misc] # numba has no types
+    """Moves a bar on by each of some functions that is compiled."""
+
+    def __init__(self, functions: set[Any], bar: Any) -> None:
+        self._left, self._bar = set(functions), bar
+
+    def on_start(self, event: event.Event) -> None:
+        """Nothing to do."""
+
+    def on_end(self, event: event.Event) -> None:
+        """Count a function once: it may be compiled for several types, and others of numba's own are too."""
+        function = event.data["dispatcher"]
+        if function in self._left:
+            self._left.remove(function)
+            self._bar.update()
+
+
+@contextmanager
+def _shown(functions: set[Any]) -> Iterator[None]:
+    """Bar of the functions that are compiled meanwhile, in a terminal, after two seconds."""
+    with (
+        tqdm(total=len(functions), desc="compiling", unit="function", delay=PATIENCE, disable=None, leave=False) as bar,
+        event.install_listener("numba:compile", _Count(functions, bar)),
+    ):
+        yield
+
+
+def _functions_of(kernel: Any) -> set[Any]:
+    """A kernel and all kernels that it calls, but for those that are written out in their callers."""
+    found, ahead = {kernel}, [kernel]
+    while ahead:
+        function = ahead.pop().py_func
+        names = set(function.__code__.co_names) & set(function.__globals__)
+        called = {one for one in map(function.__globals__.get, names) if isinstance(one, Dispatcher)} - found
+        found |= called
+        ahead += called
+    return {one for one in found if one.targetoptions.get("inline") != "always"}
+
+
 def _how_often() -> str:
     if Path(KERNEL_CACHE).is_relative_to(WANTED_CACHE):
-        return "once on this computer, some ten seconds"
-    return f"some ten seconds in every process, since {WANTED_CACHE} can't be written to; NUMBA_CACHE_DIR names another"
+        return "once on this computer"
+    return f"in every process, since {WANTED_CACHE} can't be written to; NUMBA_CACHE_DIR names another"
 
 
 def is_cached(kernel: Any) -> bool:
