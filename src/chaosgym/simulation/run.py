@@ -79,7 +79,7 @@ def _in_slices(
         part = slice(done, done + count)
         along = None if tangents is None else tangents._replace(log_growth=tangents.log_growth[part])
         began = time.perf_counter()
-        rows = arrays if cycles <= count else CycleArrays(*(array[part] for array in arrays))
+        rows = CycleArrays(*(array[part] for array in arrays))
         outcome, finished = machine.run(*motion, rows, integrator, along)
         spent = max(time.perf_counter() - began, 1e-9)
         done += finished
