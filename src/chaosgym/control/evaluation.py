@@ -15,8 +15,15 @@ from chaosgym.control.policies.policy import TrainedPolicy, load_policy
 from chaosgym.control.rollout import Played, Policy, play
 from chaosgym.envs.memory import SpeedMemory
 from chaosgym.errors import ModelFileError
+from chaosgym.files import first_line
 
 NAME = "this policy"
+
+ALGORITHMS = (
+    *("PPO", "A2C", "SAC", "TD3", "DDPG", "DQN"),
+    *("RecurrentPPO", "MaskablePPO", "TRPO", "QRDQN", "TQC", "CrossQ", "ARS"),
+)
+"""Algorithms of stable-baselines3 and of sb3-contrib whose files are read."""
 
 
 @dataclass(frozen=True)
@@ -126,15 +133,24 @@ def _loaded(path: Path) -> Any:
     """Model of a .zip file, whichever algorithm it was trained with."""
     if not path.is_file():
         raise ModelFileError(f"{path} does not exist")
-    from sb3_contrib import RecurrentPPO
-    from stable_baselines3 import PPO, SAC
+    import sb3_contrib
+    import stable_baselines3
+    from stable_baselines3.common.save_util import load_from_zip_file
 
-    for kind in (PPO, SAC, RecurrentPPO):
-        try:
-            return kind.load(path, device="cpu")
-        except Exception:  # each kind refuses the files of the others in its own way
-            continue
-    raise ModelFileError(f"{path} is no model of PPO, SAC or RecurrentPPO")
+    kinds = [getattr(stable_baselines3, name) for name in ALGORITHMS if hasattr(stable_baselines3, name)]
+    kinds += [getattr(sb3_contrib, name) for name in ALGORITHMS if hasattr(sb3_contrib, name)]
+    try:
+        data, _, _ = load_from_zip_file(path, device="cpu")
+        policy = (data or {})["policy_class"]
+    except Exception as error:  # whatever torch and pickle say of damaged bytes
+        raise ModelFileError(f"{path} can't be read as a model of stable-baselines3: {first_line(error)}") from None
+    for kind in kinds:
+        if any(issubclass(policy, known) for known in kind.policy_aliases.values()):
+            try:
+                return kind.load(path, device="cpu")
+            except Exception:  # several algorithms share a policy; each refuses the files of the others in its own way
+                continue
+    raise ModelFileError(f"{path} is no model of {', '.join(ALGORITHMS)}")
 
 
 def evaluate(

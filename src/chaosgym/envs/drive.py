@@ -44,18 +44,22 @@ def action_space(task: Task) -> "Box | Discrete[Any]":
 def checked_actions(task: Task, actions: Any, count: int) -> Array:
     """Return the actions of ``count`` machines as an array (count, n).
 
+    A number that stands alone may be an array of one, and a whole one may be a float: libraries hand on both.
+
     Raises
     ------
     ParameterError
         If they have another shape, or are no numbers of the space.
     """
     given = np.asarray(actions)
+    if given.shape == (count, 1) or (given.shape == (count,) and task.action == "speed"):
+        given = given.reshape((count, 1) if task.action == "speed" else (count,))
     if task.action == "trim":
-        fits = given.shape == (count,) and given.dtype.kind in "iu"
+        fits = given.shape == (count,) and given.dtype.kind in "iuf"
         if not fits or not set(given.tolist()) <= set(range(BACK + 1)):
             raise ParameterError(f"action = {actions!r} is not usable; allowed: whole numbers from 0 to {BACK}")
         return given[:, None].astype(float)
     width = 2 if task.action == "continuous" else 1
-    if given.shape != (count, width) or not np.issubdtype(given.dtype, np.number) or not np.isfinite(given).all():
+    if given.shape != (count, width) or given.dtype.kind not in "iuf" or not np.isfinite(given).all():
         raise ParameterError(f"action = {actions!r} is not usable; allowed: {width} finite numbers for each machine")
     return given.astype(float)

@@ -5,10 +5,12 @@ motion goes on from the state in which the last step ended.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Space
 from numpy.typing import NDArray
 
@@ -134,6 +136,7 @@ class MachineEnv(gym.Env[Observation, Any]):
     """
 
     metadata = METADATA
+    _spec: EnvSpec | None = None
 
     def __init__(self, machine: str = "", *, render_mode: str | None = None, **keywords: Any) -> None:
         if render_mode is not None and render_mode not in METADATA["render_modes"]:
@@ -149,6 +152,19 @@ class MachineEnv(gym.Env[Observation, Any]):
         self._job.traced = 0 if render_mode is None else 1
         self._runs = False
         self._dashboard: Dashboard | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """Specification, with the steps of a job as ``max_episode_steps``: a job ends by itself, as termination."""
+        return None if self._spec is None else replace(self._spec, max_episode_steps=self._spec_steps())
+
+    @spec.setter
+    def spec(self, given: EnvSpec | None) -> None:
+        self._spec = given
+
+    def _spec_steps(self) -> int:
+        own = self._spec and self._spec.max_episode_steps
+        return min(own or self.task.steps, self.task.steps)
 
     @property
     def speed(self) -> float:

@@ -6,10 +6,12 @@ Every sub-environment does what a single environment with its seed does, bit for
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.seeding import np_random
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
@@ -71,6 +73,8 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         If a value is out of range; names it and the allowed range.
     """
 
+    _spec: EnvSpec | None = None
+
     def __init__(
         self,
         num_envs: int = 1,
@@ -111,6 +115,19 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         self.single_observation_space = self.workplace.space
         self.action_space = batch_space(self.workplace.actions, num_envs)
         self.observation_space = batch_space(self.workplace.space, num_envs)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """Specification, with the steps of a job as ``max_episode_steps``: a job ends by itself, as termination."""
+        return None if self._spec is None else replace(self._spec, max_episode_steps=self._spec_steps())
+
+    @spec.setter
+    def spec(self, given: EnvSpec | None) -> None:
+        self._spec = given
+
+    def _spec_steps(self) -> int:
+        own = self._spec and self._spec.max_episode_steps
+        return min(own or self.task.steps, self.task.steps)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
