@@ -60,12 +60,14 @@ def test_forces_of_a_proven_orbit_are_those_of_a_run_that_has_settled(speed, pre
     assert verdict.evidence["largest_peak"] == reached.max()
 
 
-def test_step_two_runs_where_the_exponent_does_not_decide():
-    """Chaos by an exponent far from zero has no 0-1 statistic; the verdict says what decided it."""
+def test_step_two_is_finished_and_votes_on_chaos():
+    """Where the exponent shows chaos, step II has looked at section and spectrum too, and agrees (5.2.1)."""
     verdict = diagnose(ImpactBeam(), budget=400)
-    assert verdict.votes["lyapunov"] == "chaotic"
-    assert "zero_one" not in verdict.votes
+    votes = {name: verdict.votes[name] for name in ("two_step", "lyapunov", "zero_one")}
+    assert votes == {"two_step": "chaotic", "lyapunov": "chaotic", "zero_one": "chaotic"}
+    assert verdict.evidence["section"] == "set with structure"
     assert "exponent" in verdict.reason
+    assert "broad spectrum" in verdict.reason
 
 
 def test_chaos_of_the_beam_is_agreed():

@@ -192,7 +192,7 @@ def _undetermined(evidence, reason):
 
 REPETITION = {"cycles", "residual", "residual_allowed"}
 STEP_ONE = REPETITION | {"contraction_per_cycle"}
-STEP_TWO = REPETITION | {"zero_one", "spectral_floor", "spectral_lines", "bands"}
+STEP_TWO = REPETITION | {"zero_one", "spectral_floor", "spectral_lines", "bands", "section"}
 FIGURES = "spectral floor {spectral_floor:.1e}, 0-1 statistic {zero_one:.2f}"
 
 

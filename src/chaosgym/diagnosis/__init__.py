@@ -13,6 +13,7 @@ from chaosgym.diagnosis.precursors import bounce_fraction, precursors, predictiv
 from chaosgym.diagnosis.response import TYPES, Diagnosis, Nature, Type
 from chaosgym.diagnosis.response_map import ResponseMap, geometric_grid, response_map
 from chaosgym.diagnosis.response_type import ResponseType, Tolerance, default_tolerances, response_type
+from chaosgym.diagnosis.section_shape import section_shape
 from chaosgym.diagnosis.spectrum import power_spectrum
 from chaosgym.diagnosis.two_step import two_step_test
 from chaosgym.diagnosis.type_rule import Built, Neighbour, judge_type, types_on_grid
@@ -47,6 +48,7 @@ __all__ = [
     "predictive_criteria",
     "response_map",
     "response_type",
+    "section_shape",
     "signs_of_chaos",
     "two_step_test",
     "types_on_grid",

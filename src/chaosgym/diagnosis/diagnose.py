@@ -10,10 +10,10 @@ periodic, certified. All others start again with a deviation that travels along.
     it never touches         the machine is linear there and the response can't be chaotic: it settles on the drive's
                              period, or is a sum of the drive's lines and those of undamped modes
 
-Tests that cost much run where they can change the verdict: step II, with the 0-1 test, where the exponent does not
-decide, and the Matrix Update Test (flow chart of figure 5.5), on machines whose matrices depend on their
-configuration, where no orbit is proven. Chaos that dies out within the horizon counts as chaotic (thesis 5.2.3), with
-the status "transient".
+Tests that cost much run where they can change the verdict or its status: step II of the Two-Step Test, with the 0-1
+test, at the end of the last stage where the motion does not repeat, and the Matrix Update Test (flow chart of figure
+5.5), on machines whose matrices depend on their configuration, where no orbit is proven. Chaos that dies out within the
+horizon counts as chaotic (thesis 5.2.3), with the status "transient".
 """
 
 from dataclasses import dataclass, replace
@@ -189,7 +189,7 @@ def _last_stage(machine: Machine, deviation: Deviation, budget: int, sensor_erro
         searched = stage.cycles_used - len(record)
         more, more_growth = deviation.run(len(record))
         record, growth = record.followed_by(more), np.concatenate([growth, more_growth])
-    if stage.verdict.nature == "undetermined" and stage.exponent.sign <= 0 and not stage.linear:
+    if stage.verdict.nature == "undetermined" and not stage.linear:
         return replace(stage, verdict=two_step_test(record))
     return stage
 

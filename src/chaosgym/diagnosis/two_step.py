@@ -3,9 +3,10 @@ r"""The Two-Step Test (thesis 5.2.1) on one sample of the motion a cycle: period
 Step I   Does the time history repeat? Then it is periodic, with the period of the recurrence. A history that
          approaches a repetition steadily is periodic too.
 Step II  If not: the stroboscopic set and the spectrum. A closed curve gives a few lines and bounded 0-1 walks:
-         quasiperiodic. A fractal or fuzzy set gives a broad band and diffusing walks: chaotic.
+         quasiperiodic. A fractal or fuzzy set gives a broad band and diffusing walks: chaotic, unless the set itself is
+         a closed curve.
 
-Chaos that dies out counts as chaotic, as in the thesis (5.2.3), and is flagged ``transient``. Where the two figures of
+Chaos that dies out counts as chaotic, as in the thesis (5.2.3), and is flagged ``transient``. Where the figures of
 step II disagree, or the record is too short for the verdict, the answer is "undetermined".
 """
 
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.diagnosis.response import Diagnosis
+from chaosgym.diagnosis.section_shape import Shape, section_shape
 from chaosgym.diagnosis.spectrum import power_spectrum
 from chaosgym.diagnosis.stroboscopic import (
     DECAY_FACTOR,
@@ -120,7 +122,8 @@ def two_step_test(
         return _approaching(decay, evidence)
     if repeats_only:
         return _undetermined(evidence, "does not repeat")
-    verdict = _step_two(series, evidence, sensor_error)
+    section = x.section if isinstance(x, CycleRecord) else samples
+    verdict = _step_two(series, section, evidence, sensor_error)
     longest = (len(samples) - len(samples) // 2) // NOISY_REPEATS
     if verdict.nature == "undetermined" and sensor_error > 0.0 and longest < max_period:
         hint = f"; with a sensor error {len(samples)} cycles show periods up to {max(1, longest)} only"
@@ -223,7 +226,7 @@ def _dies_out(scaled: Array) -> bool:
     return decay is not None and decay.factor >= DECAY_FACTOR
 
 
-def _step_two(series: list[Array], evidence: dict[str, Any], sensor_error: float) -> Diagnosis:
+def _step_two(series: list[Array], section: Array, evidence: dict[str, Any], sensor_error: float) -> Diagnosis:
     cycles = evidence["cycles"]
     figures = [_step_two_figures(s, sensor_error) for s in series]
     bands, lines = figures[0][2], figures[0][3]
@@ -231,6 +234,7 @@ def _step_two(series: list[Array], evidence: dict[str, Any], sensor_error: float
     walks = [f[0] for f in figures if f[0] is not None]
     statistic = float(np.median(walks)) if walks else None
     evidence |= {"zero_one": statistic, "spectral_floor": floor, "spectral_lines": lines, "bands": bands}
+    evidence["section"] = _shape(section, bands) if sensor_error == 0.0 else None
     common: dict[str, Any] = {"period": None, "evidence": evidence, "horizon": cycles}
     threshold = BROAD_FLOOR if cycles >= SHORT_CYCLES else BROAD_FLOOR_SHORT
     broad = _decades(floor, threshold, over=1.0)
@@ -238,6 +242,8 @@ def _step_two(series: list[Array], evidence: dict[str, Any], sensor_error: float
     shown = "0-1 test drowned by noise" if statistic is None else f"0-1 statistic {statistic:.2f}"
     figures_shown = f"spectral floor {floor:.1e}, {shown}"
     if floor > threshold and diffuses > 0.0:
+        if evidence["section"] == "closed curve":
+            return _undetermined(evidence, f"does not repeat, and a closed curve contradicts {figures_shown}")
         if cycles < CHAOTIC_CYCLES:
             reason = f"does not repeat, but {cycles} cycles are too few to tell chaos from a torus"
             return _undetermined(evidence, reason)
@@ -257,6 +263,14 @@ def _step_two(series: list[Array], evidence: dict[str, Any], sensor_error: float
         reason = f"does not repeat, {lines} spectral lines and no band: {figures_shown}"
         return Diagnosis(nature="quasiperiodic", margin=float(margin), reason=reason, **common)
     return _undetermined(evidence, f"does not repeat, and step II does not decide: {figures_shown}")
+
+
+def _shape(section: Array, bands: int) -> Shape:
+    """Shape of the whole section, or of one of the bands that the motion visits in turn if that is a closed curve."""
+    whole = section_shape(section)
+    if whole == "set with structure" and bands > 1 and section_shape(section, bands) == "closed curve":
+        return "closed curve"
+    return whole
 
 
 def _step_two_figures(series: Array, sensor_error: float) -> tuple[float | None, float, int, int]:
