@@ -155,7 +155,7 @@ def _judge(
         features = response_features(model.scaling_, values)
     else:
         section = np.column_stack([record.displacement, record.velocity])[None]
-        features = response_features(model.scaling_, values, record.peak_force[None, :, 0], section)
+        features = response_features(model.scaling_, values, record.peaks[None], section)
     chances = model.chances(features)[0].tolist()
     names = model.classes_.tolist()
     now.probabilities, now.stage = dict(zip(names, chances, strict=True)), stage

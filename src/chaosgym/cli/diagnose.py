@@ -90,19 +90,22 @@ def _forces(machine: Any, verdict: Any) -> tuple[dict[str, Any], list[str]]:
     from chaosgym.design.statistics import summary
 
     settled, before = verdict.judged.peak_force, verdict.transient_run.peak_force
-    worst = machine.sides[verdict.judged.worst_side]
+    shown = machine.sides[verdict.judged.worst_side]
     surfaces = {side: summary(settled[:, place]) for place, side in enumerate(machine.sides)}
     transient = {side: float(before[:, place].max()) for place, side in enumerate(machine.sides)}
     told = {
-        "peak_force_summary_N": surfaces[worst],
-        "worst_surface": worst,
+        "peak_force_summary_N": surfaces[shown],
+        "worst_surface": shown,
         "surfaces_peak_force_N": surfaces,
         "transient_largest_peak_force_N": transient,
     }
     touched = {side: found for side, found in surfaces.items() if found["max"] > 0.0}
     lines = [f"{side}: {force_line(found)}" for side, found in touched.items()]
-    if min(found["max"] for found in surfaces.values()) < (1.0 - 1e-9) * surfaces[worst]["max"] and len(touched) > 1:
-        lines.append(f"worst surface: {worst}, {surfaces[worst]['max']:.2f} N")
+    largest = max(surfaces, key=lambda side: surfaces[side]["max"])
+    if surfaces[shown]["max"] < (1.0 - 1e-9) * surfaces[largest]["max"]:
+        lines.append(f"monitored: {shown}; the largest force is on {largest}, {surfaces[largest]['max']:.2f} N")
+    elif min(found["max"] for found in surfaces.values()) < (1.0 - 1e-9) * surfaces[shown]["max"] and len(touched) > 1:
+        lines.append(f"worst surface: {shown}, {surfaces[shown]['max']:.2f} N")
     if 0 < len(touched) < len(surfaces):
         lines.append(f"never touched once settled: {', '.join(side for side in surfaces if side not in touched)}")
     lines.append("transient: up to " + ", ".join(f"{peak:.2f} N {side}" for side, peak in transient.items()))

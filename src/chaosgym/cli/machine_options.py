@@ -228,10 +228,11 @@ def _checked(owner: Any, option: str, number: Number, value: float) -> float:
 
 def _setting(owner: Any, text: str) -> tuple[str, Any, str]:
     """Parse FIELD=VALUE, where a number may have a unit: (field, value, a doubt about it)."""
-    from chaosgym.machines.parameters import parameters_of
+    from chaosgym.machines.parameters import field_named, parameters_of
     from chaosgym.machines.units import parse_option
 
     field, separator, value = text.partition("=")
+    field = field_named(owner, field)
     if not separator or not field or not value:
         raise click.UsageError(f"--set {text!r} is not of the form FIELD=VALUE")
     described = parameters_of(owner).get(field)

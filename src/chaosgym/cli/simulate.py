@@ -43,6 +43,8 @@ def simulate(
     start = time.process_time()
     record = run(machine, cycles, transient=transient, samples_per_cycle=samples if series_out else 0, progress=True)
     seconds_per_cycle = (time.process_time() - start) / (transient + cycles)
+    first = 2 * record.joint
+    contact = record.contact_fraction[:, first : first + 2].sum(axis=1)
     surfaces = {side: record.peak_force[:, place] for place, side in enumerate(machine.sides)}
     worst = machine.sides[record.worst_side]
     result = {
@@ -51,7 +53,7 @@ def simulate(
         "worst_surface": worst,
         "surfaces_peak_force_N": {side: peaks.tolist() for side, peaks in surfaces.items()},
         "impacts": record.impacts.sum(axis=1).tolist(),
-        "contact_fraction": record.contact_fraction.sum(axis=1).tolist(),
+        "contact_fraction": contact.tolist(),
         "seconds_per_cycle": seconds_per_cycle,
     }
     no_contact = not record.peak_force.any()
@@ -61,9 +63,11 @@ def simulate(
             {"cycle": np.arange(1, cycles + 1), **{f"{side} [N]": peaks for side, peaks in surfaces.items()}}, out
         )
     if series_out and record.history is not None:
-        motion = record.history.reshape(-1, record.history.shape[2]).T
-        names = ("displacement [m]", "velocity [m/s]", "force [N]")
-        write_table({"time [s]": record.time, **dict(zip(names, motion, strict=False))}, series_out)
+        every = record.history if record.histories is None else record.histories
+        quantities = ("displacement [m]", "velocity [m/s]", "force [N]")
+        names = [f"{joint} {name}" for joint in machine.joints for name in quantities] or quantities
+        motion = every.reshape(-1, every.shape[2]).T
+        write_table({"time [s]": record.time, **dict(zip(names, motion, strict=True))}, series_out)
     result["files"] = [path for path in (out, series_out) if path]
     sensors = dict(zip(machine.sensors, _largest(record.sensor_peak), strict=True))
     if sensors:
@@ -76,7 +80,7 @@ def simulate(
         ),
         f"{f'last peaks, {worst}':25s} {' '.join(f'{peak:.2f}' for peak in surfaces[worst][-8:])}",
         f"impacts per cycle         {record.impacts.sum(axis=1).mean():.1f}",
-        f"share in contact          {record.contact_fraction.sum(axis=1).mean():.2f}",
+        f"share in contact          {contact.mean():.2f}",
         *(f"largest force, {name:16s} {force:.2f} N" for name, force in sensors.items()),
         *result["warnings"],
         *(f"written to {path}" for path in result["files"]),

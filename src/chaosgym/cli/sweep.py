@@ -60,7 +60,7 @@ def sweep(
     """Label many machines and keep them as Parquet; the same command again resumes."""
     from collections import Counter
 
-    from chaosgym.machines.parameters import parameters_of
+    from chaosgym.machines.parameters import field_named, parameters_of
     from chaosgym.sweeps import Axis, SweepPlan, run_sweep
     from chaosgym.sweeps.plan import default_axes
 
@@ -71,6 +71,7 @@ def sweep(
         raise click.UsageError("--random, --sobol and --crosses exclude each other")
     kind: Any = given[0] if given else sampling
     units = {name: about.unit for name, about in parameters_of(machine).items()}
+    axes = tuple("=".join([field_named(machine, field), *span]) for field, *span in (text.split("=") for text in axes))
     chosen = tuple(Axis.parse(text, units) for text in axes) or default_axes(machine, kind)
     plan = SweepPlan(machine, chosen, kind, sizes.get(kind) or 0, seed, budget, signals, full_types)
     for text in axes:
@@ -103,9 +104,10 @@ def sweep(
 
 def _note_millimetres(machine: Any, text: str) -> None:
     """Say where a bare end of an axis looks like millimetres."""
-    from chaosgym.machines.parameters import parameters_of
+    from chaosgym.machines.parameters import field_named, parameters_of
 
     field, _, span = text.partition("=")
+    field = field_named(machine, field)
     if parameters_of(machine)[field].unit == "m":
         ends = [end for end in span.split(":")[:2] if end[-1:].isdigit()]
         doubts = [millimetres_meant(field, end, float(end), getattr(machine, field)) for end in ends]

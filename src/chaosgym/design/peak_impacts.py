@@ -111,9 +111,7 @@ def _phases(record: CycleRecord, cycles: NDArray[np.int64], sides: NDArray[np.in
     if record.peak_phase is not None:
         return np.asarray(record.peak_phase[cycles, sides])
     samples = len(record.time) // len(record)
-    assert record.history is not None
-    force = record.history[cycles, :, 2] * np.where(sides == 0, 1.0, -1.0)[:, None]
-    return np.asarray(2.0 * np.pi * np.argmax(force, axis=1) / samples)
+    return np.asarray(2.0 * np.pi * np.argmax(record.surface_force[cycles, :, sides], axis=1) / samples)
 
 
 def _middle(angle: Array) -> float:

@@ -244,8 +244,7 @@ def _in_tolerance(around: ResponseMap | None) -> tuple[Built, ...]:
 
 
 def _every_impact(record: CycleRecord, side: int, brief: DesignBrief) -> float:
-    assert record.history is not None
-    force = np.maximum(record.history[:, :, 2].ravel() * (1.0 if side == 0 else -1.0), 0.0)
+    force = np.maximum(record.surface_force[:, :, side].ravel(), 0.0)
     return equivalent_force_of_history(force, len(record), brief.criteria.life_exponent)
 
 

@@ -83,6 +83,6 @@ def overlay(machine: Machine, peaks: ArrayLike, verdict: Diagnosis, *, larger: b
     if measured.ndim != 1 or len(measured) < 2:
         raise DiagnosisError(f"an overlay needs the peaks of two cycles or more, not {measured.size}")
     forces = simulate(machine, len(measured), transient=TRANSIENT).peak_force
-    simulated = forces.max(axis=1) if larger else forces[:, 0]
+    simulated = forces.max(axis=1) if larger else machine.sensed(forces)
     distance = float(wasserstein_distance(measured, simulated))
     return Overlay(machine, measured, simulated, verdict, diagnose(machine), distance)

@@ -137,7 +137,7 @@ class Jobs:
         if cycles.failed.any():
             first = int(which[int(cycles.failed.argmax())])
             raise SimulationError(f"a job can't start at a speed of {self.speed[first]:g}; {self.machines[first]}")
-        self.judge.verdict(which, growth, cycles.peak_force[:, :, 0])
+        self.judge.verdict(which, growth, variants.nominal.sensed(cycles.peak_force))
         info = {
             "speed": speeds.copy(),
             "demand": self.demand[which, 0],
@@ -157,7 +157,7 @@ class Jobs:
             self.batch.set_clearances(which, state["worn"][which])
         cycles, growth = self._run(which, speed, task.cycles_per_step, generators)
         peaks, period = cycles.peak_force, self.rules.variants.nominal.period_at(speed)
-        verdict = self.judge.verdict(which, growth, peaks[:, :, 0])
+        verdict = self.judge.verdict(which, growth, self.rules.variants.nominal.sensed(peaks))
         report, reward = np.empty(len(which), REPORT), np.empty(len(which))
         given = (task.numbers, self._job_time, which, demands, cycles.failed, peaks, task.damage(peaks), period)
         call(settle, *given, *verdict, state, self.damage, report, reward)
@@ -222,7 +222,8 @@ class Jobs:
         last = task.cycles_per_step
         drawn = sensed(task, cycles.impacts[:, -last:], generators)
         measured, values = np.empty((len(which), last)), np.empty((len(which), *space.shape), np.float32)
-        given = (task.numbers, which, self.demand, self.state, cycles.peak_force, cycles.bounce_duration, period)
+        sensed_peaks = self.rules.variants.nominal.sensed(cycles.peak_force)
+        given = (task.numbers, which, self.demand, self.state, sensed_peaks, cycles.bounce_duration, period)
         call(observe, *given, *drawn, space.low, space.high, measured, values)
         if self._monitor is not None:
             for column in measured.T:

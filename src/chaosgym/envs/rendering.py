@@ -60,11 +60,10 @@ def record_of(pieces: Iterable[Piece], cycles: int) -> CycleRecord:
             state = record.final_state
             records.append(record)
     records = records[-cycles:]
-    joined: dict[str, Any] = {
-        name: np.concatenate([getattr(record, name) for record in records])
-        for name in ("section", "displacement", "velocity", "peak_force", "impacts", "history")
-    }
-    return replace(records[-1], **joined)
+    names = ["section", "displacement", "velocity", "peak_force", "impacts", "history"]
+    names += ["motions", "histories"] if records[-1].motions is not None else []
+    joined: dict[str, Any] = {name: np.concatenate([getattr(record, name) for record in records]) for name in names}
+    return replace(records[-1], **joined).of_joint()
 
 
 class Dashboard:
@@ -121,7 +120,7 @@ class Dashboard:
     def draw(self, record: CycleRecord) -> Frame | None:
         """Draw the last step, given with its time history; return (height, width, 3), or None for a window."""
         samples, colour = samples_of(record), WILD if self._wild and self._wild[-1] else CALM
-        room = 1e3 * np.array(record.machine.room)
+        room = 1e3 * np.array(record.machine.room_of(record.joint))
         self._make_room(samples, room)
         self._picture_machine(record, colour)
         if self._background is None:

@@ -144,16 +144,15 @@ def command_of(machine: Machine) -> str:
 
 def view_of(machine: Machine) -> View:
     """Everything that is shown of a point; a motion that can't be followed is told, not raised."""
-    room = machine.room
     try:
         verdict = diagnose(machine, budget=BUDGET)
     except (SimulationError, ParameterError) as error:
         nothing = np.zeros(0)
         shown = (nothing,) * 4
-        return View(*shown, np.zeros((0, 2)), nothing, room, "undetermined", "can't be followed", (str(error),))
+        return View(*shown, np.zeros((0, 2)), nothing, machine.room, "undetermined", "can't be followed", (str(error),))
     judged = verdict.judged
     cycles = min(SHOWN_CYCLES, len(judged))
-    last = simulate(machine, cycles, judged.section[-cycles], samples_per_cycle=SAMPLES)
+    last = simulate(machine, cycles, judged.section[-cycles], samples_per_cycle=SAMPLES).of_joint(judged.joint_name)
     assert last.history is not None
     motion = last.history.reshape(-1, 3)
     heard = simulate(machine, MONITORED_CYCLES, judged.section[-1]).peak_force[:, judged.worst_side]
@@ -164,7 +163,7 @@ def view_of(machine: Machine) -> View:
         force=motion[:, 2],
         section=np.column_stack([judged.displacement, judged.velocity]),
         peaks=judged.peak_force[:, judged.worst_side],
-        room=room,
+        room=machine.room_of(judged.joint),
         nature=verdict.nature,
         headline=f"{verdict.words} ({verdict.status})",
         lines=(verdict.reason, _votes(verdict), _classified(machine), _watched(heard)),

@@ -272,6 +272,10 @@ class Machine(ABC):
         gap = float(getattr(self, self.clearance_field))
         return -gap, gap
 
+    def sensed(self, peak_force: Array) -> Array:
+        """Peak forces [N] that the sensor of the monitored joint shows, (..., cycles), of those of all ``sides``."""
+        return np.asarray(peak_force[..., 0])
+
     def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
         """Draw the machine in motion.
 

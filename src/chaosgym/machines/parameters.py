@@ -97,6 +97,12 @@ def validate(machine: Any) -> None:
         object.__setattr__(machine, name, check_parameter(machine, name, getattr(machine, name)))
 
 
+def field_named(owner: Any, name: str) -> str:
+    """Name of a field that may be written with dots, as in ``left.clearance`` for ``left_clearance``."""
+    plain = name.replace(".", "_")
+    return plain if plain in parameters_of(owner) else name
+
+
 def suggestion(name: str, known: Iterable[str]) -> str:
     """End of a message about an unknown name: the nearest known one, or all of them."""
     from difflib import get_close_matches
@@ -115,7 +121,7 @@ def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
         given together with a field that it sets.
     """
     known = parameters_of(machine)
-    settings = expand_fidelity(machine, settings)
+    settings = {field_named(machine, name): value for name, value in expand_fidelity(machine, settings).items()}
     for name in settings:
         if name not in known:
             raise ParameterError(f"{type(machine).__name__} has no field {name!r}{suggestion(name, known)}")

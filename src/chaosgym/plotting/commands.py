@@ -48,14 +48,17 @@ def _styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
     return drawn
 
 
-def point_of(machine: Machine) -> str:
-    """Name and operating point of a machine, for a title."""
+def point_of(machine: Machine, joint: str | None = None) -> str:
+    """Name and operating point of a machine, for a title, and the joint that is shown where there are several."""
     lower, upper = machine.room
     shown, gap = [], "±" if lower == -upper else "gap "
     for name in (machine.speed_field, machine.clearance_field):
         label, factor = axis_label(machine, name)
         sign = gap if name == machine.clearance_field else ""
+        if joint is not None and name == machine.clearance_field:
+            sign = f"{name.removesuffix('_clearance')} {gap}"
         shown.append(f"{sign}{factor * getattr(machine, name):.4g} {label.rpartition('[')[2].rstrip(']')}")
+    shown += [] if joint is None else [f"shown: {joint}"]
     return f"{Path(machine.name).stem}, {', '.join(shown)}"
 
 
@@ -63,7 +66,8 @@ def _followed(record: CycleRecord, cycles: int) -> CycleRecord:
     """The last cycles of a record once more, with their time history."""
     cycles = min(cycles, len(record))
     samples = min(max(SAMPLES[0], SAMPLES[1] // cycles), SAMPLES[1])
-    return simulate(record.machine, cycles, record.section[-cycles], samples_per_cycle=samples)
+    last = simulate(record.machine, cycles, record.section[-cycles], samples_per_cycle=samples)
+    return last.of_joint(record.joint_name)
 
 
 @_styled
@@ -77,18 +81,20 @@ def simulation_figure(record: CycleRecord, transient: int = 0) -> Figure:
     peaks, moves, force = figure.subplots(3, 1)
     moves.sharex(force)
     colours = (ACCENT, NATURE_COLOURS["chaotic"])
-    for side, (name, colour) in enumerate(zip(machine.sides, colours, strict=False)):
+    shown_sides = machine.sides[2 * last.joint :]
+    for side, (name, colour) in enumerate(zip(shown_sides, colours, strict=False), 2 * last.joint):
         response.cycle_points(record.peak_force[:, side], peaks, first=transient + 1, color=colour, label=name)
     peaks.set_ylim(0.0, 1.3 * float(record.peak_force.max()) or 1.0)
     peaks.legend(loc="upper right", ncols=2, borderpad=0.1, markerscale=2.0)
     response.curve(factor * last.time, 1e3 * motion[:, 0], moves)
-    response.stops(machine.room, moves, vertical=True)
+    response.stops(machine.room_of(last.joint), moves, vertical=True)
     moves.set_ylabel("displacement [mm]")
     moves.tick_params(labelbottom=False)
     response.curve(factor * last.time, motion[:, 2], force)
     shown = f"the last {len(last)} cycles" if len(last) > 1 else "the last cycle"
-    force.set(xlabel=f"time over {shown} [{unit}]", ylabel=f"force, {machine.sides[0]} + [N]")
-    figure.suptitle(point_of(machine), x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    upward = machine.sides[0] if last.joint_name is None else "upper"
+    force.set(xlabel=f"time over {shown} [{unit}]", ylabel=f"force, {upward} + [N]")
+    figure.suptitle(point_of(machine, last.joint_name), x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
     figure.align_ylabels()
     return figure
 
@@ -106,14 +112,19 @@ def diagnosis_figure(verdict: Diagnosis) -> Figure:
     motion = last.history.reshape(-1, 3)
     response.phase_plane(motion[:, 0], motion[:, 1], portrait, pale=repeats is None)
     response.section_points(judged.displacement, judged.velocity, portrait, color=INK if repeats else colour)
-    response.stops(machine.room, portrait)
+    response.stops(machine.room_of(last.joint), portrait)
     portrait.set_title("Motion between the stops; dots: once a cycle", fontweight="normal", fontsize=9.5)
     first = (verdict.horizon or len(judged)) - len(judged) + 1
     worst = judged.worst_side
     response.cycle_points(judged.peak_force[:, worst], peaks, first=first, color=colour)
     peaks.set_ylabel(f"peak force, {machine.sides[worst]} [N]")
     figure.suptitle(
-        f"{point_of(machine)}\n{_told(verdict)}", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK
+        f"{point_of(machine, judged.joint_name)}\n{_told(verdict)}",
+        x=0.02,
+        ha="left",
+        fontsize=10.5,
+        fontweight="bold",
+        color=INK,
     )
     return figure
 

@@ -103,16 +103,32 @@ class CycleRecord:
         return instants
 
     @property
-    def surface(self) -> int:
-        """Column of the surface that is shown: the one of ``joint`` with the largest force; 0 with one joint."""
-        if self.motions is None or not len(self):
-            return 0
-        return 2 * self.joint + int(np.argmax(self.peak_force[:, 2 * self.joint : 2 * self.joint + 2].max(axis=0)))
+    def joint_name(self) -> str | None:
+        """Name of the joint that is shown; None for a machine with one."""
+        return None if self.motions is None else self.machine.joints[self.joint]
+
+    @property
+    def surface_force(self) -> Array:
+        """Force [N] on each surface at the samples, less that on the opposite one: (n_cycles, samples, sides).
+
+        Raises
+        ------
+        SimulationError
+            If the run kept no time history.
+        """
+        every = self.history if self.histories is None else self.histories
+        if every is None:
+            raise SimulationError("the run kept no time history; simulate with samples_per_cycle above 0")
+        force = every[:, :, 2::3]
+        return np.stack([force, -force], axis=-1).reshape(*force.shape[:2], -1)
 
     @property
     def peaks(self) -> Array:
-        """Peak force [N] of each cycle on the ``surface`` that is shown, (n_cycles,)."""
-        return np.asarray(self.peak_force[:, self.surface])
+        """Peak force [N] of each cycle on the first side of the joint; on ``worst_side`` where there are several joints.
+
+        It is what data sets keep and the classifier reads, (n_cycles,).
+        """
+        return np.asarray(self.peak_force[:, 0 if self.motions is None else self.worst_side])
 
     def of_joint(self, name: str | None = None) -> "CycleRecord":
         """Return the record with displacement, velocity and history of a joint.
@@ -144,9 +160,11 @@ class CycleRecord:
 
     @property
     def worst_side(self) -> int:
-        """Column of the surface with the largest peak force; the first of those that are equal but for rounding."""
-        largest = self.peak_force.max(axis=0)
-        return int(np.argmax(largest >= (1.0 - 1e-9) * largest.max()))
+        """Column of the surface of the joint that is shown with the largest peak force; the first of equal ones."""
+        first = 2 * self.joint
+        forces = self.peak_force if self.motions is None else self.peak_force[:, first : first + 2]
+        largest = forces.max(axis=0)
+        return first + int(np.argmax(largest >= (1.0 - 1e-9) * largest.max()))
 
     def after(self, cycles: int) -> "CycleRecord":
         """Return the record without its first cycles."""

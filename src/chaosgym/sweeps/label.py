@@ -70,7 +70,7 @@ def label_point(machine: Machine, budget: int, *, signals: bool = False) -> dict
     except (DiagnosisError, SimulationError) as error:
         return {"status": "failed", "reason": str(error)}
     judged = verdict.judged
-    peaks = judged.peak_force[:, 0]
+    peaks = judged.peaks
     exponent = verdict.evidence["largest_lyapunov_exponent_per_cycle"]
     label = {
         "nature": verdict.nature,
@@ -106,7 +106,7 @@ def _signals(machine: Machine, record: CycleRecord) -> dict[str, Any]:
             record = record.followed_by(simulate(machine, missing, record.final_state))
     except SimulationError:
         return {}
-    series = {"peak_force": record.peak_force[:, 0], "displacement": record.displacement, "velocity": record.velocity}
+    series = {"peak_force": record.peaks, "displacement": record.displacement, "velocity": record.velocity}
     return {
         f"{window}_{name}": series[name][first : first + WINDOW].astype(np.float32)
         for window, first in WINDOWS.items()

@@ -217,7 +217,7 @@ class RecedingHorizon(Controller):
             self._batch.branch(job, row)
         which = places.ravel()
         self._batch.set_speeds(which, targets.ravel())
-        peaks = self._batch.run(which, HORIZON).peak_force[:, :, 0]
+        peaks = self._model.sensed(self._batch.run(which, HORIZON).peak_force)
         wild = (recurrence_miss(peaks) > MISS).reshape(targets.shape).astype(float)
         cost = task.deviation_weight * np.abs(targets - demand[:, None]) + task.type_iii_weight * wild
         return np.asarray(targets[np.arange(len(jobs)), cost.argmin(axis=1)])

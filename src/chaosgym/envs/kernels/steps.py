@@ -167,22 +167,22 @@ def recurrence_misses(peaks, misses):
 
 @njit(cache=True, nogil=True)
 def observe(
-    tasks, which, demands, jobs, peak_force, bounce_duration, period, errors, counted, low, high, measured, values
+    tasks, which, demands, jobs, true_peaks, bounce_duration, period, errors, counted, low, high, measured, values
 ):
     """Write what agents see of the last cycles: ``values`` (k, 14 or more), ``measured`` peaks (k, last).
 
-    ``peak_force`` and ``bounce_duration`` (k, cycles, sides), ``period`` and ``counted`` impacts (k,). ``errors``
-    (k, last + 1) from 0 to 1, of the peak forces of the first side and of the share of bouncing. ``values`` lie between
-    ``low`` and ``high``; their first 14 columns are ``observation.OBSERVATION_NAMES``.
+    ``true_peaks`` (k, cycles) where the sensor is, ``bounce_duration`` (k, cycles, sides), ``period`` and ``counted``
+    impacts (k,). ``errors`` (k, last + 1) from 0 to 1, of these peaks and of the share of bouncing. ``values`` lie
+    between ``low`` and ``high``; their first 14 columns are ``observation.OBSERVATION_NAMES``.
     """
-    task, last, sides = tasks[0], measured.shape[1], peak_force.shape[2]
-    first = peak_force.shape[1] - last
+    task, last, sides = tasks[0], measured.shape[1], bounce_duration.shape[2]
+    first = true_peaks.shape[1] - last
     for k, i in enumerate(which):
         job, peaks, seen = jobs[i], measured[k], values[k]
         total, largest, squares, bouncing = 0.0, 0.0, 0.0, 0.0
         for n in range(last):
             error = (2.0 * errors[k, n] - 1.0) * task["sensor_error"]
-            peaks[n] = max(peak_force[k, first + n, 0] + error, 0.0)
+            peaks[n] = max(true_peaks[k, first + n] + error, 0.0)
             total += peaks[n]
             largest = max(largest, peaks[n])
             for side in range(sides):

@@ -20,7 +20,7 @@ from chaosgym.machines.modal_machine.jointed import Joint, machine_with_joints
 from chaosgym.machines.modal_machine.keys import REQUIRED, TABLES, checked_table, schema
 from chaosgym.machines.modal_machine.machine import ModalMachine
 from chaosgym.machines.modal_machine.structure import BASE, Structure
-from chaosgym.machines.parameters import check_parameter, parameter, parameters_of, suggestion
+from chaosgym.machines.parameters import check_parameter, field_named, parameter, parameters_of, suggestion
 from chaosgym.machines.units import parse_quantity
 
 FIELDS = {"stiffness": "contact_stiffness", "damping": "contact_damping"}
@@ -241,7 +241,7 @@ def _tolerances(given: Mapping[str, Any], machine: Machine) -> dict[str, tuple[f
     known = {name: about for name, about in parameters_of(machine).items() if not about.choices}
     found = {}
     for key, text in _flat(given).items():
-        name = key if key in known else key.replace(".", "_")
+        name = field_named(machine, key)
         if name not in known:
             raise ParameterError(f"[tolerances] has no key {name!r}{suggestion(name, known)}")
         relative = isinstance(text, str) and text.strip().endswith("%")

@@ -245,6 +245,13 @@ class JointedMachine(Machine):
         """Motion of every joint."""
         return {"motions": arrays.tip, "histories": arrays.history if arrays.history.shape[1] else None}
 
+    def sensed(self, peak_force: Array) -> Array:
+        """Largest force [N] of each cycle on the surfaces of the monitored joint, or on all: (..., cycles)."""
+        if self.monitored == LARGEST:
+            return np.asarray(peak_force.max(axis=-1))
+        first = 2 * self.joints.index(self.monitored)
+        return np.asarray(peak_force[..., first : first + 2].max(axis=-1))
+
     def share_of_bound(self, states: Array, peak_force: Array) -> float:
         """Share of the bound of passivity: only the drive gives energy, and what preloads or offsets have stored."""
         sets, n = self.sets, self.n_states // 2
