@@ -44,7 +44,7 @@ def test_the_page_runs(tmp_path, monkeypatch, capsys):
         if kind == "python":
             exec(compile(text, "own-machine.md", "exec"), names)
         elif kind == "toml":
-            Path("arm.toml").write_text(text)
+            Path("arm2.toml" if "[[joint]]" in text else "arm.toml").write_text(text)
         else:
             for line in text.strip().splitlines():
                 command, _, target = line.partition(" > ")
@@ -53,11 +53,12 @@ def test_the_page_runs(tmp_path, monkeypatch, capsys):
                 if target:
                     Path(target).write_text(result.stdout)
                 if "diagnose" in command:
-                    assert re.search(r"arm.toml: (periodic|quasiperiodic|chaotic|undetermined)", result.stdout)
+                    assert re.search(r"arm2?.toml: (periodic|quasiperiodic|chaotic|undetermined)", result.stdout)
     assert "Type" in Path("report.html").read_text()
     assert Path("overlay.png").stat().st_size > 10_000
     assert 20.0 < names["arm"].natural_frequencies[0] < 25.0
     assert len(names["observation"]) == 14
+    assert (names["record"].peak_force.max(axis=0) > 0.0).sum() >= 3
     np.testing.assert_allclose(names["frequencies"], tested.natural_frequencies, rtol=2e-3)
     for row, point in zip(names["shapes"], ("tip", "motor"), strict=True):
         np.testing.assert_allclose(np.abs(row), np.abs(tested.modes.shape(point)), rtol=2e-2, atol=5e-3)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from chaosgym.diagnosis.step_check import step_check
     from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
     from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, ImpactBeam, SliderCrank
-    from chaosgym.machines.modal_machine import Drive, ModalMachine, Structure, read_machine
+    from chaosgym.machines.modal_machine import Drive, Joint, ModalMachine, Structure, machine_with_joints, read_machine
     from chaosgym.simulation import CycleRecord, ExactEvents, RungeKutta4, simulate, simulate_many
     from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
 
@@ -33,7 +33,14 @@ _HOME = {
     "chaosgym.diagnosis.step_check": ("step_check",),
     "chaosgym.errors": ("ChaosgymError", "ParameterError", "SimulationError"),
     "chaosgym.machines": ("THESIS_IMPACT_BEAM", "THESIS_SLIDER_CRANK", "ImpactBeam", "SliderCrank"),
-    "chaosgym.machines.modal_machine": ("Drive", "ModalMachine", "Structure", "read_machine"),
+    "chaosgym.machines.modal_machine": (
+        "Drive",
+        "Joint",
+        "ModalMachine",
+        "Structure",
+        "machine_with_joints",
+        "read_machine",
+    ),
     "chaosgym.simulation": ("CycleRecord", "ExactEvents", "RungeKutta4", "simulate", "simulate_many"),
     "chaosgym.sweeps": ("Axis", "SweepPlan", "read_sweep", "run_sweep"),
 }
@@ -49,6 +56,7 @@ __all__ = [
     "Drive",
     "ExactEvents",
     "ImpactBeam",
+    "Joint",
     "MachineClassifier",
     "ModalMachine",
     "ParameterError",
@@ -63,6 +71,7 @@ __all__ = [
     "diagnose",
     "evaluate",
     "follow",
+    "machine_with_joints",
     "read_machine",
     "read_sweep",
     "response_map",

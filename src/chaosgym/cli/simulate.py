@@ -139,7 +139,7 @@ def show(machine: Any, markdown: bool, as_json: bool) -> None:
 @click.option("--schema", is_flag=True, help="The JSON schema of such files instead, for editors.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def new_machine(out: Path | None, schema: bool, as_json: bool) -> None:
-    """Print the commented file of a machine: modes or matrices, a joint with a gap, and what drives it."""
+    """Print the commented file of a machine: modes or matrices, joints with gaps, and what drives it."""
     from chaosgym.files import write_atomically
     from chaosgym.machines.modal_machine.file import schema_text, template
 

@@ -31,6 +31,9 @@ MOST_SETS = 1_000_000
 MOST_BYTES = 500_000_000
 """Memory for the tables of a machine at one speed; when it is full they are made anew as they are visited."""
 
+LIKELY = 12
+"""Sets that are made at once at another speed or drive, those that were visited first."""
+
 MOST_LEVELS = 16
 """Lengths of an interval."""
 
@@ -103,6 +106,10 @@ class PressedSets:
         if code not in self._made:
             self._made[code] = self._make(code)
         return self._made[code]
+
+    def visited(self, most: int) -> list[int]:
+        """Numbers of the sets that were made first, so many at most."""
+        return list(self._made)[:most]
 
     @property
     def fastest(self) -> float:
@@ -186,7 +193,9 @@ class JointTables:
         """Make the tables of a set; arrays in which a run may still be are left as they are."""
         found = self._sets.of(code)
         n = len(self._static)
-        rest, drift = settled(found.generator, found.to_modal[:, n:] @ self._static)
+        rest, drift = np.zeros(2 * n), np.zeros(2 * n)
+        if self._static.any():
+            rest, drift = settled(found.generator, found.to_modal[:, n:] @ self._static)
         under_load = (self._sets.shape @ found.from_modal[:n]) @ rest
         lag = np.divide(found.dampers, found.springs, out=np.zeros(len(found.springs)), where=found.springs > 0.0)
         row = call(
@@ -259,4 +268,8 @@ class JointTables:
             made = 1 if finished else made + 1
             if made > self._most:
                 return outcome, done
+            if self._kept == 0:
+                # at another speed these sets were visited: they likely are at this one
+                for likely in self._sets.visited(min(LIKELY, self._most - 1)):
+                    self._make(likely)
             self._make(code)
