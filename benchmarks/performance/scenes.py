@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from chaosgym.core.binned.taylor import TaylorModel
 from chaosgym.machines.slider_crank import SliderCrank
-from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
 from chaosgym.simulation import simulate
 
 _BALL = {"slider_joint": "ideal", "gravity": 9.81}
@@ -65,6 +65,6 @@ def scene_costs(revolutions: int = 10) -> list[SceneCost]:
         start = time.thread_time()
         simulate(crank, revolutions, state)
         revolution = (time.thread_time() - start) / revolutions
-        method = "Taylor" if isinstance(model, SteppedCrankModel) else "exact"
+        method = "Taylor" if isinstance(model, TaylorModel) else "exact"
         costs.append(SceneCost(scene, crank.degrees_of_freedom, method, setup, revolution))
     return costs

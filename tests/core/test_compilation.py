@@ -50,7 +50,7 @@ def test_the_functions_that_are_counted_are_those_that_are_compiled():
 
 def test_no_kernel_gives_python_a_named_tuple():
     """Where Ctrl-C arrives while numba makes one of a kernel's result, the process crashes."""
-    for machine in (ImpactBeam(), ImpactBeam(contact_law="restitution", n_modes=1, fitted_modes=0), SliderCrank()):
+    for machine in (ImpactBeam(), SliderCrank()):
         simulate(machine, 1)
     simulate(ImpactBeam(n_modes=1, fitted_modes=0), 1, integrator=RungeKutta4(4000))
     called = [kernel for kernel, _ in compilation._ready]

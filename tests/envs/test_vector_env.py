@@ -100,7 +100,7 @@ def test_any_number_of_cycles_in_a_step(cycles: int) -> None:
 @pytest.mark.parametrize(
     ("name", "keywords"),
     [
-        (BEAM, {"contact_law": "restitution", "n_modes": 1, "fitted_modes": 0}),
+        (BEAM, {"n_modes": 1, "fitted_modes": 0}),
         (CRANK, {"contact_law": "hertz", "rod": "rigid", "matrix_update_interval": 15.0}),
         (CRANK, {"ball_joint": "instrumented", "rod": "rigid", "matrix_update_interval": 15.0}),
     ],

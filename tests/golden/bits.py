@@ -26,7 +26,6 @@ CYCLES = 8
 
 MACHINES: dict[str, Machine] = {
     "beam": ImpactBeam(excitation_frequency=19.0),
-    "rigid beam": ImpactBeam(contact_law="restitution", n_modes=1, fitted_modes=0),
     "crank": SliderCrank(matrix_update_interval=30.0, crank_speed=190.0, slider_clearance=0.254e-3),
     "crank, both joints": SliderCrank(matrix_update_interval=30.0, ball_joint="spherical", crank_speed=160.0),
     "crank, hertz": SliderCrank(matrix_update_interval=30.0, contact_law="hertz", crank_speed=180.0),

@@ -12,7 +12,6 @@ BEAMS: dict[str, dict[str, Any]] = {
     "wide": {"excitation_frequency": 24.0, "clearance": 0.254e-3},
     "uniform damping": {"damping_family": "uniform", "excitation_frequency": 13.0},
     "rigid": {"n_modes": 1, "fitted_modes": 0},
-    "restitution": {"contact_law": "restitution", "n_modes": 1, "fitted_modes": 0},
     "many modes": {"n_modes": 12, "event_accuracy": "tightest"},
 }
 

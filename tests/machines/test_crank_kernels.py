@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 from chaosgym import SliderCrank
+from chaosgym.core.binned.cycle import advance
+from chaosgym.core.binned.series import FORCING_TERMS, series_order
+from chaosgym.core.binned.tables import table_places, tables
 from chaosgym.core.cubic import cubic
 from chaosgym.core.cycle import Episode, cycle_arrays
 from chaosgym.core.events import KEEPS, UNSURE, judge
@@ -14,9 +17,6 @@ from chaosgym.core.lanes import LANES, padded
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import SimulationError
 from chaosgym.machines.slider_crank.equations import equations
-from chaosgym.machines.slider_crank.kernels.exact import advance
-from chaosgym.machines.slider_crank.kernels.propagator import table_places, tables
-from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, series_order
 from chaosgym.machines.slider_crank.model import side_by_side
 from chaosgym.simulation import ExactEvents, simulate, simulate_with_deviations
 from tests.machines.crank_twin import continuous_twin, rigid_twin

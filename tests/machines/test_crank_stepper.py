@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chaosgym.core.binned.taylor import advance
 from chaosgym.core.cycle import Episode, cycle_arrays
-from chaosgym.machines.slider_crank.kernels.stepped import advance
 from chaosgym.machines.slider_crank.model import stepped_model
 from chaosgym.simulation import ExactEvents, simulate
 from tests.machines.crank_twin import rigid_ball_twin

@@ -280,3 +280,42 @@ def test_the_file_of_a_pipe_in_two_supports():
     assert pickle.loads(pickle.dumps(pipe.at(30.0))) == pipe.at(30.0)
     record = simulate(pipe, 60, transient=20)
     assert (record.peak_force.max(axis=0).reshape(-1, 2).max(axis=1) > 1.0).all()
+
+
+@pytest.mark.parametrize("restitution", [0.9, 0.5])
+def test_a_stated_restitution_is_what_an_impact_leaves(tmp_path, restitution):
+    """A free mass of 2 kg that strikes a stop stated by its restitution leaves with that share of its speed, to 1e-6."""
+    file = tmp_path / "mass.toml"
+    file.write_text(
+        f"""
+        [structure]
+        frequencies = "0 Hz"
+        damping_ratios = "0 %"
+        [structure.shapes]
+        mass = "{0.5**0.5:.12f} kg^-1/2"
+        [joint]
+        at = "mass"
+        clearance = "1 mm"
+        stiffness = "1 N/um"
+        restitution = {restitution}
+        [[drive]]
+        at = "mass"
+        force = "1e-9 N"
+        [operation]
+        speed = "1 Hz"
+        speed_range = "1 to 2 Hz"
+        clearance_range = "0.1 to 1 mm"
+        """
+    )
+    machine = chaosgym.read_machine(file)
+    record = simulate(machine, 1, np.array([0.0, 0.0015 / 0.5**0.5]))
+    assert record.impacts.sum() == 1
+    assert -record.final_state.coordinates[1] * 0.5**0.5 == pytest.approx(0.0015 * restitution, rel=1e-6)
+    text = file.read_text()
+    for old, new, message in (
+        (f"restitution = {restitution}", "restitution = 1.5", "allowed: 0.001 to 1"),
+        ("restitution", 'damping = "1 N s/m"\nrestitution', "allowed: one of them"),
+    ):
+        file.write_text(text.replace(old, new, 1))
+        with pytest.raises(ParameterError, match=message):
+            chaosgym.read_machine(file)

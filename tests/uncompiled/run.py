@@ -7,9 +7,9 @@ import gymnasium as gym
 import numpy as np
 
 import chaosgym
+import chaosgym.core.binned.batch
 import chaosgym.core.compilation
 import chaosgym.core.lanes
-import chaosgym.machines.slider_crank.kernels.batch
 from chaosgym import ImpactBeam, SliderCrank
 from chaosgym.classifier import classifier_for
 from chaosgym.simulation import simulate_with_deviations
@@ -28,7 +28,7 @@ def install():
         for name, value in list(vars(module).items()):
             if id(value) in plain:
                 setattr(module, name, plain[id(value)])
-    chaosgym.machines.slider_crank.kernels.batch.pointer = lambda address: ctypes.c_void_p(int(address))
+    chaosgym.core.binned.batch.pointer = lambda address: ctypes.c_void_p(int(address))
     chaosgym.core.compilation.prepare = lambda *_: None
 
 

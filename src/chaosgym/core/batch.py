@@ -15,7 +15,6 @@ from chaosgym.core.modal_impact import advance as advance_beam
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.core.modal_run import make_run
 from chaosgym.core.propagator import Regimes
-from chaosgym.core.restitution import RestitutionModel, advance_restitution
 from chaosgym.core.tangent import no_tangents
 
 
@@ -110,40 +109,6 @@ def advance_beams(batch, regimes, tables, which, motions, arrays, settings, outc
             motions.coordinates[i],
             episode_of(motions, i),
             rows_of(arrays, k),
-            settings.event_budget,
-            no_tangents(motions.coordinates.shape[1], arrays.section.shape[1]),
-        )[0]
-
-
-@njit(cache=True, inline="always")
-def rigid_beam_of(batch, regimes, i):
-    """Model of machine i."""
-    return RestitutionModel(
-        batch.excitation_frequency[i],
-        batch.force_amplitude[i],
-        batch.clearance[i],
-        batch.stiffness[i],
-        batch.damping[i],
-        batch.tip_shape[i],
-        batch.force_shape[i],
-        regimes_of(regimes, i),
-        batch.restitution[i],
-        batch.contact_duration[i],
-        batch.force_per_speed[i],
-    )
-
-
-@side_by_side
-def advance_rigid_beams(batch, regimes, which, motions, arrays, settings, outcome):
-    """As ``advance_beams``, for beams whose impacts take no time."""
-    for k in prange(which.shape[0]):
-        i = which[k]
-        outcome[k] = advance_restitution(
-            rigid_beam_of(batch, regimes, i),
-            motions.coordinates[i],
-            episode_of(motions, i),
-            rows_of(arrays, k),
-            settings.step_phase,
             settings.event_budget,
             no_tangents(motions.coordinates.shape[1], arrays.section.shape[1]),
         )[0]

@@ -2,12 +2,11 @@
 
 from numba import njit, prange
 
-from chaosgym.core.batch import beam_of, episode_of, rigid_beam_of
+from chaosgym.core.batch import beam_of, episode_of
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.kernel import side_by_side
 from chaosgym.core.modal_impact import advance as advance_beam
 from chaosgym.core.modal_run import make_run
-from chaosgym.core.restitution import advance_restitution
 from chaosgym.core.tangent import Tangents
 
 
@@ -51,24 +50,6 @@ def _vary_beam(batch, regimes, tables, i, speeds, motions, vectors, growth, arra
     return 0
 
 
-@njit(cache=True)
-def _vary_rigid_beam(batch, regimes, i, speeds, motions, vectors, growth, arrays, settings, k):
-    for c in range(speeds.shape[1]):
-        batch.excitation_frequency[i] = speeds[k, c]
-        outcome = advance_restitution(
-            rigid_beam_of(batch, regimes, i),
-            motions.coordinates[i],
-            episode_of(motions, i),
-            cycle_of(arrays, k, c),
-            settings.step_phase,
-            settings.event_budget,
-            Tangents(vectors[i], growth[k, c : c + 1]),
-        )[0]
-        if outcome != 0:
-            return outcome
-    return 0
-
-
 @side_by_side
 def advance_varied_beams(batch, regimes, tables, which, speeds, motions, vectors, growth, arrays, settings, outcome):
     """As ``advance_beams``, for a cycle at each of the excitation frequencies ``speeds`` (k, cycles).
@@ -78,10 +59,3 @@ def advance_varied_beams(batch, regimes, tables, which, speeds, motions, vectors
     """
     for k in prange(which.shape[0]):
         outcome[k] = _vary_beam(batch, regimes, tables, which[k], speeds, motions, vectors, growth, arrays, settings, k)
-
-
-@side_by_side
-def advance_varied_rigid_beams(batch, regimes, which, speeds, motions, vectors, growth, arrays, settings, outcome):
-    """As ``advance_varied_beams``, for beams whose impacts take no time."""
-    for k in prange(which.shape[0]):
-        outcome[k] = _vary_rigid_beam(batch, regimes, which[k], speeds, motions, vectors, growth, arrays, settings, k)

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.core import status
-from chaosgym.core.batch import Motions, Settings, advance_beams, advance_rigid_beams
+from chaosgym.core.batch import Motions, Settings, advance_beams
 from chaosgym.core.compilation import call_side_by_side
 from chaosgym.core.cycle import CycleArrays
-from chaosgym.core.varied import advance_varied_beams, advance_varied_rigid_beams
+from chaosgym.core.varied import advance_varied_beams
 from chaosgym.machines.integrators import ExactEvents
 
 if TYPE_CHECKING:
@@ -126,35 +126,29 @@ class CompiledBatch(ABC):
         """Run the machines ``which`` (k,) in place; rows of ``arrays`` and ``outcome`` (k,) in that order."""
 
 
-class RestitutionBatch(CompiledBatch):
-    """Machines of one mode and one gap, whose impacts take no time."""
-
-    nested: tuple[str, ...] = ("regimes",)
-    """Parts of the model that are models themselves."""
-
-    _varied = advance_varied_rigid_beams
+class ModalImpactBatch(CompiledBatch):
+    """Machines of a few modes and one gap."""
 
     def __init__(self, machine: "Machine", count: int) -> None:
         super().__init__(machine, count)
         model = machine.reduce()
-        self._parts = [stacked([getattr(model, name)] * count) for name in self.nested]
-        self._batch = stacked([self._flat(model)] * count)
+        self._parts = [stacked([getattr(model, name)] * count) for name in _PARTS]
+        self._batch = stacked([_flat(model)] * count)
         self._deviations = np.ones((count, 1, machine.n_states))
+        self._machines: list[Any] = [machine] * count
 
     def start(self, i: int, machine: "Machine") -> None:
         """Put a machine at rest into place i."""
         super().start(i, machine)
         self._deviations[i] = np.cos(1.0 + np.arange(self._deviations.shape[2]))
 
-    def _flat(self, model: Any) -> Any:
-        return model._replace(**dict.fromkeys(self.nested, 0.0))
-
     def change(self, i: int, machine: "Machine") -> None:
         """Put another machine into place i, whose motion goes on."""
         model = machine.reduce()
-        for name, part in zip(self.nested, self._parts, strict=True):
+        for name, part in zip(_PARTS, self._parts, strict=True):
             put(part, i, getattr(model, name))
-        put(self._batch, i, self._flat(model))
+        put(self._batch, i, _flat(model))
+        self._machines[i] = machine
 
     def run_varied(self, which: Indices, speeds: Array) -> tuple[Cycles, Array]:
         """Run the machines ``which`` (k,) for a cycle at each of the frequencies ``speeds`` (k, cycles) [Hz].
@@ -167,37 +161,12 @@ class RestitutionBatch(CompiledBatch):
         arrays, outcome = self._empty(len(which), speeds.shape[1])
         growth = np.zeros((*speeds.shape, 1))
         given = (self._batch, *self._parts, which, speeds, self._motions, self._deviations, growth, arrays)
-        call_side_by_side(self._varied, len(self), *given, self._settings, outcome)
+        call_side_by_side(advance_varied_beams, len(self), *given, self._settings, outcome)
         return self._cycles(arrays, outcome), growth[:, :, 0]
 
     def set_speeds(self, which: Indices, speeds: Array) -> None:
         """Change the excitation frequencies [Hz]."""
         self._batch.excitation_frequency[which] = speeds
-
-    def set_clearances(self, which: Indices, clearances: Array) -> None:
-        """Change the clearances [m]."""
-        self._batch.clearance[which] = clearances
-
-    def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
-        given = (self._batch, *self._parts, which, self._motions, arrays, self._settings, outcome)
-        call_side_by_side(advance_rigid_beams, len(self), *given)
-
-
-class ModalImpactBatch(RestitutionBatch):
-    """Machines of a few modes and one gap."""
-
-    nested = ("regimes", "tables")
-
-    _varied = advance_varied_beams
-
-    def __init__(self, machine: "Machine", count: int) -> None:
-        super().__init__(machine, count)
-        self._machines: list[Any] = [machine] * count
-
-    def change(self, i: int, machine: "Machine") -> None:
-        """Put another machine into place i, whose motion goes on."""
-        super().change(i, machine)
-        self._machines[i] = machine
 
     def set_clearances(self, which: Indices, clearances: Array) -> None:
         """Change the clearances [m]."""
@@ -207,3 +176,11 @@ class ModalImpactBatch(RestitutionBatch):
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         given = (self._batch, *self._parts, which, self._motions, arrays, self._settings, outcome)
         call_side_by_side(advance_beams, len(self), *given)
+
+
+_PARTS = ("regimes", "tables")
+"""Parts of the model that are models themselves."""
+
+
+def _flat(model: Any) -> Any:
+    return model._replace(**dict.fromkeys(_PARTS, 0.0))

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from chaosgym.core import status
 from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays
-from chaosgym.core.joint_cycle import advance_joints
-from chaosgym.core.joint_run import JointRun, new_space, work_space
-from chaosgym.core.joint_tables import ROW, layout, tabulate
+from chaosgym.core.joints.cycle import advance_joints
+from chaosgym.core.joints.run import JointRun, new_space, work_space
+from chaosgym.core.joints.tables import ROW, layout, tabulate
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents

@@ -29,6 +29,18 @@ class LinearImpact(NamedTuple):
     force_per_speed: float
 
 
+def damping_for(restitution: float, mass: float, stiffness: float) -> float:
+    """Damper [N s/m] of a surface that leaves a mass [kg] a share of its speed, from 0.001 to 1."""
+    low, high = 0.0, 1e3
+    for _ in range(200):
+        ratio = 0.5 * (low + high)
+        if linear_impact(1.0, 1.0, 2.0 * ratio).restitution > restitution:
+            low = ratio
+        else:
+            high = ratio
+    return 2.0 * low * math.sqrt(stiffness * mass)
+
+
 def linear_impact(mass: float, stiffness: float, damping: float) -> LinearImpact:
     """Impact of a mass [kg] on a surface with a stiffness [N/m] and a damping [N s/m]."""
     rate = math.sqrt(stiffness / mass)

@@ -1,9 +1,7 @@
 """Machines that are a few modes and one gap: from modal data to the model of the kernels, and how that runs.
 
 A subclass of ``ModalImpactMachine`` has the fields of a machine and returns its model from ``reduce``, made by
-``flexible_model`` or ``rigid_model`` of its modal data.
-
-The file is long because it is all that a new machine of this kind imports.
+``flexible_model`` of its modal data.
 """
 
 import math
@@ -21,12 +19,10 @@ from chaosgym.core.fixed_step import advance_fixed_step
 from chaosgym.core.modal_impact import advance_model
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.core.propagator import Regimes
-from chaosgym.core.restitution import RestitutionModel, advance_restitution
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
-from chaosgym.machines.linear_impact import linear_impact
-from chaosgym.machines.machine import Machine, refuse_fixed_steps
+from chaosgym.machines.machine import Machine
 
 if TYPE_CHECKING:
     from chaosgym.machines.batch import CompiledBatch
@@ -264,25 +260,6 @@ def flexible_model(
     )
 
 
-def rigid_model(modes: Modes, contact_stiffness: float, contact_damping: float) -> RestitutionModel:
-    """Model of a machine with one mode whose impacts take no time; not yet at an operating point."""
-    stiffness = modes.angular_frequency**2
-    impact = linear_impact(1.0 / float(modes.tip_shape[0]) ** 2, contact_stiffness, contact_damping)
-    return RestitutionModel(
-        excitation_frequency=math.nan,
-        force_amplitude=math.nan,
-        clearance=math.nan,
-        stiffness=stiffness,
-        damping=modes.damping,
-        tip_shape=modes.tip_shape,
-        force_shape=modes.force_shape,
-        regimes=_regimes(modes, (np.diag(stiffness), modes.damping)),
-        restitution=impact.restitution,
-        contact_duration=impact.duration,
-        force_per_speed=impact.force_per_speed,
-    )
-
-
 @dataclass(frozen=True, kw_only=True)
 class ModalImpactMachine(Machine):
     """A machine of a few modes, driven by one harmonic force, that rattles between two surfaces.
@@ -301,8 +278,8 @@ class ModalImpactMachine(Machine):
 
     @property
     @abstractmethod
-    def structure(self) -> ModalImpactModel | RestitutionModel:
-        """Model by ``flexible_model`` or ``rigid_model``, whatever frequency, force and clearance."""
+    def structure(self) -> ModalImpactModel:
+        """Model by ``flexible_model``, whatever frequency, force and clearance."""
 
     @staticmethod
     def period_at(speed: Any) -> Any:
@@ -312,26 +289,17 @@ class ModalImpactMachine(Machine):
     @property
     def force_shape(self) -> Array:
         """Mass-normalised mode shapes where the force acts, (n,) [kg^-1/2]."""
-        structure = self.structure
-        if isinstance(structure, ModalImpactModel):
-            return np.asarray(structure.drive[0, 0, 1])
-        return structure.force_shape
+        return np.asarray(self.structure.drive[0, 0, 1])
 
     def stops_at(self, clearance: Any) -> Array:
         """Positions of the upper and the lower stop [m] at a clearance, (2,), or at many, (k, 2)."""
         return np.stack([clearance, -np.asarray(clearance)], axis=-1)
 
-    def reduce(self) -> ModalImpactModel | RestitutionModel:
+    def reduce(self) -> ModalImpactModel:
         """Return the modal model; machines that differ in frequency, force or clearance share the costly part."""
         speed, clearance = getattr(self, self.speed_field), getattr(self, self.clearance_field)
-        structure = self.structure
-        if isinstance(structure, ModalImpactModel):
-            stops = self.stops_at(clearance)
-            return structure._replace(
-                excitation_frequency=speed, drive=self.force_amplitude * structure.drive, stops=stops
-            )
-        force = self.force_amplitude
-        return structure._replace(excitation_frequency=speed, force_amplitude=force, clearance=clearance)
+        structure, stops = self.structure, self.stops_at(clearance)
+        return structure._replace(excitation_frequency=speed, drive=self.force_amplitude * structure.drive, stops=stops)
 
     @property
     def natural_frequencies(self) -> Array:
@@ -369,14 +337,7 @@ class ModalImpactMachine(Machine):
         """
         model = self.reduce()
         structure = -float(np.trace(model.damping)) * self.cycle_period
-        if isinstance(model, RestitutionModel):
-            return structure + 2.0 * math.log(model.restitution) * impacts
         return structure - float(model.contact_damping @ contact_time) * float(np.sum(model.tip_shape**2))
-
-    @property
-    def runs_fixed_steps(self) -> bool:
-        """True unless impacts take no time."""
-        return isinstance(self.structure, ModalImpactModel)
 
     def run(
         self,
@@ -392,14 +353,9 @@ class ModalImpactMachine(Machine):
         along = tangents or no_tangents(len(coordinates), len(arrays.section))
         if isinstance(integrator, ExactEvents):
             step, tolerance, budget = integrator.step_phase, integrator.event_tolerance, integrator.event_budget
-            if isinstance(model, ModalImpactModel):
-                outcome = call(advance_model, model, step, tolerance, *motion, budget, along)
-            else:
-                outcome = call(advance_restitution, model, *motion, step, budget, along)
-        elif isinstance(model, ModalImpactModel):
-            outcome = call(advance_fixed_step, model, *motion, integrator.steps_per_cycle)
+            outcome = call(advance_model, model, step, tolerance, *motion, budget, along)
         else:
-            raise refuse_fixed_steps(integrator, self)
+            outcome = call(advance_fixed_step, model, *motion, integrator.steps_per_cycle)
         status, done = outcome
         return status, done
 
@@ -420,6 +376,6 @@ class ModalImpactMachine(Machine):
 
     def batch(self, count: int) -> "CompiledBatch":
         """Return ``count`` variants that move in one compiled call."""
-        from chaosgym.machines.batch import ModalImpactBatch, RestitutionBatch
+        from chaosgym.machines.batch import ModalImpactBatch
 
-        return (ModalImpactBatch if self.runs_fixed_steps else RestitutionBatch)(self, count)
+        return ModalImpactBatch(self, count)

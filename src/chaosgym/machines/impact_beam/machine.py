@@ -6,11 +6,10 @@ from functools import lru_cache
 from typing import Any
 
 from chaosgym.core.modal_model import ModalImpactModel
-from chaosgym.core.restitution import RestitutionModel
 from chaosgym.machines.impact_beam.modes import modal_analysis, static_tip_deflection
 from chaosgym.machines.impact_beam.parameters import BeamParameters
 from chaosgym.machines.integrators import TIGHTEST_EVENTS, ExactEvents
-from chaosgym.machines.modal_impact import flexible_model, rigid_model
+from chaosgym.machines.modal_impact import flexible_model
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,11 +50,11 @@ class ImpactBeam(BeamParameters):
 
     @property
     def swings(self) -> bool:
-        """True where the sensors are springs."""
-        return self.contact_law == "linear"
+        """Always: the sensors are springs."""
+        return True
 
     @property
-    def structure(self) -> ModalImpactModel | RestitutionModel:
+    def structure(self) -> ModalImpactModel:
         """Model of the beam, whatever frequency, force and clearance; beams that differ in these alone share it."""
         return _structure(self._with_unchecked(excitation_frequency=1.0, force_amplitude=0.0, clearance=0.0))
 
@@ -65,8 +64,6 @@ THESIS_IMPACT_BEAM = ImpactBeam(reduction="interfaces", n_modes=5, fitted_modes=
 
 
 @lru_cache(maxsize=256)
-def _structure(beam: ImpactBeam) -> ModalImpactModel | RestitutionModel:
+def _structure(beam: ImpactBeam) -> ModalImpactModel:
     modes, contact = modal_analysis(beam), (beam.contact_stiffness, beam.contact_damping)
-    if beam.contact_law == "restitution":
-        return rigid_model(modes, *contact)
     return flexible_model(modes, *contact, step_phase=beam.default_integrator.step_phase)

@@ -50,7 +50,7 @@ class BeamParameters(ModalImpactMachine):
         )
     }
     former_rungs: ClassVar[Mapping[str, str]] = {
-        "restitution": "contact_law='restitution', n_modes=1, fitted_modes=0",
+        "restitution": "n_modes=1, fitted_modes=0, whose impacts take the time that spring and damper give them",
         "rigid": "n_modes=1, fitted_modes=0",
         "modes-3": "fidelity='standard'",
         "draft": "fidelity='standard', which costs no more",
@@ -163,9 +163,8 @@ class BeamParameters(ModalImpactMachine):
     """Linearised Hertzian stiffness of a sensor surface [N/m]."""
     contact_damping: float = parameter(20.0, unit="N s/m", low=0.0, high=1e6, provenance="printed", source="thesis 3.3")
     """Damping of a sensor surface [N s/m]."""
-    contact_law: str = parameter("linear", choices=("linear", "restitution"), provenance="printed", source="thesis 3.3")
-    """"linear": spring and damper; "restitution": impacts of a rigid beam that take no time, with what the same spring
-    and damper restore of the speed."""
+    contact_law: str = parameter("linear", choices=("linear",), provenance="printed", source="thesis 3.3")
+    """Spring and damper. Data sets name it; there is no other."""
     event_accuracy: str = parameter(
         "standard", choices=("standard", "tightest"), provenance="assumed", source="a matter of computing"
     )
@@ -184,11 +183,6 @@ class BeamParameters(ModalImpactMachine):
 
     def __post_init__(self, fidelity: str | None) -> None:
         super().__post_init__(fidelity)
-        if self.contact_law == "restitution" and self.n_modes + self.fitted_modes > 1:
-            raise ParameterError(
-                f"n_modes = {self.n_modes} and fitted_modes = {self.fitted_modes} are out of range; allowed: 1 and 0 "
-                "with contact_law = 'restitution', whose beam is rigid"
-            )
         if self.reduction == "interfaces" and (self.n_modes < INTERFACES or self.fitted_modes):
             raise ParameterError(
                 f"n_modes = {self.n_modes} and fitted_modes = {self.fitted_modes} are out of range; allowed: "

@@ -13,6 +13,7 @@ import numpy as np
 
 from chaosgym.errors import ParameterError
 from chaosgym.files import contents, toml_of
+from chaosgym.machines.linear_impact import damping_for
 from chaosgym.machines.machine import Machine, Work
 from chaosgym.machines.modal_machine.archives import LARGEST, read_archive, read_matrix
 from chaosgym.machines.modal_machine.drive import KINDS, Drive
@@ -141,7 +142,7 @@ def _built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> typ
         watched = {"monitored": operation["monitored"]} if "monitored" in operation else {}
         made = machine_with_joints(
             structure,
-            _several_joints(data["joint"]),
+            _several_joints(data["joint"], structure),
             drives,
             about=about,
             usual_ranges=usual,
@@ -160,8 +161,10 @@ def _built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> typ
     return kind
 
 
-def _stated_of(joint: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """What a file states of a joint, with factors of the lower stop."""
+def _stated_of(joint: Mapping[str, Any], name: str, structure: Structure) -> dict[str, Any]:
+    """What a file states of a joint, with factors of the lower stop, and the damper that a restitution stands for."""
+    if "restitution" in joint:
+        joint = _with_damper(joint, name, structure)
     _, clearance, *upper = _needed(name, joint, "at", "clearance", "stiffness", "damping")
     stated = {key: value for key, value in joint.items() if key not in ("lower", "name")}
     for key, above in zip(("stiffness", "damping"), upper, strict=True):
@@ -175,14 +178,34 @@ def _stated_of(joint: Mapping[str, Any], name: str) -> dict[str, Any]:
     return stated
 
 
-def _several_joints(tables: list[dict[str, Any]]) -> dict[str, Joint]:
+def _with_damper(joint: Mapping[str, Any], name: str, structure: Structure) -> dict[str, Any]:
+    """A joint with the damper that restores the stated share of the speed of the mass that strikes.
+
+    That mass is what resists a short push at the joint, 1 / |phi|^2 of all kept modes (Schwager and Poeschel 2007, see
+    ``linear_impact``).
+    """
+    at, stiffness, restored = _needed(name, joint, "at", "stiffness", "restitution")
+    if "damping" in joint or "damping" in joint["lower"]:
+        raise ParameterError(f"{name} has restitution and damping; allowed: one of them")
+    if not 1e-3 <= restored <= 1.0 or not stiffness > 0.0:
+        raise ParameterError(f"{name}.restitution = {restored:g} is out of range; allowed: 0.001 to 1")
+    mobility = float(np.sum(structure.shape(at) ** 2))
+    if mobility == 0.0:
+        raise ParameterError(f"{name}.at = {at!r} never moves: every shape is 0 there")
+    lower = joint["lower"].get("stiffness", stiffness)
+    dampers = [damping_for(restored, 1.0 / mobility, spring) for spring in (stiffness, lower)]
+    rest = {key: value for key, value in joint.items() if key != "restitution"}
+    return {**rest, "damping": dampers[0], "lower": {**joint["lower"], "damping": dampers[1]}}
+
+
+def _several_joints(tables: list[dict[str, Any]], structure: Structure) -> dict[str, Joint]:
     """Joints by their names: the stated ones, or joint_1, joint_2 ..."""
     joints: dict[str, Joint] = {}
     for number, table in enumerate(tables, 1):
         name = table.get("name", f"joint_{number}")
         if name in joints:
             raise ParameterError(f"two [[joint]] have the name {name!r}; allowed: a name of its own for each")
-        joints[name] = Joint(**_stated_of(table, name if "name" in table else "joint"))
+        joints[name] = Joint(**_stated_of(table, name if "name" in table else "joint", structure))
     return joints
 
 
@@ -196,7 +219,7 @@ def _with_one_joint(
     definition: Any,
     path: str,
 ) -> Any:
-    stated = _stated_of(joint, "joint")
+    stated = _stated_of(joint, "joint", structure)
     fields: dict[str, Any] = {
         "modes": structure,
         "joint": stated.pop("at"),

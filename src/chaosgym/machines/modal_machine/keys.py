@@ -65,6 +65,7 @@ TABLES: Mapping[str, Mapping[str, Key]] = {
         "stops": Key("two, or one on the upper side", kind=TEXT, choices=("two", "one")),
         "stiffness": Key("spring of a stop", "N/m"),
         "damping": Key("damper of a stop", "N s/m"),
+        "restitution": Key("speed after over speed before an impact, 0.001 to 1, in place of damping"),
         "preload": Key("constant force towards the upper stop", "N"),
     },
     "joint.lower": {

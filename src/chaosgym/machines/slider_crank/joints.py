@@ -241,7 +241,7 @@ def ball_joint_of(machine: "SliderCrank") -> JointModel:
 
 
 class Joint(NamedTuple):
-    """A contact of ``stepped``; see ``SteppedCrankModel``. ``scale`` and ``damping`` multiply stiffness and damping."""
+    """A contact; see ``core.binned.taylor.TaylorModel``. ``scale`` and ``damping`` multiply stiffness and damping."""
 
     row: Array
     gap: float
@@ -271,7 +271,7 @@ def joints_of(machine: "SliderCrank") -> list[Joint]:
 
 
 class Channels(NamedTuple):
-    """Contact channels; see ``SliderCrankModel``. ``slides`` (m,): friction acts along the guide."""
+    """Contact channels; see ``BinnedModel``. ``slides`` (m,): friction acts along the guide."""
 
     row: Array
     stiffness: Array

@@ -20,13 +20,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.core.binned.cycle import BinnedModel
+from chaosgym.core.binned.series import FORCING_TERMS, series_order
+from chaosgym.core.binned.tables import tables
+from chaosgym.core.binned.taylor import HERTZ, LINEAR, TaylorModel
 from chaosgym.core.lanes import LANES, padded
 from chaosgym.machines.slider_crank.equations import Equations, equations, loads, rod_of
 from chaosgym.machines.slider_crank.joints import Channels, channels_of, display_of, gaps_of, hertz_constants, joints_of
-from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
-from chaosgym.machines.slider_crank.kernels.propagator import tables
-from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, series_order
-from chaosgym.machines.slider_crank.kernels.stepped import HERTZ, LINEAR, SteppedCrankModel
 from chaosgym.machines.slider_crank.kinematics import slider_rate
 from chaosgym.machines.slider_crank.spatial_equations import spatial_equations, spatial_loads
 
@@ -66,11 +66,11 @@ class _RecentModels:
     """Models by key within ``KEPT_BYTES``; several threads may ask at once."""
 
     def __init__(self) -> None:
-        self._models: OrderedDict[Hashable, SliderCrankModel] = OrderedDict()
+        self._models: OrderedDict[Hashable, BinnedModel] = OrderedDict()
         self._bytes = 0
         self._lock = Lock()
 
-    def get(self, key: Hashable, make: Callable[[], SliderCrankModel]) -> SliderCrankModel:
+    def get(self, key: Hashable, make: Callable[[], BinnedModel]) -> BinnedModel:
         with self._lock:
             if key in self._models:
                 self._models.move_to_end(key)
@@ -101,7 +101,7 @@ class ModelsBySpeed:
     def __init__(self, step_phase: float, structure: tuple[Any, ...]) -> None:
         self._step_phase, self._structure = step_phase, structure
 
-    def at(self, crank_speed: float) -> SliderCrankModel:
+    def at(self, crank_speed: float) -> BinnedModel:
         """Return the model at a speed [rpm]; its gaps are zero."""
         return _recent.get(
             (crank_speed, self), lambda: _at_speed(crank_speed, self._step_phase, _structure(*self._structure))
@@ -118,7 +118,7 @@ def models_by_speed(machine: "SliderCrank", step_phase: float = STEP_PHASE) -> M
     return _models_by_speed(step_phase, *_key(machine))
 
 
-def exact_model(machine: "SliderCrank", step_phase: float) -> SliderCrankModel:
+def exact_model(machine: "SliderCrank", step_phase: float) -> BinnedModel:
     """Model of a machine that ``has_propagators``; ``step_phase`` is that of ``SliderCrank.reduce``."""
     return models_by_speed(machine, step_phase).at(machine.crank_speed)._replace(gap=gaps_of(machine))
 
@@ -185,7 +185,7 @@ def _free_motion(free: Array, forcing: Array, rate: float) -> Array:
     return np.concatenate([free[0] + rate * free[1] + rate**2 * free[2], forcing[0] + rate**2 * forcing[1]], axis=1)
 
 
-def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankModel:
+def stepped_model(machine: "SliderCrank", step_phase: float) -> TaylorModel:
     """Model of any machine for Taylor series.
 
     A closed contact turns by ``step_phase`` / 4 in a piece of a series; half of it leaves a sixteenth of the error.
@@ -208,7 +208,7 @@ def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankMode
     system[:, n:, :n] = np.eye(n)
     system[:, :, n:] = acceleration[:, : 2 * n]
     spectrum = float(np.max(np.abs(np.linalg.eigvals(system[[0, bins // 4]]))))
-    return SteppedCrankModel(
+    return TaylorModel(
         bin_duration=duration,
         steps=max(1, math.ceil(duration * max(4.0 * contact / step_phase, spectrum / PIECE_PHASE))),
         longest=duration / max(1.0, duration * spectrum / SPAN_PHASE),
@@ -230,7 +230,7 @@ def stepped_model(machine: "SliderCrank", step_phase: float) -> SteppedCrankMode
 
 
 def _with_readings(accelerations: Array, row: Array) -> Array:
-    """Lanes of ``SteppedCrankModel`` of accelerations (..., n)."""
+    """Lanes of ``TaylorModel`` of accelerations (..., n)."""
     rows, n = row.shape
     lanes = np.zeros((*accelerations.shape[:-1], padded(rows + n)))
     lanes[..., :rows] = accelerations @ row.T
@@ -238,7 +238,7 @@ def _with_readings(accelerations: Array, row: Array) -> Array:
     return lanes
 
 
-def fastest_rate(machine: "SliderCrank", model: SteppedCrankModel) -> float:
+def fastest_rate(machine: "SliderCrank", model: TaylorModel) -> float:
     """Largest modulus [1/s] of an eigenvalue with every contact closed."""
     rows, n = model.row.shape
     some = model.acceleration[[0, len(model.acceleration) // 4], :, rows : rows + n]
@@ -365,13 +365,13 @@ def _friction(machine: "SliderCrank", crank_angle: Array) -> Array:
     return np.asarray(machine.friction_coefficient * np.clip(speed, -1.0, 1.0))
 
 
-def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> SliderCrankModel:
+def _at_speed(crank_speed: float, step_phase: float, parts: _Structure) -> BinnedModel:
     rate, bins = crank_speed * math.pi / 30.0, parts.bins
     duration = 2.0 * math.pi / (bins * rate)
     steps = max(1, math.ceil(duration * parts.spectrum / (2.0 * LANES * step_phase)))
     order = series_order(parts.spectrum * duration / (LANES * steps))
     accelerations = (parts.free, parts.forcing, parts.push, bins, rate)
-    return SliderCrankModel(
+    return BinnedModel(
         bin_duration=duration,
         bins=bins,
         steps=steps,

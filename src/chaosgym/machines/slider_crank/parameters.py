@@ -5,7 +5,7 @@ slider that runs along a straight guide (thesis 4.2). Clearance in the slider jo
 guide, clearance in the ball joint lets the ball rattle in its housing.
 
 Nominal kinematics and rod (``kinematics``, ``connecting_rod``) -> equations of small motions (``equations``),
-held over bins of crank angle -> exact propagators (``kernels.propagator``) -> SliderCrankModel.
+held over bins of crank angle -> exact propagators (``kernels.propagator``) -> BinnedModel.
 
 Gravity is off by default. With the mechanism's plane upright, the slider's weight keeps it on the guide below about
 360 rpm, so no impact could happen in the slider joint; yet the thesis shows impacts of 35 to 130 N at 190 to 290 rpm
@@ -28,6 +28,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.core.binned.cycle import BinnedModel
+from chaosgym.core.binned.taylor import TaylorModel
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
@@ -38,8 +40,6 @@ from chaosgym.machines.parameters import parameter
 from chaosgym.machines.slider_crank import run as running
 from chaosgym.machines.slider_crank.equations import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom, equations
 from chaosgym.machines.slider_crank.joints import sensors_of
-from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
-from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
 from chaosgym.machines.slider_crank.kinematics import slider_position
 from chaosgym.machines.slider_crank.model import STEP_PHASE, exact_model, fastest_rate, has_propagators, stepped_model
 from chaosgym.machines.slider_crank.run import CrankBatch, SteppedCrankBatch
@@ -375,7 +375,7 @@ class SliderCrank(Machine):
         """True if the motor stands at an angle, so that the rod swings in two planes."""
         return self.motor_angle > 0.0
 
-    def reduce(self, step_phase: float = STEP_PHASE) -> SliderCrankModel | SteppedCrankModel:
+    def reduce(self, step_phase: float = STEP_PHASE) -> BinnedModel | TaylorModel:
         """Return the model with exact propagators if contact is linear and does not turn with the ball.
 
         The fastest motion turns by ``step_phase`` [rad] in half an interval between two readings of the contacts. Any

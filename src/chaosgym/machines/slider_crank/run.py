@@ -7,17 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.core import status
+from chaosgym.core.binned.batch import advance_binned_machines, advance_kicked_machines, advance_taylor_machines
+from chaosgym.core.binned.cycle import BinnedModel, advance
+from chaosgym.core.binned.fixed_step import advance_binned_fixed_step
+from chaosgym.core.binned.taylor import TaylorModel
+from chaosgym.core.binned.taylor import advance as advance_stepped
 from chaosgym.core.compilation import call, call_side_by_side
 from chaosgym.core.cycle import CycleArrays, Episode, cycle_arrays
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.machines.batch import CompiledBatch, Cycles, put, stacked
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.slider_crank.joints import gaps_of, sensor_peaks
-from chaosgym.machines.slider_crank.kernels.batch import advance_cranks, advance_kicked_cranks, advance_stepped_cranks
-from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel, advance
-from chaosgym.machines.slider_crank.kernels.fixed_step import advance_crank_fixed_step
-from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
-from chaosgym.machines.slider_crank.kernels.stepped import advance as advance_stepped
 from chaosgym.machines.slider_crank.model import (
     STEP_PHASE,
     ModelsBySpeed,
@@ -54,12 +54,12 @@ def run(
     settings: tuple[Any, ...]
     if isinstance(integrator, ExactEvents):
         model = crank.reduce(integrator.step_phase)
-        kernel = advance_stepped if isinstance(model, SteppedCrankModel) else advance
+        kernel = advance_stepped if isinstance(model, TaylorModel) else advance
         steps = model.steps * round(360.0 / crank.matrix_update_interval)
         settings = (integrator.event_tolerance / model.contact_rate, integrator.event_budget)
     else:
         model = stepped_model(crank, STEP_PHASE)
-        kernel, steps = advance_crank_fixed_step, integrator.steps_per_cycle
+        kernel, steps = advance_binned_fixed_step, integrator.steps_per_cycle
         settings = (steps, fastest_rate(crank, model))
     # a kernel can't be interrupted: many revolutions take many calls
     cycles, at_once, done = len(arrays.section), max(1, STEPS_AT_ONCE // steps), 0
@@ -121,7 +121,7 @@ class CrankBatch(CompiledBatch):
         self._models = [models_by_speed(machine)] * count
         self._speeds = np.full(count, np.nan)
         # a table lives as long as the batch holds its address
-        self._kept: list[SliderCrankModel | None] = [None] * count
+        self._kept: list[BinnedModel | None] = [None] * count
 
     def __getstate__(self) -> dict[str, Any]:
         """State without models: addresses mean nothing in another process."""
@@ -147,7 +147,7 @@ class CrankBatch(CompiledBatch):
     def set_speeds(self, which: Indices, speeds: Array) -> None:
         """Change the speeds of the cranks [rpm]."""
         # machines of one make are often at one speed: each pair is looked up once
-        found: dict[tuple[ModelsBySpeed, float], SliderCrankModel] = {}
+        found: dict[tuple[ModelsBySpeed, float], BinnedModel] = {}
         for i, speed in zip(which.tolist(), speeds.tolist(), strict=True):
             if self._speeds[i] == speed:
                 continue
@@ -170,12 +170,12 @@ class CrankBatch(CompiledBatch):
         """``kick`` the machines ``which`` (k,) by each of the shares (k, cycles, n_states / 2) and run them a cycle."""
         arrays, outcome = self._empty(*kicks.shape[:2])
         given = (self._batch, which, kicks, self._motions, self._scale, arrays, self._settings, outcome)
-        call_side_by_side(advance_kicked_cranks, len(self), *given)
+        call_side_by_side(advance_kicked_machines, len(self), *given)
         return self._cycles(arrays, outcome)
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         given = (self._batch, which, self._motions, arrays, self._settings, outcome)
-        call_side_by_side(advance_cranks, len(self), *given)
+        call_side_by_side(advance_binned_machines, len(self), *given)
 
 
 class SteppedCrankBatch(CompiledBatch):
@@ -204,4 +204,4 @@ class SteppedCrankBatch(CompiledBatch):
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         given = (self._batch, which, self._motions, arrays, self._settings, outcome)
-        call_side_by_side(advance_stepped_cranks, len(self), *given)
+        call_side_by_side(advance_taylor_machines, len(self), *given)

@@ -1,16 +1,12 @@
 """What is proven of a look of eight intervals by the readings at their ends, and recorded of it.
 
 Between two ends a reading lies within 4/27 of the interval times the slopes that lead beyond them, and within
-``VALUE_DOUBT`` times its fourth power and the bound of the fourth derivative (``contact``).
+``VALUE_DOUBT`` times its fourth power and the bound of the fourth derivative (``events``).
 """
 
 import math
 
-from chaosgym.core.cycle import LOWER, UPPER
-from chaosgym.core.events import VALUE_DOUBT, trend
-from chaosgym.core.kernel import leaf, part
-from chaosgym.core.lanes import LANES, add_tops, first_above, first_doubt
-from chaosgym.machines.slider_crank.kernels.motion import (
+from chaosgym.core.binned.motion import (
     ALONG,
     GAP,
     NOW,
@@ -25,7 +21,11 @@ from chaosgym.machines.slider_crank.kernels.motion import (
     places,
     side_of,
 )
-from chaosgym.machines.slider_crank.kernels.record import note_peak, note_share, resultant
+from chaosgym.core.binned.record import note_peak, note_share, resultant
+from chaosgym.core.cycle import LOWER, UPPER
+from chaosgym.core.events import VALUE_DOUBT, trend
+from chaosgym.core.kernel import leaf, part
+from chaosgym.core.lanes import LANES, add_tops, first_above, first_doubt
 
 
 @leaf

@@ -1,13 +1,13 @@
 r"""Exact motion of a few modes whose joints, any number, rattle between two surfaces each.
 
-Between contact events the machine is linear (``joint_tables``). A surface presses with N = k p + d p', p the
+Between contact events the machine is linear (``joints.tables``). A surface presses with N = k p + d p', p the
 penetration, while p and N are positive; beyond a surface that would pull, a joint is open like one in its gap. Sets of
 pressed surfaces have tables of their own. They are made outside, when a set is first visited: ``advance`` then stops
 before the cycle with NEEDS_SET and tells which.
 
-From one event to the next the motion goes on by eight intervals, as long as proofs allow (``joint_events``); where they
-fail intervals become shorter, and in the shortest one the first change of contact is found on Taylor series. Recording
-only reads: a time history does not change the motion by a bit.
+From one event to the next the motion goes on by eight intervals, as long as proofs allow (``joints.events``). Where
+they fail intervals become shorter, and in the shortest one the first change of contact is found on Taylor series.
+Recording only reads: a time history does not change the motion by a bit.
 """
 
 import math
@@ -17,7 +17,7 @@ from numba import njit
 
 from chaosgym.core import status
 from chaosgym.core.cycle import LOWER, UPPER
-from chaosgym.core.joint_events import (
+from chaosgym.core.joints.events import (
     choose_level,
     first_change,
     note_crests,
@@ -27,7 +27,7 @@ from chaosgym.core.joint_events import (
     quiet_intervals,
     read_series,
 )
-from chaosgym.core.joint_run import (
+from chaosgym.core.joints.run import (
     JOINT,
     NUMBERS,
     RATES,
@@ -52,7 +52,7 @@ from chaosgym.core.joint_run import (
     travel,
     write_samples,
 )
-from chaosgym.core.joint_tables import FROM, GENERATOR, HARMONICS, JOINTS, MODES, SHORTEST, STATES, TO, WIDTH
+from chaosgym.core.joints.tables import FROM, GENERATOR, HARMONICS, JOINTS, MODES, SHORTEST, STATES, TO, WIDTH
 from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import LANES, add_columns
 from chaosgym.core.tangent import MAX_CONTRACTION, orthonormalise

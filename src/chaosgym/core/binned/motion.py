@@ -1,10 +1,12 @@
-"""Where the motion of a slider crank is, what its channels read, and how tables and series take it on."""
+"""Where the motion of a mechanism is, what its channels read, and how tables and series take it on."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from chaosgym.core.binned.series import FORCING_TERMS, expand, put_time
+from chaosgym.core.binned.tables import table_places
 from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import (
     LANES,
@@ -17,8 +19,6 @@ from chaosgym.core.lanes import (
     padded,
     sum_series,
 )
-from chaosgym.machines.slider_crank.kernels.propagator import table_places
-from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, expand, put_time
 
 READINGS = 4 * LANES
 """Numbers kept of a channel: eight readings that serve as work space and for now, eight ahead, and as many slopes."""
@@ -55,7 +55,7 @@ class Places(NamedTuple):
     columns, width, states, lanes : int
         Numbers of z, the same padded, 2n padded, n + m padded.
     z, rest : int
-        The augmented state (width,) of ``propagator``; the part of its places that the anchors of closed channels
+        The augmented state (width,) of ``tables``; the part of its places that the anchors of closed channels
         make up.
     sampled : int
         Another state (width,).

@@ -1,20 +1,17 @@
-r"""Fixed steps of Runge-Kutta for the slider crank: the comparison for exact propagation.
+r"""Fixed steps of Runge-Kutta for a mechanism: the comparison for exact propagation.
 
-The classical Runge-Kutta method of order four on the equations of ``stepped``, any joint and contact law, without
+The classical Runge-Kutta method of order four on the equations of ``taylor``, any joint and contact law, without
 event location: which joints push is judged at every stage, so touch and release are placed to O(h). Matrices are those
-of the bin of crank angle in which a stage falls.
+of the bin of the angle in which a stage falls.
 """
 
 import numpy as np
 from numba import njit
 
 from chaosgym.core import status
-from chaosgym.core.cycle import LOWER, UPPER
-from chaosgym.core.fixed_step import STABILITY_LIMIT
-from chaosgym.core.kernel import leaf
-from chaosgym.machines.slider_crank.kernels.exact import RUNAWAY, STEP_BUDGET
-from chaosgym.machines.slider_crank.kernels.record import begin_cycle, note_peak, note_share, write_peaks, write_sample
-from chaosgym.machines.slider_crank.kernels.stepped import (
+from chaosgym.core.binned.cycle import RUNAWAY, STEP_BUDGET
+from chaosgym.core.binned.record import begin_cycle, note_peak, note_share, write_peaks, write_sample
+from chaosgym.core.binned.taylor import (
     FORCE,
     begin,
     expand,
@@ -24,6 +21,9 @@ from chaosgym.machines.slider_crank.kernels.stepped import (
     new_view,
     note_touch_of,
 )
+from chaosgym.core.cycle import LOWER, UPPER
+from chaosgym.core.fixed_step import STABILITY_LIMIT
+from chaosgym.core.kernel import leaf
 
 
 @leaf
@@ -58,7 +58,7 @@ def note_joint_peaks(model, closed, view, channel_peak):
 
 
 @njit(cache=True, nogil=True)
-def advance_crank_fixed_step(model, state, episode, arrays, steps, fastest):
+def advance_binned_fixed_step(model, state, episode, arrays, steps, fastest):
     """Advance ``state`` and ``episode`` by whole revolutions of ``steps`` equal steps; see ``slider_crank.advance``.
 
     ``fastest`` is the largest angular frequency with all contacts closed. Peaks and samples are taken at the ends of

@@ -1,6 +1,6 @@
 r"""Tables of the exact motion of a mechanism with held matrices while its contacts stay as they are.
 
-Over one bin of crank angle, and for one set of closed contacts, the n coordinates obey
+Over one bin of the angle of the drive, and for one set of closed contacts, the n coordinates obey
 
     p'' = A_p p + A_v p' + sum_k F_k x^k + sum_j s_j c_j B_j,      x = time in the bin / duration of the bin
 
@@ -10,8 +10,6 @@ p'' = A z, and the Taylor series of p follows from A alone.
 
 A bin is cut into looks of eight intervals. The propagator of an interval is the series for all columns of z at once,
 summed to round-off; squared three times it is that of a look. Eight bins are worked on side by side.
-
-The file is long because the tables, their layout in memory and the bounds of what they leave out go together.
 """
 
 from typing import NamedTuple
@@ -20,6 +18,7 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
+from chaosgym.core.binned.series import FORCING_TERMS, SHARES
 from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import (
     LANES,
@@ -35,7 +34,6 @@ from chaosgym.core.lanes import (
     put,
     unset,
 )
-from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, SHARES
 
 BOUND_TERMS = 16
 """Terms of the series that bounds a propagator over half an interval."""
@@ -292,7 +290,7 @@ def _put_channels(space, row, lag, anchor, s, duration, interval, count, table, 
 
 @leaf
 def _put_acceleration(space, free, forcing, push, rate, row, s, group, groups):
-    """Sum the accelerations of eight bins at a crank rate, and those of the channels."""
+    """Sum the accelerations of eight bins at a rate of the drive, and those of the channels."""
     m, n = row.shape
     own, width = space.own, space.width
     for i in range(n):
@@ -323,15 +321,15 @@ def tables(free, forcing, push, bins, rate, row, lag, anchor, duration, steps, o
     Parameters
     ----------
     free : (3, groups, n, 2n, 8)
-        Accelerations per unit p and p' without contact, by powers of the crank rate, of eight bins side by side.
+        Accelerations per unit p and p' without contact, by powers of the rate, of eight bins side by side.
     forcing : (2, groups, n, 4, 8)
-        Accelerations per unit 1, x, x^2, x^3, and per squared crank rate.
+        Accelerations per unit 1, x, x^2, x^3, and per squared rate.
     push : (sets, groups, n, 2n + m, 8)
         What closed contacts add per unit p, p' and clearance.
     bins
         Number of bins; the last ones of a group that is not full are left out.
     rate
-        Of the crank [rad/s].
+        Of the drive [rad/s].
     row : (m, n)
         Displacement of each channel per unit coordinate.
     lag : (sets, m)

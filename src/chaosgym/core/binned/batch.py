@@ -1,6 +1,6 @@
-"""Many slider cranks at once: each by its own ``advance``, side by side on all threads.
+"""Many mechanisms at once: each by its own ``advance``, side by side on all threads.
 
-The large table of a slider crank stays where it is, and its batch holds the address: machines at equal speeds share
+The large table of a mechanism stays where it is, and its batch holds the address: machines at equal speeds share
 it.
 """
 
@@ -10,14 +10,14 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from chaosgym.core.batch import episode_of, rows_of
+from chaosgym.core.binned.cycle import BinnedModel
+from chaosgym.core.binned.cycle import advance as advance_binned
+from chaosgym.core.binned.tables import table_places
+from chaosgym.core.binned.taylor import TaylorModel
+from chaosgym.core.binned.taylor import advance as advance_taylor
 from chaosgym.core.kernel import side_by_side
 from chaosgym.core.tangent import no_tangents
 from chaosgym.core.varied import cycle_of
-from chaosgym.machines.slider_crank.kernels.exact import SliderCrankModel
-from chaosgym.machines.slider_crank.kernels.exact import advance as advance_crank
-from chaosgym.machines.slider_crank.kernels.propagator import table_places
-from chaosgym.machines.slider_crank.kernels.stepped import SteppedCrankModel
-from chaosgym.machines.slider_crank.kernels.stepped import advance as advance_stepped_crank
 
 
 @intrinsic
@@ -31,11 +31,11 @@ def pointer(typing_context, address):
 
 
 @njit(cache=True, inline="always")
-def crank_of(batch, i):
+def binned_model_of(batch, i):
     """Model of machine i of a batch that holds the addresses of the tables."""
     m, n = batch.row.shape[1:]
     size = batch.radix[i] ** m * batch.bins[i] * table_places(n, m).length
-    return SliderCrankModel(
+    return BinnedModel(
         batch.bin_duration[i],
         batch.bins[i],
         batch.steps[i],
@@ -57,12 +57,12 @@ def crank_of(batch, i):
 
 
 @side_by_side
-def advance_cranks(batch, which, motions, arrays, settings, outcome):
-    """As ``advance_beams``, for slider cranks."""
+def advance_binned_machines(batch, which, motions, arrays, settings, outcome):
+    """As ``advance_beams``, for mechanisms."""
     for k in prange(which.shape[0]):
         i = which[k]
-        outcome[k] = advance_crank(
-            crank_of(batch, i),
+        outcome[k] = advance_binned(
+            binned_model_of(batch, i),
             motions.coordinates[i],
             episode_of(motions, i),
             rows_of(arrays, k),
@@ -81,7 +81,7 @@ def _kick_crank(model, kicks, coordinates, scale, episode, arrays, settings, k):
             scale[c] = max(scale[c], abs(coordinates[c]))
         for c in range(half):
             coordinates[half + c] += kicks[k, cycle, c] * scale[half + c]
-        outcome = advance_crank(
+        outcome = advance_binned(
             model,
             coordinates,
             episode,
@@ -96,21 +96,21 @@ def _kick_crank(model, kicks, coordinates, scale, episode, arrays, settings, k):
 
 
 @side_by_side
-def advance_kicked_cranks(batch, which, kicks, motions, scale, arrays, settings, outcome):
-    """As ``advance_cranks``; before each cycle velocities change by ``kicks`` (k, cycles, n_states / 2).
+def advance_kicked_machines(batch, which, kicks, motions, scale, arrays, settings, outcome):
+    """As ``advance_binned_machines``; before each cycle velocities change by ``kicks`` (k, cycles, n_states / 2).
 
     These are shares of the largest velocities so far, which ``scale`` (N, n_states) keeps.
     """
     for k in prange(which.shape[0]):
         i = which[k]
-        model, episode = crank_of(batch, i), episode_of(motions, i)
+        model, episode = binned_model_of(batch, i), episode_of(motions, i)
         outcome[k] = _kick_crank(model, kicks, motions.coordinates[i], scale[i], episode, arrays, settings, k)
 
 
 @njit(cache=True, inline="always")
-def stepped_crank_of(batch, i):
+def taylor_model_of(batch, i):
     """Model of machine i."""
-    return SteppedCrankModel(
+    return TaylorModel(
         batch.bin_duration[i],
         batch.steps[i],
         batch.longest[i],
@@ -132,12 +132,12 @@ def stepped_crank_of(batch, i):
 
 
 @side_by_side
-def advance_stepped_cranks(batch, which, motions, arrays, settings, outcome):
-    """As ``advance_beams``, for slider cranks that move by Taylor series."""
+def advance_taylor_machines(batch, which, motions, arrays, settings, outcome):
+    """As ``advance_beams``, for mechanisms that move by Taylor series."""
     for k in prange(which.shape[0]):
         i = which[k]
-        outcome[k] = advance_stepped_crank(
-            stepped_crank_of(batch, i),
+        outcome[k] = advance_taylor(
+            taylor_model_of(batch, i),
             motions.coordinates[i],
             episode_of(motions, i),
             rows_of(arrays, k),

@@ -1,6 +1,6 @@
-r"""Motion of a slider crank without a table of propagators, by its Taylor series.
+r"""Motion of a mechanism without a table of propagators, by its Taylor series.
 
-The equations of ``exact`` between contacts, and joints for which there is no table: a ball in a spherical shell, whose
+The equations of ``cycle`` between contacts, and joints for which there is no table: a ball in a spherical shell, whose
 force turns with the ball; Hertzian contact; contacts too many for a table of all sets. Joint j reads
 e = (row_1 . p, row_2 . p, ...) and pushes along e / |e| with a force N of penetration x = |e| - c:
 
@@ -10,9 +10,7 @@ e = (row_1 . p, row_2 . p, ...) and pushes along e / |e| with a force N of penet
 as long as x and N are positive. Until a contact changes, p is its Taylor series: each coefficient follows from those
 before it, the force's by the recurrences of products, quotients and powers (Jorba and Zou, 2005). A series serves for
 a span, whose length its last coefficients tell. Contacts and forces are read from it piece by piece, and the instant
-of a change is found on it. Matrices are held over each bin of crank angle, the forcing is continuous.
-
-The file is long because it is a whole second way to run the machine, from the force of a joint to the revolution.
+of a change is found on it. Matrices are held over each bin of the angle, the forcing is continuous.
 
 References
 ----------
@@ -28,12 +26,8 @@ from numba import njit
 from numba.extending import register_jitable
 
 from chaosgym.core import status
-from chaosgym.core.cubic import cubic, cubic_extremum
-from chaosgym.core.cycle import LOWER, UPPER, note_touch
-from chaosgym.core.kernel import leaf, part
-from chaosgym.core.lanes import LANES, add_columns, next_term, padded, sum_series
-from chaosgym.machines.slider_crank.kernels.exact import RUNAWAY, STEP_BUDGET
-from chaosgym.machines.slider_crank.kernels.record import (
+from chaosgym.core.binned.cycle import RUNAWAY, STEP_BUDGET
+from chaosgym.core.binned.record import (
     begin_cycle,
     channel_crest,
     crest_instant,
@@ -43,7 +37,11 @@ from chaosgym.machines.slider_crank.kernels.record import (
     write_peaks,
     write_sample,
 )
-from chaosgym.machines.slider_crank.kernels.series import FORCING_TERMS, SHARES, shift_forcing
+from chaosgym.core.binned.series import FORCING_TERMS, SHARES, shift_forcing
+from chaosgym.core.cubic import cubic, cubic_extremum
+from chaosgym.core.cycle import LOWER, UPPER, note_touch
+from chaosgym.core.kernel import leaf, part
+from chaosgym.core.lanes import LANES, add_columns, next_term, padded, sum_series
 
 LINEAR, HERTZ = 0, 1
 
@@ -69,15 +67,15 @@ DEPTH, RATE, MARGIN, FORCE, CHANGE = range(5)
 """Columns of ``View.joint``."""
 
 
-class SteppedCrankModel(NamedTuple):
-    """All that the kernels know of a slider crank with n coordinates, J joints and R rows.
+class TaylorModel(NamedTuple):
+    """All that the kernels know of a mechanism with n coordinates, J joints and R rows.
 
     Lanes are what the R rows read, then the n coordinates, rounded up to a multiple of 8.
 
     Attributes
     ----------
     bin_duration : float
-        Time [s] in which the crank turns through one bin.
+        Time [s] in which the drive turns through one bin.
     steps : int
         Length of a bin over that of the longest piece.
     longest : float

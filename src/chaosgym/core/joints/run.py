@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from chaosgym.core.joint_tables import (
+from chaosgym.core.joints.tables import (
     AHEAD,
     BLOCKS,
     BOUNDS,
@@ -64,7 +64,7 @@ class JointRun(NamedTuple):
     Attributes
     ----------
     tables : (...,)
-        Rows of ``joint_tables`` one after the other.
+        Rows of ``joints.tables`` one after the other.
     rows : (radix^m,) int
         Where the row of each set of pressed surfaces begins, -1 where there is none yet.
     radix : (m,) int

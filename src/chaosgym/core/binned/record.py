@@ -1,4 +1,4 @@
-"""Records of the joints of a slider crank.
+"""Records of the joints of a mechanism.
 
 The resultant of the monitored joint is a tuple (upward part, size, rate of the size, along, sideways).
 """

@@ -1,7 +1,7 @@
 """What is proven of several joints over intervals ahead, what is recorded of them, and what ends an interval.
 
 A joint's reading and the proofs are those of ``events``, with the gap and the lag of the surface in question. Readings
-are taken at the ends of intervals (``joint_run.look``), and within the shortest one on its Taylor series.
+are taken at the ends of intervals (``joints.run.look``), and within the shortest one on its Taylor series.
 """
 
 import math
@@ -22,7 +22,7 @@ from chaosgym.core.events import (
     reading_at,
     trend,
 )
-from chaosgym.core.joint_run import (
+from chaosgym.core.joints.run import (
     AWAKE,
     FOURTH,
     LOWER_GAP,
@@ -39,7 +39,7 @@ from chaosgym.core.joint_run import (
     lag_of,
     spring_of,
 )
-from chaosgym.core.joint_tables import DEGREE, JOINTS, LEVELS, SHORTEST
+from chaosgym.core.joints.tables import DEGREE, JOINTS, LEVELS, SHORTEST
 from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import LANES, add_tops, first_above, first_doubt
 

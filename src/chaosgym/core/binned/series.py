@@ -1,4 +1,4 @@
-"""Taylor series of the motion of a mechanism with held matrices, whose equations are those of ``propagator``."""
+"""Taylor series of the motion of a mechanism with held matrices, whose equations are those of ``tables``."""
 
 import math
 

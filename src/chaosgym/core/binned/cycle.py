@@ -1,20 +1,18 @@
-r"""Exact motion of a slider crank whose joints rattle in their clearance.
+r"""Exact motion of a mechanism whose joints rattle in their clearance.
 
-Coordinates p are small motions about the nominal motion of the crank. A contact channel j measures row_j . p against
+Coordinates p are small motions about the nominal motion of the drive. A contact channel j measures row_j . p against
 its clearance c_j on one side or on both; closed on side s = +-1 it pushes with
 
     |N| = k (s row.p - c) + d s row.p'    while the penetration s row.p - c and |N| are positive
 
 so it pushes and never pulls: beyond the surface it detaches when spring and damper together would pull. The matrices
-are held over each bin of crank angle, the forcing is continuous, and between two changes of contact the motion is
-propagated exactly (``propagator``).
+are held over each bin of the angle of the drive, the forcing is continuous, and between two changes of contact the
+motion is propagated exactly (``tables``).
 
 Readings of the channels are looked at eight intervals ahead, and the motion goes on through those in which it is proven
 that no contact changes and that no force exceeds the peak of the revolution unseen (``look``). The next one is expanded
 in its Taylor series, on which changes of contact and crests are found. Recording only reads: a time history does not
 change the motion by a bit.
-
-The file is long because one revolution decides in turn what is looked at, what is expanded, and what both record.
 """
 
 from typing import NamedTuple
@@ -23,19 +21,14 @@ import numpy as np
 from numba import njit
 
 from chaosgym.core import status
-from chaosgym.core.cycle import LOWER, UPPER, note_touch
-from chaosgym.core.events import CROSSES, KEEPS, closing, crossing, opening, settled
-from chaosgym.core.kernel import leaf, part
-from chaosgym.core.lanes import LANES, add_columns
-from chaosgym.core.tangent import orthonormalise
-from chaosgym.machines.slider_crank.kernels.look import (
+from chaosgym.core.binned.look import (
     force_at,
     joint_force,
     note_channels,
     note_joint,
     quiet_intervals,
 )
-from chaosgym.machines.slider_crank.kernels.motion import (
+from chaosgym.core.binned.motion import (
     GAP,
     LAG,
     NOW,
@@ -61,8 +54,7 @@ from chaosgym.machines.slider_crank.kernels.motion import (
     read_now,
     side_of,
 )
-from chaosgym.machines.slider_crank.kernels.propagator import table_places
-from chaosgym.machines.slider_crank.kernels.record import (
+from chaosgym.core.binned.record import (
     begin_cycle,
     channel_crest,
     crest_instant,
@@ -71,7 +63,13 @@ from chaosgym.machines.slider_crank.kernels.record import (
     write_peaks,
     write_sample,
 )
-from chaosgym.machines.slider_crank.kernels.series import order_for, put_time
+from chaosgym.core.binned.series import order_for, put_time
+from chaosgym.core.binned.tables import table_places
+from chaosgym.core.cycle import LOWER, UPPER, note_touch
+from chaosgym.core.events import CROSSES, KEEPS, closing, crossing, opening, settled
+from chaosgym.core.kernel import leaf, part
+from chaosgym.core.lanes import LANES, add_columns
+from chaosgym.core.tangent import orthonormalise
 
 RUNAWAY = 1e3
 """Coordinate [m] that counts as divergence."""
@@ -89,13 +87,13 @@ NEAR_PEAK = 0.99
 """Share of the peak so far that the cubic must reach for a crest to be worth a search."""
 
 
-class SliderCrankModel(NamedTuple):
-    """All that the kernels know of a slider crank with n coordinates and m contact channels.
+class BinnedModel(NamedTuple):
+    """All that the kernels know of a mechanism with n coordinates and m contact channels.
 
     Attributes
     ----------
     bin_duration : float
-        Time [s] in which the crank turns through one bin.
+        Time [s] in which the drive turns through one bin.
     bins : int
         How many there are.
     steps : int
@@ -458,7 +456,7 @@ def turn(model, motion, peak, episode, arrays, cycle, tolerance, budget, vectors
 def advance(model, state, episode, arrays, event_tolerance, event_budget, tangents):
     """Advance ``state`` (2n,) and ``episode`` in place by whole revolutions, one for each row of ``arrays``.
 
-    Every revolution starts at crank angle zero. ``event_tolerance`` is the error [s] of an event's instant.
+    Every revolution starts at angle zero of the drive. ``event_tolerance`` is the error [s] of an event's instant.
     ``tangents`` are ``core.tangent.Tangents``, of no vectors if none are wanted.
 
     Returns
