@@ -284,7 +284,7 @@ def test_the_file_of_a_pipe_in_two_supports():
 
 @pytest.mark.parametrize("restitution", [0.9, 0.5])
 def test_a_stated_restitution_is_what_an_impact_leaves(tmp_path, restitution):
-    """A free mass of 2 kg that strikes a stop stated by its restitution leaves with that share of its speed, to 1e-6."""
+    """A free mass of 2 kg leaves a stop with the share of its speed that the file states, to 1e-6."""
     file = tmp_path / "mass.toml"
     file.write_text(
         f"""
