@@ -1,14 +1,19 @@
 """Machines with several joints: exact against another program, and the same whichever way they are run."""
 
+import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from scipy.integrate import solve_ivp
 
 import chaosgym
 from chaosgym import Drive, ImpactBeam, RungeKutta4, Structure, simulate
+from chaosgym.cli import app
 from chaosgym.diagnosis.lyapunov import lyapunov_spectrum
 from chaosgym.errors import ChaosgymError, ParameterError
 from chaosgym.machines import joint_sets
@@ -319,3 +324,43 @@ def test_a_stated_restitution_is_what_an_impact_leaves(tmp_path, restitution):
         file.write_text(text.replace(old, new, 1))
         with pytest.raises(ParameterError, match=message):
             chaosgym.read_machine(file)
+
+
+def test_commands_know_every_surface(tmp_path):
+    """simulate and diagnose tell what each surface takes; axes, settings and series name a joint and its fields."""
+    runner = CliRunner()
+
+    def answer(*words):
+        done = runner.invoke(app, [*map(str, words), "--json"], catch_exceptions=False)
+        assert done.exit_code == 0, done.output
+        return json.loads(done.stdout)
+
+    series = tmp_path / "series.csv"
+    told = answer("simulate", PIPE, "--cycles", 20, "--set", "guide.clearance=0.1 mm", "--series-out", series)
+    pipe = replace(chaosgym.read_machine(PIPE), guide_clearance=1e-4)
+    record = simulate(pipe, 20)
+    assert list(told["surfaces"]) == list(pipe.sides)
+    assert told["surface"] == pipe.sides[int(np.argmax(record.peak_force.max(axis=0)))]
+    assert told["peak_force_N"] == record.peaks.tolist()
+    header = series.read_text().splitlines()[0]
+    assert "guide displacement [m]" in header
+    assert "saddle force [N]" in header
+    watched = answer("simulate", PIPE, "--cycles", 5, "--set", "monitored=guide")
+    assert watched["surface"].startswith("guide")
+    lines = runner.invoke(app, ["diagnose", str(PIPE), "--set", "monitored=guide", "--budget", "200"]).output
+    assert "which is not the joint that is monitored" in lines
+    plan = tmp_path / "sweep"
+    axis = "saddle.clearance=0.2mm:0.3mm:2"
+    assert answer("sweep", PIPE, "--axis", axis, "--budget", 100, "--out", plan)["points"] == 2
+
+
+def test_an_environment_senses_the_largest_force_of_all_joints():
+    """Mean peak force of an observation, without errors, is the mean over the cycles of the largest on any surface."""
+    env = gym.make("chaosgym/Machine-v0", machine=str(PIPE), sensor_error=0.0, speed_ripple=0.0, cycles_per_step=5)
+    env.reset(seed=3)
+    env.unwrapped.jobs.traced = 0
+    observation = env.step(env.action_space.sample())[0]
+    record = env.unwrapped.jobs.batch.records[0]
+    found = record.peak_force.max(axis=1)[-5:]
+    assert observation[6] == pytest.approx(found.mean(), rel=1e-5)
+    assert observation[8] == pytest.approx(found.max(), rel=1e-5)

@@ -23,8 +23,9 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.joint_sets import JointTables, PressedSets
 from chaosgym.machines.machine import Machine, Number, Option, refuse_fixed_steps
+from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, modal_drive
-from chaosgym.machines.modal_machine.machine import ModalMachine
+from chaosgym.machines.modal_machine.machine import ModalMachine, rigid_note
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import parameter, parameters_of
 
@@ -180,6 +181,11 @@ class JointedMachine(Machine):
         return np.asarray(self.frequency_factor * self.modes.angular_frequency / (2.0 * math.pi))
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """Modes that count as rigid."""
+        return tuple(filter(None, [rigid_note(self.natural_frequencies)]))
+
+    @property
     def n_states(self) -> int:
         """Displacement and velocity of every mode."""
         return 2 * len(self.modes.angular_frequency)
@@ -283,9 +289,11 @@ def _sets(
 ) -> PressedSets:
     shape = np.array([modes.shape(place) for place in places])
     upper, damper = np.array(springs), np.array(dampers)
+    rates, damping = frequency_factor * modes.angular_frequency, damping_factor * modes.damping
+    free = with_rigid_bodies(Modes(rates, damping, shape[0], np.zeros_like(shape[0])))
     return PressedSets(
-        (frequency_factor * modes.angular_frequency) ** 2,
-        damping_factor * modes.damping,
+        free.angular_frequency**2,
+        free.damping,
         shape,
         np.stack([upper, upper * spring_factors], axis=1),
         np.stack([damper, damper * damper_factors], axis=1),

@@ -144,8 +144,6 @@ class ModalMachine(ModalImpactMachine):
     def notes(self) -> tuple[str, ...]:
         """Modes that count as rigid, and digits that a static force costs."""
         hertz = self.frequency_factor * self.modes.angular_frequency / (2.0 * math.pi)
-        slow = ", ".join(f"{rate:.3g}" for rate in hertz[nearly_rigid(hertz)])
-        rigid = f"modes of {slow} Hz count as motions of a rigid body: below {RIGID_SHARE:g} of the fastest mode"
         model, far = self.structure, ""
         held = (model.stiffness > 0.0) & (model.tip_shape * model.static_force != 0.0)
         away = np.abs(model.tip_shape * model.static_force)[held] / model.stiffness[held]
@@ -155,7 +153,7 @@ class ModalMachine(ModalImpactMachine):
                 f"the static force would push a mode of {hertz[held][np.argmax(away)]:.3g} Hz {farthest:.2g} m away: "
                 f"positions are good to {ROUNDING * farthest:.1g} m only; write 0 Hz if the body is free"
             )
-        return tuple(note for note in (rigid if slow else "", far) if note)
+        return tuple(note for note in (rigid_note(hertz), far) if note)
 
     def share_of_bound(self, states: Array, peak_force: Array) -> float:
         """Share of the bound of passivity: only the drive gives energy, and what a preload or offset has stored."""
@@ -172,6 +170,13 @@ class ModalMachine(ModalImpactMachine):
         stiffest, damper = float(np.max(model.contact_stiffness)), float(np.max(model.contact_damping))
         force = (math.sqrt(stiffest) + damper * float(np.linalg.norm(model.tip_shape))) * speed
         return max(float(np.max(np.sqrt(energy[1:]) / speed)), float(np.max(peak_force.max(axis=1) / force)))
+
+
+def rigid_note(hertz: Array) -> str:
+    """What is to be said of natural frequencies (n,) [Hz] that count as motions of a rigid body; empty if none does."""
+    slow = ", ".join(f"{rate:.3g}" for rate in hertz[nearly_rigid(hertz)])
+    told = f"modes of {slow} Hz count as motions of a rigid body: below {RIGID_SHARE:g} of the fastest mode"
+    return told if slow else ""
 
 
 @lru_cache(maxsize=256)
