@@ -339,16 +339,16 @@ def test_commands_know_every_surface(tmp_path):
     told = answer("simulate", PIPE, "--cycles", 20, "--set", "guide.clearance=0.1 mm", "--series-out", series)
     pipe = replace(chaosgym.read_machine(PIPE), guide_clearance=1e-4)
     record = simulate(pipe, 20)
-    assert list(told["surfaces"]) == list(pipe.sides)
-    assert told["surface"] == pipe.sides[int(np.argmax(record.peak_force.max(axis=0)))]
+    assert list(told["surfaces_peak_force_N"]) == list(pipe.sides)
+    assert told["worst_surface"] == pipe.sides[int(np.argmax(record.peak_force.max(axis=0)))]
     assert told["peak_force_N"] == record.peaks.tolist()
     header = series.read_text().splitlines()[0]
     assert "guide displacement [m]" in header
     assert "saddle force [N]" in header
     watched = answer("simulate", PIPE, "--cycles", 5, "--set", "monitored=guide")
-    assert watched["surface"].startswith("guide")
+    assert watched["worst_surface"].startswith("guide")
     lines = runner.invoke(app, ["diagnose", str(PIPE), "--set", "monitored=guide", "--budget", "200"]).output
-    assert "which is not the joint that is monitored" in lines
+    assert "monitored: guide upper; the largest force is on saddle upper" in lines
     plan = tmp_path / "sweep"
     axis = "saddle.clearance=0.2mm:0.3mm:2"
     assert answer("sweep", PIPE, "--axis", axis, "--budget", 100, "--out", plan)["points"] == 2

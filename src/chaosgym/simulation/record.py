@@ -124,7 +124,7 @@ class CycleRecord:
 
     @property
     def peaks(self) -> Array:
-        """Peak force [N] of each cycle on the first side of the joint; on ``worst_side`` where there are several joints.
+        """Peak force [N] of each cycle on the first side; on ``worst_side`` where there are several joints.
 
         It is what data sets keep and the classifier reads, (n_cycles,).
         """
