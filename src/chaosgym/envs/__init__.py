@@ -5,7 +5,7 @@
 
 from dataclasses import replace
 from importlib import import_module
-from typing import Any, NoReturn
+from typing import Any
 
 from gymnasium.envs.registration import EnvSpec, register, registry
 
