@@ -315,7 +315,7 @@ def _root(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, name: str, turns: b
         return ends.get(share) or between(family, a, b, share, CLOSELY)
 
     try:
-        share = float(brentq(lambda one: test(orbit(one)), 0.0, 1.0, xtol=1e-13, rtol=1e-14, maxiter=60))
+        share = brentq(lambda one: test(orbit(one)), 0.0, 1.0, xtol=1e-13, rtol=1e-14, full_output=True, disp=False)[0]
     except NotFollowedError:
         if float(np.linalg.norm(b.x - a.x)) > ROUGHLY_PLACED:
             raise

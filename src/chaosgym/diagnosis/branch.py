@@ -203,7 +203,7 @@ def _at_end(family: OrbitFamily, here: OrbitPoint, beyond: OrbitPoint) -> OrbitP
     from scipy.optimize import brentq
 
     border = 1.0 if beyond.x[-1] > 1.0 else 0.0
-    share = float(brentq(lambda one: _s_between(family, here, beyond, one) - border, 0.0, 1.0, xtol=1e-12))
+    share = float(brentq(lambda one: _s_between(family, here, beyond, one) - border, 0.0, 1.0, xtol=1e-12, disp=False))
     last = between(family, here, beyond, share)
     normal = np.zeros_like(last.tangent)
     normal[-1] = np.sign(last.tangent[-1])
