@@ -210,3 +210,27 @@ def test_one_command_gives_one_answer(options):
         assert (found["response_type"] == "undetermined") == (found["nature"] == "undetermined")
     else:
         assert found["step_check"]["nature_stays"] == (found["step_check"]["finer_nature"] == found["nature"])
+
+
+def test_diagnose_offers_the_two_step_test_alone():
+    """At 30 Hz, +-0.127 mm both steps end in chaos, on a section with structure; no exponent is asked (5.2.1)."""
+    found = run_json("diagnose", "impact-beam", "--test", "two-step", "--budget", "400")
+    assert (found["nature"], found["evidence"]["section"]) == ("chaotic", "set with structure")
+    assert found["votes"] == {}
+    assert found["evidence"]["cycles"] == 400
+
+
+def test_diagnose_prints_each_sign_of_chaos_in_one_line():
+    """Criteria (5.3.1) and precursors (5.3.2) stand below the verdict, with precision and recall."""
+    point = ("diagnose", "impact-beam", "--frequency-hz", "12")
+    code, out, err = run(*point)
+    assert code == 0, err
+    told = [line for line in out.splitlines() if "(5.3." in line]
+    assert [line.split(" (")[0].strip() for line in told] == [
+        "criteria",
+        "period doubling",
+        "period three",
+        "long bouncing",
+    ]
+    assert all("% of those with chaos had it" in line for line in told)
+    assert [sign["present"] for sign in run_json(*point)["signs_of_chaos"]] == [False] * 4

@@ -41,6 +41,8 @@ def test_info_tells_rows_classes_settings_and_faults(folder):
     assert sum(sum(part.values()) for part in info["classes"]["nature_by_split"].values()) == 50
     assert info["faults"]["failed"] == 0
     assert info["types"]["points"] == 10
+    assert info["two_step"]["rows"] + info["two_step"]["undetermined"] == 50
+    assert info["two_step"]["agreement"] > 0.9
     assert sum(info["classes"]["response_type"].values()) == 10
     _, out, _ = run("dataset", "info", str(folder))
     assert "50 of 50 points, complete" in out
@@ -66,6 +68,7 @@ def test_card_holds_the_command_that_makes_the_dataset_again(folder, tmp_path):
     code, out, _ = run(*command.split()[1:])
     assert code == 0
     assert "complete, 50 points" in out
+    assert "The Two-Step Test alone (`two_step`) and the exponent's sign agree on chaos at " in card
     for heading in ("How it was made", "Class balance", "How far to trust", "Label noise", "Split", "Licence"):
         assert f"## {heading}" in card
     (tmp_path / "keep").mkdir()

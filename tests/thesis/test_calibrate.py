@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import DatasetError, ParameterError
+from chaosgym.machines import ImpactBeam
 from chaosgym.machines.impact_beam.modes import static_tip_deflection
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.machines.slider_crank.parameters import frequencies_at
@@ -34,11 +35,23 @@ COMPARED = {one.id: one for one in read_comparisons().compared}
 
 def test_a_start_of_the_beam_is_the_present_machine():
     """The search begins at the constants in use too, so it can't end worse."""
-    basin = next(one for one in BEAM.basins if one.name == "interfaces, wide")
+    basin = next(one for one in BEAM.basins if one.name == "hard pivot, damping of the beam")
     machine = BEAM.machine(basin, basin.shares())
     for name in parameters_of(machine):
         value, present = getattr(machine, name), getattr(BEAM.base, name)
         assert value == present or value == pytest.approx(present, rel=1e-3), name
+
+
+def test_the_beam_that_is_fitted_is_the_one_that_users_get():
+    """One beam: its number of modes is that of the rung "standard"; no basin is walled off from a soft pivot."""
+    assert BEAM.base == ImpactBeam()
+    for basin in BEAM.basins:
+        lows = {one.name: one.low for one in basin.dimensions}
+        assert lows["pivot_translational_stiffness"] <= 1e3
+        assert lows["shaker_stiffness"] <= 1.0
+        assert lows["shaker_damping"] <= 0.3
+        assert {"shaker_mass", "force_position", "width"} <= set(lows)
+    assert {basin.fixed["damping_family"] for basin in BEAM.basins} == {"beam", "uniform", "stiffness"}
 
 
 def test_searched_parameters_are_not_in_print():

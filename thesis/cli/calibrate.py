@@ -7,6 +7,9 @@ import click
 
 from chaosgym.cli.output import emit
 
+UNFINISHED = 3
+"""Exit code of a search that leaves statements out of reach while a bound is active; see ``scorecard.walls``."""
+
 
 @click.command()
 @click.argument("machine", type=click.Choice(["impact-beam", "slider-crank"]))
@@ -47,7 +50,9 @@ def calibrate(
         progress=True,
     )
     result = found.as_dict()
-    emit(result, as_json, lambda: _lines(result, out))
+    emit(result, as_json, lambda: [*_lines(result, out), *(one.line for one in found.walls)])
+    if any(one.unfinished for one in found.walls):
+        raise SystemExit(UNFINISHED)
 
 
 def _lines(result: dict[str, Any], out: str) -> list[str]:

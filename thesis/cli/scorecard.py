@@ -9,16 +9,28 @@ from chaosgym.cli.output import emit
 
 @click.command()
 @click.option("--machine", type=click.Choice(["impact-beam", "slider-crank"]), multiple=True, help="Default: both.")
+@click.option(
+    "--beam",
+    metavar="NAME|FILE",
+    help="Judge this beam instead: a candidate of thesis/scorecard/candidates.json, or result.json of a search.",
+)
 @click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
 @click.option("--markdown", is_flag=True, help="Print the page of the documentation.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def scorecard(machine: tuple[str, ...], workers: int | None, markdown: bool, as_json: bool) -> None:
+def scorecard(machine: tuple[str, ...], beam: str | None, workers: int | None, markdown: bool, as_json: bool) -> None:
     """Compare every simulated statement of the thesis with the machines here; misses are shown."""
     from thesis.cache import default_folder
     from thesis.scorecard.page import page
     from thesis.scorecard.scorecard import scorecard as judge
 
-    card = judge(machine or None, folder=default_folder(), workers=workers, progress=True)
+    bases = None
+    if beam is not None:
+        from thesis.scorecard.candidates import read_candidate
+
+        if machine and machine != ("impact-beam",):
+            raise click.UsageError("--beam goes with --machine impact-beam alone")
+        machine, bases = ("impact-beam",), {"impact-beam": read_candidate(beam)}
+    card = judge(machine or None, bases=bases, folder=default_folder(), workers=workers, progress=True)
     if markdown:
         return click.echo(page(card), nl=False)
     result = card.as_dict()
@@ -32,6 +44,10 @@ def _lines(result: dict[str, Any]) -> list[str]:
         lines += [_target(one) for one in result["targets"] if one["machine"] == machine]
         lines += [_count(group, count) for group, count in totals["groups"].items()]
         lines += [_count("all", totals["all"]), *_firm(totals)]
+        told = [one for one in result["measured"] if one["machine"] == machine]
+        hits = sum(one["verdict"] == "hit" for one in told)
+        lines += [f"  measured, never fitted: {hits} of {len(told)} hit"]
+        lines += [_target({**one, "neighbours": None}) for one in told]
     return lines
 
 

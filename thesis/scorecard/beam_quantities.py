@@ -74,7 +74,7 @@ def _final_period(machine: Machine, comparison: Comparison, results: Results) ->
 
 
 def _moving(machine: Machine, comparison: Comparison, effort: Effort) -> list[Job]:
-    return [Job(beam_runs.force_point_motion, machine, (60, 20) if effort.hasty else (200, 50))]
+    return [Job(beam_runs.force_point_motion, machine, (60, 20, 1000) if effort.hasty else (200, 50))]
 
 
 def _motion(which: str, unit: float) -> Callable[[Machine, Comparison, Results], Finding]:

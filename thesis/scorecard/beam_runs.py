@@ -70,9 +70,9 @@ def follow_modes(record: CycleRecord) -> tuple[Array, Array, Array]:
     return displacement, velocity, tip
 
 
-def force_point_motion(beam: ImpactBeam, transient: int, cycles: int) -> dict[str, Any]:
+def force_point_motion(beam: ImpactBeam, transient: int, cycles: int, samples: int = MOTION_SAMPLES) -> dict[str, Any]:
     """Range of displacement [m] and velocity [m/s] of the point where the shaker pushes a beam."""
-    record = simulate(beam, cycles, transient=transient, samples_per_cycle=MOTION_SAMPLES)
+    record = simulate(beam, cycles, transient=transient, samples_per_cycle=samples)
     displacement, velocity, tip = follow_modes(record)
     assert record.history is not None
     return {

@@ -26,6 +26,7 @@ from thesis.scorecard.observation import THOROUGH
 from thesis.scorecard.scorecard import Scorecard
 from thesis.scorecard.search import JOURNAL_FILE, WIDE, WIDTH, Budget, Candidate, open_journal, search
 from thesis.scorecard.search_space import SEARCH_SPACES, Basin, SearchSpace
+from thesis.scorecard.walls import Walls, walls_of
 
 RESULT_FILE = "result.json"
 
@@ -70,6 +71,11 @@ class Calibration:
         return self.space.machine(self.basin, self.best.shares)
 
     @property
+    def walls(self) -> tuple[Walls, ...]:
+        """What each basin did not reach."""
+        return walls_of(self.space.basins, self.candidates)
+
+    @property
     def basin(self) -> Basin:
         """Basin of the best candidate."""
         return self.space.basins[self.best.basin]
@@ -88,6 +94,7 @@ class Calibration:
                 basin.name: min((one.value for one in self.candidates if one.basin == k), default=None)
                 for k, basin in enumerate(self.space.basins)
             },
+            "walls": [one.as_dict() for one in self.walls],
             "searched": self.basin.values(self.best.shares),
             "parameters": {field: getattr(self.machine, field) for field in parameters_of(self.machine)},
             "unprinted": self.space.conditions(self.basin, self.best.shares),

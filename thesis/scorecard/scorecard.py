@@ -1,7 +1,7 @@
 """The scorecard: every simulated statement of the thesis, judged.
 
 Near, missed and not computed statements count as not hit. Statements that the text itself contradicts are shown and
-left out of the ratio.
+left out of the ratio. What the thesis measured is judged apart.
 """
 
 from collections import Counter
@@ -16,15 +16,26 @@ from thesis.scorecard.evaluation import THESIS_MACHINES, evaluate
 from thesis.scorecard.firmness import Firmness, firmness_of
 from thesis.scorecard.observation import THOROUGH, Effort
 from thesis.scorecard.verdicts import COUNTED, Judged
-from thesis.statements import read_comparisons
+from thesis.statements import read_comparisons, read_measured
 
 
 @dataclass(frozen=True)
 class Scorecard:
-    """Every statement, judged."""
+    """Every statement, judged.
+
+    Attributes
+    ----------
+    judged
+        Statements about simulations.
+    firmness
+        What is known of the neighbours, by machine.
+    measured
+        Statements about measurements, judged apart: no search is shown them, and no total counts them.
+    """
 
     judged: tuple[Judged, ...]
     firmness: Mapping[str, Firmness] = field(default_factory=dict)
+    measured: tuple[Judged, ...] = ()
 
     def totals(self) -> dict[str, dict[str, Any]]:
         """Return {machine: {"all": {hit, near, miss, contradictory, total}, "groups": {group: the same}, ...}}.
@@ -65,10 +76,16 @@ class Scorecard:
         counted = [one for one in self.judged if one.comparison.machine == machine and one.verdict != "contradictory"]
         return sum(one.verdict == "hit" for one in counted), len(counted)
 
+    def measured_rate(self, machine: str) -> tuple[int, int]:
+        """Hits, and number of the measured statements about a machine."""
+        told = [one for one in self.measured if one.comparison.machine == machine]
+        return sum(one.verdict == "hit" for one in told), len(told)
+
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         return {
             "version": __version__,
+            "measured": [one.as_dict() for one in self.measured],
             "targets": [{**one.as_dict(), "neighbours": self.share(one)} for one in self.judged],
             "totals": self.totals(),
         }
@@ -106,8 +123,9 @@ def scorecard(
     wanted = set(THESIS_MACHINES) if machines is None else set(machines)
     comparisons = [one for one in read_comparisons().compared if one.machine in wanted]
     made = {name: (bases or {}).get(name, THESIS_MACHINES[name]) for name in wanted}
+    further = [one for one in read_measured().compared if one.machine in wanted]
     judged = evaluate(
-        comparisons,
+        [*comparisons, *further],
         made,
         efforts=efforts,
         folder=folder,
@@ -115,5 +133,7 @@ def scorecard(
         progress="scorecard" if progress else None,
         unprinted=unprinted,
     )
+    count = len(comparisons)
     known = {name: firmness_of(machine) for name, machine in made.items()}
-    return Scorecard(judged, {name: one for name, one in known.items() if one is not None})
+    firm = {name: one for name, one in known.items() if one is not None}
+    return Scorecard(judged[:count], firm, judged[count:])

@@ -26,7 +26,7 @@ from thesis.scorecard.search_space import Basin, SearchSpace
 
 PLAN_FILE, JOURNAL_FILE = "plan.json", "journal.jsonl"
 
-WIDTH = 0.08
+WIDTH = 0.03
 """Standard deviation of the first generation, as a share of the searched ranges."""
 
 WIDE = 0.25

@@ -8,7 +8,7 @@ Mechanical Engineering, Massachusetts Institute of Technology, 1994. Transcribed
 is only drawn in a figure is not in it.
 """
 
-from thesis.statements.comparisons import Comparison, Tolerance, conditions, read_comparisons
+from thesis.statements.comparisons import Comparison, Tolerance, conditions, read_comparisons, read_measured
 from thesis.statements.statements import Statement, read_statements
 
-__all__ = ["Comparison", "Statement", "Tolerance", "conditions", "read_comparisons", "read_statements"]
+__all__ = ["Comparison", "Statement", "Tolerance", "conditions", "read_comparisons", "read_measured", "read_statements"]

@@ -137,6 +137,14 @@ def read_comparisons() -> Comparisons:
     return parse_comparisons(text, read_statements())
 
 
+@cache
+def read_measured() -> Comparisons:
+    """Comparisons with what the thesis measured, which no search is shown; raises as ``read_comparisons`` does."""
+    text = (resources.files("thesis.statements") / "measured.toml").read_text(encoding="utf-8")
+    measured = {name: one for name, one in read_statements().items() if set(one.kinds) == {"experiment"}}
+    return parse_comparisons(text, measured)
+
+
 def parse_comparisons(text: str, statements: Mapping[str, Statement]) -> Comparisons:
     """Read a table of comparisons; see ``read_comparisons``."""
     try:

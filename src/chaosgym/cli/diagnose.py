@@ -14,10 +14,10 @@ from chaosgym.machines import MACHINES
 @machine_command(required=False)
 @click.option(
     "--test",
-    type=click.Choice(["adaptive", "mut"]),
+    type=click.Choice(["adaptive", "two-step", "mut"]),
     default="adaptive",
     show_default=True,
-    help="All tests in stages, or the Matrix Update Test alone.",
+    help="All tests in stages, or the Two-Step Test or the Matrix Update Test alone.",
 )
 @click.option("--budget", type=click.IntRange(100, 10**7), default=3200, show_default=True, help="Cycles at the most.")
 @click.option("--types", is_flag=True, help="Also tell the response type (I, II, III) over the tolerances.")
@@ -61,6 +61,10 @@ def diagnose(
         draw(picture, lambda plots: plots.measured_figure(run.peaks, run.verdict.diagnosis, name), result, lines)
     elif machine is None:
         raise click.UsageError(f"give a machine ({', '.join(MACHINES)}), --peaks FILE or --series FILE")
+    elif test == "two-step":
+        with patience("diagnose"):
+            result, lines, verdict = _two_step(machine, budget, measured.sensor_error or 0.0)
+        draw(picture, lambda plots: plots.diagnosis_figure(verdict), result, lines)
     elif test == "mut":
         with patience("diagnose"):
             result, lines, verdict = _matrix_update(machine)
@@ -74,6 +78,23 @@ def diagnose(
                 _add_margins(machine, verdict, reach, kicks or 0, result, lines)
         draw(picture, lambda plots: plots.diagnosis_figure(verdict), result, lines)
     emit(result, as_json, lambda: lines)
+
+
+def _two_step(machine: Any, budget: int, sensor_error: float) -> tuple[dict[str, Any], list[str], Any]:
+    """Both steps of the Two-Step Test on one run from rest."""
+    from dataclasses import replace
+
+    from chaosgym.diagnosis import two_step_test
+    from chaosgym.simulation import simulate
+
+    record = simulate(machine, budget)
+    verdict = replace(two_step_test(record, sensor_error=sensor_error), record=record)
+    told, forces = _forces(machine, verdict)
+    result = {"machine": machine.name, **verdict.as_dict(), **told, "warnings": []}
+    lines = verdict_lines(f"{machine.name}, Two-Step Test", verdict, forces)
+    if section := verdict.evidence.get("section"):
+        lines.append(f"  section: {section}")
+    return result, lines, verdict
 
 
 def _matrix_update(machine: Any) -> tuple[dict[str, Any], list[str], Any]:
@@ -115,7 +136,7 @@ def _forces(machine: Any, verdict: Any) -> tuple[dict[str, Any], list[str]]:
 def _diagnose_machine(
     machine: Any, budget: int, types: bool, check: bool, sensor_error: float
 ) -> tuple[dict[str, Any], list[str], Any]:
-    from chaosgym.diagnosis import diagnose, response_type
+    from chaosgym.diagnosis import diagnose, response_type, signs_of_chaos
     from chaosgym.diagnosis.step_check import step_check
 
     verdict = diagnose(machine, budget=budget, sensor_error=sensor_error)
@@ -134,6 +155,9 @@ def _diagnose_machine(
     votes = ", ".join(f"{test} {vote}" for test, vote in verdict.votes.items())
     lines = verdict_lines(machine.name, verdict, forces)
     lines.append(f"  {result['cycles_used']} cycles used; votes: {votes}")
+    signs = signs_of_chaos(verdict)
+    result["signs_of_chaos"] = [sign.as_dict() for sign in signs]
+    lines += [f"  {sign.line}" for sign in signs]
     if not verdict.judged.peak_force.any():
         lines.append(f"  {result['warnings'][-1]}")
     if types:

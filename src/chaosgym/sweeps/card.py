@@ -71,6 +71,7 @@ def _finished(sweep: LabelledSweep, size: int) -> dict[str, Any]:
         "bytes": size,
         "classes": classes,
         "faults": _faults(sweep),
+        "two_step": _two_step(sweep),
         "types": compare_types(sweep),
         "settings": sweep.settings,
         "definitions": json.loads(metadata[b"definitions"]),
@@ -97,6 +98,24 @@ def _faults(sweep: LabelledSweep) -> dict[str, int]:
             len(sweep.table) - sweep.table.column("start_velocity").null_count
         )
     return faults
+
+
+def _two_step(sweep: LabelledSweep) -> dict[str, Any] | None:
+    """How often the Two-Step Test alone and the exponent's sign agree that a response is chaotic or is not.
+
+    None for a sweep of a version without the column.
+    """
+    if "two_step" not in sweep.table.column_names:
+        return None
+    alone = sweep.column("two_step")
+    exponent, error = sweep.column("exponent"), sweep.column("exponent_error")
+    told = np.array([word not in (None, "undetermined") for word in alone])
+    chaotic = exponent > 3.0 * error
+    return {
+        "rows": int(told.sum()),
+        "undetermined": int(np.sum(alone == "undetermined")),
+        "agreement": round(float(np.mean((alone == "chaotic")[told] == chaotic[told])), 4) if told.any() else None,
+    }
 
 
 def compare_types(sweep: LabelledSweep) -> dict[str, Any] | None:
@@ -219,6 +238,12 @@ def _trust(plan: SweepPlan, info: Mapping[str, Any]) -> str:
         f"- {faults['undetermined']:,} rows are undetermined, {faults['failed']:,} could not be run, "
         f"{faults['disputed']:,} are disputed between tests.",
     ]
+    votes = info["two_step"]
+    if votes and votes["agreement"] is not None:
+        lines.append(
+            f"- The Two-Step Test alone (`two_step`) and the exponent's sign agree on chaos at "
+            f"{votes['agreement']:.1%} of {votes['rows']:,} rows; it is undetermined at {votes['undetermined']:,}."
+        )
     if "without_all_neighbours" in faults:
         lines.append(
             f"- {faults['without_all_neighbours']:,} rows at borders of the grid lack some neighbours "

@@ -69,6 +69,11 @@ LABELS: Mapping[str, Column] = {
     ),
     "status": Column(pa.string(), "-", STATUS_MEANING),
     "margin": _figure("-", "distance of the verdict from its threshold: 0 on it, 1 without doubt"),
+    "two_step": Column(
+        pa.string(),
+        "-",
+        "nature by both steps of the Two-Step Test alone (thesis 5.2.1); undetermined where it does not decide",
+    ),
     "irregularity": _figure(
         "N",
         "half range of the peak force within the classes of the best period up to 16, largest class, of the settled "

@@ -77,6 +77,7 @@ def label_point(machine: Machine, budget: int, *, signals: bool = False) -> dict
         "period": verdict.period,
         "status": verdict.status,
         "margin": verdict.margin,
+        "two_step": verdict.votes["two_step"],
         "exponent": exponent["value"],
         "exponent_error": exponent["standard_error"],
         "peak_force_min": peaks.min(),
