@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from contextlib import contextmanager
+from http.client import HTTPConnection
 from urllib.parse import urlparse
 
 import pytest
@@ -36,10 +37,10 @@ HEADLINE = deep("all(document, 'h2').map(node => node.textContent).join()")
 
 
 @contextmanager
-def served(*arguments):
+def served(*arguments, stderr=None):
     """Address of a page that the command serves."""
     command = [sys.executable, "-m", "chaosgym", "explore", *arguments, "--port", "0", "--no-browser", "--json"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=stderr, text=True) as server:
         assert server.stdout is not None
         try:
             yield json.loads(server.stdout.readline())["address"]
@@ -122,6 +123,60 @@ def test_a_link_that_says_nonsense_is_answered_in_words(address, browser):
     """No error page: the reason."""
     browser.visit(address.partition("?")[0] + "?machine=engine")
     assert browser.wait(f"{HEADLINE}.includes('can\\'t be shown')")
+
+
+def test_links_of_all_kinds_are_answered(address, browser):
+    """A field without a machine is that of the machine served; bytes that are no text, and other hosts, are refused."""
+    base = address.partition("?")[0]
+    browser.visit(base + "?excitation_frequency=19.5", width=1400)
+    assert browser.wait("location.search.includes('excitation_frequency=19.5')")
+    browser.visit(base + "?clearence=1")
+    assert browser.wait(f"{HEADLINE}.includes('can\\'t be shown')")
+    place = urlparse(base)
+    for path, host, status in (("/?machine=%ff", None, 400), ("/", "evil.com:5006", 403), ("/", None, 200)):
+        asked = HTTPConnection("localhost", place.port, timeout=60)
+        asked.request("GET", path, headers={"Host": host} if host else {})
+        assert asked.getresponse().status == status
+        asked.close()
+
+
+def test_the_page_stays_alive_while_a_link_is_computed(address, browser):
+    """Forty modes, stiff stops and a cycle of a thousand seconds hold their own page, and no other."""
+    base = address.partition("?")[0]
+    hard = "?machine=impact-beam&n_modes=40&contact_stiffness=1e12&excitation_frequency=0.001"
+    place = urlparse(base)
+    for query in (hard, ""):
+        asked = HTTPConnection("localhost", place.port, timeout=20)
+        asked.request("GET", "/" + query)
+        assert asked.getresponse().status == 200
+        asked.close()
+
+
+@pytest.mark.parametrize(("width", "columns"), [(1280, 2), (400, 1)])
+def test_the_page_fits(address, browser, width, columns, tmp_path):
+    """No scrolling sideways; two pictures beside each other, or one column; every handle has a name."""
+    browser.visit(address, width=width)
+    browser.wait(f"{HEADLINE}.includes('periodic')")
+    browser.wait(deep("all(document, '.noUi-handle').every(node => node.getAttribute('aria-label'))"))
+    whole, shown = browser.seen().width
+    assert whole <= shown <= width
+    places = browser.value(deep("[...new Set(all(document, '.bk-Figure').map(n => Math.round(middle(n)[0] / 20)))]"))
+    assert len(places) == columns, places
+    labels = browser.value(deep("all(document, '.noUi-handle').map(node => node.getAttribute('aria-label'))"))
+    assert len(set(labels)) == 3
+    browser.picture(tmp_path / f"{width}.png")
+
+
+def test_closing_tabs_prints_nothing(tmp_path):
+    """Tabs that are closed while the page computes leave the terminal as it was."""
+    with (tmp_path / "err").open("w") as errors, served("impact-beam", stderr=errors) as address:
+        for number in range(3):
+            with Browser(tmp_path / f"profile-{number}") as browser:
+                browser.visit(address, width=1400)
+                browser.value("location.reload()")
+    said = (tmp_path / "err").read_text()
+    assert "Traceback" not in said
+    assert [line for line in said.splitlines() if "compil" not in line and line not in ("", "Aborted.")] == []
 
 
 def check(seen):

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from functools import partial
 from html import escape
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,22 @@ from bokeh.application import Application
 from bokeh.application.handlers import FunctionHandler
 from bokeh.document import Document
 from bokeh.layouts import column, row
-from bokeh.models import BoxAnnotation, Button, ColumnDataSource, CustomJS, Div, Select, Span, TextAreaInput
+from bokeh.models import (
+    BoxAnnotation,
+    Button,
+    ColumnDataSource,
+    CustomJS,
+    Div,
+    Select,
+    Span,
+    TextAreaInput,
+)
 from bokeh.models import Slider as Widget
 from bokeh.plotting import figure
 from bokeh.server.server import Server
 
 from chaosgym.errors import ChaosgymError
+from chaosgym.explore.gate import guard
 from chaosgym.explore.playback import Playback
 from chaosgym.explore.point import (
     View,
@@ -28,6 +39,7 @@ from chaosgym.explore.point import (
     sliders_of,
     view_of,
 )
+from chaosgym.explore.worker import Worker
 from chaosgym.machines import MACHINES, Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.plotting.style import ACCENT, BAD, INK, MUTED, NATURE_COLOURS, PALE
@@ -63,6 +75,28 @@ source.onended = () => sound.close()
 """Three seconds of the contact force as sound: every impact is a click."""
 
 
+NARROW = "@media (max-width: 900px) { :host { display: block !important } :host > * { width: calc(100% - 10px) } }"
+WRAPS = ":host { flex-wrap: wrap }"
+"""Rows that become a column on a narrow page, and rows that go on in the next line."""
+
+TEMPLATE = """{% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">
+<style>body { margin: 8px }</style>{% endblock %}
+"""
+
+LABEL = """
+const roots = node => [...node.querySelectorAll('*')].flatMap(
+    each => each.shadowRoot ? [each.shadowRoot, ...roots(each.shadowRoot)] : [])
+const label = () => roots(document).forEach(root => {
+    const title = root.querySelector('.bk-slider-title')
+    root.querySelectorAll('.noUi-handle').forEach(
+        handle => handle.setAttribute('aria-label', title ? title.textContent.split(':')[0] : 'value'))
+})
+label()
+setInterval(label, 1000)
+"""
+"""Names the handles of the sliders, which Bokeh leaves without; sliders change with the machine."""
+
+
 class Page:
     """The state behind one opened page.
 
@@ -76,7 +110,8 @@ class Page:
 
     def __init__(self, document: Document, machine: Machine) -> None:
         self._document, self.machine = document, machine
-        self._waits = self._draws = False
+        self._waits = False
+        self._worker = Worker(document)
         self._sources = {
             "motion": ColumnDataSource({"time": [], "x": [], "v": [], "f": []}),
             "section": ColumnDataSource({"x": [], "v": []}),
@@ -93,9 +128,10 @@ class Page:
             title="machine", value=machine.name, options=list(dict.fromkeys([*MACHINES, machine.name]))
         )
         self._choice.on_change("value", lambda name, old, new: self.show(MACHINES[new]()))
-        self._panel = column(width=340)
+        self._panel = column(width=340, max_width=340)
         self._playback = Playback(document, self.show)
-        document.title = "chaosgym explore"
+        document.title, document.template = "chaosgym explore", TEMPLATE
+        document.js_on_event("document_ready", CustomJS(code=LABEL))
         document.add_root(self._layout())
         self.show(machine)
 
@@ -137,14 +173,16 @@ class Page:
     def _follow(self) -> None:
         """Let everything but the orbit diagram follow the machine."""
         self._waits = False
-        view = view_of(self.machine)
+        self._worker.ask("view", partial(view_of, self.machine), self._show_view)
+        self._link.text = link_of(self.machine)
+        self._python.value, self._command.value = python_of(self.machine), command_of(self.machine)
+        self._here.location = float(getattr(self.machine, self.machine.speed_field))
+
+    def _show_view(self, view: View) -> None:
         self._draw(view)
         colour = NATURE_COLOURS[view.nature]
         lines = "".join(f'<p style="margin:0 0 8px">{escape(line)}</p>' for line in view.lines)
         self._verdict.text = f'<h2 style="color:{colour};margin:4px 0 8px">{escape(view.headline)}</h2>{lines}'
-        self._link.text = link_of(self.machine)
-        self._python.value, self._command.value = python_of(self.machine), command_of(self.machine)
-        self._here.location = float(getattr(self.machine, self.machine.speed_field))
 
     def _draw(self, view: View) -> None:
         millimetres = 1e3 * view.displacement
@@ -165,19 +203,18 @@ class Page:
         self._orbit = orbit_diagram(self.machine, self._sliders[0])
         self._sources["orbit"].data = {"speed": [], "peak": []}
         self._speed_axis.axis_label = self._sliders[0].label
-        if not self._draws:
-            self._draws = True
-            self._document.add_next_tick_callback(self._more_diagram)
+        self._more_diagram()
 
     def _more_diagram(self) -> None:
-        speeds, peaks = [], []
-        for _, (speed, found) in zip(range(AT_ONCE), self._orbit, strict=False):
-            speeds += [speed] * len(found)
-            peaks += found.tolist()
-        self._draws = bool(speeds)
-        if speeds:
-            self._sources["orbit"].stream({"speed": speeds, "peak": peaks})
-            self._document.add_timeout_callback(self._more_diagram, 1)
+        orbit = self._orbit
+        self._worker.ask("diagram", lambda: (orbit, list(islice(orbit, AT_ONCE))), self._show_diagram)
+
+    def _show_diagram(self, answer: tuple[Any, list[tuple[float, Any]]]) -> None:
+        orbit, found = answer
+        if orbit is self._orbit and found:
+            speeds = [speed for speed, peaks in found for _ in peaks]
+            self._sources["orbit"].stream({"speed": speeds, "peak": [peak for _, peaks in found for peak in peaks]})
+            self._more_diagram()
 
     def _figure(self, title: str, across: str, up: str, **options: Any) -> Any:
         made = figure(
@@ -215,17 +252,13 @@ class Page:
         keep_link = CustomJS(args={"link": self._link}, code="history.replaceState(null, '', '?' + link.text)")
         self._link.js_on_change("text", keep_link)
         pictures = column(
-            row(moves, force, sizing_mode="stretch_width"),
-            row(portrait, strobe, sizing_mode="stretch_width"),
-            row(diagram, record, sizing_mode="stretch_width"),
-            row(
-                self._python,
-                column(self._command, self._buttons(), sizing_mode="stretch_width"),
-                sizing_mode="stretch_width",
-            ),
+            _row(moves, force),
+            _row(portrait, strobe),
+            _row(diagram, record),
+            _row(self._python, column(self._command, self._buttons(), sizing_mode="stretch_width")),
             sizing_mode="stretch_width",
         )
-        return column(row(self._panel, pictures, sizing_mode="stretch_width"), self._link, sizing_mode="stretch_width")
+        return column(_row(self._panel, pictures), self._link, sizing_mode="stretch_width")
 
     def _buttons(self) -> Any:
         """Buttons that copy Python, command and link, and one that plays the impacts."""
@@ -240,7 +273,11 @@ class Page:
             buttons.append(button)
         listen = Button(label="Listen", width=120)
         listen.js_on_click(CustomJS(args={"motion": self._sources["motion"]}, code=LISTEN))
-        return row(*buttons, listen)
+        return row(*buttons, listen, stylesheets=[WRAPS])
+
+
+def _row(*parts: Any) -> Any:
+    return row(*parts, sizing_mode="stretch_width", stylesheets=[NARROW])
 
 
 def open_page(document: Document, machine: Machine) -> None:
@@ -248,9 +285,9 @@ def open_page(document: Document, machine: Machine) -> None:
     context: Any = document.session_context
     given = {} if context is None else context.request.arguments
     asked = {name: values[0].decode() for name, values in given.items() if not name.startswith("bokeh")}
-    if "machine" in asked:
+    if asked:
         try:
-            machine = machine_from(asked.pop("machine"), asked, machine.name)
+            machine = machine_from(asked.pop("machine", machine.name), asked, machine.name)
         except ChaosgymError as error:
             document.add_root(Div(text=f"<h2>This link can't be shown</h2><p>{escape(str(error))}</p>"))
             return
@@ -280,6 +317,7 @@ def serve(machine: Machine, port: int, ready: Callable[[str], object]) -> None:
     application = Application(FunctionHandler(partial(open_page, machine=machine)))
     # only pages from localhost and this port may open its websocket, which is Bokeh's default
     server: Any = Server({"/": application}, address=LOOPBACK, port=port)
+    guard(server)
     server.start()
     ready(f"http://localhost:{server.port}/?{link_of(machine)}")
     try:

@@ -1,6 +1,7 @@
 """One point of the exploration: a machine, and everything that is shown of it, as plain numbers and lines."""
 
 import shlex
+import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -27,6 +28,9 @@ SHOWN_CYCLES, SAMPLES = 6, 300
 
 DIAGRAM_POINTS, DIAGRAM_CYCLES, DIAGRAM_TRANSIENT = 140, 30, 60
 """Speeds of the orbit diagram, cycles shown of each, and cycles before them."""
+
+MOST_SECONDS = 0.05
+"""Processor time that a cycle may take [s]."""
 
 SENSOR_ERROR, MONITORED_CYCLES = 3.0, 64
 """Largest error [N] of the monitor's sensor (thesis 3.6), and settled cycles that it sees."""
@@ -145,6 +149,7 @@ def command_of(machine: Machine) -> str:
 def view_of(machine: Machine) -> View:
     """Everything that is shown of a point; a motion that can't be followed is told, not raised."""
     try:
+        _check_cost(machine)
         verdict = diagnose(machine, budget=BUDGET)
     except (SimulationError, ParameterError) as error:
         nothing = np.zeros(0)
@@ -167,6 +172,18 @@ def view_of(machine: Machine) -> View:
         nature=verdict.nature,
         headline=f"{verdict.words} ({verdict.status})",
         lines=(verdict.reason, _votes(verdict), _classified(machine), _watched(heard)),
+    )
+
+
+def _check_cost(machine: Machine) -> None:
+    """Refuse a machine of which a few hundred cycles would take minutes."""
+    for _ in range(2):  # the first one may compile
+        began = time.thread_time()
+        simulate(machine, 1)
+        if (took := time.thread_time() - began) < MOST_SECONDS:
+            return
+    raise SimulationError(
+        f"a cycle takes {took:.2g} s; allowed here: {MOST_SECONDS} s; `chaosgym diagnose` takes its time"
     )
 
 
