@@ -92,10 +92,12 @@ def scales(samples: Array) -> Array:
 
 def class_residuals(samples: Array, max_period: int) -> Array:
     """Half range of the worst class for the periods 1 ... max_period, (max_period,)."""
-    residuals = np.empty(max_period)
-    for k in range(1, max_period + 1):
-        residuals[k - 1] = 0.5 * _widest(_classes(samples, k))
-    return residuals
+    return np.array([_residual(samples, period) for period in range(1, max_period + 1)])
+
+
+def _residual(samples: Array, period: int) -> float:
+    """Half range of the worst class of a period."""
+    return 0.5 * _widest(_classes(samples, period))
 
 
 def _widest(classes: Array) -> float:
@@ -113,19 +115,22 @@ def irregularity(peaks: ArrayLike, max_period: int = MAX_DECAY_PERIOD) -> float:
 
 
 def noisy_class_residuals(samples: Array, max_period: int) -> Array:
-    """The same for samples with errors that are evenly spread over +-1 (or normal with three deviations of 1).
+    """The same for samples with errors; see ``_noisy_residual``."""
+    return np.array([_noisy_residual(samples, period) for period in range(1, max_period + 1)])
 
-    Half ranges of noise grow with the number of samples, so the scatter within classes counts: sqrt(3) standard
-    deviations less two standard errors; a single sample may lie 1.5 away.
+
+def _noisy_residual(samples: Array, period: int) -> float:
+    """Scatter of the worst class of a period, in samples with errors.
+
+    Errors are evenly spread over +-1, or normal with three deviations of 1. Half ranges of noise grow with the number
+    of samples, so the scatter within classes counts: sqrt(3) standard deviations less two standard errors; a single
+    sample may lie 1.5 away.
     """
-    residuals = np.empty(max_period)
-    for k in range(1, max_period + 1):
-        classes = _classes(samples, k)
-        freedom = (len(classes) - 1) * k
-        scatter = np.sqrt(3.0 * np.sum((classes - classes.mean(axis=0)) ** 2, axis=(0, 1)) / freedom)
-        scatter /= 1.0 + np.sqrt(2.0 / freedom)
-        residuals[k - 1] = max(np.max(scatter), 0.5 * _widest(classes) / 1.5)
-    return residuals
+    classes = _classes(samples, period)
+    freedom = (len(classes) - 1) * period
+    scatter = np.sqrt(3.0 * np.sum((classes - classes.mean(axis=0)) ** 2, axis=(0, 1)) / freedom)
+    scatter /= 1.0 + np.sqrt(2.0 / freedom)
+    return float(max(np.max(scatter), 0.5 * _widest(classes) / 1.5))
 
 
 def _classes(samples: Array, period: int) -> Array:
@@ -154,16 +159,19 @@ def find_recurrence(
     units = scaled / allowed
     tail = units[len(units) // 2 :]
     longest = max(1, min(max_period, len(tail) // (NOISY_REPEATS if noisy else MIN_REPEATS)))
-    residuals = noisy_class_residuals(tail, longest) if noisy else class_residuals(tail, longest)
     worst = float(np.max(allowed))
-    recurrent = np.flatnonzero(residuals <= 1.0)
-    if len(recurrent) == 0:
+    residual, residuals = _noisy_residual if noisy else _residual, list[float]()
+    for candidate in range(1, longest + 1):
+        residuals.append(residual(tail, candidate))
+        if residuals[-1] <= 1.0:
+            break
+    else:
         return Recurrence(None, float(np.min(residuals)) * worst, None, None)
-    period = _true_period(tail, int(recurrent[0]) + 1)
+    period = _true_period(tail, candidate)
     deviation = deviations(units, period)
     beyond = np.flatnonzero(deviation > 2.0)
     settle = int(beyond[-1]) + 1 if len(beyond) else 0
-    return Recurrence(period, float(residuals[period - 1]) * worst, settle, _contraction(deviation, settle, period))
+    return Recurrence(period, residuals[period - 1] * worst, settle, _contraction(deviation, settle, period))
 
 
 def _true_period(tail: Array, period: int) -> int:
