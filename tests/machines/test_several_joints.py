@@ -358,9 +358,8 @@ def test_an_environment_senses_the_largest_force_of_all_joints():
     """Mean peak force of an observation, without errors, is the mean over the cycles of the largest on any surface."""
     env = gym.make("chaosgym/Machine-v0", machine=str(PIPE), sensor_error=0.0, speed_ripple=0.0, cycles_per_step=5)
     env.reset(seed=3)
-    env.unwrapped.jobs.traced = 0
     observation = env.step(env.action_space.sample())[0]
-    record = env.unwrapped.jobs.batch.records[0]
+    record = env.unwrapped._job.batch.records[0]
     found = record.peak_force.max(axis=1)[-5:]
     assert observation[6] == pytest.approx(found.mean(), rel=1e-5)
     assert observation[8] == pytest.approx(found.max(), rel=1e-5)
