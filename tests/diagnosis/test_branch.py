@@ -8,6 +8,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from chaosgym.diagnosis import diagnose
+from chaosgym.diagnosis.bifurcation_curve import follow_bifurcation
 from chaosgym.diagnosis.bifurcation_diagram import follow
 from chaosgym.diagnosis.branch import stretch
 from chaosgym.diagnosis.orbit_family import family_of
@@ -124,6 +125,29 @@ def test_published_bifurcations_of_an_impact_oscillator(kind, omega, start, span
         _, found = branch_from(machine, "drive_level", *span, state, 2, -1.0)
         values += bifurcations(found, kind)[:1]
     assert without_square_root(values) == pytest.approx(published, abs=5e-9)
+
+
+def test_a_published_curve_of_folds_over_force_and_speed():
+    """The fold above, followed over the speed: A at w = 0.799301 by Ghosh and Simpson (pp2_omega0.8_SN.csv)."""
+    values = []
+    for stiffness in (1e8, 4e8, 1.6e9, 6.4e9):
+        machine = oscillator(
+            damping=0.02,
+            stiffness=stiffness,
+            contact_damping=damper_of(0.9, stiffness),
+            stops="one",
+            angle=-math.pi / 2.0,
+            speed=0.799 / (2.0 * math.pi),
+            force=0.363,
+        )
+        state = shaken(0.799, 0.363, 0.034154055932653, 0.245022580357925, 0.9)
+        _, found = branch_from(machine, "drive_level", 0.3625, 0.3632, state, 2, -1.0)
+        fold = next(each.bifurcation for each in found.found if each.bifurcation.kind == "fold")
+        span = 0.799 / (2.0 * math.pi), 0.7993009999999987 / (2.0 * math.pi)
+        curve = follow_bifurcation(machine, fold, "drive_level", "speed", span, steps=4)
+        assert curve.ends[1].startswith("end of the range")
+        values.append(float(curve.along_values[-1]))
+    assert without_square_root(values) == pytest.approx(0.3624594710373588, abs=5e-9)
 
 
 def test_the_flip_of_shaw_and_holmes_in_the_limit_of_stiff_stops():

@@ -1,0 +1,170 @@
+"""Curves of a bifurcation over two parameters: where a motion ends, over speed and clearance.
+
+Step by step in the second parameter: the orbit of the last bifurcation leads to one on the new branch, on the plane
+normal to the last branch; along the new branch the bifurcation is placed as on any other. The step is halved where that
+fails, so a curve ends where it turns back in the second parameter.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.diagnosis.bifurcation import Bifurcation, Found, Kind, bifurcations_between
+from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitPoint, continuous_field, family_of
+from chaosgym.errors import ParameterError
+from chaosgym.machines import Machine
+from chaosgym.machines.parameters import with_settings
+
+Array = NDArray[np.float64]
+
+STEPS = 33
+"""Values of the second parameter over its range."""
+
+SHORTEST = 1.0 / 64.0
+"""Share of a step down to which it is halved."""
+
+WINDOW = 0.05
+"""Range of the first parameter around a bifurcation that counts as 1 in scaled unknowns, as a share of its value."""
+
+LOOKS = (3e-3, 1e-2, 3e-2, 0.1, 0.3)
+"""Distances along a new branch at which the bifurcation is looked for."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BifurcationCurve:
+    """Points of one bifurcation, in the order of the second parameter.
+
+    Attributes
+    ----------
+    kind, period
+        Of the bifurcation.
+    along, against
+        Fields.
+    along_values, against_values : (n,)
+        Where it lies.
+    ends
+        Why it was not followed further, below and above.
+    """
+
+    kind: Kind
+    period: int
+    along: str
+    against: str
+    along_values: Array
+    against_values: Array
+    ends: tuple[str, str]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {
+            "kind": self.kind,
+            "period": self.period,
+            self.along: self.along_values.tolist(),
+            self.against: self.against_values.tolist(),
+            "ends": list(self.ends),
+        }
+
+
+def follow_bifurcation(
+    machine: Machine,
+    bifurcation: Bifurcation,
+    along: str,
+    against: str,
+    span: tuple[float, float],
+    *,
+    steps: int = STEPS,
+) -> BifurcationCurve:
+    """Follow a bifurcation over a second parameter.
+
+    Parameters
+    ----------
+    machine
+        For whose value of the second parameter the bifurcation holds.
+    bifurcation
+        One of ``follow(machine, along, ...)``.
+    along, against
+        First and second parameter: fields, or "speed" or "clearance".
+    span
+        Lowest and highest value of the second one; the machine's own lies between.
+    steps
+        Values over the span.
+
+    Raises
+    ------
+    ParameterError
+        If a field does not vary continuously, or the machine's own value lies outside of the span.
+    """
+    first, second = continuous_field(machine, along), continuous_field(machine, against)
+    own = float(getattr(machine, second))
+    if not span[0] <= own <= span[1] or not span[0] < span[1]:
+        raise ParameterError(
+            f"{second} = {own:g} of the machine lies outside of {span[0]:g} to {span[1]:g}; allowed: a range around it"
+        )
+    parts, ends = [], []
+    for end in span:
+        points, why = _part(machine, bifurcation, first, second, end, (span[1] - span[0]) / (steps - 1))
+        parts.append(points)
+        ends.append(why)
+    places = [*reversed(parts[0]), (bifurcation.value, own), *parts[1]]
+    return BifurcationCurve(
+        kind=bifurcation.kind,
+        period=bifurcation.period,
+        along=first,
+        against=second,
+        along_values=np.array([place[0] for place in places]),
+        against_values=np.array([place[1] for place in places]),
+        ends=(ends[0], ends[1]),
+    )
+
+
+def _part(
+    machine: Machine, start: Bifurcation, first: str, second: str, end: float, step: float
+) -> tuple[list[tuple[float, float]], str]:
+    """Points (first, second) from a bifurcation to one end of the span, and why there are no more."""
+    at = float(getattr(machine, second))
+    places, here, share = [(start.value, at)], start, 1.0
+    while at != end:
+        reach = share * step * np.sign(end - at)
+        value = end if abs(end - at) <= abs(reach) * (1.0 + 1e-9) else at + reach
+        guess = _extrapolated(places, value)
+        try:
+            here = _near(with_settings(machine, {second: value, first: guess}), here, first, guess).bifurcation
+        except (NotFollowedError, ParameterError) as reason:
+            share *= 0.5
+            if share < SHORTEST:
+                return places[1:], f"not followed beyond {second} = {at:.6g}: {reason}"
+            continue
+        places.append((here.value, value))
+        at, share = value, min(1.0, 2.0 * share)
+    return places[1:], f"end of the range at {second} = {end:.6g}"
+
+
+def _extrapolated(places: list[tuple[float, float]], value: float) -> float:
+    if len(places) == 1:
+        return places[0][0]
+    (p1, q1), (p2, q2) = places[-2:]
+    return p2 + (p2 - p1) * (value - q2) / (q2 - q1)
+
+
+def _near(machine: Machine, last: Bifurcation, field: str, guess: float) -> Found:
+    """The bifurcation of the same kind near the last one."""
+    half = WINDOW * abs(guess)
+    family = family_of(machine, field, guess - half, guess + half, last.state, last.period)
+    x = np.append(family.weight * last.state, 0.5)
+    try:
+        normal = family.tangent(x, np.append(np.zeros(len(x) - 1), 1.0))
+    except NotFollowedError:
+        normal = np.append(np.zeros(len(x) - 1), 1.0)
+    here = family.solve(x, normal)
+    sides = {sign: here for sign in (1.0, -1.0)}
+    for reach in LOOKS:
+        for sign in (1.0, -1.0):
+            there = family.solve(here.x + sign * reach * here.tangent, sign * here.tangent)
+            pair: tuple[OrbitPoint, OrbitPoint] = (sides[sign], there)
+            for found in bifurcations_between(family, *pair):
+                if found.bifurcation.kind == last.kind:
+                    return found
+            sides[sign] = there
+    raise NotFollowedError(f"no {last.kind} is near")
