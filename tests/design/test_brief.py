@@ -140,3 +140,57 @@ def test_too_few_cycles_are_marked_as_an_estimate():
 def test_default_machine_of_a_brief_is_the_one_of_the_thesis():
     """Fields left out keep the value of the thesis."""
     assert brief("").machine == ImpactBeam()
+
+
+@pytest.mark.parametrize(
+    ("life", "hours"),
+    [("10 years", 29220.0), ("3652.5 days", 29220.0), ("29220 h", 29220.0), ("3155.76 Mcycles", 0.0)],
+)
+def test_a_life_in_time_is_that_many_cycles_of_the_machine(life, hours):
+    """Ten years of eight hours a day at 30 Hz: 10 * 365.25 * 8 * 3600 * 30 cycles; at 15 Hz half as many."""
+    text = f'machine = "impact-beam"\n[duty]\nhours_a_day = "8 h"\n{CRITERIA.replace("10 Mcycles", life)}'
+    found = brief_from(tomllib.loads(text)).criteria
+    assert found.life == pytest.approx(10 * 365.25 * 8 * 3600 * 30 * 1e-6)
+    assert found.hours == pytest.approx(hours)
+    assert found.at(1.0 / 15.0).life == pytest.approx(found.life / (2.0 if hours else 1.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('[duty]\nhours_a_day = "25 h"', "at most 24 h"),
+        ("[duty]\nhours_a_day = 8", 'write duty.hours_a_day = "8 h"'),
+        ('load_rating = "3 N"', r"the brief has no key 'load_rating'; it belongs into \[criteria\]"),
+        ('clearance = "1 mm"', r"the brief has no key 'clearance'; it belongs into \[parameters\]"),
+        ('[region]\nhours_a_day = "8 h"', r"it belongs into \[duty\]"),
+        ('[tolerances]\nlife = "1 h"', r"\[tolerances\] has no key 'life'; it belongs into \[criteria\]"),
+        ("joint = 3", "the file of the machine, which the brief names"),
+    ],
+)
+def test_a_key_in_the_wrong_place_is_told_where_it_belongs(text, message):
+    """One line with the section, or the file."""
+    with pytest.raises((DesignError, ParameterError), match=message) as error:
+        brief(text)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("life", ["0 h", "-3 years", "10 fortnights", "ten years", "1e12 years"])
+def test_a_life_that_is_none_is_refused(life):
+    """The criterion and what is allowed are named."""
+    with pytest.raises((DesignError, ParameterError), match=r"life|hours"):
+        brief_from(tomllib.loads('machine = "impact-beam"\n' + CRITERIA.replace("10 Mcycles", life)))
+
+
+def test_a_file_of_a_machine_is_a_brief_of_its_template(tmp_path):
+    """The machine, its tolerances and examples of criteria, of which none counts as stated."""
+    path = "docs/machines/kahraman-singh-1990.toml"
+    brief_file = tmp_path / "brief.toml"
+    brief_file.write_text(template(path))
+    found, by_template = read_brief(path), read_brief(brief_file)
+    assert found.stated == ()
+    assert by_template.stated
+    assert (found.region, found.criteria, found.changes) == (
+        by_template.region,
+        by_template.criteria,
+        by_template.changes,
+    )

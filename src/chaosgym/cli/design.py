@@ -1,7 +1,6 @@
 """May a designer rely on the machine? ``design``."""
 
 import datetime
-from pathlib import Path
 
 import click
 
@@ -35,7 +34,10 @@ def design(
     workers: int | None,
     as_json: bool,
 ) -> None:
-    """Say whether a machine meets its criteria within its tolerances, and what to change if not."""
+    """Say whether a machine meets its criteria within its tolerances, and what to change if not.
+
+    FILE.toml is a brief (see --template), or a machine's file, which starts from its template.
+    """
     from chaosgym.design import brief as briefs
     from chaosgym.design.bearing import Criteria
     from chaosgym.design.measured import evaluate_peaks
@@ -52,6 +54,7 @@ def design(
     if out is not None:
         report.report_paths(out, overwrite)
     asked = briefs.read_brief(brief) if brief is not None else None
+    text, of_machine = briefs.brief_text(brief) if brief is not None else ("", False)
     if asked is not None:
         note_machine(asked.machine)
     if measured:
@@ -75,11 +78,15 @@ def design(
                 answer,
                 f"chaosgym design {brief} --seed {seed}",
                 date=datetime.date.today().isoformat(),
-                brief=Path(str(brief)).read_text(encoding="utf-8"),
+                brief=text,
             ),
             answer.as_dict(),
             answer.lines(),
         )
+    if of_machine:
+        result["criteria_are_examples"] = True
+        lines.append(f"{brief} is a machine's file, judged by the examples of its template; state your own criteria:")
+        lines.append(f"  chaosgym design --template {brief} > brief.toml")
     if out is not None:
         report.write_report(page, result, out, overwrite)
         lines.append(f"report: {out}")

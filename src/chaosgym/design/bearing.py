@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -41,7 +41,9 @@ class Criteria:
     )
     """Force under which the surface lasts a million cycles [N]; C of thesis eq. 5.2."""
     life: float = parameter(1.0, unit="Mcycles", low=1e-9, high=1e9, provenance="assumed", source="an example")
-    """Life that is required [10^6 cycles]."""
+    """Life that is required [10^6 cycles]; where ``hours`` are given, what these are at the machine's speed."""
+    hours: float = parameter(0.0, unit="h", low=0.0, high=1e9, provenance="assumed", source="0: the life is in cycles")
+    """Life that is required [h] of operation; 0 where it is stated in cycles."""
     reliability: float = parameter(0.99, low=0.0, high=1.0, provenance="assumed", source="thesis 5.4.2: high")
     """Probability that the strength exceeds the stress that is required."""
     machines_that_meet: float = parameter(
@@ -69,10 +71,25 @@ class Criteria:
     confidence: float = parameter(0.95, low=0.5, high=0.9999, provenance="assumed", source="usual")
     """Confidence of the intervals; statistics must meet the criteria with their unfavourable end."""
 
+    def at(self, cycle_period: float) -> "Criteria":
+        """Return the criteria of a machine by its cycle [s]: the hours that are required become cycles."""
+        return replace(self, life=self.hours / hours_of(1.0, cycle_period)) if self.hours else self
+
     def __post_init__(self) -> None:
         validate(self)
         if not 0.0 < self.reliability < 1.0:
             raise ParameterError(f"reliability = {self.reliability:g} is out of range; allowed: above 0, below 1")
+
+
+def hours_of(life: float, cycle_period: float) -> float:
+    """Hours of operation that a life [10^6 cycles] takes.
+
+    Examples
+    --------
+    >>> hours_of(3.6, 1.0)
+    1000.0
+    """
+    return life * 1e6 * cycle_period / 3600.0
 
 
 def variation_region(

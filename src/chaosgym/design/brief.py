@@ -1,7 +1,8 @@
 """The design brief: machine, tolerances, criteria and changes in one TOML file."""
 
+import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,19 @@ from chaosgym.errors import DesignError
 from chaosgym.files import toml_of
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
 from chaosgym.machines.parameters import parameters_of, suggestion, with_settings
-from chaosgym.machines.units import parse_quantity
+from chaosgym.machines.units import parse_quantity, units_of
 
 REQUIRED_CRITERIA = ("load_rating", "life", "reliability")
 """Criteria that a brief must state; the others have defaults, which the report lists."""
 
-SECTIONS = ("machine", "series", "parameters", "tolerances", "region", "criteria", "changes", "costs")
+SECTIONS = ("machine", "series", "parameters", "tolerances", "region", "duty", "criteria", "changes", "costs")
+
+DUTY = ("hours_a_day",)
+
+DAYS_A_YEAR = 365.25
+
+OF_MACHINE = ("structure", "joint", "joints", "drive", "operation")
+"""Sections of a machine's file: what holds one is no brief."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,8 +60,21 @@ class DesignBrief:
     stated: tuple[str, ...] = field(default=())
 
 
+def brief_text(path: str | Path) -> tuple[str, bool]:
+    """Text of a brief, and whether the file is a machine's, whose template it then is.
+
+    Raises
+    ------
+    DesignError
+        If the file can't be read as TOML.
+    """
+    text, values = _read(path)
+    of_machine = "machine" not in values and any(key in values for key in OF_MACHINE)
+    return (template(str(path)), True) if of_machine else (text, False)
+
+
 def read_brief(path: str | Path) -> DesignBrief:
-    """Read a design brief.
+    """Read a design brief, or start from the template of a machine's file.
 
     Raises
     ------
@@ -62,32 +83,40 @@ def read_brief(path: str | Path) -> DesignBrief:
     ParameterError
         If a parameter, tolerance or criterion is out of its range.
     """
-    try:
-        _, values = toml_of(path)
-    except ValueError as error:
-        raise DesignError(f"{path} {error}") from None
+    text, of_machine = brief_text(path)
+    values = tomllib.loads(text)
     beside = Path(path).parent / str(values.get("machine"))
+    if of_machine:
+        return replace(brief_from(values), stated=())
     if beside.suffix == FILE_ENDING and beside.is_file():
         values["machine"] = str(beside)
     return brief_from(values)
 
 
+def _read(path: str | Path) -> tuple[str, dict[str, Any]]:
+    try:
+        text, values = toml_of(path)
+    except ValueError as error:
+        raise DesignError(f"{path} {error}") from None
+    return text, values
+
+
 def brief_from(values: Mapping[str, Any]) -> DesignBrief:
     """Build a design brief from the values of its file."""
-    _known("the brief", values, SECTIONS)
     name = values.get("machine")
+    _known("the brief", values, SECTIONS, _homes(MACHINES[str(name)]() if name in MACHINES else None))
     machine = _machine(name)
     fields = parameters_of(machine)
     settings = {
         key: given if fields[key].choices else parse_quantity(f"parameters.{key}", given, fields[key].unit)
-        for key, given in _section(values, "parameters", fields).items()
+        for key, given in _section(values, "parameters", fields, machine).items()
     }
     machine = with_settings(machine, settings)
-    region = _section(values, "region", ("tolerances", "wear"))
+    region = _section(values, "region", ("tolerances", "wear"), machine)
     wear = region.get("wear", False)
     if not isinstance(wear, bool):
         raise DesignError(f"region.wear = {wear!r} is out of range; allowed: true or false")
-    criteria = _criteria(values)
+    criteria = _criteria(values, machine)
     return DesignBrief(
         machine=machine,
         region=variation_region(machine, _tolerances(values, machine), region.get("tolerances", 1), wear),
@@ -105,30 +134,62 @@ def _machine(name: Any) -> Any:
     return MACHINES[name]()
 
 
-def _known(where: str, given: Iterable[str], known: Iterable[str]) -> None:
+def _known(where: str, given: Iterable[str], known: Iterable[str], homes: Mapping[str, str] | None = None) -> None:
     known = list(known)
     for key in given:
         if key not in known:
-            raise DesignError(f"{where} has no key {key!r}{suggestion(key, known)}")
+            home = f"; it belongs into {homes[key]}" if homes and key in homes else suggestion(key, known)
+            raise DesignError(f"{where} has no key {key!r}{home}")
 
 
-def _section(values: Mapping[str, Any], name: str, known: Iterable[str]) -> Mapping[str, Any]:
+def _homes(machine: Machine | None = None) -> dict[str, str]:
+    """Where a key belongs that stands in the wrong place."""
+    homes = dict.fromkeys(parameters_of(machine), "[parameters], [tolerances] or [changes]") if machine else {}
+    homes |= dict.fromkeys(set(parameters_of(Criteria)) - {"hours"}, "[criteria]") | {"wear": "[region]"}
+    homes |= dict.fromkeys(DUTY, "[duty]") | dict.fromkeys(SECTIONS, "the brief itself, above or beside this section")
+    return homes | dict.fromkeys(OF_MACHINE, 'the file of the machine, which the brief names: machine = "FILE.toml"')
+
+
+def _section(
+    values: Mapping[str, Any], name: str, known: Iterable[str], machine: Machine | None = None
+) -> Mapping[str, Any]:
     section = values.get(name, {})
     if not isinstance(section, Mapping):
         raise DesignError(f"{name} = {section!r} is not a table; write [{name}] and one line a value below it")
-    _known(f"[{name}]", section, known)
+    _known(f"[{name}]", section, known, _homes(machine))
     return section
 
 
-def _criteria(values: Mapping[str, Any]) -> Criteria:
-    known = parameters_of(Criteria)
-    section = _section(values, "criteria", known)
+def _criteria(values: Mapping[str, Any], machine: Machine) -> Criteria:
+    known = {name: about for name, about in parameters_of(Criteria).items() if name != "hours"}  # a unit of the life
+    section = _section(values, "criteria", known, machine)
     for name in REQUIRED_CRITERIA:
         if name not in section:
             raise DesignError(f"[criteria] lacks {name}")
-    return Criteria(
-        **{key: parse_quantity(f"criteria.{key}", given, known[key].unit) for key, given in section.items()}
-    )
+    read = {
+        key: parse_quantity(f"criteria.{key}", given, known[key].unit)
+        for key, given in section.items()
+        if key != "life"
+    }
+    return Criteria(**read, **_life(section["life"], _hours_a_day(values, machine))).at(machine.cycle_period)
+
+
+def _hours_a_day(values: Mapping[str, Any], machine: Machine) -> float:
+    given = _section(values, "duty", DUTY, machine).get("hours_a_day", "24 h")
+    hours = parse_quantity("duty.hours_a_day", given, "h", {"h": 1.0, "min": 1.0 / 60.0})
+    if not 0.0 < hours <= 24.0:
+        raise DesignError(f"duty.hours_a_day = {given!r} is out of range; allowed: above 0 h, at most 24 h")
+    return hours
+
+
+def _life(given: Any, hours_a_day: float) -> dict[str, float]:
+    """A life in cycles or in time, of which the duty leaves the hours of operation."""
+    year = DAYS_A_YEAR * hours_a_day
+    in_hours = {"h": 1.0, "years": year, "year": year, "days": hours_a_day, "day": hours_a_day}
+    value = parse_quantity("criteria.life", given, "Mcycles", {**units_of("Mcycles"), **in_hours})
+    if not value > 0.0:
+        raise DesignError(f"criteria.life = {given!r} is out of range; allowed: above 0")
+    return {"hours" if given.rpartition(" ")[2] in in_hours else "life": value}
 
 
 def _tolerances(values: Mapping[str, Any], machine: Machine) -> dict[str, Tolerance]:
@@ -136,7 +197,7 @@ def _tolerances(values: Mapping[str, Any], machine: Machine) -> dict[str, Tolera
         return default_tolerances(machine)
     fields = {name: about for name, about in parameters_of(machine).items() if not about.choices}
     tolerances = {}
-    for key, given in _section(values, "tolerances", fields).items():
+    for key, given in _section(values, "tolerances", fields, machine).items():
         relative = isinstance(given, str) and given.strip().endswith("%")
         value = parse_quantity(f"tolerances.{key}", given, "-" if relative else fields[key].unit)
         if not value > 0.0:
@@ -150,7 +211,7 @@ def _changes(values: Mapping[str, Any], machine: Machine) -> dict[str, tuple[flo
         return default_changes(machine)
     fields = {name: about for name, about in parameters_of(machine).items() if not about.choices}
     changes = {}
-    for key, given in _section(values, "changes", fields).items():
+    for key, given in _section(values, "changes", fields, machine).items():
         row = given if isinstance(given, list) else [given]
         changes[key] = tuple(parse_quantity(f"changes.{key}", one, fields[key].unit) for one in row)
         for value in changes[key]:
@@ -159,7 +220,7 @@ def _changes(values: Mapping[str, Any], machine: Machine) -> dict[str, tuple[flo
 
 
 def _costs(values: Mapping[str, Any], machine: Machine) -> dict[str, float]:
-    section = _section(values, "costs", _changes(values, machine))
+    section = _section(values, "costs", _changes(values, machine), machine)
     costs = {key: parse_quantity(f"costs.{key}", given, "-") for key, given in section.items()}
     for key, cost in costs.items():
         if not cost >= 0.0:
@@ -202,9 +263,12 @@ def template(name: str) -> str:
         "tolerances = 1  # 1, or 2 to look at twice the tolerance",
         "wear = false    # true: two tolerances for the clearance, which grows in service",
         "",
+        "[duty]",
+        'hours_a_day = "24 h"  # of operation: a life in years or days is that many',
+        "",
         "[criteria]",
         'load_rating = "500 N"          # force under which the surface lasts a million cycles',
-        'life = "2000 Mcycles"          # million cycles',
+        'life = "2000 Mcycles"          # or in time: "10 years", "87600 h"',
         "reliability = 0.999            # probability that the strength exceeds the contact stress",
         'machines_that_meet = "90 %"    # of those in tolerance, each by its own statistics',
         f"safety_factor = {criteria.safety_factor:g}              # strength against stress, for Types I and II",

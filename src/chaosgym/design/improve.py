@@ -19,7 +19,7 @@ from chaosgym.design.methodology import SERIES_SIZE, Assessment, Check, assess
 from chaosgym.diagnosis import default_tolerances
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import parameters_of, with_settings
+from chaosgym.machines.parameters import parameters_of, quantity_of, with_settings
 
 CLEARANCE_FACTORS = (0.75, 0.5, 0.25)
 DAMPING_FACTORS = (2.0, 4.0)
@@ -46,6 +46,12 @@ class Trial:
     def meets(self) -> bool:
         """Whether the changed machine meets the criteria."""
         return self.assessment.verdict == "meets"
+
+    @property
+    def told(self) -> str:
+        """The changes with their units, for people: "excitation frequency 15 Hz"."""
+        machine = self.assessment.machine
+        return ", ".join(f"{name} = {quantity_of(machine, name)}" for name in self.changes)
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""

@@ -224,7 +224,7 @@ def assess(
         If a run can't be finished.
     """
     region = default_tolerances(machine) if tolerances is None else dict(tolerances)
-    criteria = criteria or Criteria()
+    criteria = (criteria or Criteria()).at(machine.cycle_period)
     exponent = criteria.life_exponent
     centre = diagnose(machine, budget=NOMINAL_BUDGET)
     nominal = settled_run(machine, verdict=centre, until_converged=True, budget=NOMINAL_BUDGET)

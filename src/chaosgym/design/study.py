@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from chaosgym.design.bearing import hours_of
 from chaosgym.design.brief import DesignBrief
 from chaosgym.design.fatigue import equivalent_force_of_history
 from chaosgym.design.improve import Improvement, improve
-from chaosgym.design.methodology import Assessment, assess
+from chaosgym.design.methodology import Assessment, Check, assess
 from chaosgym.design.peak_impacts import PeakImpactDiagram, filling_cycles, peak_impacts, worn_side
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
 from chaosgym.design.trends import HISTORY_SAMPLES, LifeTrend, life_against
@@ -77,28 +78,25 @@ class DesignStudy:
             f"{found.machine.name}: {found.verdict}",
             f"  Type {found.type}: {found.response.reason}; {found.evaluation.method.partition(': ')[2]}",
             f"  {found.series.told}",
-            *(
-                f"  {check.name:19s} {check.reached:.6g} of {check.required:g} {check.unit}".rstrip()
-                + (" met" if check.met else " NOT met")
-                for check in found.checks
-            ),
+            *(f"  {check.name:19s} {_told(check, found.machine)}" for check in found.checks),
             f"  largest peak        {found.evaluation.largest_force:.1f} N, equivalent {found.evaluation.force:.1f} N",
             f"  load rating         {found.evaluation.required_load_rating:.0f} N needed for the life",
         ]
         if best is not None:
-            changes = ", ".join(f"{name} = {value:g}" for name, value in best.changes.items())
-            lines.append(f"  cheapest change that meets all criteria: {changes} (SI), cost {best.cost:.2f}")
+            lines.append(f"  cheapest change that meets all criteria: {best.told}, cost {best.cost:.2f}")
         elif self.improvement is not None:
             lines.append("  no change that was tried meets all criteria")
         return lines
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        found = self.improvement
+        found, lives = self.improvement, self.assessment.evaluation.life_interval
         return {
             "chaosgym": __version__,
             "seed": self.seed,
             **self.assessment.as_dict(),
+            "life_hours": _finite([hours_of(life, self.assessment.machine.cycle_period) for life in lives]),
+            "required_life_hours": hours_of(self.assessment.criteria.life, self.assessment.machine.cycle_period),
             "improvement": None
             if found is None
             else {
@@ -124,6 +122,15 @@ class DesignStudy:
                 "cycles_to_fill": self.cycles_to_fill,
             },
         }
+
+
+def _told(check: Check, machine: Machine) -> str:
+    """What a check reached of what is required; a life in hours first."""
+    told = f"{check.reached:.6g} of {check.required:g} {check.unit}".rstrip()
+    if check.name == "fatigue life":
+        reached, required = (hours_of(life, machine.cycle_period) for life in (check.reached, check.required))
+        told = f"{reached:,.4g} h of {required:,.4g} h in operation ({told})"
+    return told + (" met" if check.met else " NOT met")
 
 
 def _finite(values: Any) -> list[float | None]:

@@ -143,6 +143,20 @@ def origin_of(machine: Any, name: str) -> tuple[str, str]:
     return "given", "this command"
 
 
+def quantity_of(owner: Any, name: str) -> str:
+    """Value of a field with its unit, for people: millimetres and gigapascals where these are usual."""
+    value, unit = getattr(owner, name), parameters_of(owner)[name].unit
+    if isinstance(value, str):
+        return value
+    if unit == "m":
+        value, unit = 1e3 * value, "mm"
+    elif unit == "Pa" and abs(value) >= 1e6:
+        value, unit = 1e-9 * value, "GPa"
+    elif unit == "Mcycles":
+        unit = "million cycles"
+    return f"{value:,.6g}" + ("" if unit == "-" else f" {unit}")
+
+
 def markdown_table(machine: Any) -> list[str]:
     """Lines of a table with every parameter of a machine, its value, unit, provenance and source."""
     rows = ["| parameter | value | unit | provenance | source |", "|---|---|---|---|---|"]

@@ -37,7 +37,7 @@ def units_of(unit: str) -> Mapping[str, float]:
     return ALTERNATIVES.get(unit, {unit: 1.0})
 
 
-def parse_quantity(name: str, given: Any, unit: str) -> float:
+def parse_quantity(name: str, given: Any, unit: str, allowed: Mapping[str, float] | None = None) -> float:
     """Value in the field's own unit.
 
     Parameters
@@ -48,13 +48,15 @@ def parse_quantity(name: str, given: Any, unit: str) -> float:
         A text such as ``"30 Hz"``; a bare number only where the field has no unit.
     unit
         Of the field.
+    allowed
+        Units that are understood here, and their size; those of the field's unit if None.
 
     Raises
     ------
     ParameterError
         If the unit is missing or unknown, or the number is none; says what is allowed.
     """
-    allowed = units_of(unit)
+    allowed = allowed or units_of(unit)
     listed = ", ".join(each or "no unit" for each in allowed)
     if isinstance(given, bool) or not isinstance(given, int | float | str):
         raise ParameterError(f"{name} = {shown(given)} is not a quantity; allowed: a number with a unit ({listed})")

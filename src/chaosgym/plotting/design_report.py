@@ -17,13 +17,14 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chaosgym.design.bearing import hours_of
 from chaosgym.design.fatigue import rating_life
 from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.design.methodology import Assessment
 from chaosgym.design.study import DesignStudy
 from chaosgym.errors import DesignError
 from chaosgym.files import write_atomically
-from chaosgym.machines.parameters import parameters_of
+from chaosgym.machines.parameters import parameters_of, quantity_of
 from chaosgym.plotting import design as figures
 from chaosgym.plotting.style import STYLE, TYPE_COLOURS, figure_of
 from chaosgym.version import __version__
@@ -96,7 +97,8 @@ def design_report(study: DesignStudy, command: str = "", *, date: str = "", brie
         date=date,
         brief=brief,
         trials=tried if best is None else [best, *(trial for trial in tried if trial is not best)],
-        service_hours=found.evaluation.life_interval.low * 1e6 * found.machine.cycle_period / 3600.0,
+        service_hours=hours_of(found.evaluation.life_interval.low, found.machine.cycle_period),
+        required_hours=hours_of(criteria.life, found.machine.cycle_period),
         rainflow_life=rating_life(study.force_of_every_impact, criteria.load_rating, criteria.life_exponent),
         described=parameters_of(found.machine),
         reference=type(found.machine)(),
@@ -129,7 +131,7 @@ def _rendered(template: str, command: str, **names: object) -> str:
         "version": __version__,
         "command": command,
         "type_colours": TYPE_COLOURS,
-        "value_of": _value,
+        "value_of": quantity_of,
         "tolerance_of": _tolerance,
         "newton": lambda value: f"{value:.2f} N",
         "life": _life,
@@ -259,19 +261,6 @@ def _picture(figure: Figure, caption: str, wide: bool = False) -> Picture:
     with matplotlib.rc_context(STYLE):
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     return Picture(base64.b64encode(buffer.getvalue()).decode("ascii"), caption, wide)
-
-
-def _value(owner: object, name: str) -> str:
-    value, unit = getattr(owner, name), parameters_of(owner)[name].unit
-    if isinstance(value, str):
-        return value
-    if unit == "m":
-        value, unit = 1e3 * value, "mm"
-    elif unit == "Pa" and abs(value) >= 1e6:
-        value, unit = 1e-9 * value, "GPa"
-    elif unit == "Mcycles":
-        unit = "million cycles"
-    return f"{value:,.6g}" + ("" if unit == "-" else f" {unit}")
 
 
 def _tolerance(found: Assessment, name: str) -> str:
