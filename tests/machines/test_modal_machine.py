@@ -376,3 +376,39 @@ def test_wear_of_variants_keeps_each_offset():
     peaks = batch.run(np.arange(2), 12).peak_force
     for found, machine in zip(peaks, machines, strict=True):
         np.testing.assert_array_equal(found, simulate(machine.at(clearance=5e-4), 12).peak_force)
+
+
+def test_a_base_that_is_moved_for_good_changes_nothing(machine_file):
+    """Samples with a mean: of a displacement it is left out, of an acceleration it is a weight on every mode."""
+    modes = Structure.of_modes([5.0], 0.02, {"x": [0.5], "base": [2.0]})
+    given = dict(modes=modes, joint="x", speed=8.0, clearance=5e-4, contact_stiffness=1e6)
+    wave = 1e-3 * np.sin(2.0 * np.pi * np.arange(16) / 16)
+    moved, still = (
+        ModalMachine(drives=(Drive.sampled("displacement", "base", wave + m, 1),), **given) for m in (7e-3, 0.0)
+    )
+    np.testing.assert_allclose(simulate(moved, 20).peak_force, simulate(still, 20).peak_force, rtol=1e-9)
+    shaken = ModalMachine(drives=(Drive.sampled("acceleration", "base", 1e3 * wave - 3.0, 1),), **given)
+    loaded = ModalMachine(
+        drives=(Drive.sampled("acceleration", "base", 1e3 * wave, 1), Drive("force", "x", (), 3.0 * 2.0 / 0.5)), **given
+    )
+    np.testing.assert_allclose(simulate(shaken, 20).peak_force, simulate(loaded, 20).peak_force, rtol=1e-7)
+
+
+WORDS = {
+    "friction": ([("preload = ", "friction = ")], "friction does not fit"),
+    "torque": ([("force = ", "torque = ")], "m for rad, N for N m"),
+    "a unit of torque": ([('"4 N"', '"4 N m"')], "m for rad, N for N m"),
+    "a unit of angle": ([('"0.15 mm"', '"1 arcmin"')], "m for rad, N for N m"),
+    "a random drive": ([("force = ", "psd = ")], "repeats with every cycle"),
+    "backlash": ([('clearance = "0.15', 'backlash = "0.15')], "clearance is half the gap"),
+    "flow": ([("preload = ", "flow_velocity = ")], "forces that depend on the motion"),
+}
+
+
+@pytest.mark.parametrize("case", WORDS)
+def test_what_does_not_fit_is_said_where_it_is_met(machine_file, case):
+    """A word that people try is answered with the limit, or the way, and the page."""
+    changes, message = WORDS[case]
+    with pytest.raises(ParameterError, match=message) as told:
+        chaosgym.read_machine(machine_file(*changes))
+    assert "docs/own-machine.md" in str(told.value)

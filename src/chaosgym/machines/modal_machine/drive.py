@@ -76,8 +76,8 @@ def checked(drive: Drive) -> Drive:
         if not 1 <= order <= MOST_HARMONICS:
             raise ParameterError(f"harmonic = {shown(order)} is out of range; allowed: 1 to {MOST_HARMONICS}")
         numbers(drive.kind, amplitudes, -LARGEST, LARGEST, KINDS[drive.kind])
-    if drive.mean and drive.kind != "force":
-        raise ParameterError(f"the mean of {drive.kind} at {drive.at!r} is not 0; allowed: for a force only")
+    if drive.mean and drive.kind == "unbalance":
+        raise ParameterError(f"the mean of {drive.kind} at {drive.at!r} is not 0; allowed: of all other kinds")
     return drive
 
 
@@ -88,7 +88,8 @@ def modal_drive(structure: Structure, drives: Iterable[Drive]) -> tuple[Array, A
     forces, static = np.zeros((2, highest, 2, n)), np.zeros(n)
     for drive in drives:
         shape = structure.shape(drive.at)
-        static += drive.mean * shape
+        # a base that is moved takes structure and stops along; one under constant acceleration weighs on each mode
+        static += {"force": 1.0, "acceleration": -1.0}.get(drive.kind, 0.0) * drive.mean * shape
         if not shape.any():
             raise ParameterError(f"the drive at {drive.at!r} moves no mode: every shape is 0 there")
         grows = int(drive.kind in ("unbalance", "displacement"))

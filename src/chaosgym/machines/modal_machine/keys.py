@@ -7,8 +7,8 @@ import numpy as np
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_machine.drive import KINDS
+from chaosgym.machines.modal_machine.limits import hint, told_of
 from chaosgym.machines.numbers import shown
-from chaosgym.machines.parameters import suggestion
 from chaosgym.machines.units import parse_quantity, parse_row, units_of
 
 
@@ -121,9 +121,22 @@ def checked_table(path: str, given: Any) -> dict[str, Any]:
         key = known.get(name) or known.get("*")
         if key is None:
             where = f"[{path}]" if path else "the file"
-            raise ParameterError(f"{where} has no key {name!r}{suggestion(name, [*known, *inner])}")
-        values[name] = value if path in ("tolerances", "job") else _value(f"{prefix}{name}", value, key)
+            raise ParameterError(f"{where} has no key {name!r}{told_of(name, [*known, *inner])}")
+        values[name] = value if path in ("tolerances", "job") else _told_value(f"{prefix}{name}", value, key)
     return values
+
+
+def _told_value(name: str, given: Any, key: Key) -> Any:
+    """Value of a key; a unit that does not fit is told of."""
+    try:
+        return _value(name, given, key)
+    except ParameterError as error:
+        _, found, unit = str(error).partition(" has the unknown unit '")
+        raise ParameterError(f"{error}{hint(unit.partition(chr(39))[0]) or _turns(unit) if found else ''}") from None
+
+
+def _turns(unit: str) -> str:
+    return hint("rad") if unit.partition("'")[0] in ("N m", "N m/rad", "N m s/rad", "kg m^2", "kg m2", "Nm") else ""
 
 
 def _value(name: str, given: Any, key: Key) -> Any:

@@ -1,0 +1,40 @@
+"""What people look for in a machine's file and does not fit, or has another name: the word, and what to do."""
+
+from chaosgym.machines.parameters import suggestion
+
+PAGE = "docs/own-machine.md, 'What is modelled'"
+
+TURNS = "a machine that turns is written with m for rad, N for N m, N/m for N m/rad and kg for kg m^2"
+
+LIMITS = {
+    "torque moment inertia rad arcmin": TURNS,
+    "friction coulomb stribeck mu": "friction does not fit: the motion between contacts is linear",
+    "random psd noise seed white": "a random drive does not fit: what drives repeats with every cycle",
+    "flow fluid velocity wind": "forces that depend on the motion, as of a flow, do not fit",
+    "time_varying mesh parametric stiffness_samples": "stiffness that varies in time does not fit; its mean does",
+    "chirp ramp step impulse": "a drive that does not repeat with every cycle does not fit; sweep over the speed",
+    "control controller pid feedback": "a controller within the machine does not fit; an agent trims the speed only",
+    "gap backlash play": "clearance is half the gap: of a backlash, its half",
+    "joints gaps second": "several gaps are several [[joint]] tables, each with at, clearance, stiffness and damping",
+    "cam lift": "a cam's lift is a displacement of the base in samples of one cycle, with the sign turned",
+    "amplitude": "the amplitude is the number of the force, unbalance, displacement or acceleration itself",
+    "frequency omega rad/s": "frequencies are in Hz (1 rad/s = 0.159 Hz); a drive's is harmonic times speed",
+    "gravity weight": "a weight is a preload, or a force of constant samples",
+    "cubic nonlinear hertz": "stops are linear springs; a stiffness that grows with the load does not fit",
+}
+"""By words that a key or a unit holds."""
+
+
+def hint(word: str) -> str:
+    """What to say of a key or a unit that is unknown; empty if nothing is known of it."""
+    given = word.lower()
+    parts = {given, *given.replace("-", "_").split("_"), *given.replace("*", " ").replace("/", " ").split()}
+    for words, told in LIMITS.items():
+        if parts & set(words.split()):
+            return f"; {told} ({PAGE})"
+    return ""
+
+
+def told_of(word: str, known: list[str]) -> str:
+    """End of a message about an unknown key: what is known of the word, or the nearest key."""
+    return hint(word) or suggestion(word, known)
