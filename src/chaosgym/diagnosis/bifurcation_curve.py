@@ -25,6 +25,9 @@ STEPS = 33
 SHORTEST = 1.0 / 64.0
 """Share of a step down to which it is halved."""
 
+MOST_TRIES = 3
+"""Steps that are tried for each value of the second parameter, on average."""
+
 WINDOW = 0.05
 """Range of the first parameter around a bifurcation that counts as 1 in scaled unknowns, as a share of its value."""
 
@@ -125,7 +128,9 @@ def _part(
     """Points (first, second) from a bifurcation to one end of the span, and why there are no more."""
     at = float(getattr(machine, second))
     places, here, share = [(start.value, at)], start, 1.0
-    while at != end:
+    for _ in range(MOST_TRIES * round(abs(end - at) / step + 1.0)):
+        if at == end:
+            break
         reach = share * step * np.sign(end - at)
         value = end if abs(end - at) <= abs(reach) * (1.0 + 1e-9) else at + reach
         guess = _extrapolated(places, value)
@@ -138,7 +143,9 @@ def _part(
             continue
         places.append((here.value, value))
         at, share = value, min(1.0, 2.0 * share)
-    return places[1:], f"end of the range at {second} = {end:.6g}"
+    if at == end:
+        return places[1:], f"end of the range at {second} = {end:.6g}"
+    return places[1:], f"not followed beyond {second} = {at:.6g}: its steps became too short"
 
 
 def _extrapolated(places: list[tuple[float, float]], value: float) -> float:
