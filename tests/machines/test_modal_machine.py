@@ -386,7 +386,7 @@ def test_a_base_that_is_moved_for_good_changes_nothing(machine_file):
     moved, still = (
         ModalMachine(drives=(Drive.sampled("displacement", "base", wave + m, 1),), **given) for m in (7e-3, 0.0)
     )
-    np.testing.assert_allclose(simulate(moved, 20).peak_force, simulate(still, 20).peak_force, rtol=1e-9)
+    np.testing.assert_allclose(simulate(moved, 20).peak_force, simulate(still, 20).peak_force, rtol=1e-6)
     shaken = ModalMachine(drives=(Drive.sampled("acceleration", "base", 1e3 * wave - 3.0, 1),), **given)
     loaded = ModalMachine(
         drives=(Drive.sampled("acceleration", "base", 1e3 * wave, 1), Drive("force", "x", (), 3.0 * 2.0 / 0.5)), **given
