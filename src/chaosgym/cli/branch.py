@@ -60,9 +60,10 @@ def branch(
     picture = picture_path(plot, f"branch-{Path(machine.name).stem}")
     if out:
         check_target(out, overwrite)
-    name = along.partition("=")[0]
+    name, _, span = along.partition("=")
+    field = continuous_field(machine, name)
     units = {field: about.unit for field, about in parameters_of(machine).items()}
-    axis = Axis.parse(along, units | {name: units[continuous_field(machine, name)]})
+    axis = Axis.parse(f"{field}={span}" if span else along, units)
     diagram = follow(
         machine,
         name,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from chaosgym.diagnosis.periodic_orbit import PRECISE, period_map
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import check_parameter, parameters_of, suggestion, with_settings
+from chaosgym.machines.parameters import check_parameter, field_named, parameters_of, suggestion, with_settings
 from chaosgym.simulation import CycleRecord, simulate
 
 Array = NDArray[np.float64]
@@ -330,6 +330,7 @@ def continuous_field(machine: Machine, name: str) -> str:
     """
     usual = {"speed": machine.speed_field, "clearance": machine.clearance_field}
     known = parameters_of(machine)
+    name = field_named(machine, name)
     field = name if name in known else usual.get(name, name)
     numbers: list[str] = [key for key, about in known.items() if not about.choices and _continuous(machine, key)]
     if field not in numbers:
