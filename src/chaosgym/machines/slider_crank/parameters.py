@@ -36,7 +36,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.batch import CompiledBatch
 from chaosgym.machines.integrators import Integrator
 from chaosgym.machines.machine import Machine, Option, Work
-from chaosgym.machines.parameters import parameter
+from chaosgym.machines.parameters import Parameter, parameter, parameters_of
 from chaosgym.machines.slider_crank import run as running
 from chaosgym.machines.slider_crank.equations import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom, equations
 from chaosgym.machines.slider_crank.joints import sensors_of
@@ -52,6 +52,24 @@ Array = NDArray[np.float64]
 _FIT = "fitted to the statements, see docs/development/calibration.md"
 _FREQUENCY = "first natural frequency 75.6 Hz, thesis 4.5.5"
 _STEEL = "steel"
+
+DIMENSIONS = (
+    "crank_radius",
+    "rod_length",
+    "rod_diameter",
+    "youngs_modulus",
+    "density",
+    "slider_mass",
+    "yoke_mass",
+    "housing_mass",
+)
+"""Fields that make it another crank than that of the thesis."""
+
+
+def _is_fitted(name: str, about: Parameter) -> bool:
+    """True for a constant that was fitted to the thesis' results, or follows from them: a mass, spring or damping."""
+    numbers = about.provenance == "calibrated" and about.source == _FIT and not about.choices and name != "n_modes"
+    return numbers or (about.provenance == "derived" and about.unit in ("kg", "kg m^2"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -337,6 +355,19 @@ class SliderCrank(Machine):
             tilt = math.radians(self.motor_angle)
             return slider_position(phase, self.crank_radius, self.rod_length, tilt), "m"
         return np.degrees(np.arctan2(force[:, 1], force[:, 0])), "deg"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Constants that were fitted to the thesis' crank and that a crank of other dimensions keeps."""
+        default, known = type(self)(), parameters_of(self)
+        usual = {name for name in known if getattr(self, name) == getattr(default, name)}
+        others = [name for name in DIMENSIONS if name not in usual]
+        kept = [name for name, about in known.items() if name in usual and _is_fitted(name, about)]
+        kept = [name for name in kept if name != "ball_damping_mass" or self.ball_joint != "ideal"]
+        if not others or not kept:
+            return ()
+        values = ", ".join(f"{name} {getattr(self, name):g} {known[name].unit.strip('-')}".strip() for name in kept)
+        return (f"{', '.join(others)}: not the thesis' crank, yet these are still fitted to it: {values}",)
 
     @property
     def sensors(self) -> tuple[str, ...]:
