@@ -26,6 +26,9 @@ VALUE_DOUBT, SLOPE_DOUBT = 1.0 / 384.0, math.sqrt(3.0) / 216.0
 ROUNDING = 1e-12
 """Share of a reading that is rounding: a contact that has just changed is at zero within it."""
 
+MOST_PIECES = 2_000
+"""Pieces that one search may look at; a graze needs some hundred. What is no number ends none by itself."""
+
 POLISH = 60
 """Iterations to locate one event; safeguarded Newton needs two to four, bisection about fifty."""
 
@@ -148,7 +151,9 @@ def opening(own, series, lanes, last, side, gap, lag, h, tolerance):
     y, v, a, _ = reading_at(own, series, lanes, last, 0.0)
     low, length = 0.0, h
     e0, d0 = side * (y + lag * v) - gap, side * (v + lag * a)
-    while low < h:
+    for _ in range(MOST_PIECES):
+        if low >= h:
+            break
         high = min(low + length, h)
         y, v, a, _ = reading_at(own, series, lanes, last, high)
         e1, d1 = side * (y + lag * v) - gap, side * (v + lag * a)
@@ -179,7 +184,9 @@ def closing(own, series, lanes, last, side, gap, lag, h, tolerance):
     y, v, a, _ = reading_at(own, series, lanes, last, 0.0)
     low, length = 0.0, h
     p0, q0, e0, d0 = gap - side * y, -side * v, gap - side * (y + lag * v), -side * (v + lag * a)
-    while low < h:
+    for _ in range(MOST_PIECES):
+        if low >= h:
+            break
         high = min(low + length, h)
         y, v, a, _ = reading_at(own, series, lanes, last, high)
         p1, q1, e1, d1 = gap - side * y, -side * v, gap - side * (y + lag * v), -side * (v + lag * a)

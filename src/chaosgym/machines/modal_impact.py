@@ -23,6 +23,7 @@ from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.machine import Machine
+from chaosgym.machines.parameters import refuse_not_finite
 
 if TYPE_CHECKING:
     from chaosgym.machines.batch import CompiledBatch
@@ -214,6 +215,7 @@ def flexible_model(
     step_phase
         For which the tables are made; see ``ExactEvents``.
     """
+    refuse_not_finite("a model of modes", *modes, 0.0 if static_force is None else static_force)
     modes = with_rigid_bodies(modes)
     n, tip, stiffness = len(modes.tip_shape), modes.tip_shape, modes.angular_frequency**2
     upper = Stop(contact_stiffness, contact_damping)

@@ -12,6 +12,8 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any, Literal, TypeVar
 
+import numpy as np
+
 from chaosgym.errors import ParameterError
 
 Provenance = Literal["printed", "derived", "calibrated", "assumed", "stated"]
@@ -101,6 +103,20 @@ def field_named(owner: Any, name: str) -> str:
     """Name of a field that may be written with dots, as in ``left.clearance`` for ``left_clearance``."""
     plain = name.replace(".", "_")
     return plain if plain in parameters_of(owner) else name
+
+
+def refuse_not_finite(what: str, *arrays: Any) -> None:
+    """Refuse arrays of a model that hold anything but finite numbers: a kernel would not come back from them.
+
+    Raises
+    ------
+    ParameterError
+        If one does; names ``what`` they are.
+    """
+    if not all(np.all(np.isfinite(array)) for array in arrays):
+        raise ParameterError(
+            f"{what} holds values that are not finite numbers; allowed: parameters that give finite ones"
+        )
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

@@ -473,6 +473,8 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget, tangen
         begin_cycle(model, state, arrays, cycle)
         for i in range(2 * n):
             motion.own[z + i] = state[i]
+            if not abs(state[i]) < RUNAWAY:
+                return status.DIVERGED, cycle
         find_sides(motion, model.row)
         arrays.events[cycle] = turn(
             model,

@@ -25,6 +25,7 @@ from chaosgym.core.binned.series import FORCING_TERMS, series_order
 from chaosgym.core.binned.tables import tables
 from chaosgym.core.binned.taylor import HERTZ, LINEAR, TaylorModel
 from chaosgym.core.lanes import LANES, padded
+from chaosgym.machines.parameters import refuse_not_finite
 from chaosgym.machines.slider_crank.equations import Equations, equations, loads, rod_of
 from chaosgym.machines.slider_crank.joints import Channels, channels_of, display_of, gaps_of, hertz_constants, joints_of
 from chaosgym.machines.slider_crank.kinematics import slider_rate
@@ -177,7 +178,9 @@ def _held(machine: "SliderCrank") -> tuple[Array, Array, Array, Array]:
     free[:, :, :n] = -np.swapaxes(inverse_mass @ held.stiffness, -1, -2)
     free[:2, :, n:] = -np.swapaxes(inverse_mass @ held.damping, -1, -2)
     friction = _friction(machine, middles)[:, None] * held.slider_along
-    return inverse_mass, free, _forcing(inverse_mass, loads), friction
+    forcing = _forcing(inverse_mass, loads)
+    refuse_not_finite("the equations of a slider crank", inverse_mass, free, forcing, friction)
+    return inverse_mass, free, forcing, friction
 
 
 def _free_motion(free: Array, forcing: Array, rate: float) -> Array:
