@@ -18,10 +18,12 @@ if TYPE_CHECKING:
     from chaosgym.control.evaluation import evaluate
     from chaosgym.diagnosis import Diagnosis, diagnose, response_map, response_type, two_step_test
     from chaosgym.diagnosis.bifurcation_diagram import follow
+    from chaosgym.diagnosis.measured import judge_peaks
     from chaosgym.diagnosis.step_check import step_check
     from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
     from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, ImpactBeam, SliderCrank
     from chaosgym.machines.modal_machine import Drive, Joint, ModalMachine, Structure, machine_with_joints, read_machine
+    from chaosgym.monitor import Monitor
     from chaosgym.simulation import CycleRecord, ExactEvents, RungeKutta4, simulate, simulate_many
     from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
 
@@ -30,6 +32,7 @@ _HOME = {
     "chaosgym.control.evaluation": ("evaluate",),
     "chaosgym.diagnosis": ("Diagnosis", "diagnose", "response_map", "response_type", "two_step_test"),
     "chaosgym.diagnosis.bifurcation_diagram": ("follow",),
+    "chaosgym.diagnosis.measured": ("judge_peaks",),
     "chaosgym.diagnosis.step_check": ("step_check",),
     "chaosgym.errors": ("ChaosgymError", "ParameterError", "SimulationError"),
     "chaosgym.machines": ("THESIS_IMPACT_BEAM", "THESIS_SLIDER_CRANK", "ImpactBeam", "SliderCrank"),
@@ -41,6 +44,7 @@ _HOME = {
         "machine_with_joints",
         "read_machine",
     ),
+    "chaosgym.monitor": ("Monitor",),
     "chaosgym.simulation": ("CycleRecord", "ExactEvents", "RungeKutta4", "simulate", "simulate_many"),
     "chaosgym.sweeps": ("Axis", "SweepPlan", "read_sweep", "run_sweep"),
 }
@@ -59,6 +63,7 @@ __all__ = [
     "Joint",
     "MachineClassifier",
     "ModalMachine",
+    "Monitor",
     "ParameterError",
     "ResponseClassifier",
     "RungeKutta4",
@@ -71,6 +76,7 @@ __all__ = [
     "diagnose",
     "evaluate",
     "follow",
+    "judge_peaks",
     "machine_with_joints",
     "read_machine",
     "read_sweep",

@@ -2,6 +2,7 @@
 
 import functools
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import click
@@ -104,13 +105,13 @@ def measured_runs(given: Measured, *, several: bool = False) -> list[Run]:
         signal, cut = peaks_of_series(
             recording, given.column, given.unit, rate_hz=given.rate_hz, period=period, tachometer=given.tachometer
         )
-        found.append((signal, cut.peaks, cut.resolution, (f"{len(cut.peaks)} cycles", *cut.notes)))
+        found.append((signal, cut.peaks, cut.resolution, (f"{len(cut.peaks)} cycles", *cut.notes), cut.condition))
     else:
         chosen = forces if several else lambda *of: [choose_force(*of)]
         for signal in chosen(recording, given.column, given.unit):
-            found.append((signal, check_peaks(signal, recording), 0.0, ()))
+            found.append((signal, check_peaks(signal, recording), 0.0, (), ""))
     runs = []
-    for signal, peaks, resolution, notes in found:
+    for signal, peaks, resolution, notes, condition in found:
         try:
             verdict = judge_peaks(
                 peaks, sensor_error=given.sensor_error, sensor_sigma=given.sensor_sigma, resolution=resolution
@@ -118,6 +119,7 @@ def measured_runs(given: Measured, *, several: bool = False) -> list[Run]:
         except DiagnosisError as error:
             run = f", run {signal.name!r}" if len(found) > 1 else ""
             raise DiagnosisError(f"{recording.source}{run}: {error}") from error
+        verdict = replace(verdict, diagnosis=replace(verdict.diagnosis, condition=condition))
         runs.append(
             Run(signal.name, peaks, verdict, recording.source, recording.sha256, (f"read {signal.described}", *notes))
         )

@@ -27,6 +27,8 @@ FOLLOWS = {
     "undetermined": "what the response is has to be settled before the life may be relied on",
 }
 
+RANDOM_FOLLOWS = "the pattern repeats and its scatter is random, so that the life follows from their statistics"
+
 
 @dataclass(frozen=True)
 class MeasuredPeaks:
@@ -70,7 +72,8 @@ class MeasuredPeaks:
     def headline(self) -> str:
         """Nature of the response, and what follows for its life."""
         verdict = self.verdict.diagnosis
-        return f"{verdict.words}: {FOLLOWS[verdict.nature]}"
+        follows = RANDOM_FOLLOWS if self.verdict.random else FOLLOWS[verdict.nature]
+        return f"{verdict.words}: {follows}"
 
     @property
     def doubt(self) -> str:
@@ -160,7 +163,12 @@ def evaluate_peaks(
     forces = as_forces(peaks)
     if not np.any(forces):
         raise DesignError("all peak forces are zero: no contact, so that there is no life to tell")
-    values = require_enough(forces)
+    try:
+        values = require_enough(forces)
+    except DesignError as error:
+        if verdict is None:
+            raise
+        raise DesignError(f"{verdict.diagnosis.words}, but no life is told: {error}") from error
     return MeasuredPeaks(
         values,
         criteria,

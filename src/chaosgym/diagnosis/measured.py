@@ -64,6 +64,9 @@ def judge_peaks(
         few = f"{len(readings)} cycles are too few to judge; needed: {SHORT_RECORD} or more"
         return MeasuredVerdict(undetermined(few, readings), told)
     whole, outliers, gaps = repair(readings)
+    why = unsteady(whole)
+    if why:
+        return MeasuredVerdict(undetermined(f"not a steady response: {why}", readings), told, outliers=outliers)
     resolved = max(resolution, 0.5 * quantum(readings))
     parts = _parts(whole, resolved / math.sqrt(3.0) + 1e-5 * float(np.max(np.abs(whole))), MOST_PARTS)
     verdicts = [_judge_part(part, told, resolved) for part in parts]
@@ -140,7 +143,7 @@ def _judge_part(readings: Array, told: SensorError | None, resolved: float) -> M
     if size < SHORT_RECORD:
         return MeasuredVerdict(undetermined(f"{size} cycles are too few to judge", readings), told)
     found, exact = None, two_step_test(readings)
-    if (exact.nature == "chaotic" and not exact.transient) or exact.nature == "undetermined":
+    if exact.nature in ("chaotic", "undetermined"):
         found = scatter_of(readings, resolved / math.sqrt(3.0))
         exact = two_step_test(found.readings) if found.drift else exact
     notes = (f"drifts by {found.drift:.3g} N over the record",) if found is not None and found.drift else ()
@@ -148,6 +151,34 @@ def _judge_part(readings: Array, told: SensorError | None, resolved: float) -> M
         told = told or SensorError(resolved, resolved / math.sqrt(3.0), "estimated")
         return MeasuredVerdict(_in_newton(exact, readings, resolved), told, notes=notes)
     return replace(judge_scatter(found, told, resolved), notes=notes)
+
+
+BLOCKS, STEP, STEADY = 8, 0.03, 2.0
+"""Blocks of a record whose levels and swings are compared, the share by which each must rise or fall where the response
+grows or decays, and the factor that makes in all."""
+
+EVENT_SHARE, EVENT_VARIANCE = 0.1, 0.9
+"""Share of the cycles in which a single event lasts, and of the variance that it holds."""
+
+
+def unsteady(readings: Array) -> str:
+    """In what way a response is not steady: it decays, grows, or is a single event; empty if it is none of these."""
+    size = len(readings)
+    if size < 4 * BLOCKS or np.ptp(readings) == 0.0:
+        return ""
+    blocks = readings[: size // BLOCKS * BLOCKS].reshape(BLOCKS, -1)
+    levels, swings = np.mean(np.abs(blocks), axis=1), np.std(np.diff(blocks, axis=1), axis=1)
+    for name, values, ways in (("the force", levels, (1.0, -1.0)), ("its variation", swings, (1.0,))):
+        for way in ways:
+            ordered = values[:: int(way)]
+            factor = float(ordered[-1] / max(ordered[0], 1e-300))
+            if np.all(ordered[1:] > (1.0 + STEP) * ordered[:-1]) and factor > STEADY:
+                return f"{name} {'grows' if way > 0.0 else 'decays'} {min(factor, 1e6):.2g} times over the record"
+    away = (readings - np.median(readings)) ** 2
+    span = max(1, round(EVENT_SHARE * size))
+    held = float(np.convolve(away, np.ones(span), "valid").max()) / float(away.sum())
+    event = f"{100.0 * held:.0f} % of its variation lies within {span} cycles, a single event"
+    return event if held > EVENT_VARIANCE else ""
 
 
 def _in_newton(exact: Diagnosis, readings: Array, resolved: float) -> Diagnosis:

@@ -58,6 +58,8 @@ class Diagnosis:
         The run that was judged; None where a plain series was.
     orbit_record
         The motion on the proven orbit, whole periods of it; None where none was proven.
+    condition
+        What the nature rests on that was guessed, such as "if the cycle is 49.4 ms"; empty if nothing was.
     """
 
     nature: Nature
@@ -72,11 +74,13 @@ class Diagnosis:
     votes: Mapping[str, Nature] = field(default_factory=lambda: _EMPTY)
     record: "CycleRecord | None" = field(default=None, repr=False, compare=False)
     orbit_record: "CycleRecord | None" = field(default=None, repr=False, compare=False)
+    condition: str = ""
 
     @property
     def words(self) -> str:
-        """Nature and period, such as "periodic, period 2"."""
-        return f"{self.nature}, period {self.period}" if self.period else self.nature
+        """Nature, period and condition, such as "periodic, period 2"."""
+        told = f"{self.nature}, period {self.period}" if self.period else self.nature
+        return f"{told}, {self.condition}" if self.condition else told
 
     @property
     def run(self) -> "CycleRecord":
@@ -109,6 +113,6 @@ class Diagnosis:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
-        runs = ("record", "orbit_record")
-        plain = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in runs}
+        left_out = ("record", "orbit_record", "condition")
+        plain = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in left_out}
         return {**plain, "evidence": dict(self.evidence), "votes": dict(self.votes)}

@@ -1,26 +1,28 @@
-r"""Scatter of the sensor or of the machine: what readings do about their repetition, and the verdict on it.
+r"""Scatter of the sensor, of the process or of chaos: what readings do about their repetition, and the verdict on it.
 
-With a stated error, what exceeds it is the machine's. Without one the scatter itself is judged: a sensor's is random
-from cycle to cycle and small, chaos can be forecast from what came before, a torus is a few lines of the spectrum.
+Scatter has three causes, and its size tells none of them: the sensor, a process that is random (load, supply, speed),
+deterministic chaos. Chaos is claimed only where ``determinism`` finds a map that makes the irregularity without noise,
+a torus where a few lines of the spectrum are all. A pattern that stands out of noise is periodic with random scatter.
+What is left is undetermined, and the verdict says what would tell.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.diagnosis.determinism import Determinism, beats_surrogates, determinism
 from chaosgym.diagnosis.response import Diagnosis
-from chaosgym.diagnosis.two_step import MAX_LINES, QUASIPERIODIC_CYCLES, two_step_test
+from chaosgym.diagnosis.two_step import CHAOTIC_CYCLES, MAX_LINES, QUASIPERIODIC_CYCLES
 from chaosgym.signals.noise import (
+    RANDOM,
     REPEATS,
     SensorError,
     class_residual,
     correlation,
     dominant_period,
-    local_scatter,
-    nonlinear_part,
     predictability,
     without_drift,
 )
@@ -73,21 +75,22 @@ def _fitted(values: Array, time: NDArray[Any], frequencies: Array) -> tuple[Arra
     return frequencies + np.clip(change, -0.5 / len(time), 0.5 / len(time)), rest
 
 
-RANDOM = 3.6
-"""Predictability below which a scatter may be a sensor's."""
-
 SMALL_SCATTER, LARGE_SCATTER = 0.015, 0.08
-"""Standard deviations, as shares of the mean force: random scatter below the first is a sensor's without being stated;
-a stated error above the second hides what would matter."""
+"""Standard deviations, as shares of the mean force. Scatter around one level above the first is told from chaos only by
+the sensor's error: chaos of a crank looks like white noise of 3 to 11 %. A stated error above the second hides what
+would matter."""
 
-FEW_REPEATS = 12
-"""Periods below which a lost cycle can look like chaos."""
+PATTERN, LONGEST_PATTERN, SEEN = 2.0, 32, 12
+"""Standard deviation of a pattern in those of the scatter around it, its longest period, and how often it is seen."""
 
 TORUS_REST = 0.3
 """Share of its standard deviation that the lines of a torus may leave."""
 
 ENOUGH_CYCLES = 100
-"""Cycles from which random scatter can be told from chaos without a stated error."""
+"""Cycles from which small random scatter is told from chaos without a stated error."""
+
+MORE_CYCLES = 1000
+"""Cycles below which more of them would tell more."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +103,12 @@ class MeasuredVerdict:
         Nature, period and reason; the reason says within or beyond how many newton.
     error
         Error of the sensor, stated or estimated from the record; None where it can't be estimated.
+    scatter
+        Standard deviation of the readings around their pattern [N]; None where they repeat, or were not asked.
+    coefficient_of_variation
+        The same as a share of the mean reading.
+    random
+        Whether the scatter of a periodic response is that of a random process or sensor.
     outliers
         Cycles, from 1, whose single readings were left out.
     gaps
@@ -112,6 +121,9 @@ class MeasuredVerdict:
 
     diagnosis: Diagnosis
     error: SensorError | None
+    scatter: float | None = None
+    coefficient_of_variation: float | None = None
+    random: bool = False
     outliers: tuple[int, ...] = ()
     gaps: tuple[int, ...] = ()
     changes: tuple[int, ...] = ()
@@ -120,7 +132,9 @@ class MeasuredVerdict:
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON: those of the diagnosis, and what is known of the readings."""
         error = None if self.error is None else self.error._asdict()
-        own = {name: list(getattr(self, name)) for name in ("outliers", "gaps", "changes", "notes")}
+        own: dict[str, Any] = {n: list(getattr(self, n)) for n in ("outliers", "gaps", "changes", "notes")}
+        own |= {name: getattr(self, name) for name in ("scatter", "coefficient_of_variation", "random")}
+        own["condition"] = self.diagnosis.condition
         return {**self.diagnosis.as_dict(), "sensor_error": error, **own}
 
 
@@ -145,7 +159,6 @@ class Scatter:
     sigma: float
     mean: float
     forecast: float
-    nonlinear: float
 
     @property
     def relative(self) -> float:
@@ -153,18 +166,31 @@ class Scatter:
         return self.sigma / self.mean if self.mean else 0.0
 
     @property
+    def residual(self) -> Array:
+        """Readings less their pattern, (cycles,)."""
+        return class_residual(self.readings, self.period)
+
+    @property
     def random(self) -> bool:
         """Whether a reading can't be told from those before it."""
         return self.forecast < RANDOM
 
+    @property
+    def has_pattern(self) -> bool:
+        """Whether a period above one stands out of the scatter, and is the same in both halves."""
+        size, k = len(self.readings), self.period
+        if not 1 < k <= LONGEST_PATTERN or size < SEEN * k:
+            return False
+        half = size // (2 * k) * k
+        halves = [part.reshape(-1, k).mean(axis=0) for part in (self.readings[:half], self.readings[half : 2 * half])]
+        patterns = [pattern - pattern.mean() for pattern in halves]
+        stands_out = min(float(np.std(pattern)) for pattern in patterns) >= PATTERN * self.sigma
+        apart = max(1.0, 4.0 * math.sqrt(2.0 * k / half)) * self.sigma
+        return stands_out and float(np.max(np.abs(patterns[0] - patterns[1]))) < apart
+
     def evidence(self) -> dict[str, float]:
         """Figures for JSON."""
-        return {
-            "scatter_sigma": self.sigma,
-            "scatter_share": self.relative,
-            "predictability": self.forecast,
-            "nonlinear_predictability": self.nonlinear,
-        }
+        return {"scatter_sigma": self.sigma, "scatter_share": self.relative, "predictability": self.forecast}
 
 
 def scatter_of(readings: Array, floor: float) -> Scatter:
@@ -177,99 +203,161 @@ def scatter_of(readings: Array, floor: float) -> Scatter:
     period = int(np.flatnonzero(variances <= allowed)[0]) + 1
     residual = class_residual(level, period)
     sigma = math.sqrt(float(variances[period - 1]))
-    linear = correlation(residual, period)
-    forecast = max(predictability(level, residual), linear)
-    rest = nonlinear_part(residual)
-    nonlinear = predictability(level[-len(rest) :], rest) if forecast >= RANDOM else 0.0
-    mean = float(np.mean(np.abs(readings)))
-    return Scatter(level, period, drift, sigma, mean, forecast, nonlinear)
+    forecast = max(predictability(level, residual), correlation(residual, period))
+    return Scatter(level, period, drift, sigma, float(np.mean(np.abs(readings))), forecast)
 
 
-def _periodic(found: Scatter, within: float, why: str, error: SensorError) -> MeasuredVerdict:
+def judge_scatter(found: Scatter, told: SensorError | None, resolved: float) -> MeasuredVerdict:
+    """Verdict on readings that do not repeat exactly; ``resolved`` is the half width of a reading's own step."""
+    verdict = _judge(found, told, resolved)
+    if verdict.scatter is None:
+        verdict = replace(verdict, scatter=found.sigma, coefficient_of_variation=found.relative)
+    return verdict
+
+
+def _judge(found: Scatter, told: SensorError | None, resolved: float) -> MeasuredVerdict:
+    if np.max(np.abs(found.residual)) <= 2.0 * resolved:
+        step = told or SensorError(resolved, resolved / math.sqrt(3.0), "estimated")
+        return _periodic(found, f"within {newton(2.0 * resolved)}, the step of the record", step)
+    most = None if told is None else _most(found, told, resolved)
+    if most is not None and found.sigma <= most:
+        assert told is not None
+        return _within_error(found, told, resolved)
+    torus = _torus(found, max(SMALL_SCATTER * found.mean, resolved) if most is None else most, told)
+    if torus is not None:
+        return torus
+    if len(found.readings) < CHAOTIC_CYCLES:
+        return _open(found, f"{_beyond(found, told)}: {len(found.readings)} cycles are too few to tell why", told)
+    fitted = determinism(found.readings)
+    if _is_chaotic(found, fitted):
+        return _chaotic(found, fitted, told)
+    return _random(found, fitted, told) or _cannot_tell(found, told)
+
+
+def _most(found: Scatter, told: SensorError, resolved: float) -> float:
+    """Standard deviation up to which scatter may be all the sensor's."""
+    freedom = 2.0 * (len(found.readings) - found.period)
+    return math.hypot(told.sigma, resolved) * (1.05 + 3.0 / math.sqrt(freedom))
+
+
+def _within_error(found: Scatter, told: SensorError, resolved: float) -> MeasuredVerdict:
+    """Verdict on scatter that may be all the sensor's."""
+    sigma, half_width = math.hypot(told.sigma, resolved), told.half_width + resolved
+    if not found.random:
+        fitted = determinism(found.readings) if len(found.readings) >= CHAOTIC_CYCLES else None
+        reason = f"can't tell: varies within the sensor's error of {newton(half_width)}, but not at random"
+        return (_random(found, fitted, told) if fitted else None) or _open(found, reason, told)
+    if found.relative > LARGE_SCATTER or (found.sigma < 0.4 * sigma and found.relative > SMALL_SCATTER):
+        spread = 0.5 * float(np.ptp(found.readings))
+        reason = f"can't tell: the sensor's error of {newton(half_width)} hides a spread of +-{newton(spread)}"
+        return _open(found, reason, told)
+    outside = float(np.mean(np.abs(found.residual) > half_width))
+    if told.source == "stated sigma":
+        shown = f"with a standard deviation of {newton(found.sigma)}; stated: {newton(told.sigma)}"
+    elif outside:
+        shown = (
+            f"with a standard deviation of {newton(found.sigma)}; {100.0 * outside:.2g} % of the readings lie outside "
+            f"the stated +-{newton(half_width)}"
+        )
+    else:
+        shown = f"within {newton(float(np.max(np.abs(found.residual))))}; stated: {newton(half_width)}"
+    return _periodic(found, shown, told)
+
+
+def _periodic(found: Scatter, how: str, error: SensorError | None, *, random: bool = False) -> MeasuredVerdict:
     cycle = "cycle" if found.period == 1 else f"{found.period} cycles"
     return MeasuredVerdict(
         Diagnosis(
             nature="periodic",
             period=found.period,
             margin=float(np.clip(1.0 - found.forecast / RANDOM, 0.0, 1.0)),
-            reason=f"repeats every {cycle} within {within:.3g} N, {why}",
+            reason=f"repeats every {cycle} {how}",
             horizon=len(found.readings),
             evidence={"cycles": len(found.readings), **found.evidence()},
         ),
         error,
+        random=random,
     )
+
+
+def _random(found: Scatter, fitted: Determinism, told: SensorError | None) -> MeasuredVerdict | None:
+    """Periodic with random scatter: a pattern that stands out, or scatter as small as a sensor's; else None.
+
+    The rest must be noise: the map comes to rest without it, or no nonlinear forecast of the rest beats the linear one.
+    """
+    size = len(found.readings)
+    small = found.relative <= (SMALL_SCATTER if size >= ENOUGH_CYCLES else 0.1 * SMALL_SCATTER)
+    if not (found.has_pattern or (small and found.period == 1 and found.random)):
+        return None
+    if not fitted.map_rests and beats_surrogates(found.residual):
+        return None
+    kind = "random" if found.random else "random, correlated"
+    how = f"with {kind} scatter of {newton(found.sigma)} (standard deviation, {100.0 * found.relative:.2g} %)"
+    if told is None:
+        estimate = SensorError(3.0 * found.sigma, found.sigma, "estimated")
+        return _periodic(found, f"{how}, of the sensor or the process", estimate, random=True)
+    stated = "more than" if found.sigma > told.sigma else "within"
+    return _periodic(found, f"{how}, {stated} the stated error", told, random=True)
+
+
+def _beyond(found: Scatter, told: SensorError | None) -> str:
+    if told is None:
+        return f"irregular, with a scatter of {newton(found.sigma)} ({100.0 * found.relative:.2g} %)"
+    return f"irregular beyond {newton(told.half_width)}, the sensor's error"
+
+
+def _cannot_tell(found: Scatter, told: SensorError | None) -> MeasuredVerdict:
+    ask = ["the sensor's error"] if told is None else []
+    ask += ["more cycles"] if len(found.readings) < MORE_CYCLES else []
+    ask += ["a second sensor", "another speed", "the machine's model"]
+    tell = f"{', '.join(ask[:-1])} or {ask[-1]} would tell"
+    return _open(found, f"{_beyond(found, told)}: random or chaotic, this record cannot tell; {tell}", told)
 
 
 def _open(found: Scatter, reason: str, error: SensorError | None) -> MeasuredVerdict:
     return MeasuredVerdict(undetermined(reason, found.readings, **found.evidence()), error)
 
 
-def judge_scatter(found: Scatter, told: SensorError | None, resolved: float) -> MeasuredVerdict:
-    """Verdict on readings that do not repeat exactly; ``resolved`` is the half width of a reading's own step."""
-    return _with_estimated(found, resolved) if told is None else _with_stated(found, told, resolved)
+def _is_chaotic(found: Scatter, fitted: Determinism) -> bool:
+    """Whether the map is chaotic, forecasts better than a fixed pattern, and gains more than in random surrogates."""
+    better = fitted.nonlinear < 0.5 * found.sigma**2 / float(np.var(found.readings))
+    return better and fitted.map_is_chaotic and beats_surrogates(found.readings, (fitted.dimension,))
 
 
-def _with_stated(found: Scatter, told: SensorError, resolved: float) -> MeasuredVerdict:
+def _chaotic(found: Scatter, fitted: Determinism, told: SensorError | None) -> MeasuredVerdict:
+    low, middle = fitted.exponent
+    last = "the last" if fitted.dimension == 1 else f"the last {fitted.dimension}"
+    reason = (
+        f"{_beyond(found, told)}: a map of {last} forecasts all but {100.0 * fitted.nonlinear:.2g} % of the variance "
+        f"(linear: all but {100.0 * fitted.linear:.2g} %), and without noise it is chaotic, exponent {middle:.2f} a "
+        f"cycle, above {low:.2f} in nine of ten refits"
+    )
+    figures = {
+        "map_dimension": fitted.dimension,
+        "linear_rest": fitted.linear,
+        "nonlinear_rest": fitted.nonlinear,
+        "map_exponent": middle,
+        "map_exponent_low": low,
+    }
     size = len(found.readings)
-    sigma = math.hypot(told.sigma, resolved)
-    most = sigma * (1.05 + 3.0 / math.sqrt(2.0 * (size - found.period)))
-    half_width = told.half_width + resolved
-    if found.sigma > most:
-        if found.random and found.sigma < 2.0 * most and found.relative < LARGE_SCATTER:
-            reason = (
-                f"the scatter of {newton(found.sigma)} (standard deviation) exceeds the stated error a little and is "
-                "random: a worse sensor, or the machine"
-            )
-            return _open(found, reason, told)
-        near = dominant_period(found.readings, resolved)
-        if size < FEW_REPEATS * near and local_scatter(found.readings, near) <= most:
-            few = f"most cycles come back after {near} others, but not all, and {size} cycles are too few to tell why"
-            return _open(found, few, told)
-        lead = f"irregular beyond the sensor's error of {newton(half_width)}"
-        return _torus(found, most, told) or _irregular(found, half_width, lead, told)
-    if not found.random:
-        reason = f"can't tell: varies within the sensor's error of {newton(half_width)}, but not at random"
-        return _open(found, reason, told)
-    if found.relative > LARGE_SCATTER or (found.sigma < 0.4 * sigma and found.relative > SMALL_SCATTER):
-        spread = 0.5 * float(np.ptp(found.readings))
-        reason = f"can't tell: the sensor's error of {newton(half_width)} hides a spread of +-{newton(spread)}"
-        return _open(found, reason, told)
-    if found.sigma < 0.4 * sigma:
-        return _periodic(found, 3.0 * found.sigma, "less than the stated error", told)
-    return _periodic(found, half_width, "the stated error", told)
-
-
-def _with_estimated(found: Scatter, resolved: float) -> MeasuredVerdict:
-    size = len(found.readings)
-    error = SensorError(3.0 * found.sigma, found.sigma, "estimated")
-    residual = class_residual(found.readings, found.period)
-    if np.max(np.abs(residual)) <= 2.0 * resolved:
-        step = SensorError(resolved, resolved / math.sqrt(3.0), "estimated")
-        return _periodic(found, 2.0 * resolved, "the step of the record", step)
-    share = f"the scatter of {100.0 * found.relative:.2g} %"
-    ask = "could be sensor or machine; state the sensor's error"
-    if not found.random:
-        torus = _torus(found, max(SMALL_SCATTER * found.mean, resolved), None)
-        if torus is not None or (found.nonlinear < RANDOM and found.relative < LARGE_SCATTER):
-            return torus or _open(found, f"{share} is not independent from cycle to cycle, but {ask}", None)
-        if _few_lines(found):
-            return _open(found, f"a few lines of the spectrum and a random rest: {share} {ask}", None)
-        return _irregular(found, resolved, f"irregular beyond any random error: {share} can be forecast", None)
-    if found.relative <= SMALL_SCATTER and (size >= ENOUGH_CYCLES or found.relative <= 0.1 * SMALL_SCATTER):
-        return _periodic(
-            found, 3.0 * found.sigma, "a sensor's error by its size; state the sensor's if you know it", error
-        )
-    return _open(found, f"{share} {ask}", None)
+    margin = float(np.clip(low / middle, 0.0, 1.0))
+    evidence = {"cycles": size, **found.evidence(), **figures}
+    return MeasuredVerdict(
+        Diagnosis(nature="chaotic", margin=margin, reason=reason, horizon=size, evidence=evidence), told
+    )
 
 
 def _torus(found: Scatter, most: float, told: SensorError | None) -> MeasuredVerdict | None:
-    """Quasiperiodic, if a few lines leave no more than the sensor's error; None if they leave more."""
+    """Quasiperiodic, if a few lines leave no more than the sensor's error; None if they leave more, or for one line.
+
+    One line alone is as well a hum of the mains or a modulation of the load.
+    """
     size = len(found.readings)
-    if size < QUASIPERIODIC_CYCLES or found.forecast < 2.0 * RANDOM:
+    if size < QUASIPERIODIC_CYCLES or found.forecast < 2.0 * RANDOM or found.relative < SMALL_SCATTER:
         return None
     rest, lines = without_lines(found.readings, MAX_LINES, 0.5 * most if told is None else most)
     sigma = float(np.std(rest))
-    if sigma > min(most, TORUS_REST * float(np.std(found.readings))) or correlation(rest) > 2.0 * RANDOM:
+    if sigma > min(most, TORUS_REST * float(np.std(found.readings))) or correlation(rest) > 2.0 * RANDOM or lines < 2:
         return None
     reason = f"does not repeat; {lines} lines of the spectrum leave {newton(sigma)}, no more than the sensor's error"
     evidence = {"cycles": size, **found.evidence(), "spectral_lines": lines}
@@ -277,26 +365,6 @@ def _torus(found: Scatter, most: float, told: SensorError | None) -> MeasuredVer
         nature="quasiperiodic", margin=1.0 - sigma / most, reason=reason, horizon=size, evidence=evidence
     )
     return MeasuredVerdict(diagnosis, told or SensorError(3.0 * sigma, sigma, "estimated"))
-
-
-def _few_lines(found: Scatter) -> bool:
-    """Whether a few lines leave a rest that is half as large and can't be forecast, as a torus and noise do."""
-    rest, _ = without_lines(found.readings, MAX_LINES // 2, 0.1 * float(np.std(found.readings)))
-    smaller = float(np.std(rest)) < 0.5 * float(np.std(found.readings))
-    return smaller and predictability(found.readings, rest) < RANDOM
-
-
-def _irregular(found: Scatter, beyond: float, lead: str, told: SensorError | None) -> MeasuredVerdict:
-    """Chaotic, quasiperiodic or undetermined: step II for what does not repeat within the error."""
-    second = two_step_test(found.readings, sensor_error=beyond)
-    diagnosis = Diagnosis(
-        nature=second.nature if second.nature != "periodic" else "undetermined",
-        margin=second.margin,
-        reason=f"{lead}: {second.reason}",
-        horizon=len(found.readings),
-        evidence={**second.evidence, **found.evidence()},
-    )
-    return MeasuredVerdict(diagnosis, told)
 
 
 def newton(force: float) -> str:

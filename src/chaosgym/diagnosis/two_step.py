@@ -34,6 +34,7 @@ from chaosgym.diagnosis.stroboscopic import (
 )
 from chaosgym.diagnosis.zero_one import zero_one_statistic
 from chaosgym.errors import DiagnosisError
+from chaosgym.signals.noise import RANDOM, predictability
 from chaosgym.simulation import CycleRecord
 
 Array = NDArray[np.float64]
@@ -69,7 +70,10 @@ def two_step_test(
     initial_transient: int = INITIAL_TRANSIENT,
     repeats_only: bool = False,
 ) -> Diagnosis:
-    """Tell the nature of a response.
+    """Tell the nature of an exact series, as simulations give.
+
+    Measured readings scatter at random too, which this test takes for chaos; ``chaosgym.judge_peaks`` tells the two
+    apart. A plain series that is called chaotic and whose scatter looks random is warned of in the reason.
 
     Parameters
     ----------
@@ -124,11 +128,21 @@ def two_step_test(
         return _undetermined(evidence, "does not repeat")
     section = x.section if isinstance(x, CycleRecord) else samples
     verdict = _step_two(series, section, evidence, sensor_error)
+    if verdict.nature == "chaotic" and not isinstance(x, CycleRecord):
+        evidence["looks_random"] = all(looks_random(column) for column in series)
+        if evidence["looks_random"]:
+            warning = "; but no reading can be forecast from those before: for measured readings use judge_peaks"
+            verdict = replace(verdict, reason=verdict.reason + warning)
     longest = (len(samples) - len(samples) // 2) // NOISY_REPEATS
     if verdict.nature == "undetermined" and sensor_error > 0.0 and longest < max_period:
         hint = f"; with a sensor error {len(samples)} cycles show periods up to {max(1, longest)} only"
         return replace(verdict, reason=verdict.reason + hint)
     return verdict
+
+
+def looks_random(series: Array) -> bool:
+    """Whether no reading of (cycles,) can be forecast from those before, as for the error of a sensor."""
+    return predictability(series, series) < RANDOM
 
 
 def _observables(x: CycleRecord | ArrayLike, sensor_error: float) -> tuple[Array, list[Array]]:

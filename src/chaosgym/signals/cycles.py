@@ -40,12 +40,15 @@ class CyclePeaks:
         Cycle [s]; the mean one with a tachometer.
     notes
         How the cycle is known, what is missing, and doubts.
+    condition
+        "if the cycle is 49.4 ms" where it was estimated; empty where it is known.
     """
 
     peaks: Array
     resolution: float
     period: float
     notes: tuple[str, ...]
+    condition: str = ""
 
 
 def cycle_period(rpm: float | None, hz: float | None, period_s: float | None) -> float | None:
@@ -150,12 +153,13 @@ def cycle_peaks(
     DiagnosisError
         If a cycle has fewer than 8 samples, or the series is shorter than one cycle.
     """
-    notes = [f"missing samples: {gap}" for gap in instants.gaps]
+    notes, condition = [f"missing samples: {gap}" for gap in instants.gaps], ""
     if starts is not None:
         cycle = float(np.mean(np.diff(starts)))
         notes.append(f"cycle from the tachometer: {cycle:.6g} s on average, {len(starts) - 1} cycles")
     elif period is None:
         cycle = estimated_period(value, instants.step)
+        condition = f"if the cycle is {1e3 * cycle:.4g} ms"
         notes.append(
             f"cycle estimated from the spectrum: {cycle:.6g} s ({1.0 / cycle:.5g} Hz); state it (--hz, --rpm) if that "
             "is not the speed"
@@ -178,7 +182,7 @@ def cycle_peaks(
         notes.append(f"{dropped} cycles left out: samples are missing")
     if len(peaks) == 0:
         raise DiagnosisError(f"the series holds no whole cycle of {cycle:g} s")
-    return CyclePeaks(peaks, spread, cycle, tuple(notes))
+    return CyclePeaks(peaks, spread, cycle, tuple(notes), condition)
 
 
 def _check_cycle(cycle: float, instants: Sampling) -> None:

@@ -29,7 +29,7 @@ REACH = 4
 OUTLIER_SHARE = 0.02
 """Share of the cycles that may be wrong readings; more of them belong to the motion."""
 
-MOST_GAPS = 4
+MOST_GAPS = 16
 """Places at which cycles may be missing."""
 
 NORMAL = 1.4826
@@ -39,8 +39,8 @@ NORMAL = 1.4826
 class SensorError(NamedTuple):
     """Error of one reading, in the unit of the record.
 
-    ``half_width`` is its largest value, ``sigma`` its standard deviation; ``source`` says which of them was "stated",
-    or "estimated" from the record.
+    ``half_width`` is its largest value, ``sigma`` its standard deviation; ``source`` is "stated" for the former,
+    "stated sigma" for the latter, "estimated" where both are from the record.
     """
 
     half_width: float
@@ -63,7 +63,7 @@ def stated_error(half_width: float | None, sigma: float | None) -> SensorError |
             raise DiagnosisError(f"sensor {name} = {value:g} N is out of range; allowed: finite, 0 or more")
     if half_width is not None:
         return SensorError(half_width, half_width / math.sqrt(3.0), "stated")
-    return None if sigma is None else SensorError(3.0 * sigma, sigma, "stated")
+    return None if sigma is None else SensorError(3.0 * sigma, sigma, "stated sigma")
 
 
 def quantum(values: Array) -> float:
@@ -192,6 +192,10 @@ def _misfit(values: Array, place: int, missing: int, period: int) -> float:
     return float(np.mean(np.abs(later - np.roll(earlier, -missing)[: len(later)])))
 
 
+RANDOM = 3.6
+"""Predictability below which a scatter is independent from cycle to cycle."""
+
+
 def predictability(values: Array, residual: Array) -> float:
     r"""How well do earlier readings predict what is left of a reading? About normal(0, 1) for a random sensor error.
 
@@ -242,14 +246,6 @@ def without_drift(values: Array, period: int) -> tuple[Array, float]:
     if abs(slope) <= max(6.0 * error, 1e-9 * float(np.max(np.abs(values)))):
         return values, 0.0
     return values - slope * time, slope
-
-
-def nonlinear_part(residual: Array, lags: int = 4) -> Array:
-    """What a linear forecast from the last readings leaves of a residual, (cycles - lags,): coloured noise goes."""
-    centred = residual - residual.mean()
-    past = np.lib.stride_tricks.sliding_window_view(centred[:-1], lags)
-    weights = np.linalg.lstsq(past, centred[lags:], rcond=None)[0]
-    return np.asarray(centred[lags:] - past @ weights)
 
 
 def correlation(residual: Array, period: int = 1, lags: int = 10) -> float:
