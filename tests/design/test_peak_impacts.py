@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from chaosgym import Drive, ModalMachine, Structure
 from chaosgym.design.peak_impacts import PeakImpactDiagram, coverage, filling_cycles, peak_impacts
 from chaosgym.design.statistics import convergence
 from chaosgym.design.trends import life_against
-from chaosgym.errors import SimulationError
+from chaosgym.errors import DesignError, SimulationError
 from chaosgym.machines import MACHINES, ImpactBeam
 from chaosgym.machines.parameters import with_settings
 from chaosgym.machines.slider_crank.kinematics import slider_position
@@ -165,3 +166,26 @@ def test_life_against_speed_is_one_at_its_reference_and_scattered_in_chaos():
     assert trend.highest[1] == pytest.approx(trend.lowest[1], rel=1e-3)
     assert trend.highest[2] > 2.0 * trend.lowest[2]
     assert trend.lowest[2] < trend.statistical[2] < trend.highest[2]
+
+
+def test_life_against_speed_starts_where_there_is_contact_and_finds_the_speeds_without():
+    """Of one mode at 20 Hz: where twice the linear amplitude stays in the gap, life is unlimited; in it, life ends."""
+    structure = Structure.of_matrices(np.eye(1), np.array([[(40.0 * np.pi) ** 2]]), 0.05, {"tip": 0}, modes=1)
+    drives = (Drive.sine("force", "tip", 2.0),)
+    joint = {"contact_stiffness": 1e6, "contact_damping": 20.0, "clearance": 0.4e-3}
+    machine = ModalMachine(modes=structure, joint="tip", drives=drives, speed=20.0, **joint)
+    speeds = np.linspace(5.0, 45.0, 21)
+    trend = life_against(machine, "speed", speeds)
+    ratio = speeds / 20.0
+    amplitude = 2.0 / (40.0 * np.pi) ** 2 / np.hypot(1.0 - ratio**2, 0.1 * ratio)
+    free, closed = 2.0 * amplitude < 0.4e-3, amplitude > 0.4e-3
+    assert free.any()
+    assert closed.any()
+    assert np.all(np.isinf(trend.statistical[free]))
+    assert np.all(np.isfinite(trend.statistical[closed]))
+    assert trend.reference == trend.values[np.isfinite(trend.statistical)][0]
+    below, above = trend.longer_lived(20.0, 1e3)
+    assert below < 20.0 < above
+    assert np.isinf(trend.statistical[np.isin(trend.values, [below, above])]).all()
+    with pytest.raises(DesignError, match="no contact from"):
+        life_against(machine, "speed", speeds[free][:1])

@@ -1,5 +1,6 @@
 """Everything that a design report shows: the assessment, the map around it, life over speed, and what to change."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +30,9 @@ MIDDLE = len(MAP_SHARES) // 2
 TREND_POINTS = 53
 """Speeds of the life trend."""
 
+NO_TREND = "the gap closes at no speed of the usual range"
+"""Why life is not drawn against speed."""
+
 DIAGRAM_CYCLES = 200
 """Cycles of the Peak Impact Diagram."""
 
@@ -48,7 +52,7 @@ class DesignStudy:
     map
         Types around the nominal speed and clearance; None where these have no tolerance or it leaves their range.
     life_over_speed
-        Over the machine's usual range; None without contact at its low end.
+        Over the machine's usual range; None without contact anywhere in it.
     diagram
         Where the peak impacts act.
     force_of_every_impact
@@ -86,6 +90,8 @@ class DesignStudy:
             lines.append(f"  cheapest change that meets all criteria: {best.told}, cost {best.cost:.2f}")
         elif self.improvement is not None:
             lines.append("  no change that was tried meets all criteria")
+        if self.life_over_speed is None:
+            lines.append(f"  no life against speed: {NO_TREND}")
         return lines
 
     def as_dict(self) -> dict[str, Any]:
@@ -110,6 +116,7 @@ class DesignStudy:
             if self.life_over_speed is None
             else {
                 "speed": self.life_over_speed.values.tolist(),
+                "reference_speed": self.life_over_speed.reference,
                 "nature": list(self.life_over_speed.nature),
                 "relative_life": _finite(self.life_over_speed.statistical),
                 "lowest": _finite(self.life_over_speed.lowest),
@@ -172,11 +179,12 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
         workers=workers,
         progress=progress,
     )
+    trend = _life_over_speed(machine, workers, progress)
     improvement = None
     if assessment.verdict != "meets":
         improvement = improve(
             assessment,
-            brief.changes,
+            _seeded(brief, assessment, trend),
             brief.costs,
             series_size=brief.series_size,
             seed=seed,
@@ -190,7 +198,7 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
         assessment,
         improvement,
         around,
-        _life_over_speed(machine, workers, progress),
+        trend,
         peak_impacts(record, worn_side(record, brief.criteria.life_exponent)),
         _every_impact(record, side, brief),
         seed,
@@ -248,6 +256,16 @@ def _in_tolerance(around: ResponseMap | None) -> tuple[Built, ...]:
         for j in inside
         if MAP_SHARES[i] or MAP_SHARES[j]
     )
+
+
+def _seeded(brief: DesignBrief, found: Assessment, trend: LifeTrend | None) -> Mapping[str, tuple[float, ...]]:
+    """Changes of the brief; where the speed is one, speeds too at which the trend shows no contact or enough life."""
+    field = brief.machine.speed_field
+    if trend is None or field not in brief.changes:
+        return brief.changes
+    lacking = found.criteria.life / max(found.evaluation.life_interval.low, 1e-300)
+    seeds = trend.longer_lived(getattr(brief.machine, field), max(lacking, 1.0))
+    return {**brief.changes, field: tuple(dict.fromkeys([*brief.changes[field], *seeds]))}
 
 
 def _every_impact(record: CycleRecord, side: int, brief: DesignBrief) -> float:

@@ -36,7 +36,9 @@ class LifeTrend:
     nature : (n,) of str
         Of the response at each value.
     lowest, highest, statistical : (n,)
-        Life relative to the statistical life at the first value.
+        Life relative to the statistical life at ``reference``; infinite without contact.
+    reference
+        First value of the field with contact.
     largest_peak, mean_peak : (n,)
         [N].
     """
@@ -49,6 +51,21 @@ class LifeTrend:
     statistical: Array
     largest_peak: Array
     mean_peak: Array
+    reference: float
+
+    def longer_lived(self, nominal: float, factor: float) -> list[float]:
+        """Values nearest to nominal, one on either side, whose life is longer by a factor, and one without contact.
+
+        The values beside them must do as well, so that none is a narrow window.
+        """
+        own = float(self.statistical[int(np.argmin(np.abs(self.values - nominal)))])
+        calm = np.array([nature == "periodic" for nature in self.nature]) & (self.statistical >= factor * own)
+        found = []
+        for suits in (np.isinf(self.statistical), calm):
+            wide = suits & np.append(True, suits[:-1]) & np.append(suits[1:], True)
+            below, above = self.values[wide & (self.values < nominal)], self.values[wide & (self.values > nominal)]
+            found += [*below[-1:].tolist(), *above[:1].tolist()]
+        return sorted(set(found))
 
 
 def life_against(
@@ -69,7 +86,7 @@ def life_against(
     field
         Field that varies.
     values : (n,)
-        In its unit; the first one is the reference.
+        In its unit; the first one with contact is the reference.
     exponent
         Of the life law.
     workers
@@ -82,7 +99,7 @@ def life_against(
     ParameterError
         If the field does not exist or a value is out of its range.
     DesignError
-        If there is no contact at the first value.
+        If there is contact at none of the values.
     """
     chosen = np.atleast_1d(np.asarray(values, dtype=float))
     machines = [with_settings(machine, {field: float(value)}) for value in chosen]
@@ -90,9 +107,11 @@ def life_against(
         settled_run, machines, workers=workers, progress=f"life against {field}" if progress else None
     )
     peaks = [run.worse_side(exponent) for run in runs]
-    reference = equivalent_force(peaks[0], exponent)
-    if reference == 0.0:
-        raise DesignError(f"{field} = {chosen[0]:g} can't be the reference of a relative life: there is no contact")
+    forces = [equivalent_force(each, exponent) for each in peaks]
+    touching = np.flatnonzero(forces)
+    if not len(touching):
+        raise DesignError(f"no life against {field}: no contact from {chosen[0]:g} to {chosen[-1]:g}")
+    reference = forces[int(touching[0])]
     lives = np.array([relative_life(each, reference, exponent) for each in peaks])
     return LifeTrend(
         field,
@@ -103,4 +122,5 @@ def life_against(
         lives[:, 2],
         np.array([run.largest_peak for run in runs]),
         np.array([float(np.mean(each)) for each in peaks]),
+        float(chosen[int(touching[0])]),
     )

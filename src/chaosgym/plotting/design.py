@@ -114,7 +114,7 @@ def type_map_around(result: ResponseMap, region: Any, ax: Axes) -> Axes:
 
 
 def life_over_speed(trend: LifeTrend, machine: Machine, ax: Axes) -> Axes:
-    """Life relative to the lowest speed (thesis figure 5.12): statistical mean, and what single peaks would suggest."""
+    """Life relative to the lowest speed with contact (thesis figure 5.12): statistical mean, and what peaks suggest."""
     label, factor = axis_label(machine, trend.field)
     nature = np.array(trend.nature)
     for kind, colour in NATURE_COLOURS.items():
@@ -124,6 +124,9 @@ def life_over_speed(trend: LifeTrend, machine: Machine, ax: Axes) -> Axes:
             ax.vlines(at, trend.lowest[rows], trend.highest[rows], color=colour, lw=2.2, alpha=0.75)
             ax.plot(at, trend.statistical[rows], "o", ms=3.5, color=colour, label=kind)
     ax.plot(factor * trend.values, trend.statistical, color=INK, lw=0.9)
+    calm = factor * trend.values[np.isinf(trend.statistical)]
+    if len(calm):
+        ax.plot(calm, np.full(len(calm), 0.97), "|", color=INK, transform=ax.get_xaxis_transform(), label="no contact")
     ax.axvline(factor * getattr(machine, trend.field), color=MUTED, lw=1.0, ls=":")
     ax.set(yscale="log", xlabel=label, ylabel="relative life (cubic law)", title="What speed costs")
     ax.legend(loc="lower left", ncols=2)

@@ -210,8 +210,8 @@ def _pictures(study: DesignStudy) -> list[Picture]:
     if study.life_over_speed is not None:
         trend = study.life_over_speed
         caption = (
-            "Life relative to the lowest speed. Dots: statistical mean life; bars: what the largest and the smallest "
-            "peak alone would suggest. Dotted: the design."
+            "Life relative to the lowest speed with contact. Dots: statistical mean life; bars: what the largest and "
+            "the smallest peak alone would suggest. Dotted: the design."
         )
         pictures.append(_picture(_drawn(lambda ax: figures.life_over_speed(trend, machine, ax)), caption))
     caption = "Machines with deviations spread over all tolerances at once, each from rest, by its own statistics."
