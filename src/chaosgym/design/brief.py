@@ -13,6 +13,7 @@ from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError
 from chaosgym.files import toml_of
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
+from chaosgym.machines.numbers import shown
 from chaosgym.machines.parameters import parameters_of, suggestion, with_settings
 from chaosgym.machines.units import parse_quantity, units_of
 
@@ -104,6 +105,8 @@ def _read(path: str | Path) -> tuple[str, dict[str, Any]]:
 def brief_from(values: Mapping[str, Any]) -> DesignBrief:
     """Build a design brief from the values of its file."""
     name = values.get("machine")
+    if not isinstance(name, str):
+        raise DesignError(f"machine = {shown(name)} does not exist; {MACHINES.listed('')}")
     _known("the brief", values, SECTIONS, _homes(MACHINES[str(name)]() if name in MACHINES else None))
     machine = _machine(name)
     fields = parameters_of(machine)
@@ -115,7 +118,7 @@ def brief_from(values: Mapping[str, Any]) -> DesignBrief:
     region = _section(values, "region", ("tolerances", "wear"), machine)
     wear = region.get("wear", False)
     if not isinstance(wear, bool):
-        raise DesignError(f"region.wear = {wear!r} is out of range; allowed: true or false")
+        raise DesignError(f"region.wear = {shown(wear)} is out of range; allowed: true or false")
     criteria = _criteria(values, machine)
     return DesignBrief(
         machine=machine,
@@ -155,7 +158,7 @@ def _section(
 ) -> Mapping[str, Any]:
     section = values.get(name, {})
     if not isinstance(section, Mapping):
-        raise DesignError(f"{name} = {section!r} is not a table; write [{name}] and one line a value below it")
+        raise DesignError(f"{name} = {shown(section)} is not a table; write [{name}] and one line a value below it")
     _known(f"[{name}]", section, known, _homes(machine))
     return section
 
@@ -178,7 +181,7 @@ def _hours_a_day(values: Mapping[str, Any], machine: Machine) -> float:
     given = _section(values, "duty", DUTY, machine).get("hours_a_day", "24 h")
     hours = parse_quantity("duty.hours_a_day", given, "h", {"h": 1.0, "min": 1.0 / 60.0})
     if not 0.0 < hours <= 24.0:
-        raise DesignError(f"duty.hours_a_day = {given!r} is out of range; allowed: above 0 h, at most 24 h")
+        raise DesignError(f"duty.hours_a_day = {shown(given)} is out of range; allowed: above 0 h, at most 24 h")
     return hours
 
 
@@ -188,7 +191,7 @@ def _life(given: Any, hours_a_day: float) -> dict[str, float]:
     in_hours = {"h": 1.0, "years": year, "year": year, "days": hours_a_day, "day": hours_a_day}
     value = parse_quantity("criteria.life", given, "Mcycles", {**units_of("Mcycles"), **in_hours})
     if not value > 0.0:
-        raise DesignError(f"criteria.life = {given!r} is out of range; allowed: above 0")
+        raise DesignError(f"criteria.life = {shown(given)} is out of range; allowed: above 0")
     return {"hours" if given.rpartition(" ")[2] in in_hours else "life": value}
 
 
@@ -201,7 +204,7 @@ def _tolerances(values: Mapping[str, Any], machine: Machine) -> dict[str, Tolera
         relative = isinstance(given, str) and given.strip().endswith("%")
         value = parse_quantity(f"tolerances.{key}", given, "-" if relative else fields[key].unit)
         if not value > 0.0:
-            raise DesignError(f"tolerances.{key} = {given!r} is out of range; allowed: above 0")
+            raise DesignError(f"tolerances.{key} = {shown(given)} is out of range; allowed: above 0")
         tolerances[key] = Tolerance(value, relative=relative)
     return tolerances
 
@@ -231,7 +234,7 @@ def _costs(values: Mapping[str, Any], machine: Machine) -> dict[str, float]:
 def _series_size(values: Mapping[str, Any]) -> int:
     size = values.get("series", SERIES_SIZE)
     if isinstance(size, bool) or not isinstance(size, int) or not 8 <= size <= 4096:
-        raise DesignError(f"series = {size!r} is out of range; allowed: whole numbers from 8 to 4096")
+        raise DesignError(f"series = {shown(size)} is out of range; allowed: whole numbers from 8 to 4096")
     return size
 
 
