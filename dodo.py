@@ -207,6 +207,8 @@ def task_picture():
     """Pictures of the rattling beam, of an agent at work, of the trade-off and of the extremes."""
     rattle = "benchmarks/documentation/rattle.py"
     yield task("rattle", [rattle], ["docs/rattle.gif"], "python -m benchmarks.documentation.rattle docs/rattle.gif")
+    used = ["thesis/figures/type_two.py", "thesis/scorecard/candidates.json"]
+    yield task("type-two", used, ["docs/type-two.png"], "python -m thesis.figures.type_two C docs/type-two.png")
     play = "chaosgym run-agent chaosgym/ImpactBeamTolerance-v1 --machine 13 --out docs/agent.gif"
     yield task("agent", [*TASKS, *LEARNED], ["docs/agent.gif"], play)
     curves, drawn = "docs/data/training.csv", "docs/training.png"

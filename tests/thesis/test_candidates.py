@@ -42,7 +42,7 @@ def test_a_file_of_a_search_and_a_name_are_both_read(tmp_path):
     file = tmp_path / "result.json"
     file.write_text(json.dumps({"parameters": dict(candidates()["A"]["parameters"])}))
     assert read_candidate(str(file)) == read_candidate("A")
-    code, _, err = run("scorecard", "--beam", "C", module="thesis")
+    code, _, err = run("scorecard", "--beam", "Z", module="thesis")
     assert code == 2
     assert "neither a file nor one of A, B" in err
 

@@ -18,7 +18,11 @@ LARGEST_FILE = 1_000_000
 
 @cache
 def candidates() -> Mapping[str, Mapping[str, Any]]:
-    """Candidates by name: "parameters" of the beam, and how it was found."""
+    """Candidates by name: how it was "found", its "parameters", and verdict and value of every statement, measured too.
+
+    The journal of their search is ``candidates_journal.jsonl``: basin, generation, shares of the ranges, objective and
+    costs of each candidate.
+    """
     found: Mapping[str, Mapping[str, Any]] = json.loads(KEPT.read_text(encoding="utf-8"))
     return found
 
