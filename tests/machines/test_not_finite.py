@@ -20,7 +20,7 @@ from chaosgym import SliderCrank
 from chaosgym.core import status
 from chaosgym.core.cycle import Episode
 from chaosgym.core.tangent import no_tangents
-from chaosgym.machines.slider_crank.kernels.exact import advance
+from chaosgym.core.binned.cycle import advance
 
 crank = SliderCrank(fidelity="draft")
 model, state = crank.reduce(), np.zeros(crank.n_states)
