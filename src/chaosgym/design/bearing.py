@@ -21,6 +21,7 @@ from chaosgym.design.reliability import (
 from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
+from chaosgym.machines.numbers import shown
 from chaosgym.machines.parameters import parameter, validate
 
 _STEEL = "hardened steel, surface endurance strength 2.76 HB - 70 MPa at 600 HB (Shigley)"
@@ -114,7 +115,7 @@ def variation_region(
         If ``region`` is not 1 or 2, or wear is to be considered and the clearance has no tolerance.
     """
     if region not in (1, 2):
-        raise ParameterError(f"region = {region!r} is out of range; allowed: 1 or 2 tolerances")
+        raise ParameterError(f"region = {shown(region)} is out of range; allowed: 1 or 2 tolerances")
     if wear and machine.clearance_field not in tolerances:
         raise ParameterError(f"wear needs a tolerance of {machine.clearance_field}")
     factors = {name: 2 if wear and name == machine.clearance_field else region for name in tolerances}

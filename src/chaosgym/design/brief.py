@@ -133,7 +133,7 @@ def brief_from(values: Mapping[str, Any]) -> DesignBrief:
 
 def _machine(name: Any) -> Any:
     if name not in MACHINES:
-        raise DesignError(f"machine = {name!r} does not exist; {MACHINES.listed(name)}")
+        raise DesignError(f"machine = {shown(name)} does not exist; {MACHINES.listed(name)}")
     return MACHINES[name]()
 
 
@@ -142,7 +142,7 @@ def _known(where: str, given: Iterable[str], known: Iterable[str], homes: Mappin
     for key in given:
         if key not in known:
             home = f"; it belongs into {homes[key]}" if homes and key in homes else suggestion(key, known)
-            raise DesignError(f"{where} has no key {key!r}{home}")
+            raise DesignError(f"{where} has no key {shown(key)}{home}")
 
 
 def _homes(machine: Machine | None = None) -> dict[str, str]:
