@@ -9,7 +9,6 @@ import pytest
 ROOT = Path(__file__).parent.parent
 
 STALE: dict[str, str] = {
-    "page:scorecard": "IBS-060 counts; the page is made with the constants of the beam that the search found",
     "page:commands": "diagnose prints signs of chaos and offers --test two-step; sweeps have a column two_step",
 }
 """Artefacts known to be stale, and why they still are. An entry goes with the commit that makes the artefact anew."""
