@@ -11,7 +11,7 @@ import numpy as np
 
 from chaosgym.diagnosis import TYPES, default_tolerances
 from chaosgym.errors import DatasetError
-from chaosgym.files import contents, write_atomically
+from chaosgym.files import contents, first_line, write_atomically
 from chaosgym.machines.parameters import changes_of, parameters_of
 from chaosgym.sweeps.dataset import DAMAGE, DATA_FILE, LabelledSweep, read_sweep
 from chaosgym.sweeps.folder import CHUNK_FOLDER, LARGEST_PLAN, PLAN_FILE, read_plan_file
@@ -44,7 +44,7 @@ def dataset_info(folder: str | Path) -> dict[str, Any]:
     try:
         plan = SweepPlan.from_settings(settings)
     except DAMAGE as error:
-        raise DatasetError(f"{folder / PLAN_FILE} is damaged: {type(error).__name__}: {error}") from error
+        raise DatasetError(f"{folder / PLAN_FILE} is damaged: {type(error).__name__}: {first_line(error)}") from error
     kept = {path.name for path in (folder / CHUNK_FOLDER).glob("*.parquet")}
     rows = sum(len(chunk) for chunk in plan.chunks() if f"{chunk.start:012d}.parquet" in kept)
     return {
