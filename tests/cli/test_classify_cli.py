@@ -259,4 +259,4 @@ def test_shipped_classifier_judges_a_simulated_record():
         assert code == 0
         answer = json.loads(out)
         assert answer["irregular"] is irregular
-        assert answer["nature"] == ("chaotic" if irregular else "periodic")
+        assert answer["nature"] == ("undetermined" if irregular else "periodic")

@@ -476,3 +476,10 @@ def test_a_beam_that_does_not_touch_is_periodic():
     verdict = two_step_test(simulate(ImpactBeam(clearance=0.1), 60, transient=200))
     assert (verdict.nature, verdict.period) == ("periodic", 1)
     assert "no contact" in verdict.reason
+
+
+def test_a_series_that_looks_random_is_warned_of():
+    """The test is for exact series: normal noise is chaotic to it, and the reason warns; not so of the logistic map."""
+    noise = 100.0 + 6.0 * np.random.default_rng(0).normal(size=500)
+    assert "for measured readings use judge_peaks" in two_step_test(noise).reason
+    assert "judge_peaks" not in two_step_test(logistic(3.9, 500)).reason

@@ -128,11 +128,9 @@ def two_step_test(
         return _undetermined(evidence, "does not repeat")
     section = x.section if isinstance(x, CycleRecord) else samples
     verdict = _step_two(series, section, evidence, sensor_error)
-    if verdict.nature == "chaotic" and not isinstance(x, CycleRecord):
-        evidence["looks_random"] = all(looks_random(column) for column in series)
-        if evidence["looks_random"]:
-            warning = "; but no reading can be forecast from those before: for measured readings use judge_peaks"
-            verdict = replace(verdict, reason=verdict.reason + warning)
+    if verdict.nature == "chaotic" and not isinstance(x, CycleRecord) and all(map(looks_random, series)):
+        warning = "; but no reading can be forecast from those before: for measured readings use judge_peaks"
+        verdict = replace(verdict, reason=verdict.reason + warning)
     longest = (len(samples) - len(samples) // 2) // NOISY_REPEATS
     if verdict.nature == "undetermined" and sensor_error > 0.0 and longest < max_period:
         hint = f"; with a sensor error {len(samples)} cycles show periods up to {max(1, longest)} only"
