@@ -164,7 +164,7 @@ SIMULATE = ("simulate", "impact-beam")
     [
         ((*SIMULATE, "--clearance-mm", "-1"), "--clearance-mm = -1 is out of range; allowed: 0 to 1000 mm"),
         ((*SIMULATE, "--frequency-hz", "0"), "--frequency-hz = 0 is out of range; allowed: 0.001 to 10000 Hz"),
-        ((*SIMULATE, "--frequency-hz", "nan"), "--frequency-hz = nan is out of range"),
+        ((*SIMULATE, "--frequency-hz", "nan"), "--frequency-hz = 'nan Hz' is no finite number"),
         ((*SIMULATE, "--frequency-hz", "fast"), "'fast' is not a valid float"),
         ((*SIMULATE, "--set", "lenth=1"), "did you mean length?"),
         ((*SIMULATE, "--set", "length=-1"), "length = -1 m is out of range; allowed: 0.01 to 10 m"),
