@@ -3,13 +3,13 @@
 import statistics
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any, NamedTuple
 from unittest.mock import patch
 
 import numpy as np
 
-from chaosgym.core.compilation import call
+from chaosgym.core.compilation import call, call_side_by_side
 from chaosgym.machines import Machine, batch
 from chaosgym.machines.slider_crank import run
 from chaosgym.simulation import CycleRecord, Integrator, simulate
@@ -74,17 +74,26 @@ class KernelTime:
 
     seconds = 0.0
 
-    def call(self, kernel: Any, *arguments: Any) -> Any:
-        """Call a kernel and count its time."""
-        start = time.thread_time()
-        result = call(kernel, *arguments)
-        self.seconds += time.thread_time() - start
-        return result
+    def counted(self, call: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a way to call kernels that counts their time."""
+
+        def counting(*arguments: Any) -> Any:
+            start = time.thread_time()
+            result = call(*arguments)
+            self.seconds += time.thread_time() - start
+            return result
+
+        return counting
 
 
 @contextmanager
 def kernel_time() -> Iterator[KernelTime]:
     """Count the time of these kernels meanwhile."""
     spent = KernelTime()
-    with patch.object(batch, "call", spent.call), patch.object(run, "call", spent.call):
+    side_by_side = spent.counted(call_side_by_side)
+    with ExitStack() as patched:
+        for module in (batch, run):
+            patched.enter_context(patch.object(module, "call_side_by_side", side_by_side))
+            if hasattr(module, "call"):
+                patched.enter_context(patch.object(module, "call", spent.counted(call)))
         yield spent

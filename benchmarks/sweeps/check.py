@@ -1,7 +1,7 @@
 """Rows of a dataset labelled again: does it still say what this installation computes?
 
-The same packages on the same kind of processor give the same bits. Elsewhere the last bit of a sine differs, which a
-chaotic response amplifies, and a few rows near a boundary change their nature.
+The same sources and packages on the same kind of processor give the same bits. Elsewhere the last bit of a sine
+differs, which a chaotic response amplifies, and a few rows near a boundary change their nature.
 """
 
 import random
@@ -16,8 +16,8 @@ from chaosgym.sweeps.dataset import LabelledSweep
 from chaosgym.sweeps.label import provenance
 from chaosgym.sweeps.run import relabel
 
-SOURCES = ("commit", "physics")
-"""Entries of a provenance that say which sources ran; a dataset should outlive their changes."""
+SOURCES = ("commit",)
+"""Entries of a provenance that move no bit: ``physics`` is the digest of the sources that do."""
 
 SAME_NATURE = 0.96
 """Least share of natures that must be equal on another platform."""
@@ -37,7 +37,7 @@ class Check:
     identical, same_nature
         How many agree bit for bit, and how many in their nature.
     same_platform
-        Whether the dataset was computed with these packages on this kind of processor.
+        Whether the dataset was computed by these sources, with these packages, on this kind of processor.
     """
 
     rows: tuple[int, ...]

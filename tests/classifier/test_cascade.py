@@ -157,8 +157,11 @@ def test_a_machine_of_ones_own_is_judged_by_proofs_and_by_its_forces():
     assert (calm.nature, calm.centre.proven, calm.response_type) == ("periodic", True, "I")
     beam = read_machine(PUBLISHED / "moon-shaw-1983.toml")
     general = classifier_for(beam)
-    wild = general.classify(beam).centre
-    assert (wild.nature, wild.proven, wild.cycles) == ("chaotic", False, 128)
+    near = [
+        general.classify(beam.at(share * beam.speed), types=False).centre for share in (0.99, 0.995, 1.0, 1.002, 1.005)
+    ]
+    assert {(wild.plausible, wild.proven, wild.cycles) for wild in near} == {(("chaotic",), False, 128)}
+    assert [wild.nature for wild in near].count("chaotic") >= 3
     assert general.classify(beam, budget_us=0.0, types=False).abstained
     with pytest.raises(ModelFileError, match="diagnose --peaks"):
         general.classify_record(np.ones(20))

@@ -139,14 +139,14 @@ def test_simulated_series_are_read_back(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("diagnose", "--peaks", "-", "--sensor-error", "inf"), "finite, 0 or more"),
+        (("diagnose", "--peaks", "-", "--sensor-error", "inf"), "is no finite number"),
         (("diagnose", "--peaks", "-", "--sensor-error", "3 m"), "unknown unit 'm' (allowed: N, kN"),
-        (("diagnose", "impact-beam", "--sensor-error", "inf"), "finite, 0 or more"),
+        (("diagnose", "impact-beam", "--sensor-error", "inf"), "is no finite number"),
         (("diagnose", "--peaks", "-", "--hz", "20"), "--hz belongs to --series"),
         (("diagnose", "--peaks", "-", "--series", "-"), "exclude each other"),
         (("diagnose", "--peaks", "-", "--sensor-error", "1", "--sensor-sigma", "1"), "given twice"),
         (("diagnose", "--column", "upper"), "belong to --peaks or --series"),
-        (("classify", "impact-beam", "--peaks", "-", "--sensor-error", "nan"), "finite, 0 or more"),
+        (("classify", "impact-beam", "--peaks", "-", "--sensor-error", "nan"), "is no finite number"),
         (("diagnose", "--series", "-"), "no time column; use --rate-hz"),
         (
             ("simulate", "impact-beam", "--clearance-mm", "0.1 furlong"),

@@ -253,7 +253,7 @@ def test_bad_calls_are_named() -> None:
     with pytest.raises(ParameterError, match="leaves sub-environments without a job"):
         envs.reset(options={"reset_mask": np.array([True, False])})
     envs.reset(seed=0)
-    for bad in (np.zeros(2), np.zeros(3, int), np.full(2, 7)):
+    for bad in (np.full(2, 0.5), np.zeros(3, int), np.full(2, 7)):
         with pytest.raises(ParameterError, match="action"):
             envs.step(bad)
     for options in (
