@@ -27,6 +27,15 @@ class Balance:
     through: float = 0.0
 
 
+def _dips(values, slopes, later, later_slopes, h):
+    """Which quantities fall below zero and rise again between two instants, by the cubic through both ends."""
+    shares = np.linspace(0.0, 1.0, 33)[:, None]
+    rest = 1.0 - shares
+    path = rest**2 * (values * (1.0 + 2.0 * shares) + slopes * h * shares)
+    path += shares**2 * (later * (1.0 + 2.0 * rest) - later_slopes * h * rest)
+    return (slopes < 0.0) & (later_slopes > 0.0) & (path.min(axis=0) < 0.0)
+
+
 class _Regime:
     """Steps of h / 2^k in one regime, and the integrals of work and dissipation over them."""
 
@@ -167,7 +176,9 @@ class Referee:
                 ahead = regime.steps[k] @ z
                 values, middle = rows @ ahead, rows @ (regime.steps[min(k + 1, HALVINGS - 1)] @ z)
                 fallen = ((values < 0.0) | (middle < 0.0)) & ~waits
-                if k == HALVINGS - 1 or not fallen.any():
+                dips = _dips(rows @ z, rows @ (regime.a @ z), values, rows @ (regime.a @ ahead), regime.h / 2**k)
+                below = waits & ((values <= 0.0) | (middle <= 0.0))
+                if k == HALVINGS - 1 or not (fallen | (dips & ~waits) | below).any():
                     break
                 k += 1
             work, loss = float(z @ regime.works[k] @ z), float(z @ regime.losses[k] @ z)
