@@ -1,0 +1,222 @@
+r"""Equations of small motions of a mechanism about its nominal motion, over the crank angle (thesis 2.2).
+
+With the compatibility matrix B of the gaps p, particles r_k of mass m_k and Phi_k = dr_k/dz B, all derivatives by the
+crank angle, which turns at the rate w:
+
+    M = sum m Phi^T Phi       D = C + 2 w sum m Phi^T Phi'       K = K_e + w^2 sum m Phi^T Phi'' + K_g
+    f = sum m Phi^T (w^2 r'' - g) - Phi^T F
+
+Bodies add their central inertia with the turn in place of the particle. (l, f) = A^-T (sum m dr/dz^T a - F) are the
+forces of the nominal motion in every joint, the drive's torque first. With them and the second derivatives of points
+and joints, the geometric stiffness is
+
+    K_g = B^T (sum m a . d2r - F . d2r - sum_c (l, f)_c d2c) B
+
+Derivatives by the angle are those of the Fourier series through a uniform grid. Where that is too coarse it is refined.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.mechanism.links import Link
+from chaosgym.machines.mechanism.mechanism import Force, Mechanism, Spring
+from chaosgym.machines.mechanism.nominal import Nominal, Revolution, nominal
+
+Array = NDArray[np.float64]
+
+TAIL = 1e-10
+"""Share of the largest term of a Fourier series that its last terms may have."""
+
+MOST_ANGLES = 4096
+"""Angles of a grid, at the most."""
+
+
+class SmallMotion(NamedTuple):
+    """Equations of small motions at B crank angles, by powers of the crank rate w; n coordinates.
+
+    Attributes
+    ----------
+    mass : (B, n, n)
+    damping : (2, B, n, n)
+    stiffness : (3, B, n, n)
+    load : (3, B, n)
+        f: what must be overcome, so that M p'' + D p' + K p = -f + contact forces.
+    torque : (3, B)
+        Torque of the drive in the nominal motion [N m].
+    """
+
+    mass: Array
+    damping: Array
+    stiffness: Array
+    load: Array
+    torque: Array
+
+
+def derivatives(values: Array) -> tuple[Array, Array]:
+    """First and second derivative by the crank angle of values (B, ...) on a uniform grid of a revolution."""
+    count = len(values)
+    k = np.arange(count // 2 + 1).reshape(-1, *[1] * (values.ndim - 1))
+    series = np.fft.rfft(values, axis=0)
+    first = 1j * k * series
+    if count % 2 == 0:
+        first[-1] = 0.0
+    return np.fft.irfft(first, count, axis=0), np.fft.irfft(-(k**2) * series, count, axis=0)
+
+
+def _tail(values: Array) -> float:
+    """Share of the last terms of the Fourier series of values (B, ...) in its largest one."""
+    series = np.abs(np.fft.rfft(values, axis=0))
+    return float(np.max(series[-max(2, len(values) // 24) :]) / max(np.max(series), 1e-300))
+
+
+def _angles(first: float, count: int) -> Array:
+    return np.asarray(first + np.arange(count) * (2.0 * np.pi / count), dtype=np.float64)
+
+
+def _smooth(mechanism: Mechanism, revolution: Revolution, first: float, count: int) -> tuple[Nominal, int]:
+    """Nominal motion on a uniform grid from ``first`` on that is a multiple of ``count`` angles, and that multiple."""
+    scale = np.ones(mechanism.size)
+    for own in mechanism.at.values():
+        scale[own.start + 2 : own.stop] = revolution.length
+    gaps = mechanism.size - len(mechanism.coordinates)
+    for times in (1, 2, 4, 8, 16, 32, 64):
+        if times > 1 and times * count > MOST_ANGLES:
+            break
+        theta = _angles(first, times * count)
+        found = nominal(mechanism, revolution, theta)
+        periodic = found.z - theta[:, None] * revolution.winding
+        # turns in radians, gaps in metres: both count by the length that they move a point
+        parts = [found.inverse[:, :, gaps:] * scale[:, None], periodic * scale]
+        if max(_tail(part) for part in parts if part.size) < TAIL:
+            return found, times
+    where = np.degrees(theta[int(np.argmax(found.condition))] % (2.0 * np.pi))
+    raise ParameterError(
+        f"the mechanism is near a change point at crank angle {where:.0f} deg, where it could go on in two ways; "
+        "allowed: dimensions further from it"
+    )
+
+
+def small_motion(mechanism: Mechanism, revolution: Revolution, first: float, count: int) -> SmallMotion:
+    """Equations at ``count`` crank angles (B,), a uniform grid of a revolution from ``first`` [rad] on.
+
+    Raises
+    ------
+    ParameterError
+        If the mechanism is near a change point.
+    """
+    found, times = _smooth(mechanism, revolution, first, count)
+    theta = _angles(first, times * count)
+    sums = _Sums(mechanism, revolution, found, theta)
+    for link in mechanism.links:
+        if len(link.mass):
+            sums.add_masses(link)
+        sums.add_elastic(link)
+    for force in mechanism.forces:
+        sums.add_force(force)
+    for spring in mechanism.springs:
+        sums.add_spring(spring)
+    sums.add_geometric()
+    return SmallMotion(
+        mass=sums.mass[::times],
+        damping=sums.damping[:, ::times],
+        stiffness=sums.stiffness[:, ::times],
+        load=np.einsum("kbz,bzn->kbn", sums.pull, sums.compatible)[:, ::times],
+        torque=np.einsum("bz,kbz->kb", found.inverse[:, :, 0], sums.pull)[:, ::times],
+    )
+
+
+class _Sums:
+    """What masses, springs and forces add, at B crank angles.
+
+    ``mass`` (B, n, n), ``damping`` (2, B, n, n), ``stiffness`` (3, B, n, n), ``pull`` (3, B, z) what the links resist
+    with in their own coordinates, ``bent`` (3, B, z, z) its derivative by the second derivatives of the points.
+    """
+
+    def __init__(self, mechanism: Mechanism, revolution: Revolution, found: Nominal, theta: Array) -> None:
+        self.mechanism, self.found, self.theta = mechanism, found, theta
+        self.winding = revolution.winding
+        n, size, count = len(mechanism.coordinates), mechanism.size, len(theta)
+        self.compatible = found.inverse[:, :, size - n :]
+        self.mass, self.damping = np.zeros((count, n, n)), np.zeros((2, count, n, n))
+        self.stiffness, self.pull = np.zeros((3, count, n, n)), np.zeros((3, count, size))
+        self.bent = np.zeros((3, count, size, size))
+
+    def add_masses(self, link: Link) -> None:
+        """Add the particles of a link and what turns with them."""
+        own = self.mechanism.at[link.name]
+        z, compatible, places = self.found.z[:, own], self.compatible[:, own], link.masses
+        gradient = places.gradient(z)
+        acceleration = derivatives(places.moved(z))[1]
+        gravity = np.broadcast_to(-np.asarray(self.mechanism.gravity), acceleration.shape)
+        weight = np.repeat(link.mass, 2)
+        motion = (gradient @ compatible[:, None]).reshape(len(z), len(weight), -1)
+        self._add_inertia(motion, motion * weight[:, None])
+        for power, each in ((0, gravity), (2, acceleration)):
+            pushed = link.mass[:, None] * each
+            self.pull[power][:, own] += np.einsum("bki,bkiz->bz", pushed, gradient)
+            self.bent[power][:, own, own] += places.bent(z, pushed)
+        if link.inertia.any():
+            row = np.hstack([np.ones((len(link.inertia), 1)), places.slope])
+            inertia = row.T @ (link.inertia[:, None] * row)
+            turns = self.found.z[:, own.start + 2] - self.theta * self.winding[own.start + 2]
+            spin = derivatives(turns)[1]
+            self._add_inertia(compatible[:, 2:], inertia @ compatible[:, 2:])
+            self.pull[2][:, own.start + 2 : own.stop] += spin[:, None] * inertia[0]
+
+    def _add_inertia(self, motion: Array, weighted: Array) -> None:
+        first, second = derivatives(motion)
+        back = np.swapaxes(weighted, -1, -2)
+        self.mass += back @ motion
+        self.damping[1] += 2.0 * back @ first
+        self.stiffness[2] += back @ second
+
+    def add_elastic(self, link: Link) -> None:
+        """Add stiffness and damping of the elastic coordinates of a link, which are the last of p."""
+        own = self.mechanism.at[link.name]
+        part = self.compatible[:, own.start + 3 : own.stop]
+        self.stiffness[0] += np.swapaxes(part, -1, -2) @ link.stiffness @ part
+        self.damping[0] += np.swapaxes(part, -1, -2) @ link.damping @ part
+
+    def add_force(self, force: Force) -> None:
+        """Add a force that acts whatever moves."""
+        vector = force.at(self.theta)
+        _, gradient = self.mechanism.point(self.found.z, force.point)
+        self.pull[0] -= np.einsum("bi,biz->bz", vector, gradient)
+        self.mechanism.add_bent(self.found.z, force.point, -vector, self.bent[0])
+
+    def add_spring(self, spring: Spring) -> None:
+        """Add a spring and damper between two points."""
+        z, mechanism = self.found.z, self.mechanism
+        apart, gradient = mechanism.apart(z, spring.first, spring.second)
+        length = np.linalg.norm(apart, axis=1)
+        if not np.all(length > 1e-9 * max(1.0, float(np.max(np.abs(apart))))):
+            where = np.degrees(self.theta[int(np.argmin(length))] % (2.0 * np.pi))
+            raise ParameterError(
+                f"the spring between {'.'.join(spring.first)} and {'.'.join(spring.second)} has no length at crank "
+                f"angle {where:.0f} deg; allowed: ends that never meet"
+            )
+        unit = apart / length[:, None]
+        slope = np.einsum("bi,biz->bz", unit, gradient)
+        bend = np.swapaxes(gradient, -1, -2) @ gradient - slope[:, :, None] * slope[:, None]
+        bend /= length[:, None, None]
+        mechanism.add_bent(z, spring.second, unit, bend)
+        mechanism.add_bent(z, spring.first, -unit, bend)
+        rate = derivatives(length)[0]
+        pulls = (spring.stiffness * (length - spring.free_length), spring.damping * rate)
+        for power, pulled in enumerate(pulls):
+            self.pull[power] += pulled[:, None] * slope
+            self.bent[power] += pulled[:, None, None] * bend
+        motion = np.einsum("bz,bzn->bn", slope, self.compatible)
+        change = derivatives(motion)[0]
+        self.stiffness[0] += spring.stiffness * motion[:, :, None] * motion[:, None]
+        self.damping[0] += spring.damping * motion[:, :, None] * motion[:, None]
+        self.stiffness[1] += spring.damping * motion[:, :, None] * change[:, None]
+
+    def add_geometric(self) -> None:
+        """Add the geometric stiffness of all that the others have pulled."""
+        forces = np.einsum("bzc,kbz->kbc", self.found.inverse, self.pull)
+        self.mechanism.add_bent_rows(self.found.z, -forces, self.bent)
+        self.stiffness += np.swapaxes(self.compatible, -1, -2) @ self.bent @ self.compatible

@@ -1,0 +1,149 @@
+r"""Links of a planar mechanism: where their points are, and how these move with the coordinates of the link.
+
+A link has coordinates z = (x, y, phi, q): the place of its frame on the ground, its turn, and elastic coordinates q, of
+which a rigid link has none. A point lies at
+
+    r = (x, y) + R(phi) (rho + N q + 1/2 q C q)
+
+with its place rho, shape N and curve C in the axes of the link. In the nominal motion q is zero.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+RIGID = 3
+"""Coordinates of a rigid link: two places and a turn."""
+
+_QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
+
+
+def rotation(angle: Array) -> Array:
+    """Turn of vectors by angles (...,) [rad]: (..., 2, 2)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)
+
+
+def quarter_after(turn: Array) -> Array:
+    """Derivative of a turn (..., 2, 2) by its angle."""
+    return np.asarray(turn @ _QUARTER)
+
+
+class Places(NamedTuple):
+    """k points of a link with e elastic coordinates.
+
+    Attributes
+    ----------
+    place : (k, 2)
+        In the axes of the link [m].
+    shape : (k, 2, e)
+        Motion per unit of each elastic coordinate.
+    slope : (k, e)
+        Turn [rad] per unit of each elastic coordinate.
+    curve : (k, 2, e, e)
+        Second derivative of the place by the elastic coordinates.
+    """
+
+    place: Array
+    shape: Array
+    slope: Array
+    curve: Array
+
+    def moved(self, z: Array) -> Array:
+        """Places on the ground (B, k, 2) at coordinates z (B, 3 + e), whose elastic ones are zero."""
+        return np.asarray(z[:, None, :2] + self.place @ np.swapaxes(rotation(z[:, 2]), -1, -2))
+
+    def gradient(self, z: Array) -> Array:
+        """Derivatives of the places by the coordinates, (B, k, 2, 3 + e)."""
+        turn, (count, _, elastic) = rotation(z[:, 2]), self.shape.shape
+        gradient = np.zeros((len(z), count, 2, RIGID + elastic))
+        gradient[:, :, 0, 0] = gradient[:, :, 1, 1] = 1.0
+        gradient[..., 2] = self.place @ np.swapaxes(quarter_after(turn), -1, -2)
+        gradient[..., RIGID:] = turn[:, None] @ self.shape
+        return gradient
+
+    def bent(self, z: Array, force: Array) -> Array:
+        """Second derivatives of the places times forces (..., B, k, 2), summed over the points: (..., B, z, z)."""
+        turn, size = rotation(z[:, 2]), RIGID + self.shape.shape[2]
+        own = force @ turn
+        bent = np.zeros((*force.shape[:-2], size, size))
+        bent[..., 2, 2] = -np.einsum("...ki,ki->...", own, self.place)
+        bent[..., 2, RIGID:] = np.einsum("...ki,kie->...e", force @ quarter_after(turn), self.shape)
+        bent[..., RIGID:, 2] = bent[..., 2, RIGID:]
+        bent[..., RIGID:, RIGID:] = np.einsum("...ki,kief->...ef", own, self.curve)
+        return bent
+
+
+def fixed(place: Array, elastic: int = 0) -> Places:
+    """Points (k, 2) that stand still in a link with some elastic coordinates."""
+    place = np.asarray(place, dtype=float).reshape(-1, 2)
+    shape = np.zeros((len(place), 2, elastic))
+    return Places(place, shape, np.zeros((len(place), elastic)), np.zeros((*shape.shape, elastic)))
+
+
+def together(some: list[Places]) -> Places:
+    """Points of one link in a row."""
+    return Places(*(np.concatenate(parts) for parts in zip(*some, strict=True)))
+
+
+class Body(NamedTuple):
+    """A rigid body of a link: mass [kg], inertia about its own centre [kg m^2], and the centre [m]."""
+
+    mass: float
+    inertia: float = 0.0
+    centre: tuple[float, float] = (0.0, 0.0)
+
+
+class Link(NamedTuple):
+    """A link of a mechanism.
+
+    Attributes
+    ----------
+    name
+        How joints name it.
+    points
+        One point each, by name.
+    masses
+        Where its particles are.
+    mass, inertia : (k,)
+        Of each particle [kg], and what turns with it [kg m^2].
+    angle
+        Rough turn [rad] at crank angle 0: tells which way a loop is closed.
+    elastic
+        Names of the elastic coordinates.
+    stiffness, damping : (e, e)
+        Of the elastic coordinates.
+    """
+
+    name: str
+    points: Mapping[str, Places]
+    masses: Places
+    mass: Array
+    inertia: Array
+    angle: float = 0.0
+    elastic: tuple[str, ...] = ()
+    stiffness: Array = np.zeros((0, 0))
+    damping: Array = np.zeros((0, 0))
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return RIGID + len(self.elastic)
+
+
+def rigid_link(
+    name: str, points: Mapping[str, tuple[float, float]], bodies: tuple[Body, ...] = (), angle: float = 0.0
+) -> Link:
+    """Return a link that neither bends nor stretches; points [m] and bodies in its axes, ``angle`` [rad]."""
+    return Link(
+        name,
+        {point: fixed(np.array(place)) for point, place in points.items()},
+        fixed(np.array([body.centre for body in bodies]).reshape(-1, 2)),
+        np.array([body.mass for body in bodies], dtype=float),
+        np.array([body.inertia for body in bodies], dtype=float),
+        angle,
+    )

@@ -1,0 +1,213 @@
+"""Nominal motion of a mechanism: where its links are at every crank angle while every gap stays in its middle.
+
+From rough angles of the links at crank angle 0 the loops are closed by Newton's method. Steps along the tangent, each
+corrected, follow the closed loops through a revolution; all angles that are asked for then start from cubics through
+these steps.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.mechanism.mechanism import Mechanism
+
+Array = NDArray[np.float64]
+
+STEP, SHORTEST = 2.0 * np.pi / 24, 1e-4
+"""Longest and shortest step of the crank [rad]."""
+
+FAR = 0.25
+"""Correction of a step, in rad or in lengths of the mechanism, beyond which it is tried anew with half the length."""
+
+CLOSED, ROUNDING = 1e-9, 1e-13
+"""Last correction of coordinates of closed loops that is admitted, and one that needs no more."""
+
+WORST = 1e9
+"""Condition number of the loops' equations beyond which they are singular."""
+
+TRIES = 40
+
+
+class Nominal(NamedTuple):
+    """Nominal motion at B crank angles.
+
+    ``z`` (B, size) coordinates of all links, ``inverse`` (B, size, size) of A = dc/dz, ``condition`` (B,) of A.
+    """
+
+    z: Array
+    inverse: Array
+    condition: Array
+
+
+def _degrees(theta: float) -> str:
+    return f"{np.degrees(theta) % 360.0:.1f} deg"
+
+
+class _Loops:
+    """The functions of a mechanism, in lengths of its own."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism, self.length = mechanism, _length_of(mechanism)
+        lengths = np.ones(mechanism.size)
+        for own in mechanism.at.values():
+            lengths[own.start : own.start + 2] = self.length
+        self.scale = lengths
+
+    def solve(self, z: Array, theta: Array, tries: int = TRIES) -> tuple[Array, float]:
+        """Coordinates (B, z) by Newton's method, and the last correction."""
+        last = np.inf
+        for _ in range(tries):
+            before = last
+            value, slope = self.mechanism.functions(z, theta)
+            try:
+                step = np.linalg.solve(slope * self.scale, value[..., None])[..., 0]
+            except np.linalg.LinAlgError:
+                return z, np.inf
+            last = float(np.max(np.abs(step)))
+            if not np.isfinite(last):
+                return z, np.inf
+            z = z - self.scale * step / max(1.0, last)
+            if last < ROUNDING or (last < CLOSED and last >= before):
+                break
+        return z, last
+
+    def tangent(self, z: Array, theta: Array) -> Array:
+        """Derivatives (B, z) of the coordinates by the crank angle."""
+        _, slope = self.mechanism.functions(z, theta)
+        drive = np.zeros((len(z), self.mechanism.size, 1))
+        drive[:, 0] = 1.0
+        return np.asarray(np.linalg.solve(slope, drive)[..., 0])
+
+
+def _length_of(mechanism: Mechanism) -> float:
+    """Largest distance [m] of two points of a link, or of the ground."""
+    sets = [np.array(list(mechanism.ground.values()), dtype=float).reshape(-1, 2)]
+    sets += [np.array([p.place[0] for p in link.points.values()]).reshape(-1, 2) for link in mechanism.links]
+    lengths = [float(np.max(np.linalg.norm(some[:, None] - some, axis=-1), initial=0.0)) for some in sets]
+    return max(lengths) or 1.0
+
+
+def _refuse_singular(loops: _Loops, z: Array, theta: float) -> None:
+    """Refuse functions that depend on each other: the count is right, and yet two joints hold the same motion."""
+    mechanism = loops.mechanism
+    slope = mechanism.functions(z, np.array([theta]))[1][0] * loops.scale
+    left, sizes, _ = np.linalg.svd(slope)
+    if sizes[-1] > sizes[0] / WORST:
+        return
+    weight = np.abs(left[:, -1])
+    names = ["the drive", *map(str, mechanism.rows())]
+    involved = [name for name, share in zip(names, weight, strict=False) if share > 0.1 * weight.max()]
+    raise ParameterError(
+        f"at crank angle {_degrees(theta)} the mechanism can't move, or moves in two ways: {', '.join(involved)} "
+        "depend on each other; allowed: joints that hold different motions, away from a dead centre"
+    )
+
+
+def _start(loops: _Loops) -> Array:
+    """Coordinates (1, z) at crank angle 0 near the rough angles of the links."""
+    mechanism, theta = loops.mechanism, np.zeros(1)
+    z = np.zeros((1, mechanism.size))
+    places = []
+    for link in mechanism.links:
+        own = mechanism.at[link.name].start
+        z[0, own + 2] = link.angle
+        places += [own, own + 1]
+    value, slope = mechanism.functions(z, theta)
+    z[0, places] -= np.linalg.lstsq(slope[0][:, places], value[0], rcond=None)[0]
+    found, last = loops.solve(z, theta)
+    if last > CLOSED:
+        _refuse_singular(loops, z, 0.0)
+        value, _ = mechanism.functions(found, theta)
+        names = ["the drive", *map(str, mechanism.rows())]
+        worst = [name for name, gap in zip(names, np.abs(value[0]), strict=False) if gap > 0.3 * np.abs(value[0]).max()]
+        raise ParameterError(
+            f"the loop does not close at crank angle 0: {', '.join(worst)} stay apart by "
+            f"{np.abs(value[0]).max():.3g} m or rad; allowed: lengths that reach, and angles of the links "
+            "that are roughly right there"
+        )
+    _refuse_singular(loops, found, 0.0)
+    return found
+
+
+class Revolution(NamedTuple):
+    """Steps of the nominal motion through a revolution.
+
+    ``theta`` (s,) crank angles from 0 to 2 pi, ``z`` and ``tangent`` (s, size) coordinates and their derivatives,
+    ``winding`` (size,) turns of each coordinate in a revolution, ``length`` [m] of the mechanism.
+    """
+
+    theta: Array
+    z: Array
+    tangent: Array
+    winding: Array
+    length: float
+
+
+def revolution_of(mechanism: Mechanism) -> Revolution:
+    """Follow the closed loops through a revolution of the crank.
+
+    Raises
+    ------
+    ParameterError
+        If a loop does not close, the crank can't turn, or the mechanism does not come back; says where.
+    """
+    loops = _Loops(mechanism)
+    angles, places = [0.0], [_start(loops)]
+    tangents = [loops.tangent(places[0], np.zeros(1))]
+    step = STEP
+    while angles[-1] < 2.0 * np.pi:
+        end = min(angles[-1] + step, 2.0 * np.pi)
+        theta = np.array([end if 2.0 * np.pi - end > 0.1 * SHORTEST else 2.0 * np.pi])
+        guess = places[-1] + (theta - angles[-1]) * tangents[-1]
+        z, last = loops.solve(guess, theta, 12)
+        if last > CLOSED or np.max(np.abs(z - guess) / loops.scale) > FAR * min(1.0, 4.0 * step / STEP):
+            step *= 0.5
+            if step < SHORTEST:
+                raise ParameterError(
+                    f"the crank can't turn beyond {_degrees(angles[-1])}: the loop does not close there; allowed: "
+                    "lengths with which it turns right round"
+                )
+            continue
+        angles.append(float(theta[0]))
+        places.append(z)
+        tangents.append(loops.tangent(z, theta))
+        step = min(2.0 * step, STEP)
+    drift = places[-1][0] - places[0][0]
+    turns = np.zeros(mechanism.size)
+    for own in mechanism.at.values():
+        turns[own.start + 2] = np.round(drift[own.start + 2] / (2.0 * np.pi))
+    if np.max(np.abs(drift - 2.0 * np.pi * turns) / loops.scale) > 1e-6:
+        raise ParameterError(
+            "the mechanism does not come back after a revolution of the crank: its links pass a dead centre; allowed: "
+            "a motion that repeats with every revolution"
+        )
+    return Revolution(
+        np.array(angles), np.concatenate(places), np.concatenate(tangents), turns[: mechanism.size], loops.length
+    )
+
+
+def nominal(mechanism: Mechanism, revolution: Revolution, theta: Array) -> Nominal:
+    """Nominal motion at crank angles (B,) [rad] of a revolution.
+
+    Raises
+    ------
+    ParameterError
+        If a loop does not close to rounding, or is singular there.
+    """
+    loops, where = _Loops(mechanism), np.mod(theta, 2.0 * np.pi)
+    at = np.clip(np.searchsorted(revolution.theta, where, side="right") - 1, 0, len(revolution.theta) - 2)
+    begin, span = revolution.theta[at], np.diff(revolution.theta)[at]
+    x, h = ((where - begin) / span)[:, None], span[:, None]
+    z0, z1, d0, d1 = (part[k] for part in (revolution.z, revolution.tangent) for k in (at, at + 1))
+    z = z0 * (1 + 2 * x) * (1 - x) ** 2 + z1 * x**2 * (3 - 2 * x) + h * (d0 * x * (1 - x) ** 2 - d1 * x**2 * (1 - x))
+    z, last = loops.solve(z, where, 8)
+    slope = mechanism.functions(z, where)[1]
+    condition = np.linalg.cond(slope * loops.scale)
+    if last > CLOSED or not np.all(condition < WORST):
+        worst = float(where[int(np.argmax(condition))])
+        raise ParameterError(
+            f"the loop is singular at crank angle {_degrees(worst)}: the mechanism is at a dead centre"
+        )
+    return Nominal(z, np.asarray(np.linalg.inv(slope)), np.asarray(condition))
