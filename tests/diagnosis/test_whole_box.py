@@ -22,6 +22,30 @@ LONGEST_REVOLUTION = 20_000
 SLOW = {"excitation_frequency": 0.1}
 OVERDAMPED = {"excitation_frequency": 2.0, "damping_ratio": 1.0}
 STILL = {"force_amplitude": 0.0}
+SLOW_PAIR = {
+    "height": 1e-4,
+    "length": 10.0,
+    "force_position": 10.0,
+    "density": 4575.999023514545,
+    "youngs_modulus": 1e8,
+    "width": 1.0,
+    "n_modes": 14,
+    "fitted_modes": 4,
+    "reduction": "free",
+    "shaker_mass": 1000.0,
+    "shaker_stiffness": 428061124.6336942,
+    "shaker_damping": 1.0,
+    "damping_ratio": 100.0,
+    "damping_family": "beam",
+    "pivot_rotational_stiffness": 0.0,
+    "pivot_translational_stiffness": 59874.14171519782,
+    "contact_stiffness": 1e12,
+    "contact_damping": 1e6,
+    "clearance": 3.266814324024429e-09,
+    "excitation_frequency": 1e-3,
+    "force_amplitude": 0.0,
+}
+"""Among its motions are two equally slow ones, which round-off makes a pair."""
 LAST = {"length": 0.01, "force_position": 0.005, "damping_ratio": 100.0, "excitation_frequency": 1e4}
 
 
@@ -59,6 +83,7 @@ def test_what_dies_within_a_cycle_is_a_certified_period(fields):
 @settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
 @example(fields=STILL)
 @example(fields=LAST)
+@example(fields=SLOW_PAIR)
 @given(fields=box(ImpactBeam))
 def test_a_diagnosis_anywhere_in_the_box_of_the_beam(fields):
     """Every value that JSON can hold, or a named error; never a bare exception."""

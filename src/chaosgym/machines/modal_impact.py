@@ -143,7 +143,8 @@ def _add_damped(
             "1 by a millionth or more"
         )
     resting = int(np.sum(np.linalg.eigvalsh(stiffness) < NEGLIGIBLE * scale**2)) if rigid else 0
-    values[np.argsort(np.abs(values))[:resting]] = 0.0
+    slowest = np.argsort(np.abs(values))[:resting]
+    values[slowest[values[slowest].imag == 0.0]] = 0.0
     vectors = np.concatenate([basis @ vectors[:n], basis @ vectors[n:]])
     turning = [i for i in np.argsort(np.abs(values)) if values[i].imag > 0.0]
     decaying = [i for i in np.argsort(np.abs(values)) if values[i].imag == 0.0]
