@@ -48,6 +48,11 @@ def is_clock(values: Array) -> bool:
     return is_counter(values) or (steady and float(np.max(steps)) < 20.0 * float(steps.mean()))
 
 
+def _counts(values: Array) -> bool:
+    """Whether values are whole numbers in steps of one."""
+    return is_counter(values) and bool(values[1] - values[0] == 1.0 and values[0] == round(float(values[0])))
+
+
 def force_names(recording: Recording) -> list[str]:
     """Columns that could be forces: those with a unit of force, or else those that nothing speaks against."""
     known = [name for name, unit in recording.units.items() if unit in FORCES]
@@ -126,15 +131,17 @@ def _force(recording: Recording, name: str, unit: str | None) -> Signal:
     if written and written not in FORCES:
         told = f"allowed: {', '.join(FORCES)}" if unit else f"give its unit with --unit ({', '.join(FORCES)})"
         raise DiagnosisError(f"{recording.source}: column {name!r} is in {written}, no unit of force; {told}")
-    if is_counter(values):
+    if is_counter(values[np.isfinite(values)]):
         raise DiagnosisError(f"{recording.source}: column {name!r} rises in equal steps and can't be a force")
     shown = f"{written}" if written else "taken as N"
     described = f"{recording.source}: {recording.form}, column {name!r} ({shown}), {len(values)} readings"
+    if missing := int(np.count_nonzero(~np.isfinite(values))):
+        described += f", {missing} of them missing, the first in {recording.where(int(np.argmin(np.isfinite(values))))}"
     return Signal(values * FORCES[written or "N"], name, described)
 
 
 def check_peaks(signal: Signal, recording: Recording) -> Array:
-    """Peaks [N] of a column.
+    """Peaks [N] of a column, without those that are missing.
 
     Raises
     ------
@@ -147,16 +154,21 @@ def check_peaks(signal: Signal, recording: Recording) -> Array:
             f"{recording.source}, {recording.where(int(low[0]))}: {signal.values[low[0]]:g} N is a negative force; "
             "allowed: 0 N and more, one peak a cycle"
         )
-    return signal.values
+    return signal.values[np.isfinite(signal.values)]
 
 
-def choose_time(recording: Recording) -> Signal | None:
-    """Time stamps [s], if a column holds them: by its unit, its name, or as the one that rises like a clock."""
+def choose_time(recording: Recording, *, told: bool = False) -> Signal | None:
+    """Time stamps [s], if a column holds them: by its unit, its name, or as the one that rises like a clock.
+
+    With ``told`` only those that unit or name tell. A column that counts one by one is no clock.
+    """
     fits = [name for name in recording.columns if recording.units.get(name, "") in TIMES]
     fits += [name for name in recording.columns if re.search(r"time|zeit|temps|stamp", name, re.IGNORECASE)]
-    if len(recording.columns) > 1:
+    if len(recording.columns) > 1 and not told:
         fits += [
-            name for name in recording.columns if is_clock(recording.columns[name]) and not recording.units.get(name)
+            name
+            for name, values in recording.columns.items()
+            if is_clock(values) and not recording.units.get(name) and not _counts(values)
         ]
     if not fits:
         return None
@@ -196,12 +208,12 @@ def sampling(recording: Recording, size: int, rate_hz: float | None = None) -> S
     DiagnosisError
         If there is neither, or the stamps fall, or their steps differ by more than rounding.
     """
+    stamps = None if rate_hz is not None else choose_time(recording, told=recording.rate_hz is not None)
     rate = rate_hz if rate_hz is not None else recording.rate_hz
-    if rate is not None:
+    if rate is not None and stamps is None:
         if not (math.isfinite(rate) and rate > 0.0):
             raise DiagnosisError(f"rate = {rate:g} Hz is out of range; allowed: above 0")
         return Sampling(np.arange(size) / rate, 1.0 / rate, ())
-    stamps = choose_time(recording)
     if stamps is None:
         raise DiagnosisError(
             f"{recording.source} has no time column; use --rate-hz, or name the time column 'time [s]'"

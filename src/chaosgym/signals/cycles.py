@@ -140,7 +140,7 @@ def cycle_peaks(
     Parameters
     ----------
     value : (n,)
-        The signal.
+        The signal; a cycle with a sample that is not finite is left out.
     instants
         Its sampling.
     period
@@ -153,6 +153,7 @@ def cycle_peaks(
     DiagnosisError
         If a cycle has fewer than 8 samples, or the series is shorter than one cycle.
     """
+    missing, value = ~np.isfinite(value), _filled(value)
     notes, condition = [f"missing samples: {gap}" for gap in instants.gaps], ""
     if starts is not None:
         cycle = float(np.mean(np.diff(starts)))
@@ -177,12 +178,19 @@ def cycle_peaks(
         first = instants.time[0]
         starts = first + cycle * np.arange(int((instants.time[-1] + instants.step - first) / cycle * (1.0 + 1e-12)) + 1)
     starts = _shifted_to_quiet(value, instants.time, starts)
-    peaks, spread, dropped = _largest(value, instants, starts)
+    peaks, spread, dropped = _largest(np.where(missing, np.nan, value), instants, starts)
     if dropped:
         notes.append(f"{dropped} cycles left out: samples are missing")
     if len(peaks) == 0:
         raise DiagnosisError(f"the series holds no whole cycle of {cycle:g} s")
     return CyclePeaks(peaks, spread, cycle, tuple(notes), condition)
+
+
+def _filled(value: Array) -> Array:
+    """The signal with straight lines over what is missing."""
+    there = np.isfinite(value)
+    places = np.arange(len(value))
+    return value if there.all() else np.interp(places, places[there], value[there])
 
 
 def _check_cycle(cycle: float, instants: Sampling) -> None:
@@ -221,7 +229,8 @@ def _largest(value: Array, instants: Sampling, starts: Array) -> tuple[Array, fl
     peaks, opens = [], []
     dropped = 0
     for first, last, begin, end in zip(edges[:-1], edges[1:], starts[:-1], starts[1:], strict=True):
-        if last - first < max(1.0, FULL * (end - begin) / instants.step - 1.0):
+        whole = last - first >= max(1.0, FULL * (end - begin) / instants.step - 1.0)
+        if not whole or np.isnan(size[first:last]).any():
             dropped += 1
             continue
         top = int(first + np.argmax(size[first:last]))

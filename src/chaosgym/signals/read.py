@@ -1,7 +1,8 @@
 """Recorders' files as columns of numbers with names and units, whatever wrote them.
 
-CSV with any common delimiter, decimal comma, UTF-8 or UTF-16, comments and a line of units; Parquet, NumPy ``.npy``,
-MATLAB ``.mat``, WAV, and universal files (UFF 58, extra ``[uff]``). Formats are told by their first bytes.
+CSV with any common delimiter, decimal comma, UTF-8 or UTF-16, comments and a heading; Parquet, NumPy ``.npy``, MATLAB
+``.mat``, WAV; universal files (UFF 58, extra ``[uff]``); TDMS, MDF, HDF5, MATLAB 7.3, Excel and FLAC (extra
+``[recordings]``). Formats are told by their first bytes.
 """
 
 import hashlib
@@ -18,7 +19,9 @@ import pyarrow.csv
 from numpy.typing import NDArray
 
 from chaosgym.errors import DiagnosisError
-from chaosgym.signals.text import COMMENT, NUMBER, QUOTED, TORN, read_text, split_unit
+from chaosgym.signals import recorders
+from chaosgym.signals.heading import split_unit
+from chaosgym.signals.text import COMMENT, MOST_MISSING, NUMBER, QUOTED, TORN, read_text
 
 Array = NDArray[np.float64]
 
@@ -92,7 +95,7 @@ def read_recording(source: str | Path) -> Recording:
         raise DiagnosisError(f"{name} holds no numbers")
     for title, values in columns.items():
         bad = np.flatnonzero(~np.isfinite(values))
-        if len(bad) and title not in problems:
+        if len(bad) > MOST_MISSING * len(values) and title not in problems:
             lines = found.get("lines", ())
             place = f"line {lines[bad[0]]}" if len(lines) else f"reading {bad[0] + 1}"
             problems[title] = f"{place}: {str(values[bad[0]])!r} is not a finite number"
@@ -129,17 +132,16 @@ def _standard_input() -> bytes:
 
 def _reader(data: bytes) -> tuple[Any, str]:
     """Function that reads the bytes, and the name of the format."""
-    if data[:4] == b"PAR1":
-        return _parquet, "Parquet"
-    if data[:6] == b"\x93NUMPY":
-        return _numpy, "NumPy"
-    if data[:4] in (b"RIFF", b"RIFX"):
-        return _wav, "WAV"
     if data[:6] == b"MATLAB":
-        return _matlab, "MATLAB"
+        return recorders.matlab, "MATLAB"
+    if data[:4] in (b"RIFF", b"RIFX"):
+        return recorders.wav, "WAV"
+    if data[:4] == b"PK\x03\x04":
+        return lambda workbook: read_text(recorders.excel(workbook)), "Excel"
     if data[:80].split(b"\n")[0].strip() == b"-1":
         return _universal, "UFF"
-    return read_text, "CSV"
+    known = {b"PAR1": (_parquet, "Parquet"), b"\x93NUMPY": (_numpy, "NumPy"), **recorders.READERS}
+    return next((reader for first, reader in known.items() if data.startswith(first)), (read_text, "CSV"))
 
 
 def _parquet(data: bytes) -> dict[str, Any]:
@@ -148,6 +150,11 @@ def _parquet(data: bytes) -> dict[str, Any]:
     table = pq.read_table(io.BytesIO(data))
     columns, units = {}, {}
     for column in table.schema:
+        if pa.types.is_timestamp(column.type):
+            stamps = table.column(column.name).to_numpy()
+            columns[column.name] = (stamps - stamps[0]) / np.timedelta64(1, "s")
+            units[column.name] = "s"
+            continue
         if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
             continue
         values = table.column(column.name).cast(pa.float64()).to_numpy(zero_copy_only=False)
@@ -173,33 +180,6 @@ def _numpy(data: bytes) -> dict[str, Any]:
     if array.dtype.names:
         return {"columns": {name: np.asarray(array[name], dtype=float) for name in array.dtype.names}}
     return {"columns": _numbered(array), "named": False}
-
-
-def _matlab(data: bytes) -> dict[str, Any]:
-    from scipy.io import loadmat
-
-    found = loadmat(io.BytesIO(data))
-    columns: dict[str, Array] = {}
-    for name, value in found.items():
-        if (
-            name.startswith("__")
-            or not isinstance(value, np.ndarray)
-            or value.dtype.kind not in "fiu"
-            or value.size < 2
-        ):
-            continue
-        parts = _numbered(np.squeeze(value))
-        columns |= (
-            {name: next(iter(parts.values()))} if len(parts) == 1 else {f"{name} {k}": v for k, v in parts.items()}
-        )
-    return {"columns": columns}
-
-
-def _wav(data: bytes) -> dict[str, Any]:
-    from scipy.io import wavfile
-
-    rate, samples = wavfile.read(io.BytesIO(data))
-    return {"columns": _numbered(samples), "rate_hz": float(rate), "named": False, "form": f"WAV, {rate} Hz"}
 
 
 def _universal(data: bytes) -> dict[str, Any]:
