@@ -8,6 +8,7 @@ Needs the extra [offline]. With MINARI_DATASETS_PATH=minari, `minari.load_datase
 
 import argparse
 import os
+import shutil
 from pathlib import Path
 
 import gymnasium as gym
@@ -15,6 +16,7 @@ from tqdm import trange
 
 from chaosgym.control.policies import load_policy
 from chaosgym.envs import environment
+from chaosgym.files import made_whole
 
 
 def main() -> None:
@@ -26,14 +28,22 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, default=Path("minari"))
     asked = parser.parse_args()
-    asked.out.mkdir(parents=True, exist_ok=True)
-    os.environ["MINARI_DATASETS_PATH"] = str(asked.out.resolve())
-    from minari import DataCollector  # it looks for the folder when it is imported
-
     behaviour = asked.policy.name if asked.policy else "random"
     name = f"chaosgym/{Path(asked.env).stem.removesuffix('-v1')}/{behaviour}-v1"
     if (asked.out / name).exists():
         raise SystemExit(f"{asked.out / name} exists; choose another folder with --out")
+    with made_whole(asked.out / name) as folder:
+        _export(asked, name, behaviour, folder)
+    print(f"{name}: {asked.jobs} jobs in {asked.out}")
+
+
+def _export(asked: argparse.Namespace, name: str, behaviour: str, folder: Path) -> None:
+    """Write the dataset into a folder, by way of one in which Minari keeps its datasets."""
+    store = folder / "minari"
+    store.mkdir()
+    os.environ["MINARI_DATASETS_PATH"] = str(store.resolve())
+    from minari import DataCollector  # it looks for the folder when it is imported
+
     policy = load_policy(asked.policy) if asked.policy else None
     env = gym.make(environment(asked.env), **(policy.keywords if policy else {}))
     env.action_space.seed(asked.seed)
@@ -55,7 +65,9 @@ def main() -> None:
         description=f"{asked.jobs} jobs of {asked.env} from seed {asked.seed}, {behaviour}",
     )
     collector.close()
-    print(f"{name}: {asked.jobs} jobs in {asked.out}")
+    for part in (store / name).iterdir():
+        part.rename(folder / part.name)
+    shutil.rmtree(store)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,18 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import ChaosgymError, DatasetError, UnfinishedError
-from chaosgym.files import array_of, claimed, contents, held, is_empty, parquet_of, toml_of, unpacked, write_atomically
+from chaosgym.files import (
+    array_of,
+    claimed,
+    contents,
+    held,
+    is_empty,
+    made_whole,
+    parquet_of,
+    toml_of,
+    unpacked,
+    write_atomically,
+)
 
 HOLD = """
 import sys, time
@@ -63,6 +74,25 @@ def test_a_folder_is_held_by_one_process(tmp_path):
     assert is_empty(tmp_path)
     with held(tmp_path):
         assert not list(tmp_path.glob(".*.tmp"))
+
+
+def test_a_folder_is_whole_or_not_there(tmp_path):
+    """What a killed process left of it is gone with the next one; a failure leaves nothing; what is there stays."""
+    half = tmp_path / ".out.chaosgym.tmp"
+    (half / "deep").mkdir(parents=True)
+    (half / "deep" / "half").write_text("half")
+    with pytest.raises(OSError, match="disk full"), made_whole(tmp_path / "out"):
+        raise OSError("disk full")
+    assert list(tmp_path.iterdir()) == []
+    (half / "deep").mkdir(parents=True)
+    (tmp_path / "out").mkdir()
+    with made_whole(tmp_path / "out") as folder:
+        (folder / "a").write_text("whole")
+        assert is_empty(tmp_path / "out")
+    assert [path.relative_to(tmp_path).as_posix() for path in sorted(tmp_path.rglob("*"))] == ["out", "out/a"]
+    with pytest.raises(DatasetError, match="exists and is no empty folder"), made_whole(tmp_path / "out"):
+        pass
+    assert (tmp_path / "out" / "a").read_text() == "whole"
 
 
 def test_arrays_are_what_was_saved():

@@ -1,9 +1,11 @@
-"""kill -9 at random moments: the same command again, as often as it takes, ends with the result of an undisturbed run.
+"""kill -9 and SIGTERM at random moments: the same command again ends with the result of an undisturbed run.
 
 Each command is first run undisturbed, which says how long it takes. Then it is started again and again in another
-folder and killed at moments drawn over that time, and at last left alone. ``CHAOSGYM_KILLS=20`` kills it more often.
+folder and killed at moments drawn over that time, every third time by SIGTERM, and at last left alone.
+``CHAOSGYM_KILLS=30`` kills it twenty times by SIGKILL and ten by SIGTERM.
 """
 
+import json
 import os
 import random
 import signal
@@ -16,7 +18,7 @@ import pyarrow.parquet as pq
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MOMENTS = int(os.environ.get("CHAOSGYM_KILLS", "2"))
+MOMENTS = int(os.environ.get("CHAOSGYM_KILLS", "3"))
 """Kills of each command; each takes half a run of it."""
 
 SWEEP = "impact-beam --axis excitation_frequency=10:30 --axis clearance=5e-5:2e-4 --sobol 1200 --seed 2 --budget 100"
@@ -29,6 +31,33 @@ CROSSES = (
 )
 
 
+SMALL = "--envs 16 --rollout 60 --batch 240 --every 960"
+SCRIPTS = {
+    "ppo": TRAIN,
+    "recurrent_ppo": f"--env {BEAM} --steps 2880 {SMALL}",
+    "constrained_ppo": f"--env {BEAM} --steps 3840 {SMALL}",
+    "sac": f"--env {BEAM} --steps 1600 --envs 16 --every 800 --gradient-steps 1",
+}
+LEARNED = (
+    "impact-beam --axis excitation_frequency=4:30:log --axis clearance=2e-5:2e-4:log --sobol 600 --seed 5 "
+    "--budget 200 --signals 1"
+)
+BRIEF = """machine = "impact-beam"
+series = 8
+[parameters]
+excitation_frequency = "8 Hz"
+[tolerances]
+excitation_frequency = "2 %"
+clearance = "5 %"
+[criteria]
+load_rating = "300 N"
+life = "2000 Mcycles"
+reliability = 0.999
+[changes]
+clearance = ["0.0635 mm"]
+"""
+
+
 def _sweep(out):
     return f"-m chaosgym sweep {SWEEP} --out {out}"
 
@@ -37,8 +66,8 @@ def _rows(out):
     return pq.read_table(out / "sweep.parquet").to_pylist()
 
 
-def _training(out):
-    return f"{ROOT / 'agents' / 'ppo.py'} {TRAIN} --out {out}"
+def _training(script):
+    return lambda out: f"{ROOT / 'agents' / script}.py {SCRIPTS[script]} --out {out}"
 
 
 def _policy(out):
@@ -82,9 +111,61 @@ def _dataset(out):
     return pq.read_table(out / "data" / "sweep.parquet").to_pylist(), card
 
 
+def _commands(*commands, unless):
+    """Program that runs one command line after another, and nothing once a file is there."""
+    return [
+        "-c",
+        f"import os, sys; from subprocess import run; os.path.exists({str(unless)!r}) or "
+        f"[run([sys.executable, *words], check=True) for words in {list(commands)!r}]",
+    ]
+
+
+def _classifier(out):
+    sweep = ["-m", "chaosgym", "sweep", *LEARNED.split(), "--out", f"{out}/data"]
+    train = ["-m", "chaosgym", "train-classifier", "--data", f"{out}/data", "--out", f"{out}/learned"]
+    return _commands(sweep, train, unless=out / "learned")
+
+
+def _learned(out):
+    report = json.loads((out / "learned" / "report.json").read_text())
+    del report["training_seconds"]
+    return report, [(out / "learned" / name).read_bytes() for name in ("CARD.md", "classifier.npz")]
+
+
+def _design(out):
+    (out / "brief.toml").write_text(BRIEF)
+    return f"-m chaosgym design {out}/brief.toml --out {out}/report.html --overwrite"
+
+
+def _report(out):
+    return json.loads((out / "report.json").read_text()), (out / "report.html").read_text().replace(str(out), "OUT")
+
+
+def _minari(out):
+    name = out / "minari" / "chaosgym" / "ImpactBeamTolerance" / "random-v1"
+    return _commands([str(ROOT / "agents" / "export_minari.py"), "--jobs", "20", "--out", f"{out}/minari"], unless=name)
+
+
+def _jobs_of_minari(out):
+    program = (
+        "import hashlib, minari; h = hashlib.sha256()\n"
+        "for e in minari.load_dataset('chaosgym/ImpactBeamTolerance/random-v1'):\n"
+        "    [h.update(a.tobytes()) for a in (e.observations, e.actions, e.rewards, e.terminations)]\n"
+        "print(h.hexdigest())"
+    )
+    where = {**os.environ, "MINARI_DATASETS_PATH": str(out / "minari")}
+    return subprocess.run([sys.executable, "-c", program], env=where, check=True, capture_output=True, text=True).stdout
+
+
 WORK = {
     "a sweep": (_sweep, _rows),
-    "training": (_training, _policy),
+    "training": (_training("ppo"), _policy),
+    "training of recurrent PPO": (_training("recurrent_ppo"), _policy),
+    "training under a constraint": (_training("constrained_ppo"), _policy),
+    "training of SAC": (_training("sac"), _policy),
+    "a classifier": (_classifier, _learned),
+    "a design": (_design, _report),
+    "a dataset of Minari": (_minari, _jobs_of_minari),
     "a calibration": (_calibration, _constants),
     "an evaluation": (_comparison, _jobs),
     "a dataset with its card": (_pipeline, _dataset),
@@ -110,15 +191,17 @@ def test_a_killed_command_ends_as_an_undisturbed_one(kind, tmp_path):
     assert _start(command, tmp_path / "undisturbed").wait() == 0
     duration = time.monotonic() - began
     moments, killed = random.Random(kind), 0
-    for _ in range(MOMENTS):
+    for moment in range(MOMENTS):
         process = _start(command, tmp_path / "killed")
         try:
             process.wait(moments.uniform(0.0, duration))
         except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            killed += process.wait() == -signal.SIGKILL
+            how = signal.SIGTERM if moment % 3 == 2 else signal.SIGKILL
+            os.killpg(process.pid, how)
+            killed += process.wait() == -how
         else:
             assert process.returncode == 0, (tmp_path / "log").read_text()[-2000:]
+    print(f"{kind}: ended {killed} of {MOMENTS} times within {duration:.0f} s")
     assert killed > 0
     assert _start(command, tmp_path / "killed").wait() == 0, (tmp_path / "log").read_text()[-2000:]
     assert result(tmp_path / "killed") == result(tmp_path / "undisturbed")

@@ -7,6 +7,7 @@ their bytes and a bound on the unpacked size allow. Tables are CSV or Parquet by
 import io
 import math
 import os
+import shutil
 import stat
 import tomllib
 import zipfile
@@ -158,6 +159,34 @@ def held(folder: Path, *inner: str) -> Iterator[None]:
         raise UnfinishedError(
             f"another process writes into {folder}; wait until it ends, or choose another folder"
         ) from None
+
+
+@contextmanager
+def made_whole(folder: str | Path) -> Iterator[Path]:
+    """Another folder to fill, which takes the name once that is done; what a killed process left of it is removed.
+
+    Raises
+    ------
+    DatasetError
+        If something is under the name already, but for an empty folder.
+    UnfinishedError
+        If another process makes the same folder.
+    """
+    target = claimed(folder, what="empty folder")
+    begun = target.with_name(f".{target.name}.{OWN_END}")
+    with held(begun):
+        for left in begun.iterdir():
+            if left.name != LOCK_FILE:
+                shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
+        try:
+            yield begun
+        except BaseException:
+            shutil.rmtree(begun, ignore_errors=True)
+            raise
+    (begun / LOCK_FILE).unlink(missing_ok=True)
+    if target.is_dir():
+        shutil.rmtree(target)  # empty, but for what ``is_empty`` overlooks
+    os.replace(begun, target)
 
 
 def claimed(folder: str | Path, *marks: str, what: str) -> Path:

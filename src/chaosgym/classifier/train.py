@@ -27,7 +27,6 @@ from chaosgym.classifier.features import MAX_CYCLES, MIN_CYCLES
 from chaosgym.classifier.machine_classifier import IRREGULAR, NATURE, MachineClassifier
 from chaosgym.diagnosis.stroboscopic import irregularity
 from chaosgym.errors import DatasetError
-from chaosgym.files import write_atomically
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import LabelledSweep
 from chaosgym.version import __version__
@@ -120,10 +119,8 @@ class TrainingResult:
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
         self.classifier.save(target / "classifier.npz")
-        text = json.dumps(self.report, indent=1)
-        write_atomically(target / "report.json", lambda temporary: temporary.write_text(text + "\n"))
-        card = "\n".join(card_lines(self.classifier.card)) + "\n"
-        write_atomically(target / "CARD.md", lambda temporary: temporary.write_text(card))
+        (target / "report.json").write_text(json.dumps(self.report, indent=1) + "\n", encoding="utf-8")
+        (target / "CARD.md").write_text("\n".join(card_lines(self.classifier.card)) + "\n", encoding="utf-8")
 
 
 def train_classifier(sweep: LabelledSweep, seed: int = 0, *, progress: bool = False) -> TrainingResult:

@@ -225,18 +225,17 @@ def train_classifier(data: tuple[str, ...], out: str, seed: int, as_json: bool) 
     """Train the classifier on a sweep and judge it on machines held out (needs the extra [learn])."""
     from chaosgym.classifier.train import report_table
     from chaosgym.classifier.train import train_classifier as train
+    from chaosgym.files import made_whole
     from chaosgym.sweeps import read_sweep
 
-    target = Path(out)
-    if target.exists() and (not target.is_dir() or any(target.iterdir())):
-        raise click.UsageError(f"--out {out} exists already and is not an empty folder; choose another one")
-    if not target.absolute().parent.is_dir():
+    if not Path(out).absolute().parent.is_dir():
         raise click.UsageError(f"--out {out} lies in a folder that does not exist")
     reports = {}
-    for folder in data:
-        trained = train(read_sweep(folder), seed, progress=True)
-        name = trained.classifier.machine.name
-        trained.save(target / name if len(data) > 1 else target)
-        reports[name] = trained.report
+    with made_whole(out) as target:
+        for folder in data:
+            trained = train(read_sweep(folder), seed, progress=True)
+            name = trained.classifier.machine.name
+            trained.save(target / name if len(data) > 1 else target)
+            reports[name] = trained.report
     result = {"out": out, **(reports if len(data) > 1 else next(iter(reports.values())))}
     emit(result, as_json, lambda: [line for name, report in reports.items() for line in (name, *report_table(report))])
