@@ -44,7 +44,8 @@ def test_the_page_runs(tmp_path, monkeypatch, capsys):
         if kind == "python":
             exec(compile(text, "own-machine.md", "exec"), names)
         elif kind == "toml":
-            Path("arm2.toml" if "[[joint]]" in text else "arm.toml").write_text(text)
+            name = "servo" if "arcmin" in text else "arm2" if "[[joint]]" in text else "arm"
+            Path(f"{name}.toml").write_text(text)
         else:
             for line in text.strip().splitlines():
                 command, _, target = line.partition(" > ")
@@ -53,7 +54,9 @@ def test_the_page_runs(tmp_path, monkeypatch, capsys):
                 if target:
                     Path(target).write_text(result.stdout)
                 if "diagnose" in command:
-                    assert re.search(r"arm2?.toml: (periodic|quasiperiodic|chaotic|undetermined)", result.stdout)
+                    assert re.search(
+                        r"(arm2?|servo).toml: (period|quasiperiodic|chaotic|undetermined)", result.stdout
+                    )
     assert "Type" in Path("report.html").read_text()
     assert Path("overlay.png").stat().st_size > 10_000
     assert 20.0 < names["arm"].natural_frequencies[0] < 25.0

@@ -396,9 +396,7 @@ def test_a_base_that_is_moved_for_good_changes_nothing(machine_file):
 
 WORDS = {
     "friction": ([("preload = ", "friction = ")], "friction does not fit"),
-    "torque": ([("force = ", "torque = ")], "m for rad, N for N m"),
-    "a unit of torque": ([('"4 N"', '"4 N m"')], "m for rad, N for N m"),
-    "a unit of angle": ([('"0.15 mm"', '"1 arcmin"')], "m for rad, N for N m"),
+    "torque": ([("force = ", "torque = ")], "forces in N m, springs in N m/rad"),
     "a random drive": ([("force = ", "psd = ")], "repeats with every cycle"),
     "backlash": ([('clearance = "0.15', 'backlash = "0.15')], "clearance is half the gap"),
     "flow": ([("preload = ", "flow_velocity = ")], "forces that depend on the motion"),

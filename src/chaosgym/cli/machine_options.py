@@ -17,7 +17,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines import FILE_ENDING, MACHINES
 from chaosgym.machines.machine import Choice, Number, Option
 
-BASE = {"mm": "m"}
+BASE = {"mm": "m", "arcmin": "rad"}
 """Unit of the field behind an option, where it is another than the option's."""
 
 

@@ -1,7 +1,8 @@
 """Quantities as they are written, a number and a unit such as ``0.127 mm``: a bare number invites a wrong guess.
 
 Each unit of a field has its alternatives and what one of them is in the field's own unit. A frequency of a cycle and a
-rotation differ by 60, never by 2 pi. Units that are not listed are written as the field states them. µ is u.
+rotation differ by 60, never by 2 pi. Units that are not listed are written as the field states them. µ is u, and
+N·m, N*m, Nm and N m are one, as are m², m2 and m^2.
 """
 
 import math
@@ -28,8 +29,52 @@ ALTERNATIVES: Mapping[str, Mapping[str, float]] = {
     "Mcycles": {"Mcycles": 1.0, "cycles": 1e-6},
     "deg": {"deg": 1.0},
     "-": {"": 1.0, "%": 1e-2},
+    "rad": {
+        "rad": 1.0,
+        "mrad": 1e-3,
+        "deg": math.pi / 180.0,
+        "arcmin": math.pi / 10_800.0,
+        "arcsec": math.pi / 648_000.0,
+    },
+    "N m": {
+        "N m": 1.0,
+        "kN m": 1e3,
+        "mN m": 1e-3,
+        "N mm": 1e-3,
+        "N cm": 1e-2,
+        "lbf ft": 1.3558179483314,
+        "lbf in": 0.1129848290276,
+    },
+    "N m/rad": {
+        "N m/rad": 1.0,
+        "kN m/rad": 1e3,
+        "MN m/rad": 1e6,
+        "N mm/rad": 1e-3,
+        "N m/deg": 180.0 / math.pi,
+        "N m/arcmin": 10_800.0 / math.pi,
+    },
+    "N m s/rad": {"N m s/rad": 1.0, "mN m s/rad": 1e-3, "N mm s/rad": 1e-3, "N m s/deg": 180.0 / math.pi},
+    "rad/(N m)": {"rad/(N m)": 1.0, "deg/(N m)": math.pi / 180.0, "arcmin/(N m)": math.pi / 10_800.0},
+    "kg m^2": {"kg m^2": 1.0, "kg cm^2": 1e-4, "kg mm^2": 1e-6, "g cm^2": 1e-7, "g mm^2": 1e-9, "t m^2": 1e3},
+    "rad/s^2": {"rad/s^2": 1.0, "deg/s^2": math.pi / 180.0},
+    "kg^-1/2 m^-1": {"kg^-1/2 m^-1": 1.0},
+    "kg^1/2 m": {"kg^1/2 m": 1.0},
 }
 """By unit of a field: the units that are understood, and their size."""
+
+TURNING: Mapping[str, str] = {
+    "m": "rad",
+    "N": "N m",
+    "N/m": "N m/rad",
+    "N s/m": "N m s/rad",
+    "m/N": "rad/(N m)",
+    "kg": "kg m^2",
+    "kg m": "kg m^2",
+    "m/s^2": "rad/s^2",
+    "kg^-1/2": "kg^-1/2 m^-1",
+    "kg^1/2": "kg^1/2 m",
+}
+"""By unit of what slides: the unit of the same quantity of what turns."""
 
 
 def units_of(unit: str) -> Mapping[str, float]:
@@ -143,13 +188,42 @@ def looks_like_millimetres(value: float, usual: float) -> bool:
     return usual != 0.0 and LOOKS_SCALED[0] < abs(value / usual) < LOOKS_SCALED[1]
 
 
+_SPELLINGS = {"\u00b5": "u", "\u03bc": "u", "\u00b7": " ", "*": " ", "\u00b2": "^2", "m2": "m^2", "Nm": "N m"}
+
+
+def unit_as_listed(written: str) -> str:
+    """A unit in the spelling of ``ALTERNATIVES``."""
+    for spelling, listed in _SPELLINGS.items():
+        written = written.replace(spelling, listed)
+    return " ".join(written.split())
+
+
+def turns(given: Any, unit: str) -> bool | None:
+    """Whether a quantity, or the first of a row, is of something that turns; None if its unit leaves that open.
+
+    Parameters
+    ----------
+    given
+        As for ``parse_quantity`` or ``parse_row``.
+    unit
+        Of a field of something that slides.
+    """
+    while isinstance(given, list) and given:
+        given = given[0]
+    if not isinstance(given, str) or unit not in TURNING:
+        return None
+    found = _ROW.fullmatch(given.strip())
+    written = unit_as_listed(found[2]) if found else ""
+    return True if written in units_of(TURNING[unit]) else False if written in units_of(unit) else None
+
+
 def _split(text: str) -> tuple[str, str]:
     """Number and unit: ``30 Hz`` and ``2%``."""
-    words = text.strip().replace("\u00b5", "u").replace("\u03bc", "u").split(maxsplit=1)
+    words = text.strip().split(maxsplit=1)
     if len(words) == 2:
-        return words[0], " ".join(words[1].split())
+        return words[0], unit_as_listed(words[1])
     word = words[0] if words else ""
     end = len(word)
     while end and not (word[end - 1].isdigit() or word[end - 1] == "."):
         end -= 1
-    return word[:end], word[end:]
+    return word[:end], unit_as_listed(word[end:])

@@ -19,10 +19,11 @@ from chaosgym.machines.modal_machine.archives import LARGEST, read_archive, read
 from chaosgym.machines.modal_machine.drive import KINDS, Drive
 from chaosgym.machines.modal_machine.jointed import Joint, machine_with_joints
 from chaosgym.machines.modal_machine.keys import REQUIRED, TABLES, checked_table, schema
-from chaosgym.machines.modal_machine.machine import ModalMachine
+from chaosgym.machines.modal_machine.machine import ModalMachine, clearance_option
 from chaosgym.machines.modal_machine.structure import BASE, Structure
+from chaosgym.machines.modal_machine.turning import turning_joints
 from chaosgym.machines.parameters import check_parameter, field_named, parameter, parameters_of, suggestion
-from chaosgym.machines.units import parse_quantity
+from chaosgym.machines.units import TURNING, parse_quantity
 
 FIELDS = {"stiffness": "contact_stiffness", "damping": "contact_damping"}
 """Fields of the machine by key of [joint], where they have other names."""
@@ -105,6 +106,8 @@ def _tables(values: Mapping[str, Any]) -> dict[str, Any]:
             data[path] = [checked_table(path, row) for row in rows]
         else:
             data[path] = checked_table(path, given) if path != "joint" else _joints(given)
+    for joint, moves in zip(data["joint"], turning_joints(values), strict=True):
+        joint["turns"] = moves
     return data
 
 
@@ -174,7 +177,7 @@ def _stated_of(joint: Mapping[str, Any], name: str, structure: Structure) -> dic
                 raise ParameterError(f"{name}.lower.{key} needs {name}.{key} above 0")
             stated[f"lower_{key}_factor"] = lower / above
     if not clearance >= 0.0:
-        raise ParameterError(f"{name}.clearance = {clearance:g} m is a gap of negative width; allowed: 0 or more")
+        raise ParameterError(f"{name}.clearance = {clearance:g} is a gap of negative width; allowed: 0 or more")
     return stated
 
 
@@ -220,6 +223,7 @@ def _with_one_joint(
     path: str,
 ) -> Any:
     stated = _stated_of(joint, "joint", structure)
+    turning = stated.pop("turns")
     fields: dict[str, Any] = {
         "modes": structure,
         "joint": stated.pop("at"),
@@ -227,10 +231,14 @@ def _with_one_joint(
         "definition": definition,
     }
     known = parameters_of(ModalMachine)
-    for field, value in {"speed": speed, **{FIELDS.get(name, name): value for name, value in stated.items()}}.items():
-        about = {**vars(known[field]), "provenance": "stated", "source": path}
-        fields[field] = parameter(check_parameter(ModalMachine, field, value), **about)
-    types = {**types, "usual_ranges": usual}
+    values = {"speed": speed, **{FIELDS.get(name, name): value for name, value in stated.items()}}
+    for field in known:
+        about = {**vars(known[field]), **({"provenance": "stated", "source": path} if field in values else {})}
+        if turning:
+            about["unit"] = TURNING.get(about["unit"], about["unit"])
+        fields[field] = parameter(values.get(field, getattr(ModalMachine, field)), **about)
+    options = {"--speed-hz": ModalMachine.options["--speed-hz"], **clearance_option("clearance", turning)}
+    types = {**types, "usual_ranges": usual, "turning": ("joint",) if turning else (), "options": options}
     annotations: dict[str, Any] = dict.fromkeys(fields, Any)
     annotations |= {name: ClassVar[Any] for name in types if not name.startswith("__")}
     namespace = {"__module__": __name__, "__annotations__": annotations, **fields, **types}

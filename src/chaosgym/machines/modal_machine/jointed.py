@@ -25,9 +25,10 @@ from chaosgym.machines.joint_sets import JointTables, PressedSets
 from chaosgym.machines.machine import Machine, Number, Option, refuse_fixed_steps
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, modal_drive
-from chaosgym.machines.modal_machine.machine import ModalMachine, rigid_note
+from chaosgym.machines.modal_machine.machine import ModalMachine, clearance_option, rigid_note, turning_note
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import parameter, parameters_of
+from chaosgym.machines.units import TURNING
 
 Array = NDArray[np.float64]
 
@@ -52,7 +53,8 @@ class Joint(NamedTuple):
 
     ``at`` is the point that moves in the gap, such as "tip", "-tip" or "pinion - wheel"; ``clearance`` [m] half the
     gap; ``stiffness`` [N/m] and ``damping`` [N s/m] of the upper stop, and factors of the lower one's; ``offset`` [m]
-    of the middle of the gap; ``stops`` "two" or "one"; ``preload`` [N] towards the upper stop.
+    of the middle of the gap; ``stops`` "two" or "one"; ``preload`` [N] towards the upper stop. ``turns`` says that m
+    is rad and N is N m.
     """
 
     at: str
@@ -64,6 +66,7 @@ class Joint(NamedTuple):
     lower_stiffness_factor: float = 1.0
     lower_damping_factor: float = 1.0
     preload: float = 0.0
+    turns: bool = False
 
 
 def _as_there(name: str) -> Any:
@@ -95,6 +98,9 @@ class JointedMachine(Machine):
     options: ClassVar[Mapping[str, Option]] = {"--speed-hz": Number("speed", "Hz")}
     places: ClassVar[Mapping[str, str]] = {}
     """Point that moves in the gap of each joint, by the joint's name."""
+
+    turning: ClassVar[tuple[str, ...]] = ()
+    """Names of joints that turn, as of ``ModalMachine``."""
 
     modes: Structure
     drives: tuple[Drive, ...] = field(default=())
@@ -182,8 +188,8 @@ class JointedMachine(Machine):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Modes that count as rigid."""
-        return tuple(filter(None, [rigid_note(self.natural_frequencies)]))
+        """What turns, and modes that count as rigid."""
+        return tuple(filter(None, [turning_note(self.turning), rigid_note(self.natural_frequencies)]))
 
     @property
     def n_states(self) -> int:
@@ -363,7 +369,9 @@ def machine_with_joints(
         if not name.isidentifier() or name.startswith("_"):
             raise ParameterError(f"joint name {name!r} is out of range; allowed: letters, digits and _, as in left_1")
         for what, same in FIELDS.items():
-            defaults[f"{name}_{what}"] = parameter(getattr(joint, what), **{**vars(known[same]), **about})
+            unit = known[same].unit
+            more = {**about, "unit": TURNING.get(unit, unit) if joint.turns else unit}
+            defaults[f"{name}_{what}"] = parameter(getattr(joint, what), **{**vars(known[same]), **more})
     own = parameters_of(JointedMachine)
     defaults["monitored"] = parameter(
         stated.pop("monitored", LARGEST), **{**vars(own["monitored"]), "choices": (LARGEST, *joints)}
@@ -380,8 +388,9 @@ def machine_with_joints(
         "usual_ranges": {"speed": usual["speed"], f"{first}_clearance": usual["clearance"]},
         "options": {
             "--speed-hz": Number("speed", "Hz"),
-            "--clearance-mm": Number(f"{first}_clearance", "mm", 1e-3),
+            **clearance_option(f"{first}_clearance", joints[first].turns),
         },
+        "turning": tuple(name for name, joint in joints.items() if joint.turns),
         **(namespace or {}),
     }
     hints = get_type_hints(JointedMachine)

@@ -9,7 +9,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_machine.drive import KINDS
 from chaosgym.machines.modal_machine.limits import hint, told_of
 from chaosgym.machines.numbers import shown
-from chaosgym.machines.units import parse_quantity, parse_row, units_of
+from chaosgym.machines.units import TURNING, parse_quantity, parse_row, turns, units_of
 
 
 class Key(NamedTuple):
@@ -132,23 +132,24 @@ def _told_value(name: str, given: Any, key: Key) -> Any:
         return _value(name, given, key)
     except ParameterError as error:
         _, found, unit = str(error).partition(" has the unknown unit '")
-        raise ParameterError(f"{error}{hint(unit.partition(chr(39))[0]) or _turns(unit) if found else ''}") from None
-
-
-def _turns(unit: str) -> str:
-    return hint("rad") if unit.partition("'")[0] in ("N m", "N m/rad", "N m s/rad", "kg m^2", "kg m2", "Nm") else ""
+        raise ParameterError(f"{error}{hint(unit.partition(chr(39))[0]) if found else ''}") from None
 
 
 def _value(name: str, given: Any, key: Key) -> Any:
+    unit = "kg^1/2" if name == "structure.shapes.base" else key.unit
+    moves = turns(given, unit)
+    if moves:
+        unit = TURNING[unit]
+    elif key is SHAPE and moves is None:
+        unit = "-"  # no unit, which modal masses allow
     if key.kind in ("row", "rows"):
-        unit = "kg^1/2" if name == "structure.shapes.base" else key.unit
         if key.kind == "rows":
             if not isinstance(given, list):
                 raise ParameterError(f"{name} = {shown(given)} is out of range; allowed: a list of rows")
             return [parse_row(name, row, unit) for row in given]
         return np.array(parse_row(name, given, unit))
     if key.kind == "quantity":
-        return parse_quantity(name, given, key.unit)
+        return parse_quantity(name, given, unit)
     kind: Any = {"text": str, "texts": list, "count": int, "flag": bool}[key.kind]
     if not isinstance(given, kind) or (key.kind == "count" and isinstance(given, bool)):
         what = {"text": "a text", "texts": "a list of texts", "count": "a whole number", "flag": "true or false"}
@@ -184,7 +185,7 @@ def _table_schema(path: str) -> dict[str, Any]:
 
 def _key_schema(path: str, key: Key) -> dict[str, Any]:
     text: dict[str, Any] = {"type": "string"}
-    number = [{"type": "number"}] if key.unit == "-" else []
+    number = [{"type": "number"}] if key.unit == "-" or key is SHAPE else []
     one = {"anyOf": [text, *number]} if number else text
     shapes: dict[str, Any] = {
         "quantity": one,
@@ -195,5 +196,6 @@ def _key_schema(path: str, key: Key) -> dict[str, Any]:
         "count": {"type": "integer"},
         "flag": {"type": "boolean"},
     }
-    about = key.about if key.unit == "-" else f"{key.about} [{', '.join(units_of(key.unit))}]"
+    listed = [*units_of(key.unit), *(units_of(TURNING[key.unit]) if key.unit in TURNING else ())]
+    about = key.about if key.unit == "-" else f"{key.about} [{', '.join(listed)}]"
     return {**shapes["quantity" if path in ("tolerances", "job") else key.kind], "description": about}

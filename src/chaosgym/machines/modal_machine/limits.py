@@ -4,7 +4,7 @@ from chaosgym.machines.parameters import suggestion
 
 PAGE = "docs/own-machine.md, 'What is modelled'"
 
-TURNS = "a machine that turns is written with m for rad, N for N m, N/m for N m/rad and kg for kg m^2"
+TURNS = "what turns has a gap in rad or arcmin, forces in N m, springs in N m/rad, masses in kg m^2, by the same keys"
 
 LIMITS = {
     "torque moment inertia rad arcmin": TURNS,

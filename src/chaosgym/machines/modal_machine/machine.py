@@ -77,6 +77,9 @@ class ModalMachine(ModalImpactMachine):
         "1000 times the drive": {"drive_level": 1e3},
     }
 
+    turning: ClassVar[tuple[str, ...]] = ()
+    """Names of joints that turn: their fields are in rad and N m, and "N" and "m" of a result mean these."""
+
     modes: Structure
     joint: str
     drives: tuple[Drive, ...] = field(default=())
@@ -142,7 +145,7 @@ class ModalMachine(ModalImpactMachine):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Modes that count as rigid, and digits that a static force costs."""
+        """What turns, modes that count as rigid, and digits that a static force costs."""
         hertz = self.frequency_factor * self.modes.angular_frequency / (2.0 * math.pi)
         model, far = self.structure, ""
         held = (model.stiffness > 0.0) & (model.tip_shape * model.static_force != 0.0)
@@ -153,7 +156,7 @@ class ModalMachine(ModalImpactMachine):
                 f"the static force would push a mode of {hertz[held][np.argmax(away)]:.3g} Hz {farthest:.2g} m away: "
                 f"positions are good to {ROUNDING * farthest:.1g} m only; write 0 Hz if the body is free"
             )
-        return tuple(note for note in (rigid_note(hertz), far) if note)
+        return tuple(note for note in (turning_note(self.turning), rigid_note(hertz), far) if note)
 
     def share_of_bound(self, states: Array, peak_force: Array) -> float:
         """Share of the bound of passivity: only the drive gives energy, and what a preload or offset has stored."""
@@ -170,6 +173,19 @@ class ModalMachine(ModalImpactMachine):
         stiffest, damper = float(np.max(model.contact_stiffness)), float(np.max(model.contact_damping))
         force = (math.sqrt(stiffest) + damper * float(np.linalg.norm(model.tip_shape))) * speed
         return max(float(np.max(np.sqrt(energy[1:]) / speed)), float(np.max(peak_force.max(axis=1) / force)))
+
+
+def turning_note(joints: tuple[str, ...]) -> str:
+    """What is to be said of joints that turn; empty if none does."""
+    who = "the joint turns" if joints == ("joint",) else f"joints that turn: {', '.join(joints)}"
+    return f"{who}; results write N for its N m and m for its rad (mm for mrad)" if joints else ""
+
+
+def clearance_option(field: str, turning: bool) -> dict[str, Option]:
+    """Short option of the clearance of a joint, in the unit that is usual for it."""
+    if turning:
+        return {"--clearance-arcmin": Number(field, "arcmin", math.pi / 10_800.0)}
+    return {"--clearance-mm": Number(field, "mm", 1e-3)}
 
 
 def rigid_note(hertz: Array) -> str:
