@@ -113,10 +113,10 @@ def check_page(browser, path, pictures):
 
 @needs_browser
 def test_report_opens_in_a_browser(answered, browser, tmp_path):
-    """A page of a study: no external request, no error, all seven figures."""
+    """A page of a study: no external request, no error, all nine figures."""
     path = tmp_path / "report.html"
     write_report(design_report(answered), answered.as_dict(), path)
-    check_page(browser, path, 7)
+    check_page(browser, path, 9)
 
 
 @needs_browser
@@ -156,8 +156,8 @@ def test_worked_example_of_the_documentation(chaotic):
     assert shown.keys() == given.keys() == {"fatigue life", "reliability", "load rating"}
     assert given == pytest.approx(shown, rel=0.1)
     assert chaotic.assessment.type == "III"
-    printed = re.search(r"cheapest change that meets all criteria: clearance = (\S+) ", page)
-    assert chaotic.improvement.best.changes["clearance"] == pytest.approx(float(printed[1]), rel=0.15)
+    printed = re.search(r"cheapest change that meets all criteria: clearance = (\S+) mm", page)
+    assert 1e3 * chaotic.improvement.best.changes["clearance"] == pytest.approx(float(printed[1]), rel=0.15)
 
 
 def test_examples_of_the_documentation():
@@ -168,10 +168,10 @@ def test_examples_of_the_documentation():
 @pytest.mark.slow
 @needs_browser
 def test_report_on_the_chaotic_beam_opens_in_a_browser(chaotic, browser, tmp_path):
-    """Type III has the running statistics as an eighth figure."""
+    """Type III has the running statistics as a tenth figure."""
     path = tmp_path / "report.html"
     write_report(design_report(chaotic), chaotic.as_dict(), path)
-    check_page(browser, path, 8)
+    check_page(browser, path, 10)
 
 
 def test_report_says_what_the_numbers_say(answered):
@@ -187,6 +187,19 @@ def test_report_says_what_the_numbers_say(answered):
     assert not re.search(r"<script|https?://", page)
 
 
+def test_a_load_collective_is_told_speed_by_speed():
+    """Life, types and damage of each speed stand in lines, page and JSON; the study does not contradict itself."""
+    text = CALM.replace("[criteria]", '[duty.speeds]\n"8 Hz" = "75 %"\n"12 Hz" = "25 %"\n[criteria]')
+    answer = study(brief_from(tomllib.loads(text.replace('["0.0635 mm"]', '["0.12 mm"]'))))
+    told = [line for line in answer.lines() if "of the time at" in line]
+    assert len(told) == 2
+    assert told[0].strip().startswith("75% of the time at 8 Hz: Type I")
+    values = answer.as_dict()
+    assert [part["speed"] for part in values["collective"]] == [8.0, 12.0]
+    assert sum(part["share_of_damage"] for part in values["collective"]) == pytest.approx(1.0)
+    assert told[0].strip() in design_report(answer)
+
+
 def test_numbers_lie_beside_the_report(answered, tmp_path):
     """The JSON file holds what the page shows."""
     page, numbers = write_report(design_report(answered), answered.as_dict(), tmp_path / "report.html")
@@ -197,6 +210,9 @@ def test_numbers_lie_beside_the_report(answered, tmp_path):
     assert values["improvement"]["best"]["verdict"] == "meets"
     assert len(values["series"]["largest_peak_N"]) == 8
     assert values["force_of_every_impact_N"] > 0.0
+    assert values["combination"]["types"]["I"]["share"] == 1.0
+    assert values["margins"]["nearest"] is None
+    assert {"5.3", "5.5.1"} < {one["section"] for one in values["guidelines"]}
     assert len(values["map"]["type"]) == len(values["map"]["speed"])
 
 
@@ -267,7 +283,7 @@ def test_a_date_and_the_brief_are_printed_if_given(answered):
     assert "2030-01-02" in page
     assert "# &lt;b&gt;" in page
     links = re.findall(r'href="#(\w+)"', page)
-    assert links == ["joint", "numbers", "assumed", "brief"]
+    assert links == ["guidelines", "combination", "joint", "numbers", "assumed", "brief"]
     assert all(f'id="{name}"' in page for name in links)
 
 

@@ -22,7 +22,7 @@ REQUIRED_CRITERIA = ("load_rating", "life", "reliability")
 
 SECTIONS = ("machine", "series", "parameters", "tolerances", "region", "duty", "criteria", "changes", "costs")
 
-DUTY = ("hours_a_day",)
+DUTY = ("hours_a_day", "speeds")
 
 DAYS_A_YEAR = 365.25
 
@@ -48,6 +48,8 @@ class DesignBrief:
         Cost weights by field.
     series_size
         Machines that represent the region.
+    duty
+        Share of the operating time by speed, in nominal speeds; empty for one speed.
     stated
         Names of the criteria that the brief states itself.
     """
@@ -58,6 +60,7 @@ class DesignBrief:
     changes: Mapping[str, tuple[float, ...]]
     costs: Mapping[str, float]
     series_size: int = SERIES_SIZE
+    duty: Mapping[float, float] = field(default_factory=dict)
     stated: tuple[str, ...] = field(default=())
 
 
@@ -115,6 +118,10 @@ def brief_from(values: Mapping[str, Any]) -> DesignBrief:
         for key, given in _section(values, "parameters", fields, machine).items()
     }
     machine = with_settings(machine, settings)
+    duty = _speeds(values, machine, machine.speed_field in settings)
+    if duty and machine.speed_field not in settings:
+        machine = machine.at(max(duty, key=lambda speed: duty[speed]))
+    nominal = getattr(machine, machine.speed_field)
     region = _section(values, "region", ("tolerances", "wear"), machine)
     wear = region.get("wear", False)
     if not isinstance(wear, bool):
@@ -127,6 +134,7 @@ def brief_from(values: Mapping[str, Any]) -> DesignBrief:
         changes=_changes(values, machine),
         costs=_costs(values, machine),
         series_size=_series_size(values),
+        duty={speed / nominal: share for speed, share in duty.items()},
         stated=tuple(values.get("criteria", {})),
     )
 
@@ -183,6 +191,36 @@ def _hours_a_day(values: Mapping[str, Any], machine: Machine) -> float:
     if not 0.0 < hours <= 24.0:
         raise DesignError(f"duty.hours_a_day = {shown(given)} is out of range; allowed: above 0 h, at most 24 h")
     return hours
+
+
+def _speeds(values: Mapping[str, Any], machine: Machine, stated: bool) -> dict[float, float]:
+    """Share of the operating time at each speed of a load collective; empty for one speed."""
+    given = _section(values, "duty", DUTY, machine).get("speeds", {})
+    if not isinstance(given, Mapping):
+        raise DesignError(
+            f'duty.speeds = {shown(given)} is not a table; write [duty.speeds] and "20 Hz" = "40 %" below'
+        )
+    unit, name = parameters_of(machine)[machine.speed_field].unit, machine.speed_field
+    shares = dict[float, float]()
+    for key, share in given.items():
+        speed = parse_quantity(f"duty.speeds {shown(key)}", key, unit)
+        with_settings(machine, {name: speed})
+        if speed in shares:
+            raise DesignError(f"duty.speeds states {shown(key)} twice; add its shares up")
+        shares[speed] = parse_quantity(f"duty.speeds.{key}", share, "-")
+        if not 0.0 < shares[speed] <= 1.0:
+            raise DesignError(f"duty.speeds.{key} = {shown(share)} is out of range; allowed: above 0 %, at most 100 %")
+    total = sum(shares.values())
+    if shares and abs(total - 1.0) > 1e-6:
+        raise DesignError(
+            f"duty.speeds adds up to {100.0 * total:.6g} %; allowed: shares of the time that add up to 100 %"
+        )
+    nominal = getattr(machine, name)
+    if shares and stated and nominal not in shares:
+        raise DesignError(
+            f"duty.speeds lacks the nominal {name} {nominal:g} {unit}; give it a share, or leave it out of [parameters]"
+        )
+    return {speed: share / total for speed, share in shares.items()}
 
 
 def _life(given: Any, hours_a_day: float) -> dict[str, float]:
@@ -268,6 +306,9 @@ def template(name: str) -> str:
         "",
         "[duty]",
         'hours_a_day = "24 h"  # of operation: a life in years or days is that many',
+        "# [duty.speeds]  # a load collective: share of the operating time at each speed; left out, one speed",
+        f'# {_quoted(machine, 1.0)} = "60 %"',
+        f'# {_quoted(machine, 0.8)} = "40 %"',
         "",
         "[criteria]",
         'load_rating = "500 N"          # force under which the surface lasts a million cycles',
@@ -290,6 +331,12 @@ def template(name: str) -> str:
         f"{speed} = 2",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _quoted(machine: Machine, factor: float) -> str:
+    """A multiple of the nominal speed, as a key."""
+    name = machine.speed_field
+    return f'"{factor * getattr(machine, name):.4g} {parameters_of(machine)[name].unit}"'
 
 
 _SHOWN_UNITS = {"m": ("mm", 1e-3)}

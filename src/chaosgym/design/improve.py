@@ -15,7 +15,8 @@ from typing import Any
 
 from tqdm import tqdm
 
-from chaosgym.design.methodology import SERIES_SIZE, Assessment, Check, assess
+from chaosgym.design.collective import assess_duty
+from chaosgym.design.methodology import SERIES_SIZE, Assessment, Check
 from chaosgym.diagnosis import default_tolerances
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
@@ -141,6 +142,8 @@ def improve(
         If a change names no field, or a weight is negative.
     """
     machine = assessment.machine
+    nominal = getattr(machine, machine.speed_field)
+    duty = {part.speed / nominal: part.share for part in assessment.collective}
     values = changes or default_changes(machine)
     for name, weight in (weights or {}).items():
         if name not in values or not weight >= 0.0:
@@ -149,8 +152,14 @@ def improve(
     def attempt(change: Mapping[str, float]) -> Trial | None:
         try:
             changed = with_settings(machine, change)
-            result = assess(
-                changed, assessment.region, assessment.criteria, series_size=series_size, seed=seed, workers=workers
+            result = assess_duty(
+                changed,
+                assessment.region,
+                assessment.criteria,
+                duty,
+                series_size=series_size,
+                seed=seed,
+                workers=workers,
             )
         except SimulationError:
             return None

@@ -21,7 +21,7 @@ machines must meet the criteria by their own statistics too, whatever the type.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,6 +103,14 @@ class Check:
         return self.reached >= self.required
 
 
+class AtSpeed(NamedTuple):
+    """One speed of a load collective: in the unit of its field, its share of the operating time, and what is found."""
+
+    speed: float
+    share: float
+    assessment: "Assessment"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Assessment:
     """The result of the methodology for one machine.
@@ -133,6 +141,8 @@ class Assessment:
         "meets", "fails", or "undetermined" where the nominal response is.
     machines_that_meet
         Share of the series, each judged by its own statistics.
+    collective
+        The speeds of a duty of several, whose evaluation, checks and verdict these are; empty for one speed.
     """
 
     machine: Machine
@@ -148,6 +158,18 @@ class Assessment:
     checks: tuple[Check, ...]
     verdict: Verdict
     machines_that_meet: float
+    collective: tuple[AtSpeed, ...] = ()
+
+    @property
+    def cycle_period(self) -> float:
+        """Mean duration of a cycle in operation [s]."""
+        parts = self.collective or (AtSpeed(0.0, 1.0, self),)
+        return 1.0 / sum(part.share / part.assessment.machine.cycle_period for part in parts)
+
+    @property
+    def types(self) -> tuple[Type, ...]:
+        """Type at each speed of the duty."""
+        return tuple(part.assessment.type for part in self.collective) or (self.type,)
 
     @property
     def type(self) -> Type:
@@ -237,7 +259,7 @@ def assess(
     own = evaluate(time_blocks(nominal.worse_side(exponent)), criteria, "statistics of the nominal machine", seed)
     evaluation = _by_type(response, built, nominal, series, trend, criteria, seed)
     share = _share_that_meets(series.runs or (nominal,), criteria, seed)
-    checks = _checks(response.type, evaluation, share, criteria)
+    checks = checks_of(response.type, evaluation, share, criteria)
     return Assessment(
         machine=machine,
         criteria=criteria,
@@ -250,7 +272,7 @@ def assess(
         nominal_evaluation=own,
         evaluation=evaluation,
         checks=checks,
-        verdict=_verdict(response.type, checks),
+        verdict=verdict_of(response.type, checks),
         machines_that_meet=share,
     )
 
@@ -283,7 +305,8 @@ def _by_type(
     return evaluate(blocks, criteria, "Type III: statistics over all machines in the tolerances", seed)
 
 
-def _checks(kind: Type, evaluation: Evaluation, share: float, criteria: Criteria) -> tuple[Check, ...]:
+def checks_of(kind: Type, evaluation: Evaluation, share: float, criteria: Criteria) -> tuple[Check, ...]:
+    """Each criterion beside what is reached; the safety factor for Types I and II only."""
     life = Check("fatigue life", evaluation.life_interval.low, criteria.life, "million cycles")
     endures = Check("reliability", evaluation.reliability_interval.low, criteria.reliability, "")
     built = Check("machines that meet", share, criteria.machines_that_meet, "")
@@ -292,7 +315,8 @@ def _checks(kind: Type, evaluation: Evaluation, share: float, criteria: Criteria
     return life, endures, built
 
 
-def _verdict(kind: Type, checks: tuple[Check, ...]) -> Verdict:
+def verdict_of(kind: Type, checks: tuple[Check, ...]) -> Verdict:
+    """Whether all criteria are met, by a response that was told."""
     if not all(check.met for check in checks):
         return "fails"
     return "undetermined" if kind == "undetermined" else "meets"

@@ -33,6 +33,12 @@ LONGEST_RUN = 12_800
 """Cycles after which statistics that have not converged are given up."""
 
 
+def worse_side(peaks: Array, exponent: float = LIFE_EXPONENT) -> Array:
+    """Peaks (cycles,) of the surface that fatigues faster, of those of all surfaces (cycles, sides)."""
+    damage = [equivalent_force(column, exponent) for column in peaks.T]
+    return np.ascontiguousarray(peaks[:, int(np.argmax(damage))])
+
+
 @dataclass(frozen=True)
 class SettledRun:
     """Settled response of one machine.
@@ -59,8 +65,7 @@ class SettledRun:
 
     def worse_side(self, exponent: float = LIFE_EXPONENT) -> Array:
         """Peaks (cycles,) of the surface that fatigues faster."""
-        damage = [equivalent_force(column, exponent) for column in self.peaks.T]
-        return np.ascontiguousarray(self.peaks[:, int(np.argmax(damage))])
+        return worse_side(self.peaks, exponent)
 
     @property
     def largest_peak(self) -> float:
@@ -185,12 +190,13 @@ def build_series(
 
     sequence = qmc.Sobol(len(names), rng=np.random.default_rng(seed))
     shares = 2.0 * sequence.random_base2(int(np.ceil(np.log2(size))))[:size] - 1.0
-    machines = [_deviating(machine, tolerances, row) for row in shares]
+    machines = [deviating(machine, tolerances, row) for row in shares]
     runs = parallel_map(settled_run, machines, workers=workers, progress="machines in tolerance" if progress else None)
     return Series(names, shares, tuple(runs))
 
 
-def _deviating(machine: Machine, tolerances: Mapping[str, Tolerance], shares: Sequence[float] | Array) -> Machine:
+def deviating(machine: Machine, tolerances: Mapping[str, Tolerance], shares: Sequence[float] | Array) -> Machine:
+    """Build the machine whose parameters deviate by shares of their tolerances."""
     settings = {
         name: tolerance.at(getattr(machine, name), float(share))
         for (name, tolerance), share in zip(tolerances.items(), shares, strict=True)

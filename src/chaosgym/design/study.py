@@ -6,18 +6,23 @@ from typing import Any
 
 import numpy as np
 
-from chaosgym.design.bearing import hours_of
+from chaosgym.design.bearing import hours_of, plain
 from chaosgym.design.brief import DesignBrief
+from chaosgym.design.collective import assess_duty, damage_shares
+from chaosgym.design.combination import Combination, combination
 from chaosgym.design.fatigue import equivalent_force_of_history
+from chaosgym.design.guidelines import Guideline, guidelines
 from chaosgym.design.improve import Improvement, improve
-from chaosgym.design.methodology import Assessment, Check, assess
+from chaosgym.design.methodology import Assessment, Check
 from chaosgym.design.peak_impacts import PeakImpactDiagram, filling_cycles, peak_impacts, worn_side
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
 from chaosgym.design.trends import HISTORY_SAMPLES, LifeTrend, life_against
-from chaosgym.diagnosis import Built, ResponseMap, response_map
+from chaosgym.diagnosis import Built, ResponseMap, find_periodic_orbit, response_map
+from chaosgym.diagnosis.margins import Margins, margins
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import Machine
+from chaosgym.machines.parameters import quantity_of, with_settings
 from chaosgym.simulation import CycleRecord, simulate
 from chaosgym.version import __version__
 
@@ -55,6 +60,12 @@ class DesignStudy:
         Over the machine's usual range; None without contact anywhere in it.
     diagram
         Where the peak impacts act.
+    combination
+        What the tolerances do together.
+    guidelines
+        The thesis' guidelines, as sentences on this machine.
+    margins
+        How far each tolerance is from a loss of stability; None unless the nominal response is proven to be periodic.
     force_of_every_impact
         Equivalent force a cycle [N] if every impact counts, by rainflow counting, and not the peak of a cycle alone.
     seed
@@ -67,6 +78,9 @@ class DesignStudy:
     map: ResponseMap | None
     life_over_speed: LifeTrend | None
     diagram: PeakImpactDiagram
+    combination: Combination
+    guidelines: tuple[Guideline, ...]
+    margins: Margins | None
     force_of_every_impact: float
     seed: int
 
@@ -82,10 +96,14 @@ class DesignStudy:
             f"{found.machine.name}: {found.verdict}",
             f"  Type {found.type}: {found.response.reason}; {found.evaluation.method.partition(': ')[2]}",
             f"  {found.series.told}",
-            *(f"  {check.name:19s} {_told(check, found.machine)}" for check in found.checks),
+            *(f"  {line}" for line in self.combination.told),
+            *(f"  {line}" for line in self.duty_told),
+            *(f"  {check.name:19s} {_told(check, found.cycle_period)}" for check in found.checks),
             f"  largest peak        {found.evaluation.largest_force:.1f} N, equivalent {found.evaluation.force:.1f} N",
             f"  load rating         {found.evaluation.required_load_rating:.0f} N needed for the life",
         ]
+        lines.append(f"  {self.margin_told}")
+        lines += [f"  {one.sentence} ({one.section})" for one in self.guidelines]
         if best is not None:
             lines.append(f"  cheapest change that meets all criteria: {best.told}, cost {best.cost:.2f}")
         elif self.improvement is not None:
@@ -94,6 +112,33 @@ class DesignStudy:
             lines.append(f"  no life against speed: {NO_TREND}")
         return lines
 
+    @property
+    def duty_told(self) -> list[str]:
+        """Each speed of the load collective, for people; none for one speed."""
+        parts = self.assessment.collective
+        lines = []
+        for part, damage in zip(parts, damage_shares(parts), strict=True):
+            found = part.assessment
+            hours = hours_of(found.evaluation.life_interval.low, found.machine.cycle_period)
+            alone = f"{hours:,.4g} h if it ran at this speed alone" if np.isfinite(hours) else "no contact"
+            speed = quantity_of(found.machine, found.machine.speed_field)
+            lines.append(
+                f"{part.share:.0%} of the time at {speed}: Type {found.type}, {alone}, {damage:.0%} of the damage"
+            )
+        return lines
+
+    @property
+    def margin_told(self) -> str:
+        """The nearest loss of stability, for people."""
+        if self.margins is None:
+            return "no margin to a loss of stability: it needs a nominal response that is proven to be periodic"
+        nearest = self.margins.nearest
+        if nearest is None:
+            return "no loss of stability within the tolerances, each varied alone"
+        at = quantity_of(with_settings(self.assessment.machine, {nearest.parameter: nearest.value}), nearest.parameter)
+        where = f"{nearest.share:.2f} tolerances {'above' if nearest.side > 0 else 'below'}"
+        return f"nearest loss of stability: {nearest.kind} at {nearest.parameter.replace('_', ' ')} {at}, {where}"
+
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         found, lives = self.improvement, self.assessment.evaluation.life_interval
@@ -101,8 +146,24 @@ class DesignStudy:
             "chaosgym": __version__,
             "seed": self.seed,
             **self.assessment.as_dict(),
-            "life_hours": _finite([hours_of(life, self.assessment.machine.cycle_period) for life in lives]),
-            "required_life_hours": hours_of(self.assessment.criteria.life, self.assessment.machine.cycle_period),
+            "life_hours": _finite([hours_of(life, self.assessment.cycle_period) for life in lives]),
+            "required_life_hours": hours_of(self.assessment.criteria.life, self.assessment.cycle_period),
+            "collective": [
+                {
+                    "speed": part.speed,
+                    "share_of_time": part.share,
+                    "share_of_damage": damage,
+                    "type": part.assessment.type,
+                    "verdict_alone": part.assessment.verdict,
+                    "evaluation": plain(vars(part.assessment.evaluation)),
+                }
+                for part, damage in zip(
+                    self.assessment.collective, damage_shares(self.assessment.collective), strict=True
+                )
+            ],
+            "combination": self.combination.as_dict(),
+            "guidelines": [one._asdict() for one in self.guidelines],
+            "margins": None if self.margins is None else self.margins.as_dict(),
             "improvement": None
             if found is None
             else {
@@ -131,11 +192,11 @@ class DesignStudy:
         }
 
 
-def _told(check: Check, machine: Machine) -> str:
+def _told(check: Check, cycle_period: float) -> str:
     """What a check reached of what is required; a life in hours first."""
     told = f"{check.reached:.6g} of {check.required:g} {check.unit}".rstrip()
     if check.name == "fatigue life":
-        reached, required = (hours_of(life, machine.cycle_period) for life in (check.reached, check.required))
+        reached, required = (hours_of(life, cycle_period) for life in (check.reached, check.required))
         told = f"{reached:,.4g} h of {required:,.4g} h in operation ({told})"
     return told + (" met" if check.met else " NOT met")
 
@@ -169,10 +230,11 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
     """
     machine = brief.machine
     around = _map(brief, workers, progress)
-    assessment = assess(
+    assessment = assess_duty(
         machine,
         brief.region,
         brief.criteria,
+        brief.duty,
         series_size=brief.series_size,
         further=_in_tolerance(around),
         seed=seed,
@@ -200,6 +262,9 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
         around,
         trend,
         peak_impacts(record, worn_side(record, brief.criteria.life_exponent)),
+        combination(assessment, _in_tolerance(around), seed=seed, workers=workers, progress=progress),
+        guidelines(assessment, _in_tolerance(around)),
+        _margins(assessment),
         _every_impact(record, side, brief),
         seed,
     )
@@ -226,7 +291,7 @@ def contradictions(answer: DesignStudy) -> list[str]:
         said.append(f"Type I, with {largest:.4g} N in the tolerances and {found.response.largest_peak:.4g} N nominally")
     if found.type in ("I", "II") and found.evaluation.largest_force < largest * (1.0 - 1e-9):
         said.append(f"largest peak {found.evaluation.largest_force:.4g} N, with {largest:.4g} N in the tolerances")
-    if (found.verdict == "meets") != (found.type != "undetermined" and all(check.met for check in found.checks)):
+    if (found.verdict == "meets") != ("undetermined" not in found.types and all(check.met for check in found.checks)):
         said.append(f"the verdict {found.verdict!r} does not follow from type and checks")
     elsewhere: dict[str, str] = {"the response type": found.response.centre.nature}
     if answer.map is not None:
@@ -256,6 +321,14 @@ def _in_tolerance(around: ResponseMap | None) -> tuple[Built, ...]:
         for j in inside
         if MAP_SHARES[i] or MAP_SHARES[j]
     )
+
+
+def _margins(found: Assessment) -> Margins | None:
+    centre = found.response.centre
+    if centre.status != "certified" or centre.period is None:
+        return None
+    orbit = find_periodic_orbit(found.machine, centre.evidence["final_state"], centre.period)
+    return margins(found.machine, orbit, found.region) if orbit is not None and orbit.certified else None
 
 
 def _seeded(brief: DesignBrief, found: Assessment, trend: LifeTrend | None) -> Mapping[str, tuple[float, ...]]:

@@ -10,6 +10,7 @@ from matplotlib.patches import Patch, Rectangle
 from numpy.typing import NDArray
 from scipy import stats
 
+from chaosgym.design.combination import Combination
 from chaosgym.design.fatigue import equivalent_force, statistical_life
 from chaosgym.design.methodology import Assessment
 from chaosgym.design.peak_impacts import PeakImpactDiagram
@@ -174,6 +175,42 @@ def sensitivities(assessment: Assessment, ax: Axes) -> Axes:
     ax.axvline(0.0, color=INK, lw=0.8)
     ax.set(xlabel="force for one tolerance upward [%]", title="What drives the force")
     ax.grid(axis="y", visible=False)
+    return ax
+
+
+def total_indices(found: Combination, ax: Axes) -> Axes:
+    """Total index of each parameter, for the largest peak force and for the life, with its interval."""
+    rows = sorted(found.influences, key=lambda one: one.peak.share)
+    for shift, what, name, colour in ((0.18, "peak", "largest peak force", BAD), (-0.18, "life", "life", ACCENT)):
+        values = [getattr(one, what) for one in rows]
+        at = np.arange(len(rows)) + shift
+        ax.barh(at, [value.share for value in values], 0.34, color=colour, alpha=0.8, label=name)
+        ax.hlines(at, [max(value.low, 0.0) for value in values], [value.high for value in values], color=INK, lw=1.0)
+    ax.set_yticks(np.arange(len(rows)), [one.parameter.replace("_", " ") for one in rows])
+    ax.set(xlabel="total index", title="What matters in combination")
+    ax.grid(axis="y", visible=False)
+    ax.legend(loc="lower right")
+    return ax
+
+
+def scatter_of_series(assessment: Assessment, found: Combination, ax: Axes) -> Axes:
+    """Largest peak force [N] of each machine built, over the parameter that matters most for it."""
+    most, series = found.most("peak"), assessment.series
+    if most is None:
+        return ax
+    label, factor = axis_label(assessment.machine, most.parameter)
+    shares = series.shares[:, series.parameters.index(most.parameter)]
+    nominal, tolerance = getattr(assessment.machine, most.parameter), assessment.region[most.parameter]
+    values = np.array([factor * tolerance.at(nominal, share) for share in shares])
+    peaks = np.array([run.largest_peak for run in series.runs])
+    natures = np.array([run.nature for run in series.runs])
+    for kind, colour in NATURE_COLOURS.items():
+        if (natures == kind).any():
+            ax.plot(values[natures == kind], peaks[natures == kind], "o", ms=5, color=colour, label=kind)
+    ax.plot(factor * nominal, assessment.nominal.largest_peak, "o", mfc="white", mec=INK, ms=7, label="nominal machine")
+    ax.set(xlabel=label, ylabel="largest peak force [N]", title="Machines in tolerance", ylim=(0.0, None))
+    ax.set_ylim(0.0, 1.25 * ax.get_ylim()[1])
+    ax.legend(loc="upper left", ncols=2)
     return ax
 
 

@@ -97,8 +97,8 @@ def design_report(study: DesignStudy, command: str = "", *, date: str = "", brie
         date=date,
         brief=brief,
         trials=tried if best is None else [best, *(trial for trial in tried if trial is not best)],
-        service_hours=hours_of(found.evaluation.life_interval.low, found.machine.cycle_period),
-        required_hours=hours_of(criteria.life, found.machine.cycle_period),
+        service_hours=hours_of(found.evaluation.life_interval.low, found.cycle_period),
+        required_hours=hours_of(criteria.life, found.cycle_period),
         rainflow_life=rating_life(study.force_of_every_impact, criteria.load_rating, criteria.life_exponent),
         described=parameters_of(found.machine),
         reference=type(found.machine)(),
@@ -224,6 +224,15 @@ def _pictures(study: DesignStudy) -> list[Picture]:
             "unexplained. Red raises the force."
         )
         pictures.append(_picture(_drawn(lambda ax: figures.sensitivities(found, ax)), caption))
+    if study.combination.influences:
+        caption = (
+            "Share of the variance in which each parameter takes part, alone or with others (total index). Of "
+            f"{study.combination.sampled} machines in the tolerances; lines: {100 * found.criteria.confidence:g} % "
+            "intervals."
+        )
+        pictures.append(_picture(_drawn(lambda ax: figures.total_indices(study.combination, ax)), caption))
+        caption = "Machines built to the tolerances, over the parameter that matters most for the largest peak force."
+        pictures.append(_picture(_drawn(lambda ax: figures.scatter_of_series(found, study.combination, ax)), caption))
     if len(study.diagram.force):
         filled = study.cycles_to_fill
         shape = f"It has its shape from cycle {filled} on." if filled else "It has not yet its final shape."

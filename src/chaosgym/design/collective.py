@@ -1,0 +1,147 @@
+r"""A load collective: life and reliability of a machine that runs at several speeds (Palmgren-Miner over the speeds).
+
+A machine that spends the share q_i of its operating time at a speed with cycle period T_i, at which alone it would live
+H_i hours, lives H hours:
+
+    1 / H = sum q_i / H_i,      w_i = (q_i / T_i) / sum (q_k / T_k)
+
+w_i is the share of its cycles, by which equivalent forces combine, F = (sum w_i F_i^p)^(1/p). Reliability and safety
+factor are the least of all speeds, since a surface has to survive each.
+
+References
+----------
+M. A. Miner, Cumulative damage in fatigue, Journal of Applied Mechanics 12 (1945), A159-A164.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from chaosgym.design.bearing import Criteria, Evaluation, evaluate, hours_of
+from chaosgym.design.fatigue import equivalent_force, required_load_rating
+from chaosgym.design.methodology import Assessment, AtSpeed, Check, assess, checks_of, verdict_of
+from chaosgym.design.reliability import Interval
+from chaosgym.diagnosis import Tolerance
+from chaosgym.machines import Machine
+
+
+def assess_duty(
+    machine: Machine,
+    region: Mapping[str, Tolerance] | None = None,
+    criteria: Criteria | None = None,
+    duty: Mapping[float, float] | None = None,
+    **options: Any,
+) -> Assessment:
+    """Take a machine through the methodology at every speed of its duty.
+
+    Parameters
+    ----------
+    machine
+        The nominal machine, at its nominal speed.
+    region, criteria
+        As for ``assess``.
+    duty
+        Share of the operating time by speed, in nominal speeds; 1 must be among them. None or empty for one speed.
+    options
+        Of ``assess``. Machines of ``further`` are at the nominal speed.
+
+    Returns
+    -------
+    Assessment
+        Of the nominal speed, whose evaluation, checks and verdict are those of the whole duty.
+
+    Raises
+    ------
+    ParameterError
+        If a speed is out of its range.
+    """
+    nominal = assess(machine, region, criteria, **options)
+    if not duty:
+        return nominal
+    speed, elsewhere = getattr(machine, machine.speed_field), {**options, "further": ()}
+    parts = []
+    for ratio, share in duty.items():
+        at = float(f"{ratio * speed:.12g}")
+        found = nominal if ratio == 1.0 else assess(machine.at(at), region, criteria, **elsewhere)
+        parts.append(AtSpeed(at, share, found))
+    return _over(nominal, tuple(parts), options.get("seed", 0))
+
+
+def _over(nominal: Assessment, parts: tuple[AtSpeed, ...], seed: int) -> Assessment:
+    """The nominal assessment with evaluation, checks and verdict of all speeds."""
+    rate = sum(part.share / part.assessment.machine.cycle_period for part in parts)
+    cycles = [part.share / part.assessment.machine.cycle_period / rate for part in parts]
+    criteria = nominal.criteria.at(1.0 / rate)
+    evaluation = _evaluation([part.assessment.evaluation for part in parts], cycles, criteria)
+    own = _evaluation([part.assessment.nominal_evaluation for part in parts], cycles, criteria)
+    share = _share_that_meets(parts, cycles, criteria, seed)
+    regular = [part.assessment for part in parts if part.assessment.type in ("I", "II")]
+    checks = checks_of(nominal.type, evaluation, share, criteria)[:3]
+    if regular:
+        least = min(one.evaluation.safety_factor for one in regular)
+        checks += (Check("safety factor", least, criteria.safety_factor, ""),)
+    kinds = [part.assessment.type for part in parts]
+    return replace(
+        nominal,
+        criteria=criteria,
+        evaluation=evaluation,
+        nominal_evaluation=own,
+        checks=checks,
+        verdict=verdict_of("undetermined" if "undetermined" in kinds else kinds[0], checks),
+        machines_that_meet=share,
+        collective=parts,
+    )
+
+
+def miner(lives: Sequence[float], shares: Sequence[float]) -> float:
+    """Life of a collective from the life at each of its levels, 1 / L = sum p_i / L_i; both in one unit.
+
+    Examples
+    --------
+    >>> miner([1000.0, 4000.0], [0.5, 0.5])
+    1600.0
+    """
+    damage = sum(share / life for life, share in zip(lives, shares, strict=True) if share and math.isfinite(life))
+    return 1.0 / damage if damage else math.inf
+
+
+def damage_shares(parts: Sequence[AtSpeed]) -> list[float]:
+    """Share of the damage that is done at each speed; zeros where there is none."""
+    done = [
+        part.share / hours_of(part.assessment.evaluation.life, part.assessment.machine.cycle_period) for part in parts
+    ]
+    return [one / sum(done) if sum(done) else 0.0 for one in done]
+
+
+def _evaluation(found: Sequence[Evaluation], cycles: Sequence[float], criteria: Criteria) -> Evaluation:
+    force = equivalent_force([one.force for one in found], criteria.life_exponent, np.array(cycles) / sum(cycles))
+    low, high = (miner([one.life_interval[end] for one in found], cycles) for end in (0, 1))
+    least = [min(one.reliability_interval[end] for one in found) for end in (0, 1)]
+    return Evaluation(
+        method=f"Palmgren-Miner over {len(found)} speeds: each as its type asks for; reliability: the least of them",
+        force=force,
+        largest_force=max(one.largest_force for one in found),
+        life=miner([one.life for one in found], cycles),
+        life_interval=Interval(low, high),
+        conservative_life=miner([one.conservative_life for one in found], cycles),
+        required_load_rating=required_load_rating(force, criteria.life, criteria.life_exponent),
+        reliability=min(one.reliability for one in found),
+        reliability_interval=Interval(*least),
+        normal_reliability=min(one.normal_reliability for one in found),
+        safety_factor=min(one.safety_factor for one in found),
+    )
+
+
+def _share_that_meets(parts: Sequence[AtSpeed], cycles: Sequence[float], criteria: Criteria, seed: int) -> float:
+    """Share of the series, each of whose machines is the same one at every speed, that lives and endures enough."""
+    exponent = criteria.life_exponent
+    rows = zip(*(part.assessment.series.runs or (part.assessment.nominal,) for part in parts), strict=True)
+    verdicts = []
+    for runs in rows:
+        own = [evaluate([run.worse_side(exponent)], criteria, "", seed) for run in runs]
+        life = miner([one.life for one in own], cycles)
+        verdicts.append(life >= criteria.life and min(one.reliability for one in own) >= criteria.reliability)
+    return float(np.mean(verdicts))

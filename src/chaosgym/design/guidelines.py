@@ -1,0 +1,105 @@
+r"""The thesis' guidelines as sentences on one machine: which case of 5.5.1 it is, signs of chaos, what 5.6 does next.
+
+    Case I     all responses in the tolerances are periodic
+    Case II    those that are not fill a part of the tolerances
+    Case III   periodic and other responses are mixed
+
+Mixed are they where the nominal machine lies amid those of the other kind, in their convex hull: the same rule that
+tells Type III from Type II (``chaosgym.diagnosis.type_rule``).
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+from chaosgym.design.methodology import Assessment
+from chaosgym.diagnosis import Built, Type, signs_of_chaos
+from chaosgym.diagnosis.type_rule import FORCE_CHANGE, surrounded
+
+Case = Literal["I", "II", "III", "undetermined"]
+
+
+class Guideline(NamedTuple):
+    """One sentence, and the section of the thesis that it follows."""
+
+    section: str
+    sentence: str
+
+
+CASES: dict[Case, str] = {
+    "I": "every response in the tolerances is periodic",
+    "II": "responses that are not periodic fill a part of the tolerances, and are of Type III",
+    "III": "periodic and other responses are mixed in the tolerances, and all are of Type III",
+    "undetermined": "the nominal response is undetermined, so that no case is told",
+}
+
+EVALUATION: dict[Type, str] = {
+    "I": "the predicted trend, taken to the unfavourable corner of the tolerances, evaluates the machine",
+    "II": "the worst case found in the tolerances evaluates the machine",
+    "III": "statistics over all machines in the tolerances evaluate the machine",
+    "undetermined": "until the nominal response is told, statistics stand in and the verdict is open",
+}
+"""Phase VI of 5.6, by type."""
+
+
+def case_of(found: Assessment, further: Sequence[Built] = ()) -> Case:
+    """Case of 5.5.1, over the machines of the series, the neighbourhood and those of ``further``.
+
+    A machine that is undetermined is not known to be periodic, and counts as not periodic.
+    """
+    nature = found.nominal.nature
+    if nature == "undetermined":
+        return "undetermined"
+    region = [(one.shares, one.nature) for one in (*found.series.built, *further)]
+    region += [({point.parameter: float(point.side)}, point.nature) for point in found.response.neighbours]
+    periodic = nature == "periodic"
+    others = [shares for shares, kind in region if (kind == "periodic") != periodic]
+    if periodic and not others:
+        return "I"
+    if others and surrounded(others):
+        return "III"
+    return "II"
+
+
+def guidelines(found: Assessment, further: Sequence[Built] = ()) -> tuple[Guideline, ...]:
+    """Sentences on one assessed machine, in the order of the thesis.
+
+    Parameters
+    ----------
+    found
+        What the methodology says of it.
+    further
+        More machines of its tolerances, as for ``assess``.
+
+    Returns
+    -------
+    tuple of Guideline
+        Signs of chaos at the nominal machine, with how often each was right on the shipped dataset (5.3); the case and
+        what it means for the types (5.5.1); the evaluation and the next step (5.6).
+    """
+    said = [Guideline("5.3", sign.line) for sign in signs_of_chaos(found.response.centre)]
+    case = case_of(found, further)
+    machines = [*found.series.built, *further]
+    told = f"Case {case}: {CASES[case]}" if case != "undetermined" else CASES[case]
+    if machines and case != "undetermined":
+        counts = Counter(one.nature for one in machines)
+        told += f" ({', '.join(f'{n} {nature}' for nature, n in counts.most_common())} of {len(machines)} machines)"
+    said.append(Guideline("5.5.1", told))
+    if case == "I":
+        above = sum(one.largest_peak > (1.0 + FORCE_CHANGE) * found.nominal.largest_peak for one in machines)
+        outcome = {0: "(1): all are Type I", len(machines): "(2): all are Type II"}.get(
+            above, f"(3): {len(machines) - above} are Type I and {above} Type II, 10 % of force above the nominal one"
+        )
+        said.append(Guideline("5.5.1", f"outcome {outcome}"))
+    said.append(Guideline("5.6, phase VI", EVALUATION[found.type]))
+    said.append(Guideline("5.6, phase VII", _next(found)))
+    return tuple(said)
+
+
+def _next(found: Assessment) -> str:
+    if found.verdict == "meets":
+        return "the criteria are met: go on to the prototype stage, and measure there what was assumed"
+    if found.verdict == "undetermined":
+        return "the nominal response is undetermined: settle it by more cycles or by other nominal values, then go on"
+    missed = [check.name for check in found.checks if not check.met]
+    return f"{' and '.join(missed)} missed: change the machine, and go through phases I to VI again"

@@ -1,0 +1,110 @@
+"""Tolerances in combination: indices of a function with known ones, probabilities of a published interval."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chaosgym.design import Criteria, assess
+from chaosgym.design.combination import combination, own_type, probability, total_indices
+from chaosgym.design.guidelines import case_of, guidelines
+from chaosgym.diagnosis import Built, Tolerance
+from chaosgym.machines import ImpactBeam
+
+CALM = ImpactBeam(excitation_frequency=8.0)
+REGION = {"force_amplitude": Tolerance(0.05), "clearance": Tolerance(0.05), "damping_ratio": Tolerance(0.1)}
+
+
+@pytest.fixture(scope="module")
+def calm():
+    """A beam that repeats and follows a trend."""
+    return assess(CALM, REGION, Criteria(load_rating=300.0, life=10.0), series_size=16)
+
+
+def test_total_indices_of_the_function_of_ishigami_and_homma():
+    """a = 7, b = 0.1: 0.5576, 0.4424 and 0.2437 in closed form (Saltelli et al. 2010); a constant has none."""
+
+    def model(points):
+        x = np.pi * points.T
+        return np.array([np.sin(x[0]) + 7.0 * np.sin(x[1]) ** 2 + 0.1 * x[2] ** 4 * np.sin(x[0]), np.ones(len(points))])
+
+    found, none = total_indices(model, 3, 1024)
+    assert [one.share for one in found] == pytest.approx([0.5576, 0.4424, 0.2437], abs=0.02)
+    assert all(one.low < exact < one.high for one, exact in zip(found, (0.5576, 0.4424, 0.2437), strict=True))
+    assert none == []
+    assert total_indices(model, 3, 64, seed=1) == total_indices(model, 3, 64, seed=1)
+
+
+def test_a_share_has_the_interval_of_clopper_and_pearson():
+    """No event in 10 trials: up to 1 - 0.025^(1/10); 3 of 10: 0.0667 to 0.6525, as in tables."""
+    assert probability(0, 10)[1:] == pytest.approx((0.0, 1.0 - 0.025**0.1))
+    assert probability(3, 10)[1:] == pytest.approx((0.0667, 0.6525), abs=1e-4)
+    assert probability(10, 10).high == 1.0
+
+
+def test_total_indices_of_a_trend_are_the_shares_of_its_slopes(calm):
+    """log F = sum b d is additive: the index of each parameter is b^2 / sum b^2, of another sample and method."""
+    found = combination(calm, base=32)
+    slopes = dict(zip(calm.trend.parameters, calm.trend.slopes, strict=True))
+    expected = np.array([slopes[one.parameter] ** 2 for one in found.influences])
+    assert [one.life.share for one in found.influences] == pytest.approx(expected / expected.sum(), abs=0.1)
+    most = found.most("life")
+    assert most is not None
+    assert most.parameter == max(slopes, key=lambda name: abs(slopes[name]))
+    assert found.types["I"].share == found.natures["periodic"].share == 1.0
+    assert found.sampled == 32 * 5
+
+
+def test_without_contact_no_parameter_matters():
+    """Forces that are zero throughout have no variance to share."""
+    rigid = replace(CALM, force_amplitude=0.01)
+    found = combination(assess(rigid, REGION, Criteria(), series_size=8), base=8)
+    assert found.influences == ()
+    assert found.most("peak") is None
+    assert found.meeting.share == 1.0
+
+
+def test_a_machine_of_the_region_has_a_type_of_its_own(calm):
+    """III if it does not repeat, II with 10 % more force than the nominal one, I otherwise."""
+    run = calm.series.runs[0]
+    peak = run.largest_peak
+    assert [own_type(run, peak), own_type(run, peak / 1.11)] == ["I", "II"]
+    assert own_type(replace(run, nature="quasiperiodic"), peak) == "III"
+    assert own_type(replace(run, nature="undetermined"), peak) == "undetermined"
+
+
+def test_where_chaos_is_mixed_in_every_machine_is_of_type_three(calm):
+    """Case III of 5.5.1 leaves no machine of Type I, and the guideline and the probabilities agree."""
+    around = [Built({"clearance": side}, "chaotic", 60.0) for side in (-0.5, 0.5)]
+    assert combination(calm, around, base=8).types["III"].share == 1.0
+    assert any("all are of Type III" in one.sentence for one in guidelines(calm, around))
+
+
+@pytest.mark.parametrize(
+    ("shares", "case"),
+    [
+        ([], "I"),
+        ([{"clearance": 0.5}], "II"),
+        ([{"clearance": 0.5}, {"clearance": 0.2, "damping_ratio": 0.1}], "II"),
+        ([{"clearance": 0.5}, {"clearance": -0.4}], "III"),
+    ],
+)
+def test_the_case_is_told_by_where_chaos_lies(calm, shares, case):
+    """None: case I. On one side of the nominal machine: II. On both: III."""
+    wild = [Built(share, "chaotic", 60.0) for share in shares]
+    assert case_of(calm, wild) == case
+
+
+def test_guidelines_say_what_the_assessment_says(calm):
+    """Signs with rates, the case with its counts, the evaluation of the type and the next phase."""
+    said = guidelines(calm)
+    sentences = [one.sentence for one in said]
+    assert sum("of those with it" in sentence for sentence in sentences) == 4
+    assert any(sentence.startswith("Case I: ") and "16 periodic of 16 machines" in sentence for sentence in sentences)
+    assert any("all are Type I" in sentence for sentence in sentences)
+    assert ("prototype" in sentences[-1]) == (calm.verdict == "meets")
+    chaotic = replace(calm, nominal=replace(calm.nominal, nature="chaotic"))
+    assert case_of(chaotic, []) == "III", "periodic machines on all sides of a chaotic one"
+    open_ = replace(calm, nominal=replace(calm.nominal, nature="undetermined"), verdict="undetermined")
+    assert case_of(open_) == "undetermined"
+    assert "settle it" in guidelines(open_)[-1].sentence
