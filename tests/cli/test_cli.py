@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -76,6 +77,18 @@ def two_masses(tmp_path_factory):
     path = folder / "two.toml"
     path.write_text(TWO_MASSES)
     return str(path)
+
+
+@pytest.mark.parametrize("command", ["simulate", "diagnose"])
+def test_a_machine_with_one_stop_has_one_surface(command):
+    """Nothing is printed of a lower stop that is not there."""
+    path = str(Path(__file__).parents[2] / "docs" / "machines" / "shaw-holmes-1983.toml")
+    told = CliRunner().invoke(app, [command, path])
+    assert "upper" in told.stdout
+    assert "lower" not in told.stdout
+    assert list(json.loads(CliRunner().invoke(app, [command, path, "--json"]).stdout)["surfaces_peak_force_N"]) == [
+        "upper"
+    ]
 
 
 @pytest.mark.parametrize(

@@ -31,9 +31,12 @@ COMMAND = (
 
 
 def start(log, *arguments):
-    """Start a process whose output goes to a file."""
+    """Start a process in a folder of its own, in which its output goes to a file."""
+    log.parent.mkdir(exist_ok=True)
     with log.open("w") as output:
-        return subprocess.Popen([sys.executable, "-m", *arguments], stdout=output, stderr=subprocess.STDOUT)
+        return subprocess.Popen(
+            [sys.executable, "-m", *arguments], stdout=output, stderr=subprocess.STDOUT, cwd=log.parent
+        )
 
 
 def wait_until(condition, seconds=120.0):
@@ -49,7 +52,7 @@ def cluster(tmp_path):
     """Address of a scheduler, and its two workers."""
     file = tmp_path / "scheduler.json"
     scheduler = start(
-        tmp_path / "scheduler.log",
+        tmp_path / "scheduler" / "log",
         "distributed.cli.dask_scheduler",
         "--host",
         "127.0.0.1",
@@ -63,7 +66,7 @@ def cluster(tmp_path):
     address = json.loads(file.read_text())["address"]
     workers = [
         start(
-            tmp_path / f"worker-{number}.log",
+            tmp_path / f"worker-{number}" / "log",
             "distributed.cli.dask_worker",
             address,
             "--nthreads",
@@ -71,7 +74,7 @@ def cluster(tmp_path):
             "--no-nanny",
             "--no-dashboard",
             "--local-directory",
-            str(tmp_path / f"worker-{number}"),
+            "scratch",
         )
         for number in range(2)
     ]

@@ -112,8 +112,8 @@ def _forces(machine: Any, verdict: Any) -> tuple[dict[str, Any], list[str]]:
 
     settled, before = verdict.judged.peak_force, verdict.transient_run.peak_force
     shown = machine.sides[verdict.judged.worst_side]
-    surfaces = {side: summary(settled[:, place]) for place, side in enumerate(machine.sides)}
-    transient = {side: float(before[:, place].max()) for place, side in enumerate(machine.sides)}
+    surfaces = {side: summary(settled[:, place]) for side, place in machine.surfaces.items()}
+    transient = {side: float(before[:, place].max()) for side, place in machine.surfaces.items()}
     told = {
         "peak_force_summary_N": surfaces[shown],
         "worst_surface": shown,

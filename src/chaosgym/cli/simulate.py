@@ -45,7 +45,7 @@ def simulate(
     seconds_per_cycle = (time.process_time() - start) / (transient + cycles)
     first = 2 * record.joint
     contact = record.contact_fraction[:, first : first + 2].sum(axis=1)
-    surfaces = {side: record.peak_force[:, place] for place, side in enumerate(machine.sides)}
+    surfaces = {side: record.peak_force[:, place] for side, place in machine.surfaces.items()}
     worst = machine.sides[record.worst_side]
     result = {
         "machine": machine.name,

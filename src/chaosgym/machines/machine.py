@@ -1,5 +1,6 @@
 """The protocol of a machine: all that simulation, diagnosis, sweeps, environments and the command line ask of one."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import InitVar, dataclass
@@ -203,6 +204,13 @@ class Machine(ABC):
     def notes(self) -> tuple[str, ...]:
         """What a user should know of this machine beside every result of it, a line each."""
         return ()
+
+    @property
+    def surfaces(self) -> Mapping[str, int]:
+        """Surfaces that there are, by name, and their columns in ``CycleRecord.peak_force``: one stop, one surface."""
+        rooms = [self.room_of(joint) for joint in range(len(self.sides) // 2)]
+        there = [math.isfinite(bound) for lower, upper in rooms for bound in (upper, lower)]
+        return {side: place for place, side in enumerate(self.sides) if there[place]}
 
     @property
     def sensors(self) -> tuple[str, ...]:

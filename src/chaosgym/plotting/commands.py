@@ -81,9 +81,10 @@ def simulation_figure(record: CycleRecord, transient: int = 0) -> Figure:
     peaks, moves, force = figure.subplots(3, 1)
     moves.sharex(force)
     colours = (ACCENT, NATURE_COLOURS["chaotic"])
-    shown_sides = machine.sides[2 * last.joint :]
-    for side, (name, colour) in enumerate(zip(shown_sides, colours, strict=False), 2 * last.joint):
-        response.cycle_points(record.peak_force[:, side], peaks, first=transient + 1, color=colour, label=name)
+    for name, place in machine.surfaces.items():
+        if place // 2 == last.joint:
+            colour = colours[place % 2]
+            response.cycle_points(record.peak_force[:, place], peaks, first=transient + 1, color=colour, label=name)
     peaks.set_ylim(0.0, 1.3 * float(record.peak_force.max()) or 1.0)
     peaks.legend(loc="upper right", ncols=2, borderpad=0.1, markerscale=2.0)
     response.curve(factor * last.time, 1e3 * motion[:, 0], moves)

@@ -19,6 +19,9 @@ harmonic's frequency; a motion of the base, with which the stops move."""
 
 MOST_HARMONICS = 64
 
+LEFT_OUT = 0.01
+"""Share of the largest harmonic that samples may differ from their harmonics unsaid."""
+
 LARGEST = 1e12
 """Largest amplitude, in the kind's unit."""
 
@@ -27,13 +30,14 @@ class Drive(NamedTuple):
     """A drive at one point.
 
     ``kind`` of ``KINDS``; ``harmonics`` (order, cosine, sine) with amplitudes in the kind's unit; ``mean`` what is
-    constant [N].
+    constant, and ``left_out`` by how much samples differ from their harmonics at the most, in that unit.
     """
 
     kind: str
     at: str
     harmonics: tuple[tuple[int, float, float], ...]
     mean: float = 0.0
+    left_out: float = 0.0
 
     @classmethod
     def sine(cls, kind: str, at: str, amplitude: float, harmonic: int = 1, angle: float = 0.0) -> "Drive":
@@ -56,7 +60,8 @@ class Drive(NamedTuple):
             raise ParameterError(f"{harmonics} harmonics need {2 * harmonics + 1} samples of a cycle, not {cycle.size}")
         parts = np.fft.rfft(cycle) / len(cycle)
         rows = tuple((k, 2.0 * float(parts[k].real), -2.0 * float(parts[k].imag)) for k in range(1, harmonics + 1))
-        return cls(kind, at, rows, float(parts[0].real))
+        kept = np.fft.irfft(np.where(np.arange(len(parts)) <= harmonics, parts, 0.0) * len(cycle), len(cycle))
+        return cls(kind, at, rows, float(parts[0].real), float(np.max(np.abs(cycle - kept))))
 
 
 def checked(drive: Drive) -> Drive:
@@ -79,6 +84,21 @@ def checked(drive: Drive) -> Drive:
     if drive.mean and drive.kind == "unbalance":
         raise ParameterError(f"the mean of {drive.kind} at {drive.at!r} is not 0; allowed: of all other kinds")
     return drive
+
+
+def drive_notes(drives: Iterable[Drive]) -> list[str]:
+    """What is to be said of sampled drives: a mean that changes nothing, and what their harmonics leave out."""
+    told = []
+    for drive in drives:
+        size = max((math.hypot(*pair) for _, *pair in drive.harmonics), default=0.0)
+        if drive.kind == "displacement" and abs(drive.mean) > 1e-9 * size:
+            told.append(f"the base's mean displacement, {drive.mean:.4g} in SI, takes the stops along: it is left out")
+        if drive.left_out > LEFT_OUT * size:
+            told.append(
+                f"{len(drive.harmonics)} harmonics differ from the samples of the {drive.kind} at {drive.at!r} by up "
+                f"to {drive.left_out:.2g} in SI; harmonics = {MOST_HARMONICS} keeps the most"
+            )
+    return told
 
 
 def modal_drive(structure: Structure, drives: Iterable[Drive]) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ from chaosgym.files import contents, toml_of
 from chaosgym.machines.linear_impact import damping_for
 from chaosgym.machines.machine import Machine, Work
 from chaosgym.machines.modal_machine.archives import LARGEST, read_archive, read_matrix
+from chaosgym.machines.modal_machine.cycle_file import files_of, with_samples
 from chaosgym.machines.modal_machine.drive import KINDS, Drive
 from chaosgym.machines.modal_machine.jointed import Joint, machine_with_joints
 from chaosgym.machines.modal_machine.keys import REQUIRED, TABLES, checked_table, schema
@@ -47,11 +48,14 @@ def machine_class(path: str | Path) -> type[Machine]:
     except ValueError as error:
         raise ParameterError(f"{path} {error}") from None
     try:
-        data, folder = _tables(values), Path(path).parent
+        folder = Path(path).parent
+        data = _tables(values, folder)
         digest = hashlib.sha256(text.encode())
         for name in ("matrices", "mass", "stiffness", "damping", "universal_file"):
             if name in data["structure"]:
                 digest.update(_bytes(folder / data["structure"][name]))
+        for name in files_of(values):
+            digest.update(_bytes(folder / name))
         key = f"{path} {digest.hexdigest()}"
         if key not in _classes:
             _classes[key] = _built(str(path), digest.hexdigest()[:16], data, folder)
@@ -90,9 +94,10 @@ def _bytes(path: Path) -> bytes:
         raise ParameterError(f"{path} {error}") from None
 
 
-def _tables(values: Mapping[str, Any]) -> dict[str, Any]:
+def _tables(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """All tables by their path, values in SI."""
     data: dict[str, Any] = {}
+    drives: list[Any] = []
     for name in REQUIRED:
         if name not in values:
             raise ParameterError(f"[[{name}]] is missing" if name == "drive" else f"[{name}] is missing")
@@ -102,11 +107,11 @@ def _tables(values: Mapping[str, Any]) -> dict[str, Any]:
             continue
         given = values.get(outer, {}).get(inner, {}) if outer else values.get(path, {}) if path else values
         if path == "drive":
-            rows = given if isinstance(given, list) else [given]
-            data[path] = [checked_table(path, row) for row in rows]
+            drives = [with_samples(row, folder) for row in (given if isinstance(given, list) else [given])]
+            data[path] = [checked_table(path, row) for row in drives]
         else:
             data[path] = checked_table(path, given) if path != "joint" else _joints(given)
-    for joint, moves in zip(data["joint"], turning_joints(values), strict=True):
+    for joint, moves in zip(data["joint"], turning_joints({**values, "drive": drives}), strict=True):
         joint["turns"] = moves
     return data
 

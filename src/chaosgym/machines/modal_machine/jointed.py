@@ -24,7 +24,7 @@ from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.joint_sets import JointTables, PressedSets
 from chaosgym.machines.machine import Machine, Number, Option, refuse_fixed_steps
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
-from chaosgym.machines.modal_machine.drive import Drive, checked, modal_drive
+from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.machine import ModalMachine, clearance_option, rigid_note, turning_note
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import parameter, parameters_of
@@ -188,8 +188,9 @@ class JointedMachine(Machine):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What turns, and modes that count as rigid."""
-        return tuple(filter(None, [turning_note(self.turning), rigid_note(self.natural_frequencies)]))
+        """What turns, modes that count as rigid, and what sampled drives leave out."""
+        notes = turning_note(self.turning), rigid_note(self.natural_frequencies), *drive_notes(self.drives)
+        return tuple(filter(None, notes))
 
     @property
     def n_states(self) -> int:

@@ -16,7 +16,7 @@ LIMITS = {
     "control controller pid feedback": "a controller within the machine does not fit; an agent trims the speed only",
     "gap backlash play": "clearance is half the gap: of a backlash, its half",
     "joints gaps second": "several gaps are several [[joint]] tables, each with at, clearance, stiffness and damping",
-    "cam lift": "a cam's lift is a displacement of the base in samples of one cycle, with the sign turned",
+    "cam lift": "a cam's lift moves the base and pulls the spring to ground, as in docs/machines/cam-follower.toml",
     "amplitude": "the amplitude is the number of the force, unbalance, displacement or acceleration itself",
     "frequency omega rad/s": "frequencies are in Hz (1 rad/s = 0.159 Hz); a drive's is harmonic times speed",
     "gravity weight": "a weight is a preload, or a force of constant samples",

@@ -24,7 +24,7 @@ from chaosgym.machines.modal_impact import (
     flexible_model,
     nearly_rigid,
 )
-from chaosgym.machines.modal_machine.drive import Drive, checked, modal_drive
+from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import parameter
 
@@ -156,7 +156,8 @@ class ModalMachine(ModalImpactMachine):
                 f"the static force would push a mode of {hertz[held][np.argmax(away)]:.3g} Hz {farthest:.2g} m away: "
                 f"positions are good to {ROUNDING * farthest:.1g} m only; write 0 Hz if the body is free"
             )
-        return tuple(note for note in (turning_note(self.turning), rigid_note(hertz), far) if note)
+        of_drives = drive_notes(self.drives)
+        return tuple(note for note in (turning_note(self.turning), rigid_note(hertz), far, *of_drives) if note)
 
     def share_of_bound(self, states: Array, peak_force: Array) -> float:
         """Share of the bound of passivity: only the drive gives energy, and what a preload or offset has stored."""
