@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import count, islice
 
+from chaosgym.machines.binned.model import KEPT_BYTES, models_by_speed
 from chaosgym.machines.slider_crank import SliderCrank
-from chaosgym.machines.slider_crank.model import KEPT_BYTES, models_by_speed
 
 CRANKS = {
     "plain modes, 1 deg": SliderCrank(n_modes=3, fitted_modes=0, matrix_update_interval=1.0),

@@ -16,8 +16,8 @@ from chaosgym.core.events import KEEPS, UNSURE, judge
 from chaosgym.core.lanes import LANES, padded
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import SimulationError
+from chaosgym.machines.binned.model import side_by_side
 from chaosgym.machines.slider_crank.equations import equations
-from chaosgym.machines.slider_crank.model import side_by_side
 from chaosgym.simulation import ExactEvents, simulate, simulate_with_deviations
 from tests.machines.crank_twin import continuous_twin, rigid_twin
 from tests.plain_modes import PLAIN_CRANK

@@ -247,5 +247,5 @@ def test_contact_damping_is_related_to_a_mass():
     heavy = replace(CRANK, contact_damping_mass=4.0 * moving)
     assert heavy.contact_damping == pytest.approx(2.0 * CRANK.contact_damping)
     both = replace(heavy, ball_joint="instrumented", ball_damping_mass=moving)
-    damping = [joint.damping * both.contact_damping / joint.scale for joint in joints_of(both)]
+    damping = [joint.damping * both.contact_stiffness / joint.stiffness for joint in joints_of(both)]
     assert damping == pytest.approx([2.0 * CRANK.contact_damping] + 3 * [CRANK.contact_damping])

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.machines.binned import model as binned
 from chaosgym.machines.slider_crank.equations import (
     BALL_ACROSS,
     BALL_DIRECTIONS,
@@ -240,22 +241,12 @@ def ball_joint_of(machine: "SliderCrank") -> JointModel:
     return TightJoint()
 
 
-class Joint(NamedTuple):
-    """A contact; see ``core.binned.taylor.TaylorModel``. ``scale`` and ``damping`` multiply stiffness and damping."""
-
-    row: Array
-    gap: float
-    scale: float
-    damping: float
-    two_sided: bool
-    reading: Array
-    slides: bool
-
-
-def joints_of(machine: "SliderCrank") -> list[Joint]:
+def joints_of(machine: "SliderCrank") -> list[binned.Contact]:
     """All contacts of a machine: those of the slider joint, then those of the ball joint."""
     names = machine.degrees_of_freedom
     joints = []
+    linear = machine.contact_law == "linear"
+    stiffness, damper = (machine.contact_stiffness, machine.contact_damping) if linear else hertz_constants(machine)
     ball = math.sqrt(machine.ball_damping_mass / machine.damped_mass) if machine.ball_damping_mass else 1.0
     for model, clearance, recorded, damping in (
         (slider_joint_of(machine), machine.slider_clearance, machine.monitored_joint == "slider", 1.0),
@@ -266,33 +257,11 @@ def joints_of(machine: "SliderCrank") -> list[Joint]:
             row = np.stack([contact.motion.get(name, none) for name in names], axis=1)
             reading = contact.force * recorded
             share = contact.share
-            joints.append(Joint(row, clearance, share, share * damping, contact.two_sided, reading, contact.slides))
+            damped = damper * (share * damping) if linear else damper
+            joints.append(
+                binned.Contact(row, clearance, stiffness * share, damped, contact.two_sided, reading, contact.slides)
+            )
     return joints
-
-
-class Channels(NamedTuple):
-    """Contact channels; see ``BinnedModel``. ``slides`` (m,): friction acts along the guide."""
-
-    row: Array
-    stiffness: Array
-    damping: Array
-    two_sided: NDArray[np.bool_]
-    reading: Array
-    slides: NDArray[np.bool_]
-
-
-def channels_of(machine: "SliderCrank") -> Channels:
-    """The contacts of a machine whose contacts have one row each, as arrays."""
-    joints = joints_of(machine)
-    scale = np.array([joint.scale for joint in joints])
-    return Channels(
-        row=np.concatenate([joint.row for joint in joints]),
-        stiffness=machine.contact_stiffness * scale,
-        damping=machine.contact_damping * np.array([joint.damping for joint in joints]),
-        two_sided=np.array([joint.two_sided for joint in joints]),
-        reading=np.concatenate([joint.reading for joint in joints]),
-        slides=np.array([joint.slides for joint in joints]),
-    )
 
 
 @lru_cache(maxsize=64)

@@ -28,21 +28,17 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.core.binned.cycle import BinnedModel
-from chaosgym.core.binned.taylor import TaylorModel
+from chaosgym.core.binned.taylor import HERTZ, LINEAR
 from chaosgym.core.cycle import CycleArrays
-from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
-from chaosgym.machines.batch import CompiledBatch
-from chaosgym.machines.integrators import Integrator
-from chaosgym.machines.machine import Machine, Option, Work
+from chaosgym.machines.binned.machine import BinnedMachine
+from chaosgym.machines.binned.model import MAX_SETS, Contact, Held
+from chaosgym.machines.machine import Option, Work
 from chaosgym.machines.parameters import Parameter, parameter, parameters_of
-from chaosgym.machines.slider_crank import run as running
 from chaosgym.machines.slider_crank.equations import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom, equations
-from chaosgym.machines.slider_crank.joints import sensors_of
+from chaosgym.machines.slider_crank.joints import display_of, gaps_of, joints_of, sensor_peaks, sensors_of
 from chaosgym.machines.slider_crank.kinematics import slider_position
-from chaosgym.machines.slider_crank.model import STEP_PHASE, exact_model, fastest_rate, has_propagators, stepped_model
-from chaosgym.machines.slider_crank.run import CrankBatch, SteppedCrankBatch
+from chaosgym.machines.slider_crank.model import force_bound, held_of
 from chaosgym.machines.slider_crank.scenes import EXTREMES, OPTIONS, SCENES
 from chaosgym.machines.slider_crank.spatial_equations import spatial_equations
 from chaosgym.machines.slider_crank.work import WORK
@@ -73,7 +69,7 @@ def _is_fitted(name: str, about: Parameter) -> bool:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SliderCrank(Machine):
+class SliderCrank(BinnedMachine):
     """The Spatial Slider Crank; the defaults are the planar mechanism of the thesis with clearance at the slider.
 
     Raises
@@ -108,6 +104,7 @@ class SliderCrank(Machine):
     scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = SCENES
     extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = EXTREMES
     work: ClassVar[Work] = WORK
+    beside_matrices: ClassVar[tuple[str, ...]] = ("crank_speed", "slider_clearance", "ball_clearance")
     sides: ClassVar[tuple[str, ...]] = ("upper", "lower")
     """Surfaces whose force points up and down: on the slider, or on the housing if the ball joint is monitored."""
 
@@ -310,16 +307,6 @@ class SliderCrank(Machine):
                 f"allowed: from mass times squared offset, {least:g} kg m^2, on"
             )
 
-    @staticmethod
-    def period_at(speed: Any) -> Any:
-        """Duration of one operating cycle [s] at a speed [rpm], or at many."""
-        return 60.0 / speed
-
-    @property
-    def crank_rate(self) -> float:
-        """Angular velocity of the crank [rad/s]."""
-        return self.crank_speed * math.pi / 30.0
-
     @property
     def contact_damping(self) -> float:
         """Damping constant [N s/m] of the slider joint in contact: 2 zeta sqrt(k m), m the contact damping mass."""
@@ -406,48 +393,61 @@ class SliderCrank(Machine):
         """True if the motor stands at an angle, so that the rod swings in two planes."""
         return self.motor_angle > 0.0
 
-    def reduce(self, step_phase: float = STEP_PHASE) -> BinnedModel | TaylorModel:
-        """Return the model with exact propagators if contact is linear and does not turn with the ball.
+    @property
+    def bins(self) -> int:
+        """Bins of crank angle over which matrices are held."""
+        return round(360.0 / self.matrix_update_interval)
 
-        The fastest motion turns by ``step_phase`` [rad] in half an interval between two readings of the contacts. Any
-        other machine has a model for Taylor series. Machines that differ in clearance alone share all of it; those
-        that differ in speed share the assembly.
-        """
-        return exact_model(self, step_phase) if has_propagators(self) else stepped_model(self, 2.0 * step_phase)
+    def held(self) -> Held:
+        """Return the held accelerations, whatever the speed and the clearances."""
+        return held_of(self)
 
     @property
-    def n_states(self) -> int:
-        """Displacement and velocity of every degree of freedom."""
-        return 2 * len(self.degrees_of_freedom)
+    def contacts(self) -> list[Contact]:
+        """All contacts, those of the slider joint first."""
+        return joints_of(self)
 
     @property
-    def fastest_rate(self) -> float:
-        """Largest modulus [1/s] of an eigenvalue, contacts closed."""
-        return fastest_rate(self, stepped_model(self, STEP_PHASE))
-
-    def arrays(self, cycles: int, samples: int = 0) -> CycleArrays:
-        """Return the arrays into which ``run`` writes what happens in some cycles, with samples of the history."""
-        return running.arrays_of(self, cycles, samples)
-
-    def run(
-        self,
-        coordinates: Array,
-        bouncing: Array,
-        arrays: CycleArrays,
-        integrator: Integrator,
-        tangents: Tangents | None = None,
-    ) -> tuple[int, int]:
-        """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
-        return running.run(self, coordinates, bouncing, arrays, integrator, tangents)
+    def gaps(self) -> Array:
+        """Clearances [m] of the contacts."""
+        return gaps_of(self)
 
     @property
-    def carries_deviations(self) -> bool:
-        """True where motion between two changes of contact is linear: deviations take the motion's propagators."""
-        return has_propagators(self)
+    def display(self) -> Array:
+        """Displacement of the monitored joint: of the slider across the guide, or of the rod's end across the rod."""
+        return display_of(self)
+
+    @property
+    def stiffest(self) -> float:
+        """Contact stiffness [N/m]."""
+        return self.contact_stiffness
+
+    @property
+    def law(self) -> int:
+        """Law of all contacts."""
+        return LINEAR if self.contact_law == "linear" else HERTZ
+
+    @property
+    def has_propagators(self) -> bool:
+        """True if contact is linear, no contact force turns with the ball, and the contact sets are few."""
+        if self.contact_law != "linear" or self.ball_joint == "spherical":
+            return False
+        return int(self.radix ** len(self.gaps)) <= MAX_SETS
+
+    @property
+    def radix(self) -> int:
+        """Contact states of a channel that differ in their matrices: friction tells one side from the other."""
+        return 3 if self.friction_coefficient > 0.0 else 2
+
+    @property
+    def sampled_bins(self) -> list[int]:
+        """Bins at which eigenvalues are looked at: the rod in line with the guide, and farthest off it."""
+        return [0, self.bins // 4]
 
     def further_results(self, arrays: CycleArrays) -> dict[str, Any]:
         """Phase and components of each peak force, and the peaks of the sensors."""
-        return running.further_results(self, arrays)
+        peaks = sensor_peaks(self, arrays.channel_peak) if self.sensors else None
+        return {**super().further_results(arrays), "sensor_peak": peaks}
 
     @property
     def room(self) -> tuple[float, float]:
@@ -464,11 +464,7 @@ class SliderCrank(Machine):
 
     def share_of_bound(self, states: Array, peak_force: Array) -> float:
         """Largest force, as a share of that of an impact of all masses at ten times the speed of the crank pin."""
-        return float(peak_force.max()) / running.force_bound(self)
-
-    def batch(self, count: int) -> CompiledBatch:
-        """Return ``count`` variants that move in one compiled call."""
-        return (CrankBatch if has_propagators(self) else SteppedCrankBatch)(self, count)
+        return float(peak_force.max()) / force_bound(self)
 
 
 THESIS_SLIDER_CRANK = SliderCrank(fitted_modes=0, matrix_update_interval=5.0)

@@ -1,6 +1,5 @@
-"""Runs of slider cranks, single or in batches: which kernel moves them, and what it records besides."""
+"""Runs of mechanisms, single or in batches: which kernel moves them, and what it records besides."""
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,21 +12,14 @@ from chaosgym.core.binned.fixed_step import advance_binned_fixed_step
 from chaosgym.core.binned.taylor import TaylorModel
 from chaosgym.core.binned.taylor import advance as advance_stepped
 from chaosgym.core.compilation import call, call_side_by_side
-from chaosgym.core.cycle import CycleArrays, Episode, cycle_arrays
+from chaosgym.core.cycle import CycleArrays, Episode
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.machines.batch import CompiledBatch, Cycles, put, stacked
+from chaosgym.machines.binned.model import STEP_PHASE, ModelsBySpeed, fastest_rate, models_by_speed, stepped_model
 from chaosgym.machines.integrators import ExactEvents, Integrator
-from chaosgym.machines.slider_crank.joints import gaps_of, sensor_peaks
-from chaosgym.machines.slider_crank.model import (
-    STEP_PHASE,
-    ModelsBySpeed,
-    fastest_rate,
-    models_by_speed,
-    stepped_model,
-)
 
 if TYPE_CHECKING:
-    from chaosgym.machines.slider_crank.parameters import SliderCrank
+    from chaosgym.machines.binned.machine import BinnedMachine
 
 Array = NDArray[np.float64]
 
@@ -35,14 +27,8 @@ STEPS_AT_ONCE = 200_000
 """Steps without events in one call of a kernel: some tenths of a second of processor time."""
 
 
-def arrays_of(crank: "SliderCrank", cycles: int, samples: int) -> CycleArrays:
-    """Arrays for the cycles of a crank: contact travels along the bearing, and sensors have channels."""
-    channels = len(gaps_of(crank)) if crank.sensors else 0
-    return cycle_arrays(cycles, crank.n_states, samples, travels=True, channels=channels)
-
-
 def run(
-    crank: "SliderCrank",
+    machine: "BinnedMachine",
     coordinates: Array,
     bouncing: Array,
     arrays: CycleArrays,
@@ -53,14 +39,14 @@ def run(
     episode = Episode(side=bouncing[:1], touch=bouncing[1:])
     settings: tuple[Any, ...]
     if isinstance(integrator, ExactEvents):
-        model = crank.reduce(integrator.step_phase)
+        model = machine.reduce(integrator.step_phase)
         kernel = advance_stepped if isinstance(model, TaylorModel) else advance
-        steps = model.steps * round(360.0 / crank.matrix_update_interval)
+        steps = model.steps * machine.bins
         settings = (integrator.event_tolerance / model.contact_rate, integrator.event_budget)
     else:
-        model = stepped_model(crank, STEP_PHASE)
+        model = stepped_model(machine, STEP_PHASE)
         kernel, steps = advance_binned_fixed_step, integrator.steps_per_cycle
-        settings = (steps, fastest_rate(crank, model))
+        settings = (steps, fastest_rate(machine, model))
     # a kernel can't be interrupted: many revolutions take many calls
     cycles, at_once, done = len(arrays.section), max(1, STEPS_AT_ONCE // steps), 0
     while done < cycles:
@@ -77,41 +63,14 @@ def run(
     return status.OK, done
 
 
-def further_results(crank: "SliderCrank", arrays: CycleArrays) -> dict[str, Any]:
-    """Phase and components of each peak force, and the peaks of the sensors."""
-    return {
-        "peak_phase": arrays.peak_instant * crank.crank_rate,
-        "peak_vector": arrays.peak_vector,
-        "sensor_peak": sensor_peaks(crank, arrays.channel_peak) if crank.sensors else None,
-    }
-
-
-def force_bound(crank: "SliderCrank") -> float:
-    """Force [N] of an impact of all moving masses at ten times the speed of the crank pin.
-
-    The motor may give any power, so that there is no bound of energy. What turns with the rod counts as the mass at its
-    end that has the same inertia.
-    """
-    rod = crank.density * crank.rod_length * math.pi / 4.0 * crank.rod_diameter**2
-    turning = (crank.yoke_inertia + crank.housing_inertia) / crank.rod_length**2
-    mass = crank.slider_mass + crank.yoke_mass + crank.housing_mass + rod + turning
-    speed = 10.0 * (crank.crank_radius * crank.crank_rate + math.sqrt(crank.gravity * crank.rod_length))
-    damping = crank.contact_damping * math.sqrt(mass / (crank.slider_mass + crank.yoke_mass))
-    bound = (math.sqrt(crank.contact_stiffness * mass) + damping) * speed
-    if crank.contact_law == "hertz":
-        # k of the secant at the reference force; stiffer in proportion to the cube root of a larger force
-        bound *= max(1.0, bound / crank.hertz_reference_force) ** 0.2
-    return bound
-
-
 Indices = NDArray[np.int64]
 
 SPEED_FIELDS = ("bin_duration", "steps", "order")
-"""Fields of a slider crank's model that change with its speed, apart from the table."""
+"""Fields of a model that change with its speed, apart from the table."""
 
 
-class CrankBatch(CompiledBatch):
-    """Slider cranks that ``has_propagators``."""
+class BinnedBatch(CompiledBatch):
+    """Mechanisms that have propagators."""
 
     def __init__(self, machine: Any, count: int) -> None:
         super().__init__(machine, count)
@@ -142,10 +101,10 @@ class CrankBatch(CompiledBatch):
         self._machines[i] = machine
         self._models[i] = models_by_speed(machine)
         self._speeds[i] = np.nan
-        self.set_speeds(np.array([i]), np.array([machine.crank_speed]))
+        self.set_speeds(np.array([i]), np.array([machine.drive_speed]))
 
     def set_speeds(self, which: Indices, speeds: Array) -> None:
-        """Change the speeds of the cranks [rpm]."""
+        """Change the speeds of the drives [rpm]."""
         # machines of one make are often at one speed: each pair is looked up once
         found: dict[tuple[ModelsBySpeed, float], BinnedModel] = {}
         for i, speed in zip(which.tolist(), speeds.tolist(), strict=True):
@@ -164,7 +123,7 @@ class CrankBatch(CompiledBatch):
         """Change the clearances of the monitored joint [m]."""
         for i, clearance in zip(which.tolist(), clearances.tolist(), strict=True):
             self._machines[i] = self._machines[i].at(clearance=clearance)
-            self._batch.gap[i] = gaps_of(self._machines[i])
+            self._batch.gap[i] = self._machines[i].gaps
 
     def run_kicked(self, which: Indices, kicks: Array) -> Cycles:
         """``kick`` the machines ``which`` (k,) by each of the shares (k, cycles, n_states / 2) and run them a cycle."""
@@ -178,8 +137,8 @@ class CrankBatch(CompiledBatch):
         call_side_by_side(advance_binned_machines, len(self), *given)
 
 
-class SteppedCrankBatch(CompiledBatch):
-    """Slider cranks that move by Taylor series."""
+class TaylorBatch(CompiledBatch):
+    """Mechanisms that move by Taylor series."""
 
     def __init__(self, machine: Any, count: int) -> None:
         super().__init__(machine, count)
@@ -192,9 +151,9 @@ class SteppedCrankBatch(CompiledBatch):
         put(self._batch, i, machine.reduce())
 
     def set_speeds(self, which: Indices, speeds: Array) -> None:
-        """Change the speeds of the cranks [rpm]."""
+        """Change the speeds of the drives [rpm]."""
         for i, speed in zip(which.tolist(), speeds.tolist(), strict=True):
-            if self._machines[i].crank_speed != speed:
+            if self._machines[i].drive_speed != speed:
                 self.change(i, self._machines[i].at(speed))
 
     def set_clearances(self, which: Indices, clearances: Array) -> None:

@@ -1,0 +1,142 @@
+"""The base of machines whose matrices vary with the angle of a drive: from held matrices and contacts to runs."""
+
+import math
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.core.binned.cycle import BinnedModel
+from chaosgym.core.binned.taylor import LINEAR, TaylorModel
+from chaosgym.core.cycle import CycleArrays, cycle_arrays
+from chaosgym.core.tangent import Tangents
+from chaosgym.machines.batch import CompiledBatch
+from chaosgym.machines.binned import run as running
+from chaosgym.machines.binned.model import STEP_PHASE, Contact, Held, exact_model, fastest_rate, stepped_model
+from chaosgym.machines.integrators import Integrator
+from chaosgym.machines.machine import Machine
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BinnedMachine(Machine):
+    """A mechanism that is driven at a constant speed [rpm], with contacts along rows of displacement."""
+
+    beside_matrices: ClassVar[tuple[str, ...]] = ()
+    """Fields that change neither the matrices nor the contacts but for their gaps: speed and clearances."""
+
+    @property
+    @abstractmethod
+    def bins(self) -> int:
+        """Bins of the drive's angle over which matrices are held."""
+
+    @abstractmethod
+    def held(self) -> Held:
+        """Return the held accelerations, whatever the speed and the clearances."""
+
+    @property
+    @abstractmethod
+    def contacts(self) -> Sequence[Contact]:
+        """All contacts, those of a joint in a row."""
+
+    @property
+    @abstractmethod
+    def has_propagators(self) -> bool:
+        """True if contact is linear, no contact force turns with a ball, and the contact sets are few."""
+
+    @property
+    @abstractmethod
+    def display(self) -> Array:
+        """Displacement (n,) of the monitored joint per unit coordinate."""
+
+    @property
+    @abstractmethod
+    def stiffest(self) -> float:
+        """Stiffness [N/m] that the fastest contact may have."""
+
+    @property
+    def law(self) -> int:
+        """Law of all contacts, one of ``core.binned.taylor``."""
+        return LINEAR
+
+    @property
+    def gaps(self) -> Array:
+        """Clearances [m] of the contacts."""
+        return np.array([contact.gap for contact in self.contacts])
+
+    @property
+    def radix(self) -> int:
+        """Contact states of a channel that differ in their matrices: 3 where friction tells one side from the other."""
+        return 2
+
+    @property
+    def sampled_bins(self) -> list[int]:
+        """Bins at which eigenvalues are looked at."""
+        return list(range(0, self.bins, max(1, self.bins // 12)))
+
+    @staticmethod
+    def period_at(speed: Any) -> Any:
+        """Duration of one operating cycle [s] at a speed [rpm], or at many."""
+        return 60.0 / speed
+
+    @property
+    def drive_speed(self) -> float:
+        """Speed of the drive [rpm]."""
+        return float(getattr(self, self.speed_field))
+
+    @property
+    def crank_rate(self) -> float:
+        """Angular velocity of the crank [rad/s]."""
+        return self.drive_speed * math.pi / 30.0
+
+    @property
+    def n_states(self) -> int:
+        """Displacement and velocity of every degree of freedom."""
+        return 2 * len(self.degrees_of_freedom)
+
+    @property
+    def fastest_rate(self) -> float:
+        """Largest modulus [1/s] of an eigenvalue, contacts closed."""
+        return fastest_rate(self, stepped_model(self, STEP_PHASE))
+
+    def reduce(self, step_phase: float = STEP_PHASE) -> BinnedModel | TaylorModel:
+        """Return the model with exact propagators if contact is linear and does not turn with a ball.
+
+        The fastest motion turns by ``step_phase`` [rad] in half an interval between two readings of the contacts. Any
+        other machine has a model for Taylor series. Machines that differ in clearance alone share all of it; those
+        that differ in speed share the assembly.
+        """
+        return exact_model(self, step_phase) if self.has_propagators else stepped_model(self, 2.0 * step_phase)
+
+    def arrays(self, cycles: int, samples: int = 0) -> CycleArrays:
+        """Return the arrays into which ``run`` writes what happens in some cycles, with samples of the history."""
+        channels = len(self.gaps) if self.sensors else 0
+        return cycle_arrays(cycles, self.n_states, samples, travels=True, channels=channels)
+
+    def run(
+        self,
+        coordinates: Array,
+        bouncing: Array,
+        arrays: CycleArrays,
+        integrator: Integrator,
+        tangents: Tangents | None = None,
+    ) -> tuple[int, int]:
+        """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
+        return running.run(self, coordinates, bouncing, arrays, integrator, tangents)
+
+    @property
+    def carries_deviations(self) -> bool:
+        """True where motion between two changes of contact is linear: deviations take the motion's propagators."""
+        return self.has_propagators
+
+    def further_results(self, arrays: CycleArrays) -> dict[str, Any]:
+        """Phase and components of each peak force."""
+        return {"peak_phase": arrays.peak_instant * self.crank_rate, "peak_vector": arrays.peak_vector}
+
+    def batch(self, count: int) -> CompiledBatch:
+        """Return ``count`` variants that move in one compiled call."""
+        return (running.BinnedBatch if self.has_propagators else running.TaylorBatch)(self, count)
