@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from chaosgym import read_machine
 from chaosgym.cli import app
-from chaosgym.machines.modal_machine.file import template
+from chaosgym.machines.machine_file import template
 
 PAGE = (Path(__file__).parent.parent / "docs" / "own-machine.md").read_text()
 

@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip("bokeh")
 
-from chaosgym.machines.modal_machine.file import template
+from chaosgym.machines.machine_file import template
 from tests.browser import CHROMIUM, Browser
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")

@@ -19,7 +19,7 @@ from chaosgym.cli import app
 from chaosgym.errors import ChaosgymError, ParameterError
 from chaosgym.machines.beam_element import bending_matrices
 from chaosgym.machines.impact_beam.modes import modal_analysis
-from chaosgym.machines.modal_machine.file import schema_text, template
+from chaosgym.machines.machine_file import schema_text, template
 from chaosgym.plotting import response
 
 FIELDS = ("section", "peak_force", "impacts", "contact_fraction", "bounce_duration")

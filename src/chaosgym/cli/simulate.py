@@ -96,9 +96,12 @@ def _largest(sensor_peak: Any) -> list[float]:
 
 @machine_command
 @click.option("--markdown", is_flag=True, help="Print the table of the documentation.")
-def show(machine: Any, markdown: bool, as_json: bool) -> None:
-    """Print every parameter of a machine, where the number comes from, and what follows from them."""
+@plot_option()
+def show(machine: Any, markdown: bool, plot: str | None, as_json: bool) -> None:
+    """Print every parameter of a machine, where the number comes from, and what follows; --plot draws a mechanism."""
     from chaosgym.machines.parameters import markdown_table, origin_of, parameters_of
+
+    picture = picture_path(plot, f"show-{machine.name}")
 
     if markdown:
         return click.echo("\n".join(markdown_table(machine)))
@@ -125,25 +128,29 @@ def show(machine: Any, markdown: bool, as_json: bool) -> None:
             unit = "" if about.unit == "-" else about.unit
             origin = provenance[name]
             rows.append(f"{name:30s} {shown:>11s} {unit:8s} {origin['grade']:10s} {origin['source']}")
-        rows.append("natural frequencies [Hz]: " + ", ".join(f"{value:.1f}" for value in frequencies))
+        if frequencies:
+            rows.append("natural frequencies [Hz]: " + ", ".join(f"{value:.1f}" for value in frequencies))
         for name in ("degrees_of_freedom", "sensors"):
             if names := getattr(machine, name):
                 rows.append(f"{len(names)} {name.replace('_', ' ')}: {', '.join(names)}")
         return rows
 
-    emit(result, as_json, lines)
+    drawn: list[str] = []
+    draw(picture, lambda plots: plots.machine_figure(machine), result, drawn)
+    emit(result, as_json, lambda: lines() + drawn)
 
 
 @click.command("new-machine")
+@click.argument("kind", default="modes", metavar="[modes|four-bar|slider-crank|compressor]")
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="New file; standard output by default.")
 @click.option("--schema", is_flag=True, help="The JSON schema of such files instead, for editors.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def new_machine(out: Path | None, schema: bool, as_json: bool) -> None:
-    """Print the commented file of a machine: modes or matrices, joints with gaps, and what drives it."""
+def new_machine(kind: str, out: Path | None, schema: bool, as_json: bool) -> None:
+    """Print the commented file of a machine: of modes or matrices with gaps, or a mechanism of links and joints."""
     from chaosgym.files import write_atomically
-    from chaosgym.machines.modal_machine.file import schema_text, template
+    from chaosgym.machines.machine_file import schema_text, template
 
-    text = schema_text() if schema else template()
+    text = schema_text() if schema else template(kind)
     if out is not None:
         if out.exists():
             raise click.UsageError(f"--out {out} exists already; choose another name")

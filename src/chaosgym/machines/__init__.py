@@ -24,7 +24,7 @@ class MachineRegistry(Mapping[str, "type[Machine]"]):
 
     def __getitem__(self, name: str) -> "type[Machine]":
         if str(name).endswith(FILE_ENDING):
-            from chaosgym.machines.modal_machine.file import machine_class
+            from chaosgym.machines.machine_file import machine_class
 
             return machine_class(name)
         module, _, kind = self.entry_points[name].partition(":")

@@ -304,6 +304,16 @@ class Machine(ABC):
 
         draw_displacement(panel, record, colour, moment, force_limit)
 
+    def draw_poses(self, panels: Any) -> None:
+        """Draw the machine at equal steps of its cycle, one in each of the panels of matplotlib.
+
+        Raises
+        ------
+        ParameterError
+            If it has no such picture.
+        """
+        raise ParameterError(f"{self.name} has no picture of its links; allowed: the file of a mechanism")
+
     @property
     def swings(self) -> bool:
         """True for a beam, with the fields of ``ImpactBeam``, that flies from one spring to another as it rocks."""

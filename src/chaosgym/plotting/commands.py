@@ -70,6 +70,19 @@ def _followed(record: CycleRecord, cycles: int) -> CycleRecord:
     return last.of_joint(record.joint_name)
 
 
+POSES = 8
+"""Moments of a cycle at which a machine is drawn."""
+
+
+@_styled
+def machine_figure(machine: Machine) -> Figure:
+    """Draw a mechanism at eight crank angles, with the paths of its points and its gaps larger than they are."""
+    figure = figure_of(1.6 * WIDTH, 4.2)
+    machine.draw_poses(figure.subplots(2, POSES // 2).ravel())
+    figure.suptitle(point_of(machine), x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    return figure
+
+
 @_styled
 def simulation_figure(record: CycleRecord, transient: int = 0) -> Figure:
     """Peak force of every cycle, and the motion in its gap with the contact force over the last ones."""

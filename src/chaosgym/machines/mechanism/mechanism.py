@@ -55,7 +55,7 @@ class Row(NamedTuple):
         return f"{self.joint.name} {self.motion}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mechanism:
     """Links and joints with mobility one, whose drive turns a revolute joint.
 

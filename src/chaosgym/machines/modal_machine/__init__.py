@@ -1,7 +1,7 @@
 """A machine that a user describes: modes or matrices, joints with gaps, and a periodic drive."""
 
+from chaosgym.machines.machine_file import read_machine
 from chaosgym.machines.modal_machine.drive import Drive
-from chaosgym.machines.modal_machine.file import read_machine
 from chaosgym.machines.modal_machine.jointed import Joint, JointedMachine, machine_with_joints
 from chaosgym.machines.modal_machine.machine import ModalMachine
 from chaosgym.machines.modal_machine.structure import Structure

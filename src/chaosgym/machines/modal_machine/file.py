@@ -1,30 +1,28 @@
-"""The file of a machine: TOML with units in, a class of machines out, whose defaults are what the file states."""
+"""The file of modes or matrices, joints and drives: its tables in SI, and a class of machines out of them."""
 
-import hashlib
-import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from importlib import resources
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
 from chaosgym.errors import ParameterError
-from chaosgym.files import contents, toml_of
+from chaosgym.machines.file_keys import needed
 from chaosgym.machines.linear_impact import damping_for
 from chaosgym.machines.machine import Machine, Work
-from chaosgym.machines.modal_machine.archives import LARGEST, read_archive, read_matrix
-from chaosgym.machines.modal_machine.cycle_file import files_of, with_samples
+from chaosgym.machines.modal_machine import cycle_file
+from chaosgym.machines.modal_machine.archives import read_archive, read_matrix
 from chaosgym.machines.modal_machine.drive import KINDS, Drive
 from chaosgym.machines.modal_machine.jointed import Joint, machine_with_joints
-from chaosgym.machines.modal_machine.keys import REQUIRED, TABLES, checked_table, schema
+from chaosgym.machines.modal_machine.keys import KEYS
 from chaosgym.machines.modal_machine.machine import ModalMachine, clearance_option
 from chaosgym.machines.modal_machine.structure import BASE, Structure
 from chaosgym.machines.modal_machine.turning import turning_joints
-from chaosgym.machines.parameters import check_parameter, field_named, parameter, parameters_of, suggestion
-from chaosgym.machines.units import TURNING, parse_quantity
+from chaosgym.machines.parameters import parameter, parameters_of, suggestion
+from chaosgym.machines.stated import range_of, reduced, tolerances_of
+from chaosgym.machines.units import TURNING
 
 FIELDS = {"stiffness": "contact_stiffness", "damping": "contact_damping"}
 """Fields of the machine by key of [joint], where they have other names."""
@@ -32,85 +30,30 @@ FIELDS = {"stiffness": "contact_stiffness", "damping": "contact_damping"}
 MOST_SAMPLED = 16
 """Harmonics of a sampled cycle by default, at most."""
 
-_classes: dict[str, type[Machine]] = {}
 
-
-def machine_class(path: str | Path) -> type[Machine]:
-    """Class of the machines that a file describes; calling it without arguments gives the one that is stated.
+def tables_of(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """All tables by their path, values in SI.
 
     Raises
     ------
     ParameterError
-        If the file can't be read, a key is unknown, a unit missing, or a value not allowed; one line that says where.
+        If a table or a key is missing or unknown, or a unit or a value is wrong.
     """
-    try:
-        text, values = toml_of(path)
-    except ValueError as error:
-        raise ParameterError(f"{path} {error}") from None
-    try:
-        folder = Path(path).parent
-        data = _tables(values, folder)
-        digest = hashlib.sha256(text.encode())
-        for name in ("matrices", "mass", "stiffness", "damping", "universal_file"):
-            if name in data["structure"]:
-                digest.update(_bytes(folder / data["structure"][name]))
-        for name in files_of(values):
-            digest.update(_bytes(folder / name))
-        key = f"{path} {digest.hexdigest()}"
-        if key not in _classes:
-            _classes[key] = _built(str(path), digest.hexdigest()[:16], data, folder)
-        return _classes[key]
-    except ParameterError as error:
-        raise ParameterError(f"{path}: {error}") from None
-
-
-def read_machine(path: str | Path) -> Machine:
-    """Machine that a file describes, at the speed and clearance that it states.
-
-    Raises
-    ------
-    ParameterError
-        As ``machine_class``.
-    """
-    kind: Any = machine_class(path)
-    machine: Machine = kind()
-    return machine
-
-
-def template() -> str:
-    """Commented file of an example, ready to edit."""
-    return (resources.files(__package__) / "template.toml").read_text(encoding="utf-8")
-
-
-def schema_text() -> str:
-    """JSON schema of such files, as text."""
-    return json.dumps(schema(), indent=1) + "\n"
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        return contents(path, LARGEST)
-    except ValueError as error:
-        raise ParameterError(f"{path} {error}") from None
-
-
-def _tables(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """All tables by their path, values in SI."""
     data: dict[str, Any] = {}
     drives: list[Any] = []
-    for name in REQUIRED:
+    for name in KEYS.required:
         if name not in values:
             raise ParameterError(f"[[{name}]] is missing" if name == "drive" else f"[{name}] is missing")
-    for path in TABLES:
+    for path in KEYS.tables:
         outer, _, inner = path.rpartition(".")
         if outer == "joint":
             continue
         given = values.get(outer, {}).get(inner, {}) if outer else values.get(path, {}) if path else values
         if path == "drive":
-            drives = [with_samples(row, folder) for row in (given if isinstance(given, list) else [given])]
-            data[path] = [checked_table(path, row) for row in drives]
+            drives = [cycle_file.with_samples(row, folder) for row in (given if isinstance(given, list) else [given])]
+            data[path] = [KEYS.checked(path, row) for row in drives]
         else:
-            data[path] = checked_table(path, given) if path != "joint" else _joints(given)
+            data[path] = KEYS.checked(path, given) if path != "joint" else _joints(given)
     for joint, moves in zip(data["joint"], turning_joints({**values, "drive": drives}), strict=True):
         joint["turns"] = moves
     return data
@@ -123,27 +66,34 @@ def _joints(given: Any) -> list[dict[str, Any]]:
         raise ParameterError("[[joint]] is missing")
     found = []
     for row in rows:
-        values = checked_table("joint", row)
-        found.append({**values, "lower": checked_table("joint.lower", row.get("lower", {}))})
+        values = KEYS.checked("joint", row)
+        found.append({**values, "lower": KEYS.checked("joint.lower", row.get("lower", {}))})
     return found
 
 
-def _needed(table: str, values: Mapping[str, Any], *names: str) -> list[Any]:
-    for name in names:
-        if name not in values:
-            raise ParameterError(f"[{table}] lacks {name}")
-    return [values[name] for name in names]
+def files_of(values: Mapping[str, Any], folder: Path) -> list[Path]:
+    """Files that a machine's file names, whose tables have been checked."""
+    names = ("matrices", "mass", "stiffness", "damping", "universal_file")
+    named = [values["structure"][name] for name in names if name in values["structure"]]
+    return [folder / name for name in (*named, *cycle_file.files_of(values))]
 
 
-def _built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type[Machine]:
-    """Make the class: its fields have the file's values as defaults, and one more names the file's content."""
+def built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type[Machine]:
+    """Make the class: its fields have the file's values as defaults, and one more names the file's content.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not allowed.
+    """
     structure = structure_of(data, folder)
     operation: dict[str, Any] = data["operation"]
-    speed, *ends = _needed("operation", operation, "speed", "speed_range", "clearance_range")
-    usual = {name: _range(name, given) for name, given in zip(("speed", "clearance"), ends, strict=True)}
+    speed, *ends = needed("operation", operation, "speed", "speed_range", "clearance_range")
+    named = zip(("speed", "clearance"), ends, strict=True)
+    usual = {name: range_of(ModalMachine, f"operation.{name}_range", name, given) for name, given in named}
     definition = parameter(digest, choices=(digest,), provenance="stated", source=path)
     drives, title = tuple(_drive(row) for row in data["drive"]), data[""].get("title", path)
-    types: dict[str, Any] = {"name": path, "__doc__": title, "__reduce__": _reduced}
+    types: dict[str, Any] = {"name": path, "__doc__": title, "__reduce__": reduced}
     made: Any
     if len(data["joint"]) > 1:
         about = {"provenance": "stated", "source": path}
@@ -163,7 +113,7 @@ def _built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> typ
         if "monitored" in operation:
             raise ParameterError("operation.monitored needs several [[joint]]; allowed with one: leave it out")
         made = _with_one_joint(structure, data["joint"][0], drives, speed, usual, types, definition, path)
-    made.tolerances = _tolerances(data["tolerances"], made())
+    made.tolerances = tolerances_of(data["tolerances"], made())
     made.work = Work(task=data["job"])
     kind: type[Machine] = made
     return kind
@@ -173,7 +123,7 @@ def _stated_of(joint: Mapping[str, Any], name: str, structure: Structure) -> dic
     """What a file states of a joint, with factors of the lower stop, and the damper that a restitution stands for."""
     if "restitution" in joint:
         joint = _with_damper(joint, name, structure)
-    _, clearance, *upper = _needed(name, joint, "at", "clearance", "stiffness", "damping")
+    _, clearance, *upper = needed(name, joint, "at", "clearance", "stiffness", "damping")
     stated = {key: value for key, value in joint.items() if key not in ("lower", "name")}
     for key, above in zip(("stiffness", "damping"), upper, strict=True):
         lower = joint["lower"].get(key, above)
@@ -192,7 +142,7 @@ def _with_damper(joint: Mapping[str, Any], name: str, structure: Structure) -> d
     That mass is what resists a short push at the joint, 1 / |phi|^2 of all kept modes (Schwager and Poeschel 2007, see
     ``linear_impact``).
     """
-    at, stiffness, restored = _needed(name, joint, "at", "stiffness", "restitution")
+    at, stiffness, restored = needed(name, joint, "at", "stiffness", "restitution")
     if "damping" in joint or "damping" in joint["lower"]:
         raise ParameterError(f"{name} has restitution and damping; allowed: one of them")
     if not 1e-3 <= restored <= 1.0 or not stiffness > 0.0:
@@ -248,56 +198,6 @@ def _with_one_joint(
     annotations |= {name: ClassVar[Any] for name in types if not name.startswith("__")}
     namespace = {"__module__": __name__, "__annotations__": annotations, **fields, **types}
     return dataclass(frozen=True, kw_only=True)(type("ModalMachine", (ModalMachine,), namespace))
-
-
-def _reduced(machine: Any) -> Any:
-    """How a machine is pickled: by the name of its file, whose class has no name of its own."""
-    return _restored, (machine.name, {each.name: getattr(machine, each.name) for each in fields(machine)})
-
-
-def _restored(path: str, values: Mapping[str, Any]) -> Machine:
-    kind: Any = machine_class(path)
-    if kind.definition != values["definition"]:
-        raise ParameterError(f"{path} has changed: it is not the machine that was kept")
-    machine: Machine = kind(**values)
-    return machine
-
-
-def _range(name: str, values: Any) -> tuple[float, float]:
-    if len(values) != 2 or not values[0] < values[1]:
-        raise ParameterError(
-            f"operation.{name}_range is no range; allowed: a text such as '4 to 30 Hz', the lower one first"
-        )
-    low, high = (check_parameter(ModalMachine, name, end) for end in values)
-    return low, high
-
-
-def _tolerances(given: Mapping[str, Any], machine: Machine) -> dict[str, tuple[float, bool]]:
-    """Half widths by field, and whether they are shares of the value."""
-    known = {name: about for name, about in parameters_of(machine).items() if not about.choices}
-    found = {}
-    for key, text in _flat(given).items():
-        name = field_named(machine, key)
-        if name not in known:
-            raise ParameterError(f"[tolerances] has no key {name!r}{suggestion(name, known)}")
-        relative = isinstance(text, str) and text.strip().endswith("%")
-        value = parse_quantity(f"tolerances.{name}", text, "-" if relative else known[name].unit)
-        if not value > 0.0 or (relative and getattr(machine, name) == 0.0):
-            raise ParameterError(f"tolerances.{name} = {text!r} is out of range; allowed: above 0, no share of 0")
-        nominal = getattr(machine, name)
-        for side in (-1.0, 1.0):
-            check_parameter(machine, name, nominal + side * value * (abs(nominal) if relative else 1.0))
-        found[name] = (value, relative)
-    return found
-
-
-def _flat(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Entries of a table with those of tables in it, such as left.clearance, by their dotted keys."""
-    flat: dict[str, Any] = {}
-    for key, value in given.items():
-        inner = _flat(value) if isinstance(value, dict) else {"": value}
-        flat |= {f"{key}.{name}" if name else key: each for name, each in inner.items()}
-    return flat
 
 
 def _drive(row: Mapping[str, Any]) -> Drive:
@@ -368,14 +268,14 @@ def structure_of(data: Mapping[str, Any], folder: Path) -> Structure:
 def _ratios(table: Mapping[str, Any]) -> Any:
     if "modal_damping" in table:
         return table["modal_damping"]
-    (ratios,) = _needed("structure", table, "damping_ratios")
+    (ratios,) = needed("structure", table, "damping_ratios")
     return ratios[0] if len(ratios) == 1 else ratios
 
 
 def _of_modes(table: Mapping[str, Any], shapes: Mapping[str, Any], residual: Mapping[str, Any]) -> Structure:
     rest = None
     if residual:
-        at, compliance = _needed("structure.residual", residual, "at", "compliance")
+        at, compliance = needed("structure.residual", residual, "at", "compliance")
         rest = (at, compliance, residual.get("frequency", 2.0 * float(np.max(table["frequencies"]))))
     if not shapes:
         raise ParameterError("[structure.shapes] is missing: the shape of each mode at each named point")
@@ -399,7 +299,7 @@ def _of_matrices(table: Mapping[str, Any], data: Mapping[str, Any], folder: Path
     if "C" in matrices:
         _refuse_two("structure", {**table, "the damping matrix C": 0}, "the damping matrix C", *_DAMPED)
     joints = [str(joint.get("at", "")).lstrip("-+ ") for joint in data["joint"]]
-    (modes,) = _needed("structure", table, "modes")
+    (modes,) = needed("structure", table, "modes")
     return Structure.of_matrices(
         matrices["M"],
         matrices["K"],
@@ -416,6 +316,6 @@ def _matrices(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Matrices M, K and, if they are there, C, base and names."""
     if "matrices" in table:
         return read_archive(folder / table["matrices"])
-    mass, stiffness = _needed("structure", table, "mass", "stiffness")
+    mass, stiffness = needed("structure", table, "mass", "stiffness")
     files = {"M": mass, "K": stiffness, **({"C": table["damping"]} if "damping" in table else {})}
     return {name: read_matrix(folder / file) for name, file in files.items()}

@@ -1,33 +1,18 @@
-"""Keys of a machine's file: unit and meaning of each, from which reader, messages and JSON schema are made."""
+"""Keys of the file of modes or matrices."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
-from chaosgym.errors import ParameterError
+from chaosgym.machines.file_keys import OPERATION, TEXT, Key, Keys
 from chaosgym.machines.modal_machine.drive import KINDS
 from chaosgym.machines.modal_machine.limits import hint, told_of
-from chaosgym.machines.numbers import shown
-from chaosgym.machines.units import TURNING, parse_quantity, parse_row, turns, units_of
+from chaosgym.machines.units import TURNING, turns
 
-
-class Key(NamedTuple):
-    """What stands behind a key.
-
-    ``about`` it; ``unit`` of a quantity; ``kind`` "quantity", "row", "rows", "text", "texts", "count" or "flag";
-    ``choices`` of a text.
-    """
-
-    about: str
-    unit: str = "-"
-    kind: str = "quantity"
-    choices: tuple[str, ...] = ()
-
-
-TEXT = "text"
 SHAPE = Key(
-    "mass-normalised mode shape there, a number for each mode; 'base': participation [kg^1/2]", "kg^-1/2", "row"
+    "mass-normalised mode shape there, a number for each mode; 'base': participation [kg^1/2]",
+    "kg^-1/2",
+    "row",
+    bare=True,
 )
 
 TABLES: Mapping[str, Mapping[str, Key]] = {
@@ -89,114 +74,27 @@ TABLES: Mapping[str, Mapping[str, Key]] = {
         "clearance_range": Key("lowest and highest, of the monitored or the first joint", "m", "row"),
         "monitored": Key("joint that is shown and judged; if open, the one with the largest force", kind=TEXT),
     },
-    "tolerances": {"*": Key("half width of a field of the machine, with its unit or as a share in %")},
-    "job": {"*": Key("number of the environments' task, as a keyword of gymnasium.make")},
+    **OPERATION,
 }
-"""Tables of the file by their path; "*" is a name that the user chooses. ``drive`` is a list of tables, and ``joint``
-may be."""
-
-REQUIRED = ("structure", "joint", "drive", "operation")
+"""Tables of the file by their path; "*" is a name that the user chooses."""
 
 
-def _inner(path: str) -> list[str]:
-    """Names of the tables within a table."""
-    return [name.rpartition(".")[2] for name in TABLES if name and name.rpartition(".")[0] == path]
-
-
-def checked_table(path: str, given: Any) -> dict[str, Any]:
-    """Values of a table in SI: floats, arrays, texts; tables within it are left out.
-
-    Raises
-    ------
-    ParameterError
-        If a key is unknown (the nearest one is suggested), a unit is missing, or a value has the wrong form.
-    """
-    if not isinstance(given, dict):
-        raise ParameterError(f"{path} = {shown(given)} is not a table; write [{path}] and one line a value below it")
-    known, prefix = TABLES[path], f"{path}." if path else ""
-    inner = _inner(path)
-    values = {}
-    for name, value in given.items():
-        if name in inner:
-            continue
-        key = known.get(name) or known.get("*")
-        if key is None:
-            where = f"[{path}]" if path else "the file"
-            raise ParameterError(f"{where} has no key {name!r}{told_of(name, [*known, *inner])}")
-        values[name] = value if path in ("tolerances", "job") else _told_value(f"{prefix}{name}", value, key)
-    return values
-
-
-def _told_value(name: str, given: Any, key: Key) -> Any:
-    """Value of a key; a unit that does not fit is told of."""
-    try:
-        return _value(name, given, key)
-    except ParameterError as error:
-        _, found, unit = str(error).partition(" has the unknown unit '")
-        raise ParameterError(f"{error}{hint(unit.partition(chr(39))[0]) if found else ''}") from None
-
-
-def _value(name: str, given: Any, key: Key) -> Any:
+def _unit_of(name: str, given: Any, key: Key) -> str:
+    """Unit of a key: that of what turns where the unit given says so, and none of a shape that has none."""
     unit = "kg^1/2" if name == "structure.shapes.base" else key.unit
     moves = turns(given, unit)
     if moves:
-        unit = TURNING[unit]
-    elif key is SHAPE and moves is None:
-        unit = "-"  # no unit, which modal masses allow
-    if key.kind in ("row", "rows"):
-        if key.kind == "rows":
-            if not isinstance(given, list):
-                raise ParameterError(f"{name} = {shown(given)} is out of range; allowed: a list of rows")
-            return [parse_row(name, row, unit) for row in given]
-        return np.array(parse_row(name, given, unit))
-    if key.kind == "quantity":
-        return parse_quantity(name, given, unit)
-    kind: Any = {"text": str, "texts": list, "count": int, "flag": bool}[key.kind]
-    if not isinstance(given, kind) or (key.kind == "count" and isinstance(given, bool)):
-        what = {"text": "a text", "texts": "a list of texts", "count": "a whole number", "flag": "true or false"}
-        raise ParameterError(f"{name} = {shown(given)} is out of range; allowed: {what[key.kind]}")
-    if key.kind == "texts" and not all(isinstance(one, str) for one in given):
-        raise ParameterError(f"{name} = {shown(given)} is out of range; allowed: a list of texts")
-    if key.choices and given not in key.choices:
-        raise ParameterError(f"{name} = {shown(given)} is not one of {', '.join(key.choices)}")
-    return given
+        return TURNING[unit]
+    return "-" if key is SHAPE and moves is None else unit  # no unit, which modal masses allow
 
 
-def schema() -> dict[str, Any]:
-    """JSON schema of a machine's file, for editors."""
-    top: dict[str, Any] = _table_schema("")
-    top["required"] = list(REQUIRED)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "chaosgym machine", **top}
-
-
-def _table_schema(path: str) -> dict[str, Any]:
-    prefix = f"{path}." if path else ""
-    properties, free = {}, None
-    for name, key in TABLES[path].items():
-        if name == "*":
-            free = _key_schema(path, key)
-        else:
-            properties[name] = _key_schema(path, key)
-    for inner in _inner(path):
-        table = _table_schema(f"{prefix}{inner}")
-        several = {"type": "array", "items": table}
-        properties[inner] = several if inner == "drive" else {"anyOf": [table, several]} if inner == "joint" else table
-    return {"type": "object", "properties": properties, "additionalProperties": False if free is None else free}
-
-
-def _key_schema(path: str, key: Key) -> dict[str, Any]:
-    text: dict[str, Any] = {"type": "string"}
-    number = [{"type": "number"}] if key.unit == "-" or key is SHAPE else []
-    one = {"anyOf": [text, *number]} if number else text
-    shapes: dict[str, Any] = {
-        "quantity": one,
-        "row": {"anyOf": [text, *number, {"type": "array", "items": one}]},
-        "rows": {"type": "array", "items": {"anyOf": [text, {"type": "array", "items": one}]}},
-        "text": {"type": "string", "enum": list(key.choices)} if key.choices else text,
-        "texts": {"type": "array", "items": text},
-        "count": {"type": "integer"},
-        "flag": {"type": "boolean"},
-    }
-    listed = [*units_of(key.unit), *(units_of(TURNING[key.unit]) if key.unit in TURNING else ())]
-    about = key.about if key.unit == "-" else f"{key.about} [{', '.join(listed)}]"
-    return {**shapes["quantity" if path in ("tolerances", "job") else key.kind], "description": about}
+KEYS = Keys(
+    TABLES,
+    required=("structure", "joint", "drive", "operation"),
+    lists=("drive",),
+    either=("joint",),
+    unknown=told_of,
+    misfit=hint,
+    unit_of=_unit_of,
+    beside=TURNING,
+)

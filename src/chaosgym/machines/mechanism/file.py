@@ -1,0 +1,245 @@
+"""The file of a mechanism: links, joints and what pulls at them, with units; a class of machines out of it."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.file_keys import needed
+from chaosgym.machines.machine import Work
+from chaosgym.machines.mechanism.forces import STROKE_ANGLES, Gas, Sampled
+from chaosgym.machines.mechanism.joints import Joint
+from chaosgym.machines.mechanism.keys import KEYS
+from chaosgym.machines.mechanism.links import Body, Link, rigid_link
+from chaosgym.machines.mechanism.machine import CLEARANCE_FIELDS, Clearance, MechanismMachine, machine_of, opened_by
+from chaosgym.machines.mechanism.mechanism import Force, Mechanism, Spring
+from chaosgym.machines.mechanism.nominal import nominal, revolution_of
+from chaosgym.machines.numbers import number
+from chaosgym.machines.parameters import parameter
+from chaosgym.machines.stated import range_of, reduced, tolerances_of
+
+HEAVIEST, LONGEST = 1e9, 1e6
+"""Most mass [kg] and distance [m] that a file may state."""
+
+
+def tables_of(values: Mapping[str, Any], _folder: Path) -> dict[str, Any]:
+    """All tables of a file, values in SI.
+
+    Raises
+    ------
+    ParameterError
+        If a table or a key is missing or unknown, or a unit or a value is wrong.
+    """
+    for name in KEYS.required:
+        if name not in values:
+            raise ParameterError(f"[{name}] is missing" if name != "joint" else "[[joint]] is missing")
+    data: dict[str, Any] = {"": KEYS.checked("", values)}
+    for path in ("ground", "operation", "tolerances", "job"):
+        data[path] = KEYS.checked(path, values.get(path, {}))
+    data["ground.points"] = _points("ground", values["ground"])
+    if not isinstance(values["link"], dict) or not values["link"]:
+        raise ParameterError("[link.NAME] is missing: each link is a table, such as [link.crank]")
+    data["link"] = {name: _link_table(name, table) for name, table in values["link"].items()}
+    for path in ("joint", "force", "gas", "spring"):
+        data[path] = [KEYS.checked(path, row) for row in _list(path, values.get(path, []))]
+    return data
+
+
+def files_of(_values: Mapping[str, Any], _folder: Path) -> list[Path]:
+    """Files that the tables name: none."""
+    return []
+
+
+def _list(path: str, given: Any) -> list[Any]:
+    if not isinstance(given, list):
+        raise ParameterError(f"[{path}] is a list: write [[{path}]] for each")
+    return given
+
+
+def _points(where: str, table: Any) -> dict[str, tuple[float, float]]:
+    found = {}
+    path = f"{where.partition('.')[0]}.points"
+    for name, values in KEYS.checked(path, table.get("points", {}), f"{where}.points").items():
+        found[name] = _pair(f"{where}.points.{name}", values)
+    return found
+
+
+def _pair(where: str, values: Any) -> tuple[float, float]:
+    if len(values) != 2:
+        raise ParameterError(f"{where} has {len(values)} numbers; allowed: two, x and y, as in '50, 0 mm'")
+    x, y = (number(where, value, -LONGEST, LONGEST, "m") for value in values)
+    return x, y
+
+
+def _link_table(name: str, table: Any) -> dict[str, Any]:
+    where = f"link.{name}"
+    values = KEYS.checked("link", table, where)
+    values["points"] = _points(where, table)
+    rows = _list(f"{where}.body", table.get("body", []))
+    values["body"] = [KEYS.checked("link.body", row, f"{where}.body") for row in rows]
+    return values
+
+
+def _link(name: str, table: Mapping[str, Any]) -> Link:
+    bodies = []
+    for row in table["body"]:
+        where = f"link.{name}.body"
+        (mass,) = needed(where, row, "mass")
+        if not mass > 0.0:
+            raise ParameterError(f"{where}.mass = {mass:g} kg is out of range; allowed: above 0")
+        inertia = number(f"{where}.inertia", row.get("inertia", 0.0), 0.0, HEAVIEST, "kg m^2")
+        centre = _pair(f"{where}.centre", row.get("centre", np.zeros(2)))
+        bodies.append(Body(number(f"{where}.mass", mass, 0.0, HEAVIEST, "kg"), inertia, centre))
+    return rigid_link(name, table["points"], tuple(bodies), math.radians(table.get("angle", 0.0)))
+
+
+def _ends(where: str, row: Mapping[str, Any]) -> list[tuple[str, str]]:
+    (between,) = needed(where, row, "between")
+    if len(between) != 2:
+        raise ParameterError(f"{where}.between names {len(between)} points; allowed: two")
+    return [_end(f"{where}.between", each) for each in between]
+
+
+def _end(where: str, text: str) -> tuple[str, str]:
+    link, dot, point = text.partition(".")
+    if not (link and dot and point):
+        raise ParameterError(f"{where} = {text!r} is no point; allowed: LINK.POINT, such as 'crank.pin'")
+    return link, point
+
+
+def _clearance(name: str, kind: str, row: Mapping[str, Any]) -> Clearance | None:
+    """Clearance of a joint, if it has one."""
+    where = f"joint {name}"
+    if "clearance" not in row:
+        for key in ("stiffness", "damping", "stations"):
+            if key in row:
+                raise ParameterError(f"{where} has {key} and no clearance; allowed: both, or none")
+        return None
+    values = needed(where, row, "clearance", "stiffness", "damping")
+    for (what, about), value in zip(CLEARANCE_FIELDS.items(), values, strict=True):
+        low, high, unit = about["low"], about["high"], about["unit"]
+        number(f"{name}_{what}", value, low, high, unit)
+    stations = tuple(float(place) for place in row.get("stations", ()))
+    if stations and len(set(stations)) < 2:
+        raise ParameterError(
+            f"{where}.stations are at one place; allowed: two or more, or none for a guide without tilt"
+        )
+    gap, stiffness, damping = (float(value) for value in values)
+    found = Clearance(gap, stiffness, damping, stations)
+    try:
+        opened_by(kind, found)
+    except ParameterError as error:
+        raise ParameterError(f"{where}: {error}") from None
+    return found
+
+
+def _joints(rows: list[dict[str, Any]]) -> tuple[list[Joint], dict[str, Clearance]]:
+    joints: list[Joint] = []
+    clearances: dict[str, Clearance] = {}
+    for row in rows:
+        (name,) = needed("joint", row, "name")
+        if any(name == joint.name for joint in joints):
+            raise ParameterError(f"two [[joint]] have the name {name!r}; allowed: a name of its own for each")
+        where = f"joint {name}"
+        (kind,) = needed(where, row, "kind")
+        first, second = _ends(where, row)
+        clearance = _clearance(name, kind, row)
+        for key, kinds in (("axis", ("prismatic", "slot")), ("turn", ("prismatic", "weld"))):
+            if key in row and kind not in kinds:
+                raise ParameterError(f"{where}.{key} has no meaning in a {kind} joint; leave it out")
+        driven = row.get("driven", False)
+        if driven and clearance:
+            raise ParameterError(f"{where} is driven and has clearance; allowed: one of them")
+        if clearance:
+            clearances[name] = clearance
+        angles = (math.radians(row.get(key, 0.0)) for key in ("axis", "turn"))
+        axis, turn = angles
+        opened = opened_by(kind, clearance) if clearance else ()
+        joints.append(Joint(name, kind, first, second, axis, "", opened, driven, turn))
+    return joints, clearances
+
+
+def _direction(angle: float) -> tuple[float, float]:
+    return math.cos(math.radians(angle)), math.sin(math.radians(angle))
+
+
+def _force(row: Mapping[str, Any]) -> Force:
+    at, values = needed("force", row, "at", "force")
+    return Force(_end("force.at", at), Sampled(np.asarray(values), np.array(_direction(row.get("direction", 0.0)))).at)
+
+
+def _gas(row: Mapping[str, Any], mechanism: Mechanism) -> Force:
+    """Force of the gas on the piston along its nominal stroke."""
+    at, bore, dead, low, high = needed("gas", row, "at", "bore", "dead_volume", "suction", "discharge")
+    number("gas.bore", bore, 1e-4, 10.0, "m")
+    number("gas.dead_volume", dead, 1e-3, 100.0)
+    number("gas.suction", low, 0.0, 1e9, "Pa")
+    number("gas.discharge", high, low, 1e9, "Pa")
+    exponent = number("gas.exponent", row.get("exponent", 1.3), 0.5, 3.0)
+    behind = number("gas.behind", row.get("behind", low), 0.0, 1e9, "Pa")
+    gas = Gas(math.pi / 4.0 * bore**2, dead, low, high, behind, exponent)
+    direction, point = np.array(_direction(row.get("direction", 0.0))), _end("gas.at", at)
+    theta: Any = np.arange(STROKE_ANGLES) * (2.0 * math.pi / STROKE_ANGLES)
+    place = mechanism.point(nominal(mechanism, revolution_of(mechanism), theta).z, point)[0] @ direction
+    return Force(point, Sampled(gas.force(place), direction).at)
+
+
+def _spring(row: Mapping[str, Any]) -> Spring:
+    first, second = _ends("spring", row)
+    stiffness, length = needed("spring", row, "stiffness", "free_length")
+    number("spring.stiffness", stiffness, 0.0, 1e12, "N/m")
+    number("spring.free_length", length, 0.0, LONGEST, "m")
+    return Spring(
+        first, second, stiffness, length, number("spring.damping", row.get("damping", 0.0), 0.0, 1e9, "N s/m")
+    )
+
+
+def mechanism_of(data: Mapping[str, Any]) -> tuple[Mechanism, dict[str, Clearance]]:
+    """Mechanism of the tables of a file, and the clearances of its joints by their names."""
+    joints, clearances = _joints(data["joint"])
+    links = tuple(_link(name, table) for name, table in data["link"].items())
+    ground = data["ground"]
+    gravity = number("ground.gravity", ground.get("gravity", 0.0), 0.0, 1e6, "m/s^2")
+    x, y = _direction(ground.get("gravity_direction", -90.0))
+    springs = tuple(map(_spring, data["spring"]))
+    still = Mechanism(links, tuple(joints), data["ground.points"], (gravity * x, gravity * y), springs=springs)
+    for spring in springs:
+        still.places(spring.first), still.places(spring.second)
+    forces = tuple(map(_force, data["force"])) + tuple(_gas(row, still) for row in data["gas"])
+    for force in forces:
+        still.places(force.point)
+    return Mechanism(links, still.joints, still.ground, still.gravity, forces, springs), clearances
+
+
+def built(path: str, digest: str, data: Mapping[str, Any], _folder: Path) -> type[MechanismMachine]:
+    """Class of the machines that a file describes; its fields have the file's values as defaults.
+
+    Raises
+    ------
+    ParameterError
+        If the mechanism can't move, nothing rattles, or a value is out of range.
+    """
+    operation = data["operation"]
+    speed, *ends = needed("operation", operation, "speed", "speed_range", "clearance_range")
+    mechanism, clearances = mechanism_of(data)
+    made = machine_of(
+        mechanism,
+        clearances,
+        monitored=operation.get("monitored", ""),
+        about={"provenance": "stated", "source": path},
+        namespace={"name": path, "__doc__": data[""].get("title", path), "__reduce__": reduced},
+        definition=parameter(digest, choices=(digest,), provenance="stated", source=path),
+        speed=speed,
+    )
+    machine = made()
+    fields = (machine.speed_field, machine.clearance_field)
+    named = zip(("speed_range", "clearance_range"), fields, ends, strict=True)
+    made.usual_ranges = {field: range_of(made, f"operation.{key}", field, given) for key, field, given in named}
+    made.tolerances = tolerances_of(data["tolerances"], machine)
+    made.work = Work(task=data["job"])
+    machine.held()  # what can't move is refused here, by name
+    kind: type[MechanismMachine] = made
+    return kind

@@ -1,0 +1,79 @@
+"""Forces over the crank angle: samples of a revolution, and the gas of a reciprocating compressor."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.errors import ParameterError
+
+Array = NDArray[np.float64]
+
+STROKE_ANGLES = 1440
+"""Crank angles at which the pressure of a cylinder is followed."""
+
+
+class Sampled(NamedTuple):
+    """Values (s,) at equal steps of the crank angle from 0 on, straight lines between them, along a direction (2,)."""
+
+    values: Array
+    direction: Array
+
+    def at(self, theta: Array) -> Array:
+        """Vectors (B, 2) at crank angles (B,) [rad]."""
+        count = len(self.values)
+        place = np.mod(theta, 2.0 * np.pi) * (count / (2.0 * np.pi))
+        first = np.minimum(place.astype(int), count - 1)
+        share = place - first
+        value = self.values[first] * (1.0 - share) + self.values[(first + 1) % count] * share
+        return np.asarray(value[:, None] * self.direction)
+
+
+class Gas(NamedTuple):
+    """Ideal reciprocating compressor.
+
+    Attributes
+    ----------
+    area
+        Of the piston [m^2].
+    dead_volume
+        Volume above the piston at its highest place, as a share of the swept volume.
+    suction, discharge, behind
+        Pressures [Pa] at which the valves open, and on the other side of the piston.
+    exponent
+        Of the polytropic changes between them.
+    """
+
+    area: float
+    dead_volume: float
+    suction: float
+    discharge: float
+    behind: float
+    exponent: float
+
+    def pressure(self, place: Array) -> Array:
+        """Pressure [Pa] over a revolution (s,) of a piston that compresses as its place (s,) [m] grows.
+
+        It stays between suction and discharge, and follows p V^n = const while both valves are closed.
+
+        Raises
+        ------
+        ParameterError
+            If the piston does not move.
+        """
+        stroke = float(np.ptp(place))
+        if not stroke > 0.0:
+            raise ParameterError("[[gas]] acts on a piston that does not move; allowed: a point that has a stroke")
+        volume = (place.max() - place) / stroke + self.dead_volume
+        top, pressure = int(np.argmin(volume)), np.empty(len(place))
+        now = self.discharge
+        # the second revolution has forgotten where the first began
+        for k in range(1, 2 * len(place) + 1):
+            i, before = (top + k) % len(place), (top + k - 1) % len(place)
+            now = now * (volume[before] / volume[i]) ** self.exponent
+            now = pressure[i] = min(max(now, self.suction), self.discharge)
+        return pressure
+
+    def force(self, place: Array) -> Array:
+        """Force [N] on the piston in the direction in which its place (s,) grows."""
+        return np.asarray(-(self.pressure(place) - self.behind) * self.area)

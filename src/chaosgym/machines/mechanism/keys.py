@@ -1,0 +1,92 @@
+"""Keys of the file of a mechanism."""
+
+from chaosgym.machines.file_keys import OPERATION, TEXT, Key, Keys
+from chaosgym.machines.mechanism.joints import KINDS
+
+LIMITS = {
+    "friction coulomb mu": "friction in the joints of a file is not modelled",
+    "hertz exponent restitution": "a surface is a linear spring and damper: stiffness and damping",
+    "gap backlash play radius": "clearance is how far the pin may leave the middle of its hole, or half a guide's gap",
+    "motor torque": "the crank turns at constant speed; the torque that this takes is a result",
+    "length": "a link's length is the distance of its points",
+    "speed": "the speed of the crank stands in [operation]",
+    "youngs_modulus modes flexible beam": "links of a file are rigid",
+    "spherical universal cylindrical": "the mechanism is planar",
+}
+"""What people look for and does not fit, or has another name: words, and what to say."""
+
+
+def _unknown(word: str, known: list[str]) -> str:
+    from chaosgym.machines.parameters import suggestion
+
+    for words, told in LIMITS.items():
+        if word.lower() in words.split():
+            return f"; {told}"
+    return suggestion(word, known)
+
+
+POINT = Key("x and y in the axes of the link", "m", "row")
+
+KEYS = Keys(
+    {
+        "": {"title": Key("what the machine is", kind=TEXT)},
+        "ground": {
+            "gravity": Key("acceleration; none by default", "m/s^2"),
+            "gravity_direction": Key("in which it pulls, from the x axis on; -90 by default, downward", "deg"),
+        },
+        "ground.points": {"*": Key("x and y on the ground", "m", "row")},
+        "link": {"angle": Key("roughly, at crank angle 0: tells which way a loop is closed; 0 by default", "deg")},
+        "link.points": {"*": POINT},
+        "link.body": {
+            "mass": Key("of a rigid body of the link", "kg"),
+            "inertia": Key("about its own centre; 0 by default", "kg m^2"),
+            "centre": Key("x and y in the axes of the link; 0, 0 by default", "m", "row"),
+        },
+        "joint": {
+            "name": Key("begins the names of its fields, as in wrist_clearance", kind=TEXT),
+            "kind": Key("what it holds", kind=TEXT, choices=tuple(KINDS)),
+            "between": Key(
+                "two points, such as ['crank.pin', 'rod.start']; a guide or slot is of the first", kind="texts"
+            ),
+            "axis": Key("of a guide or slot, in the axes of the first link; 0 by default", "deg"),
+            "turn": Key("of the second link from the first, where the joint holds it; 0 by default", "deg"),
+            "driven": Key("true for the one revolute joint whose turn is the crank angle", kind="flag"),
+            "clearance": Key("how far the pin may leave the middle of its hole, or half the gap of a guide", "m"),
+            "stiffness": Key("spring of a surface", "N/m"),
+            "damping": Key("damper of a surface", "N s/m"),
+            "stations": Key("where a guide can touch, along it from the point; else it can't tilt", "m", "row"),
+        },
+        "force": {
+            "at": Key("point it acts on, such as 'ram.nose'", kind=TEXT),
+            "direction": Key("from the x axis of the ground on; 0 by default", "deg"),
+            "force": Key("constant, or samples of a revolution at equal steps from crank angle 0 on", "N", "row"),
+        },
+        "gas": {
+            "at": Key("point of the piston, such as 'piston.pin'", kind=TEXT),
+            "direction": Key("in which the piston compresses, from the x axis of the ground on; 0 by default", "deg"),
+            "bore": Key("diameter of the cylinder", "m"),
+            "dead_volume": Key("as a share of the swept volume"),
+            "suction": Key("pressure at which the inlet opens", "Pa"),
+            "discharge": Key("pressure at which the outlet opens", "Pa"),
+            "behind": Key("pressure on the other side of the piston; that of suction by default", "Pa"),
+            "exponent": Key("of the polytropic changes; 1.3 by default"),
+        },
+        "spring": {
+            "between": Key("two points, such as ['ground.wall', 'yoke.slot']", kind="texts"),
+            "stiffness": Key("of the spring", "N/m"),
+            "free_length": Key("without force", "m"),
+            "damping": Key("of a damper beside it; none by default", "N s/m"),
+        },
+        "operation": {
+            "speed": Key("of the crank, constant", "rpm"),
+            "speed_range": Key("lowest and highest", "rpm", "row"),
+            "clearance_range": Key("lowest and highest, of the monitored joint", "m", "row"),
+            "monitored": Key("joint that is recorded; the first with clearance by default", kind=TEXT),
+        },
+        **OPERATION,
+    },
+    required=("ground", "link", "joint", "operation"),
+    lists=("joint", "force", "gas", "spring", "link.body"),
+    named=("link",),
+    unknown=_unknown,
+)

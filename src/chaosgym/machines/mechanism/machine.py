@@ -1,0 +1,413 @@
+"""A mechanism with clearance in some of its joints, as a machine; ``machine_of`` makes its class."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.binned.machine import BinnedMachine
+from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS, Contact, Held, held, middles_and_nodes
+from chaosgym.machines.machine import Number, Option
+from chaosgym.machines.mechanism.equations import SmallMotion, small_motion
+from chaosgym.machines.mechanism.joints import ACROSS, ALONG, TURN
+from chaosgym.machines.mechanism.mechanism import Force, Mechanism
+from chaosgym.machines.mechanism.nominal import Revolution, nominal, revolution_of
+from chaosgym.machines.parameters import parameter
+
+Array = NDArray[np.float64]
+
+SMALL = 0.02
+"""Clearance as a share of a link's length beyond which motions in the gap are not small."""
+
+
+LEAST_MASS = 1e-10
+"""Least eigenvalue of a mass matrix whose diagonal is one."""
+
+
+class Clearance(NamedTuple):
+    """The gap of a joint.
+
+    Attributes
+    ----------
+    gap
+        Half of it, or how far a pin may leave the middle of its hole [m].
+    stiffness, damping
+        Spring [N/m] and damper [N s/m] of a surface; of each station.
+    stations
+        Places [m] along a guide from the joint's point at which it can touch; none where it can't tilt.
+    """
+
+    gap: float
+    stiffness: float
+    damping: float
+    stations: tuple[float, ...] = ()
+
+
+def opened_by(kind: str, clearance: Clearance) -> tuple[str, ...]:
+    """Motions that the clearance of a joint of some kind leaves open.
+
+    Raises
+    ------
+    ParameterError
+        If such a joint has no gap, or its clearance no stations.
+    """
+    if kind == "weld":
+        raise ParameterError("a weld has no clearance; allowed: revolute, prismatic or slot")
+    if clearance.stations and kind != "prismatic":
+        raise ParameterError(f"stations have no meaning in a {kind} joint; leave them out")
+    if kind == "revolute":
+        return (ALONG, ACROSS)
+    return (ACROSS, TURN) if clearance.stations else (ACROSS,)
+
+
+def _assumed(default: Any, unit: str, low: float, high: float) -> Any:
+    return parameter(default, unit=unit, low=low, high=high, provenance="assumed", source="default")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MechanismMachine(BinnedMachine):
+    """A planar mechanism whose crank turns at constant speed, with clearance in some joints; made by ``machine_of``.
+
+    Every joint with clearance has fields that begin with its name: ``wrist_clearance``, ``wrist_stiffness`` and
+    ``wrist_damping`` of the joint "wrist"; every link with mass has a ``rod_mass_factor``.
+
+    Attributes
+    ----------
+    mechanism
+        Its links and joints, in their middle.
+
+    Raises
+    ------
+    ParameterError
+        On construction, if a field is outside its range; names it and what is allowed.
+    """
+
+    name: ClassVar[str] = "mechanism"
+    speed_field: ClassVar[str] = "speed"
+    fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        rung: {"matrix_update_interval": interval}
+        for rung, interval in (("draft", 6.0), ("standard", 2.0), ("fine", 1.0), ("reference", 0.5))
+    }
+    stations: ClassVar[Mapping[str, tuple[float, ...]]] = {}
+    """Places [m] along a guide at which each joint with clearance can touch."""
+    extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = {"no gravity": {"gravity_factor": 0.0}}
+
+    mechanism: Mechanism
+    speed: float = _assumed(600.0, "rpm", 0.1, 1e5)
+    """Constant speed of the crank [rpm]."""
+    gravity_factor: float = _assumed(1.0, "-", 0.0, 100.0)
+    """Factor of gravity."""
+    load_factor: float = _assumed(1.0, "-", 0.0, 1e3)
+    """Factor of the forces over the crank angle, those of a gas among them."""
+    matrix_update_interval: float = _assumed(2.0, "deg", 0.25, 30.0)
+    """Crank angle over which mass, damping and stiffness matrices are held [deg]; divides 360."""
+    monitored: str = parameter("", choices=("",), provenance="assumed", source="default")
+    """Joint whose motion and force are recorded."""
+
+    def __post_init__(self, fidelity: str | None) -> None:
+        super().__post_init__(fidelity)
+        bins = 360.0 / self.matrix_update_interval
+        if abs(bins - round(bins)) > 1e-9:
+            raise ParameterError(
+                f"matrix_update_interval = {self.matrix_update_interval:g} deg is out of range; "
+                "allowed: 0.25 to 30 deg that divide 360 deg"
+            )
+
+    @property
+    def clearance_field(self) -> str:
+        """Field of the clearance of the monitored joint."""
+        return f"{self.monitored}_clearance"
+
+    @property
+    def bins(self) -> int:
+        """Bins of crank angle over which matrices are held."""
+        return round(360.0 / self.matrix_update_interval)
+
+    @property
+    def degrees_of_freedom(self) -> tuple[str, ...]:
+        """Names of the coordinates: the gaps, then what bends."""
+        return self.mechanism.coordinates
+
+    @property
+    def revolution(self) -> Revolution:
+        """Steps of the nominal motion through a revolution."""
+        return _revolution(self.mechanism)
+
+    def nominal_places(self, theta: Array) -> Array:
+        """Coordinates (B, z) of all links at crank angles (B,) [rad] with every gap in its middle."""
+        return nominal(self.mechanism, self.revolution, theta).z
+
+    def equations(self, first: float, count: int) -> SmallMotion:
+        """Equations of small motions on a uniform grid of crank angles; see ``small_motion``."""
+        return small_motion(self._scaled(), self.revolution, first, count)
+
+    def _scaled(self) -> Mechanism:
+        """The mechanism with the factors of this machine."""
+        links = []
+        for link in self.mechanism.links:
+            factor = getattr(self, f"{link.name}_mass_factor", 1.0)
+            links.append(link._replace(mass=factor * link.mass, inertia=factor * link.inertia))
+        gravity = (self.gravity_factor * self.mechanism.gravity[0], self.gravity_factor * self.mechanism.gravity[1])
+        forces = tuple(_Loaded(force, self.load_factor).force for force in self.mechanism.forces)
+        return replace(
+            self.mechanism,
+            links=tuple(links),
+            gravity=gravity,
+            forces=forces,
+        )
+
+    def held(self) -> Held:
+        """Return the held accelerations, whatever the speed and the clearances."""
+        middles, nodes = middles_and_nodes(self.bins)
+        found = self.equations(float(middles[0]), len(middles))
+        self._refuse_massless(found.mass)
+        return held(found.mass, found.damping, found.stiffness, self.equations(0.0, len(nodes)).load)
+
+    def _refuse_massless(self, mass: Array) -> None:
+        """Refuse mass matrices (bins, n, n) in which some motion moves no mass."""
+        size = np.sqrt(np.maximum(np.einsum("bii->bi", mass), 0.0))
+        scaled = mass / np.where(size > 0.0, size, 1.0)[:, :, None] / np.where(size > 0.0, size, 1.0)[:, None]
+        sizes, ways = np.linalg.eigh(scaled)
+        worst = int(np.argmin(sizes[:, 0]))
+        if sizes[worst, 0] > LEAST_MASS:
+            return
+        name = self.degrees_of_freedom[int(np.argmax(np.abs(ways[worst, :, 0])))]
+        raise ParameterError(
+            f"nothing resists the motion {name!r}: the links that it moves have no mass, or no inertia where they "
+            "only turn; allowed: a [[link.NAME.body]] with mass and inertia"
+        )
+
+    def row_of(self, joint: str, motion: str) -> Array:
+        """The coordinate (n,) that is a motion of a joint."""
+        return np.array([float(name == f"{joint} {motion}") for name in self.degrees_of_freedom])
+
+    @property
+    def contacts(self) -> list[Contact]:
+        """Contacts of all joints with clearance, in their order."""
+        found = []
+        for joint in self.mechanism.joints:
+            if not joint.opened:
+                continue
+            gap, spring, damper = (
+                getattr(self, f"{joint.name}_{what}") for what in ("clearance", "stiffness", "damping")
+            )
+            seen = float(joint.name == self.monitored)
+            across = self.row_of(joint.name, ACROSS)
+            if joint.kind == "revolute":
+                rows = np.stack([self.row_of(joint.name, ALONG), across])
+                reading = seen * np.eye(3)[:2]
+                found.append(Contact(rows, gap, spring, damper, True, reading))
+                continue
+            for place in self.stations[joint.name] or (0.0,):
+                row = across + place * self.row_of(joint.name, TURN)
+                found.append(Contact(row[None], gap, spring, damper, True, seen * np.eye(3)[1:2]))
+        return found
+
+    @property
+    def has_propagators(self) -> bool:
+        """True if every contact is a channel, and the sets of closed ones are few and fit into memory."""
+        rows = [len(contact.row) for contact in self.contacts]
+        n, sets = len(self.degrees_of_freedom), 2 ** len(rows)
+        return max(rows) == 1 and sets <= MAX_SETS and sets * self.bins * 16 * (2 * n + 5) ** 2 < KEPT_BYTES
+
+    @property
+    def display(self) -> Array:
+        """Displacement of the monitored joint: across it."""
+        return self.row_of(self.monitored, ACROSS)
+
+    @property
+    def stiffest(self) -> float:
+        """Stiffness [N/m] of the stiffest contact."""
+        return max(contact.stiffness for contact in self.contacts)
+
+    @property
+    def natural_frequencies(self) -> Array:
+        """Natural frequencies [Hz] of what bends, at rest at crank angle 0 with every joint tight; none if rigid."""
+        elastic = sum(len(link.elastic) for link in self.mechanism.links)
+        if not elastic:
+            return np.zeros(0)
+        from scipy.linalg import eigh
+
+        found = self.equations(0.0, 12)
+        stiffness, mass = found.stiffness[0, 0, -elastic:, -elastic:], found.mass[0, -elastic:, -elastic:]
+        squares = eigh(stiffness, mass, eigvals_only=True)
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi))
+
+    def sensed(self, peak_force: Array) -> Array:
+        """Largest force [N] of each cycle on either side of the monitored joint, (..., cycles)."""
+        return np.asarray(peak_force.max(axis=-1))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Gaps that are not small against the links that they join."""
+        told = []
+        for joint in self.mechanism.joints:
+            if joint.opened:
+                gap, reach = getattr(self, f"{joint.name}_clearance"), _reach(self.mechanism, joint.name)
+                if gap > SMALL * reach:
+                    told.append(
+                        f"{joint.name}_clearance is {gap / reach:.2g} of the {reach:.3g} m that its links reach: "
+                        f"motions are taken as small, and are good to some 2 % only up to {SMALL:g}"
+                    )
+        return tuple(told)
+
+    def share_of_bound(self, states: Array, peak_force: Array) -> float:
+        """Largest force, as a share of that of an impact of all masses at ten times the speed of the nominal motion."""
+        mechanism = self._scaled()
+        theta: Any = np.arange(72) * (2.0 * math.pi / 72)
+        z, mass, fastest, load = self.nominal_places(theta), 0.0, 0.0, 0.0
+        for link in mechanism.links:
+            moved = np.concatenate([place.moved(z[:, mechanism.at[link.name]]) for place in link.points.values()], 1)
+            fastest = max(fastest, float(np.ptp(moved, axis=0).max(initial=0.0)))
+            mass += float(link.mass.sum() + link.inertia.sum() / max(self.revolution.length, 1e-9) ** 2)
+        for force in mechanism.forces:
+            load += float(np.abs(force.at(theta)).max())
+        for spring in mechanism.springs:
+            apart = mechanism.apart(z, spring.first, spring.second)[0]
+            load += spring.stiffness * float(np.abs(np.linalg.norm(apart, axis=1) - spring.free_length).max())
+        gravity = math.hypot(*mechanism.gravity)
+        speed = 10.0 * (fastest * self.crank_rate + math.sqrt(gravity * self.revolution.length))
+        speed += 10.0 * load * self.cycle_period / mass
+        damper = max(contact.damping for contact in self.contacts)
+        return float(peak_force.max()) / ((math.sqrt(self.stiffest * mass) + damper) * speed)
+
+    def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
+        """Draw the links at a moment; see ``Machine.draw``."""
+        from chaosgym.machines.mechanism.picture import draw_mechanism
+
+        draw_mechanism(panel, record, colour, moment, force_limit)
+
+    def draw_poses(self, panels: Any) -> None:
+        """Draw the links at equal steps of the crank angle, one in each panel."""
+        from chaosgym.machines.mechanism.picture import draw_poses
+
+        draw_poses(panels, self)
+
+
+class _Loaded(NamedTuple):
+    """A force times a factor."""
+
+    given: Force
+    factor: float
+
+    @property
+    def force(self) -> Force:
+        return Force(self.given.point, lambda theta: self.factor * self.given.at(theta))
+
+
+@lru_cache(maxsize=256)
+def _revolution(mechanism: Mechanism) -> Revolution:
+    return revolution_of(mechanism)
+
+
+@lru_cache(maxsize=1024)
+def _reach(mechanism: Mechanism, joint: str) -> float:
+    """Shortest distance [m] between two points of the moving links that a joint joins; infinite if they have one."""
+    found = next(each for each in mechanism.joints if each.name == joint)
+    shortest = math.inf
+    for name, _ in (found.first, found.second):
+        if name in mechanism.at:
+            places = np.array([point.place[0] for point in mechanism.link(name).points.values()])
+            apart = np.linalg.norm(places[:, None] - places, axis=-1)
+            shortest = min(shortest, float(np.min(apart[apart > 0.0], initial=math.inf)))
+    return shortest
+
+
+CLEARANCE_FIELDS: Mapping[str, dict[str, Any]] = {
+    "clearance": {"unit": "m", "low": 0.0, "high": 1.0},
+    "stiffness": {"unit": "N/m", "low": 1.0, "high": 1e13},
+    "damping": {"unit": "N s/m", "low": 0.0, "high": 1e9},
+}
+
+
+def machine_of(
+    mechanism: Mechanism,
+    clearances: Mapping[str, Clearance],
+    *,
+    monitored: str = "",
+    about: Mapping[str, Any] | None = None,
+    usual_ranges: Mapping[str, tuple[float, float]] | None = None,
+    namespace: Mapping[str, Any] | None = None,
+    definition: Any = None,
+    **stated: Any,
+) -> Any:
+    """Class of machines that are one mechanism, whose fields default to what is given.
+
+    Parameters
+    ----------
+    mechanism
+        Its links and joints; those with clearance are opened as ``opened_by`` says.
+    clearances
+        Of these joints, by their names.
+    monitored
+        Joint whose motion and force are recorded; the first with clearance if empty.
+    about
+        Provenance and source of what is given.
+    usual_ranges
+        Of the speed, as "speed", and of the clearance of the monitored joint, as "clearance".
+    namespace
+        More attributes of the class.
+    definition
+        Field that tells the class from others.
+    stated
+        Other fields of ``MechanismMachine``, such as ``speed``.
+
+    Raises
+    ------
+    ParameterError
+        If no joint has clearance, a name can't begin that of a field, or a value is out of range.
+    """
+    from typing import get_type_hints
+
+    from chaosgym.machines.parameters import parameters_of
+
+    if not clearances:
+        raise ParameterError("no joint has clearance: nothing rattles; allowed: clearance in at least one [[joint]]")
+    about = {"provenance": "assumed", "source": "default", **(about or {})}
+    watched = monitored or next(iter(clearances))
+    if watched not in clearances:
+        raise ParameterError(f"monitored = {watched!r} is not one of {', '.join(clearances)}, which have clearance")
+    for name in (*clearances, *(link.name for link in mechanism.links)):
+        if not name.isidentifier() or name.startswith("_"):
+            raise ParameterError(f"name {name!r} is out of range; allowed: letters, digits and _, as in big_end")
+    fields: dict[str, Any] = {"mechanism": mechanism}
+    for name, given in clearances.items():
+        values = (given.gap, given.stiffness, given.damping)
+        for (what, described), value in zip(CLEARANCE_FIELDS.items(), values, strict=True):
+            fields[f"{name}_{what}"] = parameter(value, **described, **about)
+    for link in mechanism.links:
+        if link.mass.any() or link.inertia.any():
+            fields[f"{link.name}_mass_factor"] = _assumed(1.0, "-", 1e-3, 1e3)
+    own = parameters_of(MechanismMachine)
+    fields["monitored"] = parameter(watched, **{**vars(own["monitored"]), **about, "choices": tuple(clearances)})
+    if definition is not None:
+        fields["definition"] = definition
+    for name, value in stated.items():
+        fields[name] = parameter(value, **{**vars(own[name]), **about})
+    usual = {"speed": (100.0, 1000.0), "clearance": (1e-5, 2e-4), **(usual_ranges or {})}
+    types: dict[str, Any] = {
+        "stations": {name: given.stations for name, given in clearances.items()},
+        "beside_matrices": ("speed", *(f"{name}_clearance" for name in clearances)),
+        "usual_ranges": {"speed": usual["speed"], f"{watched}_clearance": usual["clearance"]},
+        "options": _options(watched),
+        **(namespace or {}),
+    }
+    hints = get_type_hints(MechanismMachine)
+    annotations = {name: hints.get(name, Any) for name in fields}
+    annotations |= {name: ClassVar[Any] for name in types if not name.startswith("__")}
+    body = {"__module__": __name__, "__annotations__": annotations, **fields, **types}
+    made: Any = dataclass(frozen=True, kw_only=True)(type("MechanismMachine", (MechanismMachine,), body))
+    made()  # its defaults are checked
+    return made
+
+
+def _options(watched: str) -> dict[str, Option]:
+    return {
+        "--speed-rpm": Number("speed", "rpm"),
+        "--clearance-mm": Number(f"{watched}_clearance", "mm", 1e-3),
+    }

@@ -1,0 +1,77 @@
+"""What every file of a machine states alike: ranges, tolerances, and how its machines are kept."""
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.machine import Machine
+from chaosgym.machines.parameters import check_parameter, field_named, parameters_of, suggestion
+from chaosgym.machines.units import parse_quantity
+
+
+def range_of(kind: Any, what: str, field: str, values: Any) -> tuple[float, float]:
+    """Lowest and highest value of a field of a class of machines.
+
+    Raises
+    ------
+    ParameterError
+        If it is no range; ``what`` names it.
+    """
+    if len(values) != 2 or not values[0] < values[1]:
+        raise ParameterError(f"{what} is no range; allowed: a text such as '4 to 30 Hz', the lower one first")
+    low, high = (check_parameter(kind, field, end) for end in values)
+    return low, high
+
+
+def tolerances_of(given: Mapping[str, Any], machine: Machine) -> dict[str, tuple[float, bool]]:
+    """Half widths by field, and whether they are shares of the value.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such field, or the width is none or leads out of the field's range.
+    """
+    known = {name: about for name, about in parameters_of(machine).items() if not about.choices}
+    found = {}
+    for key, text in _flat(given).items():
+        name = field_named(machine, key)
+        if name not in known:
+            raise ParameterError(f"[tolerances] has no key {name!r}{suggestion(name, known)}")
+        relative = isinstance(text, str) and text.strip().endswith("%")
+        value = parse_quantity(f"tolerances.{name}", text, "-" if relative else known[name].unit)
+        if not value > 0.0 or (relative and getattr(machine, name) == 0.0):
+            raise ParameterError(f"tolerances.{name} = {text!r} is out of range; allowed: above 0, no share of 0")
+        nominal = getattr(machine, name)
+        for side in (-1.0, 1.0):
+            check_parameter(machine, name, nominal + side * value * (abs(nominal) if relative else 1.0))
+        found[name] = (value, relative)
+    return found
+
+
+def _flat(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Entries of a table with those of tables in it, such as left.clearance, by their dotted keys."""
+    flat: dict[str, Any] = {}
+    for key, value in given.items():
+        inner = _flat(value) if isinstance(value, dict) else {"": value}
+        flat |= {f"{key}.{name}" if name else key: each for name, each in inner.items()}
+    return flat
+
+
+def reduced(machine: Any) -> Any:
+    """How a machine is pickled: by the name of its file, whose class has no name of its own."""
+    kind = type(machine)
+    values = {each.name: getattr(machine, each.name) for each in fields(machine)}
+    # what is the file's own comes back with it
+    own = {name: value for name, value in values.items() if value is not getattr(kind, name, None)}
+    return _restored, (machine.name, {**own, "definition": machine.definition})
+
+
+def _restored(path: str, values: Mapping[str, Any]) -> Machine:
+    from chaosgym.machines.machine_file import machine_class
+
+    kind: Any = machine_class(path)
+    if kind.definition != values["definition"]:
+        raise ParameterError(f"{path} has changed: it is not the machine that was kept")
+    machine: Machine = kind(**values)
+    return machine

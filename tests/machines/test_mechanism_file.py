@@ -1,0 +1,209 @@
+"""The file of a mechanism: templates, what every command takes, and one line for each way in which it can be wrong."""
+
+import json
+import pickle
+import tomllib
+from pathlib import Path
+
+import gymnasium as gym
+import jsonschema
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import chaosgym
+from chaosgym import simulate
+from chaosgym.cli import app
+from chaosgym.errors import ChaosgymError, ParameterError
+from chaosgym.machines.machine_file import TEMPLATES, schema_text, template
+
+KINDS = [kind for kind in TEMPLATES if kind != "modes"]
+
+
+def run(*arguments):
+    """Run a command in this process; any error but one that chaosgym raises on purpose fails the test."""
+    result = CliRunner().invoke(app, [*map(str, arguments)])
+    if result.exception and not isinstance(result.exception, SystemExit | ChaosgymError):
+        raise result.exception
+    return result
+
+
+def answer(*arguments):
+    """JSON object of a command that must succeed."""
+    result = run(*arguments, "--json")
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)
+
+
+@pytest.fixture
+def file_of(tmp_path):
+    """Write a template with some texts replaced."""
+
+    def write(kind="slider-crank", *replaced):
+        text = template(kind)
+        for old, new in replaced:
+            assert old in text, old
+            text = text.replace(old, new, 1)
+        path = tmp_path / "own.toml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_templates_run_and_fit_the_schema(kind, file_of):
+    """Each template is printed, fits the published schema, is read, and rattles."""
+    assert run("new-machine", kind).stdout == template(kind)
+    jsonschema.Draft202012Validator(json.loads(schema_text())).validate(tomllib.loads(template(kind)))
+    machine = chaosgym.read_machine(file_of(kind))
+    assert simulate(machine, 5).peak_force.max() > 0.0
+    assert set(machine.tolerances) >= {machine.speed_field, machine.clearance_field}
+
+
+def test_an_unknown_template_is_answered_with_the_nearest():
+    """A misspelt name of a template is told."""
+    assert "did you mean four-bar" in str(run("new-machine", "four-bat").exception)
+
+
+def test_runs_are_split_kept_and_equal(file_of):
+    """A split run, a pickled machine and a batch give the same bits as one run of one machine."""
+    for kind in ("slider-crank", "four-bar"):
+        machine = chaosgym.read_machine(file_of(kind))
+        whole, again = simulate(machine, 6), pickle.loads(pickle.dumps(machine.at(machine.speed)))
+        first = simulate(again, 2)
+        second = simulate(again, 4, first.final_state)
+        np.testing.assert_array_equal(np.concatenate([first.peak_force, second.peak_force]), whole.peak_force)
+        batch = machine.batch(2)
+        for i in range(2):
+            batch.start(i, machine)
+        np.testing.assert_array_equal(batch.run(np.arange(2), 6).peak_force, np.stack([whole.peak_force] * 2))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["slider-crank", "four-bar"])
+def test_exact_propagation_agrees_with_fixed_steps(kind, file_of):
+    """Runge-Kutta with 400,000 steps gives the largest forces of the first cycle of guide and pin to 0.05 %."""
+    machine = chaosgym.read_machine(file_of(kind))
+    fixed = simulate(machine, 1, integrator=chaosgym.RungeKutta4(400_000))
+    assert fixed.peak_force.max() == pytest.approx(simulate(machine, 1).peak_force.max(), rel=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("settings", "same"),
+    [
+        ({"rod_mass_factor": 2.0, "slider_mass_factor": 2.0, "guide_stiffness": 16e6, "guide_damping": 1000.0}, 2.0),
+        ({"guide_clearance": 0.1e-3}, 1.0),
+    ],
+)
+def test_forces_scale_with_the_masses(file_of, settings, same):
+    """Twice the masses, springs and dampers give twice the forces: factors reach every part of the equations."""
+    machine = chaosgym.read_machine(file_of())
+    other = chaosgym.machines.parameters.with_settings(machine, settings)
+    np.testing.assert_allclose(simulate(other, 3).peak_force, same * simulate(machine, 3).peak_force, rtol=1e-6)
+
+
+def test_a_wide_gap_is_told(file_of):
+    """Beyond 2 % of a link the motion in the gap is not small, and every result says so."""
+    machine = chaosgym.read_machine(file_of("four-bar"))
+    assert machine.notes == ()
+    wide = machine.at(clearance=8e-3)
+    (note,) = wide.notes
+    assert "knee_clearance is 0.032 of the 0.25 m" in note
+
+
+SPRING = """[[spring]]
+between = ["rod.wrist", "slider.wrist"]
+stiffness = "1 N/m"
+free_length = "0 m"
+"""
+FORCE = """[[force]]
+at = "slider.top"
+force = "1 N"
+"""
+BODY = """[[link.slider.body]]
+mass = "0.45 kg"
+inertia = "2e-4 kg m^2"
+"""
+FREE = 'kind = "slot"\nbetween = ["crank.pin"'
+
+REFUSED = [
+    (('wrist = "235, 0 mm"', 'wrist = "35, 0 mm"'), r"crank can't turn beyond \d+\.\d deg|does not close"),
+    (("driven = true", "driven = false"), "0 joints are driven"),
+    (('kind = "revolute"\nbetween = ["crank.pin"', FREE), "mobility 2: .*pin 1"),
+    (('"rod.pin"]', '"rod.pn"]'), "rod has no point 'pn'; known: pin, wrist"),
+    (('"rod.pin"]', '"rodpin"]'), "'rodpin' is no point; allowed: LINK.POINT"),
+    (('"rod.pin"]', '"rood.pin"]'), "no link is named 'rood'"),
+    ((BODY, ""), "nothing resists the motion 'guide turn'"),
+    (('mass = "0.30 kg"', 'mass = "0 kg"'), "link.rod.body.mass = 0 kg is out of range"),
+    (('mass = "0.30 kg"', 'mass = "0.30 m"'), "has the unknown unit 'm'"),
+    (('mass = "0.30 kg"', 'mas = "0.30 kg"'), "did you mean mass"),
+    (('clearance = "0.1 mm"', 'clearance = "-0.1 mm"'), "guide_clearance = -0.0001 m is out of range"),
+    (('stiffness = "8 N/um"', ""), r"\[joint guide\] lacks stiffness"),
+    (('stations = "-40, 40 mm"', 'stations = "40, 40 mm"'), "stations are at one place"),
+    (('clearance = "0.1 mm" ', "# "), "joint guide has .* and no clearance"),
+    (('points = { shaft = "0, 0 mm", pin', 'points = { shaft = "0 mm", pin'), "has 1 numbers; allowed: two"),
+    (('speed = "400 rpm"', 'speed = "400 mm"'), "unknown unit"),
+    (('speed = "400 rpm"', 'speed = "0 rpm"'), "speed = 0 rpm is out of range"),
+    (('speed_range = "100 to 800 rpm"', 'speed_range = "800 to 100 rpm"'), "is no range"),
+    (('# monitored = "guide"', 'monitored = "wrist"'), "monitored = 'wrist' is not one of guide"),
+    (('guide_damping = "30 %"', 'rod_damping = "30 %"'), r"\[tolerances\] has no key 'rod_damping'"),
+    (('axis = "0 deg"', "friction = 0.1"), "friction in the joints of a file is not modelled"),
+    (('gravity = "9.81 m/s^2"', "gravity = 9.81"), "has no unit"),
+    (('kind = "prismatic"', 'kind = "cam"'), "is not one of revolute, prismatic, slot, weld"),
+    (('name = "guide"', 'name = "the guide"'), "name 'the guide' is out of range"),
+    (('name = "wrist"', 'name = "pin"'), r"two \[\[joint\]\] have the name 'pin'"),
+    (("[operation]", f"{SPRING}\n[operation]"), "spring between rod.wrist and slider.wrist has no length"),
+    (("[operation]", f"{FORCE}\n[operation]"), "slider has no point 'top'"),
+]
+
+
+@pytest.mark.parametrize(("replaced", "message"), REFUSED)
+def test_what_is_wrong_is_told_in_one_line(file_of, replaced, message):
+    """Every mistake is one line that names the file, where it is, and what is allowed."""
+    with pytest.raises(ParameterError, match=message) as error:
+        chaosgym.read_machine(file_of("slider-crank", replaced))
+    assert "\n" not in str(error.value)
+    assert "own.toml" in str(error.value)
+
+
+def test_missing_tables_and_a_mechanism_without_clearance(file_of):
+    """Tables that are missing are named; so is a mechanism in which nothing rattles."""
+    path = file_of(
+        "slider-crank", ('clearance = "0.1 mm"', "#"), ("stations =", "#"), ("stiffness =", "#"), ("damping =", "#")
+    )
+    with pytest.raises(ParameterError, match="no joint has clearance"):
+        chaosgym.read_machine(path)
+    path.write_text("[ground]\npoints = {}\n")
+    with pytest.raises(ParameterError, match=r"\[link\] is missing"):
+        chaosgym.read_machine(path)
+    path.write_text("[ground]\n[link.crank]\n[operation]\n")
+    with pytest.raises(ParameterError, match=r"\[\[joint\]\] is missing"):
+        chaosgym.read_machine(path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_command_and_environment_takes_it(kind, file_of, tmp_path, monkeypatch):
+    """Simulated, shown, drawn, diagnosed, swept, briefed and reported; environments step and render."""
+    monkeypatch.chdir(tmp_path)
+    path = file_of(kind)
+    machine = chaosgym.read_machine(path)
+    assert len(answer("simulate", path, "--cycles", 4, "--plot", "s.png")["peak_force_N"]) == 4
+    assert answer("show", path, "--plot", "m.png")["degrees_of_freedom"] == list(machine.degrees_of_freedom)
+    assert answer("diagnose", path, "--budget", 200, "--types", "--step-check", "--plot", "d.png")["nature"]
+    assert all(Path(name).stat().st_size > 5000 for name in ("s.png", "m.png", "d.png"))
+    low, high = machine.usual_ranges[machine.clearance_field]
+    axes = ("--axis", f"{machine.clearance_field}={low}:{high}:2", "--axis", "speed=300:400:2")
+    assert answer("sweep", path, *axes, "--budget", 100, "--out", tmp_path / "sweep")["points"] == 4
+    assert answer("classify", path)["stage"]
+    brief = tmp_path / "brief.toml"
+    brief.write_text(run("design", "--template", path).stdout)
+    assert answer("design", brief, "--out", tmp_path / "report.html")["machine"]
+    assert {row["rung"] for row in answer("tradeoff", path, "--points", 2, "--cycles", 20, "--out", tmp_path)["rows"]}
+    env = gym.make("chaosgym/MachineTolerance-v0", machine=str(path), render_mode="rgb_array")
+    first, _ = env.reset(seed=1)
+    env.step(env.action_space.sample())
+    assert env.render().ndim == 3
+    envs = gym.make_vec("chaosgym/MachineTolerance-v0", num_envs=2, machine=str(path))
+    np.testing.assert_array_equal(envs.reset(seed=1)[0][0], first)
