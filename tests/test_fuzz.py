@@ -205,6 +205,7 @@ def _pack(buffer, name, size, method):
 
 KINDS = {
     "machines": (lambda: _replaced(template()), _machine),
+    "mechanisms": (lambda: _replaced(template("compressor")), _machine),
     "archives of matrices": (lambda: NPZ, _by_archive),
     "zips": (_bombs, _zip),
     "Matrix Market": (lambda: MARKET, _by_market),

@@ -79,7 +79,9 @@ def machine_figure(machine: Machine) -> Figure:
     """Draw a mechanism at eight crank angles, with the paths of its points and its gaps larger than they are."""
     figure = figure_of(1.6 * WIDTH, 4.2)
     machine.draw_poses(figure.subplots(2, POSES // 2).ravel())
-    figure.suptitle(point_of(machine), x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    figure.suptitle(
+        f"{point_of(machine)}\nCrank angles; rings: joints with clearance", x=0.02, ha="left", fontsize=10.5, color=INK
+    )
     return figure
 
 
