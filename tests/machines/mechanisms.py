@@ -2,14 +2,16 @@
 
 import math
 
+from chaosgym.machines.mechanism.beam import Beam, beam_link
 from chaosgym.machines.mechanism.joints import Joint
 from chaosgym.machines.mechanism.links import Body, rigid_link
 from chaosgym.machines.mechanism.mechanism import Mechanism
 
 
 def thesis_crank(machine, ball_frame="rod"):
-    """Links and joints of a ``SliderCrank`` in the plane whose rod is rigid."""
-    line, length = machine.density * math.pi * machine.rod_diameter**2 / 4.0, machine.rod_length
+    """Links and joints of a ``SliderCrank`` in the plane."""
+    area, length = math.pi * machine.rod_diameter**2 / 4.0, machine.rod_length
+    line = machine.density * area
 
     def end(at, name):
         mass, inertia, along, across = (
@@ -19,18 +21,20 @@ def thesis_crank(machine, ball_frame="rod"):
 
     off = machine.slider_offset_along, machine.slider_offset_across
     central = machine.slider_pitch_inertia - machine.slider_mass * (off[0] ** 2 + off[1] ** 2)
-    bodies = (
-        Body(line * length, line * length**3 / 12.0, (length / 2.0, 0.0)),
-        end(0.0, "housing"),
-        end(length, "yoke"),
-    )
+    bar = Body(line * length, line * length**3 / 12.0, (length / 2.0, 0.0))
+    points = {"start": (0.0, 0.0), "end": (length, 0.0)}
+    rod = rigid_link("rod", points, (bar, end(0.0, "housing"), end(length, "yoke")))
+    if machine.rod == "flexible":
+        second = math.pi * machine.rod_diameter**4 / 64.0
+        beam = Beam(length, area, second, machine.youngs_modulus, machine.density, machine.n_modes)
+        rod = beam_link("rod", beam, {"start": (end(0.0, "housing"),), "end": (end(0.0, "yoke"),)})
     opened = {"ideal": (), "clearance": ("across",), "instrumented": ("across", "turn")}[machine.slider_joint]
     ball = () if machine.ball_joint == "ideal" else ("along", "across")
     turned = math.radians(machine.gravity_angle)
     return Mechanism(
         (
             rigid_link("crank", {"shaft": (0.0, 0.0), "pin": (machine.crank_radius, 0.0)}),
-            rigid_link("rod", {"start": (0.0, 0.0), "end": (length, 0.0)}, bodies),
+            rod,
             rigid_link("slider", {"pivot": (0.0, 0.0)}, (Body(machine.slider_mass, central, off),)),
         ),
         (

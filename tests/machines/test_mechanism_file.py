@@ -112,6 +112,63 @@ def test_a_wide_gap_is_told(file_of):
     assert "knee_clearance is 0.032 of the 0.25 m" in note
 
 
+ROD = """points = { pin = "0, 0 mm", wrist = "235, 0 mm" }
+[[link.rod.body]]               # any number of rigid bodies
+mass = "0.30 kg"
+centre = "118, 0 mm"
+inertia = "1.4e-3 kg m^2"       # about its own centre
+"""
+BEAM = """[link.rod.beam]
+length = "235 mm"
+diameter = "8 mm"
+youngs_modulus = "210 GPa"
+density = "7850 kg/m^3"
+modes = 2
+damping_ratio = "1 %"
+[[link.rod.body]]
+at = "start"
+mass = "0.2 kg"
+inertia = "1e-4 kg m^2"
+"""
+BENT = ((ROD, BEAM), ('"rod.pin"', '"rod.start"'), ('"rod.wrist"', '"rod.end"'))
+
+
+def test_a_link_may_bend(file_of):
+    """A beam in place of a rigid rod: its frequencies are shown, and a stiff one moves as a rigid one does."""
+    bent = chaosgym.read_machine(file_of("slider-crank", *BENT))
+    assert bent.degrees_of_freedom == ("guide across", "guide turn", "rod stretch", "rod mode 1", "rod mode 2")
+    assert 200.0 < bent.natural_frequencies[0] < 600.0
+    text = file_of("slider-crank", *BENT).read_text(encoding="utf-8")
+    path = file_of("slider-crank")
+    path.write_text(text.replace("210 GPa", "1e13 Pa").replace("modes = 2", "modes = 1"))
+    stiff = simulate(chaosgym.read_machine(path), 3).peak_force.max()
+    rod = 7850.0 * np.pi / 4.0 * 0.008**2 * 0.235
+    start = f"""points = {{ pin = "0, 0 mm", wrist = "235, 0 mm" }}
+body = [
+    {{ mass = "0.2 kg", inertia = "1e-4 kg m^2" }},
+    {{ mass = "{rod} kg", centre = "117.5, 0 mm", inertia = "{rod * 0.235**2 / 12.0} kg m^2" }},
+]
+"""
+    rigid = simulate(chaosgym.read_machine(file_of("slider-crank", (ROD, start))), 3).peak_force.max()
+    assert stiff == pytest.approx(rigid, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("replaced", "message"),
+    [
+        (("modes = 2", "modes = 0"), r"link.rod.beam.modes = 0 is out of range; allowed: 1 to 12"),
+        (("diameter", "width"), r"\[link.rod.beam\] lacks height"),
+        (('at = "start"', ""), "link.rod.body lacks at"),
+        (("density", "dense"), "did you mean density"),
+        (('210 GPa"', '210 mm"'), "unknown unit 'mm'"),
+    ],
+)
+def test_what_is_wrong_with_a_beam_is_told(file_of, replaced, message):
+    """As of everything else."""
+    with pytest.raises(ParameterError, match=message):
+        chaosgym.read_machine(file_of("slider-crank", *BENT, replaced))
+
+
 SPRING = """[[spring]]
 between = ["rod.wrist", "slider.wrist"]
 stiffness = "1 N/m"

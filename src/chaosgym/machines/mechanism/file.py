@@ -10,6 +10,7 @@ import numpy as np
 from chaosgym.errors import ParameterError
 from chaosgym.machines.file_keys import needed
 from chaosgym.machines.machine import Work
+from chaosgym.machines.mechanism.beam import END, START, Beam, beam_link
 from chaosgym.machines.mechanism.forces import STROKE_ANGLES, Gas, Sampled
 from chaosgym.machines.mechanism.joints import Joint
 from chaosgym.machines.mechanism.keys import KEYS
@@ -20,6 +21,9 @@ from chaosgym.machines.mechanism.nominal import nominal, revolution_of
 from chaosgym.machines.numbers import number
 from chaosgym.machines.parameters import parameter
 from chaosgym.machines.stated import range_of, reduced, tolerances_of
+
+MOST_MODES = 12
+"""Modes that a beam may keep."""
 
 HEAVIEST, LONGEST = 1e9, 1e6
 """Most mass [kg] and distance [m] that a file may state."""
@@ -80,20 +84,60 @@ def _link_table(name: str, table: Any) -> dict[str, Any]:
     values["points"] = _points(where, table)
     rows = _list(f"{where}.body", table.get("body", []))
     values["body"] = [KEYS.checked("link.body", row, f"{where}.body") for row in rows]
+    if "beam" in table:
+        values["beam"] = KEYS.checked("link.beam", table["beam"], f"{where}.beam")
+        if values["points"]:
+            raise ParameterError(f"{where} has a beam, whose points are 'start' and 'end'; leave [{where}.points] out")
     return values
 
 
+def _body(where: str, row: Mapping[str, Any]) -> Body:
+    (mass,) = needed(where, row, "mass")
+    if not mass > 0.0:
+        raise ParameterError(f"{where}.mass = {mass:g} kg is out of range; allowed: above 0")
+    inertia = number(f"{where}.inertia", row.get("inertia", 0.0), 0.0, HEAVIEST, "kg m^2")
+    centre = _pair(f"{where}.centre", row.get("centre", np.zeros(2)))
+    return Body(number(f"{where}.mass", mass, 0.0, HEAVIEST, "kg"), inertia, centre)
+
+
+def _section(where: str, row: Mapping[str, Any]) -> tuple[float, float]:
+    """Area and second moment of the cross section of a beam."""
+    if "diameter" in row:
+        if "width" in row or "height" in row:
+            raise ParameterError(f"{where} has a diameter and a width or height; allowed: one of them")
+        d = number(f"{where}.diameter", row["diameter"], 1e-5, 10.0, "m")
+        return math.pi * d**2 / 4.0, math.pi * d**4 / 64.0
+    sides = zip(("width", "height"), needed(where, row, "width", "height"), strict=True)
+    b, h = (number(f"{where}.{name}", side, 1e-5, 10.0, "m") for name, side in sides)
+    return b * h, b * h**3 / 12.0
+
+
+def _beam(where: str, row: Mapping[str, Any]) -> Beam:
+    length, modulus, density, modes = needed(where, row, "length", "youngs_modulus", "density", "modes")
+    if not 1 <= modes <= MOST_MODES:
+        raise ParameterError(f"{where}.modes = {modes} is out of range; allowed: 1 to {MOST_MODES}")
+    return Beam(
+        number(f"{where}.length", length, 1e-3, 1e3, "m"),
+        *_section(where, row),
+        number(f"{where}.youngs_modulus", modulus, 1e5, 1e13, "Pa"),
+        number(f"{where}.density", density, 1.0, 1e5, "kg/m^3"),
+        modes,
+        number(f"{where}.damping_ratio", row.get("damping_ratio", 0.0), 0.0, 10.0),
+        row.get("stretch", True),
+    )
+
+
 def _link(name: str, table: Mapping[str, Any]) -> Link:
-    bodies = []
-    for row in table["body"]:
-        where = f"link.{name}.body"
-        (mass,) = needed(where, row, "mass")
-        if not mass > 0.0:
-            raise ParameterError(f"{where}.mass = {mass:g} kg is out of range; allowed: above 0")
-        inertia = number(f"{where}.inertia", row.get("inertia", 0.0), 0.0, HEAVIEST, "kg m^2")
-        centre = _pair(f"{where}.centre", row.get("centre", np.zeros(2)))
-        bodies.append(Body(number(f"{where}.mass", mass, 0.0, HEAVIEST, "kg"), inertia, centre))
-    return rigid_link(name, table["points"], tuple(bodies), math.radians(table.get("angle", 0.0)))
+    where, angle = f"link.{name}.body", math.radians(table.get("angle", 0.0))
+    bodies = [(row.get("at"), _body(where, row)) for row in table["body"]]
+    if "beam" not in table:
+        if any(at for at, _ in bodies):
+            raise ParameterError(f"{where}.at has a meaning at the ends of a beam only; leave it out")
+        return rigid_link(name, table["points"], tuple(body for _, body in bodies), angle)
+    if not all(at for at, _ in bodies):
+        raise ParameterError(f"{where} lacks at: a body of a beam is at its 'start' or its 'end'")
+    ends = {end: tuple(body for at, body in bodies if at == end) for end in (START, END)}
+    return beam_link(name, _beam(f"link.{name}.beam", table["beam"]), ends, angle)
 
 
 def _ends(where: str, row: Mapping[str, Any]) -> list[tuple[str, str]]:

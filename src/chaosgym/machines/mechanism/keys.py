@@ -1,6 +1,7 @@
 """Keys of the file of a mechanism."""
 
 from chaosgym.machines.file_keys import OPERATION, TEXT, Key, Keys
+from chaosgym.machines.mechanism.beam import END, START
 from chaosgym.machines.mechanism.joints import KINDS
 
 LIMITS = {
@@ -10,7 +11,6 @@ LIMITS = {
     "motor torque": "the crank turns at constant speed; the torque that this takes is a result",
     "length": "a link's length is the distance of its points",
     "speed": "the speed of the crank stands in [operation]",
-    "youngs_modulus modes flexible beam": "links of a file are rigid",
     "spherical universal cylindrical": "the mechanism is planar",
 }
 """What people look for and does not fit, or has another name: words, and what to say."""
@@ -37,10 +37,22 @@ KEYS = Keys(
         "ground.points": {"*": Key("x and y on the ground", "m", "row")},
         "link": {"angle": Key("roughly, at crank angle 0: tells which way a loop is closed; 0 by default", "deg")},
         "link.points": {"*": POINT},
+        "link.beam": {
+            "length": Key("along x from the link's origin; its points are 'start' and 'end'", "m"),
+            "diameter": Key("of a round section; or width and height", "m"),
+            "width": Key("of a rectangular section, across the plane", "m"),
+            "height": Key("of a rectangular section, in the plane of bending", "m"),
+            "youngs_modulus": Key("of its material", "Pa"),
+            "density": Key("of its material", "kg/m^3"),
+            "modes": Key("bending modes that are kept", kind="count"),
+            "damping_ratio": Key("of each mode and of its stretch; 0 by default"),
+            "stretch": Key("whether its length changes; true by default", kind="flag"),
+        },
         "link.body": {
+            "at": Key("end of a beam with which the body turns, 'start' or 'end'", kind=TEXT, choices=(START, END)),
             "mass": Key("of a rigid body of the link", "kg"),
             "inertia": Key("about its own centre; 0 by default", "kg m^2"),
-            "centre": Key("x and y in the axes of the link; 0, 0 by default", "m", "row"),
+            "centre": Key("x and y in the axes of the link, from the end of a beam on; 0, 0 by default", "m", "row"),
         },
         "joint": {
             "name": Key("begins the names of its fields, as in wrist_clearance", kind=TEXT),

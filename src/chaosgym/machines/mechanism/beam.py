@@ -1,0 +1,154 @@
+r"""A flexible link: a slender beam along the x axis of its frame, with rigid bodies at its ends.
+
+Its elastic coordinates are its stretch and the lowest bending modes of the beam that is pinned at both ends and
+carries the bodies there (Craig and Bampton 1968). A point beyond s is drawn in by half the integral of the squared
+slope up to s, so that tension of the nominal motion stiffens bending.
+
+References
+----------
+Craig and Bampton, Coupling of substructures for dynamic analyses, AIAA Journal 6 (1968); thesis 2.2 and 4.3.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.machines.beam_element import POINTS, bending_matrices, interpolation
+from chaosgym.machines.mechanism.links import Body, Link, Places, together
+
+Array = NDArray[np.float64]
+
+ELEMENTS = 10
+"""Finite elements, at least; more modes take two a mode."""
+
+START, END = "start", "end"
+"""Points of a beam."""
+
+STRETCH = "stretch"
+
+
+class Beam(NamedTuple):
+    """A uniform beam.
+
+    Attributes
+    ----------
+    length
+        From start to end [m].
+    area, second_moment
+        Of the cross section [m^2], [m^4].
+    youngs_modulus, density
+        [Pa], [kg/m^3].
+    modes
+        Bending modes that are kept.
+    damping_ratio
+        Of every mode, and of the stretch.
+    stretches
+        Whether its length changes.
+    """
+
+    length: float
+    area: float
+    second_moment: float
+    youngs_modulus: float
+    density: float
+    modes: int
+    damping_ratio: float = 0.0
+    stretches: bool = True
+
+
+def beam_link(name: str, beam: Beam, ends: Mapping[str, tuple[Body, ...]], angle: float = 0.0) -> Link:
+    """Return a link that bends.
+
+    Parameters
+    ----------
+    name
+        Of the link; its points are "start" and "end".
+    beam
+        Its beam.
+    ends
+        Rigid bodies that turn with the beam's start and end; their centres count from there.
+    angle
+        Rough turn [rad] at crank angle 0.
+    """
+    from scipy.linalg import eigh
+
+    count = max(ELEMENTS, 2 * beam.modes)
+    lengths, line = np.full(count, beam.length / count), beam.density * beam.area
+    mass, stiffness = bending_matrices(lengths, beam.youngs_modulus * beam.second_moment, line)
+    points, size = interpolation(lengths), 2 * count + 2
+    slopes = {START: 1, END: size - 1}
+    for end, bodies in ends.items():
+        for body in bodies:
+            mass[slopes[end], slopes[end]] += body.inertia + body.mass * float(np.dot(body.centre, body.centre))
+    inner = [i for i in range(size) if i not in (0, size - 2)]
+    at = np.ix_(inner, inner)
+    squares, shapes = eigh(stiffness[at], mass[at], subset_by_index=[0, beam.modes - 1])
+    basis = np.zeros((size, beam.modes))
+    basis[inner] = shapes * np.where(shapes[0] < 0.0, -1.0, 1.0)
+    short, whole = _drawn_in(points.slope @ basis, beam.length / count)
+    first = int(beam.stretches)
+    elastic = first + beam.modes
+
+    def places(along: Array, across: Array, slope: Array, drawn: Array) -> Places:
+        shape, curve = np.zeros((len(along), 2, elastic)), np.zeros((len(along), 2, elastic, elastic))
+        if first:
+            shape[:, 0, 0] = along / beam.length
+        shape[:, 1, first:] = across
+        curve[:, 0, first:, first:] = -drawn
+        full = np.concatenate([np.zeros((len(slope), first)), slope], axis=1)
+        return Places(np.stack([along, np.zeros_like(along)], axis=1), shape, full, curve)
+
+    none = np.zeros((len(points.position), beam.modes))
+    bar = places(points.position, points.deflection @ basis, none, short)
+    named, masses, weights, inertias = {}, [bar], list(line * points.weight), [0.0] * len(points.position)
+    for end, place in ((START, 0.0), (END, beam.length)):
+        slope = basis[slopes[end]][None]
+        named[end] = places(np.array([place]), np.zeros((1, beam.modes)), slope, whole[None] * float(end == END))
+        for body in ends.get(end, ()):
+            masses.append(_offset(named[end], np.array(body.centre)))
+            weights.append(body.mass)
+            inertias.append(body.inertia)
+    spring = beam.youngs_modulus * beam.area / beam.length
+    carried = line * beam.length / 3.0 + sum(body.mass for body in ends.get(END, ()))
+    damping = [2.0 * beam.damping_ratio * math.sqrt(spring * carried)] * first
+    return Link(
+        name,
+        named,
+        together(masses),
+        np.array(weights),
+        np.array(inertias),
+        angle,
+        (STRETCH,) * first + tuple(f"mode {k + 1}" for k in range(beam.modes)),
+        np.diag([spring] * first + squares.tolist()),
+        np.diag([*damping, *(2.0 * beam.damping_ratio * np.sqrt(squares))]),
+    )
+
+
+def _drawn_in(slope: Array, length: float) -> tuple[Array, Array]:
+    """Integrals of products of the slopes (p, modes) up to each integration point (p, modes, modes), and to the end.
+
+    Slopes are parabolas over each element, of the given length.
+    """
+    powers = np.arange(3)
+    coefficients = np.einsum(
+        "ik,ekm->eim",
+        np.linalg.pinv(np.vander(POINTS, 3, increasing=True)),
+        slope.reshape(-1, len(POINTS), slope.shape[1]),
+    )
+    ends = powers[:, None] + powers + 1
+    weight = length * np.append(POINTS, 1.0)[:, None, None] ** ends / ends
+    inside = np.einsum("kij,eim,ejn->ekmn", weight, coefficients, coefficients)
+    before = np.cumsum(inside[:, -1], axis=0)
+    upto = inside[:, :-1] + np.concatenate([np.zeros_like(before[:1]), before[:-1]])[:, None]
+    return upto.reshape(-1, *before.shape[1:]), before[-1]
+
+
+def _offset(end: Places, centre: Array) -> Places:
+    """A point that turns with the end of a beam, away from it by ``centre`` (2,)."""
+    slope = end.slope[0]
+    shape = end.shape + np.outer([-centre[1], centre[0]], slope)
+    curve = end.curve - centre[None, :, None, None] * np.outer(slope, slope)
+    return Places(end.place + centre, shape, end.slope, curve)
