@@ -226,7 +226,10 @@ def task_picture():
 
 
 def task_sample():
-    """The recording that the documentation judges."""
+    """The recording and the measured sweep that the documentation judges."""
+    swept = "docs/data/sweep.csv"
+    used = ["benchmarks/documentation/swept_peaks.py", "thesis/scorecard/candidates.json"]
+    yield task("sweep", used, [swept], f"python -m benchmarks.documentation.swept_peaks {swept}")
     point = "--frequency-hz '30 Hz' --clearance-mm '0.127 mm' --cycles 1000 --transient 200"
     made = "docs/data/peaks.csv"
     run = f"chaosgym simulate impact-beam {point} --out {made}"

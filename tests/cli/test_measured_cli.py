@@ -266,3 +266,58 @@ def test_a_design_tells_its_source_and_no_examples(tmp_path):
     code, _, err = run("design", "--peaks", path, "--load-rating", "500")
     assert code == 2
     assert "8 or more" in err
+
+
+SWEEP = Path(__file__).parents[2] / "docs" / "data" / "sweep.csv"
+
+
+def test_a_measured_sweep_is_told_by_types(tmp_path):
+    """The documentation's sweep: rises to 7 Hz, fluctuates, irregular from 25 Hz on; a picture of it."""
+    code, out, _ = run("diagnose", "--sweep", SWEEP, "--sensor-error", "3 N", "--plot", tmp_path / "s.png", "--json")
+    assert code == 0
+    told = json.loads(out)
+    assert [(one["type"], one["first"], one["last"]) for one in told["regions"]] == [
+        ("I", 4, 7),
+        ("II", 8, 24),
+        ("III", 25, 30),
+    ]
+    assert (told["speed_column"], told["speed_unit"], len(told["speeds"])) == ("frequency", "Hz", 27)
+    assert (tmp_path / "s.png").stat().st_size > 10_000
+    code, out, _ = run("diagnose", "--sweep", SWEEP, "--sensor-sigma", "1.73 N")
+    assert code == 0
+    assert "Type III  25 to 30 Hz" in out
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "message"),
+    [
+        ("speed,peak\n1,2\n", (), "needs the sensor's error"),
+        ("speed,peak\n1,2\n", ("--sensor-error", "3 N"), "1 speeds; a sweep needs 3"),
+        ("a,b\n1,2\n3,4\n", ("--sensor-error", "3 N"), "no column that says it is a speed; use --speed-column NAME"),
+        ("a,b\n1,2\n3,4\n", ("--speed-column", "c"), "has no column 'c'"),
+        ("speed,rpm,peak\n1,2,3\n4,5,6\n", ("--sensor-error", "3 N"), "several columns that could be the speed"),
+        ("speed,peak\n1,2\nx,4\n", ("--sensor-error", "3 N"), "line 3: 'x'"),
+        ("speed,peak\n1,-2\n1,3\n", ("--sensor-error", "3 N"), "is a negative force"),
+        ("speed [Hz]\n1\n2\n", ("--sensor-error", "3 N"), "--column NAME"),
+        ("", ("--sensor-error", "3 N"), "holds no numbers"),
+        ("speed,peak\n1,2\n", ("--peaks", "x.csv"), "--sweep goes alone"),
+        ("speed,peak\n1,2\n", ("--types",), "--sweep goes alone"),
+        ("speed,peak\n1,2\n", ("--step-check",), "--sweep goes alone"),
+        ("speed,peak\n1,2\n", ("--test", "mut"), "--sweep goes alone"),
+    ],
+)
+def test_a_sweep_that_is_none_is_refused_in_one_line(tmp_path, text, options, message):
+    """Exit code 2, and what to do."""
+    path = tmp_path / "sweep.csv"
+    path.write_text(text)
+    code, out, err = run("diagnose", "--sweep", path, *options)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert err.rstrip().splitlines()[-1].startswith("Error: ")
+
+
+def test_a_speed_column_belongs_to_a_sweep():
+    """Alone it would do nothing."""
+    code, _, err = run("diagnose", "impact-beam", "--speed-column", "x")
+    assert code == 2
+    assert "--speed-column belongs to --sweep" in err

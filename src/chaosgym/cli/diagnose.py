@@ -6,7 +6,14 @@ from typing import Any
 import click
 
 from chaosgym.cli.machine_options import machine_command
-from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, run_lines
+from chaosgym.cli.measured_options import (
+    Measured,
+    measured_options,
+    measured_runs,
+    measured_sweep,
+    run_as_dict,
+    run_lines,
+)
 from chaosgym.cli.output import draw, emit, force_line, patience, picture_path, plot_option, verdict_lines
 from chaosgym.machines import MACHINES
 
@@ -33,6 +40,8 @@ from chaosgym.machines import MACHINES
     "--kicks", type=click.IntRange(1, 10**5), help="With --margins: kicks of the state, and the motions they lead to."
 )
 @click.option("--step-check", is_flag=True, help="Repeat with a finer step and say whether the verdict stays.")
+@click.option("--sweep", metavar="FILE", help="Peak forces at many speeds, with a column of speeds: Types I, II, III.")
+@click.option("--speed-column", metavar="NAME", help="Column of the speed of --sweep, where there are several.")
 @measured_options
 @plot_option()
 def diagnose(
@@ -44,15 +53,30 @@ def diagnose(
     reach: float,
     kicks: int | None,
     step_check: bool,
+    sweep: str | None,
+    speed_column: str | None,
     measured: Measured,
     plot: str | None,
     as_json: bool,
 ) -> None:
-    """Tell periodic from chaotic: a machine by simulation, or a measured signal."""
+    """Tell periodic from chaotic: a machine by simulation, or a measured signal; or the types of a measured sweep."""
     picture = picture_path(plot, f"diagnose-{machine.name if machine else 'measured'}")
     if kicks and not margins:
         raise click.UsageError("--kicks belongs to --margins")
-    if measured:
+    if speed_column and not sweep:
+        raise click.UsageError("--speed-column belongs to --sweep")
+    if sweep:
+        if machine or measured or types or margins or step_check or test != "adaptive":
+            raise click.UsageError(
+                "--sweep goes alone: no machine, no --peaks or --series, nothing that needs a machine"
+            )
+        speeds, peaks, found, told = measured_sweep(sweep, speed_column, measured)
+        result = {**told, **found.as_dict(), "warnings": []}
+        lines = _sweep_lines(told, found)
+        label = f"{told['speed_column']} [{told['speed_unit']}]" if told["speed_unit"] else told["speed_column"]
+        title = f"Types of {Path(told['file']).name}"
+        draw(picture, lambda plots: plots.sweep_figure(speeds, peaks, found, label, title), result, lines)
+    elif measured:
         if machine or types or margins or step_check:
             raise click.UsageError("--peaks and --series go without a machine, --types, --margins and --step-check")
         (run,) = measured_runs(measured)
@@ -60,7 +84,7 @@ def diagnose(
         name = f"{Path(run.source).name}, {run.name}"
         draw(picture, lambda plots: plots.measured_figure(run.peaks, run.verdict.diagnosis, name), result, lines)
     elif machine is None:
-        raise click.UsageError(f"give a machine ({', '.join(MACHINES)}), --peaks FILE or --series FILE")
+        raise click.UsageError(f"give a machine ({', '.join(MACHINES)}), --peaks FILE, --series FILE or --sweep FILE")
     elif test == "two-step":
         with patience("diagnose"):
             result, lines, verdict = _two_step(machine, budget, measured.sensor_error or 0.0)
@@ -78,6 +102,20 @@ def diagnose(
                 _add_margins(machine, verdict, reach, kicks or 0, result, lines)
         draw(picture, lambda plots: plots.diagnosis_figure(verdict), result, lines)
     emit(result, as_json, lambda: lines)
+
+
+def _sweep_lines(told: dict[str, Any], found: Any) -> list[str]:
+    """Regions of types, upwards, then what was read."""
+    unit = f" {told['speed_unit']}" if told["speed_unit"] else ""
+    rows = [f"{told['file']}: {len(found.speeds)} speeds"]
+    for region in found.regions:
+        span = f"{region.first:g}" + (f" to {region.last:g}" if region.speeds > 1 else "") + unit
+        inside = [one for one in found.speeds if region.first <= one.speed <= region.last]
+        wild = sum(one.nature == "irregular" for one in inside)
+        natures = f"irregular at {wild} of {len(inside)} speeds" if wild else "periodic"
+        forces = f"mean peak {region.lowest_mean:.4g} to {region.highest_mean:.4g} N"
+        rows.append(f"  Type {region.type:4s} {span:18s} {natures}, {forces}")
+    return [*rows, *(f"  {note}" for note in told["notes"])]
 
 
 def _two_step(machine: Any, budget: int, sensor_error: float) -> tuple[dict[str, Any], list[str], Any]:

@@ -69,7 +69,7 @@ def measured_options(function: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(function)
     def wrapped(**keywords: Any) -> None:
         given = Measured(**{name: keywords.pop(name) for name in Measured._fields})
-        _check(given)
+        _check(given, bool(keywords.get("sweep")))
         function(measured=given, **keywords)
 
     for option in reversed(OPTIONS):
@@ -77,15 +77,15 @@ def measured_options(function: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
-def _check(given: Measured) -> None:
+def _check(given: Measured, sweep: bool) -> None:
     if given.peaks and given.series:
         raise click.UsageError("--peaks and --series exclude each other")
     of_series = ("rate_hz", "hz", "rpm", "period_s", "tachometer")
     for name in of_series:
         if getattr(given, name) is not None and not given.series:
             raise click.UsageError(f"--{name.replace('_', '-')} belongs to --series")
-    if (given.column or given.unit) and not given:
-        raise click.UsageError("--column and --unit belong to --peaks or --series")
+    if (given.column or given.unit) and not (given or sweep):
+        raise click.UsageError("--column and --unit belong to a file that was measured")
     if given.tachometer and any((given.hz, given.rpm, given.period_s)):
         raise click.UsageError("--tachometer and a stated cycle exclude each other")
 
@@ -124,6 +124,36 @@ def measured_runs(given: Measured, *, several: bool = False) -> list[Run]:
             Run(signal.name, peaks, verdict, recording.source, recording.sha256, (f"read {signal.described}", *notes))
         )
     return runs
+
+
+def measured_sweep(source: str, speed: str | None, given: Measured) -> tuple[Any, Any, Any, dict[str, Any]]:
+    """Read and judge peaks at many speeds: speeds, peaks, their types, and where they come from."""
+    from chaosgym.diagnosis.measured_sweep import sweep_types
+    from chaosgym.errors import DiagnosisError
+    from chaosgym.signals.columns import check_peaks, choose_force, choose_speed
+    from chaosgym.signals.read import read_recording
+
+    recording = read_recording(source)
+    at = choose_speed(recording, speed)
+    force = choose_force(recording, given.column, given.unit)
+    if at.name == force.name:
+        raise DiagnosisError(f"{recording.source}: column {at.name!r} can't be both speed and force; use --column NAME")
+    peaks = check_peaks(force, recording)
+    if len(at.values) != len(peaks):
+        raise DiagnosisError(f"{recording.source} has {len(at.values)} speeds and {len(peaks)} peaks; needed: as many")
+    try:
+        found = sweep_types(at.values, peaks, sensor_error=given.sensor_error, sensor_sigma=given.sensor_sigma)
+    except DiagnosisError as error:
+        raise DiagnosisError(f"{recording.source}: {error}") from error
+    told = {
+        "file": recording.source,
+        "sha256": recording.sha256,
+        "speed_column": at.name,
+        "speed_unit": recording.units.get(at.name, ""),
+        "column": force.name,
+        "notes": [f"read {force.described}", at.described],
+    }
+    return at.values, peaks, found, told
 
 
 def run_lines(subject: str, run: Run) -> list[str]:

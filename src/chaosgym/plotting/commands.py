@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.diagnosis import Diagnosis
 from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram
+from chaosgym.diagnosis.measured_sweep import SweepTypes
 from chaosgym.diagnosis.overlay import Overlay
 from chaosgym.machines import Machine
 from chaosgym.plotting import response
 from chaosgym.plotting.branches import branches
 from chaosgym.plotting.design import axis_label, peak_record
-from chaosgym.plotting.style import ACCENT, INK, NATURE_COLOURS, STYLE, figure_of
+from chaosgym.plotting.style import ACCENT, INK, NATURE_COLOURS, STYLE, TYPE_COLOURS, figure_of
 from chaosgym.simulation import CycleRecord, simulate
 
 Array = NDArray[np.float64]
@@ -167,6 +168,31 @@ def measured_figure(peaks: Array, verdict: Diagnosis, title: str) -> Figure:
     response.cycle_points(peaks, over, color=colour)
     response.next_peak(peaks, mapped, color=colour)
     figure.suptitle(f"{title}\n{_told(verdict)}", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    return figure
+
+
+@_styled
+def sweep_figure(speeds: Array, peaks: Array, types: SweepTypes, label: str, title: str) -> Figure:
+    """Measured peak forces over the speed, their means, and the regions of types, as in figure 3.16 of the thesis."""
+    figure = figure_of(1.45 * WIDTH, 3.0)
+    ax = figure.subplots()
+    at = [one.speed for one in types.speeds]
+    middles = 0.5 * (np.array(at[1:]) + np.array(at[:-1]))
+    ends = [at[0] - (middles[0] - at[0]), *middles, at[-1] + (at[-1] - middles[-1])]
+    for region in types.regions:
+        low, high = ends[at.index(region.first)], ends[at.index(region.last) + 1]
+        ax.axvspan(low, high, color=TYPE_COLOURS[region.type], alpha=0.18, lw=0.0)
+        ax.text(0.5 * (low + high), 1.02, region.type, transform=ax.get_xaxis_transform(), ha="center", fontsize=9)
+    irregular = np.isin(speeds, [one.speed for one in types.speeds if one.nature == "irregular"])
+    for nature, shown, which in (("periodic", "periodic", ~irregular), ("chaotic", "irregular", irregular)):
+        if which.any():
+            ax.plot(speeds[which], peaks[which], ".", ms=3.5, mew=0.0, color=NATURE_COLOURS[nature], label=shown)
+    ax.plot(at, [one.mean_peak for one in types.speeds], color=INK, lw=0.8, label="mean")
+    ax.set(
+        xlabel=label, ylabel="peak force [N]", xlim=(ends[0], ends[-1]), ylim=(0.0, 1.08 * float(peaks.max()) or 1.0)
+    )
+    ax.legend(loc="upper left", fontsize=8)
+    figure.suptitle(title, x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
     return figure
 
 

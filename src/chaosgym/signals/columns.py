@@ -23,6 +23,11 @@ OTHER = re.compile(
 )
 """Words in the name of a column that is no force."""
 
+SPEED = re.compile(r"hz|freq\w*|frequenz|rpm|speed|drehzahl", re.IGNORECASE)
+"""Words in the name of a column that holds the speed of each reading."""
+
+SPEEDS = ("Hz", "rpm", "1/min", "min-1", "rad/s")
+
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "min": 60.0, "h": 3600.0}
 FORCES = ALTERNATIVES["N"]
 
@@ -93,7 +98,6 @@ def choose_force(recording: Recording, column: str | None = None, unit: str | No
     DiagnosisError
         If there is no such column, several could be meant, it can't be a force, or an entry is no finite number.
     """
-    listed = ", ".join(repr(name) for name in dict.fromkeys([*recording.columns, *recording.problems]))
     if column is None:
         names = force_names(recording)
         if len(names) > 1:
@@ -106,14 +110,47 @@ def choose_force(recording: Recording, column: str | None = None, unit: str | No
             raise DiagnosisError(f"{recording.source} has no column that could be a force ({why}); use --column NAME")
         name = names[0]
     else:
-        matching = [name for name in recording.columns if name.casefold() == column.strip().casefold()]
-        place = re.fullmatch(r"\d+", column.strip())
-        if not matching and place and 1 <= int(column) <= len(recording.columns):
-            matching = [list(recording.columns)[int(column) - 1]]
-        if not matching:
-            raise DiagnosisError(f"{recording.source} has no column {column!r}; its columns: {listed}")
-        name = matching[0]
+        name = _named(recording, column)
     return _force(recording, name, unit)
+
+
+def _named(recording: Recording, column: str) -> str:
+    """Name of the column that is meant by a name or a number."""
+    matching = [name for name in recording.columns if name.casefold() == column.strip().casefold()]
+    place = re.fullmatch(r"\d{1,9}", column.strip(), re.ASCII)
+    if not matching and place and 1 <= int(column) <= len(recording.columns):
+        matching = [list(recording.columns)[int(column) - 1]]
+    if not matching:
+        listed = ", ".join(repr(name) for name in dict.fromkeys([*recording.columns, *recording.problems]))
+        raise DiagnosisError(f"{recording.source} has no column {column!r}; its columns: {listed}")
+    return matching[0]
+
+
+def choose_speed(recording: Recording, column: str | None = None) -> Signal:
+    """Speed of each reading, in the file's unit: the column of that name, or the one whose name or unit says so.
+
+    Raises
+    ------
+    DiagnosisError
+        If there is no such column, several could be meant, or an entry is no finite number.
+    """
+    if column is None:
+        names = [
+            name
+            for name in dict.fromkeys([*recording.columns, *recording.problems])
+            if recording.units.get(name, "") in SPEEDS or any(map(SPEED.fullmatch, re.split(r"[\W_\d]+", name)))
+        ]
+        if len(names) != 1:
+            several = f"several columns that could be the speed: {', '.join(map(repr, names))}"
+            told = several if names else "no column that says it is a speed"
+            raise DiagnosisError(f"{recording.source} has {told}; use --speed-column NAME")
+        name = names[0]
+    else:
+        name = _named(recording, column)
+    if name in recording.problems:
+        raise DiagnosisError(f"{recording.source}, {recording.problems[name]}")
+    unit = recording.units.get(name, "")
+    return Signal(recording.columns[name], name, f"column {name!r}{f' ({unit})' if unit else ''} is the speed")
 
 
 def forces(recording: Recording, column: str | None = None, unit: str | None = None) -> list[Signal]:
