@@ -38,9 +38,9 @@ MACHINES = {
 JUDGES = {
     True: "The motion is judged as it runs. A small deviation travels with it, exactly, through every contact. Its "
     "exponent is the mean over some ten cycles of the logarithm of its growth in a cycle. A cycle in which that is "
-    "positive is Type III. What transient motion damps is not charged.",
+    "positive is irregular and costs. What transient motion damps is not charged.",
     False: "The motion is judged as it runs. The peak forces of a step's last cycles are compared with those of the "
-    "cycles before. A step is Type III if they differ, at every period up to eight, by more than 2 % of their mean.",
+    "cycles before. A step is irregular if they differ, at every period up to eight, by more than 2 % of their mean.",
 }
 
 TEXT = (Path(__file__).parent / "page.md").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""What does every speed do to a machine? The share of Type III as the running motion has it, speed by speed.
+"""What does every speed do to a machine? The share of irregular cycles as the running motion has it, speed by speed.
 
 The machine sweeps upwards through the speeds of its task, disturbed as in a job, and is judged as in a job once it has
 settled. Such maps are for planners, of models or of the machine itself, and for references; no agent is given one.
@@ -33,7 +33,7 @@ SMOOTHING = np.array([0.15, 0.7, 0.15])
 
 @dataclass(frozen=True)
 class Maps:
-    """Maps of n machines: ``speeds`` (s,); ``share`` of Type III and ``mean_peak`` [N], (n, s)."""
+    """Maps of n machines: ``speeds`` (s,); ``share`` of irregular cycles and ``mean_peak`` [N], (n, s)."""
 
     speeds: Array
     share: Array

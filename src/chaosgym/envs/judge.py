@@ -1,13 +1,16 @@
-"""When is a cycle Type III? The motion is judged as it runs, so that what costs is what happens.
+"""When is a cycle irregular? The motion is judged as it runs, so that what costs is what happens.
 
 A machine whose kernel carries small deviations along is judged by their growth: the mean over some ten cycles of the
-logarithm of the growth in a cycle, an exponent of the running motion. A cycle with a positive one is Type III. What
+logarithm of the growth in a cycle, an exponent of the running motion. A cycle with a positive one is irregular. What
 transient motion damps is not charged, and chaos that dies out is charged while it lasts.
 
-Other machines are judged by recurrence with an amplitude: a step is Type III if, over its last cycles, peak forces miss
-those of the cycles before, at every period up to eight, by more than 2 % of their mean. The first eight cycles after a
-change of speed are compared with nothing. A step of less than 20 cycles is judged with those before it, so that a speed
-which changes in every cycle is judged too.
+Other machines are judged by recurrence with an amplitude: a step is irregular if, over its last cycles, peak forces
+miss those of the cycles before, at every period up to eight, by more than 2 % of their mean. The first eight cycles
+after a change of speed are compared with nothing. A step of less than 20 cycles is judged with those before it, so that
+a speed which changes in every cycle is judged too.
+
+Type III of thesis 5.5 is a property of a region of tolerances, and holds its periodic windows too; these do not cost.
+The key ``type_iii`` of the environments is the share of irregular cycles.
 
 On the beam recurrence takes weak chaos for calm, which is why the beam is not judged by it: ``python -m benchmarks
 judges`` measures both.
@@ -39,7 +42,7 @@ WINDOW = 20
 
 
 class Judge(Protocol):
-    """What tells Type III of N machines."""
+    """What tells irregular motion of N machines."""
 
     def start(self, which: Indices) -> None:
         """Forget the machines ``which`` (k,)."""
@@ -51,7 +54,7 @@ class Judge(Protocol):
         Returns
         -------
         (share, irregularity)
-            (k,) share of the cycles in Type III, and the number behind the last verdict.
+            (k,) share of the irregular cycles, and the number behind the last verdict.
         """
         ...
 

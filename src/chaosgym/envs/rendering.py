@@ -254,7 +254,7 @@ class Dashboard:
             panel.draw_artist(part)
 
     def _update_title(self, record: CycleRecord, colour: str) -> None:
-        verdict = "Type III" if colour == WILD else "calm"
+        verdict = "irregular" if colour == WILD else "calm"
         done = len(self._speeds) * self._task.cycles_per_step
         speed = self._speeds[-1] if self._speeds else float(getattr(record.machine, record.machine.speed_field))
         self._title.set(

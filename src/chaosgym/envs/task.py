@@ -3,7 +3,7 @@ r"""What is a job, what speed does it ask for, and what does it cost? Every numb
 A step of a job costs
 
     - deviation_weight |speed - demand|
-    - type_iii_weight  (share of the step's cycles in Type III)
+    - type_iii_weight  (share of the step's cycles that are irregular)
     - damage_weight    (increase of the damage)
     - time_weight      (duration of the step) / (duration of the whole job at top speed)
     - failure_weight   (steps that are left)                     on fracture or a failed simulation
@@ -87,7 +87,7 @@ class Task:
         0.0, high=0.1, source="standard deviation of the change of each velocity once a cycle, as a share of its range"
     )
     wear: float = _number(0.0, high=10.0, source="growth of the clearance over the job, as a share of it")
-    type_iii_weight: float = _number(1.0, source="cost of a step that is Type III throughout")
+    type_iii_weight: float = _number(1.0, source="cost of a step that is irregular throughout")
     deviation_weight: float = _number(0.25, source="cost of a step at a speed by 1 from the demand")
     damage_weight: float = _number(1.0, source="cost of a life of the joint")
     time_weight: float = _number(0.0, source="cost of the time that the job takes at top speed")
