@@ -53,6 +53,20 @@ def check(folder: str, points: int, seed: int | None, as_json: bool) -> None:
         raise SystemExit(1)
 
 
+@click.command("check-types")
+@FOLDER
+@click.option("--points", type=click.IntRange(1, 10**6), default=300, show_default=True, help="Crosses to judge again.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@AS_JSON
+def types(folder: str, points: int, seed: int, as_json: bool) -> None:
+    """Judge centres of crosses over their whole regions of speed and clearance, and count other types."""
+    from benchmarks.sweeps.regions import region_types
+    from chaosgym.sweeps import read_sweep
+
+    found = region_types(read_sweep(folder), points, seed=seed, progress=True)
+    emit(found.as_dict(), as_json, found.lines)
+
+
 @click.command("sweep-cost")
 @FOLDER
 @click.option("--points", type=click.IntRange(3, 10**6), default=300, show_default=True, help="Rows to label again.")
@@ -202,7 +216,7 @@ def app() -> None:
     """Numbers about chaosgym itself."""
 
 
-for command in (bench, agreement, check, cost, judges, audit, curves, headroom, classifier, monitors, general):
+for command in (bench, agreement, check, types, cost, judges, audit, curves, headroom, classifier, monitors, general):
     app.add_command(command)
 
 

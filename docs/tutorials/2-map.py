@@ -50,7 +50,7 @@ plt.show()
 # - **Type I**: periodic in the whole tolerance, and nowhere a peak force more than 10 % higher.
 # - **Type II**: periodic at the nominal point, but somewhere in the tolerance the force is higher or the motion
 #   irregular.
-# - **Type III**: chaotic at the nominal point or on both sides of it, or unpredictable.
+# - **Type III**: chaotic at the nominal point, or periodic where periodic and chaotic points are mixed.
 
 # %%
 found = chaosgym.response_type(chaosgym.ImpactBeam(excitation_frequency=8.0), window="speed-clearance")
@@ -59,7 +59,7 @@ print(found.type, "-", found.reason)
 # %% [markdown]
 # ## A map
 #
-# `response_map` judges every point of a grid over its tolerances in speed and clearance: nine runs a point, fewer where
+# `response_map` judges every point of a grid over its tolerances in speed and clearance: 25 runs a point, fewer where
 # neighbours are near enough to share them.
 
 # %%

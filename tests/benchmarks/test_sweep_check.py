@@ -8,6 +8,7 @@ import pyarrow as pa
 import pytest
 
 from benchmarks.sweeps.check import check_rows
+from benchmarks.sweeps.regions import region_types
 from chaosgym.errors import DatasetError
 from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
 from tests.plain_modes import PLAIN_BEAM
@@ -66,3 +67,22 @@ def test_shipped_rows_are_what_is_computed_here(name):
     """Fifty random rows of each shipped dataset: bit for bit where it was made, elsewhere their natures."""
     found = check_rows(read_sweep(SHIPPED / name), 50, seed=1)
     assert found.sound, f"{found}"
+
+
+def test_types_of_regions_contain_those_of_crosses(tmp_path):
+    """Five points of a region can't show more than 25: no type falls where more points are judged."""
+    axes = (Axis("excitation_frequency", 17.0, 29.0), Axis("clearance", 1.2e-4, 1.4e-4))
+    crosses = run_sweep(SweepPlan(PLAIN_BEAM, axes, "crosses", size=6, budget=100), tmp_path / "c")
+    found = region_types(crosses, 6)
+    assert found.points == 6
+    order = ("I", "II", "III", "undetermined")
+    assert all(order.index(region) >= order.index(cross) for cross, region in found.pairs)
+    assert found.moved == sum(count for (cross, region), count in found.pairs.items() if cross != region)
+    assert 0 <= found.periodic <= found.irregular
+    assert found.lines()[0].startswith("6 centres, ")
+
+
+def test_only_crosses_are_compared_with_regions(sweep):
+    """A grid has no crosses, and that is said."""
+    with pytest.raises(DatasetError, match="no crosses"):
+        region_types(sweep, 3)

@@ -61,8 +61,8 @@ def test_type_i_is_evaluated_by_its_trend():
 
 
 def test_type_ii_is_evaluated_by_its_worst_case():
-    """At 19 Hz the largest force anywhere in the tolerances acts in every cycle."""
-    found = assess(replace(PLAIN_BEAM, excitation_frequency=19.0), REGION, Criteria(load_rating=500.0), series_size=8)
+    """At 16.75 Hz the largest force anywhere in the tolerances acts in every cycle."""
+    found = assess(replace(PLAIN_BEAM, excitation_frequency=16.75), REGION, Criteria(load_rating=500.0), series_size=8)
     assert found.type == "II"
     seen = [run.largest_peak for run in found.series.runs] + [point.largest_peak for point in found.response.neighbours]
     assert found.evaluation.force >= max(seen)

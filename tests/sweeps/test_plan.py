@@ -154,6 +154,16 @@ def test_types_reach_one_tolerance_far():
     assert SweepPlan(PLAIN_BEAM, (fine, coarse)).type_reach() == {}
 
 
+def test_a_point_counts_the_points_of_its_tolerances():
+    """One step of speed and two of clearance: 3 x 5 points less the one in the middle; 2 x 3 less one in a corner."""
+    fine = Axis("excitation_frequency", 10.0, 10.0 * 1.02**20, 21, "log")
+    half = Axis("clearance", 1e-4, 1e-4 * 1.025**10, 11, "log")
+    plan = SweepPlan(PLAIN_BEAM, (fine, half))
+    assert plan.all_neighbours == 14
+    found = plan.type_neighbours(range(len(plan))).reshape(plan.shape)
+    assert (found[0, 0], found[10, 5]) == (5, 14)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

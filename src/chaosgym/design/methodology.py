@@ -31,7 +31,7 @@ from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.reliability import time_blocks
 from chaosgym.design.runs import DIAGNOSIS_BUDGET, NOMINAL_BUDGET, Series, SettledRun, build_series, settled_run
 from chaosgym.design.statistics import Convergence, convergence
-from chaosgym.diagnosis import Built, ResponseType, Tolerance, Type, default_tolerances, diagnose, response_type
+from chaosgym.diagnosis import Neighbour, ResponseType, Tolerance, Type, default_tolerances, diagnose, response_type
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
 
@@ -212,7 +212,7 @@ def assess(
     criteria: Criteria | None = None,
     *,
     series_size: int = SERIES_SIZE,
-    further: Sequence[Built] = (),
+    further: Sequence[Neighbour] = (),
     seed: int = 0,
     workers: int | None = None,
     progress: bool = False,
@@ -279,7 +279,7 @@ def assess(
 
 def _by_type(
     response: ResponseType,
-    built: Sequence[Built],
+    built: Sequence[Neighbour],
     nominal: SettledRun,
     series: Series,
     trend: Trend,

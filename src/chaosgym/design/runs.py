@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.design.statistics import convergence
-from chaosgym.diagnosis import Built, Diagnosis, Nature, Tolerance, diagnose
+from chaosgym.diagnosis import Diagnosis, Nature, Neighbour, Tolerance, diagnose
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import MotionState, parallel_map, rest_state, simulate
@@ -144,10 +144,10 @@ class Series:
         return f"{natures} of {len(self.runs)} machines in the tolerances"
 
     @property
-    def built(self) -> tuple[Built, ...]:
+    def built(self) -> tuple[Neighbour, ...]:
         """Deviations, nature and largest peak of each machine."""
         return tuple(
-            Built(dict(zip(self.parameters, row.tolist(), strict=True)), run.nature, run.largest_peak)
+            Neighbour(dict(zip(self.parameters, row.tolist(), strict=True)), run.nature, run.largest_peak)
             for row, run in zip(self.shares, self.runs, strict=True)
         )
 

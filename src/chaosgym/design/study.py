@@ -17,7 +17,7 @@ from chaosgym.design.methodology import Assessment, Check
 from chaosgym.design.peak_impacts import PeakImpactDiagram, filling_cycles, peak_impacts, worn_side
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
 from chaosgym.design.trends import HISTORY_SAMPLES, LifeTrend, life_against
-from chaosgym.diagnosis import Built, ResponseMap, find_periodic_orbit, response_map
+from chaosgym.diagnosis import Neighbour, ResponseMap, find_periodic_orbit, response_map
 from chaosgym.diagnosis.margins import Margins, margins
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE
 from chaosgym.errors import DesignError, ParameterError
@@ -305,14 +305,14 @@ def contradictions(answer: DesignStudy) -> list[str]:
     return said
 
 
-def _in_tolerance(around: ResponseMap | None) -> tuple[Built, ...]:
+def _in_tolerance(around: ResponseMap | None) -> tuple[Neighbour, ...]:
     """Machines of the map within the tolerances of speed and clearance, but for the nominal one."""
     if around is None:
         return ()
     inside = np.flatnonzero(np.abs(MAP_SHARES) <= 1.0)
     fields = (around.machine.speed_field, around.machine.clearance_field)
     return tuple(
-        Built(
+        Neighbour(
             dict(zip(fields, (float(MAP_SHARES[i]), float(MAP_SHARES[j])), strict=True)),
             str(around.nature[i, j]),
             float(np.nan_to_num(around.largest_peak[i, j])),

@@ -16,12 +16,11 @@ from chaosgym.diagnosis.response_type import ResponseType, Tolerance, default_to
 from chaosgym.diagnosis.section_shape import section_shape
 from chaosgym.diagnosis.spectrum import power_spectrum
 from chaosgym.diagnosis.two_step import two_step_test
-from chaosgym.diagnosis.type_rule import Built, Neighbour, judge_type, types_on_grid
+from chaosgym.diagnosis.type_rule import Neighbour, judge_type, types_on_grid
 from chaosgym.diagnosis.zero_one import zero_one_statistic
 
 __all__ = [
     "TYPES",
-    "Built",
     "Diagnosis",
     "LyapunovExponent",
     "Nature",

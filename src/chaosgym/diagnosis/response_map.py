@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.response import Diagnosis
 from chaosgym.diagnosis.response_type import (
-    SHARES,
     Tolerance,
     check_initial_states,
     chosen_tolerances,
     coexisting_peaks,
     define,
+    region_points,
 )
 from chaosgym.diagnosis.type_rule import Neighbour, judge_type
 from chaosgym.errors import DiagnosisError, SimulationError
@@ -45,7 +45,7 @@ class ResponseMap:
     largest_peak : (n_speeds, n_clearances)
         [N].
     runs
-        Number of machines that were run; without sharing it would be nine times the number of points and more.
+        Number of machines that were run; without sharing it would be 25 times the number of points.
     definition
         Window, statistic and initial states.
     """
@@ -105,8 +105,9 @@ def response_map(
     fields = (machine.speed_field, machine.clearance_field)
     shape = (len(speed), len(clearance))
     centres = {at: _place(float(speed[at[0]]), float(clearance[at[1]])) for at in np.ndindex(shape)}
-    around = {at: _around(place, fields, allowed) for at, place in centres.items()}
-    places = list(dict.fromkeys([*centres.values(), *(place for near in around.values() for _, _, place in near)]))
+    points = region_points(machine, allowed)
+    around = {at: [_moved(place, fields, allowed, one) for one in points] for at, place in centres.items()}
+    places = list(dict.fromkeys([*centres.values(), *(place for near in around.values() for place in near)]))
 
     def at_place(place: Place) -> Machine:
         return with_settings(machine, dict(zip(fields, place, strict=True)))
@@ -129,7 +130,7 @@ def response_map(
         others: tuple[float, ...] = ()
         if initial_states > 1 and centre.nature == "periodic":
             others = coexisting_peaks(at_place(place), centre, initial_states, budget)
-        neighbours = [_neighbour(name, side, runs[near]) for name, side, near in around[at]]
+        neighbours = [_neighbour(one, runs[near]) for one, near in zip(points, around[at], strict=True)]
         types[at] = judge_type(centre.nature, float(peaks[at]), neighbours, others)[0]
     return ResponseMap(
         machine=machine,
@@ -148,19 +149,18 @@ def _place(speed: float, clearance: float) -> Place:
     return float(f"{speed:.10e}"), float(f"{clearance:.10e}")
 
 
-def _around(place: Place, fields: tuple[str, str], tolerances: Mapping[str, Tolerance]) -> list[tuple[str, int, Place]]:
-    """(parameter, side, place) of every point of a neighbourhood."""
-    points = []
-    for name, tolerance in tolerances.items():
-        at = fields.index(name)
-        for share in SHARES:
-            moved = list(place)
-            moved[at] = tolerance.at(place[at], share)
-            points.append((name, int(np.sign(share)), _place(*moved)))
-    return points
+def _moved(
+    place: Place, fields: tuple[str, str], tolerances: Mapping[str, Tolerance], shares: Mapping[str, float]
+) -> Place:
+    """Return the place that deviates from another by shares of the tolerances."""
+    speed, clearance = (
+        tolerances[name].at(value, shares[name]) if name in shares else value
+        for name, value in zip(fields, place, strict=True)
+    )
+    return _place(speed, clearance)
 
 
-def _neighbour(name: str, side: int, run: Diagnosis | None) -> Neighbour:
+def _neighbour(shares: Mapping[str, float], run: Diagnosis | None) -> Neighbour:
     if run is None:
-        return Neighbour(name, side, "undetermined", np.nan)
-    return Neighbour(name, side, run.nature, run.evidence["largest_peak"])
+        return Neighbour(shares, "undetermined", np.nan)
+    return Neighbour(shares, run.nature, run.evidence["largest_peak"])

@@ -1,20 +1,22 @@
 """Types I, II and III of a response over a tolerance neighbourhood: what a designer may rely on (thesis 5.5).
 
-The machine is run at its nominal parameters and, one parameter at a time, at two points on either side of them: half
-the tolerance and all of it, each from rest. The statistic is the largest peak force of the settled cycles.
+The machine is run at its nominal parameters and at points half a tolerance and a whole one away: every combination of
+speed and clearance, and each other parameter by itself, each from rest. The statistic is the largest peak force of the
+settled cycles.
 
 What follows from that is the rule of ``type_rule``. Window, statistic and initial states are part of the label.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.response import Diagnosis, Type
-from chaosgym.diagnosis.type_rule import FORCE_CHANGE, Built, Neighbour, judge_type
+from chaosgym.diagnosis.type_rule import FORCE_CHANGE, Neighbour, judge_type
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
@@ -24,7 +26,7 @@ Window = Literal["parameters", "speed-clearance"]
 Start = Literal["rest", "continuation"]
 
 SHARES = (-1.0, -0.5, 0.5, 1.0)
-"""Points of the neighbourhood along one parameter, in tolerances."""
+"""Points of the region along one parameter, in tolerances."""
 
 
 class Tolerance(NamedTuple):
@@ -94,10 +96,10 @@ class ResponseType:
     coexisting_peaks: tuple[float, ...]
     definition: Mapping[str, Any]
 
-    def over(self, built: Sequence[Built]) -> "ResponseType":
-        """Return the type over machines that deviate in several parameters at once, too."""
+    def over(self, built: Sequence[Neighbour]) -> "ResponseType":
+        """Return the type over more machines of the region."""
         centre = self.centre.nature, self.largest_peak
-        kind, reason = judge_type(*centre, self.neighbours, self.coexisting_peaks, built)
+        kind, reason = judge_type(*centre, [*self.neighbours, *built], self.coexisting_peaks)
         return replace(self, type=kind, reason=reason)
 
     def as_dict(self) -> dict[str, Any]:
@@ -168,15 +170,21 @@ def response_type(
     neighbours: tuple[Neighbour, ...] = ()
     coexisting: tuple[float, ...] = ()
     if centre.nature == "periodic":
-        points = _points(machine, allowed)
+        points = region_points(machine, allowed)
+        machines = [
+            with_settings(
+                machine, {name: allowed[name].at(getattr(machine, name), share) for name, share in one.items()}
+            )
+            for one in points
+        ]
         runs = parallel_map(
-            lambda point: diagnose(point[2], initial_state=origin, budget=budget, sensor_error=sensor_error),
-            points,
+            lambda one: diagnose(one, initial_state=origin, budget=budget, sensor_error=sensor_error),
+            machines,
             workers=workers,
         )
         neighbours = tuple(
-            Neighbour(name, side, run.nature, run.evidence["largest_peak"])
-            for (name, side, _), run in zip(points, runs, strict=True)
+            Neighbour(shares, run.nature, run.evidence["largest_peak"])
+            for shares, run in zip(points, runs, strict=True)
         )
         coexisting = coexisting_peaks(machine, centre, initial_states, budget)
     kind, reason = judge_type(centre.nature, centre.evidence["largest_peak"], neighbours, coexisting)
@@ -191,13 +199,13 @@ def response_type(
     )
 
 
-def _points(machine: Machine, tolerances: Mapping[str, Tolerance]) -> list[tuple[str, int, Machine]]:
-    """(parameter, side, machine) of every point of the neighbourhood."""
-    return [
-        (name, int(np.sign(share)), with_settings(machine, {name: tolerance.at(getattr(machine, name), share)}))
-        for name, tolerance in tolerances.items()
-        for share in SHARES
-    ]
+def region_points(machine: Machine, tolerances: Mapping[str, Tolerance]) -> list[dict[str, float]]:
+    """Points of the region but for its middle: deviations of the parameters that deviate, in tolerances."""
+    plane = [name for name in (machine.speed_field, machine.clearance_field) if name in tolerances]
+    combined = product((0.0, *SHARES), repeat=len(plane))
+    points = [{name: share for name, share in zip(plane, shares, strict=True) if share} for shares in combined]
+    others = [{name: share} for name in tolerances if name not in plane for share in SHARES]
+    return [*(point for point in points if point), *others]
 
 
 def chosen_tolerances(

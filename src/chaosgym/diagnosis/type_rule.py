@@ -1,19 +1,28 @@
-r"""The rule of thesis 5.5: which type follows from what a response and its neighbourhood do.
+r"""The rule of thesis 5.5.1: which type follows from what a response and the region of its tolerances do.
 
-    III           the centre is not periodic; or points that are not periodic surround it; or attractors that coexist
-                  at the centre have largest peaks more than 10 % apart
-    II            otherwise, if some point exceeds the centre's largest peak by 10 % or is not periodic
+    Case I      "If all the responses over the selected region are periodic": Type I where they are "well-behaved as
+                the parameters vary", Type II where they "change irregularly"
+    Case II     "If chaotic responses occur in a subset of the selected region, they are Type III"; the periodic rest
+                is Type I or II
+    Case III    "If periodic and chaotic responses distribute irregularly in the selected region, the responses are
+                Type III": the periodic ones too
+
+In numbers, for the point in the middle of its region:
+
+    III           it is not periodic (case II; a quasiperiodic response is Type III by 5.5.2); or no straight cut
+                  through the region parts the points that are periodic from those that are not (case III); or
+                  attractors that coexist in the middle have largest peaks more than 10 % apart
+    II            otherwise, if some point of the region is not periodic, or has a largest peak more than 10 % higher
     I             the rest
-    undetermined  if the centre is
+    undetermined  if the point is
 
-Points surround the centre if it lies in their convex hull: on both sides along one parameter, or, of machines that
-deviate in several parameters at once, on no one side of it. So periodic and chaotic responses are mixed around it (case
-III of 5.5.1); otherwise the chaotic ones fill a part of the region that the centre is beside (case II).
-
-A point that is undetermined is not known to be periodic, and counts as not periodic.
+A cut is a plane in the space of the deviations, measured in tolerances. Along one parameter periodic and chaotic points
+are mixed if their nature changes more than once. A point that is undetermined is not known to be periodic, and counts
+as not periodic.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -31,53 +40,41 @@ CROSS = ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
 
 
 class Neighbour(NamedTuple):
-    """One point of the neighbourhood: along which parameter, on which side (-1 or +1), and what it does."""
+    """A point of the region: its deviation in each parameter that deviates, in tolerances, and what it does."""
 
-    parameter: str
-    side: int
+    shares: Mapping[str, float]
     nature: str
     largest_peak: float
 
     @property
     def place(self) -> str:
         """Where it lies, for people."""
-        return f"{'above' if self.side > 0 else 'below'} the nominal {self.parameter}"
-
-
-class Built(NamedTuple):
-    """A machine of the region: its deviation in each parameter, in tolerances, and what it does."""
-
-    shares: Mapping[str, float]
-    nature: str
-    largest_peak: float
+        sides = (f"{'above' if share > 0 else 'below'} the nominal {name}" for name, share in self.shares.items())
+        return " and ".join(sides)
 
 
 def judge_type(
-    nature: str,
-    largest_peak: float,
-    neighbours: Iterable[Neighbour],
-    coexisting_peaks: Sequence[float] = (),
-    built: Sequence[Built] = (),
+    nature: str, largest_peak: float, neighbours: Iterable[Neighbour], coexisting_peaks: Sequence[float] = ()
 ) -> tuple[Type, str]:
-    """Type of a response and its reason, from what the centre and its neighbourhood do.
+    """Type of a response and its reason, from what it and the region around it do.
 
     Parameters
     ----------
     nature, largest_peak
-        Of the centre; the peak force in any unit.
+        Of the point in the middle; the peak force in any unit.
     neighbours
-        Points of the neighbourhood.
+        The other points of the region.
     coexisting_peaks
-        Largest peaks at the centre from other initial states.
-    built
-        Machines that deviate in several parameters at once.
+        Largest peaks in the middle from other initial states.
 
     Examples
     --------
-    >>> judge_type("periodic", 50.0, [Neighbour("speed", 1, "chaotic", 60.0)])
+    >>> judge_type("periodic", 50.0, [Neighbour({"speed": 1.0}, "chaotic", 60.0)])
     ('II', 'chaotic above the nominal speed')
+    >>> judge_type("periodic", 50.0, [Neighbour({"speed": s}, "chaotic", 60.0) for s in (-1.0, 1.0)])
+    ('III', '2 of 3 points in the tolerances are not periodic, mixed with periodic ones')
     """
-    neighbours = list(neighbours)
+    points = list(neighbours)
     if nature == "undetermined":
         return "undetermined", "the nominal response is undetermined"
     if nature != "periodic":
@@ -85,45 +82,54 @@ def judge_type(
     for peak in coexisting_peaks:
         if abs(peak - largest_peak) > FORCE_CHANGE * min(peak, largest_peak):
             return "III", f"another initial state leads to {peak:.3g} N instead of {largest_peak:.3g} N"
-    restless = [point for point in neighbours if point.nature != "periodic"]
-    for name in dict.fromkeys(point.parameter for point in restless):
-        if len({point.side for point in restless if point.parameter == name}) == 2:
-            return "III", f"not periodic on both sides along {name}"
-    wild = [one for one in built if one.nature != "periodic"]
-    found = f"{len(wild)} of {len(built)} machines in the tolerances are not periodic"
-    found += f" ({sum(one.nature == 'undetermined' for one in wild)} undetermined)" if wild else ""
-    if wild and surrounded([one.shares for one in wild] + [{point.parameter: point.side} for point in restless]):
-        return "III", f"{found}, on all sides of the nominal one"
+    restless = [point for point in points if point.nature != "periodic"]
     if restless:
-        return "II", f"{restless[0].nature} {restless[0].place}"
-    if wild:
-        return "II", found
-    for point in neighbours:
-        if point.largest_peak > (1.0 + FORCE_CHANGE) * largest_peak:
-            more = point.largest_peak / largest_peak - 1.0 if largest_peak > 0.0 else np.inf
-            return "II", f"peak force {more:.0%} higher {point.place}"
-    worst = max((one.largest_peak for one in built), default=0.0)
-    if worst > (1.0 + FORCE_CHANGE) * largest_peak:
-        return "II", f"peak force up to {worst:.4g} N in the tolerances, nominal {largest_peak:.4g} N"
-    return "I", "periodic throughout the neighbourhood, peak force less than 10 % higher"
+        found = f"{len(restless)} of {len(points) + 1} points in the tolerances are not periodic"
+        unknown = sum(point.nature == "undetermined" for point in restless)
+        found += f" ({unknown} undetermined)" if unknown else ""
+        calm = [point.shares for point in points if point.nature == "periodic"]
+        if mixed([point.shares for point in restless], [{}, *calm]):
+            return "III", f"{found}, mixed with periodic ones"
+        nearest = min(restless, key=lambda point: len(point.shares))
+        return "II", f"{nearest.nature} {nearest.place}" if len(nearest.shares) == 1 else found
+    highest = max(points, key=lambda point: point.largest_peak, default=None)
+    if highest is not None and highest.largest_peak > (1.0 + FORCE_CHANGE) * largest_peak:
+        more = highest.largest_peak / largest_peak - 1.0 if largest_peak > 0.0 else np.inf
+        return "II", f"peak force {more:.0%} higher {highest.place}"
+    return "I", "periodic throughout the tolerances, peak force less than 10 % higher"
 
 
-def surrounded(points: Sequence[Mapping[str, float]]) -> bool:
-    """Whether the origin lies in the convex hull of points, each given by its coordinates that are not zero.
+def mixed(some: Sequence[Mapping[str, float]], others: Sequence[Mapping[str, float]]) -> bool:
+    """Whether no plane parts two sets of points, each point given by its coordinates that are not zero.
+
+    That is so exactly where the convex hulls of the two sets meet.
 
     Examples
     --------
-    >>> surrounded([{"speed": -1.0}, {"speed": 0.5}])
-    True
-    >>> surrounded([{"speed": 1.0, "gap": 0.2}, {"speed": 0.5, "gap": -1.0}])
+    >>> mixed([{"speed": 1.0}, {"speed": 0.5, "gap": 1.0}], [{}, {"speed": -1.0}])
     False
+    >>> mixed([{"speed": 0.5}], [{}, {"speed": 1.0}])
+    True
     """
-    from scipy.optimize import nnls  # slow to import, and few questions need it
+    names = sorted({name for point in (*some, *others) for name in point})
+    first, second = (
+        np.array([[point.get(name, 0.0) for name in names] for point in points]) for points in (some, others)
+    )
+    across = first.mean(axis=0) - second.mean(axis=0)  # parts most sets that can be parted
+    if (first @ across).min() > (second @ across).max():
+        return False
+    from scipy.optimize import linprog  # slow to import, and few questions need it
 
-    names = sorted({name for point in points for name in point})
-    places = np.array([[point.get(name, 0.0) for name in names] for point in points])
-    equations = np.vstack([places.T, np.ones(len(places))])  # weights of sum 1 whose mean place is the origin
-    return float(nnls(equations, np.append(np.zeros(len(names)), 1.0))[1]) < 1e-9
+    # weights of each set, of sum 1, with the same mean point
+    equations = np.block(
+        [
+            [first.T, -second.T],
+            [np.ones(len(first)), np.zeros(len(second))],
+            [np.zeros(len(first)), np.ones(len(second))],
+        ]
+    )
+    found = linprog(np.zeros(equations.shape[1]), A_eq=equations, b_eq=[0.0] * len(names) + [1.0, 1.0])
+    return bool(found.status == 0)
 
 
 def type_of_cross(
@@ -134,7 +140,7 @@ def type_of_cross(
     """Type and its reason of the centre of a cross, from natures and largest peaks (5,) in the order of ``CROSS``."""
     peaks = np.asarray(largest_peaks).tolist()
     around = [
-        Neighbour(fields[0] if speed else fields[1], speed or clearance, nature, peak)
+        Neighbour({fields[0] if speed else fields[1]: float(speed or clearance)}, nature, peak)
         for (speed, clearance), nature, peak in list(zip(CROSS, natures, peaks, strict=True))[1:]
     ]
     return judge_type(natures[0], peaks[0], around)
@@ -143,7 +149,7 @@ def type_of_cross(
 def types_on_grid(
     natures: ArrayLike, largest_peaks: ArrayLike, axes: Sequence[int] | None = None, reach: Sequence[int] | int = 2
 ) -> NDArray[np.str_]:
-    """Types of all points of a grid whose neighbours are the points of the grid up to ``reach`` steps away.
+    """Types of all points of a grid, each over the points of the grid up to ``reach`` steps away along each axis.
 
     Parameters
     ----------
@@ -152,7 +158,7 @@ def types_on_grid(
     largest_peaks : (...)
         Largest peak force at each point.
     axes
-        Axes along which tolerances lie; all by default. At the border neighbours of one side are missing.
+        Axes along which tolerances lie; all by default. At the border a part of the region is missing.
     reach
         Steps of the grid in one tolerance, for all of ``axes`` or for each.
 
@@ -163,16 +169,20 @@ def types_on_grid(
     nature, peak = np.asarray(natures), np.asarray(largest_peaks)
     if nature.shape != peak.shape:
         raise DiagnosisError(f"natures have shape {nature.shape} and peaks {peak.shape}; allowed: the same shape")
-    chosen = range(nature.ndim) if axes is None else axes
-    reaches = [reach] * len(chosen) if isinstance(reach, int) else reach
+    chosen = list(range(nature.ndim) if axes is None else axes)
+    reaches = [reach] * len(chosen) if isinstance(reach, int) else list(reach)
+    names = [f"axis {axis}" for axis in chosen]
+    moves = [range(-far, far + 1) for _, far in zip(chosen, reaches, strict=True)]
+    region = [dict(zip(names, steps, strict=True)) for steps in product(*moves) if any(steps)]
     types = np.empty(nature.shape, dtype="<U12")
     for index in np.ndindex(nature.shape):
         neighbours = []
-        for axis, far in zip(chosen, reaches, strict=True):
-            for step in range(-far, far + 1):  # 0 is the point itself, which differs from itself in nothing
-                place = index[axis] + step
-                if 0 <= place < nature.shape[axis]:
-                    at = (*index[:axis], place, *index[axis + 1 :])
-                    neighbours.append(Neighbour(f"axis {axis}", int(np.sign(step)), nature[at], float(peak[at])))
+        for steps in region if nature[index] == "periodic" else ():
+            at = list(index)
+            for axis, step in zip(chosen, steps.values(), strict=True):
+                at[axis] += step
+            if all(0 <= place < size for place, size in zip(at, nature.shape, strict=True)):
+                shares = {name: float(step) for name, step in steps.items() if step}
+                neighbours.append(Neighbour(shares, str(nature[tuple(at)]), float(peak[tuple(at)])))
         types[index] = judge_type(str(nature[index]), float(peak[index]), neighbours)[0]
     return types

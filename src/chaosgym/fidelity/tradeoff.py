@@ -278,7 +278,7 @@ def _at_point(machine: Machine, setting: Setting, cycles: int, transient: int) -
             for share in SHARES if name in fields else ():
                 record = settled(with_settings(machine, {name: tolerance.at(getattr(machine, name), share)}))
                 peak = float(record.peak_force.max())
-                neighbours.append(Neighbour(name, int(np.sign(share)), two_step_test(record).nature, peak))
+                neighbours.append(Neighbour({name: share}, two_step_test(record).nature, peak))
     kind = judge_type(nature, float(centre.peak_force.max()), neighbours)[0]
     return _Point(centre.peak_force.ravel(), nature, kind, seconds, count)
 

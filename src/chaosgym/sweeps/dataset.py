@@ -63,7 +63,7 @@ LABELS: Mapping[str, Column] = {
     "nature": Column(pa.string(), "-", "periodic, quasiperiodic, chaotic or undetermined; null if failed"),
     "period": Column(pa.int32(), "cycles", "cycles after which a periodic response repeats; null otherwise"),
     "response_type": Column(pa.string(), "-", ""),
-    "type_neighbours": Column(pa.int8(), "-", "neighbours that the response type rests on; fewer at a border"),
+    "type_neighbours": Column(pa.int32(), "-", "neighbours that the response type rests on; fewer at a border"),
     "full_response_type": Column(
         pa.string(), "-", "I, II, III or undetermined over all tolerances and three initial states, by runs of its own"
     ),

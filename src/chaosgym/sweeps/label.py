@@ -156,7 +156,7 @@ def label_rows(plan: SweepPlan, rows: range, stop: Event | None = None) -> pa.Ta
 def with_response_types(table: pa.Table, plan: SweepPlan, rows: range) -> pa.Table:
     """Fill in the response types of some rows: a whole grid, whole crosses, or any other points.
 
-    That of a point follows from the points up to one tolerance beside it, along speed and clearance.
+    That of a point follows from the points up to one tolerance away in speed and clearance.
     """
     natures = np.array(table.column("nature").fill_null("undetermined").to_pylist())
     largest = table.column("largest_peak").to_numpy(zero_copy_only=False)
@@ -164,7 +164,7 @@ def with_response_types(table: pa.Table, plan: SweepPlan, rows: range) -> pa.Tab
         crosses = zip(natures.reshape(-1, len(CROSS)), largest.reshape(-1, len(CROSS)), strict=True)
         kinds = [kind for cross in crosses for kind in (type_of_cross(*cross)[0], *[None] * (len(CROSS) - 1))]
         table = _with_column(table, "response_type", pa.array(kinds, pa.string()))
-        return _with_column(table, "type_neighbours", pa.array(plan.type_neighbours(rows), pa.int8()))
+        return _with_column(table, "type_neighbours", pa.array(plan.type_neighbours(rows), pa.int32()))
     reach = plan.type_axes()
     if not reach and plan.sampling == "grid":
         return _with_column(table, "response_type", _without_neighbours(table))
@@ -174,7 +174,7 @@ def with_response_types(table: pa.Table, plan: SweepPlan, rows: range) -> pa.Tab
         natures.reshape(plan.shape), largest.reshape(plan.shape), axes=list(reach), reach=list(reach.values())
     )
     table = _with_column(table, "response_type", pa.array(types.ravel().tolist(), pa.string()))
-    return _with_column(table, "type_neighbours", pa.array(plan.type_neighbours(rows), pa.int8()))
+    return _with_column(table, "type_neighbours", pa.array(plan.type_neighbours(rows), pa.int32()))
 
 
 def _without_neighbours(table: pa.Table) -> pa.Array:

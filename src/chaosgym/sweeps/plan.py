@@ -12,6 +12,7 @@ plan may have a billion.
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from math import prod
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -225,10 +226,10 @@ class SweepPlan:
         if self.sampling == "crosses":
             return np.where(np.arange(rows.start, rows.stop) % len(CROSS) == 0, len(CROSS) - 1, 0)
         at = np.unravel_index(np.arange(rows.start, rows.stop), self.shape)
-        found = np.zeros(len(rows), dtype=np.int64)
+        found = np.ones(len(rows), dtype=np.int64)
         for axis, far in self.type_axes().items():
-            found += np.minimum(at[axis], far) + np.minimum(self.shape[axis] - 1 - at[axis], far)
-        return found
+            found *= np.minimum(at[axis], far) + np.minimum(self.shape[axis] - 1 - at[axis], far) + 1
+        return found - 1
 
     def type_axes(self) -> dict[int, int]:
         """``type_reach`` by the index of the axis in ``shape``."""
@@ -237,12 +238,16 @@ class SweepPlan:
     @property
     def all_neighbours(self) -> int:
         """Neighbours of a point that has all that its response type rests on; 0 where none are points of the sweep."""
-        return len(CROSS) - 1 if self.sampling == "crosses" else 2 * sum(self.type_reach().values())
+        return (
+            len(CROSS) - 1
+            if self.sampling == "crosses"
+            else prod(2 * far + 1 for far in self.type_reach().values()) - 1
+        )
 
     def type_reach(self) -> dict[str, int]:
         """Over which neighbours of a point its response type is judged: {field: steps}.
 
-        Along speed and clearance, as many steps as the default tolerance of the field holds. Empty where the steps of
+        In speed and clearance, as many steps as the default tolerance of the field holds. Empty where the steps of
         one of them are wider than its tolerance, because a type compares points one tolerance apart; and unless on a
         grid.
         """
