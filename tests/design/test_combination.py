@@ -8,7 +8,7 @@ import pytest
 from chaosgym.design import Criteria, assess
 from chaosgym.design.combination import combination, own_type, probability, total_indices
 from chaosgym.design.guidelines import case_of, guidelines
-from chaosgym.diagnosis import Built, Tolerance
+from chaosgym.diagnosis import Neighbour, Tolerance
 from chaosgym.machines import ImpactBeam
 
 CALM = ImpactBeam(excitation_frequency=8.0)
@@ -75,7 +75,7 @@ def test_a_machine_of_the_region_has_a_type_of_its_own(calm):
 
 def test_where_chaos_is_mixed_in_every_machine_is_of_type_three(calm):
     """Case III of 5.5.1 leaves no machine of Type I, and the guideline and the probabilities agree."""
-    around = [Built({"clearance": side}, "chaotic", 60.0) for side in (-0.5, 0.5)]
+    around = [Neighbour({"clearance": side}, "chaotic", 60.0) for side in (-0.5, 0.5)]
     assert combination(calm, around, base=8).types["III"].share == 1.0
     assert any("all are of Type III" in one.sentence for one in guidelines(calm, around))
 
@@ -84,14 +84,15 @@ def test_where_chaos_is_mixed_in_every_machine_is_of_type_three(calm):
     ("shares", "case"),
     [
         ([], "I"),
-        ([{"clearance": 0.5}], "II"),
-        ([{"clearance": 0.5}, {"clearance": 0.2, "damping_ratio": 0.1}], "II"),
+        ([{"clearance": 1.1}], "II"),
+        ([{"clearance": 1.1}, {"clearance": 1.2, "damping_ratio": 0.1}], "II"),
+        ([{"clearance": 0.45}], "III"),
         ([{"clearance": 0.5}, {"clearance": -0.4}], "III"),
     ],
 )
 def test_the_case_is_told_by_where_chaos_lies(calm, shares, case):
-    """None: case I. On one side of the nominal machine: II. On both: III."""
-    wild = [Built(share, "chaotic", 60.0) for share in shares]
+    """None: case I. At one end of the tolerances: II. Between periodic machines, or at both ends: III."""
+    wild = [Neighbour(share, "chaotic", 60.0) for share in shares]
     assert case_of(calm, wild) == case
 
 

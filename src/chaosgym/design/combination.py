@@ -31,7 +31,7 @@ from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.guidelines import case_of
 from chaosgym.design.methodology import Assessment
 from chaosgym.design.runs import SettledRun, deviating, worse_side
-from chaosgym.diagnosis import Built, Nature, Tolerance, Type
+from chaosgym.diagnosis import Nature, Neighbour, Tolerance, Type
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE
 from chaosgym.machines import Machine
 from chaosgym.simulation import parallel_map, simulate
@@ -163,7 +163,7 @@ def own_type(run: SettledRun, nominal_peak: float) -> Type:
 
 def combination(
     found: Assessment,
-    further: Sequence[Built] = (),
+    further: Sequence[Neighbour] = (),
     *,
     base: int = BASE,
     seed: int = 0,

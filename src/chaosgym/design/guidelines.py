@@ -4,8 +4,8 @@ r"""The thesis' guidelines as sentences on one machine: which case of 5.5.1 it i
     Case II    those that are not fill a part of the tolerances
     Case III   periodic and other responses are mixed
 
-Mixed are they where the nominal machine lies amid those of the other kind, in their convex hull: the same rule that
-tells Type III from Type II (``chaosgym.diagnosis.type_rule``).
+Mixed are they where no plane through the tolerances parts them: the same rule that tells Type III from Type II
+(``chaosgym.diagnosis.type_rule``).
 """
 
 from collections import Counter
@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 from chaosgym.design.methodology import Assessment
-from chaosgym.diagnosis import Built, Type, signs_of_chaos
-from chaosgym.diagnosis.type_rule import FORCE_CHANGE, surrounded
+from chaosgym.diagnosis import Neighbour, Type, signs_of_chaos
+from chaosgym.diagnosis.type_rule import FORCE_CHANGE, mixed
 
 Case = Literal["I", "II", "III", "undetermined"]
 
@@ -42,7 +42,7 @@ EVALUATION: dict[Type, str] = {
 """Phase VI of 5.6, by type."""
 
 
-def case_of(found: Assessment, further: Sequence[Built] = ()) -> Case:
+def case_of(found: Assessment, further: Sequence[Neighbour] = ()) -> Case:
     """Case of 5.5.1, over the machines of the series, the neighbourhood and those of ``further``.
 
     A machine that is undetermined is not known to be periodic, and counts as not periodic.
@@ -50,18 +50,16 @@ def case_of(found: Assessment, further: Sequence[Built] = ()) -> Case:
     nature = found.nominal.nature
     if nature == "undetermined":
         return "undetermined"
-    region = [(one.shares, one.nature) for one in (*found.series.built, *further)]
-    region += [({point.parameter: float(point.side)}, point.nature) for point in found.response.neighbours]
-    periodic = nature == "periodic"
-    others = [shares for shares, kind in region if (kind == "periodic") != periodic]
-    if periodic and not others:
+    points = [*found.series.built, *further, *found.response.neighbours]
+    region = [({}, nature), *((one.shares, one.nature) for one in points)]
+    calm = [shares for shares, kind in region if kind == "periodic"]
+    restless = [shares for shares, kind in region if kind != "periodic"]
+    if not restless:
         return "I"
-    if others and surrounded(others):
-        return "III"
-    return "II"
+    return "III" if calm and mixed(restless, calm) else "II"
 
 
-def guidelines(found: Assessment, further: Sequence[Built] = ()) -> tuple[Guideline, ...]:
+def guidelines(found: Assessment, further: Sequence[Neighbour] = ()) -> tuple[Guideline, ...]:
     """Sentences on one assessed machine, in the order of the thesis.
 
     Parameters
