@@ -11,7 +11,7 @@ import numpy as np
 
 from chaosgym.core.compilation import call, call_side_by_side
 from chaosgym.machines import Machine, batch
-from chaosgym.machines.slider_crank import run
+from chaosgym.machines.binned import run
 from chaosgym.simulation import CycleRecord, Integrator, simulate
 
 BLOCKS = 5
