@@ -24,8 +24,11 @@ _QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 def rotation(angle: Array) -> Array:
     """Turn of vectors by angles (...,) [rad]: (..., 2, 2)."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)
+    turn = np.empty((*angle.shape, 2, 2))
+    turn[..., 0, 0] = turn[..., 1, 1] = np.cos(angle)
+    turn[..., 1, 0] = np.sin(angle)
+    turn[..., 0, 1] = -turn[..., 1, 0]
+    return turn
 
 
 def quarter_after(turn: Array) -> Array:

@@ -1,11 +1,11 @@
 """Nominal motion of a mechanism: where its links are at every crank angle while every gap stays in its middle.
 
-From rough angles of the links at crank angle 0 the loops are closed by Newton's method. Steps along the tangent, each
-corrected, follow the closed loops through a revolution; all angles that are asked for then start from cubics through
-these steps.
+From rough angles of the links at crank angle 0 the loops are closed by Newton's method. Steps of the crank follow them
+through a revolution, each foretold by the cubic through the last two and corrected; all angles that are asked for then
+start from cubics through these steps.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,8 @@ STEP, SHORTEST = 2.0 * np.pi / 24, 1e-4
 FAR = 0.25
 """Correction of a step, in rad or in lengths of the mechanism, beyond which it is tried anew with half the length."""
 
-CLOSED, ROUNDING = 1e-9, 1e-13
-"""Last correction of coordinates of closed loops that is admitted, and one that needs no more."""
+CLOSED, NEARLY, ROUNDING = 1e-9, 1e-6, 1e-13
+"""Last correction of coordinates of closed loops that is admitted, that is enough for a step, and that is rounding."""
 
 WORST = 1e9
 """Condition number of the loops' equations beyond which they are singular."""
@@ -55,30 +55,30 @@ class _Loops:
             lengths[own.start : own.start + 2] = self.length
         self.scale = lengths
 
-    def solve(self, z: Array, theta: Array, tries: int = TRIES) -> tuple[Array, float]:
-        """Coordinates (B, z) by Newton's method, and the last correction."""
-        last = np.inf
+    def solve(self, z: Array, theta: Array, tries: int = TRIES, enough: float = ROUNDING) -> tuple[Array, float, Array]:
+        """Coordinates (B, z) by Newton's method, the last correction, and A (B, z, z) before it in own lengths."""
+        last, slope = np.inf, np.empty(0)
         for _ in range(tries):
             before = last
             value, slope = self.mechanism.functions(z, theta)
+            slope = slope * self.scale
             try:
-                step = np.linalg.solve(slope * self.scale, value[..., None])[..., 0]
+                step = np.linalg.solve(slope, value[..., None])[..., 0]
             except np.linalg.LinAlgError:
-                return z, np.inf
+                return z, np.inf, slope
             last = float(np.max(np.abs(step)))
             if not np.isfinite(last):
-                return z, np.inf
+                return z, np.inf, slope
             z = z - self.scale * step / max(1.0, last)
-            if last < ROUNDING or (last < CLOSED and last >= before):
+            if last < enough or (last < CLOSED and last >= before):
                 break
-        return z, last
+        return z, last, slope
 
-    def tangent(self, z: Array, theta: Array) -> Array:
-        """Derivatives (B, z) of the coordinates by the crank angle."""
-        _, slope = self.mechanism.functions(z, theta)
-        drive = np.zeros((len(z), self.mechanism.size, 1))
+    def tangent(self, slope: Array) -> Array:
+        """Derivatives (B, z) of the coordinates by the crank angle, of A in own lengths."""
+        drive = np.zeros((len(slope), self.mechanism.size, 1))
         drive[:, 0] = 1.0
-        return np.asarray(np.linalg.solve(slope, drive)[..., 0])
+        return np.asarray(self.scale * np.linalg.solve(slope, drive)[..., 0])
 
 
 def _length_of(mechanism: Mechanism) -> float:
@@ -116,7 +116,7 @@ def _start(loops: _Loops) -> Array:
         places += [own, own + 1]
     value, slope = mechanism.functions(z, theta)
     z[0, places] -= np.linalg.lstsq(slope[0][:, places], value[0], rcond=None)[0]
-    found, last = loops.solve(z, theta)
+    found, last, _ = loops.solve(z, theta)
     if last > CLOSED:
         _refuse_singular(loops, z, 0.0)
         value, _ = mechanism.functions(found, theta)
@@ -155,14 +155,14 @@ def revolution_of(mechanism: Mechanism) -> Revolution:
     """
     loops = _Loops(mechanism)
     angles, places = [0.0], [_start(loops)]
-    tangents = [loops.tangent(places[0], np.zeros(1))]
+    tangents = [loops.tangent(loops.solve(places[0], np.zeros(1), 1)[2])]
     step = STEP
     while angles[-1] < 2.0 * np.pi:
         end = min(angles[-1] + step, 2.0 * np.pi)
         theta = np.array([end if 2.0 * np.pi - end > 0.1 * SHORTEST else 2.0 * np.pi])
-        guess = places[-1] + (theta - angles[-1]) * tangents[-1]
-        z, last = loops.solve(guess, theta, 12)
-        if last > CLOSED or np.max(np.abs(z - guess) / loops.scale) > FAR * min(1.0, 4.0 * step / STEP):
+        guess = _foretold(angles, places, tangents, float(theta[0]))
+        z, last, slope = loops.solve(guess, theta, 12, NEARLY)
+        if last > NEARLY or np.max(np.abs(z - guess) / loops.scale) > FAR * min(1.0, 4.0 * step / STEP):
             step *= 0.5
             if step < SHORTEST:
                 raise ParameterError(
@@ -172,7 +172,7 @@ def revolution_of(mechanism: Mechanism) -> Revolution:
             continue
         angles.append(float(theta[0]))
         places.append(z)
-        tangents.append(loops.tangent(z, theta))
+        tangents.append(loops.tangent(slope))
         step = min(2.0 * step, STEP)
     drift = places[-1][0] - places[0][0]
     turns = np.zeros(mechanism.size)
@@ -188,6 +188,20 @@ def revolution_of(mechanism: Mechanism) -> Revolution:
     )
 
 
+def _foretold(angles: list[float], places: list[Array], tangents: list[Array], theta: float) -> Array:
+    """Coordinates at the next crank angle, by the cubic through the last two steps."""
+    if len(angles) < 2:
+        return places[-1] + (theta - angles[-1]) * tangents[-1]
+    span = angles[-1] - angles[-2]
+    return _between((theta - angles[-2]) / span, span, places[-2], places[-1], tangents[-2], tangents[-1])
+
+
+def _between(x: Any, h: Any, z0: Array, z1: Array, d0: Array, d1: Array) -> Array:
+    """Cubic with values z and slopes d at both ends of h, at a share x of it."""
+    ends = z0 * ((1 + 2 * x) * (1 - x) ** 2) + z1 * (x**2 * (3 - 2 * x))
+    return np.asarray(ends + h * (d0 * (x * (1 - x) ** 2) - d1 * (x**2 * (1 - x))))
+
+
 def nominal(mechanism: Mechanism, revolution: Revolution, theta: Array) -> Nominal:
     """Nominal motion at crank angles (B,) [rad] of a revolution.
 
@@ -201,8 +215,7 @@ def nominal(mechanism: Mechanism, revolution: Revolution, theta: Array) -> Nomin
     begin, span = revolution.theta[at], np.diff(revolution.theta)[at]
     x, h = ((where - begin) / span)[:, None], span[:, None]
     z0, z1, d0, d1 = (part[k] for part in (revolution.z, revolution.tangent) for k in (at, at + 1))
-    z = z0 * (1 + 2 * x) * (1 - x) ** 2 + z1 * x**2 * (3 - 2 * x) + h * (d0 * x * (1 - x) ** 2 - d1 * x**2 * (1 - x))
-    z, last = loops.solve(z, where, 8)
+    z, last, _ = loops.solve(_between(x, h, z0, z1, d0, d1), where, 8)
     slope = mechanism.functions(z, where)[1]
     condition = np.linalg.cond(slope * loops.scale)
     if last > CLOSED or not np.all(condition < WORST):
