@@ -4,6 +4,7 @@ import click
 
 from chaosgym.cli import run_command
 from thesis.cli.calibrate import calibrate
+from thesis.cli.exclusions import exclusions
 from thesis.cli.figures import figures
 from thesis.cli.firmness import firmness
 from thesis.cli.scorecard import scorecard
@@ -14,7 +15,7 @@ def app() -> None:
     """The statements and figures of the thesis, computed on the machines of chaosgym."""
 
 
-for command in (scorecard, figures, calibrate, firmness):
+for command in (scorecard, figures, calibrate, firmness, exclusions):
     app.add_command(command)
 
 

@@ -1,5 +1,9 @@
 """The page of the scorecard: one table a machine, misses shown like hits."""
 
+from collections.abc import Set
+
+from chaosgym.machines import ImpactBeam
+from thesis.scorecard.exclusions import known_exclusions
 from thesis.scorecard.scorecard import Scorecard
 from thesis.scorecard.verdicts import Judged
 from thesis.statements import read_comparisons
@@ -36,7 +40,34 @@ def _section(card: Scorecard, machine: str) -> str:
         "|---|---|---|---|---|---|---|---|",
     ]
     lines += [row(card, one) for one in card.judged if one.comparison.machine == machine]
+    if machine == ImpactBeam.name:
+        hit = {one.comparison.id for one in card.judged if one.verdict == "hit"}
+        lines += ["", _exclusions(hit)]
     return "\n".join(lines) + "\n"
+
+
+def _exclusions(hit: Set[str]) -> str:
+    """Pairs of statements that no beam of the searches hits together, and which of them the shipped beam hits."""
+    found = known_exclusions()
+    rows = "\n".join(
+        f"| {_named(pair.one)} | {pair.hits} | {_named(pair.other)} | {pair.hits_of_other} | {pair.judged} "
+        f"| {len(hit & {pair.one, pair.other})} |"
+        for pair in found.pairs
+    )
+    never = f"None hits {', '.join(found.never)}. " if found.never else ""
+    return (
+        f"### Exclusions\n\nOf {found.candidates} beams of the search without walls (`python -m thesis exclusions`), "
+        "most of them with a soft pivot and judged by quick runs, none hits both statements of a row, though by chance "
+        f"one or more would. {never}Where the shipped beam, of a hard pivot, hits both, the soft pivot excludes them; "
+        "where not, no beam is known that does both.\n\n"
+        "| statement | hit by | statement | hit by | judged on both | hit by the shipped beam |\n"
+        "|---|---|---|---|---|---|\n" + rows
+    )
+
+
+def _named(name: str) -> str:
+    known = {one.id: one.statement for one in read_comparisons().compared}
+    return f"{name}, {known[name].figure}: {known[name].quantity}" if name in known else name
 
 
 def _firm(card: Scorecard, machine: str) -> str:
