@@ -47,6 +47,21 @@ def test_a_file_of_a_search_and_a_name_are_both_read(tmp_path):
     assert "neither a file nor one of A, B" in err
 
 
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--basin", "x", "--machine", "slider-crank"), "begins no name of a structure"),
+        (("--basin", "gravity"), "--basin goes with one --machine"),
+        (("--basin", "soft", "--machine", "impact-beam", "--beam", "A"), "--basin goes with one --machine"),
+    ],
+)
+def test_a_structure_that_is_none_is_refused(options, told):
+    """Before anything is computed, in one line."""
+    code, out, err = run("scorecard", *options, module="thesis")
+    assert (code, out) == (2, "")
+    assert told in err
+
+
 def test_what_was_measured_is_judged_apart():
     """No measured statement is among those that a search may follow."""
     measured = {one.id for one in read_measured().compared}

@@ -14,16 +14,26 @@ from chaosgym.cli.output import emit
     metavar="NAME|FILE",
     help="Judge this beam instead: a candidate of thesis/scorecard/candidates.json, or result.json of a search.",
 )
+@click.option("--basin", metavar="NAME", help="Judge where this structure of the search begins instead; one --machine.")
 @click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
 @click.option("--markdown", is_flag=True, help="Print the page of the documentation.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def scorecard(machine: tuple[str, ...], beam: str | None, workers: int | None, markdown: bool, as_json: bool) -> None:
+def scorecard(
+    machine: tuple[str, ...], beam: str | None, basin: str | None, workers: int | None, markdown: bool, as_json: bool
+) -> None:
     """Compare every simulated statement of the thesis with the machines here; misses are shown."""
     from thesis.cache import default_folder
     from thesis.scorecard.page import page
     from thesis.scorecard.scorecard import scorecard as judge
 
-    bases = None
+    bases: dict[str, Any] | None = None
+    if basin is not None:
+        from thesis.scorecard.search_space import SEARCH_SPACES
+
+        if len(machine) != 1 or beam is not None:
+            raise click.UsageError("--basin goes with one --machine, and without --beam")
+        space = SEARCH_SPACES[machine[0]].only(basin)
+        bases = {machine[0]: space.machine(space.basins[0], space.basins[0].shares())}
     if beam is not None:
         from thesis.scorecard.candidates import read_candidate
 
