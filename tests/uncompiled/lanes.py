@@ -220,6 +220,18 @@ def item(own, at):
 
 
 @operation
+def exponent(value):
+    """Exponent of two of a number above 0."""
+    return int(np.frexp(value)[1]) - 1 if np.isfinite(value) else 1024
+
+
+@operation
+def power_of_two(power):
+    """Two to the power of an integer."""
+    return 2.0 ** int(power)
+
+
+@operation
 def put(own, at, value):
     """Number put at a place."""
     own[at] = value

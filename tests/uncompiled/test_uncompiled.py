@@ -32,6 +32,8 @@ CALLS = {
     "next_terms_of_eight": lambda call, table, own: call(own, 0, 250, 400, 56, 3, 2.0, 0.25, 600),
     "deal": lambda call, table, own: call(table, 0, 24, 5, own, 600, 30, 7, 6),
     "keep_largest": lambda call, table, own: call(own, 3, 600, 16),
+    "exponent": lambda call, table, own: [call(2.0**k * (1.0 + abs(x) % 0.9)) for k, x in enumerate(own[:9], -4)],
+    "power_of_two": lambda call, table, own: [call(k) for k in range(-5, 40)],
     "put": lambda call, table, own: call(own, 3, 0.3),
     "sum_series": lambda call, table, own: call(table, 3, 24, 6, 0.7, own, 900, 16),
     "add_tops": lambda call, table, own: call(own, 0, 20, 0.1, -1.0, 0.7, 0.2, 600),

@@ -635,6 +635,19 @@ def item(e, own, at):
     return e.number(own, at)
 
 
+@_operation(types.int64)
+def exponent(e, value):
+    """Exponent of two of a number above 0: the largest k with 2^k not above it; 1024 of infinity."""
+    bits = e.builder.lshr(e.builder.bitcast(value, _INDEX), e.index(52))
+    return e.builder.sub(bits, e.index(1023))
+
+
+@_operation(types.float64)
+def power_of_two(e, power):
+    """Two to the power of an integer from -1022 to 1023."""
+    return e.builder.bitcast(e.builder.shl(e.builder.add(power, e.index(1023)), e.index(52)), _DOUBLE)
+
+
 @_operation()
 def put(e, own, at, value):
     """Write a number at a place that is not negative."""

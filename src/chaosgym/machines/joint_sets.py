@@ -173,7 +173,7 @@ class JointTables:
         shortest = self._shortest(sets.fastest)
         levels = min(max(math.ceil(math.log2(self._period / (4.0 * shortest))), 1), MOST_LEVELS)
         self._layout = call(layout, n, len(drive), m, levels)
-        self._at = call(work_space, self._layout)
+        self._at = call(work_space, self._layout, sets.radix)
         self._length = int(self._layout[ROW])
         self._most = max(1, MOST_BYTES // (8 * self._length))
         self._lock = Lock()
@@ -228,23 +228,13 @@ class JointTables:
             self._rows = rows
             self._kept += 1
 
-    def _run(self, stops: Array, event_tolerance: float) -> JointRun:
+    def _run(self, stops: Array, event_tolerance: float) -> tuple[JointRun, NDArray[np.int64]]:
+        """All that a run reads, and where the rows of the sets begin."""
         with self._lock:
             tables, rows = self._tables, self._rows
-        return JointRun(
-            tables=tables,
-            rows=rows,
-            radix=self._sets.radix,
-            shape=self._sets.shape,
-            stops=stops,
-            stiffness=self._sets.springs,
-            damping=self._sets.dampers,
-            weights=self._weights,
-            own=call(new_space, self._at),
-            at=self._at,
-            period=self._period,
-            resolution=event_tolerance / self._step_phase,
-        )
+        sets = self._sets
+        own = call(new_space, self._at, sets.shape, stops, sets.springs, sets.dampers)
+        return JointRun(tables, own, self._at, self._period, event_tolerance / self._step_phase), rows
 
     def advance(
         self,
@@ -260,8 +250,9 @@ class JointTables:
         while True:
             part = CycleArrays(*(values[done:] for values in arrays))
             along = tangents._replace(log_growth=tangents.log_growth[done:])
-            run = self._run(stops, integrator.event_tolerance)
-            outcome, finished, code = call(advance_joints, run, state, bouncing, part, integrator.event_budget, along)
+            run, rows = self._run(stops, integrator.event_tolerance)
+            motion = (state, bouncing, part, integrator.event_budget, along)
+            outcome, finished, code = call(advance_joints, run, rows, self._weights, *motion)
             done += finished
             if outcome != status.NEEDS_SET:
                 return outcome, min(done, cycles)

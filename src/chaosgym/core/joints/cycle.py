@@ -29,11 +29,15 @@ from chaosgym.core.joints.events import (
 )
 from chaosgym.core.joints.run import (
     JOINT,
+    LOWER_DAMPER,
     NUMBERS,
+    PEAKS,
     RATES,
+    SHAPES,
     SIDE,
     SPARE,
     STATE,
+    UPPER_DAMPER,
     U,
     bound_fourth,
     enter,
@@ -45,9 +49,9 @@ from chaosgym.core.joints.run import (
     leave,
     look,
     place,
-    prepare,
     pressed_set,
     read_after,
+    read_next,
     read_now,
     travel,
     write_samples,
@@ -86,6 +90,8 @@ def begin_state(run, state):
         own[first + i] = state[i]
     for h in range(run.at[HARMONICS]):
         own[first + state.shape[0] + h], own[first + state.shape[0] + run.at[HARMONICS] + h] = 1.0, 0.0
+    for column in range(2 * run.at[JOINTS]):
+        own[run.at[PEAKS] + column] = 0.0
     find_sides(run, state)
 
 
@@ -112,7 +118,7 @@ def note_touch(bouncing, joints, j, side, time, bounce_time):
 
 
 @leaf
-def carry(run, row, elapsed, tangents, cycle):
+def carry(run, weights, row, elapsed, tangents, cycle):
     """Advance deviations (k, 2n) by ``elapsed`` seconds in a set; see ``tangent.carry``."""
     own, at, vectors = run.own, run.at, tangents.vectors
     n, width, states, spare = at[MODES], at[WIDTH], 2 * at[MODES], at[SPARE]
@@ -133,35 +139,36 @@ def carry(run, row, elapsed, tangents, cycle):
             for i in range(states):
                 vectors[k, i] = own[at[STATE] + i]
         if several:
-            orthonormalise(run.weights, tangents, cycle)
+            orthonormalise(weights, tangents, cycle)
 
 
 @leaf
-def touch(shape, damping, vectors):
+def touch(run, j, side, vectors):
     """Saltation of deviations (k, 2n) at the touch of a surface: its damper acts at once, for each at its own time."""
-    n = shape.shape[0]
+    own, n = run.own, run.at[MODES]
+    shape, damping = run.at[SHAPES] + j * n, known(run, j, UPPER_DAMPER if side > 0.0 else LOWER_DAMPER)
     for k in range(vectors.shape[0]):
         shift = 0.0
         for i in range(n):
-            shift += shape[i] * vectors[k, i]
+            shift += own[shape + i] * vectors[k, i]
         for i in range(n):
-            vectors[k, n + i] -= damping * shape[i] * shift
+            vectors[k, n + i] -= damping * own[shape + i] * shift
 
 
 @leaf
-def run_cycle(run, bouncing, arrays, cycle, event_budget, tangents):
+def run_cycle(run, rows, weights, bouncing, arrays, cycle, event_budget, tangents):
     """Move through one cycle: (status, set that is needed). The state is in the work space, as at the end."""
     own, at = run.own, run.at
-    m, history, peak = at[JOINTS], arrays.history[cycle], arrays.peak_force[cycle]
+    m, history = at[JOINTS], arrays.history[cycle]
     contact_time, bounce_time = arrays.contact_time[cycle], arrays.bounce_time[cycle]
     carries = tangents.vectors.shape[0] > 0
     code = pressed_set(run)
-    row = run.rows[code]
+    row = rows[code]
     if row < 0:
         return status.NEEDS_SET, code
     enter(run, row)
     read_now(run, row)
-    note_now(run, peak)
+    note_now(run)
     for j in range(m):
         if not math.isfinite(own[place_of(run, j)]):
             return status.DIVERGED, code
@@ -175,13 +182,14 @@ def run_cycle(run, bouncing, arrays, cycle, event_budget, tangents):
         if left <= 0.0:
             break
         bound_fourth(run, row)
-        level, h = choose_level(run, row, most, left, peak)
+        looked = False
+        level, h = choose_level(run, row, most, left)
         if h < left:
             look(run, row, level, h)
             whole = int(min(8.0, left / h))
-            count = quiet_intervals(run, h, whole)
+            count = quiet_intervals(run, row, h, whole)
             if code > 0 and count > 0:
-                count = note_peaks(run, h, count, peak)
+                count = note_peaks(run, h, count)
             if count > 0:
                 if sample < history.shape[0]:
                     sample = write_samples(run, row, time, count * h, sample, history)
@@ -196,21 +204,29 @@ def run_cycle(run, bouncing, arrays, cycle, event_budget, tangents):
             if level > 0:
                 most = max(level - ZOOM, 0)
                 continue
-            left = run.period - time
+            looked = True
+            if count > 0:
+                read_next(run, count)
+                left = run.period - time
         most = MOST_LEVEL
         shortest = run.tables[row + SHORTEST]
         span = min(shortest, left)
-        expand(run, row)
-        read_series(run, span)
-        changed, towards, instant = first_change(run, span, run.resolution * shortest)
+        expanded = not (looked and span == shortest)
+        if expanded:
+            expand(run, row)
+            read_series(run, span)
+        changed, towards, instant, expanded = first_change(run, row, span, expanded, run.resolution * shortest)
         if changed >= 0:
             read_series(run, instant)
         if code > 0:
-            note_crests(run, instant, peak)
+            note_crests(run, row, instant, expanded)
             add_contact_time(run, instant, contact_time)
         if sample < history.shape[0]:
             sample = write_samples(run, row, time, instant, sample, history)
-        place(run, row, instant)
+        if instant == shortest:
+            jump(run, row, 0, 1, shortest)
+        else:
+            place(run, row, instant)
         unfinished = changed >= 0 or span < left
         time += instant
         if changed < 0:
@@ -221,12 +237,12 @@ def run_cycle(run, bouncing, arrays, cycle, event_budget, tangents):
             return status.EVENT_BUDGET, code
         touches = towards * own[place_of(run, changed) + 1 + RATES] > 0.0
         if carries:
-            carry(run, row, time - carried, tangents, cycle)
+            carry(run, weights, row, time - carried, tangents, cycle)
             carried = time
         leave(run, row)
         own[at[JOINT] + changed * NUMBERS + SIDE] = towards
         code = pressed_set(run)
-        row = run.rows[code]
+        row = rows[code]
         if row < 0:
             return status.NEEDS_SET, code
         if towards != 0.0:
@@ -234,37 +250,40 @@ def run_cycle(run, bouncing, arrays, cycle, event_budget, tangents):
             arrays.impacts[cycle, 2 * changed + which] += 1
             note_touch(bouncing, m, changed, towards, time, bounce_time)
             if carries and touches:
-                touch(run.shape[changed], run.damping[changed, which], tangents.vectors)
+                touch(run, changed, towards, tangents.vectors)
         enter(run, row)
         read_now(run, row)
-        note_now(run, peak)
+        note_now(run)
     if sample < history.shape[0]:
         write_samples(run, row, time, run.period, sample, history)
     leave(run, row)
     arrays.events[cycle] = events
+    for column in range(2 * m):
+        arrays.peak_force[cycle, column] = own[at[PEAKS] + column]
     if carries:
         for i in range(2 * at[MODES]):
             own[at[U] + i] = own[at[STATE] + i]
-        carry(run, row, time - carried, tangents, cycle)
+        carry(run, weights, row, time - carried, tangents, cycle)
         for i in range(2 * at[MODES]):
             own[at[STATE] + i] = own[at[U] + i]
         if tangents.log_growth.shape[1] > 0:
-            orthonormalise(run.weights, tangents, cycle)
+            orthonormalise(weights, tangents, cycle)
     return status.OK, code
 
 
 @njit(cache=True, nogil=True)
-def advance_joints(run, state, bouncing, arrays, event_budget, tangents):
+def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, tangents):
     """Advance ``state`` (2n,) and ``bouncing`` (3m,) in place by whole cycles, one for each row of ``arrays``.
 
     Every cycle starts at phase zero of the drive; ``tangents`` travel with the motion, and there may be none.
+    ``rows`` (radix^m,) tell where in the tables the row of each set of pressed surfaces begins, -1 where there is none
+    yet; ``weights`` (n,) are those of displacements in ``orthonormalise``.
 
     Returns
     -------
     (status, cycle, set) : the cycle is the first one not finished, before which state, bouncing and tangents are; with
     NEEDS_SET, the number of the set of pressed surfaces whose tables it needs.
     """
-    prepare(run)
     bounced, vectors = bouncing.copy(), tangents.vectors.copy()
     for cycle in range(arrays.section.shape[0]):
         for i in range(bouncing.shape[0]):
@@ -274,7 +293,7 @@ def advance_joints(run, state, bouncing, arrays, event_budget, tangents):
         for k in range(tangents.log_growth.shape[1]):
             tangents.log_growth[cycle, k] = 0.0
         begin_state(run, state)
-        outcome, code = run_cycle(run, bouncing, arrays, cycle, event_budget, tangents)
+        outcome, code = run_cycle(run, rows, weights, bouncing, arrays, cycle, event_budget, tangents)
         if outcome == status.OK:
             for i in range(state.shape[0]):
                 if not math.isfinite(run.own[run.at[STATE] + i]):

@@ -27,6 +27,7 @@ from chaosgym.core.joints.run import (
     FOURTH,
     LOWER_GAP,
     NOW,
+    PEAKS,
     RATES,
     READING,
     READINGS,
@@ -34,6 +35,8 @@ from chaosgym.core.joints.run import (
     SIDE,
     TOTALS,
     UPPER_GAP,
+    bound_second,
+    expand,
     gap_of,
     known,
     lag_of,
@@ -41,7 +44,8 @@ from chaosgym.core.joints.run import (
 )
 from chaosgym.core.joints.tables import DEGREE, JOINTS, LEVELS, SHORTEST
 from chaosgym.core.kernel import leaf, part
-from chaosgym.core.lanes import LANES, add_tops, first_above, first_doubt
+from chaosgym.core.lanes import LANES, add_tops, exponent, first_above, first_doubt, item, power_of_two
+from chaosgym.core.propagator import safe_time
 
 GAP_DOUBT = 0.1
 """Largest distance of an open joint from the cubics of the intervals, as a share of its distance from the nearer
@@ -64,39 +68,33 @@ def place_of(run, j):
 
 
 @part
-def choose_level(run, row, most, left, peak):
+def choose_level(run, row, most, left):
     """Level up to ``most`` at which intervals are longest, and their length.
 
     The cubic through the ends of one is near enough to what each joint reads, and four intervals fit into what is
-    ``left`` of the cycle, unless it is level 0. ``peak`` (2m,) are the largest forces so far.
+    ``left`` of the cycle, unless it is level 0.
     """
-    own, at = run.own, run.at
-    level, h = at[LEVELS] - 1, run.tables[row + SHORTEST]
-    level = min(level, most)
+    own, at, h, times = run.own, run.at, run.tables[row + SHORTEST], math.inf
+    shortest4 = VALUE_DOUBT * h * h * h * h
     for j in range(at[JOINTS]):
         if known(run, j, AWAKE) == 0.0:
             continue
-        reading, side = own[place_of(run, j)], known(run, j, SIDE)
+        reading, side = item(own, place_of(run, j)), known(run, j, SIDE)
         if side == 0.0:
             room = GAP_DOUBT * min(known(run, j, UPPER_GAP) - reading, reading + known(run, j, LOWER_GAP))
         else:
-            largest = peak[2 * j + (UPPER if side > 0.0 else LOWER)] / spring_of(run, j, side)
+            largest = item(own, at[PEAKS] + 2 * j + (UPPER if side > 0.0 else LOWER)) / spring_of(run, j, side)
             room = CONTACT_DOUBT * max(largest, side * reading - gap_of(run, j, side))
-        error = known(run, j, FOURTH) * (h * h * h * h * VALUE_DOUBT)
-        mine = 0
-        while mine < level and 16.0 * error <= room:
-            mine += 1
-            error *= 16.0
-        level = mine
-    reached = 0
-    while reached < level and 8.0 * h <= left:
-        reached += 1
-        h *= 2.0
-    return reached, h
+        times = min(times, room / (known(run, j, FOURTH) * shortest4))
+    # an interval twice as long has sixteen times the error
+    if not (times >= 16.0 and left >= 8.0 * h):
+        return np.int64(0), h
+    level = min(min(most, at[LEVELS] - 1), min(exponent(times) // 4, exponent(left / h) - 2))
+    return level, h * power_of_two(level)
 
 
 @part
-def quiet_intervals(run, h, count):
+def quiet_intervals(run, row, h, count):
     """Number of intervals, up to ``count``, in which surely no contact changes."""
     own, h4 = run.own, VALUE_DOUBT * h * h * h * h
     for j in range(run.at[JOINTS]):
@@ -108,7 +106,15 @@ def quiet_intervals(run, h, count):
             low, high = high, math.inf
         elif side < 0.0:
             low, high = -math.inf, low
-        count = min(count, first_doubt(own, place, place + RATES, h, low, high, h4 * known(run, j, FOURTH), 0))
+        doubt = h4 * known(run, j, FOURTH)
+        i = first_doubt(own, place, place + RATES, h, low, high, doubt, 0)
+        if i < count:
+            bend = bound_second(run.tables, own, run.at, row, j)
+            while i < count:
+                value, slope = item(own, place + i), item(own, place + RATES + i)
+                if not min(safe_time(high - value, -slope, bend), safe_time(value - low, slope, bend)) > h:
+                    count = i
+                i = first_doubt(own, place, place + RATES, h, low, high, doubt, i + 1)
     return count
 
 
@@ -121,60 +127,64 @@ def force_at(run, j, which):
 
 
 @leaf
-def note_now(run, peak):
-    """Raise the peaks (2m,) to the forces of now."""
+def note_now(run):
+    """Raise the peaks to the forces of now."""
+    own, peak = run.own, run.at[PEAKS]
     for j in range(run.at[JOINTS]):
         side = known(run, j, SIDE)
         if side != 0.0:
             column = 2 * j + (UPPER if side > 0.0 else LOWER)
-            peak[column] = max(peak[column], force_at(run, j, NOW)[0])
+            own[peak + column] = max(own[peak + column], force_at(run, j, NOW)[0])
 
 
 @leaf
-def note_peaks(run, h, count, peak):
-    """Raise the peaks (2m,) of pressed joints; the number of intervals before the first unknown crest."""
+def note_peaks(run, h, count):
+    """Raise the peaks of pressed joints; the number of intervals before the first unknown crest."""
     own, at, h4 = run.own, run.at, VALUE_DOUBT * h * h * h * h
     for j in range(at[JOINTS]):
         side = known(run, j, SIDE)
         if side == 0.0:
             continue
-        column, place, top = 2 * j + (UPPER if side > 0.0 else LOWER), place_of(run, j), at[TOTALS]
+        column, place, top = at[PEAKS] + 2 * j + (UPPER if side > 0.0 else LOWER), place_of(run, j), at[TOTALS]
         spring, fourth = spring_of(run, j, side), known(run, j, FOURTH)
         for k in range(LANES):
             own[top + k] = 0.0
         add_tops(own, place, place + RATES, h, side, spring, spring * (h4 * fourth - gap_of(run, j, side)), top)
-        k = first_above(own, top, peak[column], 0)
+        k = first_above(own, top, own[column], 0)
         while k < count:
             for end in range(k, k + 2):
-                peak[column] = max(peak[column], force_at(run, j, NOW + end)[0])
+                own[column] = max(own[column], force_at(run, j, NOW + end)[0])
             e0, d0, e1, d1 = own[place + k], own[place + RATES + k], own[place + k + 1], own[place + RATES + k + 1]
-            if own[top + k] > peak[column] and trend(h, e0, d0, e1, d1, fourth) == 0:
+            if own[top + k] > own[column] and trend(h, e0, d0, e1, d1, fourth) == 0:
                 count = k
-            k = first_above(own, top, peak[column], k + 1)
+            k = first_above(own, top, own[column], k + 1)
     return count
 
 
 @leaf
-def note_crests(run, h, peak):
-    """Raise the peaks (2m,) of pressed joints to their crests within h, which is expanded, and at its end."""
+def note_crests(run, row, h, expanded):
+    """Raise the peaks of pressed joints to their crests within h, and at its end; see ``first_change``."""
     own, at = run.own, run.at
     for j in range(at[JOINTS]):
         side = known(run, j, SIDE)
         if side == 0.0:
             continue
-        column, series = 2 * j + (UPPER if side > 0.0 else LOWER), at[SERIES] + j * (DEGREE + 1)
+        column, series = at[PEAKS] + 2 * j + (UPPER if side > 0.0 else LOWER), at[SERIES] + j * (DEGREE + 1)
         spring, gap, lag = spring_of(run, j, side), gap_of(run, j, side), lag_of(run, j, side)
         f0, r0 = force_at(run, j, NOW)
         f1, r1 = force_at(run, j, NOW + 1)
-        peak[column] = max(peak[column], max(f0, f1))
+        own[column] = max(own[column], max(f0, f1))
         since, length = 0.0, h
         for _ in range(CREST_SEARCHES):
             crest = cubic_extremum(f0, r0, f1, r1, length, -1.0) if r0 > 0.0 and r1 < 0.0 else -1.0
-            if crest <= 0.0 or cubic(f0, r0, f1, r1, length, crest)[0] <= NEAR_PEAK * peak[column]:
+            if crest <= 0.0 or cubic(f0, r0, f1, r1, length, crest)[0] <= NEAR_PEAK * own[column]:
                 break
+            if not expanded:
+                expand(run, row)
+                expanded = True
             y, v, a, _ = reading_at(own, series, 1, DEGREE, since + crest)
             force, rate = spring * (side * (y + lag * v) - gap), spring * side * (v + lag * a)
-            peak[column] = max(peak[column], force)
+            own[column] = max(own[column], force)
             if rate > 0.0:
                 f0, r0, since, length = force, rate, since + crest, length - crest
             else:
@@ -193,10 +203,11 @@ def read_series(run, time):
 
 
 @leaf
-def first_change(run, h, tolerance):
-    """(Joint or -1, its new side, instant) of the first change of contact within h, which is expanded.
+def first_change(run, row, h, expanded, tolerance):
+    """(Joint or -1, its new side, instant, ``expanded``) of the first change of contact within h.
 
-    The readings of now and after one interval are those at both ends.
+    The readings of now and after one interval are those at both ends. Series of the joints are made where they are
+    needed, if they are not ``expanded``.
     """
     own, at = run.own, run.at
     first, towards, instant = np.int64(-1), 0.0, h
@@ -212,6 +223,9 @@ def first_change(run, h, tolerance):
             verdict = judge(h, e0, d0, e1, d1, fourth)
             if verdict == KEEPS:
                 continue
+            if not expanded:
+                expand(run, row)
+                expanded = True
             if verdict == CROSSES:
                 found = crossing(own, series, 1, DEGREE, side, gap, lag, 0.0, h, e0, d0, e1, d1, tolerance)
             else:
@@ -228,10 +242,13 @@ def first_change(run, h, tolerance):
             verdict = judge(h, p0, q0, p1, q1, fourth) if p0 >= 0.0 else UNSURE
             if verdict == KEEPS:
                 continue
+            if not expanded:
+                expand(run, row)
+                expanded = True
             if verdict == CROSSES:
                 found = crossing(own, series, 1, DEGREE, way, gap, 0.0, 0.0, h, -p0, -q0, -p1, -q1, tolerance)
             else:
                 found = closing(own, series, 1, DEGREE, way, gap, lag_of(run, j, way), instant, tolerance)
             if found <= instant:
                 first, towards, instant = j, way, found
-    return first, towards, instant
+    return first, towards, instant, expanded

@@ -7,6 +7,7 @@ from numba import njit
 
 from chaosgym.core.joints.tables import (
     AHEAD,
+    BENDS,
     BLOCKS,
     BOUNDS,
     CONSTANTS,
@@ -35,7 +36,19 @@ from chaosgym.core.joints.tables import (
     Y,
 )
 from chaosgym.core.kernel import leaf, part
-from chaosgym.core.lanes import LANES, add_columns, aligned, dot, dot_of_sizes, padded, sample, turn, turn_and_expand
+from chaosgym.core.lanes import (
+    LANES,
+    add_columns,
+    aligned,
+    dot,
+    dot_of_sizes,
+    item,
+    padded,
+    put,
+    sample,
+    turn,
+    turn_and_expand,
+)
 from chaosgym.core.propagator import exponential
 
 UPPER_GAP, LOWER_GAP, UPPER_STIFFNESS, LOWER_STIFFNESS, UPPER_LAG, LOWER_LAG = range(6)
@@ -46,37 +59,32 @@ SIDE, AWAKE, BASE, RATE, BEND, READING_REST, READING_RATE, READING_BEND, FOURTH 
 where it rests [m]; first and second derivative of a drift; what the drift adds to the reading, and to its derivatives;
 bound of the reading's fourth derivative."""
 
-NUMBERS = 16
+UPPER_STOP, LOWER_STOP, UPPER_DAMPER, LOWER_DAMPER = range(15, 19)
+"""And more: positions of its surfaces [m], infinite where there is none; their dampers [N s/m]."""
+
+NUMBERS = 24
 
 READINGS = 4 * LANES
 """Numbers of what a joint reads: seven to spare, now, after 1 to 8 intervals; and as many rates."""
 
 NOW, RATES = LANES - 1, 2 * LANES
 
-U, SPARE, STATE, JOINT, READING, SERIES, TOTALS, OWN = range(PLACES, PLACES + 8)
+U, SPARE, STATE, JOINT, READING, SERIES, TOTALS, PEAKS, SHAPES, OWN, RADIX = range(PLACES, PLACES + 11)
 """Where coordinates and the constants after them, room for others, the state with what follows it, ``NUMBERS`` and
-``READINGS`` of the joints, their Taylor series and room for eight numbers begin in ``own``; its length."""
+``READINGS`` of the joints, their Taylor series, room for eight numbers, the largest forces of the cycle (2m,) and the
+displacements of the joints per unit modal coordinate (m, n) begin in ``own``; its length. RADIX is where in ``at`` the
+digits of a joint in the number of a set begin: 3 where its surfaces differ in spring or damper, else 2."""
 
 
 class JointRun(NamedTuple):
-    """All that a run reads, and its work space.
+    """All that a run reads, and its work space. Few arrays: a call of a function hands on seven numbers for each.
 
     Attributes
     ----------
     tables : (...,)
         Rows of ``joints.tables`` one after the other.
-    rows : (radix^m,) int
-        Where the row of each set of pressed surfaces begins, -1 where there is none yet.
-    radix : (m,) int
-        3 where the surfaces of a joint differ in spring or damper, else 2.
-    shape : (m, n)
-        Displacement of each joint per unit modal coordinate.
-    stops, stiffness, damping : (m, 2)
-        Position [m], infinite where there is none, spring and damper of the upper and the lower surface.
-    weights : (n,)
-        Of displacements in ``orthonormalise``.
     own : (...,)
-        Work space.
+        Work space, and what is known of the joints.
     at : (...,) int
         Sizes, and what lies where in a row and in ``own``.
     period : float
@@ -86,13 +94,6 @@ class JointRun(NamedTuple):
     """
 
     tables: np.ndarray
-    rows: np.ndarray
-    radix: np.ndarray
-    shape: np.ndarray
-    stops: np.ndarray
-    stiffness: np.ndarray
-    damping: np.ndarray
-    weights: np.ndarray
     own: np.ndarray
     at: np.ndarray
     period: float
@@ -100,10 +101,10 @@ class JointRun(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def work_space(layout):
-    """``JointRun.at``, the ``layout`` (PLACES,) of a row and then that of the work space."""
-    at = np.zeros(OWN + 1, np.int64)
-    at[:PLACES] = layout
+def work_space(layout, radix):
+    """``JointRun.at``, the ``layout`` (PLACES,) of a row and then that of the work space; ``radix`` (m,)."""
+    at = np.zeros(RADIX + radix.shape[0], np.int64)
+    at[:PLACES], at[RADIX:] = layout, radix
     m, width = at[JOINTS], 2 * at[WIDTH]
     at[U] = 0
     at[SPARE] = width + padded(1 + m)
@@ -112,20 +113,37 @@ def work_space(layout):
     at[READING] = at[JOINT] + NUMBERS * m
     at[SERIES] = at[READING] + READINGS * m
     at[TOTALS] = at[SERIES] + (DEGREE + 1) * m
-    at[OWN] = at[TOTALS] + LANES
+    at[PEAKS] = at[TOTALS] + LANES
+    at[SHAPES] = at[PEAKS] + padded(2 * m)
+    at[OWN] = at[SHAPES] + padded(m * at[MODES])
     return at
 
 
 @njit(cache=True, nogil=True)
-def new_space(at):
-    """Zeros for ``JointRun.own``."""
-    return aligned(at[OWN])
+def new_space(at, shape, stops, stiffness, damping):
+    """``JointRun.own``, with what is known of the joints whatever presses.
+
+    ``shape`` (m, n) is the displacement of each joint per unit modal coordinate; ``stops``, ``stiffness`` and
+    ``damping`` (m, 2) are position [m], spring and damper of its upper and lower surface.
+    """
+    own = aligned(at[OWN])
+    m, n = shape.shape
+    for j in range(m):
+        first = at[JOINT] + j * NUMBERS
+        for which in range(2):
+            own[first + UPPER_STOP + which] = stops[j, which]
+            own[first + UPPER_STIFFNESS + which] = stiffness[j, which]
+            own[first + UPPER_DAMPER + which] = damping[j, which]
+            own[first + UPPER_LAG + which] = damping[j, which] / stiffness[j, which]
+        for i in range(n):
+            own[at[SHAPES] + j * n + i] = shape[j, i]
+    return own
 
 
 @part
 def known(run, j, which):
     """One of the ``NUMBERS`` of joint j."""
-    return run.own[run.at[JOINT] + j * NUMBERS + which]
+    return item(run.own, run.at[JOINT] + j * NUMBERS + which)
 
 
 @part
@@ -146,24 +164,20 @@ def spring_of(run, j, side):
     return known(run, j, UPPER_STIFFNESS if side > 0.0 else LOWER_STIFFNESS)
 
 
-@leaf
-def prepare(run):
-    """Write what is known of the joints whatever presses."""
-    for j in range(run.at[JOINTS]):
-        own = run.own[run.at[JOINT] + j * NUMBERS : run.at[JOINT] + (j + 1) * NUMBERS]
-        for which in range(2):
-            own[UPPER_STIFFNESS + which] = run.stiffness[j, which]
-            own[UPPER_LAG + which] = run.damping[j, which] / run.stiffness[j, which]
+@part
+def stop_of(run, j, side):
+    """Position [m] of the surface on a side of joint j."""
+    return known(run, j, UPPER_STOP if side > 0.0 else LOWER_STOP)
 
 
 @leaf
 def joint_motion(run, state, j):
     """Displacement and velocity of joint j in a state (2n,)."""
-    n = run.shape.shape[1]
-    x, v = 0.0, 0.0
+    n = run.at[MODES]
+    x, v, first = 0.0, 0.0, run.at[SHAPES] + j * n
     for i in range(n):
-        x += run.shape[j, i] * state[i]
-        v += run.shape[j, i] * state[n + i]
+        x += run.own[first + i] * state[i]
+        v += run.own[first + i] * state[n + i]
     return x, v
 
 
@@ -173,9 +187,10 @@ def find_sides(run, state):
     for j in range(run.at[JOINTS]):
         x, v = joint_motion(run, state, j)
         side = 0.0
-        if x > run.stops[j, 0] and x - run.stops[j, 0] + known(run, j, UPPER_LAG) * v > 0.0:
+        upper, lower = x - stop_of(run, j, 1.0), stop_of(run, j, -1.0) - x
+        if upper > 0.0 and upper + known(run, j, UPPER_LAG) * v > 0.0:
             side = 1.0
-        elif x < run.stops[j, 1] and run.stops[j, 1] - x - known(run, j, LOWER_LAG) * v > 0.0:
+        elif lower > 0.0 and lower - known(run, j, LOWER_LAG) * v > 0.0:
             side = -1.0
         run.own[run.at[JOINT] + j * NUMBERS + SIDE] = side
 
@@ -189,8 +204,8 @@ def pressed_set(run):
         if side > 0.0:
             code += place
         elif side < 0.0:
-            code += place * (run.radix[j] - 1)
-        place *= run.radix[j]
+            code += place * (run.at[RADIX + j] - 1)
+        place *= run.at[RADIX + j]
     return code
 
 
@@ -203,7 +218,7 @@ def enter(run, row):
     own[more] = 1.0
     for j in range(m):
         side = known(run, j, SIDE)
-        own[more + 1 + j] = 0.0 if side == 0.0 else run.stops[j, 0 if side > 0.0 else 1]
+        own[more + 1 + j] = 0.0 if side == 0.0 else stop_of(run, j, side)
     add_columns(tables, row + at[TO], width, 2 * at[BLOCKS] + 1 + m, own, at[STATE], own, at[U], LANES)
     for c in range(1 + m):
         own[at[U] + width + c] = own[more + c]
@@ -220,7 +235,8 @@ def _settle(run, row, j):
     for c in range(1 + m):
         rest += tables[row + at[CONSTANTS] + j * (1 + m) + c] * own[more + c]
     if side == 0.0:
-        own[first + UPPER_GAP], own[first + LOWER_GAP] = run.stops[j, 0] - rest, rest - run.stops[j, 1]
+        own[first + UPPER_GAP] = stop_of(run, j, 1.0) - rest
+        own[first + LOWER_GAP] = rest - stop_of(run, j, -1.0)
         own[first + BASE] = rest
     else:
         own[first + (UPPER_GAP if side > 0.0 else LOWER_GAP)] = -side * rest
@@ -270,10 +286,12 @@ def leave(run, row):
 
 @leaf
 def read_now(run, row):
-    """Write what every joint reads in u."""
+    """Write what every joint that is awake reads in u."""
     own, at = run.own, run.at
     width = 2 * at[WIDTH]
     for j in range(at[JOINTS]):
+        if known(run, j, AWAKE) == 0.0:
+            continue
         rows, place = row + at[NOW_ROWS] + 4 * j * width, at[READING] + j * READINGS + NOW
         own[place] = dot(run.tables, rows + E * width, own, at[U], width) + known(run, j, READING_REST)
         own[place + RATES] = dot(run.tables, rows + E_RATE * width, own, at[U], width) + known(run, j, READING_RATE)
@@ -305,7 +323,15 @@ def bound_fourth(run, row):
     for j in range(at[JOINTS]):
         if known(run, j, AWAKE) != 0.0:
             bound = dot_of_sizes(run.tables, row + at[BOUNDS] + j * width, own, at[U], width)
-            own[at[JOINT] + j * NUMBERS + FOURTH] = bound
+            put(own, at[JOINT] + j * NUMBERS + FOURTH, bound)
+
+
+@leaf
+def bound_second(tables, own, at, row, j):
+    """Bound of the second derivative of what joint j reads, from now on."""
+    width = 2 * at[WIDTH]
+    bend = own[at[JOINT] + j * NUMBERS + READING_BEND]
+    return dot_of_sizes(tables, row + at[BENDS] + j * width, own, at[U], width) + abs(bend)
 
 
 @part
@@ -314,16 +340,32 @@ def read_after(run, intervals):
     own = run.own
     for j in range(run.at[JOINTS]):
         place = run.at[READING] + j * READINGS + NOW
-        own[place], own[place + RATES] = own[place + intervals], own[place + RATES + intervals]
+        put(own, place, item(own, place + intervals))
+        put(own, place + RATES, item(own, place + RATES + intervals))
 
 
-@leaf
+@part
 def add_drift(run, row, time, out):
     """Add to coordinates at ``out`` how far those without a position of rest drift in a time."""
     if run.tables[row + DRIFTING] != 0.0:
-        for lane in range(2 * run.at[WIDTH]):
-            drift, bend = drift_of(run, row, lane)
-            run.own[out + lane] += time * (drift + 0.5 * time * bend)
+        _drift(run, row, time, out)
+
+
+@part
+def read_next(run, intervals):
+    """Take over what the joints read one interval later as what they read after one."""
+    own = run.own
+    for j in range(run.at[JOINTS]):
+        place = run.at[READING] + j * READINGS + NOW + 1
+        put(own, place, item(own, place + intervals))
+        put(own, place + RATES, item(own, place + RATES + intervals))
+
+
+@leaf
+def _drift(run, row, time, out):
+    for lane in range(2 * run.at[WIDTH]):
+        drift, bend = drift_of(run, row, lane)
+        run.own[out + lane] += time * (drift + 0.5 * time * bend)
 
 
 @part

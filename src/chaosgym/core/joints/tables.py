@@ -30,13 +30,13 @@ Y, V, E, E_RATE = 0, 1, 2, 3
 MODES, HARMONICS, JOINTS, BLOCKS, WIDTH, STATES, LEVELS = range(7)
 """Sizes: n, H, m, N = n + H, L = N padded, 2n padded, lengths of an interval (shortest 2^level)."""
 
-AHEAD, TURN, FINER, GENERATOR, TAYLOR, NOW_ROWS, BOUNDS, SIZES, FROM, TO, CONSTANTS, DRIFTS, ROW = range(7, 20)
+AHEAD, TURN, FINER, GENERATOR, TAYLOR, NOW_ROWS, BOUNDS, BENDS, SIZES, FROM, TO, CONSTANTS, DRIFTS, ROW = range(7, 21)
 """Where the tables of a set begin in its row of numbers, and how long the row is; see ``layout``."""
 
 SHORTEST, DRIFTING = 0, 1
 """Numbers at the beginning of a row: the shortest interval [s]; 1 if a coordinate may drift, else 0."""
 
-PLACES = 20
+PLACES = 21
 
 
 @njit(cache=True)
@@ -49,8 +49,8 @@ def layout(n, harmonics, m, levels):
         Blocks of exp(B t) after 1 to 8 intervals, within the shortest interval, and B.
     TAYLOR (m, 2, 2, N, 8)
         Taylor coefficients of the displacement, of time in seconds: [joint, half, coordinate, block].
-    NOW_ROWS (m, 4, 2L), BOUNDS (m, 2L), SIZES (m, 2L)
-        What a joint shows; bounds of the reading's fourth derivative, and of the displacement.
+    NOW_ROWS (m, 4, 2L), BOUNDS (m, 2L), BENDS (m, 2L), SIZES (m, 2L)
+        What a joint shows; bounds of the reading's fourth and second derivative, and of the displacement.
     FROM (2L + 1 + m, 2n padded)
         State (q, q') by columns of u, of 1 and of the positions of the pressed surfaces.
     TO (2n + 2H + 1 + m, 2L)
@@ -72,7 +72,8 @@ def layout(n, harmonics, m, levels):
     at[TAYLOR] = at[GENERATOR] + 4 * width
     at[NOW_ROWS] = at[TAYLOR] + m * 4 * blocks * LANES
     at[BOUNDS] = at[NOW_ROWS] + m * 8 * width
-    at[SIZES] = at[BOUNDS] + m * 2 * width
+    at[BENDS] = at[BOUNDS] + m * 2 * width
+    at[SIZES] = at[BENDS] + m * 2 * width
     at[FROM] = at[SIZES] + m * 2 * width
     at[TO] = at[FROM] + (2 * width + more) * states
     at[CONSTANTS] = at[TO] + (2 * blocks + more) * 2 * width
@@ -168,7 +169,7 @@ def _put_blocks(at, whole, shortest, values):
 
 @njit(cache=True)
 def _put_joint(at, whole, output, steady, lag, shortest, j, values):
-    """Fill AHEAD, TAYLOR, NOW_ROWS, BOUNDS and SIZES of joint j; ``output`` (2n,) is its displacement in modes."""
+    """Fill AHEAD, TAYLOR, NOW_ROWS and bounds of joint j; ``output`` (2n,) is its displacement in modes."""
     n, harmonics, m, blocks, width = at[MODES], at[HARMONICS], at[JOINTS], at[BLOCKS], at[WIDTH]
     rows, reading, size = np.zeros((DEGREE + 1, 2 * blocks)), np.zeros((5, 2 * blocks)), np.empty(2 * blocks)
     rows[0, :n], rows[0, blocks : blocks + n] = output[:n], output[n:]
@@ -190,9 +191,9 @@ def _put_joint(at, whole, output, steady, lag, shortest, j, values):
         for q in range(4):
             row = rows[q] if q <= V else reading[q - E]
             values[at[NOW_ROWS] + (4 * j + q) * 2 * width + lane] = row[i]
-    for which in range(2):
-        bound(whole, reading[4] if which == 0 else rows[0], size)
-        first = (at[BOUNDS] if which == 0 else at[SIZES]) + j * 2 * width
+    for which in range(3):
+        bound(whole, reading[4] if which == 0 else reading[2] if which == 1 else rows[0], size)
+        first = at[BOUNDS + which] + j * 2 * width
         for i in range(2 * blocks):
             values[first + (i // blocks) * width + i % blocks] = size[i]
     for level in range(at[LEVELS]):
