@@ -196,6 +196,11 @@ class Machine(ABC):
         """
 
     @property
+    def operating_fields(self) -> tuple[str, ...]:
+        """Fields that may change from cycle to cycle: what the states stand for does not depend on them."""
+        return self.speed_field, self.clearance_field
+
+    @property
     def cycle_period(self) -> float:
         """Duration of one operating cycle [s]."""
         return float(self.period_at(getattr(self, self.speed_field)))

@@ -294,6 +294,11 @@ class ModalImpactMachine(Machine):
         """Mass-normalised mode shapes where the force acts, (n,) [kg^-1/2]."""
         return np.asarray(self.structure.drive[0, 0, 1])
 
+    @property
+    def operating_fields(self) -> tuple[str, ...]:
+        """Fields that may change from cycle to cycle."""
+        return *super().operating_fields, "force_amplitude"
+
     def stops_at(self, clearance: Any) -> Array:
         """Positions of the upper and the lower stop [m] at a clearance, (2,), or at many, (k, 2)."""
         return np.stack([clearance, -np.asarray(clearance)], axis=-1)

@@ -1,6 +1,6 @@
 """Records of runs: one row of results per operating cycle, and the state from which it goes on."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
@@ -70,6 +70,9 @@ class CycleRecord:
         Stroboscopic displacement and velocity of each of m joints; None for a machine with one.
     histories : (n_cycles, samples_per_cycle, 3m) or None
         ``history`` of each of m joints.
+    operation : (n_cycles,) with a column for each field, or None
+        Values of the machine's fields that changed from cycle to cycle, such as ``operation["speed"]``; None if none
+        did. ``machine`` is then that of the last cycle.
     """
 
     machine: Machine
@@ -89,6 +92,7 @@ class CycleRecord:
     chosen: str | None = None
     motions: Array | None = None
     histories: Array | None = None
+    operation: NDArray[Any] | None = None
 
     def __len__(self) -> int:
         return len(self.section)
@@ -99,8 +103,11 @@ class CycleRecord:
         if self.history is None:
             raise SimulationError("the run kept no time history; simulate with samples_per_cycle above 0")
         cycles, samples, _ = self.history.shape
-        instants: Array = np.arange(cycles * samples) * (self.machine.cycle_period / samples)
-        return instants
+        if self.operation is None or self.machine.speed_field not in (self.operation.dtype.names or ()):
+            return np.asarray(np.arange(cycles * samples) * (self.machine.cycle_period / samples))
+        periods = self.machine.period_at(self.operation[self.machine.speed_field])
+        begins = np.concatenate([[0.0], np.cumsum(periods)[:-1]])
+        return np.asarray((begins[:, None] + periods[:, None] * np.arange(samples) / samples).ravel())
 
     @property
     def joint_name(self) -> str | None:
@@ -175,12 +182,27 @@ class CycleRecord:
         return self._with_rows(lambda name: getattr(self, name)[:cycles])
 
     def followed_by(self, later: "CycleRecord") -> "CycleRecord":
-        """Return this record and the one that goes on from its final state, as one."""
-        return later._with_rows(lambda name: np.concatenate([getattr(self, name), getattr(later, name)]))
+        """Return this record and the one that goes on from its final state, as one.
+
+        Raises
+        ------
+        SimulationError
+            If other fields changed from cycle to cycle in one than in the other.
+        """
+        return joined([self, later])
 
     def _with_rows(self, rows: Callable[[str], Any]) -> "CycleRecord":
         changes: dict[str, Any] = {name: rows(name) for name in _PER_CYCLE if getattr(self, name) is not None}
         return replace(self, **changes).of_joint(self.chosen)
+
+
+def joined(records: Sequence[CycleRecord]) -> CycleRecord:
+    """Return records, each of which goes on from the final state of the one before, as one."""
+    if len({None if record.operation is None else record.operation.dtype for record in records}) > 1:
+        raise SimulationError(
+            "one record has fields that changed from cycle to cycle and another has not; allowed: the same fields"
+        )
+    return records[-1]._with_rows(lambda name: np.concatenate([getattr(record, name) for record in records]))
 
 
 _PER_CYCLE = tuple(

@@ -6,9 +6,11 @@ record.peak_force          # (100, 2) newton, upper and lower surface
 
 import os
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -21,8 +23,8 @@ from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.machine import Machine
-from chaosgym.machines.parameters import parameters_of
-from chaosgym.simulation.record import CycleRecord, MotionState
+from chaosgym.machines.parameters import field_named, parameters_of, with_settings
+from chaosgym.simulation.record import CycleRecord, MotionState, joined
 
 Array = NDArray[np.float64]
 
@@ -125,6 +127,7 @@ def simulate(
     *,
     samples_per_cycle: int = 0,
     integrator: Integrator | None = None,
+    operation: Mapping[str, ArrayLike] | None = None,
     progress: bool = False,
 ) -> CycleRecord:
     """Run a machine for whole operating cycles.
@@ -146,32 +149,84 @@ def simulate(
         Samples of the time history to keep in each cycle.
     integrator
         ``ExactEvents()`` by default, or ``RungeKutta4(...)``.
+    operation
+        Values (cycles,) of some of the machine's ``operating_fields``, one for each recorded cycle: noise or drift of
+        the speed, the force or a gap. State and phase of the drive go on where the cycle before ended. The transient
+        runs at the first values.
     progress
         Show a progress bar on standard error if it takes more than two seconds.
 
     Raises
     ------
     ParameterError
-        If a count or the initial state is not usable.
+        If a count, the initial state or the operation is not usable.
     SimulationError
         If the motion diverges, a cycle exhausts the event budget, or a fixed step is too coarse; names the machine's
         parameters.
+
+    Examples
+    --------
+    >>> drift = {"excitation_frequency": np.linspace(18.0, 20.0, 100)}
+    >>> simulate(ImpactBeam(), 100, operation=drift).operation["excitation_frequency"][-1]
+    np.float64(20.0)
     """
     cycles = _count("cycles", cycles, 1)
     transient = _count("transient", transient, 0)
     samples_per_cycle = _count("samples_per_cycle", samples_per_cycle, 0)
     integrator = integrator or machine.default_integrator
     state = _initial(machine, initial_state)
+    table = _operation(machine, operation, cycles) if operation else None
+    stretches = [(machine, cycles)] if table is None else _stretches(machine, table)
+    records: list[CycleRecord] = []
     first = 0
     with _bar(transient + cycles, progress) as bar:
-        for count, samples in ((transient, 0), (cycles, samples_per_cycle)):
+        for number, (each, count, samples) in enumerate(
+            [(stretches[0][0], transient, 0), *((*stretch, samples_per_cycle) for stretch in stretches)]
+        ):
             if count:
-                outcome, done, record = _run(machine, state, count, samples, integrator, bar=bar)
+                outcome, done, record = _run(each, state, count, samples, integrator, bar=bar)
                 if outcome != status.OK:
-                    raise _failure(machine, outcome, first + done, integrator)
+                    raise _failure(each, outcome, first + done, integrator)
                 state = record.final_state
                 first += count
-    return record
+                if number:
+                    records.append(record)
+    whole = joined(records) if len(records) > 1 else records[0]
+    return whole if table is None else replace(whole, operation=table)
+
+
+def _operation(machine: Machine, given: Mapping[str, ArrayLike], cycles: int) -> NDArray[Any]:
+    """Table (cycles,) of what changes from cycle to cycle, a column for each field."""
+    columns = {}
+    for name, values in given.items():
+        field, known = field_named(machine, name), machine.operating_fields
+        if field not in known:
+            raise ParameterError(
+                f"operation has {name!r}, which can't change while {machine.name} runs; allowed: " + ", ".join(known)
+            )
+        try:
+            columns[field] = np.asarray(values, dtype=float)
+        except (TypeError, ValueError):
+            raise ParameterError(f"operation[{name!r}] is no array; allowed: a number for each cycle") from None
+        if columns[field].shape != (cycles,):
+            raise ParameterError(
+                f"operation[{name!r}] has shape {columns[field].shape}; allowed: ({cycles},), a value for each cycle"
+            )
+    table = np.empty(cycles, [(field, float) for field in columns])
+    for field, values in columns.items():
+        table[field] = values
+    return table
+
+
+def _stretches(machine: Machine, table: NDArray[Any]) -> list[tuple[Machine, int]]:
+    """Machines that follow each other, and for how many cycles each runs, by a table of ``_operation``."""
+    fields = table.dtype.names or ()
+    changes = np.any([np.diff(table[field]) != 0.0 for field in fields], axis=0)
+    bounds = [0, *(1 + np.flatnonzero(changes)).tolist(), len(table)]
+    return [
+        (with_settings(machine, {field: float(table[field][begin]) for field in fields}), end - begin)
+        for begin, end in pairwise(bounds)
+    ]
 
 
 def simulate_with_deviations(

@@ -138,6 +138,12 @@ class JointedMachine(Machine):
         """Field of the clearance of the monitored joint, or of the first one."""
         return f"{self.joints[0] if self.monitored == LARGEST else self.monitored}_clearance"
 
+    @property
+    def operating_fields(self) -> tuple[str, ...]:
+        """Fields that may change from cycle to cycle."""
+        gaps = (f"{name}_{what}" for name in self.joints for what in ("clearance", "offset"))
+        return self.speed_field, "drive_level", *gaps
+
     @staticmethod
     def period_at(speed: Any) -> Any:
         """Duration of one operating cycle [s] at a speed [Hz], or at many."""

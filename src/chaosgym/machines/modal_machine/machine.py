@@ -120,6 +120,11 @@ class ModalMachine(ModalImpactMachine):
         return 2 * len(self.modes.angular_frequency)
 
     @property
+    def operating_fields(self) -> tuple[str, ...]:
+        """Fields that may change from cycle to cycle."""
+        return self.speed_field, self.clearance_field, "offset", "drive_level"
+
+    @property
     def structure(self) -> ModalImpactModel:
         """Model at no speed and no gap; machines that differ in these and in the level of the drive share it."""
         return _structure(self._with_unchecked(speed=1.0, clearance=0.0, offset=0.0, drive_level=1.0))
