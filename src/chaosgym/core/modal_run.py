@@ -30,6 +30,7 @@ from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import LANES, aligned, combine, dot, dot_of_sizes, padded, sample, turn, turn_and_expand
 from chaosgym.core.modal_model import FREE, LOAD, LOWER_STOP, STOP, UPPER_STOP
 from chaosgym.core.propagator import exponential
+from chaosgym.core.tangent import ABREAST
 
 SHOWN_BEND, POSITION, STIFFNESS, DAMPING, SHORTEST, NUMBERS = range(5, 11)
 """Numbers of FREE, UPPER_STOP and LOWER_STOP after the rows of ``now``, which are added to what coordinates show: rate
@@ -138,7 +139,7 @@ def _places(n, harmonics, count, pressed):
     at[NUMBER] = at[CONSTANT] + 3 * CONSTANTS * 2 * lanes
     at[U] = padded(at[NUMBER] + 3 * NUMBERS)
     at[SPARE] = at[U] + width
-    at[WORK] = at[SPARE] + width
+    at[WORK] = at[SPARE] + ABREAST * width
     at[WEIGHTS] = at[WORK] + SPACE
     at[AHEAD], at[TURN], at[FINER], at[GENERATOR], at[TAYLOR] = structure[:5]
     at[SWITCH] = structure[7]
