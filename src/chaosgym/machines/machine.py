@@ -2,7 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import InitVar, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
@@ -13,7 +13,7 @@ from chaosgym.core.cycle import CycleArrays, cycle_arrays
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
-from chaosgym.machines.parameters import check_parameter, expand_fidelity, validate
+from chaosgym.machines.parameters import check_parameter, expand_fidelity, validate, with_settings
 
 if TYPE_CHECKING:
     from chaosgym.machines.batch import CompiledBatch
@@ -268,6 +268,20 @@ class Machine(ABC):
         point = {self.speed_field: speed, self.clearance_field: clearance}
         given = {field: value for field, value in point.items() if value is not None}
         return self._with_unchecked(**{field: check_parameter(self, field, value) for field, value in given.items()})
+
+    def along(self, field: str, low: float, high: float) -> "Callable[[float], Machine]":
+        """Return the machine at any value of a field, for many values between two.
+
+        Raises
+        ------
+        ParameterError
+            By what is returned, if the field's own range ends before.
+        """
+        if field == self.speed_field:
+            return lambda value: self.at(speed=value)
+        if field == self.clearance_field:
+            return lambda value: self.at(clearance=value)
+        return lambda value: with_settings(self, {field: value})
 
     def _with_unchecked(self, **fields: Any) -> Self:
         """Return the machine with some fields replaced by values that are known to be allowed."""

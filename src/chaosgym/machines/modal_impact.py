@@ -6,7 +6,9 @@ A subclass of ``ModalImpactMachine`` has the fields of a machine and returns its
 
 import math
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -23,7 +25,7 @@ from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.machine import Machine
-from chaosgym.machines.parameters import refuse_not_finite
+from chaosgym.machines.parameters import check_parameter, refuse_not_finite
 
 if TYPE_CHECKING:
     from chaosgym.machines.batch import CompiledBatch
@@ -283,6 +285,39 @@ class ModalImpactMachine(Machine):
     @abstractmethod
     def structure(self) -> ModalImpactModel:
         """Model by ``flexible_model``, whatever frequency, force and clearance."""
+
+    @property
+    def interpolated(self) -> ModalImpactModel | None:
+        """That model, where ``along`` has interpolated it."""
+        return self.__dict__.get("_interpolated")
+
+    def along(self, field: str, low: float, high: float) -> Callable[[float], Machine]:
+        """Return the machine at any value of a field; models of many modes are interpolated between both.
+
+        Raises
+        ------
+        ParameterError
+            By what is returned, if the field's own range ends before.
+        """
+        if field in (self.speed_field, self.clearance_field):
+            return super().along(field, low, high)
+        exact: Callable[[float], Any] = super().along(field, low, high)
+        if exact(low).structure is exact(high).structure:
+            return lambda value: self._with_unchecked(**{field: check_parameter(self, field, value)})
+        from chaosgym.machines.model_line import interpolated
+
+        models = cache(lambda: interpolated(lambda value: exact(value).structure, low, high))
+
+        def at(value: float) -> Any:
+            # the ends ask for no other model
+            if value in (low, high) or not low <= value <= high:
+                return exact(value)
+            found = models()
+            if found is None:
+                return exact(value)
+            return self._with_unchecked(_interpolated=found(value), **{field: check_parameter(self, field, value)})
+
+        return at
 
     @staticmethod
     def period_at(speed: Any) -> Any:

@@ -56,7 +56,9 @@ class ImpactBeam(BeamParameters):
     @property
     def structure(self) -> ModalImpactModel:
         """Model of the beam, whatever frequency, force and clearance; beams that differ in these alone share it."""
-        return _structure(self._with_unchecked(excitation_frequency=1.0, force_amplitude=0.0, clearance=0.0))
+        return self.interpolated or _structure(
+            self._with_unchecked(excitation_frequency=1.0, force_amplitude=0.0, clearance=0.0)
+        )
 
 
 THESIS_IMPACT_BEAM = ImpactBeam(reduction="interfaces", n_modes=5, fitted_modes=0)

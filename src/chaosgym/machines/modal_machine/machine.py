@@ -127,7 +127,9 @@ class ModalMachine(ModalImpactMachine):
     @property
     def structure(self) -> ModalImpactModel:
         """Model at no speed and no gap; machines that differ in these and in the level of the drive share it."""
-        return _structure(self._with_unchecked(speed=1.0, clearance=0.0, offset=0.0, drive_level=1.0))
+        return self.interpolated or _structure(
+            self._with_unchecked(speed=1.0, clearance=0.0, offset=0.0, drive_level=1.0)
+        )
 
     @property
     def room(self) -> tuple[float, float]:
