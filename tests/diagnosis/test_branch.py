@@ -11,7 +11,7 @@ from chaosgym.diagnosis import diagnose
 from chaosgym.diagnosis.bifurcation_curve import follow_bifurcation
 from chaosgym.diagnosis.bifurcation_diagram import follow
 from chaosgym.diagnosis.branch import stretch
-from chaosgym.diagnosis.orbit_family import family_of
+from chaosgym.diagnosis.orbit_family import family_of, with_noise
 from chaosgym.diagnosis.periodic_orbit import PRECISE, find_periodic_orbit
 from chaosgym.errors import ParameterError
 from chaosgym.machines import ImpactBeam
@@ -52,7 +52,7 @@ def damper_of(restitution, stiffness):
 def branch_from(machine, field, low, high, state, period, sign):
     """Stretch of the branch through a state near an orbit at the machine's own value, towards larger or smaller."""
     orbit = find_periodic_orbit(machine, state, period, iterations=20)
-    family = family_of(machine, field, low, high, orbit.state, period)
+    family = with_noise(family_of(machine, field, low, high, orbit.state, period), orbit.state)
     s = (getattr(machine, field) - low) / (high - low)
     normal = np.append(np.zeros(len(orbit.state)), sign)
     return family, stretch(family, family.solve(np.append(family.weight * orbit.state, s), normal))

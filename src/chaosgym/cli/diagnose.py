@@ -213,17 +213,13 @@ def _add_margins(
     machine: Any, verdict: Any, reach: float, kicks: int, result: dict[str, Any], lines: list[str]
 ) -> None:
     """Add the margins of a certified orbit, or why there are none."""
-    from chaosgym.diagnosis import find_periodic_orbit
-    from chaosgym.diagnosis.margins import margins as margins_of
+    from chaosgym.diagnosis.margins import margins_of
 
-    result["margins"] = None
-    orbit = None
-    if verdict.status == "certified":
-        orbit = find_periodic_orbit(machine, verdict.evidence["final_state"], verdict.period)
-    if orbit is None or not orbit.certified:
+    found = margins_of(machine, verdict, reach=reach, kicks=kicks)
+    if found is None:
+        result["margins"] = None
         lines.append(f"  no margins: they need a periodic response that is proven, this one is {verdict.words}")
         return
-    found = margins_of(machine, orbit, reach=reach, kicks=kicks)
     result["margins"] = found.as_dict()
     lines.append(f"  largest multiplier {found.largest_multiplier:.3g}; stability ends, in tolerances:")
     lines += [f"    {line}" for line in _margin_lines(machine, found, reach)]

@@ -33,11 +33,18 @@ Kind = Literal["grazing", "fold", "flip", "Neimark-Sacker", "symmetry breaking",
 PLACED = 1e-9
 """Length of the branch within which a change of contacts is placed, in scaled unknowns."""
 
+NEAR_ENOUGH = 1e-6
+"""Length of the branch within which it is placed, if the field varies by less than ``PLACED`` there."""
+
+SOMEWHERE = 1e-3
+"""Length within which one is placed that no stability depends on, where that suffices."""
+
 ROUGHLY_PLACED = 1e-4
 """Length at which that is given up where Newton's method fails so near grazing; ``error`` of the bifurcation tells."""
 
-FIRST_DOUBT, MOST_ROUNDS = 1e-3, 40
-"""Share of an interval by which the first guess of a change of contacts may err, and rounds of guessing at the most."""
+FIRST_DOUBT, LEAST_DOUBT, MOST_ROUNDS = 1e-3, 1e-4, 40
+"""Share of an interval by which the first guess of a change of contacts may err, and any guess at the least; rounds of
+guessing at the most."""
 
 NEAREST = 1e-6
 """Shortest piece of a branch that is searched for multipliers that cross unseen."""
@@ -137,8 +144,10 @@ def _along(tangent: Array, chord: Array) -> Array:
     return tangent / part if part > 0.1 else unit
 
 
-def bifurcations_between(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> Iterator[Found]:
+def bifurcations_between(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, *, closely: bool = True) -> Iterator[Found]:
     """All bifurcations between two neighbouring orbits of a branch, in their order.
+
+    Unless ``closely``, a grazing that no stability depends on is placed to ``SOMEWHERE`` only.
 
     Raises
     ------
@@ -148,13 +157,17 @@ def bifurcations_between(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> I
     if a.impacts == b.impacts:
         yield from _smooth(family, a, b)
         return
-    before, after = _change_of_contacts(family, a, b)
+    before, after = _change_of_contacts(family, a, b, PLACED if closely else SOMEWHERE)
+    if not closely and (before.unstable, after.unstable) != (0, 0):
+        before, after = _change_of_contacts(family, before, after, PLACED)
     yield from _smooth(family, a, before)
     yield grazing(family, before, after)
-    yield from bifurcations_between(family, after, b)
+    yield from bifurcations_between(family, after, b, closely=closely)
 
 
-def _change_of_contacts(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> tuple[OrbitPoint, OrbitPoint]:
+def _change_of_contacts(
+    family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, within: float
+) -> tuple[OrbitPoint, OrbitPoint]:
     """Neighbours before and after a change of contacts.
 
     States on the cubic between both are run for a cheap guess of where it is. Then an orbit is found on either side of
@@ -163,8 +176,9 @@ def _change_of_contacts(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> tu
     doubt = FIRST_DOUBT
     for _ in range(MOST_ROUNDS):
         length = float(np.linalg.norm(b.x - a.x))
-        placed = max(PLACED, NOISY * family.noise)
-        if length < placed:
+        placed = max(within, NOISY * family.noise)
+        apart = abs(float(b.x[-1] - a.x[-1]))
+        if length < placed or (length < NEAR_ENOUGH and apart < placed):
             break
         doubt = min(max(doubt, 0.1 * placed / length), 0.25)
         guess = float(np.clip(_guess(family, a, b, doubt), 1.01 * doubt, 1.0 - 1.01 * doubt))
@@ -180,7 +194,7 @@ def _change_of_contacts(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> tu
         elif above.impacts == a.impacts:
             a, doubt = above, 8.0 * doubt
         else:
-            a, b, doubt = below, above, max(0.25 * doubt, FIRST_DOUBT)
+            a, b, doubt = below, above, max(0.1 * doubt, LEAST_DOUBT)
     return a, b
 
 

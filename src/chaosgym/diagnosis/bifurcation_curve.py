@@ -5,14 +5,22 @@ normal to the last branch; along the new branch the bifurcation is placed as on 
 fails, so a curve ends where it turns back in the second parameter.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.diagnosis.bifurcation import Bifurcation, Found, Kind, bifurcations_between
-from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitPoint, continuous_field, family_of
+from chaosgym.diagnosis.bifurcation import TESTS, Bifurcation, Found, Kind, bifurcations_between
+from chaosgym.diagnosis.orbit_family import (
+    NotFollowedError,
+    OrbitFamily,
+    OrbitPoint,
+    continuous_field,
+    family_of,
+    with_noise,
+)
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
@@ -22,7 +30,7 @@ Array = NDArray[np.float64]
 STEPS = 33
 """Values of the second parameter over its range."""
 
-SHORTEST = 1.0 / 64.0
+SHORTEST = 1.0 / 32.0
 """Share of a step down to which it is halved."""
 
 MOST_TRIES = 3
@@ -32,7 +40,22 @@ WINDOW = 0.05
 """Range of the first parameter around a bifurcation that counts as 1 in scaled unknowns, as a share of its value."""
 
 LOOKS = (3e-3, 1e-2, 3e-2, 0.1, 0.3)
-"""Distances along a new branch at which the bifurcation is looked for."""
+"""Distances along a new branch at which the bifurcation is looked for where the secant method fails."""
+
+FIRST_STEP, LONGEST_STEP, MOST_SECANTS = 1e-3, 0.1, 12
+"""Steps along a new branch of the secant method, and how many there may be."""
+
+BRACKETS = (1e-3, 1e-2)
+"""Distances from what it finds at which the bifurcation lies between two orbits."""
+
+TEST_OF: dict[Kind, str] = {
+    "fold": "one",
+    "symmetry breaking": "one",
+    "branch point": "one",
+    "flip": "minus one",
+    "Neimark-Sacker": "circle",
+}
+"""Test function of ``bifurcation`` that vanishes at each kind."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,51 +150,92 @@ def _part(
 ) -> tuple[list[tuple[float, float]], str]:
     """Points (first, second) from a bifurcation to one end of the span, and why there are no more."""
     at = float(getattr(machine, second))
-    places, here, share = [(start.value, at)], start, 1.0
+    places, states, here, share = [(start.value, at)], [start.state], start, 1.0
     for _ in range(MOST_TRIES * round(abs(end - at) / step + 1.0)):
         if at == end:
             break
         reach = share * step * np.sign(end - at)
         value = end if abs(end - at) <= abs(reach) * (1.0 + 1e-9) else at + reach
-        guess = _extrapolated(places, value)
+        guess = float(_extrapolated([place[0] for place in places], places, value))
+        state = np.asarray(_extrapolated(states, places, value))
         try:
-            here = _near(with_settings(machine, {second: value, first: guess}), here, first, guess).bifurcation
+            here = _near(with_settings(machine, {second: value, first: guess}), here, state, first, guess).bifurcation
         except (NotFollowedError, ParameterError) as reason:
             share *= 0.5
             if share < SHORTEST:
                 return places[1:], f"not followed beyond {second} = {at:.6g}: {reason}"
             continue
         places.append((here.value, value))
+        states.append(here.state)
         at, share = value, min(1.0, 2.0 * share)
     if at == end:
         return places[1:], f"end of the range at {second} = {end:.6g}"
     return places[1:], f"not followed beyond {second} = {at:.6g}: its steps became too short"
 
 
-def _extrapolated(places: list[tuple[float, float]], value: float) -> float:
+def _extrapolated(known: list[Any], places: list[tuple[float, float]], value: float) -> Any:
+    """What is known at the last two places of a curve, at a value of the second parameter beyond them."""
     if len(places) == 1:
-        return places[0][0]
-    (p1, q1), (p2, q2) = places[-2:]
-    return p2 + (p2 - p1) * (value - q2) / (q2 - q1)
+        return known[0]
+    (_, q1), (_, q2) = places[-2:]
+    return known[-1] + (known[-1] - known[-2]) * (value - q2) / (q2 - q1)
 
 
-def _near(machine: Machine, last: Bifurcation, field: str, guess: float) -> Found:
-    """The bifurcation of the same kind near the last one."""
+def _near(machine: Machine, last: Bifurcation, state: Array, field: str, guess: float) -> Found:
+    """The bifurcation of the same kind as the last one near a state and a value of the first parameter."""
     half = WINDOW * abs(guess)
-    family = family_of(machine, field, guess - half, guess + half, last.state, last.period)
-    x = np.append(family.weight * last.state, 0.5)
+    family = family_of(machine, field, guess - half, guess + half, state, last.period)
+    family = with_noise(family, state)
+    x = np.append(family.weight * state, 0.5)
     try:
         normal = family.tangent(x, np.append(np.zeros(len(x) - 1), 1.0))
     except NotFollowedError:
         normal = np.append(np.zeros(len(x) - 1), 1.0)
     here = family.solve(x, normal)
+    if last.kind == "grazing":
+        return _looked_for(family, here, last.kind)
+
+    def orbit(way: float) -> OrbitPoint:
+        return family.solve(here.x + way * here.tangent, here.tangent)
+
+    try:
+        place = _root(lambda way: TESTS[TEST_OF[last.kind]](orbit(way)))
+        for half in BRACKETS:
+            for found in bifurcations_between(family, orbit(place - half), orbit(place + half), closely=False):
+                if found.bifurcation.kind == last.kind:
+                    return found
+    except NotFollowedError:
+        pass
+    return _looked_for(family, here, last.kind)
+
+
+def _root(test: Callable[[float], float]) -> float:
+    """About where a test function vanishes along a branch, by the secant method from 0."""
+    last, here = (0.0, test(0.0)), (FIRST_STEP, test(FIRST_STEP))
+    for _ in range(MOST_SECANTS):
+        rise = here[1] - last[1]
+        way = -here[1] * (here[0] - last[0]) / rise if rise else 0.0
+        step = float(np.clip(way, -LONGEST_STEP, LONGEST_STEP))
+        if abs(step) < BRACKETS[0] / 10.0:
+            return here[0] + step
+        there = here[0] + step
+        if abs(there) > LOOKS[-1]:
+            break
+        last, here = here, (there, test(there))
+    raise NotFollowedError("the search for the bifurcation does not converge")
+
+
+def _looked_for(family: OrbitFamily, here: OrbitPoint, kind: Kind) -> Found:
+    """The bifurcation of a kind nearest to an orbit, from orbit to orbit to either side."""
+    test = TESTS.get(TEST_OF.get(kind, ""))
     sides = {sign: here for sign in (1.0, -1.0)}
     for reach in LOOKS:
         for sign in (1.0, -1.0):
-            there = family.solve(here.x + sign * reach * here.tangent, sign * here.tangent)
-            pair: tuple[OrbitPoint, OrbitPoint] = (sides[sign], there)
-            for found in bifurcations_between(family, *pair):
-                if found.bifurcation.kind == last.kind:
-                    return found
+            before, there = sides[sign], family.solve(here.x + sign * reach * here.tangent, sign * here.tangent)
             sides[sign] = there
-    raise NotFollowedError(f"no {last.kind} is near")
+            if test is not None and test(before) * test(there) > 0.0:
+                continue
+            for found in bifurcations_between(family, before, there, closely=test is None):
+                if found.bifurcation.kind == kind:
+                    return found
+    raise NotFollowedError(f"no {kind} is near")

@@ -16,7 +16,14 @@ from tqdm import tqdm
 from chaosgym.diagnosis.bifurcation import Bifurcation, Found, direction_of
 from chaosgym.diagnosis.branch import MOST_UNSTABLE, Stretch, stretch
 from chaosgym.diagnosis.diagnose import diagnose
-from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily, OrbitPoint, continuous_field, family_of
+from chaosgym.diagnosis.orbit_family import (
+    NotFollowedError,
+    OrbitFamily,
+    OrbitPoint,
+    continuous_field,
+    family_of,
+    with_noise,
+)
 from chaosgym.diagnosis.periodic_orbit import find_periodic_orbit
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
@@ -296,6 +303,7 @@ class _Branches:
         if orbit is None:
             return
         family = family_of(self._machine, self._name, self._low, self._high, orbit.state, period)
+        family = with_noise(family, orbit.state)
         s = (value - self._low) / (self._high - self._low)
         try:
             start = family.solve(np.append(family.weight * orbit.state, s), _upwards(family, orbit.state))

@@ -73,6 +73,7 @@ def stretch(
     first_step: float = 0.01,
     until: Callable[[Bifurcation], bool] | None = None,
     most_unstable: float = MOST_UNSTABLE,
+    closely: bool = True,
 ) -> Stretch:
     """Follow a branch along the tangent of ``start`` until the range or the branch ends.
 
@@ -86,6 +87,8 @@ def stretch(
         Stop at the first bifurcation of which this is true.
     most_unstable
         Largest modulus of a multiplier up to which the branch is followed.
+    closely
+        Place every grazing to 1e-9, not only those that stability depends on.
     """
     points: list[OrbitPoint] = [start]
     found: list[Found] = []
@@ -109,7 +112,7 @@ def stretch(
         try:
             if leaves:
                 there = _at_end(family, here, there)
-            for each in bifurcations_between(family, here, there):
+            for each in bifurcations_between(family, here, there, closely=closely):
                 found.append(each)
                 at.append(len(points) - 1)
                 if each.bifurcation.ends or (until is not None and until(each.bifurcation)):

@@ -17,8 +17,16 @@ from numpy.typing import NDArray
 from chaosgym.diagnosis.bifurcation import Kind
 from chaosgym.diagnosis.branch import stretch
 from chaosgym.diagnosis.diagnose import diagnose_alone
-from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily, OrbitPoint, family_of
-from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit
+from chaosgym.diagnosis.orbit_family import (
+    NotFollowedError,
+    OrbitFamily,
+    OrbitPoint,
+    contacts_of,
+    family_of,
+    with_noise,
+)
+from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit, run_period
+from chaosgym.diagnosis.response import Diagnosis
 from chaosgym.diagnosis.response_type import Tolerance, default_tolerances
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
@@ -179,8 +187,11 @@ def margins(
     if not reach > 0.0:
         raise DiagnosisError(f"reach = {reach:g} tolerances is out of range; allowed: above 0")
     chosen = default_tolerances(machine) if tolerances is None else dict(tolerances)
+    contacts = contacts_of(run_period(machine, orbit.state, orbit.period))
     found = tuple(
-        margin for name, tolerance in chosen.items() for margin in _along(machine, orbit, name, tolerance, reach)
+        margin
+        for name, tolerance in chosen.items()
+        for margin in _along(machine, orbit, contacts, name, tolerance, reach)
     )
     return Margins(
         largest_multiplier=orbit.largest_multiplier,
@@ -190,7 +201,37 @@ def margins(
     )
 
 
-def _along(machine: Machine, orbit: PeriodicOrbit, name: str, tolerance: Tolerance, reach: float) -> list[Margin]:
+def margins_of(
+    machine: Machine, verdict: Diagnosis, tolerances: Mapping[str, Tolerance] | None = None, **how: Any
+) -> Margins | None:
+    """Margins of a machine whose response is diagnosed; None unless it is periodic and proven.
+
+    Parameters
+    ----------
+    machine
+        The nominal machine.
+    verdict
+        ``diagnose(machine)``.
+    tolerances, how
+        As for ``margins``.
+
+    Examples
+    --------
+    >>> import chaosgym
+    >>> from chaosgym.diagnosis.margins import margins_of
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=19.0)
+    >>> margins_of(beam, chaosgym.diagnose(beam)).nearest.kind  # doctest: +SKIP
+    'fold'
+    """
+    if verdict.status != "certified" or verdict.period is None:
+        return None
+    orbit = find_periodic_orbit(machine, verdict.evidence["final_state"], verdict.period)
+    return margins(machine, orbit, tolerances, **how) if orbit is not None and orbit.certified else None
+
+
+def _along(
+    machine: Machine, orbit: PeriodicOrbit, contacts: tuple[int, ...], name: str, tolerance: Tolerance, reach: float
+) -> list[Margin]:
     """Margins of one parameter, below and above."""
     nominal, allowed = float(getattr(machine, name)), parameters_of(machine)[name]
     low, high = (float(np.clip(tolerance.at(nominal, side * reach), allowed.low, allowed.high)) for side in (-1, 1))
@@ -199,8 +240,10 @@ def _along(machine: Machine, orbit: PeriodicOrbit, name: str, tolerance: Toleran
     family = family_of(machine, name, low, high, orbit.state, orbit.period)
     here = np.append(family.weight * orbit.state, (nominal - low) / (high - low))
     normal = np.append(np.zeros(len(orbit.state)), 1.0)
-    ends = [_calm_end(family, here, normal, border) for border in (0.0, 1.0)]
+    ends = [_calm_end(family, here, contacts, normal, border) for border in (0.0, 1.0)]
     straight = all(ends) and _straight(here, *(end for end in ends if end is not None))
+    if not straight:
+        family = with_noise(family, orbit.state)
     found = []
     for side, end, value in ((-1, ends[0], low), (1, ends[1], high)):
         if value == nominal:
@@ -212,15 +255,16 @@ def _along(machine: Machine, orbit: PeriodicOrbit, name: str, tolerance: Toleran
     return found
 
 
-def _calm_end(family: OrbitFamily, here: Array, normal: Array, border: float) -> OrbitPoint | None:
+def _calm_end(
+    family: OrbitFamily, here: Array, contacts: tuple[int, ...], normal: Array, border: float
+) -> OrbitPoint | None:
     """The orbit at an end of the range if Newton's method leads there and it is far from losing its stability."""
     guess = np.append(here[:-1], border)
     try:
         point = family.solve(guess, normal, np.zeros(len(here) - 1), exact=False)
     except NotFollowedError:
         return None
-    same = point.impacts == family.impacts(here)
-    return point if same and point.largest_multiplier < CALM else None
+    return point if point.impacts == contacts and point.largest_multiplier < CALM else None
 
 
 def _straight(here: Array, below: OrbitPoint, above: OrbitPoint) -> bool:
@@ -234,7 +278,9 @@ def _followed(family: OrbitFamily, here: Array, side: int, name: str, tolerance:
     normal = np.append(np.zeros(len(here) - 1), float(side))
     try:
         start = family.solve(here, normal)
-        ahead = stretch(family, start, longest_step=0.25, first_step=0.1, until=lambda one: one.loses_stability)
+        ahead = stretch(
+            family, start, longest_step=0.25, first_step=0.1, until=lambda one: one.loses_stability, closely=False
+        )
     except NotFollowedError as reason:
         return Margin(name, side, 0.0, nominal, None, f"not followed: {reason}")
     lost = [each.bifurcation for each in ahead.found if each.bifurcation.loses_stability]

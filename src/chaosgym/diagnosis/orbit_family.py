@@ -6,6 +6,7 @@ Unknowns are scaled: z = W y / |W y_0| with the weights of energy, s = (p - low)
 offer is its stroboscopic map with its derivative (``periodic_orbit.period_map``), nothing else.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -14,11 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.diagnosis.periodic_orbit import PRECISE, period_map
+from chaosgym.diagnosis.periodic_orbit import Period, period_map, run_period
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import check_parameter, field_named, parameters_of, suggestion, with_settings
-from chaosgym.simulation import CycleRecord, simulate
+from chaosgym.machines.parameters import check_parameter, field_named, parameters_of, suggestion
 
 Array = NDArray[np.float64]
 
@@ -100,8 +100,9 @@ class NotFollowedError(Exception):
 class OrbitFamily:
     """Periodic orbits of ``period`` cycles of a machine whose ``field`` lies between ``low`` and ``high``.
 
-    ``weight`` (n,) turns a state into scaled coordinates. ``noise`` is how much the map jumps, in these, when the field
-    moves by nothing to speak of: rounding of a model that is computed anew for each value.
+    ``weight`` (n,) turns a state into scaled coordinates. ``machines`` gives the machine at a value. ``noise`` is how
+    much the map jumps, in these coordinates, when the field moves by nothing to speak of: rounding of a model that is
+    computed anew for each value.
     """
 
     machine: Machine
@@ -110,6 +111,7 @@ class OrbitFamily:
     high: float
     period: int
     weight: Array
+    machines: Callable[[float], Machine]
     noise: float = 0.0
 
     def value(self, s: float) -> float:
@@ -124,12 +126,7 @@ class OrbitFamily:
         ParameterError
             If the field's own range ends before.
         """
-        value = self.value(s)
-        if self.field == self.machine.speed_field:
-            return self.machine.at(speed=value)
-        if self.field == self.machine.clearance_field:
-            return self.machine.at(clearance=value)
-        return with_settings(self.machine, {self.field: value})
+        return self.machines(self.value(s))
 
     def state(self, x: Array) -> Array:
         """Physical state (n_states,) of scaled unknowns."""
@@ -157,8 +154,8 @@ class OrbitFamily:
             If there is none near, or the motion can't be followed.
         """
         try:
-            x, miss, matrix, slope, record = self._solve(guess, normal, slope, closed)
-            return self._point(x, matrix, self.slope(x, miss) if exact else slope, record, normal)
+            x, matrix, slope, run = self._solve(guess, normal, slope, closed)
+            return self._point(x, matrix, self.slope(x, run) if exact else slope, run, normal)
         except (SimulationError, ParameterError) as error:
             raise NotFollowedError(str(error).split(";")[0]) from error
         except np.linalg.LinAlgError as error:
@@ -166,28 +163,28 @@ class OrbitFamily:
 
     def _solve(
         self, guess: Array, normal: Array, slope: Array | None, closed: float
-    ) -> tuple[Array, Array, Array, Array, CycleRecord]:
-        """(x, miss, matrix, slope, record) of an orbit."""
+    ) -> tuple[Array, Array, Array, Period]:
+        """(x, matrix, slope, run) of an orbit."""
         x, last = guess, np.inf
         enough, closed = max(CLOSED, 4.0 * self.noise), max(closed, 4.0 * self.noise)
-        miss, matrix, record = self._map(x)
-        slope = self._rough_slope(x, miss) if slope is None else slope
+        miss, matrix, run = self._map(x)
+        slope = self.slope(x, run) if slope is None else slope
         for _ in range(MOST_ITERATIONS):
             size = float(np.linalg.norm(miss)) / max(float(np.linalg.norm(x[:-1])), 1e-300)
             if not np.isfinite(size) or size > 2.0 * max(last, 1e-2):
                 break
             if size < closed or (size < enough and size > 0.1 * last):
-                return x, miss, matrix, slope, record
-            last, before = size, matrix
+                return x, matrix, slope, run
             wanted = -np.append(miss, normal @ (x - guess))
             step = np.asarray(np.linalg.solve(_bordered(matrix, slope, normal), wanted), dtype=float)
-            x, change, (miss, matrix, record) = self._damped(x, step, size)
+            last, before = size, matrix
+            x, change, (miss, matrix, run) = self._damped(x, step, size)
             if abs(change[-1]) > max(NOISE, 100.0 * self.noise):
                 # the new miss tells more of dP/ds than a difference does near grazing
                 slope = slope + (miss - 0.5 * (matrix - before) @ change[:-1]) / change[-1]
         raise NotFollowedError("Newton's method does not converge")
 
-    def _damped(self, x: Array, change: Array, size: float) -> tuple[Array, Array, tuple[Array, Array, CycleRecord]]:
+    def _damped(self, x: Array, change: Array, size: float) -> tuple[Array, Array, tuple[Array, Array, Period]]:
         """x after a step of Newton's method, the step, and the map there.
 
         The step is halved while it makes the miss larger: at grazing it overshoots from one side to the other.
@@ -200,46 +197,39 @@ class OrbitFamily:
             found = self._map(x + change)
         return x + change, change, found
 
-    def _point(self, x: Array, matrix: Array, slope: Array, record: CycleRecord, along: Array) -> OrbitPoint:
+    def _point(self, x: Array, matrix: Array, slope: Array, run: Period, along: Array) -> OrbitPoint:
         tangent = np.linalg.solve(_bordered(matrix, slope, along), np.append(np.zeros(len(matrix)), 1.0))
-        force, share = record.peak_force.max(axis=0), record.contact_fraction.sum(axis=0)
-        alike = all(abs(both[0] - both[-1]) <= 1e-7 * max(both.max(), 1e-300) for both in (force, share))
+        force, spent = run.arrays.peak_force.max(axis=0), run.arrays.contact_time.sum(axis=0)
+        alike = all(np.all(np.abs(both[::2] - both[1::2]) <= 1e-7 * max(both.max(), 1e-300)) for both in (force, spent))
         return OrbitPoint(
             x=x,
             matrix=matrix,
             slope=slope,
             tangent=tangent / np.linalg.norm(tangent),
-            impacts=_contacts(record),
+            impacts=contacts_of(run),
             peaks=force,
             symmetric=alike and self.period % 2 == 1 and float(force.max()) > 0.0,
         )
 
-    def _map(self, x: Array) -> tuple[Array, Array, CycleRecord]:
+    def _map(self, x: Array) -> tuple[Array, Array, Period]:
         """Miss of a scaled state, derivative of the map and the run."""
-        record, matrix = period_map(self.machine_at(x[-1]), self.state(x), self.period, self.weight)
-        miss = self.weight * record.final_state.coordinates - x[:-1]
-        return miss, matrix * self.weight[:, None] / self.weight, record
+        run, matrix = period_map(self.machine_at(x[-1]), self.state(x), self.period, self.weight)
+        return self.weight * run.end - x[:-1], matrix * self.weight[:, None] / self.weight, run
 
-    def _rough_slope(self, x: Array, miss: Array) -> Array:
-        """dP/ds (n,) where the map misses by ``miss``, by a difference towards the middle of the range."""
-        step = max(SLOPE_STEPS[0], np.sqrt(self.noise)) * (1.0 if x[-1] < 0.5 else -1.0)
-        return np.asarray((self.end(x, x[-1] + step) - x[:-1] - miss) / step)
-
-    def slope(self, x: Array, miss: Array) -> Array:
-        """dP/ds (n,) where the map misses by ``miss``, by a central difference; at an end of the range just inside."""
+    def slope(self, x: Array, run: Period) -> Array:
+        """dP/ds (n,) where ``run`` began, by a central difference; at an end of the range just inside."""
         least = np.cbrt(self.noise)
         for step in (max(step, least) for step in SLOPE_STEPS):
             middle = float(np.clip(x[-1], step, 1.0 - step))
             low, high = (self.end(x, middle + side) for side in (-step, step))
-            bend = np.linalg.norm(low + high - 2.0 * (x[:-1] + miss)) if middle == x[-1] else 0.0
+            bend = np.linalg.norm(low + high - 2.0 * self.weight * run.end) if middle == x[-1] else 0.0
             if bend < BENT * np.linalg.norm(high - low):
                 break
         return np.asarray((high - low) / (2.0 * step))
 
     def end(self, x: Array, s: float) -> Array:
         """Scaled state (n,) after one period from that of ``x``, with the field at s."""
-        record = simulate(self.machine_at(s), self.period, self.state(x), integrator=PRECISE)
-        return np.asarray(self.weight * record.final_state.coordinates)
+        return np.asarray(self.weight * run_period(self.machine_at(s), self.state(x), self.period).end)
 
     def impacts(self, x: Array) -> tuple[int, ...]:
         """Contacts that begin in one period from scaled unknowns, of each side.
@@ -250,10 +240,9 @@ class OrbitFamily:
             If the motion can't be followed.
         """
         try:
-            record = simulate(self.machine_at(x[-1]), self.period, self.state(x), integrator=PRECISE)
+            return contacts_of(run_period(self.machine_at(x[-1]), self.state(x), self.period))
         except (SimulationError, ParameterError) as error:
             raise NotFollowedError(str(error).split(";")[0]) from error
-        return _contacts(record)
 
     def tangent(self, x: Array, along: Array) -> Array:
         """Unit tangent (n + 1,) of the orbits of the map as it is at x, near an orbit, turned along ``along``.
@@ -264,10 +253,9 @@ class OrbitFamily:
             If the motion can't be followed, or the tangent is not determined.
         """
         try:
-            miss, matrix, _ = self._map(x)
-            tangent = np.linalg.solve(
-                _bordered(matrix, self.slope(x, miss), along), np.append(np.zeros(len(matrix)), 1.0)
-            )
+            _, matrix, run = self._map(x)
+            slope = self.slope(x, run)
+            tangent = np.linalg.solve(_bordered(matrix, slope, along), np.append(np.zeros(len(matrix)), 1.0))
         except (SimulationError, ParameterError, np.linalg.LinAlgError) as error:
             raise NotFollowedError(str(error).split(";")[0]) from error
         return np.asarray(tangent / np.linalg.norm(tangent))
@@ -291,12 +279,13 @@ def _bordered(matrix: Array, slope: Array, normal: Array) -> Array:
     return system
 
 
-def _contacts(record: CycleRecord) -> tuple[int, ...]:
-    return tuple(record.impacts.sum(axis=0).tolist())
+def contacts_of(run: Period) -> tuple[int, ...]:
+    """Contacts that begin in a period, of each side."""
+    return tuple(run.arrays.impacts.sum(axis=0).tolist())
 
 
 def family_of(machine: Machine, field: str, low: float, high: float, state: Array, period: int) -> OrbitFamily:
-    """Family of the orbit through a state, along a field between two values.
+    """Family of the orbit through a state, along a field between two values; its noise is not measured.
 
     Raises
     ------
@@ -307,10 +296,15 @@ def family_of(machine: Machine, field: str, low: float, high: float, state: Arra
         check_parameter(machine, field, value)
     weight = machine.state_weights(state)
     size = float(np.linalg.norm(weight * state)) or 1.0
-    family = OrbitFamily(machine, field, low, high, period, np.asarray(weight / size))
-    if field in (machine.speed_field, machine.clearance_field):
+    machines = machine.along(field, low, high)
+    return OrbitFamily(machine, field, low, high, period, np.asarray(weight / size), machines)
+
+
+def with_noise(family: OrbitFamily, state: Array) -> OrbitFamily:
+    """The family with its noise measured near a state at the machine's own value."""
+    if family.field in (family.machine.speed_field, family.machine.clearance_field):
         return family  # these reach the model without computing it anew
-    s = float(np.clip((getattr(machine, field) - low) / (high - low), 0.01, 0.99))
+    s = float(np.clip((getattr(family.machine, family.field) - family.low) / (family.high - family.low), 0.01, 0.99))
     x = np.append(family.weight * state, s)
     try:
         ends = [family.end(x, s + k * UNMOVED) for k in range(4)]

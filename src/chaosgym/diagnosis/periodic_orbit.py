@@ -8,14 +8,17 @@ unit circle. Newton's method, like M itself, fails near grazing, where P is not 
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chaosgym.core import status
+from chaosgym.core.cycle import CycleArrays
+from chaosgym.core.tangent import Tangents
 from chaosgym.errors import SimulationError
 from chaosgym.machines import Machine
-from chaosgym.simulation import CycleRecord, ExactEvents, MotionState, simulate, simulate_with_deviations
+from chaosgym.simulation import ExactEvents, MotionState
 
 Array = NDArray[np.float64]
 
@@ -104,8 +107,8 @@ def find_periodic_orbit(
     best: tuple[float, Array, Array] | None = None
     try:
         for _ in range(iterations):
-            record, monodromy = period_map(machine, state, period, weight)
-            end = record.final_state.coordinates
+            run, monodromy = period_map(machine, state, period, weight)
+            end = run.end
             residual = _share(weight * (end - state), weight * state)
             if best is not None and residual >= best[0]:
                 break
@@ -135,24 +138,49 @@ def _share(change: Array, whole: Array) -> float:
     return size / float(np.linalg.norm(whole)) if np.any(whole) else math.inf if size else 0.0
 
 
-def period_map(machine: Machine, state: Array, period: int, weight: Array) -> tuple[CycleRecord, Array]:
+class Period(NamedTuple):
+    """One period of a motion: its final state (n_states,), and what happened in each cycle."""
+
+    end: Array
+    arrays: CycleArrays
+
+
+def run_period(machine: Machine, state: Array, period: int, tangents: Tangents | None = None) -> Period:
+    """Run over one period from a state; ``tangents`` travel along.
+
+    It is ``simulate`` without what a few cycles do not need: slices for Ctrl-C, and a record.
+
+    Raises
+    ------
+    SimulationError
+        If the run can't be finished.
+    """
+    coordinates, bouncing = np.array(state), np.zeros(3 * max(1, len(machine.joints)))
+    if not np.all(np.isfinite(coordinates)):
+        raise SimulationError("the search leads to numbers beyond all bounds")
+    arrays = machine.arrays(period)
+    outcome, _ = machine.run(coordinates, bouncing, arrays, PRECISE, tangents)
+    if outcome != status.OK:
+        raise SimulationError(f"{status.MESSAGES[outcome]}; it can't be followed over {period} cycles")
+    return Period(coordinates, arrays)
+
+
+def period_map(machine: Machine, state: Array, period: int, weight: Array) -> tuple[Period, Array]:
     """Run over one period from a state, and the derivative (n_states, n_states) of its final state.
 
     ``weight`` (n_states,) scales the differences that stand for the derivative where no exact deviations exist.
     """
     if machine.carries_deviations:
-        record, vectors, _ = simulate_with_deviations(
-            machine, period, state, deviations=np.eye(len(state)), orthonormal=False, integrator=PRECISE
-        )
-        return record, np.ascontiguousarray(vectors.T)
-    record = simulate(machine, period, state, integrator=PRECISE)
+        along = Tangents(np.eye(len(state)), np.empty((period, 0)))
+        run = run_period(machine, state, period, along)
+        return run, np.ascontiguousarray(along.vectors.T)
     derivative = np.empty((len(state), len(state)))
     for i in range(len(state)):
         step = FINITE_DIFFERENCE / weight[i]
         pair = []
         for sign in (1.0, -1.0):
-            moved = state.copy()
+            moved = np.array(state)
             moved[i] += sign * step
-            pair.append(simulate(machine, period, moved, integrator=PRECISE).final_state.coordinates)
+            pair.append(run_period(machine, moved, period).end)
         derivative[:, i] = (pair[0] - pair[1]) / (2.0 * step)
-    return record, derivative
+    return run_period(machine, state, period), derivative
