@@ -22,6 +22,11 @@ SHOWN = 30
     help="Field, or speed or clearance, and its range in SI or with a unit; COUNT points of the sweep (41).",
 )
 @click.option(
+    "--against",
+    metavar="FIELD=LOW:HIGH[:COUNT]",
+    help="Second field: follow the bifurcations over both, over a sweep of COUNT rows (13).",
+)
+@click.option(
     "--longest-period",
     type=click.IntRange(1, 64),
     default=4,
@@ -42,6 +47,7 @@ SHOWN = 30
 def branch(
     machine: Any,
     along: str,
+    against: str | None,
     longest_period: int,
     most_unstable: float,
     workers: int | None,
@@ -50,37 +56,80 @@ def branch(
     plot: str | None,
     as_json: bool,
 ) -> None:
-    """Follow periodic orbits along a field: where they fold, flip and graze, stable or not."""
-    from chaosgym.diagnosis.bifurcation_diagram import SWEEP, follow
-    from chaosgym.diagnosis.orbit_family import continuous_field
+    """Follow periodic orbits along a field: where they fold, flip and graze, stable or not; over a second one too."""
     from chaosgym.files import check_target, write_table
-    from chaosgym.machines.parameters import parameters_of
-    from chaosgym.sweeps import Axis
 
     picture = picture_path(plot, f"branch-{Path(machine.name).stem}")
     if out:
         check_target(out, overwrite)
-    name, _, span = along.partition("=")
-    field = continuous_field(machine, name)
-    units = {field: about.unit for field, about in parameters_of(machine).items()}
-    axis = Axis.parse(f"{field}={span}" if span else along, units)
-    diagram = follow(
-        machine,
-        name,
-        (axis.low, axis.high),
-        sweep=axis.count or SWEEP,
-        longest_period=longest_period,
-        most_unstable=most_unstable,
-        workers=workers,
-        progress=True,
-    )
-    result, lines = diagram.as_dict(), _lines(diagram)
+    first = _axis(machine, along)
+    limits: dict[str, Any] = {
+        "longest_period": longest_period,
+        "most_unstable": most_unstable,
+        "workers": workers,
+        "progress": True,
+    }
+    found: Any
+    if against is None:
+        from chaosgym.diagnosis.bifurcation_diagram import SWEEP, follow
+
+        found = follow(machine, first.field, (first.low, first.high), sweep=first.count or SWEEP, **limits)
+    else:
+        from chaosgym.diagnosis.bifurcation_map import COLUMNS, ROWS, bifurcation_map
+
+        second = _axis(machine, against)
+        found = bifurcation_map(
+            machine,
+            first.field,
+            second.field,
+            span=(first.low, first.high),
+            other=(second.low, second.high),
+            columns=first.count or COLUMNS,
+            rows=second.count or ROWS,
+            **limits,
+        )
+    result, lines = found.as_dict(), _lines(found) if against is None else _map_lines(found)
     if out:
-        write_table(_columns(diagram), out)
+        write_table(_columns(found), out)
         result["out"] = out
         lines.append(f"written to {out}")
-    draw(picture, lambda plots: plots.branch_figure(diagram), result, lines)
+    draw(
+        picture,
+        lambda plots: plots.branch_figure(found) if against is None else plots.bifurcation_map_figure(found),
+        result,
+        lines,
+    )
     emit(result, as_json, lambda: lines)
+
+
+def _axis(machine: Any, text: str) -> Any:
+    """Field and range of "FIELD=LOW:HIGH[:COUNT]"."""
+    from chaosgym.diagnosis.orbit_family import continuous_field
+    from chaosgym.machines.parameters import parameters_of
+    from chaosgym.sweeps import Axis
+
+    name, _, span = text.partition("=")
+    field = continuous_field(machine, name)
+    units = {field: about.unit for field, about in parameters_of(machine).items()}
+    return Axis.parse(f"{field}={span}" if span else text, units)
+
+
+def _map_lines(found: Any) -> list[str]:
+    from chaosgym.machines.parameters import parameters_of
+
+    known = parameters_of(found.machine)
+    (x, y), squares = ((known[name].unit for name in (found.along, found.against)), Counter(found.nature.ravel()))
+    told = ", ".join(f"{nature} {count}" for nature, count in sorted(squares.items()))
+    lines = [f"{found.machine.name}: {len(found.curves)} curves over {found.along} and {found.against}; sweep: {told}"]
+    rows = []
+    for number, one in enumerate(found.curves, 1):
+        a, b = one.along_values, one.against_values
+        rows.append(
+            f"  curve {number}: {one.kind}, period {one.period}, {found.along} {a.min():.6g} to {a.max():.6g} {x}, "
+            f"{found.against} {b.min():.6g} to {b.max():.6g} {y}"
+        )
+        rows += [f"    {end}" for end in one.ends if not end.startswith("end of the range")]
+    return lines + _at_most(rows)
 
 
 def _columns(diagram: Any) -> dict[str, Any]:

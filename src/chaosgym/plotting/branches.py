@@ -4,9 +4,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram, Branch
+from chaosgym.diagnosis.bifurcation_map import BifurcationMap
 from chaosgym.plotting.design import axis_label
 from chaosgym.plotting.style import ACCENT, BAD, INK, MUTED
 
@@ -22,6 +24,17 @@ MARKS = {
 }
 """Mark and colour of each kind of bifurcation."""
 
+
+SQUARES = {
+    "period 1": "#d5e5ea",
+    "period 2": "#a9cbd6",
+    "longer period": "#79aec0",
+    "periodic": "#eef3f5",
+    "quasiperiodic": "#d9c6e0",
+    "chaotic": "#f0b9c0",
+    "undetermined": "#dddddd",
+}
+"""Colour of each kind of square behind curves; "periodic" is one that is not proven."""
 
 STYLES: dict[str, dict[str, Any]] = {
     "stable": {"color": ACCENT, "lw": 1.6},
@@ -54,6 +67,47 @@ def branches(diagram: BifurcationDiagram, ax: Axes) -> Axes:
         everything = np.concatenate(heights)
         ax.set_ylim(0.95 * float(everything.min()), 1.05 * float(everything.max()) or 1.0)
     return ax
+
+
+def bifurcation_map(found: BifurcationMap, ax: Axes) -> Axes:
+    """Curves of bifurcations over two fields; squares behind: nature from rest, and the period where it is not 1."""
+    (across, x), (up, y) = (axis_label(found.machine, name) for name in (found.along, found.against))
+    wide, high = ([*values, 2.0 * values[-1] - values[-2]] for values in (found.along_values, found.against_values))
+    edges = [factor * (np.array(values) - 0.5 * (values[1] - values[0])) for factor, values in ((x, wide), (y, high))]
+    colours = _square_colours(found)
+    ax.pcolormesh(*edges, np.swapaxes(colours, 0, 1), linewidth=0, zorder=0)
+    seen: set[str] = set()
+    for curve in found.curves:
+        mark, colour = MARKS[curve.kind]
+        name = "" if curve.kind in seen else curve.kind
+        seen.add(curve.kind)
+        place = x * curve.along_values, y * curve.against_values
+        ax.plot(*place, "-", lw=1.3, marker=mark, ms=2.2, mew=0.0, color=colour, label=name or None, zorder=5)
+    names = _square_names(found)
+    for square, shade in SQUARES.items():
+        if np.any(names == square):
+            ax.plot([], [], "s", ms=7, color=shade, label=square)
+    limits = ((edge[0], edge[-1]) for edge in edges)
+    ax.set(xlabel=across, ylabel=up, **dict(zip(("xlim", "ylim"), limits, strict=True)))
+    ax.grid(visible=False)
+    return ax
+
+
+def _square_names(found: BifurcationMap) -> NDArray[np.str_]:
+    """What each square of a sweep is, (n, m): a period where it is proven, else the nature."""
+    periods = np.select(
+        [found.period == 1, found.period == 2, found.period > 2], ["period 1", "period 2", "longer period"], ""
+    )
+    return np.where(found.period > 0, periods, found.nature)
+
+
+def _square_colours(found: BifurcationMap) -> Array:
+    """Colours (n, m, 3) of the squares of a sweep."""
+    names = _square_names(found)
+    colours = np.empty((*names.shape, 3))
+    for name, colour in SQUARES.items():
+        colours[names == name] = to_rgb(colour)
+    return colours
 
 
 def _path(branch: Branch) -> tuple[Array, Array, Array]:

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.diagnosis import Diagnosis
 from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram
+from chaosgym.diagnosis.bifurcation_map import BifurcationMap
 from chaosgym.diagnosis.measured_sweep import SweepTypes
 from chaosgym.diagnosis.overlay import Overlay
 from chaosgym.machines import Machine
 from chaosgym.plotting import response
-from chaosgym.plotting.branches import branches
+from chaosgym.plotting.branches import bifurcation_map, branches
 from chaosgym.plotting.design import axis_label, peak_record
 from chaosgym.plotting.style import ACCENT, INK, NATURE_COLOURS, STYLE, TYPE_COLOURS, figure_of
 from chaosgym.simulation import CycleRecord, simulate
@@ -239,6 +240,17 @@ def branch_figure(diagram: BifurcationDiagram) -> Figure:
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8)
     name = Path(diagram.machine.name).stem
     figure.suptitle(f"{name}: periodic orbits", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    return figure
+
+
+@_styled
+def bifurcation_map_figure(found: BifurcationMap) -> Figure:
+    """Curves of bifurcations over two fields, over the natures of a sweep."""
+    figure = figure_of(1.6 * WIDTH, 4.4)
+    ax = bifurcation_map(found, figure.subplots())
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
+    name = Path(found.machine.name).stem
+    figure.suptitle(f"{name}: where motions change", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
     return figure
 
 
