@@ -29,6 +29,18 @@ def agreement(machine: Any, points: int, cycles: int, budget: int, seed: int, as
     emit(table.as_dict(), as_json, lambda: table.markdown().splitlines())
 
 
+@machine_command
+@click.option("--points", type=click.IntRange(1, 10**6), default=500, show_default=True, help="Random machines.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+def margins(machine: Any, points: int, seed: int, as_json: bool) -> None:
+    """Compare sampled response types with margins on random machines, and look at each that differs."""
+    from benchmarks.agreement import random_machines
+    from benchmarks.margins import types_and_margins
+
+    found = types_and_margins(random_machines(machine, points, seed), progress=True)
+    emit(found, as_json, lambda: [f"{count:5d}  {outcome}" for outcome, count in found["counts"].items()])
+
+
 @click.command("check-sweep")
 @FOLDER
 @click.option("--points", type=click.IntRange(1, 10**6), default=50, show_default=True, help="Rows to label again.")
@@ -216,7 +228,21 @@ def app() -> None:
     """Numbers about chaosgym itself."""
 
 
-for command in (bench, agreement, check, types, cost, judges, audit, curves, headroom, classifier, monitors, general):
+for command in (
+    bench,
+    agreement,
+    margins,
+    check,
+    types,
+    cost,
+    judges,
+    audit,
+    curves,
+    headroom,
+    classifier,
+    monitors,
+    general,
+):
     app.add_command(command)
 
 
