@@ -14,6 +14,7 @@ from click.testing import CliRunner
 import chaosgym
 from chaosgym import simulate
 from chaosgym.cli import app
+from chaosgym.design.peak_impacts import peak_impacts, worn_side
 from chaosgym.errors import ChaosgymError, ParameterError
 from chaosgym.machines.machine_file import TEMPLATES, schema_text, template
 
@@ -101,6 +102,19 @@ def test_forces_scale_with_the_masses(file_of, settings, same):
     machine = chaosgym.read_machine(file_of())
     other = chaosgym.machines.parameters.with_settings(machine, settings)
     np.testing.assert_allclose(simulate(other, 3).peak_force, same * simulate(machine, 3).peak_force, rtol=1e-6)
+
+
+def test_forces_are_placed_on_their_bearing(file_of):
+    """Along a guide in metres from the shaft, around a pin in degrees: what the Peak Impact Diagram needs."""
+    guide, force = chaosgym.read_machine(file_of()), np.array([[0.0, 5.0, 0.0]])
+    place, unit = guide.bearing_place(np.array([np.pi]), force)
+    assert unit == "m"
+    assert place == pytest.approx(0.235 - 0.05)
+    pin = chaosgym.read_machine(file_of("four-bar"))
+    assert pin.bearing_place(np.zeros(1), force) == (pytest.approx(90.0), "deg")
+    assert worn_side(simulate(pin, 1)) is None
+    diagram = peak_impacts(simulate(guide, 10))
+    assert 0.18 < diagram.location.min() < diagram.location.max() < 0.29
 
 
 def test_a_wide_gap_is_told(file_of):

@@ -101,7 +101,7 @@ def peak_impacts(
 
 def worn_side(record: CycleRecord, exponent: float = LIFE_EXPONENT) -> int | None:
     """Side for ``peak_impacts``: the surface that fatigues faster, or None if the bearing is one surface all around."""
-    if getattr(record.machine, "monitored_joint", None) == "ball":
+    if getattr(record.machine, "round_bearing", False):
         return None
     return int(np.argmax(np.sum(record.peak_force**exponent, axis=0)))
 

@@ -74,6 +74,11 @@ class BinnedMachine(Machine):
         return 2
 
     @property
+    def round_bearing(self) -> bool:
+        """True if the monitored joint's bearing is one surface all around, which wears as one."""
+        return False
+
+    @property
     def sampled_bins(self) -> list[int]:
         """Bins at which eigenvalues are looked at."""
         return list(range(0, self.bins, max(1, self.bins // 12)))

@@ -14,7 +14,7 @@ from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS, Contact, Held, held, middles_and_nodes
 from chaosgym.machines.machine import Number, Option
 from chaosgym.machines.mechanism.equations import SmallMotion, small_motion
-from chaosgym.machines.mechanism.joints import ACROSS, ALONG, TURN
+from chaosgym.machines.mechanism.joints import ACROSS, ALONG, TURN, Joint
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism
 from chaosgym.machines.mechanism.nominal import Revolution, nominal, revolution_of
 from chaosgym.machines.parameters import parameter
@@ -219,6 +219,36 @@ class MechanismMachine(BinnedMachine):
     def display(self) -> Array:
         """Displacement of the monitored joint: across it."""
         return self.row_of(self.monitored, ACROSS)
+
+    @property
+    def _watched(self) -> Joint:
+        return next(each for each in self.mechanism.joints if each.name == self.monitored)
+
+    @property
+    def round_bearing(self) -> bool:
+        """True for a pin in its hole."""
+        return self._watched.kind == "revolute"
+
+    def bearing_place(self, phase: Array, force: Array) -> tuple[Array, str]:
+        """Where on its bearing the monitored joint carries a force, and the unit of that place.
+
+        Parameters
+        ----------
+        phase : (n,)
+            Phases [rad] of the cycle.
+        force : (n, 3)
+            Components of the force, as in ``CycleRecord.peak_vector``.
+
+        Returns
+        -------
+        (place, unit)
+            How far the point lies along the guide or slot, and "m"; or the polar angle around a pin, counted from the
+            axis of the link that bears, and "deg".
+        """
+        joint = self._watched
+        if self.round_bearing:
+            return np.degrees(np.arctan2(force[:, 1], force[:, 0])), "deg"
+        return self.mechanism.motions(self.nominal_places(phase), joint)[ALONG][0], "m"
 
     @property
     def stiffest(self) -> float:

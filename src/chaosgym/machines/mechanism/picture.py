@@ -46,11 +46,13 @@ def _limits(machine: "MechanismMachine") -> tuple[Array, Array, float]:
 
 
 def _framed(panel: Any, machine: "MechanismMachine") -> float:
-    """Set equal scales with room for all that moves; the size [m]."""
+    """Set equal scales that fill a panel, with room for all that moves; the size [m]."""
     low, high, size = _limits(machine)
-    middle, half = 0.5 * (low + high), 0.5 * (high - low) + 0.14 * size
-    panel.set(xlim=(middle[0] - half[0], middle[0] + half[0]), ylim=(middle[1] - half[1], middle[1] + half[1]))
-    panel.set_aspect("equal")
+    middle, (x, y) = 0.5 * (low + high), 0.5 * (high - low) + 0.14 * size
+    box = panel.get_window_extent()
+    share = box.height / box.width
+    x, y = max(x, y / share), max(y, x * share)
+    panel.set(xlim=(middle[0] - x, middle[0] + x), ylim=(middle[1] - y, middle[1] + y))
     panel.axis("off")
     return size
 
@@ -139,6 +141,7 @@ def draw_poses(panels: Any, machine: "MechanismMachine") -> None:
     paths = link_lines(machine, every)
     for k, panel in enumerate(panels):
         size = _framed(panel, machine)
+        panel.set_aspect("equal")
         for path in paths.values():
             for point in range(path.shape[1]):
                 panel.plot(*path[:, point].T, color=PALE, linewidth=0.8)

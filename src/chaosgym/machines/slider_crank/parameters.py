@@ -322,6 +322,11 @@ class SliderCrank(BinnedMachine):
         """Joint whose force is recorded: the slider joint if it has clearance, otherwise the ball joint."""
         return "slider" if self.slider_joint != "ideal" else "ball"
 
+    @property
+    def round_bearing(self) -> bool:
+        """True for the ball joint."""
+        return self.monitored_joint == "ball"
+
     def bearing_place(self, phase: Array, force: Array) -> tuple[Array, str]:
         """Where on its bearing the monitored joint carries a force, and the unit of that place.
 
