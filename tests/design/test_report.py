@@ -113,10 +113,10 @@ def check_page(browser, path, pictures):
 
 @needs_browser
 def test_report_opens_in_a_browser(answered, browser, tmp_path):
-    """A page of a study: no external request, no error, all nine figures."""
+    """A page of a study: no external request, no error, all ten figures."""
     path = tmp_path / "report.html"
     write_report(design_report(answered), answered.as_dict(), path)
-    check_page(browser, path, 9)
+    check_page(browser, path, 10)
 
 
 @needs_browser
@@ -168,10 +168,10 @@ def test_examples_of_the_documentation():
 @pytest.mark.slow
 @needs_browser
 def test_report_on_the_chaotic_beam_opens_in_a_browser(chaotic, browser, tmp_path):
-    """Type III has the running statistics as a tenth figure."""
+    """Type III has the running statistics as an eleventh figure."""
     path = tmp_path / "report.html"
     write_report(design_report(chaotic), chaotic.as_dict(), path)
-    check_page(browser, path, 10)
+    check_page(browser, path, 11)
 
 
 def test_report_says_what_the_numbers_say(answered):

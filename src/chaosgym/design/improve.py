@@ -1,35 +1,69 @@
 r"""The next change, and the cheapest one that suffices: phase VII of thesis 5.6, closed.
 
-Candidates follow the thesis: less clearance, more damping, another speed, a stiffer member. Each is built and assessed
-anew, so that its effect is simulated and not extrapolated: responses of Type II and III have no derivative to trust.
+Candidates follow the thesis: less clearance, more damping, another speed, a stiffer member; then preload, stiffness of
+the contact and mass. Every value that is stated is assessed over the tolerances. Values between them, those that the
+map, the life against speed and the sensitivities suggest, and pairs of fields are screened: a few machines of the
+tolerances run for some cycles. Those that lie on the front of cost against life and robustness as screened are then
+assessed like any other, so that no suggestion rests on a screening or an extrapolation: responses of Type II and III
+have no derivative to trust.
 
 The cost of changing a field from a to b is its weight times |ln(b / a)|, so that halving costs as much as doubling;
-changes of several fields add up.
+changes of several fields add up. From zero to b it is ln(1 + |b| / s), where s is the equivalent force for a force, and
+the clearance for a length.
 """
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
+from chaosgym.design.bearing import Evaluation, evaluate
 from chaosgym.design.collective import assess_duty
 from chaosgym.design.methodology import SERIES_SIZE, Assessment, Check
+from chaosgym.design.runs import deviating, sobol_shares, worse_side
 from chaosgym.diagnosis import default_tolerances
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, quantity_of, with_settings
+from chaosgym.simulation import parallel_map, simulate
+
+Array = NDArray[np.float64]
 
 CLEARANCE_FACTORS = (0.75, 0.5, 0.25)
 DAMPING_FACTORS = (2.0, 4.0)
 SPEED_FACTORS = (0.8, 0.9, 1.1)
 SECTION_FACTORS = (1.1, 1.25)
+
+STIFFNESS_FACTORS = (0.5,)
+MASS_FACTORS = (0.8,)
+PRELOAD_FACTORS = (1.5, 2.0)
 """Factors that are tried by default."""
 
-SECTION_FIELDS = ("height", "rod_diameter")
+SECTION_FIELDS = ("height", "rod_diameter", "frequency_factor")
 """Fields that make a member stiffer."""
+
+MASS_FIELDS = ("slider_mass", "yoke_mass")
+"""Fields that make a moving part lighter."""
+
+SCREENED_MACHINES, SCREENED_CYCLES = 8, 60
+"""Machines of the tolerances, and cycles before and while peaks are taken, that screen a candidate."""
+
+STEPS = 3
+"""Values between the nominal one and the outermost one of a field that are screened."""
+
+MOST_PAIRS = 60
+"""Pairs of fields that are screened at the most, by cost."""
+
+MOST_VERIFIED = 8
+"""Screened candidates that are assessed over the tolerances at the most."""
+
+SPARE = 3
+"""Of these, candidates beside the front of cost against life and robustness."""
 
 REFINEMENTS = 3
 """Bisections between the change that suffices and the nominal value."""
@@ -49,6 +83,16 @@ class Trial:
         return self.assessment.verdict == "meets"
 
     @property
+    def life(self) -> float:
+        """Life that the methodology tells, in required lives."""
+        return self.assessment.evaluation.life_interval.low / self.assessment.criteria.life
+
+    @property
+    def robustness(self) -> float:
+        """Share of the machines in the tolerances that reach life and reliability by their own statistics."""
+        return self.assessment.machines_that_meet
+
+    @property
     def told(self) -> str:
         """The changes with their units, for people: "excitation frequency 15 Hz"."""
         machine = self.assessment.machine
@@ -62,6 +106,8 @@ class Trial:
             "changes": dict(self.changes),
             "cost": self.cost,
             "type": self.assessment.type,
+            "life_in_required_lives": self.life if math.isfinite(self.life) else None,
+            "robustness": self.robustness,
             **{name: result[name] for name in kept},
         }
 
@@ -73,35 +119,111 @@ class Improvement:
     Attributes
     ----------
     suggestions
-        Single changes, best first: those that meet the criteria by cost, then the others by how far they miss.
+        Changes that were assessed, best first: those that meet the criteria by cost, then the others by how far they
+        miss.
     best
         The cheapest change found that meets the criteria; None if none does.
+    screened
+        Candidates that were screened besides.
     """
 
     suggestions: tuple[Trial, ...]
     best: Trial | None
+    screened: int = 0
+
+    @property
+    def front(self) -> tuple[Trial, ...]:
+        """Trials that no other beats in cost, life and robustness at once, by cost."""
+        rows = [(-trial.cost, trial.life, trial.robustness) for trial in self.suggestions]
+        kept = [trial for trial, keep in zip(self.suggestions, not_dominated(rows), strict=True) if keep]
+        return tuple(sorted(kept, key=lambda trial: trial.cost))
+
+
+def not_dominated(rows: Sequence[Sequence[float]]) -> list[bool]:
+    """Whether no other row is as large in every column and larger in one; of equal rows the first stays.
+
+    Examples
+    --------
+    >>> not_dominated([(1.0, 2.0), (2.0, 1.0), (1.0, 1.0), (2.0, 1.0)])
+    [True, True, False, False]
+    """
+
+    def beaten(k: int) -> bool:
+        return any(
+            all(a >= b for a, b in zip(other, rows[k], strict=True)) and (tuple(other) != tuple(rows[k]) or j < k)
+            for j, other in enumerate(rows)
+            if j != k
+        )
+
+    return [not beaten(k) for k in range(len(rows))]
 
 
 def default_changes(machine: Machine) -> dict[str, tuple[float, ...]]:
-    """Values worth trying, by field: less clearance, more damping, other speed, stiffer member."""
+    """Values worth trying, by field: less clearance, more damping, other speed, stiffer member, softer contact, less
+    mass, more preload. Without values, as for a preload of zero, the search finds its own.
+    """
+    known = parameters_of(machine)
     factors: dict[str, tuple[float, ...]] = {machine.clearance_field: CLEARANCE_FACTORS}
     factors |= {name: DAMPING_FACTORS for name in default_tolerances(machine) if "damping" in name}
     factors[machine.speed_field] = SPEED_FACTORS
-    factors |= {name: SECTION_FACTORS for name in SECTION_FIELDS if name in parameters_of(machine)}
+    factors |= {name: SECTION_FACTORS for name in SECTION_FIELDS if name in known}
+    factors |= {name: STIFFNESS_FACTORS for name in known if _of_contact(name, known) and getattr(machine, name) > 0.0}
+    factors |= {name: MASS_FACTORS for name in MASS_FIELDS if name in known}
+    factors |= {name: PRELOAD_FACTORS for name in known if name.endswith("preload")}
     return {
-        name: tuple(_rounded(getattr(machine, name) * factor, 4) for factor in row) for name, row in factors.items()
+        name: tuple(_rounded(getattr(machine, name) * factor, 4) for factor in row if getattr(machine, name))
+        for name, row in factors.items()
     }
 
 
-def change_cost(machine: Machine, changes: Mapping[str, float], weights: Mapping[str, float] | None = None) -> float:
-    """Cost of a set of changes: the sum of weight times |ln(new / old)|; a weight is 1 unless given."""
+def _of_contact(name: str, known: Container[str]) -> bool:
+    """Whether a field is the stiffness of a contact."""
+    return name == "contact_stiffness" or (name.endswith("_stiffness") and f"{name[:-10]}_clearance" in known)
+
+
+def change_cost(
+    machine: Machine,
+    changes: Mapping[str, float],
+    weights: Mapping[str, float] | None = None,
+    force: float = 0.0,
+) -> float:
+    """Cost of a set of changes: the sum of weight times |ln(new / old)|; a weight is 1 unless given.
+
+    Parameters
+    ----------
+    machine
+        The nominal machine.
+    changes
+        New values by field.
+    weights
+        By field.
+    force
+        Equivalent force [N], beside which a force is weighed that is zero in one of the machines.
+
+    Raises
+    ------
+    ParameterError
+        If a change to or from zero, or below it, is of a field that is neither a force nor a length.
+
+    Examples
+    --------
+    >>> from chaosgym.machines import ImpactBeam
+    >>> round(change_cost(ImpactBeam(clearance=2e-4), {"clearance": 1e-4}), 4)
+    0.6931
+    """
     weights = weights or {}
     total = 0.0
     for name, value in changes.items():
         nominal = getattr(machine, name)
-        if nominal <= 0.0 or value <= 0.0:
-            raise ParameterError(f"{name}: the cost of a change from {nominal:g} to {value:g} needs values above 0")
-        total += weights.get(name, 1.0) * abs(math.log(value / nominal))
+        if nominal > 0.0 and value > 0.0:
+            size = abs(math.log(value / nominal))
+        else:
+            scales = {"N": force, "m": float(getattr(machine, machine.clearance_field))}
+            scale = scales.get(parameters_of(machine)[name].unit, 0.0)
+            if not scale > 0.0:
+                raise ParameterError(f"{name}: the cost of a change from {nominal:g} to {value:g} needs values above 0")
+            size = math.log1p(abs(value - nominal) / scale)
+        total += weights.get(name, 1.0) * size
     return total
 
 
@@ -110,16 +232,17 @@ def improve(
     changes: Mapping[str, Iterable[float]] | None = None,
     weights: Mapping[str, float] | None = None,
     *,
+    seeds: Sequence[Mapping[str, float]] = (),
     series_size: int = SERIES_SIZE,
-    most_pairs: int = 20,
     seed: int = 0,
     workers: int | None = None,
     progress: bool = False,
 ) -> Improvement:
     """Search the cheapest change with which a machine meets its criteria.
 
-    Single changes are all tried; if none suffices, pairs of fields in the order of their cost. The one that suffices
-    is then taken back towards the nominal value as far as it goes on to suffice.
+    Every value of ``changes`` is assessed alone. Further candidates are screened, and those on the front of cost
+    against life and robustness are assessed too. The cheapest one that suffices is then taken back towards the nominal
+    value as far as it goes on to suffice.
 
     Parameters
     ----------
@@ -129,10 +252,10 @@ def improve(
         Values to try, by field; ``default_changes`` if None.
     weights
         Cost weight by field; 1 if not given.
+    seeds
+        Further candidates to screen: changes of one field or of several.
     series_size, seed, workers
         As for ``assess``.
-    most_pairs
-        Pairs that are tried at most.
     progress
         Show a progress bar on standard error.
 
@@ -144,10 +267,11 @@ def improve(
     machine = assessment.machine
     nominal = getattr(machine, machine.speed_field)
     duty = {part.speed / nominal: part.share for part in assessment.collective}
-    values = changes or default_changes(machine)
+    values = {name: tuple(row) for name, row in (default_changes(machine) if changes is None else changes).items()}
     for name, weight in (weights or {}).items():
         if name not in values or not weight >= 0.0:
             raise ParameterError(f"cost of {name} = {weight:g} is out of range; allowed: 0 or more, of a changed field")
+    force = assessment.evaluation.force
 
     def attempt(change: Mapping[str, float]) -> Trial | None:
         try:
@@ -161,46 +285,121 @@ def improve(
                 seed=seed,
                 workers=workers,
             )
-        except SimulationError:
+        except (SimulationError, ParameterError):
             return None
-        return Trial(dict(change), change_cost(machine, change, weights), result)
+        return Trial(dict(change), change_cost(machine, change, weights, force), result)
 
-    singles = [{name: float(value)} for name, row in values.items() for value in row if _allowed(machine, name, value)]
+    singles: list[Mapping[str, float]] = [
+        {name: float(value)} for name, row in values.items() for value in row if _allowed(machine, {name: value}, force)
+    ]
+    proposed = [*seeds, *_between(machine, values, force)]
+    further = _distinct([one for one in proposed if _allowed(machine, one, force)], singles)
+    pairs = _distinct([{**a, **b} for a, b in combinations([*singles, *further], 2) if a.keys().isdisjoint(b)], [])
+    pairs = sorted(pairs, key=lambda one: change_cost(machine, one, weights, force))[:MOST_PAIRS]
+    candidates = [*further, *pairs]
     with tqdm(total=len(singles), desc="changes", disable=not progress, unit="machine") as bar:
         trials = []
         for change in singles:
             trials.append(attempt(change))
             bar.update()
+        chosen = _front_of_screened(assessment, candidates, weights, seed, workers)
+        bar.total += len(chosen) + REFINEMENTS
+        for change in chosen:
+            trials.append(attempt(change))
+            bar.update()
         done = [trial for trial in trials if trial is not None]
         best = _cheapest(done)
-        if best is None:
-            pairs = sorted(
-                ({**one, **other} for one, other in combinations(singles, 2) if one.keys() != other.keys()),
-                key=lambda change: change_cost(machine, change, weights),
-            )
-            bar.total += len(pairs[:most_pairs])
-            for change in pairs[:most_pairs]:
-                trial = attempt(change)
-                bar.update()
-                if trial is not None and trial.meets:
-                    best = trial
-                    break
         if best is not None:
-            bar.total += REFINEMENTS
             best = _taken_back(machine, best, attempt)
-            bar.update(REFINEMENTS)
-    return Improvement(tuple(sorted(done, key=_rank)), best)
+        bar.update(REFINEMENTS)
+    if best is not None and all(trial is not best for trial in done):
+        done.append(best)
+    return Improvement(tuple(sorted(done, key=_rank)), best, len(candidates))
 
 
-def _allowed(machine: Machine, name: str, value: float) -> bool:
-    """Whether a machine with the value can be built; an unknown field is an error."""
-    if name not in parameters_of(machine):
-        with_settings(machine, {name: value})
+def _allowed(machine: Machine, change: Mapping[str, float], force: float) -> bool:
+    """Whether a machine with the change can be built and its cost be told; an unknown field is an error."""
+    for name in change:
+        if name not in parameters_of(machine):
+            with_settings(machine, change)
     try:
-        with_settings(machine, {name: value})
+        with_settings(machine, change)
+        change_cost(machine, change, None, force)
     except ParameterError:
         return False
-    return bool(value > 0.0) and getattr(machine, name) > 0.0
+    return True
+
+
+def _between(machine: Machine, values: Mapping[str, tuple[float, ...]], force: float) -> Iterable[dict[str, float]]:
+    """Values between the nominal one and the outermost ones stated; without any, a range of its own."""
+    for name, row in values.items():
+        nominal = getattr(machine, name)
+        ends = [value for value in (min(row, default=nominal), max(row, default=nominal)) if value != nominal]
+        if not ends:
+            ends = [0.5 * nominal, 2.0 * nominal] if nominal else [-2.0 * force, 2.0 * force]
+        for end in ends:
+            for k in range(1, STEPS + 1):
+                yield {name: _part(nominal, end, k / (STEPS + bool(row)))}
+
+
+def _distinct(
+    changes: Iterable[Mapping[str, float]], known: Iterable[Mapping[str, float]]
+) -> list[Mapping[str, float]]:
+    """Changes without repetition, and without those that are known."""
+    seen = {tuple(sorted(one.items())) for one in known}
+    kept = {tuple(sorted(one.items())): one for one in changes}
+    return [one for key, one in kept.items() if key not in seen]
+
+
+def _front_of_screened(
+    assessment: Assessment,
+    candidates: Sequence[Mapping[str, float]],
+    weights: Mapping[str, float] | None,
+    seed: int,
+    workers: int | None,
+) -> list[Mapping[str, float]]:
+    """Candidates that seem to suffice and that none beats in cost, life and robustness; else the longest-lived."""
+    screened = _screened(assessment, candidates, seed, workers)
+    force = assessment.evaluation.force
+    rows = [(-change_cost(assessment.machine, one, weights, force), *screened[k]) for k, one in enumerate(candidates)]
+    least = assessment.criteria.machines_that_meet
+    likely = [k for k, row in enumerate(rows) if row[1] >= 1.0 and row[2] >= least]
+    if not likely:
+        best = sorted(range(len(rows)), key=lambda k: (-rows[k][2], -rows[k][1]))
+        return [candidates[k] for k in best[: MOST_VERIFIED // 2]]
+    by_cost = sorted(likely, key=lambda k: -rows[k][0])
+    kept = [k for k, keep in zip(by_cost, not_dominated([rows[k] for k in by_cost]), strict=True) if keep]
+    front = [kept[k] for k in sorted(set(np.linspace(0, len(kept) - 1, MOST_VERIFIED - SPARE).astype(int).tolist()))]
+    others = [k for k in by_cost if k not in front]  # a screening may be wrong: the cheapest of the rest stand in
+    return [candidates[k] for k in [*front, *others[: MOST_VERIFIED - len(front)]]]
+
+
+def _screened(
+    assessment: Assessment, candidates: Sequence[Mapping[str, float]], seed: int, workers: int | None
+) -> list[tuple[float, float]]:
+    """Life in required lives, at most 100 of them, and share of machines that meet, from few short runs of each."""
+    region, criteria, exponent = assessment.region, assessment.criteria, assessment.criteria.life_exponent
+    shares = sobol_shares(len(region), SCREENED_MACHINES, seed) if region else np.zeros((1, 0))
+
+    def run(task: tuple[Mapping[str, float], Array]) -> Evaluation | None:
+        try:
+            machine = deviating(with_settings(assessment.machine, task[0]), region, task[1])
+            peaks = simulate(machine, SCREENED_CYCLES, transient=SCREENED_CYCLES).peak_force
+        except (SimulationError, ParameterError):
+            return None
+        own = criteria.at(machine.cycle_period) if criteria.hours else criteria
+        found = evaluate([worse_side(peaks, exponent)], own, "")
+        return replace(found, life=min(found.life / own.life, 1e6))
+
+    found = parallel_map(run, [(one, row) for one in candidates for row in shares], workers=workers)
+    answers = []
+    for k in range(len(candidates)):
+        runs = found[k * len(shares) : (k + 1) * len(shares)]
+        kept = [one for one in runs if one is not None]
+        life = len(kept) / sum(1.0 / one.life for one in kept) if len(kept) == len(runs) else 0.0
+        meets = sum(one.life >= 1.0 and one.reliability >= criteria.reliability for one in kept) / len(runs)
+        answers.append((min(life, 100.0), meets))
+    return answers
 
 
 def _cheapest(trials: list[Trial]) -> Trial | None:
@@ -209,16 +408,22 @@ def _cheapest(trials: list[Trial]) -> Trial | None:
 
 def _taken_back(machine: Machine, best: Trial, attempt: Any) -> Trial:
     """Bisect, in the logarithm, between the nominal machine and the change that suffices."""
-    low, high = 0.0, 1.0
-    full = {name: math.log(value / getattr(machine, name)) for name, value in best.changes.items()}
+    low, high, full = 0.0, 1.0, dict(best.changes)
     for _ in range(REFINEMENTS):
         share = 0.5 * (low + high)
-        trial = attempt({name: _rounded(getattr(machine, name) * math.exp(share * full[name])) for name in full})
+        trial = attempt({name: _part(getattr(machine, name), value, share) for name, value in full.items()})
         if trial is not None and trial.meets:
             best, high = trial, share
         else:
             low = share
     return best
+
+
+def _part(nominal: float, value: float, share: float) -> float:
+    """A share of the way to a changed value: in the logarithm where both are above zero."""
+    if nominal > 0.0 and value > 0.0:
+        return _rounded(nominal * (value / nominal) ** share)
+    return _rounded(nominal + share * (value - nominal))
 
 
 def _rounded(value: float, digits: int = 3) -> float:

@@ -186,13 +186,18 @@ def build_series(
     names = tuple(tolerances)
     if not names or size == 0:
         return Series(names, np.empty((0, len(names))), ())
-    from scipy.stats import qmc
-
-    sequence = qmc.Sobol(len(names), rng=np.random.default_rng(seed))
-    shares = 2.0 * sequence.random_base2(int(np.ceil(np.log2(size))))[:size] - 1.0
+    shares = sobol_shares(len(names), size, seed)
     machines = [deviating(machine, tolerances, row) for row in shares]
     runs = parallel_map(settled_run, machines, workers=workers, progress="machines in tolerance" if progress else None)
     return Series(names, shares, tuple(runs))
+
+
+def sobol_shares(dimensions: int, size: int, seed: int) -> Array:
+    """Deviations (size, dimensions) of machines that lie evenly in their tolerances, -1 to 1."""
+    from scipy.stats import qmc
+
+    sequence = qmc.Sobol(dimensions, rng=np.random.default_rng(seed))
+    return np.asarray(2.0 * sequence.random_base2(int(np.ceil(np.log2(size))))[:size] - 1.0)
 
 
 def deviating(machine: Machine, tolerances: Mapping[str, Tolerance], shares: Sequence[float] | Array) -> Machine:

@@ -1,6 +1,5 @@
 """Everything that a design report shows: the assessment, the map around it, life over speed, and what to change."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +11,7 @@ from chaosgym.design.collective import assess_duty, damage_shares
 from chaosgym.design.combination import Combination, combination
 from chaosgym.design.fatigue import equivalent_force_of_history
 from chaosgym.design.guidelines import Guideline, guidelines
-from chaosgym.design.improve import Improvement, improve
+from chaosgym.design.improve import Improvement, Trial, improve
 from chaosgym.design.methodology import Assessment, Check
 from chaosgym.design.peak_impacts import PeakImpactDiagram, filling_cycles, peak_impacts, worn_side
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
@@ -106,6 +105,7 @@ class DesignStudy:
         lines += [f"  {one.sentence} ({one.section})" for one in self.guidelines]
         if best is not None:
             lines.append(f"  cheapest change that meets all criteria: {best.told}, cost {best.cost:.2f}")
+            lines += [f"  dearer, and better: {one.told}, cost {one.cost:.2f}, {_better(one)}" for one in self.dearer]
         elif self.improvement is not None:
             lines.append("  no change that was tried meets all criteria")
         if self.life_over_speed is None:
@@ -126,6 +126,14 @@ class DesignStudy:
                 f"{part.share:.0%} of the time at {speed}: Type {found.type}, {alone}, {damage:.0%} of the damage"
             )
         return lines
+
+    @property
+    def dearer(self) -> tuple[Trial, ...]:
+        """Changes on the front that meet all criteria and cost more than the cheapest one, for life or robustness."""
+        if self.improvement is None or self.improvement.best is None:
+            return ()
+        cheapest = self.improvement.best
+        return tuple(one for one in self.improvement.front if one.meets and one.cost > cheapest.cost)
 
     @property
     def margin_told(self) -> str:
@@ -169,6 +177,8 @@ class DesignStudy:
             else {
                 "best": None if found.best is None else found.best.as_dict(),
                 "suggestions": [trial.as_dict() for trial in found.suggestions],
+                "front": [dict(trial.changes) for trial in found.front],
+                "screened": found.screened,
             },
             "map": None
             if self.map is None
@@ -199,6 +209,12 @@ def _told(check: Check, cycle_period: float) -> str:
         reached, required = (hours_of(life, cycle_period) for life in (check.reached, check.required))
         told = f"{reached:,.4g} h of {required:,.4g} h in operation ({told})"
     return told + (" met" if check.met else " NOT met")
+
+
+def _better(trial: Trial) -> str:
+    """What a dearer change gives."""
+    life = f"{trial.life:.3g} required lives" if np.isfinite(trial.life) else "no contact"
+    return f"{life}, {trial.robustness:.0%} of the machines meet"
 
 
 def _finite(values: Any) -> list[float | None]:
@@ -246,8 +262,9 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
     if assessment.verdict != "meets":
         improvement = improve(
             assessment,
-            _seeded(brief, assessment, trend),
+            brief.changes,
             brief.costs,
+            seeds=_seeds(brief, assessment, trend, around),
             series_size=brief.series_size,
             seed=seed,
             workers=workers,
@@ -331,14 +348,38 @@ def _margins(found: Assessment) -> Margins | None:
     return margins(found.machine, orbit, found.region) if orbit is not None and orbit.certified else None
 
 
-def _seeded(brief: DesignBrief, found: Assessment, trend: LifeTrend | None) -> Mapping[str, tuple[float, ...]]:
-    """Changes of the brief; where the speed is one, speeds too at which the trend shows no contact or enough life."""
-    field = brief.machine.speed_field
-    if trend is None or field not in brief.changes:
-        return brief.changes
-    lacking = found.criteria.life / max(found.evaluation.life_interval.low, 1e-300)
-    seeds = trend.longer_lived(getattr(brief.machine, field), max(lacking, 1.0))
-    return {**brief.changes, field: tuple(dict.fromkeys([*brief.changes[field], *seeds]))}
+MOST_OF_MAP = 6
+"""Places of the map that seed the search."""
+
+
+def _seeds(
+    brief: DesignBrief, found: Assessment, trend: LifeTrend | None, around: ResponseMap | None
+) -> list[dict[str, float]]:
+    """Candidates for the search, of fields that may change.
+
+    Speeds at which the trend shows no contact or enough life; places of the map without contact or of Type I, nearest
+    first; and values at which the trend of the force over each tolerance reaches the required life.
+    """
+    machine, criteria = found.machine, found.criteria
+    fields = (machine.speed_field, machine.clearance_field)
+    lacking = criteria.life / max(found.evaluation.life_interval.low, 1e-300)
+    seeds = list[dict[str, float]]()
+    if trend is not None and fields[0] in brief.changes:
+        speeds = trend.longer_lived(getattr(machine, fields[0]), max(lacking, 1.0))
+        seeds += [{fields[0]: speed} for speed in speeds]
+    if around is not None and set(fields) & brief.changes.keys():
+        calm = np.argwhere((around.type == "I") | (around.largest_peak == 0.0))
+        calm = calm[np.argsort(np.abs(calm - MIDDLE).sum(axis=1), kind="stable")]
+        places = [(float(around.speed[i]), float(around.clearance[j])) for i, j in calm]
+        both = [dict(zip(fields, place, strict=True)) for place in places]
+        seeds += [{name: value for name, value in one.items() if name in brief.changes} for one in both][:MOST_OF_MAP]
+    needed = np.log(max(lacking, 1.0)) / criteria.life_exponent
+    for name, slope in zip(found.trend.parameters, found.trend.slopes.tolist(), strict=True):
+        row, nominal = brief.changes.get(name, ()), getattr(machine, name)
+        if row and slope and nominal > 0.0 and abs(needed / slope) < 1e3:
+            value = brief.region[name].at(nominal, -1.2 * needed / slope)
+            seeds.append({name: float(np.clip(value, min(*row, nominal), max(*row, nominal)))})
+    return [{name: float(f"{value:.4g}") for name, value in one.items()} for one in seeds]
 
 
 def _every_impact(record: CycleRecord, side: int, brief: DesignBrief) -> float:

@@ -12,6 +12,7 @@ from scipy import stats
 
 from chaosgym.design.combination import Combination
 from chaosgym.design.fatigue import equivalent_force, statistical_life
+from chaosgym.design.improve import Improvement
 from chaosgym.design.methodology import Assessment
 from chaosgym.design.peak_impacts import PeakImpactDiagram
 from chaosgym.design.reliability import hertz_pressure
@@ -211,6 +212,30 @@ def scatter_of_series(assessment: Assessment, found: Combination, ax: Axes) -> A
     ax.set(xlabel=label, ylabel="largest peak force [N]", title="Machines in tolerance", ylim=(0.0, None))
     ax.set_ylim(0.0, 1.25 * ax.get_ylim()[1])
     ax.legend(loc="upper left", ncols=2)
+    return ax
+
+
+def cost_against_life(found: Improvement, ax: Axes) -> Axes:
+    """Life of each change that was assessed, in required lives, over its cost; a line joins the front of both."""
+    trials = found.suggestions
+    finite = [trial.life for trial in trials if np.isfinite(trial.life)]
+    top = 3.0 * max([1.0, *finite])
+    for kind, colour in TYPE_COLOURS.items():
+        for filled in (True, False):
+            rows = [one for one in trials if one.assessment.type == kind and one.meets == filled]
+            if rows:
+                label = f"Type {kind}" if kind != "undetermined" else kind
+                at = [(one.cost, min(one.life, top)) for one in rows]
+                face = colour if filled else "white"
+                name = label + ("" if filled else ", misses a criterion")
+                ax.plot(*np.transpose(at), "o", ms=6, mfc=face, mec=colour, label=name)
+    front = found.front
+    ax.plot([one.cost for one in front], [min(one.life, top) for one in front], color=INK, lw=1.0, label="front")
+    ax.axhline(1.0, color=BAD, lw=1.2, ls="--")
+    if any(not np.isfinite(one.life) for one in trials):
+        ax.annotate("no contact", (0.0, top), fontsize="small", va="bottom")
+    ax.set(yscale="log", xlabel="relative cost", ylabel="life [required lives]", title="What a longer life costs")
+    ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=2)
     return ax
 
 

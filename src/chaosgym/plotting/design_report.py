@@ -203,6 +203,13 @@ def _pictures(study: DesignStudy) -> list[Picture]:
             wide=True,
         )
     ]
+    if study.improvement is not None and study.improvement.suggestions:
+        improvement = study.improvement
+        caption = (
+            "Every change that was assessed over the tolerances. Filled: meets all criteria. No change off the line is "
+            "better than one on it in cost, life and share of machines that meet."
+        )
+        pictures.append(_picture(_drawn(lambda ax: figures.cost_against_life(improvement, ax)), caption))
     if study.map is not None:
         caption = "Each square is a machine with its own tolerances around it. Box: the tolerances; circle: the design."
         region, result = study.assessment.region, study.map
