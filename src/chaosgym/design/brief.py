@@ -9,6 +9,7 @@ from typing import Any
 from chaosgym.design.bearing import Criteria, variation_region
 from chaosgym.design.improve import default_changes
 from chaosgym.design.methodology import SERIES_SIZE
+from chaosgym.design.wear import Wear, read_wear
 from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError
 from chaosgym.files import toml_of
@@ -20,7 +21,18 @@ from chaosgym.machines.units import parse_quantity, units_of
 REQUIRED_CRITERIA = ("load_rating", "life", "reliability")
 """Criteria that a brief must state; the others have defaults, which the report lists."""
 
-SECTIONS = ("machine", "series", "parameters", "tolerances", "region", "duty", "criteria", "changes", "costs")
+SECTIONS = (
+    "machine",
+    "series",
+    "parameters",
+    "tolerances",
+    "region",
+    "duty",
+    "criteria",
+    "changes",
+    "costs",
+    "archard",
+)
 
 DUTY = ("hours_a_day", "speeds")
 
@@ -50,6 +62,8 @@ class DesignBrief:
         Machines that represent the region.
     duty
         Share of the operating time by speed, in nominal speeds; empty for one speed.
+    wear
+        Data of Archard's law; None if wear is left out.
     stated
         Names of the criteria that the brief states itself.
     """
@@ -61,6 +75,7 @@ class DesignBrief:
     costs: Mapping[str, float]
     series_size: int = SERIES_SIZE
     duty: Mapping[float, float] = field(default_factory=dict)
+    wear: Wear | None = None
     stated: tuple[str, ...] = field(default=())
 
 
@@ -135,6 +150,7 @@ def brief_from(values: Mapping[str, Any]) -> DesignBrief:
         costs=_costs(values, machine),
         series_size=_series_size(values),
         duty={speed / nominal: share for speed, share in duty.items()},
+        wear=_wear(values, machine),
         stated=tuple(values.get("criteria", {})),
     )
 
@@ -157,6 +173,7 @@ def _homes(machine: Machine | None = None) -> dict[str, str]:
     """Where a key belongs that stands in the wrong place."""
     homes = dict.fromkeys(parameters_of(machine), "[parameters], [tolerances] or [changes]") if machine else {}
     homes |= dict.fromkeys(set(parameters_of(Criteria)) - {"hours"}, "[criteria]") | {"wear": "[region]"}
+    homes |= dict.fromkeys(parameters_of(Wear), "[archard]")
     homes |= dict.fromkeys(DUTY, "[duty]") | dict.fromkeys(SECTIONS, "the brief itself, above or beside this section")
     return homes | dict.fromkeys(OF_MACHINE, 'the file of the machine, which the brief names: machine = "FILE.toml"')
 
@@ -221,6 +238,17 @@ def _speeds(values: Mapping[str, Any], machine: Machine, stated: bool) -> dict[f
             f"duty.speeds lacks the nominal {name} {nominal:g} {unit}; give it a share, or leave it out of [parameters]"
         )
     return {speed: share / total for speed, share in shares.items()}
+
+
+def _wear(values: Mapping[str, Any], machine: Machine) -> Wear | None:
+    if "archard" not in values:
+        return None
+    known = parameters_of(Wear)
+    section = _section(values, "archard", known, machine)
+    own = {"area": {"m^2": 1.0, "cm^2": 1e-4, "mm^2": 1e-6}}
+    return read_wear(
+        {key: parse_quantity(f"archard.{key}", one, known[key].unit, own.get(key)) for key, one in section.items()}
+    )
 
 
 def _life(given: Any, hours_a_day: float) -> dict[str, float]:
@@ -329,6 +357,14 @@ def template(name: str) -> str:
         "",
         "[costs]  # weight of a change: weight * |ln(new / old)|; 1 if left out",
         f"{speed} = 2",
+        "",
+        "# [archard]  # wear by Archard's law; left out if this section is",
+        f'# limit = "{3e3 * getattr(machine, clearance):.4g} mm"      # clearance at which the joint is worn out',
+        '# sliding = "2 mm"       # of the parts by each other, in a cycle',
+        '# area = "20 mm^2"       # over which wear spreads',
+        '# hardness = "2 GPa"     # of the softer surface',
+        "# coefficient = 1e-5     # K of lubricated steel",
+        "# uncertainty = 3        # factor to which K is known",
     ]
     return "\n".join(lines) + "\n"
 
