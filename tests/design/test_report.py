@@ -19,7 +19,14 @@ from chaosgym.design.measured import evaluate_peaks
 from chaosgym.design.study import contradictions, study
 from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import DesignError
-from chaosgym.plotting.design_report import design_report, measured_report, write_report
+from chaosgym.plotting.design_report import (
+    HEADLINES,
+    comparison_report,
+    comparison_rows,
+    design_report,
+    measured_report,
+    write_report,
+)
 from tests.browser import CHROMIUM, Browser
 
 DOCUMENTATION = Path(__file__).parents[2] / "docs"
@@ -79,7 +86,10 @@ def test_the_type_of_a_tube_is_that_of_the_worst_machine_within_its_tolerances(s
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
-    """One browser for all pages."""
+    """One browser for all pages; None without chromium."""
+    if CHROMIUM is None:
+        yield None
+        return
     with Browser(tmp_path_factory.mktemp("profile")) as opened:
         yield opened
 
@@ -187,17 +197,22 @@ def test_report_says_what_the_numbers_say(answered):
     assert not re.search(r"<script|https?://", page)
 
 
-def test_a_load_collective_is_told_speed_by_speed():
+def test_a_load_collective_and_wear_are_told():
     """Life, types and damage of each speed stand in lines, page and JSON; the study does not contradict itself."""
     text = CALM.replace("[criteria]", '[duty.speeds]\n"8 Hz" = "75 %"\n"12 Hz" = "25 %"\n[criteria]')
-    answer = study(brief_from(tomllib.loads(text.replace('["0.0635 mm"]', '["0.12 mm"]'))))
+    text += '[archard]\nlimit = "0.3 mm"\nsliding = "2 mm"\narea = "20 mm^2"\n'
+    answer = study(brief_from(tomllib.loads(text)))
     told = [line for line in answer.lines() if "of the time at" in line]
     assert len(told) == 2
     assert told[0].strip().startswith("75% of the time at 8 Hz: Type I")
     values = answer.as_dict()
     assert [part["speed"] for part in values["collective"]] == [8.0, 12.0]
     assert sum(part["share_of_damage"] for part in values["collective"]) == pytest.approx(1.0)
-    assert told[0].strip() in design_report(answer)
+    page = design_report(answer)
+    assert told[0].strip() in page
+    assert answer.wear is not None
+    assert answer.wear.told[0] in page
+    assert values["wear"]["course"][-1]["clearance"] == pytest.approx(0.3e-3)
 
 
 def test_numbers_lie_beside_the_report(answered, tmp_path):
@@ -243,6 +258,31 @@ def test_command_answers_a_brief(run, tmp_path):
     code, _, err = run(brief, "--out", page)
     assert code == 2
     assert "report.html exists" in err
+
+
+def test_briefs_are_put_side_by_side(answered, browser, tmp_path):
+    """Before and after a change: one column each, what differs, and nothing that a single report would not say."""
+    after = study(brief_from(tomllib.loads(CALM.replace('"2 %"', '"2 %"\ndamping_ratio = "5 %"'))))
+    studies = {"before.toml": answered, "after.toml": after}
+    rows = comparison_rows(studies)
+    assert rows["verdict"] == [HEADLINES[one.assessment.verdict][1] for one in studies.values()]
+    assert rows["largest peak force"][0] == f"{answered.assessment.evaluation.largest_force:.1f} N"
+    page = comparison_report(studies)
+    assert "<td>damping ratio</td>" in page
+    assert "<td>clearance</td>" in page, "in the table of results"
+    assert page.count("<td>youngs modulus</td>") == 0
+    path = tmp_path / "compared.html"
+    path.write_text(page, encoding="utf-8")
+    if CHROMIUM is not None:
+        check_page(browser, path, 2)
+
+
+def test_the_same_brief_twice_is_refused(run):
+    """One line; several briefs go without measured forces."""
+    code, _, err = run("a.toml", "a.toml")
+    assert (code, len(err.strip().splitlines())) == (2, 1)
+    assert "given twice" in err
+    assert "several briefs go without" in run("a.toml", "b.toml", "--load-rating", "500 N")[2]
 
 
 def test_command_evaluates_measured_peaks(run, tmp_path):

@@ -10,7 +10,7 @@ from chaosgym.cli.output import draw, emit, note_machine, picture_path, plot_opt
 
 
 @click.command()
-@click.argument("brief", type=click.Path(dir_okay=False), required=False, metavar="[FILE.toml]")
+@click.argument("briefs_given", type=click.Path(dir_okay=False), nargs=-1, metavar="[FILE.toml]...")
 @click.option("--template", metavar="MACHINE", help="Print a commented brief of a machine, ready to edit.")
 @measured_options
 @click.option(
@@ -23,7 +23,7 @@ from chaosgym.cli.output import draw, emit, note_machine, picture_path, plot_opt
 @click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def design(
-    brief: str | None,
+    briefs_given: tuple[str, ...],
     template: str | None,
     measured: Measured,
     load_rating: float | None,
@@ -36,7 +36,8 @@ def design(
 ) -> None:
     """Say whether a machine meets its criteria within its tolerances, and what to change if not.
 
-    FILE.toml is a brief (see --template), or a machine's file, which starts from its template.
+    FILE.toml is a brief (see --template), or a machine's file, which starts from its template. Several are put side by
+    side.
     """
     from chaosgym.design import brief as briefs
     from chaosgym.design.bearing import Criteria
@@ -46,6 +47,11 @@ def design(
 
     if template is not None:
         return click.echo(briefs.template(template), nl=False)
+    if len(briefs_given) > 1:
+        if measured or load_rating is not None or plot:
+            raise click.UsageError("several briefs go without --peaks, --series, --load-rating and --plot")
+        return _compared(briefs_given, out, overwrite, seed, workers, as_json)
+    brief = briefs_given[0] if briefs_given else None
     if (brief is None) == (load_rating is None or not measured):
         raise click.UsageError("give a brief (see --template), or --peaks FILE.csv with --load-rating")
     if plot and not measured:
@@ -88,6 +94,33 @@ def design(
         lines.append(f"{brief} is a machine's file, judged by the examples of its template; state your own criteria:")
         lines.append(f"  chaosgym design --template {brief} > brief.toml")
     if out is not None:
+        report.write_report(page, result, out, overwrite)
+        lines.append(f"report: {out}")
+    emit(result, as_json, lambda: lines)
+
+
+def _compared(
+    briefs_given: tuple[str, ...], out: str | None, overwrite: bool, seed: int, workers: int | None, as_json: bool
+) -> None:
+    """Answer several briefs, and put them side by side."""
+    from chaosgym.design.brief import read_brief
+    from chaosgym.design.study import study
+    from chaosgym.plotting import design_report as report
+
+    if len(set(briefs_given)) < len(briefs_given):
+        raise click.UsageError("a brief is given twice; give each once")
+    if out is not None:
+        report.report_paths(out, overwrite)
+    asked = {path: read_brief(path) for path in briefs_given}
+    studies = {path: study(one, seed=seed, workers=workers, progress=True) for path, one in asked.items()}
+    rows = report.comparison_rows(studies)
+    width = max(len(name) for name in rows)
+    lines = [f"{'':{width}s}  {', '.join(studies)}"]
+    lines += [f"{name:{width}s}  {' | '.join(cells)}" for name, cells in rows.items()]
+    result = {"briefs": {path: found.as_dict() for path, found in studies.items()}}
+    if out is not None:
+        command = f"chaosgym design {' '.join(briefs_given)} --seed {seed}"
+        page = report.comparison_report(studies, command, date=datetime.date.today().isoformat())
         report.write_report(page, result, out, overwrite)
         lines.append(f"report: {out}")
     emit(result, as_json, lambda: lines)

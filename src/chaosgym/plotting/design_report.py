@@ -107,6 +107,78 @@ def design_report(study: DesignStudy, command: str = "", *, date: str = "", brie
     )
 
 
+def comparison_report(studies: Mapping[str, DesignStudy], command: str = "", *, date: str = "") -> str:
+    """HTML report of several studies side by side, by name of their brief."""
+    pictures = []
+    for name, study in studies.items():
+        found = study.assessment
+        drawn = _drawn(lambda ax, found=found: figures.series_life(found, ax))  # type: ignore[misc]
+        pictures.append(_picture(drawn, f"{name}: life of each machine built to the tolerances."))
+    return _rendered(
+        "comparison.html",
+        command,
+        studies=studies,
+        names=list(studies),
+        rows=comparison_rows(studies),
+        differing=_differing(studies),
+        pictures=pictures,
+        date=date,
+    )
+
+
+def comparison_rows(studies: Mapping[str, DesignStudy]) -> dict[str, list[str]]:
+    """What each study found, by quantity, as texts for people."""
+    rows: dict[str, list[str]] = {}
+    for study in studies.values():
+        found = study.assessment
+        value, machine, period = found.evaluation, found.machine, found.cycle_period
+        best = study.improvement.best if study.improvement else None
+        meeting = study.combination.meeting
+        told = {
+            "verdict": HEADLINES[found.verdict][1],
+            "machine": machine.name,
+            "speed": quantity_of(machine, machine.speed_field),
+            "clearance": quantity_of(machine, machine.clearance_field),
+            "nominal response": found.nominal.nature,
+            "type over the tolerances": found.type,
+            "machines in the tolerances": found.series.told.partition(" of ")[0],
+            "life in operation": _hours(hours_of(value.life_interval.low, period)),
+            "life required": _hours(hours_of(found.criteria.life, period)),
+            "reliability": _share(value.reliability_interval.low),
+            "largest peak force": f"{value.largest_force:.1f} N",
+            "equivalent force": f"{value.force:.1f} N",
+            "load rating needed": f"{value.required_load_rating:.0f} N",
+            "probability of meeting life and reliability": f"{_percent(meeting.share)} "
+            f"({_percent(meeting.low)} to {_percent(meeting.high)})",
+            "cheapest change that suffices": "none needed"
+            if study.improvement is None
+            else best.told
+            if best
+            else "none",
+        }
+        for name, text in told.items():
+            rows.setdefault(name, []).append(text)
+    return rows
+
+
+def _differing(studies: Mapping[str, DesignStudy]) -> dict[str, list[str]]:
+    """Parameters with their tolerances, and criteria, that are not the same in all studies."""
+    columns = []
+    for study in studies.values():
+        found = study.assessment
+        column = {
+            name: f"{quantity_of(found.machine, name)} {_tolerance(found, name)}".strip()
+            for name in parameters_of(found.machine)
+        }
+        columns.append(
+            column
+            | {name: quantity_of(found.criteria, name) for name in parameters_of(found.criteria) if name != "life"}
+        )
+    names = dict.fromkeys(name for column in columns for name in column)
+    table = {name: [column.get(name, "–") for column in columns] for name in names}
+    return {name: cells for name, cells in table.items() if len(set(cells)) > 1}
+
+
 def measured_report(measured: MeasuredPeaks, command: str = "") -> str:
     """HTML report on measured peak forces."""
     record = _figure_of_peaks(measured.peaks, measured.criteria.life_exponent)
