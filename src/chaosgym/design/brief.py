@@ -357,16 +357,24 @@ def template(name: str) -> str:
         "",
         "[costs]  # weight of a change: weight * |ln(new / old)|; 1 if left out",
         f"{speed} = 2",
+        *(_wear_lines(machine) if parameters_of(machine)[clearance].unit == "m" else ()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _wear_lines(machine: Machine) -> list[str]:
+    """The section on wear, commented out."""
+    limit = 3e3 * getattr(machine, machine.clearance_field)
+    return [
         "",
         "# [archard]  # wear by Archard's law; left out if this section is",
-        f'# limit = "{3e3 * getattr(machine, clearance):.4g} mm"      # clearance at which the joint is worn out',
+        f'# limit = "{limit:.4g} mm"      # clearance at which the joint is worn out',
         '# sliding = "2 mm"       # of the parts by each other, in a cycle',
         '# area = "20 mm^2"       # over which wear spreads',
         '# hardness = "2 GPa"     # of the softer surface',
         "# coefficient = 1e-5     # K of lubricated steel",
         "# uncertainty = 3        # factor to which K is known",
     ]
-    return "\n".join(lines) + "\n"
 
 
 def _quoted(machine: Machine, factor: float) -> str:
