@@ -104,6 +104,8 @@ def test_guidelines_say_what_the_assessment_says(calm):
     assert any(sentence.startswith("Case I: ") and "16 periodic of 16 machines" in sentence for sentence in sentences)
     assert any("all are Type I" in sentence for sentence in sentences)
     assert ("prototype" in sentences[-1]) == (calm.verdict == "meets")
+    alone = assess(CALM, {}, Criteria(), series_size=8)
+    assert any("all are Type I" in one.sentence and "II" not in one.sentence for one in guidelines(alone))
     chaotic = replace(calm, nominal=replace(calm.nominal, nature="chaotic"))
     assert case_of(chaotic, []) == "III", "periodic machines on all sides of a chaotic one"
     open_ = replace(calm, nominal=replace(calm.nominal, nature="undetermined"), verdict="undetermined")

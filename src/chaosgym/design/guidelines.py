@@ -85,9 +85,8 @@ def guidelines(found: Assessment, further: Sequence[Neighbour] = ()) -> tuple[Gu
     said.append(Guideline("5.5.1", told))
     if case == "I":
         above = sum(one.largest_peak > (1.0 + FORCE_CHANGE) * found.nominal.largest_peak for one in machines)
-        outcome = {0: "(1): all are Type I", len(machines): "(2): all are Type II"}.get(
-            above, f"(3): {len(machines) - above} are Type I and {above} Type II, 10 % of force above the nominal one"
-        )
+        some = f"(3): {len(machines) - above} are Type I and {above} Type II, 10 % of force above the nominal one"
+        outcome = "(1): all are Type I" if not above else "(2): all are Type II" if above == len(machines) else some
         said.append(Guideline("5.5.1", f"outcome {outcome}"))
     said.append(Guideline("5.6, phase VI", EVALUATION[found.type]))
     said.append(Guideline("5.6, phase VII", _next(found)))
