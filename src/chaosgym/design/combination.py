@@ -33,7 +33,6 @@ from chaosgym.design.methodology import Assessment
 from chaosgym.design.runs import SettledRun, deviating, worse_side
 from chaosgym.diagnosis import Nature, Neighbour, Tolerance, Type
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE
-from chaosgym.errors import SimulationError
 from chaosgym.machines import Machine
 from chaosgym.simulation import parallel_map, simulate
 
@@ -107,8 +106,7 @@ class Combination:
     meeting
         Probability that a machine reaches the required life and reliability by its own statistics.
     influences
-        Of each toleranced parameter; empty without tolerances, where forces do not vary, or where a run can't be
-        finished.
+        Of each toleranced parameter; empty without tolerances, or where forces do not vary.
     sampled
         Machines that were run for the influences.
     """
@@ -247,10 +245,10 @@ def influences(
     base, seed, workers, progress
         As for ``combination``.
 
-    Returns
-    -------
-    tuple of Influence
-        Empty where there are none to tell, see ``Combination``.
+    Raises
+    ------
+    SimulationError
+        If a run can't be finished.
     """
     names = tuple(region)
     if not names:
@@ -265,10 +263,7 @@ def influences(
         peak, force = np.array(parallel_map(forces, list(points), workers=workers, progress=label)).T
         return np.array([peak, np.log(np.maximum(force, LEAST_FORCE * force.max() or 1.0))])
 
-    try:
-        found = total_indices(model, len(names), base, confidence, seed)
-    except SimulationError:  # one of hundreds at the rim of the tolerances: the report tells the rest
-        return ()
+    found = total_indices(model, len(names), base, confidence, seed)
     return tuple(Influence(*row) for row in zip(names, *found, strict=True)) if all(found) else ()
 
 
