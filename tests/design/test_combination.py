@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from chaosgym.design import Criteria, assess
-from chaosgym.design.combination import combination, own_type, probability, total_indices
+from chaosgym.design.combination import combination, influences, own_type, probability, total_indices
 from chaosgym.design.guidelines import case_of, guidelines
 from chaosgym.diagnosis import Neighbour, Tolerance
+from chaosgym.errors import SimulationError
 from chaosgym.machines import ImpactBeam
 
 CALM = ImpactBeam(excitation_frequency=8.0)
@@ -33,6 +34,27 @@ def test_total_indices_of_the_function_of_ishigami_and_homma():
     assert all(one.low < exact < one.high for one, exact in zip(found, (0.5576, 0.4424, 0.2437), strict=True))
     assert none == []
     assert total_indices(model, 3, 64, seed=1) == total_indices(model, 3, 64, seed=1)
+
+
+def test_a_single_touch_among_all_machines_gives_finite_numbers():
+    """Most resamples have no variance at all then; JSON has no number that is none."""
+
+    def model(points):
+        rare = np.zeros(len(points))
+        rare[3] = 1.0
+        return np.array([rare, np.where(np.arange(len(points)) == len(points) - 1, 1.0, 0.0)])
+
+    assert np.all(np.isfinite(total_indices(model, 2, 16)))
+
+
+def test_a_run_that_fails_leaves_the_indices_out(monkeypatch):
+    """Probabilities and the rest of a report do not rest on them."""
+
+    def failing(*_arguments, **_options):
+        raise SimulationError("no cycle")
+
+    monkeypatch.setattr("chaosgym.design.combination.simulate", failing)
+    assert influences(CALM, REGION, 3.0, base=4) == ()
 
 
 def test_a_share_has_the_interval_of_clopper_and_pearson():

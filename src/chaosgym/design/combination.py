@@ -33,6 +33,7 @@ from chaosgym.design.methodology import Assessment
 from chaosgym.design.runs import SettledRun, deviating, worse_side
 from chaosgym.diagnosis import Nature, Neighbour, Tolerance, Type
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE
+from chaosgym.errors import SimulationError
 from chaosgym.machines import Machine
 from chaosgym.simulation import parallel_map, simulate
 
@@ -106,7 +107,8 @@ class Combination:
     meeting
         Probability that a machine reaches the required life and reliability by its own statistics.
     influences
-        Of each toleranced parameter; empty without tolerances, or where forces do not vary.
+        Of each toleranced parameter; empty without tolerances, where forces do not vary, or where a run can't be
+        finished.
     sampled
         Machines that were run for the influences.
     """
@@ -245,10 +247,10 @@ def influences(
     base, seed, workers, progress
         As for ``combination``.
 
-    Raises
-    ------
-    SimulationError
-        If a run can't be finished.
+    Returns
+    -------
+    tuple of Influence
+        Empty where there are none to tell, see ``Combination``.
     """
     names = tuple(region)
     if not names:
@@ -263,7 +265,10 @@ def influences(
         peak, force = np.array(parallel_map(forces, list(points), workers=workers, progress=label)).T
         return np.array([peak, np.log(np.maximum(force, LEAST_FORCE * force.max() or 1.0))])
 
-    found = total_indices(model, len(names), base, confidence, seed)
+    try:
+        found = total_indices(model, len(names), base, confidence, seed)
+    except SimulationError:  # one of hundreds at the rim of the tolerances: the report tells the rest
+        return ()
     return tuple(Influence(*row) for row in zip(names, *found, strict=True)) if all(found) else ()
 
 
