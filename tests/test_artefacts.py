@@ -8,7 +8,8 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 
-STALE: dict[str, str] = {}
+_TYPES = "its types rest on the rule before cases I to III of 5.5.1; times and constants are measured anew together"
+STALE: dict[str, str] = {"picture:tradeoff-impact-beam": _TYPES, "picture:tradeoff-slider-crank": _TYPES}
 """Artefacts known to be stale, and why they still are. An entry goes with the commit that makes the artefact anew."""
 
 
