@@ -57,6 +57,13 @@ def test_a_run_that_fails_leaves_the_indices_out(monkeypatch):
     assert influences(CALM, REGION, 3.0, base=4) == ()
 
 
+def test_a_single_parameter_takes_part_in_all_of_the_variance():
+    """With one input every output's total index is 1, however many outputs there are."""
+    found = total_indices(lambda points: np.array([points[:, 0], points[:, 0] ** 3]), 1, 64)
+    assert [one.share for each in found for one in each] == pytest.approx([1.0, 1.0], abs=0.3)
+    assert [one.parameter for one in influences(CALM, {"clearance": Tolerance(0.05)}, 3.0, base=8)] == ["clearance"]
+
+
 def test_a_share_has_the_interval_of_clopper_and_pearson():
     """No event in 10 trials: up to 1 - 0.025^(1/10); 3 of 10: 0.0667 to 0.6525, as in tables."""
     assert probability(0, 10)[1:] == pytest.approx((0.0, 1.0 - 0.025**0.1))

@@ -307,7 +307,7 @@ def total_indices(
     kept = {name: part[..., varies, :] for name, part in answers.items()}
     drawn = [np.arange(base), *random.integers(base, size=(RESAMPLES, base))]
     found = [stats.sobol_indices(func={n: part[..., one] for n, part in kept.items()}, n=base) for one in drawn]
-    index = np.array([np.atleast_2d(one.total_order) for one in found])
+    index = np.array([np.reshape(one.total_order, (-1, dimensions)) for one in found])
     tail = 50.0 * (1.0 - confidence)
     rows = iter(np.stack([index[0], *np.percentile(index[1:], [tail, 100.0 - tail], axis=0)], axis=-1))
     return [[Probability(*row) for row in next(rows).tolist()] if one else [] for one in varies]
