@@ -292,7 +292,8 @@ class MechanismMachine(BinnedMachine):
         theta: Any = np.arange(72) * (2.0 * math.pi / 72)
         z, mass, fastest, load = self.nominal_places(theta), 0.0, 0.0, 0.0
         for link in mechanism.links:
-            moved = np.concatenate([place.moved(z[:, mechanism.at[link.name]]) for place in link.points.values()], 1)
+            own, places = z[:, mechanism.at[link.name]], (*link.points.values(), link.masses)
+            moved = np.concatenate([each.moved(own) for each in places], axis=1)
             fastest = max(fastest, float(np.ptp(moved, axis=0).max(initial=0.0)))
             mass += float(link.mass.sum() + link.inertia.sum() / max(self.revolution.length, 1e-9) ** 2)
         for force in mechanism.forces:
