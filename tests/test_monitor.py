@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import ChaosgymError, DiagnosisError
-from chaosgym.monitor import LAGS, EventLog, Monitor, RepeatSums
+from chaosgym.monitor import DEAD, LAGS, LONGEST, EventLog, Monitor, RepeatSums
 from tests.classifier.made_up import settled
 
 ERROR = 1.0
@@ -74,6 +74,57 @@ def test_amplitude_counts_from_the_last_change():
     assert list(Monitor(ERROR).watch(noisy(peaks, 5)))[-1].amplitude < 1.2
 
 
+def pink(rng, cycles):
+    """1/f noise with a standard deviation of 1."""
+    frequency = np.fft.rfftfreq(cycles)
+    spectrum = rng.normal(size=len(frequency)) + 1j * rng.normal(size=len(frequency))
+    spectrum[1:] /= np.sqrt(frequency[1:])
+    spectrum[0] = 0.0
+    made = np.fft.irfft(spectrum, cycles)
+    return made / made.std()
+
+
+@pytest.mark.parametrize("kind", ["pink, learned", "normal, learned", "sensor 1.5 times worse", "periods 9, 12 and 16"])
+def test_harmless_scatter_raises_no_alarm_in_thousands_of_cycles(kind):
+    """Pink noise of 1 % with a learned error, a sensor that is worse than told, and long periods: no alarm."""
+    rng = np.random.default_rng(7)
+    runs = {
+        "pink, learned": lambda: [(None, 50.0 + 0.5 * pink(rng, 5000))],
+        "normal, learned": lambda: [(None, 50.0 + 0.5 * rng.normal(size=5000))],
+        "sensor 1.5 times worse": lambda: [(1.0, 50.0 + 1.5 * rng.uniform(-1.0, 1.0, 5000))],
+        "periods 9, 12 and 16": lambda: [
+            (1.0, np.resize(50.0 + 20.0 * rng.random(k), 1700) + rng.uniform(-1.0, 1.0, 1700)) for k in (9, 12, 16)
+        ],
+    }[kind]()
+    seen = [[one.event for one in Monitor(error, longest_period=LONGEST).watch(peaks)] for error, peaks in runs]
+    assert sum(events.count("alarm") for events in seen) == 0
+
+
+def test_a_learned_error_still_finds_chaos():
+    """After 64 regular cycles chaos raises the alarm within 16 cycles, and the state tells the learned error."""
+    monitor = Monitor()
+    list(monitor.watch(noisy(settled(3.2, 100), 1)))
+    assert monitor.state["sensor_error"] == pytest.approx(1.1 * ERROR, rel=0.3)
+    alarms = [seen.cycle for seen in monitor.watch(noisy(settled(3.9, 60), 2)) if seen.event == "alarm"]
+    assert alarms[0] <= 116
+
+
+def test_a_dead_sensor_and_missing_cycles_are_events():
+    """Equal readings after others, and zeros; a missing cycle keeps the phase, so that period 3 goes on."""
+    told = []
+    monitor = Monitor(ERROR, on_event=lambda seen: told.append((seen.cycle, seen.event)))
+    list(monitor.watch(noisy(np.full(70, 50.0), 3)))
+    list(monitor.watch(np.full(2 * DEAD, 50.0)))
+    assert told == [(70 + DEAD, "dead sensor")]
+    assert monitor.state["dead"]
+    told.clear()
+    monitor.reset()
+    for cycle, peak in enumerate(noisy(np.resize([40.0, 50.0, 60.0], 300), 4)):
+        monitor.skip() if cycle == 100 else monitor.update(peak)
+    assert told == [(101, "missing")]
+    assert monitor.state["missing"] == 1
+
+
 @pytest.mark.parametrize("peak", [-1.0, np.nan, np.inf])
 def test_bad_peaks_are_named_and_not_counted(peak):
     """A reading that is no force raises; the monitor goes on as if it had not come."""
@@ -107,11 +158,11 @@ def test_the_log_holds_every_event(tmp_path):
 def test_monitors_side_by_side_are_monitors():
     """The sums of three sensors, one of which starts anew on the way, are those of a monitor each, bit for bit."""
     peaks = 50.0 + np.random.default_rng(0).uniform(-4.0, 4.0, (40, 3))
-    sums, monitors = RepeatSums(3), [Monitor(3.0) for _ in range(3)]
+    sums, monitors = RepeatSums(3), [Monitor(5.0) for _ in range(3)]
     for cycle, row in enumerate(peaks):
         if cycle == 15:
             sums.forget(np.array([1]))
             monitors[1].reset()
-        sums.add(np.arange(3), row, 3.0)
+        sums.add(np.arange(3), row, 5.0)
         levels = [monitor.update(float(peak)).level for monitor, peak in zip(monitors, row, strict=True)]
         assert np.array_equal(sums.level(np.arange(3)), levels)

@@ -131,11 +131,26 @@ def test_monitor_prints_a_line_each_cycle_and_logs_its_events(tmp_path):
     seen = [json.loads(line) for line in out.splitlines()]
     assert code == 0
     assert [one["cycle"] for one in seen] == list(range(1, 61))
-    assert [one["alarm"] for one in seen[16:40]] == [False] * 24
+    assert [one["alarm"] for one in seen[32:40]] == [False] * 8
     assert seen[-1]["alarm"]
     (alarm,) = [one["cycle"] for one in seen if one["event"] == "alarm"]
     assert 41 <= alarm <= 50
     assert f"{alarm},alarm," in log.read_text()
+
+
+def test_a_watch_survives_what_is_no_reading():
+    """Text, NaN, a negative force and a column that is short are counted and warned of; the watch goes on."""
+    lines = [f"{k};{50.0 + 0.1 * (k % 3)}" for k in range(80)]
+    lines[40:44] = ["40;nan", "41;abc", "42;-3", "43"]
+    code, out, err = run("--follow", "--column", "2", "--json", stdin="\n".join(["cycle;F [N]", *lines]))
+    seen = [json.loads(line) for line in out.splitlines()]
+    assert code == 0
+    assert [one["event"] for one in seen if one["event"]] == ["missing"] * 4
+    assert seen[-1]["alarm"] is False
+    assert err.count("left out") == 4
+    code, _, err = run("--follow", stdin="100 N\n" * 300)
+    assert code == 2
+    assert "state --column" in err
 
 
 def test_monitor_answers_before_the_next_peak_comes():
@@ -230,7 +245,8 @@ def test_bad_options_end_in_one_line(model, tmp_path):
         (("--batch", tmp_path / "in.parquet", *out), "no column excitation_frequency"),
         (("--batch", tmp_path / "words.parquet", *out), "can't be read as Parquet"),
         (("--sensor-error", "3"), "belongs to --peaks, --series or --follow"),
-        (("--follow",), "needs --sensor-error"),
+        (("--delimiter", ";"), "belongs to --follow"),
+        (("--follow", "--timeout-s", "0"), "out of range"),
         (("--peaks", "-", "--budget-us", "9"), "belong to a machine"),
         (("--log", "events.csv"), "belongs to --follow"),
     ):

@@ -142,6 +142,7 @@ def test_simulated_series_are_read_back(tmp_path):
         (("diagnose", "--peaks", "-", "--sensor-error", "inf"), "is no finite number"),
         (("diagnose", "--peaks", "-", "--sensor-error", "3 m"), "unknown unit 'm' (allowed: N, kN"),
         (("diagnose", "impact-beam", "--sensor-error", "inf"), "is no finite number"),
+        (("diagnose", "impact-beam", "--sensor-error", "3 m"), "the sensor's error is in m; allowed without a file"),
         (("diagnose", "--peaks", "-", "--hz", "20"), "--hz belongs to --series"),
         (("diagnose", "--peaks", "-", "--series", "-"), "exclude each other"),
         (("diagnose", "--peaks", "-", "--sensor-error", "1", "--sensor-sigma", "1"), "given twice"),
@@ -321,3 +322,28 @@ def test_a_speed_column_belongs_to_a_sweep():
     code, _, err = run("diagnose", "impact-beam", "--speed-column", "x")
     assert code == 2
     assert "--speed-column belongs to --sweep" in err
+
+
+def test_an_acceleration_is_judged_in_its_own_unit(tmp_path):
+    """g stays g in every sentence; life asks for a force, which a calibration gives."""
+    path = tmp_path / "peaks.csv"
+    rng = np.random.default_rng(0)
+    path.write_text("Acc [g]\n" + "".join(f"{a:.5f}\n" for a in 3.0 + 0.01 * rng.normal(size=200)))
+    code, out, _ = run("diagnose", "--peaks", path, "--sensor-error", "0.05 g")
+    assert code == 0
+    assert "periodic, period 1" in out
+    assert " N" not in out
+    told = json.loads(run("diagnose", "--peaks", path, "--json")[1])
+    assert told["unit"] == "g"
+    assert told["peak_summary"]["mean"] == pytest.approx(3.0, rel=0.01)
+    code, _, err = run("diagnose", "--peaks", path, "--sensor-error", "0.05 mV")
+    assert code == 2
+    assert "in mV, the readings are in g" in err
+    code, _, err = run("design", "--peaks", path, "--load-rating", "500 N")
+    assert code == 2
+    assert "asks for a force; state --scale" in err
+    assert run("design", "--peaks", path, "--load-rating", "500 N", "--scale", "0.02 g/N")[0] == 0
+    code, out, _ = run("diagnose", "--peaks", path, "--scale", "0.02 g/N")
+    assert code == 0
+    assert "mean 150.0" in out
+    assert run("diagnose", "--peaks", path, "--plot", tmp_path / "g.png")[0] == 0

@@ -1,4 +1,9 @@
-"""One verdict on measured peaks: right, or an honest "can't tell", whatever sensor and recorder did to them."""
+"""One verdict on measured peaks: right, or an honest "can't tell", whatever sensor and recorder did to them.
+
+``python -m tests.diagnosis.test_measured 8`` prints the tables of the first eight records of each kind.
+"""
+
+import sys
 
 import numpy as np
 import pytest
@@ -46,10 +51,10 @@ def show(counts):
 
 
 def check(counts, wrong):
-    """At most 1 % wrong, and 35 % undetermined where the truth is in reach; the docs tell aims and misses."""
+    """At most 1 % wrong, and 20 % undetermined where the truth is in reach; the docs tell aims and misses."""
     show(counts)
     assert share(counts, "all", "wrong") <= 0.01, wrong
-    assert share(counts, "all", "undetermined", (True,)) <= 0.35
+    assert share(counts, "all", "undetermined", (True,)) <= 0.2
 
 
 def test_records_of_known_nature_are_judged_rightly():
@@ -73,14 +78,15 @@ def test_systems_that_no_threshold_was_set_on_are_judged_rightly():
 
 @pytest.mark.slow
 def test_chaos_of_maps_is_found_through_one_percent_of_noise():
-    """500 cycles of four chaotic systems, sensor noise of 1 % of the mean force: three in five are found at least."""
+    """500 cycles of four chaotic systems, noise of 1 % of the mean force: nine in ten are found, none is periodic."""
     rng, found = np.random.default_rng(31), []
     for k in range(100):
         kind = list(held_out.CHAOS)[k % 4]
         series = held_out.force(held_out.CHAOS[kind](rng, 500, k, 0.0), rng, rng.uniform(0.1, 0.3))
         found.append(judge_peaks(series + 0.01 * series.mean() * rng.normal(size=500)).diagnosis.nature)
     print({nature: found.count(nature) for nature in set(found)})
-    assert found.count("chaotic") >= 60
+    assert found.count("chaotic") >= 90
+    assert found.count("periodic") == 0
 
 
 def test_random_scatter_is_never_chaos():
@@ -277,3 +283,41 @@ def test_no_contact_is_said():
     verdict = judge_peaks(np.zeros(50)).diagnosis
     assert verdict.nature == "undetermined"
     assert "no contact" in verdict.reason
+
+
+def test_cycles_are_not_filled_into_chaos():
+    """The delayed logistic map dwells near its fixed point; no gap is reported, and its map is found through 1 %."""
+    x, y, series = 0.1, 0.2, []
+    for _ in range(900):
+        x, y = 2.27 * x * (1.0 - y), x
+        series.append(x)
+    peaks = 50.0 * (1.0 + 0.2 * (np.array(series[400:]) - 0.5) / 0.3)
+    found = judge_peaks(peaks + 0.5 * np.random.default_rng(10).normal(size=500))
+    assert found.gaps == ()
+    assert found.diagnosis.nature == "chaotic"
+
+
+def test_a_hum_is_no_period():
+    """One line at a fifth of the speed over 64 cycles may be a hum, and is no period five; a pattern is."""
+    rng = np.random.default_rng(11)
+    hum = 50.0 + 2.0 * np.cos(2.0 * np.pi * 0.2003 * np.arange(64)) + 0.3 * rng.normal(size=64)
+    assert judge_peaks(hum).diagnosis.nature == "undetermined"
+    pattern = np.resize([40.0, 70.0, 60.0, 50.0, 55.0], 64) + 0.3 * rng.normal(size=64)
+    assert judge_peaks(pattern).diagnosis.period == 5
+
+
+def test_sizes_are_told_in_the_unit_of_the_readings():
+    """No newton in what is said of an acceleration."""
+    peaks = 3.0 + 0.02 * np.random.default_rng(12).normal(size=300)
+    verdict = judge_peaks(peaks, unit="g")
+    assert verdict.unit == "g"
+    assert "scatter of 0.0193 g" in verdict.diagnosis.reason
+    assert " N" not in verdict.diagnosis.reason
+
+
+if __name__ == "__main__":
+    for name, module, first in (("process", process_records, 7000), ("held out", held_out, 9000)):
+        print(name)
+        found, missed = judged(module, module.KINDS, range(first, first + int(sys.argv[1])))
+        show(found)
+        print(*missed, sep="\n")

@@ -2,7 +2,9 @@
 
 import hashlib
 import io
+import os
 import sys
+import threading
 
 import numpy as np
 import pyarrow as pa
@@ -12,7 +14,7 @@ from scipy.io import savemat, wavfile
 
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals.columns import choose_force, forces
-from chaosgym.signals.read import parse_reading, read_recording
+from chaosgym.signals.read import read_recording
 
 FORCES = [48.25, 49.5, 47.75, 48.0, 50.25]
 
@@ -90,7 +92,7 @@ def test_a_hash_tells_files_apart(tmp_path):
         ("left [N],right [N]\n1,2\n3,1\n", "several columns that could be forces: 'left', 'right'; use --column"),
         ("cycle,rpm\n1,1140\n2,1141\n3,1139\n", "no column that could be a force"),
         ("1\n2\n3\n4\n5\n6\n", "rises like a counter"),
-        ("F [V]\n1\n2\n1\n", "no column that could be a force"),
+        ("angle [deg]\n1\n2\n1\n", "no column that could be a force"),
         ("a,b\n1,2\n1,2,3\n", "line 3 has 3 columns; allowed: 2"),
     ],
 )
@@ -111,8 +113,40 @@ def test_a_column_is_taken_by_name_number_and_unit(tmp_path):
     assert choose_force(read_recording(path), "1", "kN").values.tolist() == [1000.0, 3000.0, 2000.0]
     with pytest.raises(DiagnosisError, match="no column 'middle'; its columns: 'left', 'right'"):
         choose_force(read_recording(path), "middle")
-    with pytest.raises(DiagnosisError, match="'left' is in V, no unit of force; allowed: N"):
-        choose_force(read_recording(path), "left", "V")
+    assert choose_force(read_recording(path), "left", "V").unit == "V"
+    with pytest.raises(DiagnosisError, match="'left' is in furlong, no unit that is known; allowed: N"):
+        choose_force(read_recording(path), "left", "furlong")
+
+
+@pytest.mark.parametrize(
+    ("title", "scale", "values", "unit"),
+    [
+        ("Acc [g]", None, [1.0, 3.0, 2.0], "g"),
+        ("F [daN]", None, [10.0, 30.0, 20.0], "N"),
+        ("Channel A [mV]", "100 mV/N", [0.01, 0.03, 0.02], "N"),
+        ("Channel A [V]", "100 mV/N", [10.0, 30.0, 20.0], "N"),
+        ("Channel A [V]", "2 kN/V", [2000.0, 6000.0, 4000.0], "N"),
+        ("Channel A [mV]", "10 mV/g", [0.1, 0.3, 0.2], "g"),
+        ("Channel A [mV]", "10 mV/m/s2", [0.1, 0.3, 0.2], "m/s2"),
+        ("plain", "50 N/FS", [50.0, 150.0, 100.0], "N"),
+    ],
+)
+def test_other_quantities_keep_their_unit_or_are_calibrated(title, scale, values, unit, tmp_path):
+    """An acceleration stays in g; a voltage becomes a force by the sensor's sensitivity or the amplifier's range."""
+    path = tmp_path / "record.csv"
+    path.write_text(f"{title}\n1\n3\n2\n")
+    signal = choose_force(read_recording(path), scale=scale)
+    np.testing.assert_allclose(signal.values, values)
+    assert signal.unit == unit
+
+
+@pytest.mark.parametrize("scale", ["mV/N", "0 mV/N", "-3 mV/N", "nan mV/N", "1e999 mV/N", "3 apples/pear", "3 g/N"])
+def test_what_is_no_calibration_is_refused(scale, tmp_path):
+    """One line that says what is allowed."""
+    path = tmp_path / "record.csv"
+    path.write_text("Channel A [mV]\n1\n3\n2\n")
+    with pytest.raises(DiagnosisError, match=r"--scale .* (is no calibration|does not fit)"):
+        choose_force(read_recording(path), scale=scale)
 
 
 def test_a_counter_is_no_force_even_when_it_is_named(tmp_path):
@@ -133,19 +167,6 @@ def test_runs_are_columns_of_unequal_length(tmp_path):
         forces(read_recording(path))
 
 
-def test_lines_of_a_stream_are_read_as_those_of_a_file():
-    """Decimal commas, headings and comments; anything else names its line."""
-    assert parse_reading("48,5\n", 3, first=False) == 48.5
-    assert parse_reading("force [N]\n", 1, first=True) is None
-    assert parse_reading("# pause\n", 5, first=False) is None
-    assert parse_reading('"48,5"\n', 5, first=False) == 48.5
-    with pytest.raises(DiagnosisError, match="line 4"):
-        parse_reading('"48.5\n', 4, first=False)
-    for text in ("abc", "nan", "1;2"):
-        with pytest.raises(DiagnosisError, match="line 4"):
-            parse_reading(text, 4, first=False)
-
-
 @pytest.mark.parametrize(("row", "count"), [('"{}', 180), ('"{},1', 180), ('{},"1', 180)])
 @pytest.mark.parametrize("every", [1, 3, 180])
 def test_no_reading_is_dropped_for_a_quote(tmp_path, row, count, every):
@@ -157,3 +178,27 @@ def test_no_reading_is_dropped_for_a_quote(tmp_path, row, count, every):
     torn = len(range(0, count, every))
     with pytest.raises(DiagnosisError, match=f"line 2: a quote is not closed, as in {torn} of {count} lines"):
         choose_force(read_recording(path), "force")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="named pipes")
+def test_pipes_and_devices_never_hang(tmp_path):
+    """A pipe that nothing writes into and a device are refused within seconds; a pipe that is written is read."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(DiagnosisError, match="into which nothing was written"):
+        read_recording(pipe)
+    with pytest.raises(DiagnosisError, match="is a device"):
+        read_recording("/dev/zero")
+    writer = threading.Thread(target=pipe.write_text, args=("48.5\n47\n48\n" * 20000,))
+    writer.start()
+    assert len(choose_force(read_recording(pipe)).values) == 60000
+    writer.join()
+
+
+def test_a_file_that_is_too_large_is_refused_at_once(tmp_path):
+    """2 GiB, of which nothing is read."""
+    path = tmp_path / "large.csv"
+    with open(path, "wb") as file:
+        file.truncate(2**31)
+    with pytest.raises(DiagnosisError, match=r"holds 2\.0 GiB; allowed: up to 1 GiB"):
+        read_recording(path)

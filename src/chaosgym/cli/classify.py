@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.machine_options import Quantity, machine_command
 from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, run_lines
 from chaosgym.cli.output import draw, emit, patience, picture_path, plot_option
 from chaosgym.machines import MACHINES
@@ -36,6 +36,8 @@ def _quick_start(arguments: list[str]) -> None:
 @click.option("--nature-only", is_flag=True, help="Don't judge the type, which needs the four neighbours.")
 @click.option("--follow", is_flag=True, help="Watch peaks from standard input, one a line: a monitor with an alarm.")
 @click.option("--log", type=click.Path(dir_okay=False), help="CSV file to which --follow appends its events.")
+@click.option("--delimiter", metavar="TEXT", help="Between the columns of --follow; default: found from each line.")
+@click.option("--timeout-s", type=Quantity("s"), help="Time without a line after which --follow says: stalled.")
 @click.option("--batch", type=click.Path(exists=True, dir_okay=False), help="Judge every row of a Parquet file.")
 @click.option("--out", type=click.Path(dir_okay=False), help="Parquet file for the answers of --batch.")
 @measured_options
@@ -50,6 +52,8 @@ def classify(
     nature_only: bool,
     follow: bool,
     log: str | None,
+    delimiter: str | None,
+    timeout_s: float | None,
     batch: str | None,
     out: str | None,
     model: str | None,
@@ -66,12 +70,18 @@ def classify(
     half_width = _half_width(measured, follow)
     if (budget_us is not None or nature_only) and (measured or follow):
         raise click.UsageError("--budget-us and --nature-only belong to a machine or --batch, not to records")
-    if log and not follow:
-        raise click.UsageError("--log belongs to --follow")
+    for name, given in (("--log", log), ("--delimiter", delimiter), ("--timeout-s", timeout_s)):
+        if given is not None and not follow:
+            raise click.UsageError(f"{name} belongs to --follow")
+    if timeout_s is not None and not 0.0 < timeout_s < 1e6:
+        raise click.UsageError(f"--timeout-s {timeout_s:g} is out of range; allowed: above 0")
     if plot and not measured:
         raise click.UsageError("--plot goes with --peaks or --series; `chaosgym diagnose` draws a machine")
     if follow:
-        return _follow(sys.stdin, half_width, log, as_json)
+        from chaosgym.signals.stream import LineReader
+
+        reader = LineReader(measured.column, delimiter, measured.unit, measured.scale)
+        return _follow(sys.stdin, reader, half_width, log, timeout_s, as_json)
     from chaosgym.classifier import MachineClassifier, classifier_for
 
     classifier = MachineClassifier.load(model) if model else classifier_for(machine)
@@ -141,7 +151,7 @@ def _classify_measured(
     machine = classifier.machine.name
     picture = picture_path(plot, f"classify-{machine}")
     results, lines, drawn = {}, [], []
-    runs = measured_runs(measured, several=True)
+    runs = measured_runs(measured, several=True, of_force=True)
     for run in runs:
         try:
             learned = classifier.classify_record(run.peaks, sensor_error=half_width)
@@ -187,22 +197,42 @@ def _classify_batch(
     )
 
 
-def _follow(lines: Iterable[str], sensor_error: float | None, log: str | None, as_json: bool) -> None:
-    """Print a verdict each cycle, and a line for every event."""
-    from chaosgym.monitor import EventLog, Monitor
-    from chaosgym.signals.read import parse_reading
+GIVE_UP = 100
+"""Lines without a reading after which the stream is taken for the wrong one."""
 
-    if sensor_error is None:
-        raise click.UsageError(
-            "--follow needs --sensor-error N, the largest error of a peak: what is noise, what is not"
-        )
-    monitor = Monitor(sensor_error)
+
+def _follow(
+    lines: Iterable[str],
+    reader: Any,
+    sensor_error: float | None,
+    log: str | None,
+    timeout: float | None,
+    as_json: bool,
+) -> None:
+    """Print a verdict each cycle, and a line for every event; what is no reading is counted, warned of and survived."""
+    from chaosgym.errors import DiagnosisError
+    from chaosgym.monitor import LONGEST, EventLog, Monitor
+    from chaosgym.signals.stream import stalls
+
+    monitor = Monitor(sensor_error, longest_period=LONGEST)
     with EventLog(log) as events:
-        for number, line in enumerate(lines, start=1):
-            peak = parse_reading(line, number, first=monitor.cycle == 0)
-            if peak is None:
+        for number, line in stalls(lines, timeout):
+            if line is None:
+                emit({"event": "stalled", "cycle": monitor.cycle}, as_json, lambda: ["no reading comes  <- stalled"])
+                sys.stdout.flush()
                 continue
-            seen = monitor.update(peak)
+            try:
+                peak = reader.read(line, number, first=monitor.cycle == 0)
+                if peak is None and (number < GIVE_UP or monitor.cycle):
+                    continue
+                if peak is None:
+                    raise DiagnosisError(f"the first {number} lines hold no reading; state --column and --delimiter")
+                seen = monitor.update(peak)
+            except DiagnosisError as error:
+                if monitor.cycle == 0:
+                    raise
+                seen = monitor.skip()
+                click.echo(f"warning: {error}; left out, {monitor.missing} so far", err=True)
             events.note(seen)
             emit(seen.as_dict(), as_json, lambda: [str(seen)])  # noqa: B023
             sys.stdout.flush()

@@ -65,7 +65,7 @@ def design(
         note_machine(asked.machine)
     if measured:
         criteria = asked.criteria if asked is not None else Criteria(load_rating=load_rating or 0.0)
-        (run,) = measured_runs(measured)
+        (run,) = measured_runs(measured, of_force=True)
         source = {
             "file": run.source,
             "sha256": run.sha256,

@@ -82,7 +82,12 @@ def diagnose(
         (run,) = measured_runs(measured)
         result, lines = run_as_dict(run), run_lines(run.source, run)
         name = f"{Path(run.source).name}, {run.name}"
-        draw(picture, lambda plots: plots.measured_figure(run.peaks, run.verdict.diagnosis, name), result, lines)
+        draw(
+            picture,
+            lambda plots: plots.measured_figure(run.peaks, run.verdict.diagnosis, name, run.unit),
+            result,
+            lines,
+        )
     elif machine is None:
         raise click.UsageError(f"give a machine ({', '.join(MACHINES)}), --peaks FILE, --series FILE or --sweep FILE")
     elif test == "two-step":
@@ -262,7 +267,7 @@ def overlay(machine: Any, measured: Measured, out: Path, as_json: bool) -> None:
     from chaosgym.diagnosis.overlay import overlay as compare
     from chaosgym.plotting.commands import overlay_figure
 
-    (run,) = measured_runs(measured)
+    (run,) = measured_runs(measured, of_force=True)
     found = compare(machine, run.peaks, run.verdict.diagnosis, larger=bool(measured.series))
     try:
         overlay_figure(found).savefig(out, dpi=130)

@@ -71,6 +71,12 @@ def force_line(summary: Mapping[str, float]) -> str:
     )
 
 
+def reading_line(summary: Mapping[str, float], unit: str) -> str:
+    """How readings in any unit lie."""
+    told = {name: f"{summary[name]:.4g} {unit}" for name in ("min", "max", "mean", "std")}
+    return f"{told['min']} to {told['max']}, mean {told['mean']}, standard deviation {told['std']}"
+
+
 @contextmanager
 def patience(what: str) -> Iterator[None]:
     """Say on standard error, after two seconds and then every ten, that ``what`` goes on; on a terminal in one line."""

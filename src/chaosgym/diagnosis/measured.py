@@ -8,6 +8,7 @@ r"""The nature of a measured record: one answer from peaks and the sensor's erro
 """
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -37,25 +38,31 @@ def judge_peaks(
     sensor_error: float | None = None,
     sensor_sigma: float | None = None,
     resolution: float = 0.0,
+    unit: str = "N",
 ) -> MeasuredVerdict:
     """Tell the nature of a measured response from one reading a cycle.
 
     Parameters
     ----------
     peaks : (cycles,)
-        Peak force of each cycle, or any other reading once a cycle, in one unit [N].
+        Peak force [N] of each cycle, or any other reading once a cycle, in ``unit``.
     sensor_error
         Largest error of a reading (half width), if it is known.
     sensor_sigma
         Its standard deviation instead. Without either the error is estimated from the record.
     resolution
         Half width of what the evaluation itself adds, such as the sampling of a series.
+    unit
+        Unit of the readings, in which the verdict tells sizes.
 
     Raises
     ------
     DiagnosisError
         If there are fewer than 8 readings, one is not finite or beyond 1e9, or the error is none.
     """
+    if unit != "N":
+        verdict = judge_peaks(peaks, sensor_error=sensor_error, sensor_sigma=sensor_sigma, resolution=resolution)
+        return _in_unit(verdict, unit)
     readings = _checked(peaks)
     told = stated_error(sensor_error, sensor_sigma)
     if not np.any(readings):
@@ -71,7 +78,7 @@ def judge_peaks(
     parts = _parts(whole, resolved / math.sqrt(3.0) + 1e-5 * float(np.max(np.abs(whole))), MOST_PARTS)
     verdicts = [_judge_part(part, told, resolved) for part in parts]
     verdict = _joined(verdicts, [len(part) for part in parts])
-    if len(parts) > 2 and verdict.diagnosis.nature == "undetermined":
+    if len(parts) > 1 and verdict.diagnosis.nature == "undetermined":
         verdict = _judge_part(whole, told, resolved)
     changes = tuple(int(place) + 1 for place in np.cumsum([len(part) for part in parts])[:-1])
     notes = [*verdict.notes]
@@ -82,6 +89,16 @@ def judge_peaks(
     if len(changes) == 1:
         notes.insert(0, f"the response changes at cycle {changes[0]}")
     return replace(verdict, outliers=outliers, gaps=gaps, changes=changes, notes=tuple(notes))
+
+
+def _in_unit(verdict: MeasuredVerdict, unit: str) -> MeasuredVerdict:
+    """The verdict with its sizes in another unit than newton."""
+
+    def shown(text: str) -> str:
+        return re.sub(r"(?<=\d) N\b", f" {unit}", text.replace("the force", "the reading"))
+
+    diagnosis = replace(verdict.diagnosis, reason=shown(verdict.diagnosis.reason))
+    return replace(verdict, diagnosis=diagnosis, notes=tuple(map(shown, verdict.notes)), unit=unit)
 
 
 def _checked(peaks: ArrayLike) -> Array:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.diagnosis.determinism import Determinism, beats_surrogates, determinism
+from chaosgym.diagnosis.determinism import DRIVEN, LEAST_GAIN, Determinism, beats_surrogates, determinism, drive
 from chaosgym.diagnosis.response import Diagnosis
 from chaosgym.diagnosis.two_step import CHAOTIC_CYCLES, MAX_LINES, QUASIPERIODIC_CYCLES
 from chaosgym.signals.noise import (
@@ -83,6 +83,15 @@ would matter."""
 PATTERN, LONGEST_PATTERN, SEEN = 2.0, 32, 12
 """Standard deviation of a pattern in those of the scatter around it, its longest period, and how often it is seen."""
 
+NOISE_SHARE = 0.5
+"""Share of the scatter that a forecast must leave where noise alone keeps a resting map apart."""
+
+ONE_LINE, LONE_LINE_PERIOD = 0.9, 5
+"""Share of a pattern's variance in one line of the spectrum, and period, from which it may be a hum of the mains."""
+
+FEW_LINES, LINES_REST = 2, 1.2
+"""Sinusoids that may explain the readings as well as a map, and the factor by which they must leave more than it."""
+
 TORUS_REST = 0.3
 """Share of its standard deviation that the lines of a torus may leave."""
 
@@ -117,6 +126,8 @@ class MeasuredVerdict:
         First cycles, from 1, of a later regime.
     notes
         Sentences for people on what was left out, and on drift.
+    unit
+        Unit of the readings.
     """
 
     diagnosis: Diagnosis
@@ -128,12 +139,13 @@ class MeasuredVerdict:
     gaps: tuple[int, ...] = ()
     changes: tuple[int, ...] = ()
     notes: tuple[str, ...] = ()
+    unit: str = "N"
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON: those of the diagnosis, and what is known of the readings."""
         error = None if self.error is None else self.error._asdict()
         own: dict[str, Any] = {n: list(getattr(self, n)) for n in ("outliers", "gaps", "changes", "notes")}
-        own |= {name: getattr(self, name) for name in ("scatter", "coefficient_of_variation", "random")}
+        own |= {name: getattr(self, name) for name in ("scatter", "coefficient_of_variation", "random", "unit")}
         own["condition"] = self.diagnosis.condition
         return {**self.diagnosis.as_dict(), "sensor_error": error, **own}
 
@@ -184,13 +196,20 @@ class Scatter:
         half = size // (2 * k) * k
         halves = [part.reshape(-1, k).mean(axis=0) for part in (self.readings[:half], self.readings[half : 2 * half])]
         patterns = [pattern - pattern.mean() for pattern in halves]
+        if k >= LONE_LINE_PERIOD and _is_one_line(patterns[0] + patterns[1]):
+            return False
         stands_out = min(float(np.std(pattern)) for pattern in patterns) >= PATTERN * self.sigma
-        apart = max(1.0, 4.0 * math.sqrt(2.0 * k / half)) * self.sigma
+        apart = max(0.5, 4.0 * math.sqrt(2.0 * k / half)) * self.sigma
         return stands_out and float(np.max(np.abs(patterns[0] - patterns[1]))) < apart
 
     def evidence(self) -> dict[str, float]:
         """Figures for JSON."""
         return {"scatter_sigma": self.sigma, "scatter_share": self.relative, "predictability": self.forecast}
+
+
+def _is_one_line(pattern: Array) -> bool:
+    power = np.abs(np.fft.rfft(pattern)) ** 2
+    return float(power.max()) > ONE_LINE * float(power.sum())
 
 
 def scatter_of(readings: Array, floor: float) -> Scatter:
@@ -287,9 +306,10 @@ def _random(found: Scatter, fitted: Determinism, told: SensorError | None) -> Me
     """
     size = len(found.readings)
     small = found.relative <= (SMALL_SCATTER if size >= ENOUGH_CYCLES else 0.1 * SMALL_SCATTER)
-    if not (found.has_pattern or (small and found.period == 1 and found.random)):
+    if not (found.has_pattern or (small and found.period == 1)):
         return None
-    if not fitted.map_rests and beats_surrogates(found.residual):
+    rests = fitted.map_rests and not _forecast_gains(found, fitted, NOISE_SHARE)
+    if not rests and beats_surrogates(found.residual):
         return None
     kind = "random" if found.random else "random, correlated"
     how = f"with {kind} scatter of {newton(found.sigma)} (standard deviation, {100.0 * found.relative:.2g} %)"
@@ -319,9 +339,20 @@ def _open(found: Scatter, reason: str, error: SensorError | None) -> MeasuredVer
 
 
 def _is_chaotic(found: Scatter, fitted: Determinism) -> bool:
-    """Whether the map is chaotic, forecasts better than a fixed pattern, and gains more than in random surrogates."""
-    better = fitted.nonlinear < 0.5 * found.sigma**2 / float(np.var(found.readings))
-    return better and fitted.map_is_chaotic and beats_surrogates(found.readings, (fitted.dimension,))
+    """Whether the map is chaotic, better than a fixed pattern and than in random surrogates, and no line drives it."""
+    better = _forecast_gains(found, fitted, LEAST_GAIN)
+    if not (better and fitted.map_is_chaotic):
+        return False
+    rest, _ = without_lines(found.readings, FEW_LINES, 0.0)
+    lines_explain = float(np.var(rest)) < LINES_REST * fitted.nonlinear * float(np.var(found.readings))
+    if lines_explain or drive(found.readings)[0] <= DRIVEN:
+        return False
+    return beats_surrogates(found.readings, (fitted.dimension,), (fitted.width,))
+
+
+def _forecast_gains(found: Scatter, fitted: Determinism, least: float) -> bool:
+    """Whether the forecast leaves less than this share of the scatter around the fixed pattern."""
+    return fitted.nonlinear < least * found.sigma**2 / float(np.var(found.readings))
 
 
 def _chaotic(found: Scatter, fitted: Determinism, told: SensorError | None) -> MeasuredVerdict:
@@ -330,7 +361,7 @@ def _chaotic(found: Scatter, fitted: Determinism, told: SensorError | None) -> M
     reason = (
         f"{_beyond(found, told)}: a map of {last} forecasts all but {100.0 * fitted.nonlinear:.2g} % of the variance "
         f"(linear: all but {100.0 * fitted.linear:.2g} %), and without noise it is chaotic, exponent {middle:.2f} a "
-        f"cycle, above {low:.2f} in nine of ten refits"
+        f"cycle, above {low:.2f} in three of four refits"
     )
     figures = {
         "map_dimension": fitted.dimension,

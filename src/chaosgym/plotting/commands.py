@@ -161,13 +161,17 @@ def _told(verdict: Diagnosis) -> str:
 
 
 @_styled
-def measured_figure(peaks: Array, verdict: Diagnosis, title: str) -> Figure:
-    """Measured peak forces over the cycles, and their return map."""
+def measured_figure(peaks: Array, verdict: Diagnosis, title: str, unit: str = "N") -> Figure:
+    """Measured peaks over the cycles, and their return map."""
     colour = NATURE_COLOURS[verdict.nature]
     figure = figure_of(WIDTH, 5.6)
     over, mapped = figure.subplots(2, 1, height_ratios=(2, 3))
     response.cycle_points(peaks, over, color=colour)
     response.next_peak(peaks, mapped, color=colour)
+    if unit != "N":
+        over.set_ylabel(f"reading [{unit}]")
+        mapped.set_xlabel(f"reading of a cycle [{unit}]")
+        mapped.set_ylabel(f"of the next [{unit}]")
     figure.suptitle(f"{title}\n{_told(verdict)}", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
     return figure
 

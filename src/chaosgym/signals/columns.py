@@ -29,15 +29,28 @@ SPEED = re.compile(r"hz|freq\w*|frequenz|rpm|speed|drehzahl", re.IGNORECASE)
 SPEEDS = ("Hz", "rpm", "1/min", "min-1", "rad/s")
 
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "min": 60.0, "h": 3600.0}
-FORCES = ALTERNATIVES["N"]
+FORCES = {**ALTERNATIVES["N"], "daN": 10.0, "MN": 1e6, "kgf": 9.80665}
+_OTHERS = "g m/s² m/s2 m/s^2 m/s mm/s in/s m mm um µm μm in mil Pa kPa MPa bar psi V mV µV uV A mA Nm N·m FS"
+OTHERS = frozenset(_OTHERS.split())
+"""Units of force, and those of quantities that are judged in their own unit."""
+
+VOLTS = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6}
+
+
+CALIBRATION = re.compile(r"\s*([\d.,]+(?:e[+-]?\d+)?)\s*([^\s/]+(?:/s(?:²|2|\^2))?)\s*(?:/\s*(\S+))?\s*", re.IGNORECASE)
+"""A number, a unit and the unit that it is divided by."""
 
 
 class Signal(NamedTuple):
-    """Readings of one column, in newton or seconds; ``described`` is one line on where they come from."""
+    """Readings of one column; ``described`` is one line on where they come from.
+
+    Forces are in newton, times in seconds, any other quantity in the ``unit`` of the file.
+    """
 
     values: Array
     name: str
     described: str
+    unit: str = "N"
 
 
 def is_counter(values: Array) -> bool:
@@ -59,11 +72,12 @@ def _counts(values: Array) -> bool:
 
 
 def force_names(recording: Recording) -> list[str]:
-    """Columns that could be forces: those with a unit of force, or else those that nothing speaks against."""
+    """Columns that could be forces: those with a unit of force, or those that nothing speaks against; else others."""
     known = [name for name, unit in recording.units.items() if unit in FORCES]
     usable = [name for name in recording.columns if name not in recording.problems or recording.problems[name]]
     named = [name for name in known if name in usable]
-    return named or [name for name in usable if not _speaks_against(recording, name)]
+    plain = [name for name in usable if not _speaks_against(recording, name)]
+    return named or plain or [name for name in usable if recording.units.get(name, "") in OTHERS]
 
 
 def _speaks_against(recording: Recording, name: str) -> str:
@@ -81,8 +95,10 @@ def _speaks_against(recording: Recording, name: str) -> str:
     )
 
 
-def choose_force(recording: Recording, column: str | None = None, unit: str | None = None) -> Signal:
-    """Force [N] of a recording.
+def choose_force(
+    recording: Recording, column: str | None = None, unit: str | None = None, scale: str | None = None
+) -> Signal:
+    """Force [N] of a recording, or another quantity in its own unit.
 
     Parameters
     ----------
@@ -92,6 +108,8 @@ def choose_force(recording: Recording, column: str | None = None, unit: str | No
         Name of the column; needed where several could be the force.
     unit
         Its unit, if the file does not say it.
+    scale
+        Calibration, such as ``"100 mV/N"`` or ``"20 N/V"``, that makes a force or another quantity of the readings.
 
     Raises
     ------
@@ -111,7 +129,7 @@ def choose_force(recording: Recording, column: str | None = None, unit: str | No
         name = names[0]
     else:
         name = _named(recording, column)
-    return _force(recording, name, unit)
+    return _force(recording, name, unit, scale)
 
 
 def _named(recording: Recording, column: str) -> str:
@@ -150,43 +168,85 @@ def choose_speed(recording: Recording, column: str | None = None) -> Signal:
     if name in recording.problems:
         raise DiagnosisError(f"{recording.source}, {recording.problems[name]}")
     unit = recording.units.get(name, "")
-    return Signal(recording.columns[name], name, f"column {name!r}{f' ({unit})' if unit else ''} is the speed")
+    return Signal(recording.columns[name], name, f"column {name!r}{f' ({unit})' if unit else ''} is the speed", unit)
 
 
-def forces(recording: Recording, column: str | None = None, unit: str | None = None) -> list[Signal]:
+def forces(
+    recording: Recording, column: str | None = None, unit: str | None = None, scale: str | None = None
+) -> list[Signal]:
     """Every column that could be a force [N], or the named one: one run a column."""
     names = force_names(recording)
     if column is not None or len(names) < 2:
-        return [choose_force(recording, column, unit)]
-    return [_force(recording, name, unit) for name in names]
+        return [choose_force(recording, column, unit, scale)]
+    return [_force(recording, name, unit, scale) for name in names]
 
 
-def _force(recording: Recording, name: str, unit: str | None) -> Signal:
+def _force(recording: Recording, name: str, unit: str | None, scale: str | None) -> Signal:
     if name in recording.problems:
         raise DiagnosisError(f"{recording.source}, {recording.problems[name]}")
     values, written = recording.columns[name], unit or recording.units.get(name, "")
-    if written and written not in FORCES:
-        told = f"allowed: {', '.join(FORCES)}" if unit else f"give its unit with --unit ({', '.join(FORCES)})"
-        raise DiagnosisError(f"{recording.source}: column {name!r} is in {written}, no unit of force; {told}")
+    if written and written not in FORCES and written not in OTHERS and not scale:
+        told = "allowed" if unit else "give its unit with --unit"
+        listed = ", ".join([*FORCES, *sorted(OTHERS)])
+        raise DiagnosisError(
+            f"{recording.source}: column {name!r} is in {written}, no unit that is known; {told}: {listed}"
+        )
     if is_counter(values[np.isfinite(values)]):
         raise DiagnosisError(f"{recording.source}: column {name!r} rises in equal steps and can't be a force")
+    factor, target = FORCES.get(written or "N", 1.0), "N" if (written or "N") in FORCES else written
     shown = f"{written}" if written else "taken as N"
+    if scale:
+        factor, target = calibration(scale, written)
+        shown = f"{written or 'no unit'}, {scale.strip()}"
     described = f"{recording.source}: {recording.form}, column {name!r} ({shown}), {len(values)} readings"
     if missing := int(np.count_nonzero(~np.isfinite(values))):
         described += f", {missing} of them missing, the first in {recording.where(int(np.argmin(np.isfinite(values))))}"
-    return Signal(values * FORCES[written or "N"], name, described)
+    return Signal(values * factor, name, described, target)
 
 
-def check_peaks(signal: Signal, recording: Recording) -> Array:
-    """Peaks [N] of a column, without those that are missing.
+def calibration(scale: str, written: str) -> tuple[float, str]:
+    """(factor, unit) that make a quantity of readings in the unit ``written``.
+
+    ``100 mV/N`` is a sensitivity, ``20 N/V`` a range; the side that is not the readings' unit is the quantity's.
 
     Raises
     ------
     DiagnosisError
-        If one is negative.
+        If the text is no calibration, or neither side is a unit of the readings.
+    """
+    found = CALIBRATION.fullmatch(scale)
+    try:
+        size = float(found[1].replace(",", ".")) if found else 0.0
+    except ValueError:
+        size = 0.0
+    if found is None or not 0.0 < size < math.inf:
+        raise DiagnosisError(f"--scale {scale!r} is no calibration; allowed: such as '100 mV/N', '20 N/V' or '50 N/FS'")
+    above, below = found[2], found[3] or written or "FS"
+    for factor, quantity, electric in ((size, above, below), (1.0 / size, below, above)):
+        turned = _same_kind(written, electric)
+        if turned and (quantity in FORCES or quantity in OTHERS):
+            force = quantity in FORCES
+            return factor * turned * FORCES.get(quantity, 1.0), "N" if force else quantity
+    raise DiagnosisError(f"--scale {scale!r} does not fit readings in {written or 'no unit'}; state theirs with --unit")
+
+
+def _same_kind(written: str, electric: str) -> float:
+    """Readings' unit in that of the calibration; 0 if they are of different kinds."""
+    if written in VOLTS and electric in VOLTS:
+        return VOLTS[written] / VOLTS[electric]
+    return 1.0 if electric == written or (not written and electric == "FS") else 0.0
+
+
+def check_peaks(signal: Signal, recording: Recording) -> Array:
+    """Peaks of a column, without those that are missing.
+
+    Raises
+    ------
+    DiagnosisError
+        If a force is negative.
     """
     low = np.flatnonzero(signal.values < 0.0)
-    if len(low):
+    if len(low) and signal.unit == "N":
         raise DiagnosisError(
             f"{recording.source}, {recording.where(int(low[0]))}: {signal.values[low[0]]:g} N is a negative force; "
             "allowed: 0 N and more, one peak a cycle"
@@ -213,7 +273,7 @@ def choose_time(recording: Recording, *, told: bool = False) -> Signal | None:
     if name in recording.problems:
         raise DiagnosisError(f"{recording.source}, {recording.problems[name]}")
     unit = recording.units.get(name, "s")
-    return Signal(recording.columns[name] * TIMES.get(unit, 1.0), name, f"time from column {name!r} [{unit}]")
+    return Signal(recording.columns[name] * TIMES.get(unit, 1.0), name, f"time from column {name!r} [{unit}]", "s")
 
 
 LONGEST_GAP, UNEVEN = 1.5, 0.2

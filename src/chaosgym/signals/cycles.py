@@ -254,6 +254,7 @@ def peaks_of_series(
     rate_hz: float | None = None,
     period: float | None = None,
     tachometer: str | None = None,
+    scale: str | None = None,
 ) -> tuple[Signal, CyclePeaks]:
     """Peaks of the series in a recording: its force column, and the peak of each cycle.
 
@@ -261,7 +262,7 @@ def peaks_of_series(
     ----------
     recording
         What was read.
-    column, unit
+    column, unit, scale
         Of the force, as for ``choose_force``.
     rate_hz
         Sampling rate, if there is no time column.
@@ -272,9 +273,9 @@ def peaks_of_series(
     """
     if column is None and tachometer is not None:
         rest = {name: values for name, values in recording.columns.items() if name != tachometer}
-        signal = choose_force(replace(recording, columns=rest), None, unit)
+        signal = choose_force(replace(recording, columns=rest), None, unit, scale)
     else:
-        signal = choose_force(recording, column, unit)
+        signal = choose_force(recording, column, unit, scale)
     instants = sampling(recording, len(signal.values), rate_hz)
     size = min(len(signal.values), len(instants.time))
     instants = instants._replace(time=instants.time[:size])

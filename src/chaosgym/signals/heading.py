@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 _WRITTEN = """
 N kN mN MN daN lbf kgf ozf s ms us µs μs ns min h rpm 1/min min-1 Hz kHz 1/s V mV µV uV g m/s² m/s2 m/s^2 m mm um µm μm
-in mil m/s mm/s in/s Pa kPa MPa bar psi A mA Nm N·m deg ° rad °C K % -
+in mil rad/s m/s mm/s in/s Pa kPa MPa bar psi A mA Nm N·m deg ° rad °C K % -
 """
 UNITS = frozenset(_WRITTEN.split())
 """Units that a heading may name."""

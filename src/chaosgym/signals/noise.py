@@ -29,6 +29,10 @@ REACH = 4
 OUTLIER_SHARE = 0.02
 """Share of the cycles that may be wrong readings; more of them belong to the motion."""
 
+REPEATING, REPEATING_SPREAD = 0.95, 0.5
+"""Share of the readings that come back within the scatter where cycles are missing only, and that scatter's limit as a
+share of the range: in chaos stand-ins for cycles would spoil the record."""
+
 MOST_GAPS = 16
 """Places at which cycles may be missing."""
 
@@ -123,6 +127,8 @@ def repair(values: Array) -> Repaired:
     floor = max(quantum(values), 1e-6 * float(np.max(np.abs(values))))
     period = dominant_period(values, 0.5 * floor)
     whole, origin = _with_missing_cycles(values, period, floor)
+    if not _repeats(whole, period, floor):
+        whole, origin = values, np.arange(len(values))
     gaps = tuple(int(origin[place + 1]) + 1 for place in np.flatnonzero(origin < 0) if origin[place + 1] >= 0)
     expected = _running_medians(whole, np.arange(len(whole)) % period, period)
     climb = abs(float(np.median(whole[period:] - whole[:-period])))
@@ -133,6 +139,13 @@ def repair(values: Array) -> Repaired:
     mended = whole.copy()
     mended[wrong] = expected[wrong]
     return Repaired(mended, tuple(int(origin[place]) + 1 for place in wrong if origin[place] >= 0), gaps)
+
+
+def _repeats(values: Array, period: int, floor: float) -> bool:
+    """Whether nearly all readings come back after the period, as they do once the missing cycles are filled in."""
+    limit = max(6.0 * local_scatter(values, period), 2.5 * floor)
+    back = np.abs(values[period:] - values[:-period]) <= limit
+    return bool(back.mean() >= REPEATING and limit < REPEATING_SPREAD * float(np.ptp(values)))
 
 
 def _running_medians(values: Array, phase: NDArray[np.int64], period: int) -> Array:

@@ -7,6 +7,9 @@ CSV with any common delimiter, decimal comma, UTF-8 or UTF-16, comments and a he
 
 import hashlib
 import io
+import os
+import select
+import stat
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -21,7 +24,7 @@ from numpy.typing import NDArray
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals import recorders
 from chaosgym.signals.heading import split_unit
-from chaosgym.signals.text import COMMENT, MOST_MISSING, NUMBER, QUOTED, TORN, read_text
+from chaosgym.signals.text import MOST_MISSING, read_text
 
 Array = NDArray[np.float64]
 
@@ -77,7 +80,7 @@ def read_recording(source: str | Path) -> Recording:
     """
     name = "standard input" if str(source) == "-" else str(source)
     try:
-        data = _standard_input() if str(source) == "-" else Path(source).read_bytes()
+        data = _standard_input() if str(source) == "-" else _bytes_of(Path(source))
     except OSError as error:
         raise DiagnosisError(f"{name} can't be read: {error.strerror}") from error
     reader, form = _reader(data)
@@ -103,26 +106,37 @@ def read_recording(source: str | Path) -> Recording:
     return Recording(source=name, columns=columns, sha256=hashlib.sha256(data).hexdigest(), **found)
 
 
-def parse_reading(line: str, number: int, *, first: bool) -> float | None:
-    """Reading of one line of a stream; None for a blank line, a comment, or a heading before the first reading.
+LARGEST = 2**30
+"""Bytes of a recording at the most: a text needs ten times its size in memory."""
+
+PATIENCE = 2.0
+"""Time [s] in which a named pipe must have something to read."""
+
+
+def _bytes_of(path: Path) -> bytes:
+    """Bytes of a file or a named pipe.
 
     Raises
     ------
     DiagnosisError
-        If the line is no finite number, or holds several.
+        If it is a device, a pipe into which nothing writes, or too large.
+    OSError
+        If it can't be read.
     """
-    text = line.lstrip("\ufeff").strip().rstrip(",;")
-    text = text.strip('"') if QUOTED.match(text) else text
-    if not text or (COMMENT.match(text) and (first or not TORN.match(text))):
-        return None
-    if not NUMBER.fullmatch(text):
-        if first:
-            return None
-        raise DiagnosisError(f"standard input, line {number}: {text[:40]!r} is not a finite number")
-    value = float(text.replace(",", "."))
-    if not np.isfinite(value):
-        raise DiagnosisError(f"standard input, line {number}: {text[:40]!r} is not a finite number")
-    return value
+    told = path.stat()
+    if stat.S_ISCHR(told.st_mode) or stat.S_ISBLK(told.st_mode):
+        raise DiagnosisError(f"{path} is a device; read a stream with -, as in: program | chaosgym ... -")
+    if told.st_size > LARGEST:
+        raise DiagnosisError(
+            f"{path} holds {told.st_size / 2**30:.1f} GiB; allowed: up to 1 GiB; cut it, or one peak a cycle"
+        )
+    if not stat.S_ISFIFO(told.st_mode):
+        return path.read_bytes()
+    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as pipe:
+        if not select.select([pipe], [], [], PATIENCE)[0]:
+            raise DiagnosisError(f"{path} is a pipe into which nothing was written for {PATIENCE:g} s")
+        os.set_blocking(pipe.fileno(), True)
+        return pipe.read()
 
 
 def _standard_input() -> bytes:
