@@ -140,13 +140,14 @@ def test_simulated_series_are_read_back(tmp_path):
     ("arguments", "message"),
     [
         (("diagnose", "--peaks", "-", "--sensor-error", "inf"), "is no finite number"),
-        (("diagnose", "--peaks", "-", "--sensor-error", "3 m"), "unknown unit 'm' (allowed: N, kN"),
+        (("diagnose", "--peaks", "-", "--sensor-error", "3 furlong"), "unknown unit 'furlong' (allowed: N, kN"),
+        (("diagnose", "--peaks", "-", "--sensor-error", "3 m"), "in m, the readings are in N"),
         (("diagnose", "impact-beam", "--sensor-error", "inf"), "is no finite number"),
         (("diagnose", "impact-beam", "--sensor-error", "3 m"), "the sensor's error is in m; allowed without a file"),
         (("diagnose", "--peaks", "-", "--hz", "20"), "--hz belongs to --series"),
         (("diagnose", "--peaks", "-", "--series", "-"), "exclude each other"),
         (("diagnose", "--peaks", "-", "--sensor-error", "1", "--sensor-sigma", "1"), "given twice"),
-        (("diagnose", "--column", "upper"), "belong to --peaks or --series"),
+        (("diagnose", "--column", "upper"), "belong to a file that was measured"),
         (("classify", "impact-beam", "--peaks", "-", "--sensor-error", "nan"), "is no finite number"),
         (("diagnose", "--series", "-"), "no time column; use --rate-hz"),
         (
