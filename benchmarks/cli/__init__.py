@@ -223,6 +223,20 @@ def general(machine: Any, points: int, seed: int, as_json: bool) -> None:
     emit(found, as_json, lambda: [f"{name:24s} {value}" for name, value in found.items()])
 
 
+@click.command()
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@AS_JSON
+def exponents(seed: int, as_json: bool) -> None:
+    """Lyapunov exponents of short, noisy recordings by libraries (nolds, neurokit2) and by the fitted map."""
+    from benchmarks.classifier.exponents import exponents as measure
+
+    found = measure(seed)
+    rows = [
+        f"{name:14s} {kind:28s} {values}" for name, one in found["exponents"].items() for kind, values in one.items()
+    ]
+    emit(found, as_json, lambda: rows + [f"left out: {text}" for text in found["left_out"]])
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 def app() -> None:
     """Numbers about chaosgym itself."""
@@ -242,6 +256,7 @@ for command in (
     classifier,
     monitors,
     general,
+    exponents,
 ):
     app.add_command(command)
 
