@@ -169,8 +169,9 @@ class Progress(BaseCallback):
         self.began = time.process_time() - self.kept["seconds"]
 
     def _on_training_start(self) -> None:
-        self._write_rows()
         steps = self.model.num_timesteps
+        if steps > 0:  # a folder without a checkpoint is no run: it stays empty until the first
+            self._write_rows()
         self.bar = tqdm(total=self.asked.steps, initial=steps, unit="step", desc=self.asked.out.name)
 
     def _on_step(self) -> bool:
