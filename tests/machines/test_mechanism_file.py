@@ -256,21 +256,17 @@ def test_missing_tables_and_a_mechanism_without_clearance(file_of):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_command_and_environment_takes_it(kind, file_of, tmp_path, monkeypatch):
-    """Simulated, shown, drawn, diagnosed, swept, briefed and reported; environments step and render."""
+    """Simulated, shown, drawn, diagnosed, swept and traded off; environments step and render."""
     monkeypatch.chdir(tmp_path)
     path = file_of(kind)
     machine = chaosgym.read_machine(path)
     assert len(answer("simulate", path, "--cycles", 4, "--plot", "s.png")["peak_force_N"]) == 4
     assert answer("show", path, "--plot", "m.png")["degrees_of_freedom"] == list(machine.degrees_of_freedom)
-    assert answer("diagnose", path, "--budget", 200, "--types", "--step-check", "--plot", "d.png")["nature"]
+    assert answer("diagnose", path, "--budget", 200, "--step-check", "--plot", "d.png")["nature"]
     assert all(Path(name).stat().st_size > 5000 for name in ("s.png", "m.png", "d.png"))
     low, high = machine.usual_ranges[machine.clearance_field]
     axes = ("--axis", f"{machine.clearance_field}={low}:{high}:2", "--axis", "speed=300:400:2")
     assert answer("sweep", path, *axes, "--budget", 100, "--out", tmp_path / "sweep")["points"] == 4
-    assert answer("classify", path)["stage"]
-    brief = tmp_path / "brief.toml"
-    brief.write_text(run("design", "--template", path).stdout)
-    assert answer("design", brief, "--out", tmp_path / "report.html")["machine"]
     assert {row["rung"] for row in answer("tradeoff", path, "--points", 2, "--cycles", 20, "--out", tmp_path)["rows"]}
     env = gym.make("chaosgym/MachineTolerance-v0", machine=str(path), render_mode="rgb_array")
     first, _ = env.reset(seed=1)
@@ -278,3 +274,14 @@ def test_every_command_and_environment_takes_it(kind, file_of, tmp_path, monkeyp
     assert env.render().ndim == 3
     envs = gym.make_vec("chaosgym/MachineTolerance-v0", num_envs=2, machine=str(path))
     np.testing.assert_array_equal(envs.reset(seed=1)[0][0], first)
+
+
+@pytest.mark.slow
+def test_types_and_report_of_a_mechanism(file_of, tmp_path):
+    """Dozens of variants within the tolerances: types, the classifier's answer, and the report of a template."""
+    path = file_of("slider-crank")
+    assert answer("diagnose", path, "--budget", 200, "--types")["nature"]
+    assert answer("classify", path)["stage"]
+    brief = tmp_path / "brief.toml"
+    brief.write_text(run("design", "--template", path).stdout)
+    assert answer("design", brief, "--out", tmp_path / "report.html")["machine"]
