@@ -22,7 +22,8 @@ def logistic(rng: np.random.Generator) -> Array:
     x = float(rng.uniform(0.2, 0.4))
     for k in range(READINGS):
         values[k] = x = 4.0 * x * (1.0 - x)
-    return values + NOISE * values.std() * rng.standard_normal(READINGS)
+    noise: Array = NOISE * values.std() * rng.standard_normal(READINGS)
+    return values + noise
 
 
 def white(rng: np.random.Generator) -> Array:
