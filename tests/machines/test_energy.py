@@ -1,5 +1,6 @@
 """No energy from nothing: the balance of machines of modes, cycle by cycle, by a referee that shares no equation."""
 
+import os
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +21,9 @@ ROUNDING = 4.0 * 2.0**-52
 such distances, as the machine's notes say. An impact makes that times its force of energy."""
 
 CYCLES = 3
+
+MACHINES = int(os.environ.get("CHAOSGYM_MACHINES", "100"))
+"""Random machines of the slow test."""
 
 
 def drawn(seed):
@@ -87,17 +91,17 @@ def test_energy_comes_from_the_loads_alone(seed):
 
 
 @pytest.mark.slow
-def test_energy_comes_from_the_loads_alone_in_three_hundred_machines():
-    """The same of 300 machines, a third or more of which strike, but for one in a hundred that loses digits.
+def test_energy_comes_from_the_loads_alone_in_many_machines():
+    """The same of a hundred machines, a third or more of which strike, but for one in a hundred that loses digits.
 
-    They have two slow modes of which one is critically damped: seed 38 misses 2e-5 of the work, seed 287 the allowance
-    by a few percent.
+    These have two slow modes of which one is critically damped: seed 38 misses 2e-5 of the work, and of three hundred
+    machines (``CHAOSGYM_MACHINES=300``, half an hour) seed 287 the allowance by a few percent.
     """
-    found = {seed: worst_gap(drawn(seed)) for seed in range(300)}
-    assert sum(impacts > 0 for _, impacts in found.values()) > 100
+    found = {seed: worst_gap(drawn(seed)) for seed in range(MACHINES)}
+    assert sum(impacts > 0 for _, impacts in found.values()) > MACHINES / 3
     lossy = {seed: gap for seed, (gap, _) in found.items() if not gap < 1.0}
     print(lossy)
-    assert len(lossy) <= 3
+    assert len(lossy) <= MACHINES / 100
     assert max(lossy.values(), default=0.0) < 30.0
 
 
