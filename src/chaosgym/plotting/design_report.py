@@ -111,8 +111,7 @@ def comparison_report(studies: Mapping[str, DesignStudy], command: str = "", *, 
     """HTML report of several studies side by side, by name of their brief."""
     pictures = []
     for name, study in studies.items():
-        found = study.assessment
-        drawn = _drawn(lambda ax, found=found: figures.series_life(found, ax))  # type: ignore[misc]
+        drawn = _drawn(partial(figures.series_life, study.assessment))
         pictures.append(_picture(drawn, f"{name}: life of each machine built to the tolerances."))
     return _rendered(
         "comparison.html",
