@@ -36,7 +36,7 @@ SCRIPTS = {
     "ppo": TRAIN,
     "recurrent_ppo": f"--env {BEAM} --steps 2880 {SMALL}",
     "constrained_ppo": f"--env {BEAM} --steps 3840 {SMALL}",
-    "sac": f"--env {BEAM} --steps 1600 --envs 16 --every 800 --gradient-steps 1",
+    "sac": f"--env {BEAM} --steps 1600 --envs 8 --every 400 --gradient-steps 1",
 }
 LEARNED = (
     "impact-beam --axis excitation_frequency=4:30:log --axis clearance=2e-5:2e-4:log --sobol 600 --seed 5 "

@@ -74,6 +74,23 @@ def test_a_run_goes_on_where_it_was(tmp_path):
     assert (tmp_path / "me" / "chaosgym" / "checkpoint.key").stat().st_mode & 0o077 == 0
 
 
+def test_random_actions_go_on_where_they_were(tmp_path):
+    """SAC explores at first by actions from the space of actions, whose generator ``load`` of SB3 seeds anew."""
+    from stable_baselines3 import SAC
+
+    from chaosgym.envs import SB3VecEnv
+
+    def envs():
+        return SB3VecEnv("chaosgym/ImpactBeamTolerance-v1", 1, action="continuous")
+
+    model = SAC("MlpPolicy", envs(), buffer_size=10, seed=3, device="cpu")
+    model.action_space.sample()
+    save_checkpoint(tmp_path, model)
+    following = model.action_space.sample()
+    again, _ = load_checkpoint(tmp_path, SAC, envs())
+    assert (again.action_space.sample() == following).all()
+
+
 def test_the_pickle_of_others_is_not_read(tmp_path, monkeypatch):
     """Another user's file, one without a key, a cut one and one with a bit flipped are refused before they are read."""
     _written(tmp_path)

@@ -35,8 +35,8 @@ SIZE = 32
 BY_CLASS = ("venv", "class_attributes")
 """Attributes of a wrapper that another object of its class has too."""
 
-UNSAVED = ("_last_lstm_states", "replay_buffer")
-"""Attributes of a model that ``save`` leaves out, of those algorithms that have them."""
+UNSAVED = ("_last_lstm_states", "replay_buffer", "action_space")
+"""Attributes of a model that ``save`` leaves out, or ``load`` seeds anew, of those algorithms that have them."""
 
 
 @contextmanager
