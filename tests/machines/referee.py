@@ -14,6 +14,8 @@ from scipy.linalg import expm
 
 HALVINGS = 36
 PHASE = 0.1
+AHEAD = 64
+"""Steps that are looked at together."""
 MOST_STAYS = 20_000
 GAP, CONTACT, DETACHED = range(3)
 
@@ -27,17 +29,18 @@ class Balance:
     through: float = 0.0
 
 
-def _dips(values, slopes, later, later_slopes, h):
-    """Which quantities fall below zero and rise again between two instants, by the cubic through both ends."""
-    shares = np.linspace(0.0, 1.0, 33)[:, None]
+def _doubts(values, slopes, h):
+    """Between which neighbours (k + 1, rows) of a path a row may fall through zero, by the cubic through both: (k,)."""
+    shares = np.linspace(0.0, 1.0, 33)[:, None, None]
     rest = 1.0 - shares
-    path = rest**2 * (values * (1.0 + 2.0 * shares) + slopes * h * shares)
-    path += shares**2 * (later * (1.0 + 2.0 * rest) - later_slopes * h * rest)
-    return (slopes < 0.0) & (later_slopes > 0.0) & (path.min(axis=0) < 0.0)
+    path = rest**2 * (values[:-1] * (1.0 + 2.0 * shares) + slopes[:-1] * h * shares)
+    path += shares**2 * (values[1:] * (1.0 + 2.0 * rest) - slopes[1:] * h * rest)
+    dips = (slopes[:-1] < 0.0) & (slopes[1:] > 0.0) & (path.min(axis=0) < 0.0)
+    return np.any((values[1:] < 0.0) | dips, axis=1)
 
 
 class _Regime:
-    """Steps of h / 2^k in one regime, and the integrals of work and dissipation over them."""
+    """Steps of h / 2^k in one regime, and the integrals of work and dissipation over them; 1, 2 ... steps of h."""
 
     def __init__(self, a, power, loss, h):
         self.a, self.h, size = a, h, len(a)
@@ -50,6 +53,7 @@ class _Regime:
             for form, kept in ((power, self.works), (loss, self.losses)):
                 block[:size, size:] = form
                 kept.append(step.T @ expm(block * h / 2**k)[:size, size:])
+        self.ahead = np.array([expm(a * h * (i + 1)) for i in range(AHEAD)])
 
 
 class Referee:
@@ -158,35 +162,46 @@ class Referee:
     def _until(self, regime, rows, z, left, balance):
         """Follow z until a row falls through zero or the time is up: (z, time, (row or None, largest first row)).
 
-        A row that starts at zero or just below and rises, as after the event that began the stay, waits until it is
-        above; one that falls ends the stay at once.
+        A row that starts at zero or just below and rises, as after the event that began the stay, counts from where it
+        starts; one that falls ends the stay at once.
         """
         spent, values, slopes = 0.0, rows @ z, rows @ (regime.a @ z)
-        largest, waits = max([0.0, *values[:1]]), (values <= 0.0) & (slopes > 0.0)
-        if np.any((values < 0.0) & ~waits):
-            return z, 0.0, (int(np.argmax((values < 0.0) & ~waits)), largest)
-        while True:
-            # the longest of the halved steps that fits, and then the longest in which nothing ends
-            k = 0
-            while k < HALVINGS and regime.h / 2**k > left - spent:
-                k += 1
-            if k == HALVINGS or spent + regime.h / 2**k == spent:
-                return z, spent, (None, largest)
-            while True:
-                ahead = regime.steps[k] @ z
-                values, middle = rows @ ahead, rows @ (regime.steps[min(k + 1, HALVINGS - 1)] @ z)
-                fallen = ((values < 0.0) | (middle < 0.0)) & ~waits
-                dips = _dips(rows @ z, rows @ (regime.a @ z), values, rows @ (regime.a @ ahead), regime.h / 2**k)
-                below = waits & ((values <= 0.0) | (middle <= 0.0))
-                if k == HALVINGS - 1 or not (fallen | (dips & ~waits) | below).any():
-                    break
-                k += 1
-            work, loss = float(z @ regime.works[k] @ z), float(z @ regime.losses[k] @ z)
-            balance.work += work
-            balance.dissipated += loss
-            balance.through += abs(work) + abs(loss)
-            z, spent = ahead, spent + regime.h / 2**k
-            largest = max([largest, *values[:1]])
+        largest, rises = max([0.0, *values[:1]]), (values <= 0.0) & (slopes > 0.0)
+        if np.any((values < 0.0) & ~rises):
+            return z, 0.0, (int(np.argmax((values < 0.0) & ~rises)), largest)
+        rows = rows.copy()
+        rows[rises, 2 * self.n] -= values[rises]
+        rates = rows @ regime.a
+
+        def take(path, k):
+            """Go along a path of steps h / 2^k: (its end, largest first row)."""
+            before = path[:-1]
+            work, loss = (np.sum((before @ form[k]) * before, axis=1) for form in (regime.works, regime.losses))
+            balance.work += float(work.sum())
+            balance.dissipated += float(loss.sum())
+            balance.through += float(np.abs(work).sum() + np.abs(loss).sum())
+            return path[-1], max([largest, *(path[1:] @ rows[:1].T).ravel()])
+
+        while spent + regime.h / 2 ** (HALVINGS - 1) <= left:
+            count = min(AHEAD, int((left - spent) / regime.h))
+            if count:
+                path = np.vstack([z, regime.ahead[:count] @ z])
+                doubts = _doubts(path @ rows.T, path @ rates.T, regime.h)
+                passed = int(np.argmax(doubts)) if doubts.any() else count
+                z, largest = take(path[: passed + 1], 0)
+                spent += passed * regime.h
+                if passed == count:
+                    continue
+            # into the step in which a row falls, or the rest of the time, by ever shorter steps in which none does
+            for k in range(1, HALVINGS):
+                if spent + regime.h / 2**k > left:
+                    continue
+                path = np.vstack([z, regime.steps[k] @ z])
+                if k < HALVINGS - 1 and _doubts(path @ rows.T, path @ rates.T, regime.h / 2**k)[0]:
+                    continue
+                z, largest = take(path, k)
+                spent += regime.h / 2**k
+            fallen = rows @ z < 0.0
             if fallen.any():
                 return z, spent, (int(np.argmax(fallen)), largest)
-            waits &= values <= 0.0
+        return z, spent, (None, largest)
