@@ -1,7 +1,9 @@
 """How often the signs of chaos of thesis 5.3 are right, counted on a dataset of crosses.
 
 The printed criteria are right where the point itself is not periodic. A precursor on a periodic response is right where
-the response is not periodic at some point of its cross: one tolerance of speed or of clearance away.
+the response is not periodic at some point of its cross: one tolerance of speed or of clearance away. A case of 5.5.1,
+told from the four arms of a cross, is right of its middle where that is periodic in case I, and not periodic in the
+others.
 
     python -m benchmarks.sweeps.signs datasets/impact-beam datasets/slider-crank
 """
@@ -11,13 +13,15 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.diagnosis.precursors import Rate, precursors, predictive_criteria
-from chaosgym.diagnosis.type_rule import CROSS
+from chaosgym.diagnosis.type_rule import CROSS, mixed
 from chaosgym.errors import DatasetError
 from chaosgym.files import write_atomically
 from chaosgym.sweeps.dataset import LabelledSweep, read_sweep
+
+Array = NDArray[np.bool_]
 
 KEPT = Path("src/chaosgym/diagnosis/signs.json")
 
@@ -49,7 +53,23 @@ def sign_rates(sweep: LabelledSweep) -> dict[str, Rate]:
     rates["period doubling"] = _rate([one.period_doubling for one in early], near)
     rates["period three"] = _rate([one.period_three for one in early], near)
     rates["long bouncing"] = _rate([one.long_bouncing for one in early], near)
+    whole = known.all(axis=1)
+    told = np.array([_case(row) for row in chaos[whole, 1:]])
+    middle = chaos[whole, 0]
+    for case in ("I", "II", "II throughout", "III"):
+        rates[f"case {case}"] = _rate(told == case, middle != (case == "I"))
     return rates
+
+
+def _case(restless: Array) -> str:
+    """Case of 5.5.1 of the four arms of a cross, of which some are not periodic."""
+    arms = [{"speed": float(speed), "clearance": float(gap)} for speed, gap in CROSS[1:]]
+    calm, wild = ([arm for arm, is_so in zip(arms, row, strict=True) if is_so] for row in (~restless, restless))
+    if not wild:
+        return "I"
+    if not calm:
+        return "II throughout"
+    return "III" if mixed(wild, calm) else "II"
 
 
 def _rate(told: ArrayLike, true: ArrayLike) -> Rate:

@@ -9,6 +9,7 @@ from chaosgym.design import Criteria, assess
 from chaosgym.design.combination import combination, influences, own_type, probability, total_indices
 from chaosgym.design.guidelines import case_of, guidelines
 from chaosgym.diagnosis import Neighbour, Tolerance
+from chaosgym.diagnosis.precursors import measured_rates
 from chaosgym.errors import SimulationError
 from chaosgym.machines import ImpactBeam
 
@@ -123,6 +124,38 @@ def test_the_case_is_told_by_where_chaos_lies(calm, shares, case):
     """None: case I. At one end of the tolerances: II. Between periodic machines, or at both ends: III."""
     wild = [Neighbour(share, "chaotic", 60.0) for share in shares]
     assert case_of(calm, wild) == case
+
+
+def test_where_no_machine_is_periodic_no_part_of_the_tolerances_is_spoken_of(calm):
+    """Case II holds throughout if all machines are chaotic; the sentence claims no periodic rest."""
+    runs = tuple(replace(run, nature="chaotic") for run in calm.series.runs)
+    beside = [replace_nature(one, "chaotic") for one in calm.response.neighbours]
+    wild = replace(
+        calm,
+        nominal=replace(calm.nominal, nature="chaotic"),
+        series=replace(calm.series, runs=runs),
+        response=replace(calm.response, neighbours=tuple(beside)),
+    )
+    assert case_of(wild) == "II throughout"
+    (said,) = [one.sentence for one in guidelines(wild) if one.sentence.startswith("Case")]
+    assert said.startswith("Case II throughout: no response in the tolerances is periodic")
+    assert "part" not in said
+    assert "16 chaotic of 16 machines" in said
+
+
+def replace_nature(one, nature):
+    """The same neighbour with another nature."""
+    return one._replace(nature=nature)
+
+
+def test_each_case_says_how_often_it_was_right(calm):
+    """The rate stands in the sentence of 5.5.1, and is that of the file that the datasets were counted into."""
+    rate = measured_rates()["impact-beam"]["case I"]
+    assert rate.precision is not None
+    assert rate.precision > 0.95
+    (said,) = [one.sentence for one in guidelines(calm) if one.sentence.startswith("Case")]
+    assert f"{rate.precision:.1%} of the dataset's points" in said
+    assert {f"case {case}" for case in ("I", "II", "II throughout", "III")} <= measured_rates()["slider-crank"].keys()
 
 
 def test_guidelines_say_what_the_assessment_says(calm):

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from chaosgym.design.bearing import Criteria, variation_region
+from chaosgym.design.bending import Bending, read_bending, stress_of_modes
 from chaosgym.design.improve import default_changes
 from chaosgym.design.methodology import SERIES_SIZE
+from chaosgym.design.runs import deviating
 from chaosgym.design.wear import Wear, read_wear
 from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError
@@ -16,7 +18,7 @@ from chaosgym.files import toml_of
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
 from chaosgym.machines.numbers import shown
 from chaosgym.machines.parameters import parameters_of, suggestion, with_settings
-from chaosgym.machines.units import parse_quantity, units_of
+from chaosgym.machines.units import parse_quantity, parse_row, units_of
 
 REQUIRED_CRITERIA = ("load_rating", "life", "reliability")
 """Criteria that a brief must state; the others have defaults, which the report lists."""
@@ -32,6 +34,7 @@ SECTIONS = (
     "changes",
     "costs",
     "archard",
+    "bending",
 )
 
 DUTY = ("hours_a_day", "speeds")
@@ -64,8 +67,12 @@ class DesignBrief:
         Share of the operating time by speed, in nominal speeds; empty for one speed.
     wear
         Data of Archard's law; None if wear is left out.
+    bending
+        A section of the flexible part and its material; None if bending is left out.
     stated
         Names of the criteria that the brief states itself.
+    bending_stated
+        Those of its section on bending.
     """
 
     machine: Machine
@@ -76,7 +83,9 @@ class DesignBrief:
     series_size: int = SERIES_SIZE
     duty: Mapping[float, float] = field(default_factory=dict)
     wear: Wear | None = None
+    bending: Bending | None = None
     stated: tuple[str, ...] = field(default=())
+    bending_stated: tuple[str, ...] = field(default=())
 
 
 def brief_text(path: str | Path) -> tuple[str, bool]:
@@ -142,16 +151,19 @@ def brief_from(values: Mapping[str, Any]) -> DesignBrief:
     if not isinstance(wear, bool):
         raise DesignError(f"region.wear = {shown(wear)} is out of range; allowed: true or false")
     criteria = _criteria(values, machine)
+    tolerances = variation_region(machine, _tolerances(values, machine), region.get("tolerances", 1), wear)
     return DesignBrief(
         machine=machine,
-        region=variation_region(machine, _tolerances(values, machine), region.get("tolerances", 1), wear),
+        region=tolerances,
         criteria=criteria,
         changes=_changes(values, machine),
         costs=_costs(values, machine),
         series_size=_series_size(values),
         duty={speed / nominal: share for speed, share in duty.items()},
         wear=_wear(values, machine),
+        bending=_bending(values, machine, tolerances),
         stated=tuple(values.get("criteria", {})),
+        bending_stated=tuple(values.get("bending", {})),
     )
 
 
@@ -173,6 +185,7 @@ def _homes(machine: Machine | None = None) -> dict[str, str]:
     """Where a key belongs that stands in the wrong place."""
     homes = dict.fromkeys(parameters_of(machine), "[parameters], [tolerances] or [changes]") if machine else {}
     homes |= dict.fromkeys(set(parameters_of(Criteria)) - {"hours"}, "[criteria]") | {"wear": "[region]"}
+    homes |= dict.fromkeys((*parameters_of(Bending), *OF_SECTION), "[bending]")
     homes |= dict.fromkeys(parameters_of(Wear), "[archard]")
     homes |= dict.fromkeys(DUTY, "[duty]") | dict.fromkeys(SECTIONS, "the brief itself, above or beside this section")
     return homes | dict.fromkeys(OF_MACHINE, 'the file of the machine, which the brief names: machine = "FILE.toml"')
@@ -249,6 +262,32 @@ def _wear(values: Mapping[str, Any], machine: Machine) -> Wear | None:
     return read_wear(
         {key: parse_quantity(f"archard.{key}", one, known[key].unit, own.get(key)) for key, one in section.items()}
     )
+
+
+OF_SECTION = {"at": "m", "span": "m", "turn": "", "curvatures": "kg^-1/2 m^-2"}
+"""Keys that state a section, and their units."""
+
+
+def _bending(values: Mapping[str, Any], machine: Machine, region: Mapping[str, Tolerance]) -> Bending | None:
+    if "bending" not in values:
+        return None
+    known = parameters_of(Bending)
+    section = _section(values, "bending", [*known, *OF_SECTION], machine)
+    read = dict[str, Any]()
+    for key, given in section.items():
+        name, unit = f"bending.{key}", OF_SECTION[key] if key in OF_SECTION else known[key].unit
+        if key == "curvatures":
+            read[key] = tuple(parse_row(name, given, unit))
+        elif key == "turn" or known.get(key, known["slope"]).choices:
+            if not isinstance(given, str):
+                raise DesignError(f"{name} = {shown(given)} is out of range; allowed: a text")
+            read[key] = given
+        else:
+            read[key] = parse_quantity(name, given, unit)
+    found = read_bending(read, machine)
+    for end in (-1.0, 1.0):  # the section lies within every machine that may be built
+        stress_of_modes(deviating(machine, region, [end] * len(region)), found)
+    return found
 
 
 def _life(given: Any, hours_a_day: float) -> dict[str, float]:
@@ -358,6 +397,7 @@ def template(name: str) -> str:
         "[costs]  # weight of a change: weight * |ln(new / old)|; 1 if left out",
         f"{speed} = 2",
         *(_wear_lines(machine) if parameters_of(machine)[clearance].unit == "m" else ()),
+        *(_bending_lines(machine) if machine.flexible is not None else ()),
     ]
     return "\n".join(lines) + "\n"
 
@@ -374,6 +414,32 @@ def _wear_lines(machine: Machine) -> list[str]:
         '# hardness = "2 GPa"     # of the softer surface',
         "# coefficient = 1e-5     # K of lubricated steel",
         "# uncertainty = 3        # factor to which K is known",
+    ]
+
+
+def _bending_lines(machine: Machine) -> list[str]:
+    """The section on bending, commented out."""
+    where = [
+        '# turn = "turn2 - turn1"   # curvature of the section: turn of one point against another',
+        '# span = "20 mm"          # over the distance between them',
+        '# or the modal curvatures of the section instead of both: curvatures = "0.7, 4.2 kg^-1/2 m^-2"',
+        '# fibre = "5 mm"          # distance of the outer fibre from the neutral one',
+        '# modulus = "210 GPa"',
+    ]
+    if machine.swings:
+        where = ['# at = "150 mm"           # section of the beam, from the pivot on']
+    return [
+        "",
+        "# [bending]  # fatigue of the flexible part at a section; left out if this section is",
+        *where,
+        '# amplitude = "250 MPa"   # reversed stress that the part bears',
+        '# cycles = "1 Mcycles"    # for so many stress cycles',
+        "# slope = 5              # of the S-N line",
+        '# ultimate = "600 MPa"    # tensile strength',
+        '# mean_stress = "goodman"  # or "gerber", or "none"',
+        "# notch_factor = 1.5",
+        '# static_stress = "0 MPa"  # without any vibration',
+        "# uncertainty = 3        # factor to which lives are known",
     ]
 
 

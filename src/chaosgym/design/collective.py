@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from chaosgym.design.bearing import Criteria, Evaluation, evaluate, hours_of
+from chaosgym.design.bending import BendingLife
 from chaosgym.design.fatigue import equivalent_force, required_load_rating
 from chaosgym.design.methodology import Assessment, AtSpeed, Check, assess, checks_of, verdict_of
 from chaosgym.design.reliability import Interval
@@ -79,7 +80,7 @@ def _over(nominal: Assessment, parts: tuple[AtSpeed, ...], seed: int) -> Assessm
     own = _evaluation([part.assessment.nominal_evaluation for part in parts], cycles, criteria)
     share = _share_that_meets(parts, cycles, criteria, seed)
     regular = [part.assessment for part in parts if part.assessment.type in ("I", "II")]
-    checks = checks_of(nominal.type, evaluation, share, criteria)[:3]
+    checks = checks_of("III", evaluation, share, criteria, _bending(parts, cycles))
     if regular:
         least = min(one.evaluation.safety_factor for one in regular)
         checks += (Check("safety factor", least, criteria.safety_factor, ""),)
@@ -92,8 +93,19 @@ def _over(nominal: Assessment, parts: tuple[AtSpeed, ...], seed: int) -> Assessm
         checks=checks,
         verdict=verdict_of("undetermined" if "undetermined" in kinds else kinds[0], checks),
         machines_that_meet=share,
+        bending=_bending(parts, cycles),
         collective=parts,
     )
+
+
+def _bending(parts: Sequence[AtSpeed], cycles: Sequence[float]) -> BendingLife | None:
+    """Life in bending over all speeds, of each machine; stresses are those of the nominal speed."""
+    found = [part.assessment.bending for part in parts]
+    own = next((one for one in found if one is not None), None)
+    if own is None:
+        return None
+    lives = zip(*(one.lives for one in found if one is not None), strict=True)
+    return replace(own, lives=tuple(miner(row, cycles) for row in lives))
 
 
 def miner(lives: Sequence[float], shares: Sequence[float]) -> float:

@@ -123,13 +123,34 @@ def rainflow_cycles(history: ArrayLike) -> tuple[Array, Array]:
     The history is turned round so that it begins and ends at its largest value; then every cycle closes and none is
     counted half (ASTM E1049, 5.4.5).
     """
-    values = np.asarray(history)
+    ranges, counts = np.transpose(rainflow.count_cycles(_closed(history).tolist()))
+    return ranges, counts
+
+
+def rainflow_means(history: ArrayLike) -> tuple[Array, Array, Array]:
+    """Ranges, means and counts (cycles,) of a history that repeats, counted as by ``rainflow_cycles``.
+
+    Examples
+    --------
+    >>> ranges, means, counts = rainflow_means([80.0, 40.0, 60.0, -40.0, -20.0, -60.0])
+    >>> list(zip(ranges.tolist(), means.tolist(), counts.tolist(), strict=True))
+    [(20.0, 50.0, 1.0), (20.0, -30.0, 1.0), (140.0, 10.0, 0.5), (140.0, 10.0, 0.5)]
+    """
+    values = _closed(history)
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(values)))) + 1
+    kept = values[np.concatenate([[0], turns, [len(values) - 1]])]
+    found = [(span, mean, count) for span, mean, count, *_ in rainflow.extract_cycles(kept.tolist()) if span > 0.0]
+    ranges, means, counts = np.reshape(found, (-1, 3)).T
+    return ranges, means, counts
+
+
+def _closed(history: ArrayLike) -> Array:
+    """A history that begins and ends at its largest value."""
+    values = np.asarray(history, dtype=float)
     if values.ndim != 1 or len(values) < 3 or not np.all(np.isfinite(values)):
         raise DesignError(f"the history has shape {values.shape}; allowed: (samples,) with 3 finite values or more")
     start = int(np.argmax(values))
-    closed = np.concatenate([values[start:], values[: start + 1]])
-    ranges, counts = np.transpose(rainflow.count_cycles(closed.tolist()))
-    return ranges, counts
+    return np.concatenate([values[start:], values[: start + 1]])
 
 
 def equivalent_force_of_history(history: ArrayLike, cycles: int, exponent: float = LIFE_EXPONENT) -> float:

@@ -4,8 +4,8 @@ r"""The thesis' guidelines as sentences on one machine: which case of 5.5.1 it i
     Case II    those that are not fill a part of the tolerances
     Case III   periodic and other responses are mixed
 
-Mixed are they where no plane through the tolerances parts them: the same rule that tells Type III from Type II
-(``chaosgym.diagnosis.type_rule``).
+Case II holds throughout where no response of the tolerances is periodic. Mixed are they where no plane through the
+tolerances parts them: the same rule that tells Type III from Type II (``chaosgym.diagnosis.type_rule``).
 """
 
 from collections import Counter
@@ -14,9 +14,10 @@ from typing import Literal, NamedTuple
 
 from chaosgym.design.methodology import Assessment
 from chaosgym.diagnosis import Neighbour, Type, signs_of_chaos
+from chaosgym.diagnosis.precursors import measured_rates
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE, mixed
 
-Case = Literal["I", "II", "III", "undetermined"]
+Case = Literal["I", "II", "II throughout", "III", "undetermined"]
 
 
 class Guideline(NamedTuple):
@@ -29,6 +30,7 @@ class Guideline(NamedTuple):
 CASES: dict[Case, str] = {
     "I": "every response in the tolerances is periodic",
     "II": "responses that are not periodic fill a part of the tolerances, and are of Type III",
+    "II throughout": "no response in the tolerances is periodic, and all are of Type III",
     "III": "periodic and other responses are mixed in the tolerances, and all are of Type III",
     "undetermined": "the nominal response is undetermined, so that no case is told",
 }
@@ -56,7 +58,9 @@ def case_of(found: Assessment, further: Sequence[Neighbour] = ()) -> Case:
     restless = [shares for shares, kind in region if kind != "periodic"]
     if not restless:
         return "I"
-    return "III" if calm and mixed(restless, calm) else "II"
+    if not calm:
+        return "II throughout"
+    return "III" if mixed(restless, calm) else "II"
 
 
 def guidelines(found: Assessment, further: Sequence[Neighbour] = ()) -> tuple[Guideline, ...]:
@@ -72,8 +76,8 @@ def guidelines(found: Assessment, further: Sequence[Neighbour] = ()) -> tuple[Gu
     Returns
     -------
     tuple of Guideline
-        Signs of chaos at the nominal machine, with how often each was right on the shipped dataset (5.3); the case and
-        what it means for the types (5.5.1); the evaluation and the next step (5.6).
+        Signs of chaos at the nominal machine (5.3); the case and what it means for the types (5.5.1), both with how
+        often each was right on the shipped dataset; the evaluation and the next step (5.6).
     """
     said = [Guideline("5.3", sign.line) for sign in signs_of_chaos(found.response.centre)]
     case = case_of(found, further)
@@ -82,6 +86,8 @@ def guidelines(found: Assessment, further: Sequence[Neighbour] = ()) -> tuple[Gu
     if machines and case != "undetermined":
         counts = Counter(one.nature for one in machines)
         told += f" ({', '.join(f'{n} {nature}' for nature, n in counts.most_common())} of {len(machines)} machines)"
+    if case != "undetermined":
+        told += _held(case, found)
     said.append(Guideline("5.5.1", told))
     if case == "I":
         above = sum(one.largest_peak > (1.0 + FORCE_CHANGE) * found.nominal.largest_peak for one in machines)
@@ -91,6 +97,15 @@ def guidelines(found: Assessment, further: Sequence[Neighbour] = ()) -> tuple[Gu
     said.append(Guideline("5.6, phase VI", EVALUATION[found.type]))
     said.append(Guideline("5.6, phase VII", _next(found)))
     return tuple(said)
+
+
+def _held(case: Case, found: Assessment) -> str:
+    """How often the case of its neighbours told the nature of a point of the dataset."""
+    rate = measured_rates().get(found.machine.name, {}).get(f"case {case}")
+    if rate is None or rate.precision is None:
+        return "; how often the case tells a machine's nature was not measured on this machine"
+    what = "periodic" if case == "I" else "not periodic"
+    return f"; {rate.precision:.1%} of the dataset's points whose neighbours were of this case were {what} themselves"
 
 
 def _next(found: Assessment) -> str:

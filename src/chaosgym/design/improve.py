@@ -282,6 +282,7 @@ def improve(
                 assessment.criteria,
                 duty,
                 series_size=series_size,
+                bending=None if assessment.bending is None else assessment.bending.bending,
                 seed=seed,
                 workers=workers,
             )

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.design.bearing import Criteria, Evaluation, evaluate, plain
+from chaosgym.design.bending import Bending, BendingLife, bending_life
 from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.reliability import time_blocks
 from chaosgym.design.runs import DIAGNOSIS_BUDGET, NOMINAL_BUDGET, Series, SettledRun, build_series, settled_run
@@ -141,6 +142,8 @@ class Assessment:
         "meets", "fails", or "undetermined" where the nominal response is.
     machines_that_meet
         Share of the series, each judged by its own statistics.
+    bending
+        How long the flexible part lasts at the nominal speed; None if it is left out.
     collective
         The speeds of a duty of several, whose evaluation, checks and verdict these are; empty for one speed.
     """
@@ -158,6 +161,7 @@ class Assessment:
     checks: tuple[Check, ...]
     verdict: Verdict
     machines_that_meet: float
+    bending: BendingLife | None = None
     collective: tuple[AtSpeed, ...] = ()
 
     @property
@@ -203,6 +207,7 @@ class Assessment:
                 "largest_peak_N": [run.largest_peak for run in self.series.runs],
                 "nature": [run.nature for run in self.series.runs],
             },
+            "bending": None if self.bending is None else self.bending.as_dict(),
         }
 
 
@@ -213,6 +218,7 @@ def assess(
     *,
     series_size: int = SERIES_SIZE,
     further: Sequence[Neighbour] = (),
+    bending: Bending | None = None,
     seed: int = 0,
     workers: int | None = None,
     progress: bool = False,
@@ -231,6 +237,8 @@ def assess(
         Machines that represent the region.
     further
         Machines of the region that were run already: they count for the type and for the largest force.
+    bending
+        Section of the flexible part that must last as long as the surface; left out if None.
     seed
         Of the series and the bootstrap.
     workers
@@ -259,7 +267,8 @@ def assess(
     own = evaluate(time_blocks(nominal.worse_side(exponent)), criteria, "statistics of the nominal machine", seed)
     evaluation = _by_type(response, built, nominal, series, trend, criteria, seed)
     share = _share_that_meets(series.runs or (nominal,), criteria, seed)
-    checks = checks_of(response.type, evaluation, share, criteria)
+    bent = None if bending is None else bending_life((nominal, *series.runs), bending, workers=workers)
+    checks = checks_of(response.type, evaluation, share, criteria, bent)
     return Assessment(
         machine=machine,
         criteria=criteria,
@@ -274,6 +283,7 @@ def assess(
         checks=checks,
         verdict=verdict_of(response.type, checks),
         machines_that_meet=share,
+        bending=bent,
     )
 
 
@@ -305,14 +315,19 @@ def _by_type(
     return evaluate(blocks, criteria, "Type III: statistics over all machines in the tolerances", seed)
 
 
-def checks_of(kind: Type, evaluation: Evaluation, share: float, criteria: Criteria) -> tuple[Check, ...]:
-    """Each criterion beside what is reached; the safety factor for Types I and II only."""
+def checks_of(
+    kind: Type, evaluation: Evaluation, share: float, criteria: Criteria, bent: BendingLife | None = None
+) -> tuple[Check, ...]:
+    """Each criterion beside what is reached; the safety factor for Types I and II only, bending if it was asked."""
     life = Check("fatigue life", evaluation.life_interval.low, criteria.life, "million cycles")
     endures = Check("reliability", evaluation.reliability_interval.low, criteria.reliability, "")
     built = Check("machines that meet", share, criteria.machines_that_meet, "")
+    checks = [life, endures, built]
     if kind in ("I", "II"):
-        return life, endures, built, Check("safety factor", evaluation.safety_factor, criteria.safety_factor, "")
-    return life, endures, built
+        checks.append(Check("safety factor", evaluation.safety_factor, criteria.safety_factor, ""))
+    if bent is not None:
+        checks.append(Check("bending life", bent.assured, criteria.life, "million cycles"))
+    return tuple(checks)
 
 
 def verdict_of(kind: Type, checks: tuple[Check, ...]) -> Verdict:

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,8 @@ class SettledRun:
         One sentence for people.
     peaks : (cycles, sides)
         Peak force of each cycle [N]: one period, or a record long enough for statistics.
+    final_state
+        From which the settled response goes on.
     """
 
     machine: Machine
@@ -62,6 +64,7 @@ class SettledRun:
     period: int | None
     reason: str
     peaks: Array
+    final_state: MotionState
 
     def worse_side(self, exponent: float = LIFE_EXPONENT) -> Array:
         """Peaks (cycles,) of the surface that fatigues faster."""
@@ -108,13 +111,18 @@ def settled_run(
     repeats = verdict.nature == "periodic" and verdict.period is not None
     record = simulate(machine, verdict.period if repeats and verdict.period else cycles, state)
     run = SettledRun(
-        machine, verdict.nature, verdict.period if repeats else None, verdict.reason, record.peak_force.copy()
+        machine,
+        verdict.nature,
+        verdict.period if repeats else None,
+        verdict.reason,
+        record.peak_force.copy(),
+        record.final_state,
     )
     while until_converged and not repeats and len(record) < LONGEST_RUN:
         if convergence(run.worse_side()).converged:
             break
         record = record.followed_by(simulate(machine, len(record), record.final_state))
-        run = SettledRun(machine, run.nature, run.period, run.reason, record.peak_force.copy())
+        run = replace(run, peaks=record.peak_force.copy(), final_state=record.final_state)
     return run
 
 

@@ -105,6 +105,7 @@ class DesignStudy:
             f"  largest peak        {found.evaluation.largest_force:.1f} N, equivalent {found.evaluation.force:.1f} N",
             f"  load rating         {found.evaluation.required_load_rating:.0f} N needed for the life",
         ]
+        lines += [f"  {line}" for line in self.bending_told]
         lines += [f"  {line}" for line in ([] if self.wear is None else self.wear.told)]
         lines.append(f"  {self.margin_told}")
         lines += [f"  {one.sentence} ({one.section})" for one in self.guidelines]
@@ -131,6 +132,12 @@ class DesignStudy:
                 f"{part.share:.0%} of the time at {speed}: Type {found.type}, {alone}, {damage:.0%} of the damage"
             )
         return lines
+
+    @property
+    def bending_told(self) -> list[str]:
+        """How long the flexible part lasts, for people; none if it is left out."""
+        found = self.assessment.bending
+        return [] if found is None else found.told(self.assessment.cycle_period)
 
     @property
     def dearer(self) -> tuple[Trial, ...]:
@@ -211,7 +218,7 @@ class DesignStudy:
 def _told(check: Check, cycle_period: float) -> str:
     """What a check reached of what is required; a life in hours first."""
     told = f"{check.reached:.6g} of {check.required:g} {check.unit}".rstrip()
-    if check.name == "fatigue life":
+    if check.name in ("fatigue life", "bending life"):
         reached, required = (hours_of(life, cycle_period) for life in (check.reached, check.required))
         told = f"{reached:,.4g} h of {required:,.4g} h in operation ({told})"
     return told + (" met" if check.met else " NOT met")
@@ -259,6 +266,7 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
         brief.duty,
         series_size=brief.series_size,
         further=_in_tolerance(around),
+        bending=brief.bending,
         seed=seed,
         workers=workers,
         progress=progress,

@@ -31,6 +31,28 @@ class Number(NamedTuple):
     joints: tuple[str, ...] = ()
 
 
+class Flexible(NamedTuple):
+    """Equations of n mass-normalised modes q between contacts, q'' + D q' + diag(w^2) q = f(t) - sum phi_j F_j.
+
+    Attributes
+    ----------
+    stiffness, damping : (n,), (n, n)
+        w^2 [1/s^2] and D [1/s].
+    joints : (m, n)
+        phi_j, what each joint moves for a mode [kg^-1/2]; F_j is the force of its upper stop less that of its lower.
+    drive : (H, 2, n)
+        Modal forces of cosine and sine of each harmonic of the speed, from the first on [N kg^-1/2].
+    static : (n,)
+        The constant one [N kg^-1/2].
+    """
+
+    stiffness: NDArray[np.float64]
+    damping: NDArray[np.float64]
+    joints: NDArray[np.float64]
+    drive: NDArray[np.float64]
+    static: NDArray[np.float64]
+
+
 class Choice(NamedTuple):
     """A word: the fields that each word sets, and the options that it redirects to another field."""
 
@@ -332,6 +354,33 @@ class Machine(ABC):
             If it has no such picture.
         """
         raise ParameterError(f"{self.name} has no picture of its links; allowed: the file of a mechanism")
+
+    @property
+    def flexible(self) -> Flexible | None:
+        """Its equations between contacts, if it is one of a few modes; its states are then q and q'."""
+        return None
+
+    def shape_of(self, place: str) -> Array:
+        """Mode shapes (n,) at a named point, or of a motion between two, such as ``pinion - wheel``.
+
+        Raises
+        ------
+        ParameterError
+            If the machine has no such point.
+        """
+        raise ParameterError(f"{self.name} has no named points; allowed: the file of a machine of modes or matrices")
+
+    def stress_at(self, position: float) -> Array:
+        """Bending stress (n,) at the outer fibre of its beam for each mode, at a position [m] from its beginning on.
+
+        It is E c phi'' [Pa kg^-1/2 m^-1], positive where the upper fibre is pulled.
+
+        Raises
+        ------
+        ParameterError
+            If the machine has no beam of its own, or the position is outside it.
+        """
+        raise ParameterError(f"{self.name} has no beam of its own; allowed: impact-beam")
 
     @property
     def swings(self) -> bool:

@@ -24,7 +24,7 @@ from chaosgym.core.propagator import Regimes
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
-from chaosgym.machines.machine import Machine
+from chaosgym.machines.machine import Flexible, Machine
 from chaosgym.machines.parameters import check_parameter, refuse_not_finite
 
 if TYPE_CHECKING:
@@ -363,6 +363,14 @@ class ModalImpactMachine(Machine):
     def carries_deviations(self) -> bool:
         """Always: deviations cross every contact exactly."""
         return True
+
+    @property
+    def flexible(self) -> Flexible:
+        """Its equations between contacts."""
+        model = self.reduce()
+        omega = 2.0 * math.pi * model.excitation_frequency
+        drive = model.drive[0] + omega**2 * model.drive[1]
+        return Flexible(model.stiffness, model.damping, model.tip_shape[None], drive, model.static_force)
 
     def state_weights(self, state: Array) -> Array:
         """Weights (n_states,) by which the squared norm of a deviation is its energy.

@@ -58,6 +58,7 @@ ALTERNATIVES: Mapping[str, Mapping[str, float]] = {
     "kg m^2": {"kg m^2": 1.0, "kg cm^2": 1e-4, "kg mm^2": 1e-6, "g cm^2": 1e-7, "g mm^2": 1e-9, "t m^2": 1e3},
     "rad/s^2": {"rad/s^2": 1.0, "deg/s^2": math.pi / 180.0},
     "kg^-1/2 m^-1": {"kg^-1/2 m^-1": 1.0},
+    "kg^-1/2 m^-2": {"kg^-1/2 m^-2": 1.0},
     "kg^1/2 m": {"kg^1/2 m": 1.0},
 }
 """By unit of a field: the units that are understood, and their size."""

@@ -24,7 +24,7 @@ from chaosgym.design.methodology import Assessment
 from chaosgym.design.study import DesignStudy
 from chaosgym.errors import DesignError
 from chaosgym.files import write_atomically
-from chaosgym.machines.parameters import parameters_of, quantity_of
+from chaosgym.machines.parameters import Parameter, parameters_of, quantity_of
 from chaosgym.plotting import design as figures
 from chaosgym.plotting.style import STYLE, TYPE_COLOURS, figure_of
 from chaosgym.version import __version__
@@ -103,8 +103,18 @@ def design_report(study: DesignStudy, command: str = "", *, date: str = "", brie
         described=parameters_of(found.machine),
         reference=type(found.machine)(),
         asked=parameters_of(criteria),
+        bent_of=_of_section(study),
         pictures=_pictures(study),
     )
+
+
+def _of_section(study: DesignStudy) -> dict[str, Parameter]:
+    """What is known of the section that bends, without what its kind leaves out."""
+    found = study.assessment.bending
+    if found is None:
+        return {}
+    own = ("fibre", "modulus") if found.bending.section.at is not None else ()
+    return {name: about for name, about in parameters_of(found.bending).items() if name not in own}
 
 
 def comparison_report(studies: Mapping[str, DesignStudy], command: str = "", *, date: str = "") -> str:
@@ -212,6 +222,7 @@ def _rendered(template: str, command: str, **names: object) -> str:
         "percent": _percent,
         "shown": {
             "fatigue life": _life,
+            "bending life": _life,
             "reliability": _share,
             "safety factor": _number,
             "machines that meet": _percent,

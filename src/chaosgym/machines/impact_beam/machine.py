@@ -5,11 +5,16 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from chaosgym.core.modal_model import ModalImpactModel
-from chaosgym.machines.impact_beam.modes import modal_analysis, static_tip_deflection
+from chaosgym.machines.impact_beam.modes import modal_analysis, modal_curvatures, static_tip_deflection
 from chaosgym.machines.impact_beam.parameters import BeamParameters
 from chaosgym.machines.integrators import TIGHTEST_EVENTS, ExactEvents
 from chaosgym.machines.modal_impact import flexible_model
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +52,10 @@ class ImpactBeam(BeamParameters):
         from chaosgym.machines.impact_beam.picture import draw_beam
 
         draw_beam(panel, record, colour, moment)
+
+    def stress_at(self, position: float) -> Array:
+        """Bending stress (n,) for each mode at a position [m] from the pivot on; see ``Machine.stress_at``."""
+        return -0.5 * self.height * self.youngs_modulus * modal_curvatures(self, position)
 
     @property
     def swings(self) -> bool:

@@ -19,9 +19,7 @@ MIN_ELEMENTS = 24
 
 def _assembled(beam: BeamParameters, elements: int) -> tuple[Array, Array, int, int]:
     """Mass and stiffness matrices with springs and shaker mass, and the numbers of the force and tip deflections."""
-    stations = (0.0, beam.force_position, beam.length)
-    at_tip = beam.length - beam.force_position < 1e-9 * beam.length
-    lengths = graded_mesh((0.0, beam.length) if at_tip else stations, elements)
+    lengths = _mesh(beam, elements)
     section = beam.width * beam.height
     bending_stiffness = beam.youngs_modulus * beam.width * beam.height**3 / 12.0
     mass, stiffness = bending_matrices(lengths, bending_stiffness, beam.density * section)
@@ -44,7 +42,49 @@ def modal_analysis(beam: BeamParameters, elements: int | None = None) -> Modes:
     elements
         Number of finite elements; at least 24 and three a mode by default.
     """
-    mass, stiffness, at_force, tip = _assembled(beam, elements or max(MIN_ELEMENTS, 3 * beam.n_modes))
+    return _analysed(beam, elements)[0]
+
+
+def modal_curvatures(beam: BeamParameters, position: float, elements: int | None = None) -> Array:
+    """Curvature (n,) [kg^-1/2 m^-1] of each mode of ``modal_analysis`` at a position [m] from the pivot on.
+
+    Raises
+    ------
+    ParameterError
+        If the position is outside the beam.
+    """
+    if not 0.0 <= position <= beam.length:
+        raise ParameterError(
+            f"section at {position:g} m is outside the structure; allowed: 0 to {beam.length:g} m, from the pivot on"
+        )
+    return _analysed(beam, elements, position)[1]
+
+
+def _curvature_row(beam: BeamParameters, elements: int, position: float, size: int) -> Array:
+    """Curvature (size,) [1/m] at a position for unit degrees of freedom, the mean of both sides at a node."""
+    nodes = np.concatenate([[0.0], np.cumsum(_mesh(beam, elements))])
+    touching = [e for e in range(len(nodes) - 1) if nodes[e] <= position <= nodes[e + 1]] or [len(nodes) - 2]
+    row = np.zeros(size)
+    for e in touching:
+        h = nodes[e + 1] - nodes[e]
+        s = (position - nodes[e]) / h
+        bent = [(12.0 * s - 6.0) / h**2, (6.0 * s - 4.0) / h, (6.0 - 12.0 * s) / h**2, (6.0 * s - 2.0) / h]
+        row[2 * e : 2 * e + 4] += np.array(bent) / len(touching)
+    return row
+
+
+def _mesh(beam: BeamParameters, elements: int) -> Array:
+    """Lengths of the elements [m], from the pivot on."""
+    stations = (0.0, beam.force_position, beam.length)
+    at_tip = beam.length - beam.force_position < 1e-9 * beam.length
+    return graded_mesh((0.0, beam.length) if at_tip else stations, elements)
+
+
+def _analysed(beam: BeamParameters, elements: int | None = None, position: float | None = None) -> tuple[Modes, Array]:
+    """Modes, and their curvatures (n,) at a position; none without one."""
+    elements = elements or max(MIN_ELEMENTS, 3 * beam.n_modes)
+    mass, stiffness, at_force, tip = _assembled(beam, elements)
+    bent = np.zeros((0, len(mass))) if position is None else _curvature_row(beam, elements, position, len(mass))[None]
     basis = None
     if beam.reduction == "interfaces":
         basis = _interface_basis(mass, stiffness, tuple(dict.fromkeys((0, 1, at_force, tip))), beam.n_modes)
@@ -52,6 +92,7 @@ def modal_analysis(beam: BeamParameters, elements: int | None = None) -> Modes:
     angular, shapes = _natural_modes(beam, mass, stiffness)
     places = [tip, at_force, 0, 1]
     ends = shapes[places] if basis is None else basis[places] @ shapes
+    bent = (bent if basis is None else bent @ basis) @ shapes * np.where(ends[0] < 0.0, -1.0, 1.0)
     ends = ends * np.where(ends[0] < 0.0, -1.0, 1.0)
     reference = angular[1]
     if beam.fitted_modes:
@@ -60,13 +101,15 @@ def modal_analysis(beam: BeamParameters, elements: int | None = None) -> Modes:
         except np.linalg.LinAlgError as error:
             raise _inseparable(beam) from error
         at_ends = ends[:, beam.n_modes :] @ mix
+        of_fitted = bent[:, beam.n_modes :] @ mix * np.where(at_ends[0] < 0.0, -1.0, 1.0)
+        bent = np.hstack([bent[:, : beam.n_modes], of_fitted])
         angular = np.concatenate([angular[: beam.n_modes], fitted])
         ends = np.hstack([ends[:, : beam.n_modes], at_ends * np.where(at_ends[0] < 0.0, -1.0, 1.0)])
     else:
-        angular, ends = angular[: beam.n_modes], ends[:, : beam.n_modes]
+        angular, ends, bent = angular[: beam.n_modes], ends[:, : beam.n_modes], bent[:, : beam.n_modes]
     damping = _structural_damping(beam, angular, ends, reference)
     damping = damping + beam.shaker_damping * np.outer(ends[1], ends[1])
-    return Modes(angular, damping, ends[0].copy(), ends[1].copy())
+    return Modes(angular, damping, ends[0].copy(), ends[1].copy()), bent.ravel()
 
 
 def _natural_modes(beam: BeamParameters, mass: Array, stiffness: Array) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.joint_sets import JointTables, PressedSets
-from chaosgym.machines.machine import Machine, Number, Option, refuse_fixed_steps
+from chaosgym.machines.machine import Flexible, Machine, Number, Option, refuse_fixed_steps
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.machine import ModalMachine, clearance_option, rigid_note, turning_note
@@ -197,6 +197,15 @@ class JointedMachine(Machine):
         """What turns, modes that count as rigid, and what sampled drives leave out."""
         notes = turning_note(self.turning), rigid_note(self.natural_frequencies), *drive_notes(self.drives)
         return tuple(filter(None, notes))
+
+    @property
+    def flexible(self) -> Flexible:
+        """Its equations between contacts."""
+        return Flexible(self.sets.stiffness, self.sets.damping, self.sets.shape, *self._drive())
+
+    def shape_of(self, place: str) -> Array:
+        """Mode shapes (n,) at a point of the structure; see ``Machine.shape_of``."""
+        return self.modes.shape(place)
 
     @property
     def n_states(self) -> int:

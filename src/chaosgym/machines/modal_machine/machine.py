@@ -119,6 +119,10 @@ class ModalMachine(ModalImpactMachine):
         """Displacement and velocity of every mode."""
         return 2 * len(self.modes.angular_frequency)
 
+    def shape_of(self, place: str) -> Array:
+        """Mode shapes (n,) at a point of the structure; see ``Machine.shape_of``."""
+        return self.modes.shape(place)
+
     @property
     def operating_fields(self) -> tuple[str, ...]:
         """Fields that may change from cycle to cycle."""
