@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 import chaosgym
 from chaosgym.design.bending import Bending, Section, bending_life, stress_of_modes, stressed
-from chaosgym.design.brief import brief_from
+from chaosgym.design.brief import brief_from, template
 from chaosgym.design.collective import assess_duty
 from chaosgym.design.fatigue import rainflow_means
 from chaosgym.design.methodology import assess
@@ -244,3 +244,14 @@ def test_a_section_stays_within_every_machine_of_the_tolerances():
     assert brief_from(
         tomllib.loads('machine = "impact-beam"\n' + alone.replace('machine = "impact-beam"\n', ""))
     ).bending
+
+
+@pytest.mark.parametrize("name", ["impact-beam", PIPE])
+def test_the_section_of_a_template_is_read_once_its_comment_signs_are_away(name):
+    """What the template shows of bending may be asked; points of the file take the place of its examples."""
+    head, _, tail = template(name).partition("# [bending]")
+    section = "[bending]" + "".join(line.removeprefix("# ") + "\n" for line in tail.splitlines())
+    text = head + section.replace("or the modal", "# or the modal").replace("turn2 - turn1", "end - middle")
+    found = brief_from(tomllib.loads(text)).bending
+    assert found is not None
+    assert (found.slope, found.notch_factor, found.uncertainty) == (5.0, 1.5, 3.0)

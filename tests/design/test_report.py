@@ -210,8 +210,12 @@ def test_a_load_collective_and_wear_are_told():
     assert sum(part["share_of_damage"] for part in values["collective"]) == pytest.approx(1.0)
     page = design_report(answer)
     assert told[0].strip() in page
-    assert answer.wear is not None
-    assert answer.wear.told[0] in page
+    assert answer.assessment.wear is not None
+    assert answer.assessment.wear.told[0] in page
+    (check,) = [check for check in values["checks"] if check["name"] == "wear life"]
+    hours = values["wear"]["assured_hours"]
+    assert check["met"] == (hours >= values["required_life_hours"])
+    assert check["reached"] == pytest.approx(hours / values["required_life_hours"] * check["required"])
     assert values["wear"]["course"][-1]["clearance"] == pytest.approx(0.3e-3)
 
 

@@ -2,12 +2,16 @@
 
 import math
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from chaosgym.design import Criteria
 from chaosgym.design.brief import brief_from
-from chaosgym.design.wear import Wear, wear_depth, wear_life
+from chaosgym.design.methodology import assess
+from chaosgym.design.wear import Wear, wear_depth, wear_life, wear_over
+from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import ImpactBeam
 from chaosgym.simulation import simulate
@@ -60,6 +64,29 @@ def test_a_gap_that_never_closes_never_wears():
     assert math.isinf(found.hours)
     assert "never" in found.told[0]
     assert found.as_dict()["course"][-1]["hours"] is None
+
+
+def test_half_of_the_time_without_contact_doubles_the_hours():
+    """Over two speeds the rates of wear add up by their shares of the time."""
+    still = wear_life(ImpactBeam(excitation_frequency=8.0, force_amplitude=0.01), LAW)
+    own = wear_life(CALM, LAW)
+    half = wear_over([own, still], [0.5, 0.5])
+    assert [one.hours for one in half.course] == pytest.approx([2.0 * one.hours for one in own.course])
+    assert [one.nature for one in half.course] == [one.nature for one in own.course]
+    assert wear_over([own, own], [0.3, 0.7]).hours == pytest.approx(own.hours)
+    assert math.isinf(wear_over([still, still], [0.5, 0.5]).hours)
+
+
+def test_a_joint_that_wears_out_too_early_fails():
+    """The limit of the clearance is a criterion: what is known to a factor of three must last three times as long."""
+    criteria = Criteria(load_rating=5000.0, hours=wear_life(CALM, LAW).hours / 2.9)
+    region = {"clearance": Tolerance(0.05)}
+    plain, worn = (assess(CALM, region, criteria, series_size=8, wear=one) for one in (None, LAW))
+    assert plain.verdict == "meets"
+    assert worn.verdict == "fails"
+    assert [check.name for check in worn.checks if not check.met] == ["wear life"]
+    longer = replace(LAW, uncertainty=2.8)
+    assert assess(CALM, region, criteria, series_size=8, wear=longer).verdict == "meets"
 
 
 def test_a_brief_states_what_wears():

@@ -23,8 +23,9 @@ import numpy as np
 from chaosgym.design.bearing import Criteria, Evaluation, evaluate, hours_of
 from chaosgym.design.bending import BendingLife
 from chaosgym.design.fatigue import equivalent_force, required_load_rating
-from chaosgym.design.methodology import Assessment, AtSpeed, Check, assess, checks_of, verdict_of
+from chaosgym.design.methodology import Assessment, AtSpeed, Check, assess, checks_of, further_checks, verdict_of
 from chaosgym.design.reliability import Interval
+from chaosgym.design.wear import WearLife, wear_over
 from chaosgym.diagnosis import Tolerance
 from chaosgym.machines import Machine
 
@@ -80,10 +81,12 @@ def _over(nominal: Assessment, parts: tuple[AtSpeed, ...], seed: int) -> Assessm
     own = _evaluation([part.assessment.nominal_evaluation for part in parts], cycles, criteria)
     share = _share_that_meets(parts, cycles, criteria, seed)
     regular = [part.assessment for part in parts if part.assessment.type in ("I", "II")]
-    checks = checks_of("III", evaluation, share, criteria, _bending(parts, cycles))
+    checks = checks_of("III", evaluation, share, criteria)
     if regular:
         least = min(one.evaluation.safety_factor for one in regular)
         checks += (Check("safety factor", least, criteria.safety_factor, ""),)
+    bent, worn = _bending(parts, cycles), _wear(nominal, parts)
+    checks += further_checks(bent, worn, criteria, 1.0 / rate)
     kinds = [part.assessment.type for part in parts]
     return replace(
         nominal,
@@ -93,7 +96,8 @@ def _over(nominal: Assessment, parts: tuple[AtSpeed, ...], seed: int) -> Assessm
         checks=checks,
         verdict=verdict_of("undetermined" if "undetermined" in kinds else kinds[0], checks),
         machines_that_meet=share,
-        bending=_bending(parts, cycles),
+        bending=bent,
+        wear=worn,
         collective=parts,
     )
 
@@ -106,6 +110,14 @@ def _bending(parts: Sequence[AtSpeed], cycles: Sequence[float]) -> BendingLife |
         return None
     lives = zip(*(one.lives for one in found if one is not None), strict=True)
     return replace(own, lives=tuple(miner(row, cycles) for row in lives))
+
+
+def _wear(nominal: Assessment, parts: Sequence[AtSpeed]) -> WearLife | None:
+    """Course of the joint over all speeds, with nature and force of the nominal one."""
+    nominal_first = sorted(parts, key=lambda part: part.assessment is not nominal)
+    found = [(part.assessment.wear, part.share) for part in nominal_first]
+    lives = [(life, share) for life, share in found if life is not None]
+    return wear_over(*zip(*lives, strict=True)) if lives else None
 
 
 def miner(lives: Sequence[float], shares: Sequence[float]) -> float:

@@ -27,7 +27,7 @@ from chaosgym.design.collective import assess_duty
 from chaosgym.design.methodology import SERIES_SIZE, Assessment, Check
 from chaosgym.design.runs import deviating, sobol_shares, worse_side
 from chaosgym.diagnosis import default_tolerances
-from chaosgym.errors import ParameterError, SimulationError
+from chaosgym.errors import DesignError, ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, quantity_of, with_settings
 from chaosgym.simulation import parallel_map, simulate
@@ -283,10 +283,11 @@ def improve(
                 duty,
                 series_size=series_size,
                 bending=None if assessment.bending is None else assessment.bending.bending,
+                wear=None if assessment.wear is None else assessment.wear.wear,
                 seed=seed,
                 workers=workers,
             )
-        except (SimulationError, ParameterError):
+        except (SimulationError, ParameterError, DesignError):
             return None
         return Trial(dict(change), change_cost(machine, change, weights, force), result)
 

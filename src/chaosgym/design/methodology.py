@@ -26,12 +26,13 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.design.bearing import Criteria, Evaluation, evaluate, plain
+from chaosgym.design.bearing import Criteria, Evaluation, evaluate, hours_of, plain
 from chaosgym.design.bending import Bending, BendingLife, bending_life
 from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.reliability import time_blocks
 from chaosgym.design.runs import DIAGNOSIS_BUDGET, NOMINAL_BUDGET, Series, SettledRun, build_series, settled_run
 from chaosgym.design.statistics import Convergence, convergence
+from chaosgym.design.wear import Wear, WearLife, wear_life
 from chaosgym.diagnosis import Neighbour, ResponseType, Tolerance, Type, default_tolerances, diagnose, response_type
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
@@ -143,7 +144,9 @@ class Assessment:
     machines_that_meet
         Share of the series, each judged by its own statistics.
     bending
-        How long the flexible part lasts at the nominal speed; None if it is left out.
+        How long the flexible part lasts; None if it is left out.
+    wear
+        How the joint of the nominal machine wears; None if it is left out.
     collective
         The speeds of a duty of several, whose evaluation, checks and verdict these are; empty for one speed.
     """
@@ -162,6 +165,7 @@ class Assessment:
     verdict: Verdict
     machines_that_meet: float
     bending: BendingLife | None = None
+    wear: WearLife | None = None
     collective: tuple[AtSpeed, ...] = ()
 
     @property
@@ -208,6 +212,7 @@ class Assessment:
                 "nature": [run.nature for run in self.series.runs],
             },
             "bending": None if self.bending is None else self.bending.as_dict(),
+            "wear": None if self.wear is None else self.wear.as_dict(),
         }
 
 
@@ -219,6 +224,7 @@ def assess(
     series_size: int = SERIES_SIZE,
     further: Sequence[Neighbour] = (),
     bending: Bending | None = None,
+    wear: Wear | None = None,
     seed: int = 0,
     workers: int | None = None,
     progress: bool = False,
@@ -239,6 +245,8 @@ def assess(
         Machines of the region that were run already: they count for the type and for the largest force.
     bending
         Section of the flexible part that must last as long as the surface; left out if None.
+    wear
+        Data of Archard's law, by which the joint must last as long; left out if None.
     seed
         Of the series and the bootstrap.
     workers
@@ -268,7 +276,11 @@ def assess(
     evaluation = _by_type(response, built, nominal, series, trend, criteria, seed)
     share = _share_that_meets(series.runs or (nominal,), criteria, seed)
     bent = None if bending is None else bending_life((nominal, *series.runs), bending, workers=workers)
-    checks = checks_of(response.type, evaluation, share, criteria, bent)
+    worn = None if wear is None else wear_life(machine, wear, workers=workers)
+    checks = (
+        *checks_of(response.type, evaluation, share, criteria),
+        *further_checks(bent, worn, criteria, machine.cycle_period),
+    )
     return Assessment(
         machine=machine,
         criteria=criteria,
@@ -284,6 +296,7 @@ def assess(
         verdict=verdict_of(response.type, checks),
         machines_that_meet=share,
         bending=bent,
+        wear=worn,
     )
 
 
@@ -315,19 +328,26 @@ def _by_type(
     return evaluate(blocks, criteria, "Type III: statistics over all machines in the tolerances", seed)
 
 
-def checks_of(
-    kind: Type, evaluation: Evaluation, share: float, criteria: Criteria, bent: BendingLife | None = None
-) -> tuple[Check, ...]:
-    """Each criterion beside what is reached; the safety factor for Types I and II only, bending if it was asked."""
+def checks_of(kind: Type, evaluation: Evaluation, share: float, criteria: Criteria) -> tuple[Check, ...]:
+    """Each criterion beside what is reached; the safety factor for Types I and II only."""
     life = Check("fatigue life", evaluation.life_interval.low, criteria.life, "million cycles")
     endures = Check("reliability", evaluation.reliability_interval.low, criteria.reliability, "")
     built = Check("machines that meet", share, criteria.machines_that_meet, "")
-    checks = [life, endures, built]
     if kind in ("I", "II"):
-        checks.append(Check("safety factor", evaluation.safety_factor, criteria.safety_factor, ""))
+        return life, endures, built, Check("safety factor", evaluation.safety_factor, criteria.safety_factor, "")
+    return life, endures, built
+
+
+def further_checks(
+    bent: BendingLife | None, worn: WearLife | None, criteria: Criteria, cycle_period: float
+) -> tuple[Check, ...]:
+    """Lives of the flexible part and of a joint that wears, by a cycle's period [s], beside the one required."""
+    lives = dict[str, float]()
     if bent is not None:
-        checks.append(Check("bending life", bent.assured, criteria.life, "million cycles"))
-    return tuple(checks)
+        lives["bending life"] = bent.assured
+    if worn is not None:
+        lives["wear life"] = worn.assured / hours_of(1.0, cycle_period)
+    return tuple(Check(name, life, criteria.life, "million cycles") for name, life in lives.items())
 
 
 def verdict_of(kind: Type, checks: tuple[Check, ...]) -> Verdict:

@@ -16,7 +16,6 @@ from chaosgym.design.methodology import Assessment, Check
 from chaosgym.design.peak_impacts import PeakImpactDiagram, filling_cycles, peak_impacts, worn_side
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
 from chaosgym.design.trends import HISTORY_SAMPLES, LifeTrend, life_against
-from chaosgym.design.wear import WearLife, wear_life
 from chaosgym.diagnosis import Neighbour, ResponseMap, find_periodic_orbit, response_map
 from chaosgym.diagnosis.margins import Margins, margins
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE
@@ -66,8 +65,6 @@ class DesignStudy:
         The thesis' guidelines, as sentences on this machine.
     margins
         How far each tolerance is from a loss of stability; None unless the nominal response is proven to be periodic.
-    wear
-        How the joint wears; None if the brief leaves it out.
     force_of_every_impact
         Equivalent force a cycle [N] if every impact counts, by rainflow counting, and not the peak of a cycle alone.
     seed
@@ -83,7 +80,6 @@ class DesignStudy:
     combination: Combination
     guidelines: tuple[Guideline, ...]
     margins: Margins | None
-    wear: WearLife | None
     force_of_every_impact: float
     seed: int
 
@@ -106,7 +102,7 @@ class DesignStudy:
             f"  load rating         {found.evaluation.required_load_rating:.0f} N needed for the life",
         ]
         lines += [f"  {line}" for line in self.bending_told]
-        lines += [f"  {line}" for line in ([] if self.wear is None else self.wear.told)]
+        lines += [f"  {line}" for line in ([] if found.wear is None else found.wear.told)]
         lines.append(f"  {self.margin_told}")
         lines += [f"  {one.sentence} ({one.section})" for one in self.guidelines]
         if best is not None:
@@ -183,7 +179,6 @@ class DesignStudy:
             ],
             "combination": self.combination.as_dict(),
             "guidelines": [one._asdict() for one in self.guidelines],
-            "wear": None if self.wear is None else self.wear.as_dict(),
             "margins": None if self.margins is None else self.margins.as_dict(),
             "improvement": None
             if found is None
@@ -218,7 +213,7 @@ class DesignStudy:
 def _told(check: Check, cycle_period: float) -> str:
     """What a check reached of what is required; a life in hours first."""
     told = f"{check.reached:.6g} of {check.required:g} {check.unit}".rstrip()
-    if check.name in ("fatigue life", "bending life"):
+    if check.unit == "million cycles":
         reached, required = (hours_of(life, cycle_period) for life in (check.reached, check.required))
         told = f"{reached:,.4g} h of {required:,.4g} h in operation ({told})"
     return told + (" met" if check.met else " NOT met")
@@ -267,6 +262,7 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
         series_size=brief.series_size,
         further=_in_tolerance(around),
         bending=brief.bending,
+        wear=brief.wear,
         seed=seed,
         workers=workers,
         progress=progress,
@@ -296,7 +292,6 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
         combination(assessment, _in_tolerance(around), seed=seed, workers=workers, progress=progress),
         guidelines(assessment, _in_tolerance(around)),
         _margins(assessment),
-        None if brief.wear is None else wear_life(machine, brief.wear, workers=workers, progress=progress),
         _every_impact(record, side, brief),
         seed,
     )

@@ -15,7 +15,7 @@ J. F. Archard, Contact and rubbing of flat surfaces, Journal of Applied Physics 
 R. G. Budynas, J. K. Nisbett, Shigley's Mechanical Engineering Design, 10th ed., section 12-15.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -120,6 +120,11 @@ class WearLife:
         return self.course[-1].hours
 
     @property
+    def assured(self) -> float:
+        """Those hours over the factor to which the coefficient is known."""
+        return self.hours / self.wear.uncertainty
+
+    @property
     def change(self) -> Worn | None:
         """The first point whose nature is another than the nominal one's."""
         return next((one for one in self.course if one.nature != self.course[0].nature), None)
@@ -144,6 +149,7 @@ class WearLife:
         """Return plain values for JSON; None stands for a time without end."""
         return {
             "wear": vars(self.wear),
+            "assured_hours": self.assured if np.isfinite(self.assured) else None,
             "course": [
                 {**one._asdict(), "hours": one.hours if np.isfinite(one.hours) else None} for one in self.course
             ],
@@ -195,6 +201,25 @@ def wear_life(machine: Machine, wear: Wear, *, workers: int | None = None, progr
     return WearLife(wear, tuple(course))
 
 
+def wear_over(found: Sequence[WearLife], shares: Sequence[float]) -> WearLife:
+    """Course of a joint that spends shares of its time at several speeds; nature and force are those of the first.
+
+    Parameters
+    ----------
+    found
+        Course at each speed, over the same clearances.
+    shares
+        Of the operating time, which add up to 1.
+    """
+    with np.errstate(invalid="ignore"):
+        steps = np.array([np.diff([one.hours for one in life.course]) for life in found])
+    steps[np.isnan(steps)] = np.inf  # beyond a clearance from which on it does not wear
+    rates = sum(share * _inverse(row) for share, row in zip(shares, steps, strict=True))
+    hours = np.concatenate([[0.0], np.cumsum(_inverse(np.asarray(rates)))])
+    course = (one._replace(hours=float(hour)) for one, hour in zip(found[0].course, hours, strict=True))
+    return WearLife(found[0].wear, tuple(course))
+
+
 def _inverse(values: Array) -> Array:
     return np.array([1.0 / value if value > 0.0 else np.inf for value in values])
 
@@ -205,7 +230,9 @@ def _loads(machine: Machine) -> tuple[float, Nature, float]:
     repeats = verdict.period if verdict.nature == "periodic" else None
     state = MotionState(np.asarray(verdict.evidence["final_state"]), rest_state(machine).bouncing)
     settled = simulate(machine, repeats or CYCLES, state, samples_per_cycle=HISTORY_SAMPLES)
-    force = settled.surface_force[..., :2] if len(machine.joints) > 1 else settled.surface_force
+    gap = machine.clearance_field.removesuffix("_clearance")
+    first = 2 * machine.joints.index(gap) if gap in machine.joints else 0
+    force = settled.surface_force[..., first : first + 2]
     return float(np.mean(np.maximum(force, 0.0).sum(axis=-1))), verdict.nature, float(settled.peak_force.max())
 
 

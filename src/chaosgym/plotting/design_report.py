@@ -223,6 +223,7 @@ def _rendered(template: str, command: str, **names: object) -> str:
         "shown": {
             "fatigue life": _life,
             "bending life": _life,
+            "wear life": _life,
             "reliability": _share,
             "safety factor": _number,
             "machines that meet": _percent,
