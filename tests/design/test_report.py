@@ -27,6 +27,7 @@ from chaosgym.plotting.design_report import (
     measured_report,
     write_report,
 )
+from chaosgym.simulation import simulate
 from tests.browser import CHROMIUM, Browser
 
 DOCUMENTATION = Path(__file__).parents[2] / "docs"
@@ -281,12 +282,43 @@ def test_briefs_are_put_side_by_side(answered, browser, tmp_path):
         check_page(browser, path, 2)
 
 
+def test_what_was_measured_stands_beside_what_is_simulated(run, browser, tmp_path):
+    """A run of the brief's own machine, read as a recording, has its forces; one twice as hard lies outside all."""
+    brief, peaks, page = tmp_path / "brief.toml", tmp_path / "peaks.csv", tmp_path / "beside.html"
+    brief.write_text(CALM)
+    machine = brief_from(tomllib.loads(CALM)).machine
+    own = simulate(machine, 60, transient=300).peak_force.max(axis=1)
+    for factor, told in ((1.0, str(brief)), (2.0, "no brief")):
+        peaks.write_text("upper\n" + "".join(f"{factor * force}\n" for force in own))
+        arguments = ("--peaks", peaks, "--column", "upper", "--sensor-error", "0.5 N", "--beside")
+        code, out, err = run(brief, *arguments, "--out", page, "--overwrite")
+        assert code == 0, err
+        assert f"lies within what machines in the tolerances of {told} have" in out
+        values, text = json.loads(page.with_suffix(".json").read_text()), page.read_text()
+        assert values["measured"]["evaluation"]["force"] == pytest.approx(factor * own[0], rel=1e-3)
+        assert f"lies within what machines in the tolerances of {told} have" in text
+        assert '<th class="n">measured</th>' in text
+        (row,) = re.findall(r"(?m)^equivalent force +([0-9].*)", out)
+        assert row.endswith(f"{factor * own[0]:.1f} N")
+    if CHROMIUM is not None:
+        check_page(browser, page, 2)
+
+
+def test_a_recording_beside_no_brief_is_refused(run):
+    """One line that says what is needed."""
+    for arguments in (("--beside",), ("a.toml", "--beside"), ("--peaks", "a.csv", "--beside")):
+        code, out, err = run(*arguments)
+        assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
+        assert "--beside needs a brief, and --peaks or --series" in err
+
+
 def test_the_same_brief_twice_is_refused(run):
     """One line; several briefs go without measured forces."""
     code, _, err = run("a.toml", "a.toml")
     assert (code, len(err.strip().splitlines())) == (2, 1)
     assert "given twice" in err
     assert "several briefs go without" in run("a.toml", "b.toml", "--load-rating", "500 N")[2]
+    assert "by --beside only" in run("a.toml", "b.toml", "--peaks", "a.csv")[2]
 
 
 def test_command_evaluates_measured_peaks(run, tmp_path):

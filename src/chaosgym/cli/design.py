@@ -1,12 +1,17 @@
 """May a designer rely on the machine? ``design``."""
 
 import datetime
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from chaosgym.cli.machine_options import Quantity
-from chaosgym.cli.measured_options import Measured, measured_options, measured_runs
+from chaosgym.cli.measured_options import Measured, Run, measured_options, measured_runs
 from chaosgym.cli.output import draw, emit, note_machine, picture_path, plot_option
+
+if TYPE_CHECKING:
+    from chaosgym.design.bearing import Criteria
+    from chaosgym.design.measured import MeasuredPeaks
 
 
 @click.command()
@@ -16,6 +21,7 @@ from chaosgym.cli.output import draw, emit, note_machine, picture_path, plot_opt
 @click.option(
     "--load-rating", type=Quantity("N"), help="With measured forces and no brief: load rating of the surface."
 )
+@click.option("--beside", is_flag=True, help="Put what was measured beside what the briefs' machines do.")
 @click.option("--out", type=click.Path(dir_okay=False), help="HTML report to write, with a JSON file beside it.")
 @click.option("--overwrite", is_flag=True, help="Replace the report if it exists.")
 @plot_option()
@@ -27,6 +33,7 @@ def design(
     template: str | None,
     measured: Measured,
     load_rating: float | None,
+    beside: bool,
     out: str | None,
     overwrite: bool,
     plot: str | None,
@@ -37,20 +44,23 @@ def design(
     """Say whether a machine meets its criteria within its tolerances, and what to change if not.
 
     FILE.toml is a brief (see --template), or a machine's file, which starts from its template. Several are put side by
-    side.
+    side, with --beside next to a recording.
     """
     from chaosgym.design import brief as briefs
     from chaosgym.design.bearing import Criteria
-    from chaosgym.design.measured import evaluate_peaks
     from chaosgym.design.study import study
     from chaosgym.plotting import design_report as report
 
     if template is not None:
         return click.echo(briefs.template(template), nl=False)
-    if len(briefs_given) > 1:
-        if measured or load_rating is not None or plot:
-            raise click.UsageError("several briefs go without --peaks, --series, --load-rating and --plot")
-        return _compared(briefs_given, out, overwrite, seed, workers, as_json)
+    if beside and not (measured and briefs_given):
+        raise click.UsageError("--beside needs a brief, and --peaks or --series")
+    if len(briefs_given) > 1 or beside:
+        if (measured and not beside) or load_rating is not None or plot:
+            raise click.UsageError(
+                "several briefs go without --load-rating and --plot, and with --peaks or --series by --beside only"
+            )
+        return _compared(briefs_given, measured, out, overwrite, seed, workers, as_json)
     brief = briefs_given[0] if briefs_given else None
     if (brief is None) == (load_rating is None or not measured):
         raise click.UsageError("give a brief (see --template), or --peaks FILE.csv with --load-rating")
@@ -65,16 +75,8 @@ def design(
         note_machine(asked.machine)
     if measured:
         criteria = asked.criteria if asked is not None else Criteria(load_rating=load_rating or 0.0)
-        (run,) = measured_runs(measured, of_force=True)
-        source = {
-            "file": run.source,
-            "sha256": run.sha256,
-            "column": run.name,
-            "date": datetime.date.today().isoformat(),
-            "read as": "; ".join(run.notes).removeprefix("read "),
-        }
         stated = asked.stated if asked is not None else ("load_rating",)
-        found = evaluate_peaks(run.peaks, criteria, verdict=run.verdict, stated=stated, source=source)
+        run, found = _evaluated(measured, criteria, stated)
         page, result, lines = report.measured_report(found), found.as_dict(), [*found.lines(), *run.notes]
         draw(picture, lambda plots: plots.peaks_figure(found), result, lines)
     elif asked is not None:
@@ -99,10 +101,31 @@ def design(
     emit(result, as_json, lambda: lines)
 
 
+def _evaluated(measured: Measured, criteria: "Criteria", stated: tuple[str, ...]) -> "tuple[Run, MeasuredPeaks]":
+    """What was measured, and what it means by some criteria."""
+    from chaosgym.design.measured import evaluate_peaks
+
+    (run,) = measured_runs(measured, of_force=True)
+    source = {
+        "file": run.source,
+        "sha256": run.sha256,
+        "column": run.name,
+        "date": datetime.date.today().isoformat(),
+        "read as": "; ".join(run.notes).removeprefix("read "),
+    }
+    return run, evaluate_peaks(run.peaks, criteria, verdict=run.verdict, stated=stated, source=source)
+
+
 def _compared(
-    briefs_given: tuple[str, ...], out: str | None, overwrite: bool, seed: int, workers: int | None, as_json: bool
+    briefs_given: tuple[str, ...],
+    measured: Measured,
+    out: str | None,
+    overwrite: bool,
+    seed: int,
+    workers: int | None,
+    as_json: bool,
 ) -> None:
-    """Answer several briefs, and put them side by side."""
+    """Answer several briefs, and put them side by side, and beside what was measured."""
     from chaosgym.design.brief import read_brief
     from chaosgym.design.study import study
     from chaosgym.plotting import design_report as report
@@ -112,15 +135,22 @@ def _compared(
     if out is not None:
         report.report_paths(out, overwrite)
     asked = {path: read_brief(path) for path in briefs_given}
+    first = next(iter(asked.values()))
+    run, found = _evaluated(measured, first.criteria, first.stated) if measured else (None, None)
     studies = {path: study(one, seed=seed, workers=workers, progress=True) for path, one in asked.items()}
-    rows = report.comparison_rows(studies)
+    rows = report.comparison_rows(studies, found)
     width = max(len(name) for name in rows)
-    lines = [f"{'':{width}s}  {', '.join(studies)}"]
+    lines = [f"{'':{width}s}  {', '.join([*studies, *([report.MEASURED] if found else [])])}"]
     lines += [f"{name:{width}s}  {' | '.join(cells)}" for name, cells in rows.items()]
-    result = {"briefs": {path: found.as_dict() for path, found in studies.items()}}
+    result: dict[str, Any] = {"briefs": {path: one.as_dict() for path, one in studies.items()}}
+    if found is not None and run is not None:
+        result["measured"] = found.as_dict()
+        lines += [f"measured: {found.headline}", report.agreement(studies, found), *run.notes]
     if out is not None:
         command = f"chaosgym design {' '.join(briefs_given)} --seed {seed}"
-        page = report.comparison_report(studies, command, date=datetime.date.today().isoformat())
+        if measured:
+            command += f" --beside --{'peaks' if measured.peaks else 'series'} {measured.peaks or measured.series}"
+        page = report.comparison_report(studies, command, date=datetime.date.today().isoformat(), measured=found)
         report.write_report(page, result, out, overwrite)
         lines.append(f"report: {out}")
     emit(result, as_json, lambda: lines)

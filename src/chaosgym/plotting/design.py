@@ -1,5 +1,6 @@
 """Figures of a design study: what the force does, what it means for the bearing, and what drives it."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -65,6 +66,23 @@ def peak_record(peaks: Array, exponent: float, left: Axes, right: Axes) -> None:
         Line2D([], [], color=BAD, lw=1.2, ls="--", label=f"largest {np.max(peaks):.1f} N"),
     ]
     left.legend(handles=handles, loc="lower left", ncols=2)
+
+
+def peaks_beside(peaks: Array, assessments: Mapping[str, Assessment], axes: Axes) -> None:
+    """Cumulative distribution of measured peak forces [N] beside those of nominal machines and their tolerances."""
+    levels = np.linspace(0.0, 1.0, 201)
+    highest = float(np.max(peaks))
+    for k, (name, found) in enumerate(assessments.items()):
+        exponent = found.criteria.life_exponent
+        rows = [np.quantile(run.worse_side(exponent), levels) for run in (found.nominal, *found.series.runs)]
+        colour = f"C{k}"
+        axes.fill_betweenx(levels, np.min(rows, axis=0), np.max(rows, axis=0), color=colour, alpha=0.2, lw=0)
+        axes.plot(rows[0], levels, color=colour, lw=1.3, label=name)
+        highest = max(highest, float(np.max(rows)))
+    axes.plot(np.quantile(peaks, levels), levels, color=INK, lw=1.6, ls="--", label="measured")
+    axes.set(xlabel="peak force [N]", ylabel="share of cycles", xlim=(0.0, 1.05 * highest or 1.0), ylim=(0.0, 1.0))
+    axes.set_title("Peak force, measured and simulated")
+    axes.legend(loc="upper left")
 
 
 def running_convergence(peaks: Array, cycles: int, mean: Axes, deviation: Axes) -> None:
