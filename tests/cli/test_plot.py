@@ -90,7 +90,7 @@ def test_an_agent_is_drawn(folder):
         (("simulate", "impact-beam", "--plot", "x.doc"), "allowed: names that end in .png, .svg, .pdf"),
         (("simulate", "impact-beam", "--plot", "nowhere/x.png"), "nowhere is no folder"),
         (("classify", "impact-beam", "--plot"), "--plot goes with --peaks"),
-        (("design", "brief.toml", "--plot"), "--plot goes with --peaks"),
+        (("design", "brief.toml", "--plot", "x.doc"), "allowed: names that end in .png, .svg, .pdf"),
     ],
 )
 def test_a_wrong_name_is_refused_before_anything_runs(arguments, message):

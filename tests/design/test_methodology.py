@@ -11,8 +11,8 @@ from chaosgym import read_machine
 from chaosgym.design import Criteria, assess, improve, variation_region
 from chaosgym.design.bearing import evaluate
 from chaosgym.design.fatigue import equivalent_force, rating_life
-from chaosgym.design.improve import change_cost, default_changes
-from chaosgym.design.methodology import fit_trend
+from chaosgym.design.improve import Trial, _rank, change_cost, default_changes
+from chaosgym.design.methodology import Check, fit_trend
 from chaosgym.design.reliability import hertz_pressure, normal_reliability
 from chaosgym.design.runs import build_series, settled_run
 from chaosgym.diagnosis import Tolerance
@@ -169,6 +169,18 @@ def test_improve_says_so_when_nothing_suffices(chaotic):
     assert found.best is None
     assert len(found.suggestions) >= 2
     assert found.screened > 2
+
+
+def test_of_changes_that_miss_the_one_that_misses_least_comes_first(chaotic):
+    """Where no machine of any change meets, the other criteria tell which is nearest; those that meet come by cost."""
+
+    def trial(cost, share, life):
+        checks = (Check("machines that meet", share, 0.9, ""), Check("fatigue life", life, 100.0, "million cycles"))
+        verdict = "meets" if all(check.met for check in checks) else "fails"
+        return Trial({}, cost, replace(chaotic, checks=checks, verdict=verdict))
+
+    near, far, good, dear = trial(1.0, 0.0, 90.0), trial(0.1, 0.0, 10.0), trial(2.0, 1.0, 200.0), trial(3.0, 1.0, 900.0)
+    assert sorted([far, dear, near, good], key=_rank) == [good, dear, near, far]
 
 
 @pytest.mark.slow

@@ -64,9 +64,7 @@ def design(
     brief = briefs_given[0] if briefs_given else None
     if (brief is None) == (load_rating is None or not measured):
         raise click.UsageError("give a brief (see --template), or --peaks FILE.csv with --load-rating")
-    if plot and not measured:
-        raise click.UsageError("--plot goes with --peaks or --series; a brief is drawn in its report, --out FILE.html")
-    picture = picture_path(plot, "design-measured")
+    picture = picture_path(plot, "design-measured" if measured else "design")
     if out is not None:
         report.report_paths(out, overwrite)
     asked = briefs.read_brief(brief) if brief is not None else None
@@ -91,6 +89,7 @@ def design(
             answer.as_dict(),
             answer.lines(),
         )
+        draw(picture, lambda plots: plots.study_figure(answer), result, lines)
     if of_machine:
         result["criteria_are_examples"] = True
         lines.append(f"{brief} is a machine's file, judged by the examples of its template; state your own criteria:")

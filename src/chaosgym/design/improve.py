@@ -433,11 +433,11 @@ def _rounded(value: float, digits: int = 3) -> float:
     return float(f"{value:.{digits}g}")
 
 
-def _rank(trial: Trial) -> tuple[bool, float]:
-    """Those that meet the criteria by cost, the others by the largest factor by which they miss."""
+def _rank(trial: Trial) -> tuple[bool, tuple[float, ...]]:
+    """Those that meet the criteria by cost, the others by the factors by which they miss, the largest one first."""
     if trial.meets:
-        return False, trial.cost
-    return True, max(_shortfall(check) for check in trial.assessment.checks)
+        return False, (trial.cost,)
+    return True, tuple(sorted((_shortfall(check) for check in trial.assessment.checks), reverse=True))
 
 
 def _shortfall(check: Check) -> float:

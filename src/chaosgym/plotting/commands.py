@@ -4,16 +4,18 @@ Figures are as wide as a column of a journal takes at 80 % (4.4 in), so that the
 """
 
 from collections.abc import Callable, Sequence
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chaosgym.design.measured import MeasuredPeaks
+from chaosgym.design.study import DesignStudy
 from chaosgym.diagnosis import Diagnosis
 from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram
 from chaosgym.diagnosis.bifurcation_map import BifurcationMap
@@ -22,7 +24,7 @@ from chaosgym.diagnosis.overlay import Overlay
 from chaosgym.machines import Machine
 from chaosgym.plotting import response
 from chaosgym.plotting.branches import bifurcation_map, branches
-from chaosgym.plotting.design import axis_label, peak_record
+from chaosgym.plotting.design import axis_label, cost_against_life, peak_record, series_life, type_map_around
 from chaosgym.plotting.style import ACCENT, INK, NATURE_COLOURS, STYLE, TYPE_COLOURS, figure_of
 from chaosgym.simulation import CycleRecord, simulate
 
@@ -233,6 +235,24 @@ def peaks_figure(measured: MeasuredPeaks) -> Figure:
         f"Life {life} million cycles ({low} to {high})", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK
     )
     left.set_title("")
+    return figure
+
+
+@_styled
+def study_figure(study: DesignStudy) -> Figure:
+    """What a design report rests on: life of each machine, types around the design, and what changes cost and give."""
+    found = study.assessment
+    panels: list[Callable[[Axes], object]] = [partial(series_life, found)]
+    if study.map is not None:
+        panels.append(partial(type_map_around, study.map, found.region))
+    if study.improvement is not None and study.improvement.suggestions:
+        panels.append(partial(cost_against_life, study.improvement))
+    figure = figure_of(1.05 * WIDTH * len(panels), 3.6)
+    for ax, panel in zip(np.ravel(figure.subplots(1, len(panels))), panels, strict=True):
+        panel(ax)
+    name = Path(found.machine.name).stem
+    title = f"{name}: Type {found.type}, {found.verdict}"
+    figure.suptitle(title, x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
     return figure
 
 
