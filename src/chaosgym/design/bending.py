@@ -308,11 +308,11 @@ def _of_run(run: SettledRun, bending: Bending) -> Stressed:
     rows, samples = stress_of_modes(run.machine, bending), SAMPLES
     while True:
         record = simulate(run.machine, CYCLES, run.final_state, samples_per_cycle=samples)
-        modes = modal_history(record)
+        modes = modal_history(record, rows)
         if modes.miss <= MISS or samples >= MOST_SAMPLES:
             break
         samples *= 2
-    bent = bending.notch_factor * (modes.coordinates.reshape(-1, len(rows)) @ rows)
+    bent = bending.notch_factor * modes.shown.ravel()
     both = [stressed(side * bent + bending.static_stress, CYCLES, bending, modes.miss) for side in (1.0, -1.0)]
     return min(both, key=lambda one: one.life)
 

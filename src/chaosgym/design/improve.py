@@ -304,7 +304,7 @@ def improve(
         for change in singles:
             trials.append(attempt(change))
             bar.update()
-        chosen = _front_of_screened(assessment, candidates, weights, seed, workers)
+        chosen = _front_of_screened(assessment, candidates, weights, seed, workers, progress)
         bar.total += len(chosen) + REFINEMENTS
         for change in chosen:
             trials.append(attempt(change))
@@ -359,9 +359,10 @@ def _front_of_screened(
     weights: Mapping[str, float] | None,
     seed: int,
     workers: int | None,
+    progress: bool,
 ) -> list[Mapping[str, float]]:
     """Candidates that seem to suffice and that none beats in cost, life and robustness; else the longest-lived."""
-    screened = _screened(assessment, candidates, seed, workers)
+    screened = _screened(assessment, candidates, seed, workers, progress)
     force = assessment.evaluation.force
     rows = [(-change_cost(assessment.machine, one, weights, force), *screened[k]) for k, one in enumerate(candidates)]
     least = assessment.criteria.machines_that_meet
@@ -377,7 +378,11 @@ def _front_of_screened(
 
 
 def _screened(
-    assessment: Assessment, candidates: Sequence[Mapping[str, float]], seed: int, workers: int | None
+    assessment: Assessment,
+    candidates: Sequence[Mapping[str, float]],
+    seed: int,
+    workers: int | None,
+    progress: bool,
 ) -> list[tuple[float, float]]:
     """Life in required lives, at most 100 of them, and share of machines that meet, from few short runs of each."""
     region, criteria, exponent = assessment.region, assessment.criteria, assessment.criteria.life_exponent
@@ -393,7 +398,8 @@ def _screened(
         found = evaluate([worse_side(peaks, exponent)], own, "")
         return replace(found, life=min(found.life / own.life, 1e6))
 
-    found = parallel_map(run, [(one, row) for one in candidates for row in shares], workers=workers)
+    tasks = [(one, row) for one in candidates for row in shares]
+    found = parallel_map(run, tasks, workers=workers, progress="screened" if progress else None)
     answers = []
     for k in range(len(candidates)):
         runs = found[k * len(shares) : (k + 1) * len(shares)]

@@ -15,7 +15,7 @@ G. F. Franklin, J. D. Powell, M. L. Workman, Digital Control of Dynamic Systems,
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.errors import SimulationError
 from chaosgym.simulation.record import CycleRecord
@@ -24,19 +24,24 @@ Array = NDArray[np.float64]
 
 
 class ModalHistory(NamedTuple):
-    """Modal coordinates (cycles, samples, n) [kg^1/2 m], and the largest miss of a cycle's end as a share of them."""
+    """What modal coordinates show at the samples, (cycles, samples, k), and their largest miss at a cycle's end.
 
-    coordinates: Array
+    The miss is a share of the largest modal coordinate.
+    """
+
+    shown: Array
     miss: float
 
 
-def modal_history(record: CycleRecord) -> ModalHistory:
-    """Modal coordinates at the samples of a record.
+def modal_history(record: CycleRecord, rows: ArrayLike | None = None) -> ModalHistory:
+    """What modal coordinates show at the samples of a record.
 
     Parameters
     ----------
     record
         Of a machine of a few modes at one speed, run with ``samples_per_cycle``.
+    rows : (k, n)
+        What each mode contributes to each quantity that is shown; the modal coordinates [kg^1/2 m] themselves if None.
 
     Raises
     ------
@@ -51,20 +56,28 @@ def modal_history(record: CycleRecord) -> ModalHistory:
         raise SimulationError("the run kept no time history; simulate with samples_per_cycle above 0")
     cycles, samples, _ = every.shape
     n = len(parts.stiffness)
+    seen = np.eye(n) if rows is None else np.array(rows, dtype=float, ndmin=2)
     now, ahead, step = _propagators(parts.stiffness, parts.damping, machine.cycle_period / samples)
-    ends = np.concatenate([record.section[1:], record.final_state.coordinates[None]])
-    force = -every[:, :, 2::3] @ parts.joints  # (cycles, samples, n)
-    phase = 2.0 * np.pi / samples * np.outer(np.arange(samples + 1), 1 + np.arange(len(parts.drive)))
-    drive = np.cos(phase) @ parts.drive[:, 0] + np.sin(phase) @ parts.drive[:, 1] + parts.static
-    after = np.concatenate([force[1:, 0], force[-1:, -1]])  # the force at the end of a cycle
-    coordinates, state = np.empty((cycles, samples, n)), record.section.copy()
+    joints = every[:, :, 2::3]
+    after = np.concatenate([joints[1:, 0], joints[-1:, -1]])  # the forces at the end of a cycle
+    orders = 1 + np.arange(len(parts.drive))
+
+    def load(k: int) -> Array:
+        phase = 2.0 * np.pi * k / samples * orders
+        drive = np.cos(phase) @ parts.drive[:, 0] + np.sin(phase) @ parts.drive[:, 1] + parts.static
+        return np.asarray(drive - (joints[:, k] if k < samples else after) @ parts.joints)
+
+    shown, state, largest, ends = np.empty((cycles, samples, len(seen))), record.section.copy(), 0.0, record.section[1:]
+    held = load(0)
     for k in range(samples):
-        coordinates[:, k] = state[:, :n]
-        following = force[:, k + 1] if k + 1 < samples else after
-        state = state @ step + (force[:, k] + drive[k]) @ now + (following + drive[k + 1]) @ ahead
-    size = float(np.abs(coordinates).max())
+        shown[:, k] = state[:, :n] @ seen.T
+        largest = max(largest, float(np.abs(state[:, :n]).max()))
+        following = load(k + 1)
+        state = state @ step + held @ now + following @ ahead
+        held = following
+    ends = np.concatenate([ends, record.final_state.coordinates[None]])
     miss = float(np.abs(state[:, :n] - ends[:, :n]).max())
-    return ModalHistory(coordinates, miss / size if size else 0.0)
+    return ModalHistory(shown, miss / largest if largest else 0.0)
 
 
 def _propagators(stiffness: Array, damping: Array, interval: float) -> tuple[Array, Array, Array]:
