@@ -197,6 +197,10 @@ def task_page():
     pages = [str(path) for path in Path("docs/commands").glob("*.md")]
     write = "python -m benchmarks.documentation.commands docs/commands"
     yield task("commands", [examples, *TASKS, *LEARNED, *sources("src/chaosgym/cli")], pages, write)
+    briefs = sorted(map(str, Path("docs/examples").glob("*.toml")))
+    machines = [f"docs/machines/{name}.toml" for name in ("compressor", "pipe-in-two-supports")]
+    made = ["docs/worked-examples.md", *(brief.replace(".toml", ".png") for brief in briefs)]
+    yield task("worked", [*briefs, *machines], made, f"python -m benchmarks.documentation.worked {made[0]}")
     for script in sorted(Path("docs/tutorials").glob("*.py")):
         run = f"python -m benchmarks.documentation.tutorials docs/tutorials {script.name}"
         yield task(script.stem, [str(script), *TASKS, *LEARNED], [str(script.with_suffix(".ipynb"))], run)

@@ -1,0 +1,50 @@
+"""What does the design report say of the worked examples? Their outputs and pictures, written into the page.
+
+python -m benchmarks.documentation.worked docs/worked-examples.md [NAME ...]
+"""
+
+import re
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from benchmarks.documentation.commands import ROOT, _run, _write
+
+COMMAND = "chaosgym design {name}.toml --plot {name}.png --out {name}.html"
+
+
+def shown(name: str, text: str) -> str:
+    """Output of an example, as the page shows it."""
+    command = re.escape(COMMAND.format(name=name))
+    (output,) = re.findall(rf"```console\n\$ {command}\n(.*?)```", text, re.DOTALL)
+    return str(output)
+
+
+def written(name: str, text: str, output: str) -> str:
+    """The page with the output of an example."""
+    return (
+        text.replace(shown(name, text), output)
+        if shown(name, text)
+        else text.replace(f"$ {COMMAND.format(name=name)}\n", f"$ {COMMAND.format(name=name)}\n{output}")
+    )
+
+
+def run(name: str, place: Path) -> str:
+    """Run an example in an empty folder, and return what it prints."""
+    shutil.copytree(ROOT / "docs" / "machines", place / "machines", ignore=shutil.ignore_patterns("*.md", "*.png"))
+    shutil.copytree(ROOT / "docs" / "examples", place / "examples", ignore=shutil.ignore_patterns("*.png"))
+    return _run(COMMAND.format(name=name), place / "examples")
+
+
+def main(page: Path, names: list[str]) -> None:
+    """Run some examples, or all, and write page and pictures."""
+    for name in names or sorted(path.stem for path in (ROOT / "docs" / "examples").glob("*.toml")):
+        with tempfile.TemporaryDirectory() as folder:
+            output = run(name, Path(folder))
+            shutil.copyfile(Path(folder) / "examples" / f"{name}.png", page.parent / "examples" / f"{name}.png")
+        _write(page, written(name, page.read_text(encoding="utf-8"), output))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2:])
