@@ -11,7 +11,7 @@ from pathlib import Path
 
 from benchmarks.documentation.commands import ROOT, _run, _write
 
-COMMAND = "chaosgym design {name}.toml --plot {name}.png --out {name}.html"
+COMMAND = "chaosgym design docs/examples/{name}.toml --plot {name}.png --out {name}.html"
 
 
 def shown(name: str, text: str) -> str:
@@ -23,18 +23,16 @@ def shown(name: str, text: str) -> str:
 
 def written(name: str, text: str, output: str) -> str:
     """The page with the output of an example."""
-    return (
-        text.replace(shown(name, text), output)
-        if shown(name, text)
-        else text.replace(f"$ {COMMAND.format(name=name)}\n", f"$ {COMMAND.format(name=name)}\n{output}")
-    )
+    head = f"```console\n$ {COMMAND.format(name=name)}\n"
+    return text.replace(f"{head}{shown(name, text)}```", f"{head}{output}```")
 
 
 def run(name: str, place: Path) -> str:
     """Run an example in an empty folder, and return what it prints."""
-    shutil.copytree(ROOT / "docs" / "machines", place / "machines", ignore=shutil.ignore_patterns("*.md", "*.png"))
-    shutil.copytree(ROOT / "docs" / "examples", place / "examples", ignore=shutil.ignore_patterns("*.png"))
-    return _run(COMMAND.format(name=name), place / "examples")
+    (place / "docs").mkdir()
+    for source in ("docs/machines", "docs/examples"):
+        (place / source).symlink_to(ROOT / source)
+    return _run(COMMAND.format(name=name), place)
 
 
 def main(page: Path, names: list[str]) -> None:
@@ -42,7 +40,7 @@ def main(page: Path, names: list[str]) -> None:
     for name in names or sorted(path.stem for path in (ROOT / "docs" / "examples").glob("*.toml")):
         with tempfile.TemporaryDirectory() as folder:
             output = run(name, Path(folder))
-            shutil.copyfile(Path(folder) / "examples" / f"{name}.png", page.parent / "examples" / f"{name}.png")
+            shutil.copyfile(Path(folder) / f"{name}.png", page.parent / "examples" / f"{name}.png")
         _write(page, written(name, page.read_text(encoding="utf-8"), output))
 
 

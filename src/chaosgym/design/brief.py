@@ -1,5 +1,6 @@
 """The design brief: machine, tolerances, criteria and changes in one TOML file."""
 
+import os
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -117,7 +118,8 @@ def read_brief(path: str | Path) -> DesignBrief:
     if of_machine:
         return replace(brief_from(values), stated=())
     if beside.suffix == FILE_ENDING and beside.is_file():
-        values["machine"] = str(beside)
+        short = Path(os.path.normpath(beside))  # another file where a folder on the way is a link
+        values["machine"] = str(short if short.is_file() and short.samefile(beside) else beside)
     return brief_from(values)
 
 
