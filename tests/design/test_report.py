@@ -14,6 +14,7 @@ import pytest
 import chaosgym
 from chaosgym.cli import main
 from chaosgym.design import Criteria, assess
+from chaosgym.design.bending import Bending, BendingLife, Section, stressed
 from chaosgym.design.brief import brief_from, template
 from chaosgym.design.measured import evaluate_peaks
 from chaosgym.design.study import contradictions, study
@@ -70,6 +71,17 @@ def test_a_report_that_denies_its_own_machines_is_not_written(answered):
         "nominal machine": replace(found, nominal=replace(found.nominal, nature="chaotic")),
     }.items():
         assert any(name in line for line in contradictions(replace(answered, assessment=changed))), name
+    best = answered.improvement.best
+    worse = replace(best, assessment=replace(best.assessment, verdict="meets", checks=found.checks))
+    changed = replace(answered, improvement=replace(answered.improvement, best=worse))
+    assert any("called sufficient" in line for line in contradictions(changed))
+    section = Bending(section=Section(at=0.1))
+    bent = BendingLife(section, stressed([0.0, 1e8, 0.0], 1, section), (5.0, 4.0))
+    assert any(
+        "bending life is 1.333" in line
+        for line in contradictions(replace(answered, assessment=replace(found, bending=bent)))
+    )
+    assert any("Case I:" in line for line in contradictions(replace(answered, assessment=replace(found, series=wild))))
 
 
 @pytest.mark.parametrize("speed", [30.0, 35.0, 45.0])
