@@ -49,7 +49,7 @@ def costs(task: Any, maps: Maps, gaps: Array) -> dict[str, float]:
     following = float(weight * share[:, maps.nearest(demands)].mean())
     fleet = paid((share.sum(axis=0) - share) / (len(share) - 1))
     by_clearance = min(paid(_of_neighbours(share, gaps, width)) for width in WIDTHS)
-    own = paid(maps.smoothed())
+    own = paid(maps.smoothed().share)
     blind = min(following, fleet)
     told = [abs(np.corrcoef(gaps, peaks)[0, 1]) for peaks in maps.mean_peak.T]
     return {

@@ -16,6 +16,7 @@ from chaosgym.version import __version__
 if TYPE_CHECKING:
     from chaosgym.classifier import MachineClassifier, ResponseClassifier, default_classifier
     from chaosgym.control.evaluation import evaluate
+    from chaosgym.control.operator import Operator
     from chaosgym.diagnosis import Diagnosis, diagnose, response_map, response_type, two_step_test
     from chaosgym.diagnosis.bifurcation_diagram import follow
     from chaosgym.diagnosis.measured import judge_peaks
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 _HOME = {
     "chaosgym.classifier": ("MachineClassifier", "ResponseClassifier", "default_classifier"),
     "chaosgym.control.evaluation": ("evaluate",),
+    "chaosgym.control.operator": ("Operator",),
     "chaosgym.diagnosis": ("Diagnosis", "diagnose", "response_map", "response_type", "two_step_test"),
     "chaosgym.diagnosis.bifurcation_diagram": ("follow",),
     "chaosgym.diagnosis.measured": ("judge_peaks",),
@@ -64,6 +66,7 @@ __all__ = [
     "MachineClassifier",
     "ModalMachine",
     "Monitor",
+    "Operator",
     "ParameterError",
     "ResponseClassifier",
     "RungeKutta4",

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from chaosgym.machines.machine_file import template
 from tests.cli.test_cli import run, run_json
 from tests.control.made_up import ENV
 
@@ -33,7 +34,7 @@ def test_a_figure_is_drawn_beside_a_table(folder, tmp_path):
     out = tmp_path / "job.png"
     code, text, _ = run("run-agent", ENV, "--policy", str(folder), "--out", str(out))
     assert code == 0
-    assert len(text.splitlines()) == 1 + 12 + 2 + 1
+    assert len(text.splitlines()) == 1 + 12 + 2 + 1 + 1
     with Image.open(out) as figure:
         assert figure.size == (1440, 840)
 
@@ -44,6 +45,15 @@ def test_a_film_is_written(folder, tmp_path):
     out = tmp_path / "job.mp4"
     assert run("run-agent", ENV, "--policy", str(folder), "--out", str(out))[0] == 0
     assert out.read_bytes()[4:8] == b"ftyp"
+
+
+def test_kriging_plays_where_no_policy_is_shipped(tmp_path):
+    """The file of a machine is enough: no training, no model; what it wins is told as life."""
+    machine = tmp_path / "own.toml"
+    machine.write_text(template())
+    told = run_json("run-agent", str(machine))
+    assert told["agent"] == "Kriging"
+    assert told["life"] == pytest.approx(told["follow"]["damage"] / told["damage"])
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,11 @@
 """What a job costs, by hand: damage, status and the terms of the reward."""
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
 from chaosgym.envs.kernels.steps import TERMS, rewards_of, status_of
-from chaosgym.envs.task import Status, Task, UnknownKeywordError, demand_of, split
+from chaosgym.envs.task import LIFE_PRICE, Status, Task, UnknownKeywordError, demand_of, split
 from chaosgym.errors import ParameterError
 from tests.plain_modes import PLAIN_BEAM
 
@@ -130,3 +131,18 @@ def test_keywords_go_to_the_task_or_to_the_machine():
             split(TASK, PLAIN_BEAM, {wrong: 0.02})
     with pytest.raises(UnknownKeywordError, match=r"known: action, steps, .* and the fields of impact-beam"):
         split(TASK, PLAIN_BEAM, {"zzz": 0.02})
+
+
+def test_an_objective_is_a_set_of_weights():
+    """Life prices damage and nothing irregular; what is given beside it stands; another name is refused."""
+
+    def made(**keywords):
+        return gym.make("chaosgym/ImpactBeam-v1", **keywords).unwrapped.task
+
+    usual, life, both = (made(objective=name) for name in ("irregular", "life", "both"))
+    assert usual == made()
+    assert (life.type_iii_weight, life.damage_weight) == (0.0, LIFE_PRICE)
+    assert (both.type_iii_weight, both.damage_weight) == (usual.type_iii_weight, LIFE_PRICE)
+    assert made(objective="life", damage_weight=3.0).damage_weight == 3.0
+    with pytest.raises(ParameterError, match="objective = 'love' is not one of irregular, life, both"):
+        made(objective="love")

@@ -1,7 +1,7 @@
 """The commands ``compare`` and ``run-agent``: how controllers and trained agents do on machines."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,12 +11,19 @@ if TYPE_CHECKING:
     from chaosgym.control.rollout import Played
 
 
+OBJECTIVES = ("irregular", "life", "both")
+"""Of a task; the names are repeated here so that help needs no environment."""
+
+
 @click.command()
 @click.argument("env")
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="Parquet file; goes on from there."
 )
 @click.option("--machines", type=click.IntRange(2, 256), default=256, show_default=True, help="Of those kept for this.")
+@click.option(
+    "--objective", type=click.Choice(OBJECTIVES), default=OBJECTIVES[0], show_default=True, help="What costs."
+)
 @click.option("--only", multiple=True, help="Name of a controller to run; all by default; may be repeated.")
 @click.option("--policy", "policies", multiple=True, help="NAME=FOLDER of a trained policy; one name, several seeds.")
 @click.option("--figure", type=click.Path(dir_okay=False, path_type=Path), default=None, help="Scores as a picture.")
@@ -25,6 +32,7 @@ def compare(
     env: str,
     out: Path,
     machines: int,
+    objective: str,
     only: tuple[str, ...],
     policies: tuple[str, ...],
     figure: Path | None,
@@ -46,7 +54,8 @@ def compare(
             raise click.UsageError(f"--policy {given}: allowed: NAME=FOLDER")
         trained.setdefault(name, []).append(load_policy(folder))
     chosen = [ZERO, ONE, *(name for name in only if name not in (ZERO, ONE))] if only else None
-    scores = Scores(run(env, out, machines=machines, only=chosen, policies=trained, progress=True))
+    keywords = {} if objective == OBJECTIVES[0] else {"objective": objective}
+    scores = Scores(run(env, out, machines=machines, only=chosen, policies=trained, progress=True, **keywords))
     summary = scores.summary()
     if figure is not None:
         from chaosgym.plotting.played_job import comparison_figure
@@ -61,32 +70,41 @@ def compare(
     "--policy",
     type=click.Path(file_okay=False, path_type=Path),
     default=None,
-    help="Folder with policy.json and weights.npz; default: the shipped policy of ENV.",
+    help="Folder with policy.json and weights.npz; default: the shipped policy of ENV, or kriging.",
 )
 @click.option("--machine", type=click.IntRange(0, 255), default=0, show_default=True, help="Of those kept for this.")
 @plot_option("--out", formats="figure .png, .svg, .pdf or animation .gif, .mp4")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def run_agent(env: str, policy: Path | None, machine: int, plot: str | None, as_json: bool) -> None:
-    """Let a trained agent run one job beside following the demand.
+    """Let an agent run one job beside following the demand.
 
-    ENV is an id such as chaosgym/ImpactBeamTolerance-v1, or the file of a machine.
+    ENV is an id such as chaosgym/ImpactBeamTolerance-v1, or the file of a machine. Where no policy is shipped or given,
+    kriging looks for the speed of least load within reach: it needs no model and no training.
     """
     from chaosgym.envs import environment
 
     environment(env)
     out = _picture(plot, env)
-    from chaosgym.control.controllers import Follow
+    from chaosgym.control.controllers import Follow, Kriging
     from chaosgym.control.policies import load_policy, shipped_policy
-    from chaosgym.control.rollout import play
+    from chaosgym.control.policies.shipped import shipped_folder
+    from chaosgym.control.rollout import Policy, play
 
-    agent = load_policy(policy) if policy else shipped_policy(env)
+    agent: Policy
+    keywords: dict[str, Any]
+    if policy is None and not shipped_folder(env).is_dir():
+        agent, keywords = Kriging(), {"objective": "life"}
+    else:
+        agent, keywords = load_policy(policy) if policy else shipped_policy(env), {}
     with patience("run-agent"):
-        job, follow = play(agent, env, [machine]), play(Follow(), env, [machine])
+        job, follow = (play(player, env, [machine], **keywords) for player in (agent, Follow()))
     if out is not None:
         from chaosgym.plotting.played_job import save_job
 
         save_job({"agent": job, "follow the demand": follow}, out)
-    result = {**job.as_dict(), "follow": follow.as_dict(), **({"plot": str(out)} if out else {})}
+    life = float(follow.damage[0] / job.damage[0]) if job.damage[0] > 0.0 else None
+    result = {"agent": type(agent).__name__, **job.as_dict(), "life": life, "follow": follow.as_dict()}
+    result |= {"plot": str(out)} if out else {}
     emit(result, as_json, lambda: _job_lines(job, follow, out))
 
 
@@ -111,6 +129,9 @@ def _job_lines(job: "Played", follow: "Played", out: Path | None) -> list[str]:
     for name, played in (("agent", told), ("following the demand", follow.as_dict())):
         lines.append(
             f"{name}: {played['status'].replace('_', ' ')}, return {played['return']:.2f}, Type III in "
-            f"{played['type_iii_share']:.1%} of the cycles, {played['mean_deviation']:.2f} {job.unit} off the demand"
+            f"{played['type_iii_share']:.1%} of the cycles, {played['mean_deviation']:.2f} {job.unit} off the demand, "
+            f"largest force {played['largest_force_N']:.1f} N"
         )
+    if job.damage[0] > 0.0:
+        lines.append(f"life of the joint: x{follow.damage[0] / job.damage[0]:.2f} of that under following the demand")
     return [*lines, *([f"picture: {out}"] if out else [])]

@@ -2,8 +2,9 @@
 
     score = (mean return - that of following the demand) / (that of the own map - that of following the demand)
 
-The own map is the machine's map of Type III at every speed, smoothed, with the demands to come unknown. It is no bound
-on what a job returns: scores may exceed 1. Intervals draw machines, in pairs: the scale is drawn along.
+The own map is the machine's map of Type III and of mean peaks at every speed, smoothed, with the demands to come
+unknown. It is no bound on what a job returns: scores may exceed 1. Intervals draw machines, in pairs: the scale is
+drawn along. What is won is told in the machine's terms too: the joint's life, and how many machines are made worse.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -23,6 +24,7 @@ from chaosgym.control import controllers
 from chaosgym.control.maps import FLEET, FLEET_SEED, Maps, fleet_maps, maps_of, model_keywords
 from chaosgym.control.rollout import Played, Policy, play
 from chaosgym.control.statistics import bootstrap_interval, performance_profile
+from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.envs.task import Status
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import DatasetError, ParameterError
@@ -41,6 +43,9 @@ WORN_LEVELS = 5
 
 CYCLE_BY_CYCLE, CYCLE_BY_CYCLE_MACHINES = ("delayed feedback", "OGY"), 32
 """Controllers that act in each cycle instead of each step, and for how many machines at most: they take long."""
+
+MADE_WORSE = 1.0
+"""Return by which a job must fall short of that of following the demand for its machine to be counted as made worse."""
 
 PROFILE_SCORES = np.linspace(-1.0, 2.0, 121)
 """Scores of single jobs at which the performance profile is given."""
@@ -66,6 +71,7 @@ class Contenders:
             "back off": partial(controllers.BackOff, remembers=False),
             "back off, with memory": controllers.BackOff,
             "hill climbing": controllers.HillClimbing,
+            "kriging": controllers.Kriging,
             "bandit": lambda: controllers.Bandit(self.fleet),
             "extremum seeking": controllers.ExtremumSeeking,
             "force feedback": controllers.ForceFeedback,
@@ -164,6 +170,8 @@ def compare(
     known = native_envs(env, **keywords)
     kind = known.nominal
     subject = env if kind.definition == kind.name else f"{env} ({kind.definition})"
+    if keywords.get("objective", "irregular") != "irregular":
+        subject += f", objective {keywords['objective']}"
     table = read_comparison(out, subject) if out.exists() else None
     work: list[tuple[str, int, Policy | None]] = [(name, 0, None) for name in chosen]
     work += [(name, seed, policy) for name, seeds in (policies or {}).items() for seed, policy in enumerate(seeds)]
@@ -261,9 +269,9 @@ class Scores:
             raise ParameterError(f"the comparison has no jobs of {name!r}")
         return {machine: np.array(values) for machine, values in found.items()}
 
-    def paired(self, *names: str) -> Array:
-        """Returns of contenders, mean over seeds, on the machines that all have played, (names, machines)."""
-        found = [self.jobs(name) for name in names]
+    def paired(self, *names: str, column: str = "job_return") -> Array:
+        """A column of contenders, mean over seeds, on the machines that all have played, (names, machines)."""
+        found = [self.jobs(name, column) for name in names]
         common = sorted(set.intersection(*(set(jobs) for jobs in found)))
         return np.array([[jobs[machine].mean() for machine in common] for jobs in found])
 
@@ -280,7 +288,12 @@ class Scores:
         return dict(sorted(rows.items(), key=lambda item: item[1]["score"]))
 
     def row(self, name: str) -> dict[str, Any]:
-        """What one contender achieved, as plain values; raises as ``summary``."""
+        """What one contender achieved, as plain values; raises as ``summary``.
+
+        ``life`` is the geometric mean over machines of the joint's life over that of following the demand, ``load`` the
+        ratio of the constant forces of equal life, and ``made_worse`` the share of the machines whose return is below
+        that of following by more than ``MADE_WORSE``.
+        """
         mine, zero, one = self.paired(name, ZERO, ONE)
         if np.array_equal(zero, one):
             raise ParameterError(
@@ -293,6 +306,9 @@ class Scores:
             scale = one[drawn].mean(axis=-1) - zero[drawn].mean(axis=-1)
             return np.asarray(np.divide(gained, scale, out=np.full_like(scale, np.nan), where=scale != 0.0))
 
+        worn, usual = self.paired(name, ZERO, column="damage")
+        lived = (worn > 0.0) & (usual > 0.0)
+        life = np.exp(np.mean(np.log(usual[lived] / worn[lived]))) if lived.any() else 1.0
         every = np.arange(len(mine))
         rows = self.table.filter(pa.compute.equal(self.table["contender"], name))
         single = (mine - zero) / (one.mean() - zero.mean())
@@ -306,6 +322,9 @@ class Scores:
             "type_iii": float(np.mean(rows["type_iii"].to_numpy())),
             "deviation": float(np.mean(rows["deviation"].to_numpy())),
             "damage": float(np.mean(rows["damage"].to_numpy())),
+            "life": float(life),
+            "load": float(life ** (-1.0 / LIFE_EXPONENT)),
+            "made_worse": float(np.mean(mine < zero - MADE_WORSE)),
             "largest_force": float(np.max(rows["largest_force"].to_numpy())),
             "failed": float(np.mean(rows["failed"].to_numpy())),
             "better_than_following": float(np.mean(mine > zero)),
@@ -316,14 +335,15 @@ class Scores:
 def table_lines(summary: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Lines of a Markdown table."""
     lines = [
-        "| contender | knows | seeds | machines | return | score | 95 % | Type III | mean deviation | damage |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| contender | knows | seeds | machines | return | score | 95 % | Type III | mean deviation | damage | life "
+        "| made worse |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for name, row in summary.items():
         low, high = row["score_interval"]
         lines.append(
             f"| {name} | {row['knows']} | {row['seeds']} | {row['machines']} | {row['return']:.2f} "
             f"| {row['score']:.2f} | {low:.2f} to {high:.2f} | {row['type_iii']:.1%} | {row['deviation']:.2f} "
-            f"| {row['damage']:.2f} |"
+            f"| {row['damage']:.2f} | x{row['life']:.2f} | {row['made_worse']:.0%} |"
         )
     return lines

@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from chaosgym.design.rating_life import damage_in_a_million
 from chaosgym.envs.observation import OBSERVATION_NAMES
+from chaosgym.envs.task import Task
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.machines.parameters import parameters_of
 
@@ -39,16 +41,24 @@ class Maps:
     share: Array
     mean_peak: Array
 
-    def smoothed(self) -> Array:
-        """Shares averaged with those of the neighbouring speeds, (n, s)."""
-        wide = np.pad(self.share, ((0, 0), (1, 1)), mode="edge")
-        return np.asarray(sum(weight * wide[:, k : k + len(self.speeds)] for k, weight in enumerate(SMOOTHING)))
+    def smoothed(self) -> "Maps":
+        """The same, each speed averaged with its neighbours."""
+        return Maps(self.speeds, _smoothed(self.share), _smoothed(self.mean_peak))
+
+    def damage(self, task: Task) -> Array:
+        """Share of its life that the joint loses in a step of a task at each speed, (n, s), by the mean peaks."""
+        return damage_in_a_million(self.mean_peak, task.load_rating) * (task.life_share / task.steps)
 
     def nearest(self, speeds: Array) -> NDArray[np.int64]:
         """Places of the nearest speeds of the maps."""
         spacing = self.speeds[1] - self.speeds[0]
         place = np.rint((speeds - self.speeds[0]) / spacing).clip(0, len(self.speeds) - 1)
         return np.asarray(place, np.int64)
+
+
+def _smoothed(values: Array) -> Array:
+    wide, places = np.pad(values, ((0, 0), (1, 1)), mode="edge"), values.shape[1]
+    return np.asarray(sum(weight * wide[:, k : k + places] for k, weight in enumerate(SMOOTHING)))
 
 
 def maps_of(

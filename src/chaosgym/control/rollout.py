@@ -114,6 +114,7 @@ class Played:
             "type_iii_share": float(self.type_iii_share[0]),
             "mean_deviation": float(self.deviation[0]),
             "damage": float(self.damage[0]),
+            "largest_force_N": float(self.largest_force[0]),
             "unit": self.unit,
             "speed": _plain(self.speed),
             "demand": _plain(self.demand),

@@ -8,6 +8,8 @@ A step of a job costs
     - time_weight      (duration of the step) / (duration of the whole job at top speed)
     - failure_weight   (steps that are left)                     on fracture or a failed simulation
 
+The keyword ``objective`` names a set of these weights, ``OBJECTIVES``: irregular motion, the joint's life, or both.
+
 A step not done costs more than a bad one, so giving up never pays. Damage follows the basic rating life of a bearing
 (``life_law``), p = 10/3 for line contact; the damage of a joint is that of its worse surface.
 
@@ -139,12 +141,25 @@ class Task:
         return np.array([tuple(values)], [(name, type(value)) for name, value in zip(about, values, strict=True)])
 
 
+LIFE_PRICE = 1000.0
+"""Cost of a life of the joint where life counts (assumed): on the beam it is worth 33 jobs at 1 Hz off the demand."""
+
+OBJECTIVES: Mapping[str, Mapping[str, float]] = {
+    "irregular": {},
+    "life": {"type_iii_weight": 0.0, "damage_weight": LIFE_PRICE},
+    "both": {"damage_weight": LIFE_PRICE},
+}
+"""Weights that an objective sets: for "irregular" those of the machine's own task."""
+
+
 class UnknownKeywordError(ParameterError, TypeError):
     """A keyword that neither the task nor the machine has."""
 
 
 def split(task: Task, machine: Machine, keywords: Mapping[str, Any]) -> tuple[Task, dict[str, Any]]:
     """Return the task with the keywords that are its own, and those that are fields of the machine.
+
+    The keyword ``objective`` sets weights; those that are given beside it stand.
 
     Raises
     ------
@@ -154,13 +169,17 @@ def split(task: Task, machine: Machine, keywords: Mapping[str, Any]) -> tuple[Ta
         If a keyword is neither; it is a ``TypeError`` too, as for any call with an unknown keyword.
     """
     own, theirs = parameters_of(task), parameters_of(machine)
+    objective = keywords.get("objective", "irregular")
+    if objective not in OBJECTIVES:
+        raise ParameterError(f"objective = {objective!r} is not one of {', '.join(OBJECTIVES)}")
+    keywords = dict(OBJECTIVES[objective]) | {name: value for name, value in keywords.items() if name != "objective"}
     for name in keywords:
         if name == machine.speed_field:
             raise ParameterError(f"{name} is what the agent sets; give lowest_speed and highest_speed instead")
         if name not in own and name not in theirs and name != "fidelity":
             from difflib import get_close_matches
 
-            near = get_close_matches(name, [*own, *theirs, "fidelity", "model_fidelity", "tolerances"])
+            near = get_close_matches(name, [*own, *theirs, "objective", "fidelity", "model_fidelity", "tolerances"])
             hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(own)}, and the fields of {machine.name}"
             raise UnknownKeywordError(f"unexpected keyword argument {name!r}; {hint}")
     mine = {name: value for name, value in keywords.items() if name in own}

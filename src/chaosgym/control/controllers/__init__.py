@@ -3,6 +3,7 @@
 from chaosgym.control.controllers.chaos_control import OGY, DelayedFeedback
 from chaosgym.control.controllers.controller import Controller
 from chaosgym.control.controllers.feedback import BackOff, Bandit, ExtremumSeeking, ForceFeedback, HillClimbing
+from chaosgym.control.controllers.kriging import Kriging
 from chaosgym.control.controllers.planned import (
     Belief,
     CommonSchedule,
@@ -27,6 +28,7 @@ __all__ = [
     "Follow",
     "ForceFeedback",
     "HillClimbing",
+    "Kriging",
     "MapFollower",
     "RecedingHorizon",
     "Schedule",

@@ -52,10 +52,11 @@ class Controller:
         """Return the speeds (n,) to go to."""
         raise NotImplementedError
 
-    def cost(self, share: Array, demand: Array, grid: Array) -> Array:
-        """What a step at each speed of a grid costs, (n, s), by its share of Type III, (s,) or (n, s)."""
-        distance = np.abs(grid - demand[:, None])
-        return np.asarray(self.task.deviation_weight * distance + self.task.type_iii_weight * share)
+    def cost(self, share: Array, damage: Array, demand: Array, grid: Array) -> Array:
+        """What a step at each speed of a grid costs, (n, s), by share of Type III and damage there, (s,) or (n, s)."""
+        task = self.task
+        felt = task.type_iii_weight * share + task.damage_weight * damage
+        return np.asarray(task.deviation_weight * np.abs(grid - demand[:, None]) + felt)
 
 
 def seen(observations: Observations, name: str) -> Array:

@@ -117,7 +117,8 @@ class Bandit(Controller):
         counted = self._wild + self._calm
         share = self._wild / counted
         doubt = np.sqrt(share * (1.0 - share) / (counted + 1.0))
-        cost = self.cost(share - self.optimism * doubt, seen(observations, "demand"), grid)
+        hoped, demand = share - self.optimism * doubt, seen(observations, "demand")
+        cost = self.cost(hoped, self.fleet.damage(self.task).mean(axis=0), demand, grid)
         return np.asarray(grid[cost.argmin(axis=1)])
 
 

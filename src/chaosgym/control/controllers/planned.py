@@ -36,12 +36,12 @@ class ConstantTrim(Controller):
 
     def begin(self, envs: Any) -> None:
         """Find the trim."""
-        task, share = self.task, self.fleet.share.mean(axis=0)
+        task = self.task
         trims = np.arange(-task.largest_trim, task.largest_trim + 1e-9, task.trim_step)
         demands = np.arange(task.lowest_demand, task.highest_demand + 1e-9, task.trim_step)
         at = np.clip(demands[:, None] + trims, task.lowest_speed, task.highest_speed)
-        cost = task.deviation_weight * np.abs(at - demands[:, None])
-        cost += task.type_iii_weight * share[self.fleet.nearest(at)]
+        felt = task.type_iii_weight * self.fleet.share + task.damage_weight * self.fleet.damage(task)
+        cost = task.deviation_weight * np.abs(at - demands[:, None]) + felt.mean(axis=0)[self.fleet.nearest(at)]
         self.trim = float(trims[cost.mean(axis=0).argmin()])
 
     def speeds(self, observations: Observations) -> Array:
@@ -87,20 +87,23 @@ class MapFollower(Controller):
     def __init__(self, levels: list[Maps]) -> None:
         super().__init__()
         self.grid = levels[0].speeds
-        self._shares = np.array([maps.smoothed() for maps in levels])
+        self._levels = [maps.smoothed() for maps in levels]
 
-    def share_at(self, progress: float) -> Array:
-        """Shares of Type III (n, s) when a part of the job is done."""
-        place = progress * (len(self._shares) - 1)
-        low = min(int(place), max(0, len(self._shares) - 2))
-        high = min(low + 1, len(self._shares) - 1)
-        part = place - low
-        return np.asarray((1.0 - part) * self._shares[low] + part * self._shares[high])
+    def cost_at(self, progress: float, demand: Array) -> Array:
+        """Cost (n, s) of a step at each speed when a part of the job is done."""
+        place = progress * (len(self._levels) - 1)
+        low = min(int(place), max(0, len(self._levels) - 2))
+        high = min(low + 1, len(self._levels) - 1)
+        costs = [
+            self.cost(maps.share, maps.damage(self.task), demand, self.grid)
+            for maps in (self._levels[low], self._levels[high])
+        ]
+        return np.asarray((1.0 - place + low) * costs[0] + (place - low) * costs[1])
 
     def speeds(self, observations: Observations) -> Array:
         """The best speed of the map."""
-        share = self.share_at(1.0 - float(seen(observations, "remaining_share").min()))
-        return np.asarray(self.grid[self.cost(share, seen(observations, "demand"), self.grid).argmin(axis=1)])
+        progress = 1.0 - float(seen(observations, "remaining_share").min())
+        return np.asarray(self.grid[self.cost_at(progress, seen(observations, "demand")).argmin(axis=1)])
 
 
 class Schedule(MapFollower):
@@ -112,7 +115,7 @@ class Schedule(MapFollower):
         """Plan all jobs."""
         demand = envs.jobs.demand[:, :-1]
         steps = demand.shape[1]
-        cost = np.array([self.cost(self.share_at(t / steps), demand[:, t], self.grid) for t in range(steps)])
+        cost = np.array([self.cost_at(t / steps, demand[:, t]) for t in range(steps)])
         self._plan = self.grid[best_schedule(cost, self._places(envs.jobs.speed), self._reach())]
         self._step = 0
 
@@ -140,7 +143,7 @@ class CommonSchedule(Schedule):
     knows = "tolerances and future"
 
     def __init__(self, fleet: Maps) -> None:
-        mean = Maps(fleet.speeds, fleet.share.mean(axis=0, keepdims=True), fleet.mean_peak[:1])
+        mean = Maps(fleet.speeds, *(values.mean(axis=0, keepdims=True) for values in (fleet.share, fleet.mean_peak)))
         super().__init__([mean])
 
 
@@ -263,5 +266,5 @@ class Belief(Controller):
         self._wild[every, place] += irregular(observations, self.task, 1.17, 0.1) * held
         self._visits[every, place] += held
         share = (weight @ self.fleet.share + self._wild) / (1.0 + self._visits)
-        grid = self.fleet.speeds
-        return np.asarray(grid[self.cost(share, seen(observations, "demand"), grid).argmin(axis=1)])
+        damage, grid = weight @ self.fleet.damage(self.task), self.fleet.speeds
+        return np.asarray(grid[self.cost(share, damage, seen(observations, "demand"), grid).argmin(axis=1)])

@@ -1,0 +1,94 @@
+"""An operator at a plant sets the speeds that the same policy sets in the environment of the same readings."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import chaosgym
+from chaosgym.control.controllers import BackOff, Follow, Kriging
+from chaosgym.control.policies import shipped_policy
+from chaosgym.errors import ModelFileError, ParameterError
+
+BEAM = "chaosgym/ImpactBeamTolerance-v1"
+IDEAL = {"sensor_error": 0.0, "bouncing_error": 0.0, "missed_impacts": 0.0}
+
+
+def plant(envs):
+    """Readings of the last step, as a rig has them: peaks, impacts a cycle, share of bouncing."""
+    jobs, seen = envs.jobs, {}
+    run = jobs._run
+
+    def recorded(*given):
+        cycles, growth = run(*given)
+        last = envs.task.cycles_per_step
+        seen["peaks"] = envs.nominal.sensed(cycles.peak_force)[0, -last:]
+        seen["impacts"] = cycles.impacts[0, -last:].sum() / last
+        seen["bounce"] = cycles.bounce_duration[0, -last:]
+        return cycles, growth
+
+    jobs._run = recorded
+    return seen
+
+
+@pytest.mark.parametrize("policy", [Follow(), BackOff(), Kriging(), shipped_policy(BEAM)])
+def test_speeds_are_those_of_the_environment(policy):
+    """Forty steps with ideal sensors and a demand that changes: the same speeds to the last bit."""
+    given = IDEAL | policy.keywords | {"steps": 40, "shortest_hold": 9, "longest_hold": 12}
+    envs = gym.make_vec(BEAM, num_envs=1, **given).unwrapped
+    seen = plant(envs)
+    observation, info = envs.reset(seed=[5])
+    policy.start(envs)
+    actions, speeds, readings = [], [float(info["speed"][0])], []
+    for _ in range(40):
+        readings.append(dict(seen, speed=speeds[-1]))
+        actions.append(policy(observation))
+        observation, _, _, _, info = envs.step(actions[-1])
+        speeds.append(float(info["speed"][0]))
+    demands = envs.jobs.demand[0].tolist()
+    assert len(set(demands)) > 2
+
+    operator = chaosgym.Operator(policy, BEAM, **(IDEAL | {"steps": 40}))
+    assert operator.start(speed=speeds[0], demand=demands[0]) == speeds[0]
+    for step, read in enumerate(readings):
+        share = 2.0 * read["bounce"].sum() / (read["bounce"].size * envs.nominal.period_at(speeds[step]))
+        told = {"demand": demands[step], "impacts": read["impacts"], "bouncing": share}
+        assert operator.next(read["peaks"], **told) == speeds[step + 1], step
+
+
+def test_it_runs_for_longer_than_a_job():
+    """A rig has no end of a job: after it, the last step of one goes on."""
+    operator = chaosgym.Operator(Kriging(), BEAM, steps=10)
+    operator.start(speed=20.0, demand=22.0)
+    speeds = [operator.next(np.full(10, 80.0)) for _ in range(30)]
+    assert np.isfinite(speeds).all()
+    assert abs(operator.next(np.full(6, 80.0), demand=25.0) - 25.0) <= 2.0 + operator.task.largest_trim
+
+
+@pytest.mark.parametrize(
+    ("peaks", "readings", "complaint"),
+    [
+        ([80.0] * 4, {}, r"peaks of shape \(4,\) are not usable; allowed: 5 or more finite forces"),
+        ([80.0, np.nan] * 5, {}, "finite forces from 0 N on"),
+        ([80.0] * 10, {"demand": 99.0}, "demand = 99.0 is out of range; allowed: 16 to 30"),
+        ([80.0] * 10, {"bouncing": 2.0}, "bouncing = 2.0 is out of range; allowed: 0 to 1"),
+    ],
+)
+def test_what_is_no_reading_is_refused(peaks, readings, complaint):
+    """In one line; the machine stays where it is."""
+    operator = chaosgym.Operator(Kriging(), BEAM)
+    operator.start(speed=20.0, demand=22.0)
+    with pytest.raises(ParameterError, match=complaint):
+        operator.next(peaks, **readings)
+    assert operator.speed == 20.0
+
+
+def test_what_a_policy_needs_is_asked_for():
+    """A start, impacts and bouncing for a trained policy, and the machine that it was trained on."""
+    with pytest.raises(ParameterError, match="call start"):
+        chaosgym.Operator(Kriging(), BEAM).next([80.0] * 10)
+    operator = chaosgym.Operator(shipped_policy(BEAM), BEAM)
+    operator.start(speed=20.0, demand=22.0)
+    with pytest.raises(ParameterError, match="looks at impacts and bouncing too"):
+        operator.next([80.0] * 10)
+    with pytest.raises(ModelFileError, match="was trained on"):
+        chaosgym.Operator(shipped_policy(BEAM), "chaosgym/SliderCrank-v1").start(speed=200.0, demand=200.0)
