@@ -348,3 +348,55 @@ def test_an_acceleration_is_judged_in_its_own_unit(tmp_path):
     assert code == 0
     assert "mean 150.0" in out
     assert run("diagnose", "--peaks", path, "--plot", tmp_path / "g.png")[0] == 0
+
+
+@pytest.fixture
+def recordings(tmp_path):
+    """A folder with two sensors that repeat, an acceleration, and a text without numbers."""
+    rng = np.random.default_rng(6)
+    two = np.tile([40.0, 60.0], 60)[:, None] + 0.05 * rng.normal(size=(120, 2))
+    folder = tmp_path / "run 7"
+    folder.mkdir()
+    np.savetxt(folder / "a.csv", two, delimiter=",", header="front [N],rear [N]", comments="")
+    np.savetxt(folder / "b.csv", 3.0 + 0.02 * rng.normal(size=120), header="acc [g]", comments="")
+    (folder / "notes.txt").write_text("nothing here")
+    return folder
+
+
+def test_columns_are_named_by_patterns_lists_and_numbers(recordings):
+    """Every way to name both columns gives a line each and one together; one column gives the full answer."""
+    for column in ("front,rear", "*", "1,2", "re*,FRONT", "front, front ,2"):
+        code, out, _ = run("diagnose", "--peaks", recordings / "a.csv", "--column", column, "--json")
+        told = json.loads(out)
+        assert code == 0
+        assert {one["column"] for one in told["recordings"]} == {"front", "rear"}
+        assert [(one["nature"], one["period"]) for one in told["together"]] == [("periodic", 2)]
+    code, out, _ = run("diagnose", "--peaks", recordings / "a.csv", "--column", "re*", "--json")
+    assert (code, json.loads(out)["column"]) == (0, "rear")
+    code, _, err = run("diagnose", "--peaks", recordings / "a.csv", "--column", "front,side*")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "has no column 'side*'; its columns: 'front', 'rear'" in err
+    code, _, err = run("design", "--peaks", recordings / "a.csv", "--column", "*", "--load-rating", "500 N")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "--column '*' means 'front', 'rear'; allowed here: one column" in err
+
+
+def test_a_folder_or_a_pattern_gives_a_table(recordings):
+    """A line for every channel of every file, in its own unit; a file that can't be judged says why."""
+    picture = recordings.parent / "page.png"
+    code, out, _ = run("diagnose", "--peaks", recordings, "--plot", picture)
+    assert code == 0
+    assert picture.stat().st_size > 10_000
+    rows = out.splitlines()
+    assert rows[0].split() == ["file", "channel", "verdict", "scatter", "cycles"]
+    channels = [("a.csv", "front"), ("a.csv", "rear"), ("a.csv", "together"), ("b.csv", "acc"), ("notes.txt", "not")]
+    assert [tuple(row.split()[:2]) for row in rows[1:6]] == channels
+    assert "notes.txt holds no numbers" in out
+    code, out, _ = run("diagnose", "--peaks", recordings / "[ab].csv", "--json")
+    told = json.loads(out)
+    assert (code, told["not_judged"]) == (0, [])
+    assert [one["unit"] for one in told["recordings"]] == ["N", "N", "g"]
+    for source, message in ((recordings / "c*.csv", "holds no file"), (recordings / "notes*", "holds no numbers")):
+        code, _, err = run("diagnose", "--peaks", source)
+        assert (code, err.count("\n")) == (2, 1)
+        assert message in err

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from chaosgym.cli.machine_options import Quantity
-from chaosgym.cli.measured_options import Measured, Run, measured_options, measured_runs
+from chaosgym.cli.measured_options import Measured, Run, measured_options, measured_run
 from chaosgym.cli.output import draw, emit, note_machine, picture_path, plot_option
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def _evaluated(measured: Measured, criteria: "Criteria", stated: tuple[str, ...]
     """What was measured, and what it means by some criteria."""
     from chaosgym.design.measured import evaluate_peaks
 
-    (run,) = measured_runs(measured, of_force=True)
+    run = measured_run(measured)
     source = {
         "file": run.source,
         "sha256": run.sha256,

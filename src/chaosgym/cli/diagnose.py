@@ -9,11 +9,13 @@ from chaosgym.cli.machine_options import machine_command
 from chaosgym.cli.measured_options import (
     Measured,
     measured_options,
+    measured_run,
     measured_runs,
     measured_sweep,
     run_as_dict,
     run_lines,
 )
+from chaosgym.cli.measured_table import all_runs, judged, judged_files, sources_of, table_as_dict, table_lines
 from chaosgym.cli.output import draw, emit, force_line, patience, picture_path, plot_option, verdict_lines
 from chaosgym.machines import MACHINES
 
@@ -79,15 +81,7 @@ def diagnose(
     elif measured:
         if machine or types or margins or step_check:
             raise click.UsageError("--peaks and --series go without a machine, --types, --margins and --step-check")
-        (run,) = measured_runs(measured)
-        result, lines = run_as_dict(run), run_lines(run.source, run)
-        name = f"{Path(run.source).name}, {run.name}"
-        draw(
-            picture,
-            lambda plots: plots.measured_figure(run.peaks, run.verdict.diagnosis, name, run.unit),
-            result,
-            lines,
-        )
+        result, lines = _measured(measured, picture)
     elif machine is None:
         raise click.UsageError(f"give a machine ({', '.join(MACHINES)}), --peaks FILE, --series FILE or --sweep FILE")
     elif test == "two-step":
@@ -107,6 +101,28 @@ def diagnose(
                 _add_margins(machine, verdict, reach, kicks or 0, result, lines)
         draw(picture, lambda plots: plots.diagnosis_figure(verdict), result, lines)
     emit(result, as_json, lambda: lines)
+
+
+def _measured(measured: Measured, picture: Path | None) -> tuple[dict[str, Any], list[str]]:
+    """One measured run in full, or a table of several, with its picture."""
+    sources = sources_of(measured)
+    runs = [] if sources else measured_runs(measured)
+    if len(runs) == 1:
+        run = runs[0]
+        result, lines = run_as_dict(run), run_lines(run.source, run)
+        name = f"{Path(run.source).name}, {run.name}"
+        draw(
+            picture,
+            lambda plots: plots.measured_figure(run.peaks, run.verdict.diagnosis, name, run.unit),
+            result,
+            lines,
+        )
+        return result, lines
+    found = [judged(runs[0].source, runs)] if runs else judged_files(measured, sources)
+    result, lines = table_as_dict(found), table_lines(found)
+    shown = [(f"{Path(run.source).name}, {run.name}", run.peaks, run.verdict.diagnosis) for run in all_runs(found)]
+    draw(picture, lambda plots: plots.thumbnails(shown), result, lines)
+    return result, lines
 
 
 def _sweep_lines(told: dict[str, Any], found: Any) -> list[str]:
@@ -267,7 +283,7 @@ def overlay(machine: Any, measured: Measured, out: Path, as_json: bool) -> None:
     from chaosgym.diagnosis.overlay import overlay as compare
     from chaosgym.plotting.commands import overlay_figure
 
-    (run,) = measured_runs(measured, of_force=True)
+    run = measured_run(measured)
     found = compare(machine, run.peaks, run.verdict.diagnosis, larger=bool(measured.series))
     try:
         overlay_figure(found).savefig(out, dpi=130)

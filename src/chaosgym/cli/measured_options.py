@@ -54,7 +54,7 @@ def in_readings(size: float | None, unit: str) -> float | None:
 OPTIONS = (
     click.option("--peaks", metavar="FILE", help="Peak forces, one a cycle: CSV, Parquet, .npy, .mat; - is stdin."),
     click.option("--series", metavar="FILE", help="A force over time: the same formats, WAV and UFF; - is stdin."),
-    click.option("--column", metavar="NAME", help="Column of the force, where there are several (name or number)."),
+    click.option("--column", metavar="NAME", help="Column of the force: name, number, pattern, or several."),
     click.option("--unit", metavar="UNIT", help="Unit of the column, if the file does not name it; default N."),
     click.option("--scale", metavar="TEXT", help="Calibration of the column: '100 mV/N', '20 N/V', '50 N/FS'."),
     click.option("--rate-hz", type=Quantity("Hz"), help="Sampling rate of --series, if it has no time column."),
@@ -96,7 +96,10 @@ class Measured(NamedTuple):
 
 
 class Run(NamedTuple):
-    """One measured run: its peaks, what sampling leaves open, the verdict, and where it comes from."""
+    """One measured run: its peaks, the verdict, and where it comes from.
+
+    ``aligned`` tells that no cycle was left out, so that rows of several runs of a file belong together.
+    """
 
     name: str
     peaks: Any
@@ -105,6 +108,7 @@ class Run(NamedTuple):
     sha256: str
     notes: tuple[str, ...]
     unit: str = "N"
+    aligned: bool = False
 
 
 def measured_options(function: Callable[..., None]) -> Callable[..., None]:
@@ -140,7 +144,7 @@ def _check(given: Measured, elsewhere: bool) -> None:
 
 
 def measured_runs(given: Measured, *, several: bool = False, of_force: bool = False) -> list[Run]:
-    """Read and judge what was measured: one run, or one a column where ``several`` are welcome.
+    """Read and judge what was measured: one run, or one a column where ``several`` are welcome or named.
 
     Raises
     ------
@@ -149,26 +153,28 @@ def measured_runs(given: Measured, *, several: bool = False, of_force: bool = Fa
     """
     from chaosgym.diagnosis.measured import judge_peaks
     from chaosgym.errors import DiagnosisError
-    from chaosgym.signals.columns import check_peaks, choose_force, forces
+    from chaosgym.signals.columns import check_peaks, choose_force, forces, named_columns
     from chaosgym.signals.cycles import cycle_period, peaks_of_series
     from chaosgym.signals.read import read_recording
 
     recording = read_recording(given.peaks or given.series or "-")
     found = []
+    names = [] if given.column is None else named_columns(recording, given.column)
     if given.series:
         period = cycle_period(given.rpm, given.hz, given.period_s)
-        signal, cut = peaks_of_series(
-            recording,
-            given.column,
-            given.unit,
-            rate_hz=given.rate_hz,
-            period=period,
-            tachometer=given.tachometer,
-            scale=given.scale,
-        )
-        found.append((signal, cut.peaks, cut.resolution, (f"{len(cut.peaks)} cycles", *cut.notes), cut.condition))
+        for name in names or (None,):
+            signal, cut = peaks_of_series(
+                recording,
+                name,
+                given.unit,
+                rate_hz=given.rate_hz,
+                period=period,
+                tachometer=given.tachometer,
+                scale=given.scale,
+            )
+            found.append((signal, cut.peaks, cut.resolution, (f"{len(cut.peaks)} cycles", *cut.notes), cut.condition))
     else:
-        chosen = forces if several else lambda *of: [choose_force(*of)]
+        chosen = forces if several or names else lambda *of: [choose_force(*of)]
         for signal in chosen(recording, given.column, given.unit, given.scale):
             found.append((signal, check_peaks(signal, recording), 0.0, (), ""))
     runs = []
@@ -196,9 +202,25 @@ def measured_runs(given: Measured, *, several: bool = False, of_force: bool = Fa
                 recording.sha256,
                 (f"read {signal.described}", *notes),
                 signal.unit,
+                len(peaks) == len(signal.values),
             )
         )
     return runs
+
+
+def measured_run(given: Measured) -> Run:
+    """The one run of forces that was measured.
+
+    Raises
+    ------
+    UsageError
+        If ``--column`` means several.
+    """
+    runs = measured_runs(given, of_force=True)
+    if len(runs) > 1:
+        names = ", ".join(repr(run.name) for run in runs)
+        raise click.UsageError(f"--column {given.column!r} means {names}; allowed here: one column")
+    return runs[0]
 
 
 def _ask_for_force(source: str, signal: Any) -> None:

@@ -10,14 +10,20 @@ A random process and deterministic chaos both never repeat. Chaos differs in fou
    deterministic or look so, and are not chaotic.
 
 The model is a line plus Gaussian bumps of the last one to four readings, smoothed by generalised cross-validation.
+Several sensors make one series, in the order in which their readings follow each other within a cycle. Each sensor has
+its own map of the last readings of all, so a forecast spans the part of a cycle between two sensors.
 
 References
 ----------
 T. Schreiber, A. Schmitz, Improved surrogate data for nonlinearity tests, Phys. Rev. Lett. 77 (1996), 635-638.
+T. Schreiber, A. Schmitz, Surrogate time series, Physica D 142 (2000), 346-382.
+D. Prichard, J. Theiler, Generating surrogate data for time series with several simultaneously measured variables,
+Phys. Rev. Lett. 73 (1994), 951-954.
 M. Barahona, C.-S. Poon, Detection of nonlinear dynamics in short, noisy time series, Nature 381 (1996), 215-217.
 G. Golub, M. Heath, G. Wahba, Generalized cross-validation ..., Technometrics 21 (1979), 215-223.
 """
 
+from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
@@ -25,8 +31,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-DIMENSIONS = (1, 2, 3, 4)
-"""Readings from which the next is forecast."""
+DIMENSIONS, DIMENSIONS_TOGETHER = (1, 2, 3, 4), (1, 2, 3, 4, 6)
+"""Readings from which the next is forecast, of one sensor and of several."""
+
+MOST_ORDERED = 3
+"""Sensors at the most whose order within a cycle is found; of more the order is the one that is given."""
 
 LINEAR_LAGS = 8
 """Most readings of the linear forecasts."""
@@ -78,28 +87,44 @@ class Map(NamedTuple):
     centres: Array
     error: float
 
+    @property
+    def share(self) -> float:
+        """Width of its bumps, one of ``WIDTHS``."""
+        return self.width / float(np.sqrt(self.dimension))
+
 
 class Determinism(NamedTuple):
-    """What the fitted map says of a record.
+    """What the fitted maps say of a record.
 
     Attributes
     ----------
-    dimension, width
-        Readings that the best forecast takes, and width of its bumps, one of ``WIDTHS``.
-    linear, nonlinear
-        Variance that the best linear and nonlinear forecast leave, as a share of that of the readings.
+    order
+        Places of the sensors in the order in which their readings follow each other within a cycle.
+    maps
+        The best forecast of each sensor, in that order.
+    linear : (sensors,)
+        Variance that the best linear forecast of each leaves, as a share of that of its readings.
     exponents : (refits,)
         Largest exponent per cycle of each refit, iterated without noise; -inf where it leaves the readings' range.
-    spread
+    spread : (sensors,)
         Standard deviation of the iterated maps that stay bounded, all together, as a share of that of the readings.
     """
 
-    dimension: int
-    width: float
-    linear: float
-    nonlinear: float
+    order: tuple[int, ...]
+    maps: tuple[Map, ...]
+    linear: Array
     exponents: Array
-    spread: float
+    spread: Array
+
+    @property
+    def nonlinear(self) -> Array:
+        """Variance that the best forecast of each sensor leaves, as a share of that of its readings, (sensors,)."""
+        return np.array([one.error for one in self.maps])
+
+    @property
+    def dimension(self) -> int:
+        """Most readings that a forecast takes."""
+        return max(one.dimension for one in self.maps)
 
     @property
     def exponent(self) -> tuple[float, float]:
@@ -111,8 +136,9 @@ class Determinism(NamedTuple):
     def map_is_chaotic(self) -> bool:
         """Whether the map without noise is irregular for certain, and accounts for the readings."""
         low, high = SAME_SPREAD
-        accounts = self.nonlinear < MOST_LEFT and self.nonlinear < LEAST_GAIN * self.linear
-        return bool(accounts and self.exponent[0] > LEAST_EXPONENT and low < self.spread < high)
+        accounts = (self.nonlinear < MOST_LEFT) & (self.nonlinear < LEAST_GAIN * self.linear)
+        same = (low < self.spread) & (self.spread < high)
+        return bool(accounts.all() and self.exponent[0] > LEAST_EXPONENT and same.all())
 
     @property
     def map_rests(self) -> bool:
@@ -120,17 +146,23 @@ class Determinism(NamedTuple):
         return bool(np.isfinite(self.exponents).all() and np.quantile(self.exponents, 0.9) < REST)
 
 
-def pasts(values: Array) -> tuple[Array, Array]:
-    """(readings before each, (n, 8), the last first; the readings, (n,)), in standard deviations."""
-    scaled = (values - values.mean()) / values.std()
-    windows = np.lib.stride_tricks.sliding_window_view(scaled, LINEAR_LAGS + 1)
-    return np.ascontiguousarray(windows[:, -2::-1]), np.ascontiguousarray(windows[:, -1])
+def pasts(values: Array) -> list[tuple[Array, Array]]:
+    """For each sensor of readings (cycles, sensors): what came before, and what came.
+
+    The readings of all sensors are one series, in standard deviations of each; those before, the last first, are
+    (n, 8 sensors), those that came (n,).
+    """
+    sensors = values.shape[1]
+    scaled = ((values - values.mean(axis=0)) / values.std(axis=0)).ravel()
+    windows = np.lib.stride_tricks.sliding_window_view(scaled, LINEAR_LAGS * sensors + 1)
+    rows = [windows[place::sensors] for place in range(sensors)]
+    return [(np.ascontiguousarray(one[:, -2::-1]), np.ascontiguousarray(one[:, -1])) for one in rows]
 
 
 def linear_error(past: Array, following: Array) -> float:
-    """Least generalised cross-validation of the linear forecasts from 0 to 8 readings."""
+    """Least generalised cross-validation of the linear forecasts from 0 to 8 readings a sensor."""
     size, found = len(following), []
-    for lags in range(LINEAR_LAGS + 1):
+    for lags in range(past.shape[1] + 1):
         design = np.column_stack([np.ones(size), past[:, :lags]])
         rest = following - design @ np.linalg.lstsq(design, following, rcond=None)[0]
         found.append(size * float(rest @ rest) / (size - lags - 1) ** 2)
@@ -197,43 +229,85 @@ def _weights(model: Map, past: Array, following: Array, resampled: Array) -> Arr
     return np.asarray(np.linalg.solve(normal, right[:, :, None])[:, :, 0])
 
 
-def _iterate(model: Map, weights: Array, points: Array, rng: np.random.Generator) -> tuple[Array, float]:
-    """(exponents, standard deviation) of maps (refits, coefficients) that start from readings (n, dimension).
+def _iterate(
+    maps: tuple[Map, ...], weights: list[Array], before: list[Array], rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """(exponents, standard deviations (sensors,)) of maps that start from readings.
 
-    A map that leaves the neighbourhood of the readings starts anew from one of them; one that does so often is not
-    bounded. The deviation that is followed keeps its direction.
+    ``weights`` (refits, coefficients) and readings ``before`` (n, readings) are those of each sensor. A map that leaves
+    the neighbourhood of the readings starts anew from one of them; one that does so often is not bounded. The deviation
+    that is followed keeps its direction.
     """
-    dimension, centres, narrow = model.dimension, model.centres, model.width**-2
-    count = len(weights)
-    state = points[rng.integers(len(points), size=count)]
-    shift = np.ones_like(state) / np.sqrt(dimension)
-    constant, slopes, heights = weights[:, 0], weights[:, 1 : 1 + dimension], weights[:, 1 + dimension :]
-    squares = np.sum(centres**2, axis=1)
-    margin = BEYOND * float(np.ptp(points[:, 0]))
-    low, high = float(points[:, 0].min()) - margin, float(points[:, 0].max()) + margin
-    far = _reach(points, centres, model.width)
+    count, sensors = len(weights[0]), len(maps)
+    steps = [_Step.of(*each) for each in zip(maps, weights, before, strict=True)]
+    state = before[0][rng.integers(len(before[0]), size=count)]
+    shift = np.ones_like(state) / np.sqrt(state.shape[1])
     left, growth = np.zeros(count), np.zeros(count)
-    run = np.empty((ITERATIONS, count))
+    run = np.empty((ITERATIONS, count, sensors))
     for cycle in range(TRANSIENT + ITERATIONS):
-        distance = np.sum(state**2, axis=1)[:, None] - 2.0 * state @ centres.T + squares
-        away = (distance.min(axis=1) > far) | (state[:, 0] < low) | (state[:, 0] > high)
-        if away.any():
-            left += away
-            state[away] = points[rng.integers(len(points), size=int(away.sum()))]
-            distance = np.sum(state**2, axis=1)[:, None] - 2.0 * state @ centres.T + squares
-        bumps = heights * np.exp(-0.5 * narrow * distance)
-        following = constant + np.sum(slopes * state, axis=1) + bumps.sum(axis=1)
-        gradient = slopes + narrow * (bumps @ centres - bumps.sum(axis=1)[:, None] * state)
-        state = np.column_stack([following, state[:, :-1]])
-        shift = np.column_stack([np.sum(gradient * shift, axis=1), shift[:, :-1]])
-        size = np.maximum(np.sqrt(np.sum(shift**2, axis=1)), 1e-100)
-        shift /= size[:, None]
-        if cycle >= TRANSIENT:
-            growth += np.log(size)
-            run[cycle - TRANSIENT] = following
+        for place, step in enumerate(steps):
+            distance = step.distance(state)
+            away = step.away(state, distance)
+            if away.any():
+                left += away
+                state[away] = before[place][rng.integers(len(before[place]), size=int(away.sum()))]
+                distance = step.distance(state)
+            following, gradient = step.forecast(state, distance)
+            came = np.sum(gradient * shift[:, : gradient.shape[1]], axis=1)
+            state = np.column_stack([following, state[:, :-1]])
+            shift = np.column_stack([came, shift[:, :-1]])
+            size = np.maximum(np.sqrt(np.sum(shift**2, axis=1)), 1e-100)
+            shift /= size[:, None]
+            if cycle >= TRANSIENT:
+                growth += np.log(size)
+                run[cycle - TRANSIENT, :, place] = following
     bounded = left <= OUTSIDE * (TRANSIENT + ITERATIONS)
-    spread = float(run[:, bounded].std()) if bounded.any() else 0.0
+    spread = run[:, bounded].std(axis=(0, 1)) if bounded.any() else np.zeros(sensors)
     return np.where(bounded, growth / ITERATIONS, -np.inf), spread
+
+
+class _Step(NamedTuple):
+    """The refitted map of one sensor, as it is iterated."""
+
+    model: Map
+    constant: Array
+    slopes: Array
+    heights: Array
+    squares: Array
+    range: tuple[float, float]
+    far: float
+
+    @classmethod
+    def of(cls, model: Map, weights: Array, before: Array) -> "_Step":
+        """The step of coefficients (refits, coefficients), and where its readings (n, readings) end."""
+        dimension = model.dimension
+        margin = BEYOND * float(np.ptp(before[:, 0]))
+        return cls(
+            model,
+            weights[:, 0],
+            weights[:, 1 : 1 + dimension],
+            weights[:, 1 + dimension :],
+            np.sum(model.centres**2, axis=1),
+            (float(before[:, 0].min()) - margin, float(before[:, 0].max()) + margin),
+            _reach(before[:, :dimension], model.centres, model.width),
+        )
+
+    def distance(self, state: Array) -> Array:
+        """Squares of the distances of states (refits, readings) from the centres, (refits, centres)."""
+        last = state[:, : self.model.dimension]
+        return np.asarray(np.sum(last**2, axis=1)[:, None] - 2.0 * last @ self.model.centres.T + self.squares)
+
+    def away(self, state: Array, distance: Array) -> NDArray[np.bool_]:
+        """Which states have left the neighbourhood of the readings, (refits,)."""
+        low, high = self.range
+        return np.asarray((distance.min(axis=1) > self.far) | (state[:, 0] < low) | (state[:, 0] > high))
+
+    def forecast(self, state: Array, distance: Array) -> tuple[Array, Array]:
+        """(next reading (refits,), its gradient in the last ones (refits, dimension))."""
+        narrow, last = self.model.width**-2, state[:, : self.model.dimension]
+        bumps = self.heights * np.exp(-0.5 * narrow * distance)
+        following = self.constant + np.sum(self.slopes * last, axis=1) + bumps.sum(axis=1)
+        return following, self.slopes + narrow * (bumps @ self.model.centres - bumps.sum(axis=1)[:, None] * last)
 
 
 def _reach(points: Array, centres: Array, width: float) -> float:
@@ -243,46 +317,73 @@ def _reach(points: Array, centres: Array, width: float) -> float:
 
 
 def determinism(values: Array) -> Determinism:
-    """Fit a map to readings (cycles,) that are not constant, and iterate it without noise."""
-    past, following = pasts(values[-MOST_READINGS:])
-    model = fit_map(past, following)
+    """Fit maps to readings (cycles,) or (cycles, sensors), none constant, and iterate them without noise."""
+    values = _of_sensors(values)
+    order, maps = _best_order(values)
+    found = pasts(values[:, order])
     rng = np.random.default_rng(0)
-    resampled = rng.exponential(size=(REFITS, len(past)))
+    resampled = rng.exponential(size=(REFITS, len(found[0][1])))
     resampled[0] = 1.0
-    weights = _weights(model, past, following, resampled)
-    exponents, spread = _iterate(model, weights, past[:, : model.dimension], rng)
-    width = model.width / float(np.sqrt(model.dimension))
-    return Determinism(model.dimension, width, linear_error(past, following), model.error, exponents, spread)
+    weights = [_weights(model, *each, resampled) for model, each in zip(maps, found, strict=True)]
+    longest = max(model.dimension for model in maps)
+    exponents, spread = _iterate(maps, weights, [past[:, :longest] for past, _ in found], rng)
+    linear = np.array([linear_error(*each) for each in found])
+    return Determinism(order, maps, linear, exponents, spread)
+
+
+def _best_order(values: Array) -> tuple[tuple[int, ...], tuple[Map, ...]]:
+    """(order of the sensors within a cycle, map of each) that forecast readings (cycles, sensors) best."""
+    sensors = values.shape[1]
+    allowed = DIMENSIONS if sensors == 1 else DIMENSIONS_TOGETHER
+    orders = list(permutations(range(sensors))) if sensors <= MOST_ORDERED else [tuple(range(sensors))]
+    tried = [(order, tuple(fit_map(*each, allowed) for each in pasts(values[:, order]))) for order in orders]
+    return min(tried, key=lambda one: sum(model.error for model in one[1]))
+
+
+def _of_sensors(values: Array) -> Array:
+    """The last readings, (cycles, sensors)."""
+    return values[-MOST_READINGS:].reshape(min(len(values), MOST_READINGS), -1)
 
 
 def surrogate(values: Array, rng: np.random.Generator, rounds: int = 30) -> Array:
-    """A random record with the spectrum and the distribution of ``values`` (Schreiber and Schmitz 1996)."""
-    ordered, amplitude = np.sort(values), np.abs(np.fft.rfft(values))
-    made = rng.permutation(values)
+    """A random record with the spectra, cross-spectra and distributions of ``values``, (cycles, sensors).
+
+    Phases of all sensors at a frequency turn by one angle (Schreiber and Schmitz 2000; Prichard and Theiler 1994). Of
+    one sensor this is the surrogate of Schreiber and Schmitz (1996).
+    """
+    ordered, spectrum = np.sort(values, axis=0), np.fft.rfft(values, axis=0)
+    phase = spectrum / np.maximum(np.abs(spectrum), 1e-300)
+    made = values[rng.permutation(len(values))]
     for _ in range(rounds):
-        turned = np.fft.rfft(made)
-        turned *= amplitude / np.maximum(np.abs(turned), 1e-300)
-        made = np.empty_like(ordered)
-        made[np.argsort(np.fft.irfft(turned, len(values)))] = ordered
+        turned = np.fft.rfft(made, axis=0)
+        turned *= phase.conj() / np.maximum(np.abs(turned), 1e-300)
+        together = np.sum(turned, axis=1, keepdims=True)
+        drawn = np.fft.irfft(spectrum * together / np.maximum(np.abs(together), 1e-300), len(values), axis=0)
+        np.put_along_axis(made, np.argsort(drawn, axis=0), ordered, axis=0)
     return made
 
 
-def beats_surrogates(
-    values: Array, dimensions: tuple[int, ...] = (1, 2, 3), widths: tuple[float, ...] = (0.35, 1.4)
-) -> bool:
-    """Whether a nonlinear forecast of readings gains more on the linear one than in each of the surrogates."""
-    values = values[-MOST_READINGS:]
-    past, following = pasts(values)
-    allowed = (dimensions, widths, CENTRES_OF_SURROGATES)
-    gain = fit_map(past, following, *allowed).error / linear_error(past, following)
-    if gain >= 1.0:
-        return False
+def beats_surrogates(values: Array, fitted: Determinism | None = None) -> bool:
+    """Whether nonlinear forecasts of readings gain more on linear ones than in each of the surrogates.
+
+    Of several sensors the one that gains least counts: a sensor may be a curved function of another, which no map of
+    the past is. The forecasts are those of ``fitted``, or of one to three readings where no map is known.
+    """
+    values = _of_sensors(values)
+    allowed: list[tuple[tuple[int, ...], tuple[float, ...]]] = [((1, 2, 3), (0.35, 1.4))] * values.shape[1]
+    if fitted is not None:
+        values = values[:, fitted.order]
+        allowed = [((model.dimension,), (model.share,)) for model in fitted.maps]
+
+    def gain(record: Array) -> float:
+        return max(
+            fit_map(*each, *of, CENTRES_OF_SURROGATES).error / linear_error(*each)
+            for each, of in zip(pasts(record), allowed, strict=True)
+        )
+
+    least = gain(values)
     rng = np.random.default_rng(1)
-    for _ in range(SURROGATES):
-        past, following = pasts(surrogate(values, rng))
-        if fit_map(past, following, *allowed).error <= gain * linear_error(past, following):
-            return False
-    return True
+    return least < 1.0 and all(gain(surrogate(values, rng)) > least for _ in range(SURROGATES))
 
 
 DRIVEN = 0.4
@@ -296,7 +397,7 @@ def drive(values: Array) -> tuple[float, float]:
     phase of the drive among its arguments the forecast is nearly exact. Frequencies of patterns of up to four cycles
     are left out.
     """
-    past, following = pasts(values[-MOST_READINGS:])
+    ((past, following),) = pasts(_of_sensors(values))
     size, last = len(following), past[:, 0]
     powers = np.column_stack([np.ones(size), last, last**2, last**3])
     alone = np.linalg.qr(np.column_stack([powers, past[:, 1], past[:, 1] ** 2, last * past[:, 1]]))[0]

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.diagnosis.response import Diagnosis
 from chaosgym.diagnosis.scatter import MeasuredVerdict, judge_scatter, newton, scatter_of, undetermined
+from chaosgym.diagnosis.sensors import judge_together
 from chaosgym.diagnosis.two_step import INITIAL_TRANSIENT, two_step_test
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals.noise import SensorError, find_change, quantum, repair, stated_error
@@ -40,11 +41,11 @@ def judge_peaks(
     resolution: float = 0.0,
     unit: str = "N",
 ) -> MeasuredVerdict:
-    """Tell the nature of a measured response from one reading a cycle.
+    """Tell the nature of a measured response from one reading a cycle of one sensor, or of several.
 
     Parameters
     ----------
-    peaks : (cycles,)
+    peaks : (cycles,) or (cycles, sensors)
         Peak force [N] of each cycle, or any other reading once a cycle, in ``unit``.
     sensor_error
         Largest error of a reading (half width), if it is known.
@@ -59,7 +60,23 @@ def judge_peaks(
     ------
     DiagnosisError
         If there are fewer than 8 readings, one is not finite or beyond 1e9, or the error is none.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> noise = np.random.default_rng(0).normal(size=300)
+    >>> judge_peaks(np.tile([40.0, 60.0], 150) + 0.1 * noise, sensor_sigma=0.1).diagnosis.words
+    'periodic, period 2'
     """
+    if np.ndim(peaks) == 2:
+        table = np.asarray(peaks, dtype=float)
+        if not table.shape[1]:
+            raise DiagnosisError(f"the record has shape {table.shape}; allowed: (cycles,) or (cycles, sensors)")
+        alone = [
+            judge_peaks(column, sensor_error=sensor_error, sensor_sigma=sensor_sigma, resolution=resolution, unit=unit)
+            for column in table.T
+        ]
+        return judge_together(alone, table, [f"sensor {place}" for place in range(1, len(alone) + 1)])
     if unit != "N":
         verdict = judge_peaks(peaks, sensor_error=sensor_error, sensor_sigma=sensor_sigma, resolution=resolution)
         return _in_unit(verdict, unit)
@@ -104,7 +121,7 @@ def _in_unit(verdict: MeasuredVerdict, unit: str) -> MeasuredVerdict:
 def _checked(peaks: ArrayLike) -> Array:
     readings = np.asarray(peaks, dtype=float)
     if readings.ndim != 1:
-        raise DiagnosisError(f"the record has shape {readings.shape}; allowed: (cycles,)")
+        raise DiagnosisError(f"the record has shape {readings.shape}; allowed: (cycles,) or (cycles, sensors)")
     if len(readings) < FEWEST_CYCLES:
         raise DiagnosisError(f"the record has {len(readings)} cycles; allowed: {FEWEST_CYCLES} or more")
     bad = np.flatnonzero(~(np.abs(readings) <= LARGEST_FORCE))

@@ -7,7 +7,9 @@ What is left is undetermined, and the verdict says what would tell.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -87,7 +89,8 @@ NOISE_SHARE = 0.5
 """Share of the scatter that a forecast must leave where noise alone keeps a resting map apart."""
 
 ONE_LINE, LONE_LINE_PERIOD = 0.9, 5
-"""Share of a pattern's variance in one line of the spectrum, and period, from which it may be a hum of the mains."""
+"""Share of the variance in one line of the spectrum from which it may be a hum of the mains, and by what factor a
+pattern must be longer than another for it."""
 
 FEW_LINES, LINES_REST = 2, 1.2
 """Sinusoids that may explain the readings as well as a map, and the factor by which they must leave more than it."""
@@ -196,7 +199,7 @@ class Scatter:
         half = size // (2 * k) * k
         halves = [part.reshape(-1, k).mean(axis=0) for part in (self.readings[:half], self.readings[half : 2 * half])]
         patterns = [pattern - pattern.mean() for pattern in halves]
-        if k >= LONE_LINE_PERIOD and _is_one_line(patterns[0] + patterns[1]):
+        if may_be_hum(patterns[0] + patterns[1]):
             return False
         stands_out = min(float(np.std(pattern)) for pattern in patterns) >= PATTERN * self.sigma
         apart = max(0.5, 4.0 * math.sqrt(2.0 * k / half)) * self.sigma
@@ -207,9 +210,15 @@ class Scatter:
         return {"scatter_sigma": self.sigma, "scatter_share": self.relative, "predictability": self.forecast}
 
 
-def _is_one_line(pattern: Array) -> bool:
+def may_be_hum(pattern: Array) -> bool:
+    """Whether a pattern is as well a shorter one, at most a fifth as long, with one line of the spectrum on it."""
     power = np.abs(np.fft.rfft(pattern)) ** 2
-    return float(power.max()) > ONE_LINE * float(power.sum())
+    size, line = len(pattern), np.arange(len(power))
+    for short in range(1, size // LONE_LINE_PERIOD + 1):
+        rest = power[line % (size // short) != 0] if size % short == 0 else np.zeros(1)
+        if float(rest.max()) > ONE_LINE * float(rest.sum()):
+            return True
+    return False
 
 
 def scatter_of(readings: Array, floor: float) -> Scatter:
@@ -248,8 +257,8 @@ def _judge(found: Scatter, told: SensorError | None, resolved: float) -> Measure
     if len(found.readings) < CHAOTIC_CYCLES:
         return _open(found, f"{_beyond(found, told)}: {len(found.readings)} cycles are too few to tell why", told)
     fitted = determinism(found.readings)
-    if _is_chaotic(found, fitted):
-        return _chaotic(found, fitted, told)
+    if is_chaotic([found], fitted):
+        return chaotic([found], fitted, told)
     return _random(found, fitted, told) or _cannot_tell(found, told)
 
 
@@ -269,6 +278,9 @@ def _within_error(found: Scatter, told: SensorError, resolved: float) -> Measure
     if found.relative > LARGE_SCATTER or (found.sigma < 0.4 * sigma and found.relative > SMALL_SCATTER):
         spread = 0.5 * float(np.ptp(found.readings))
         reason = f"can't tell: the sensor's error of {newton(half_width)} hides a spread of +-{newton(spread)}"
+        return _open(found, reason, told)
+    if may_be_hum(found.readings[: found.period] - found.residual[: found.period]):
+        reason = f"can't tell: repeats every {found.period} cycles, or a line of the spectrum (a hum) lies on less"
         return _open(found, reason, told)
     outside = float(np.mean(np.abs(found.residual) > half_width))
     if told.source == "stated sigma":
@@ -308,7 +320,7 @@ def _random(found: Scatter, fitted: Determinism, told: SensorError | None) -> Me
     small = found.relative <= (SMALL_SCATTER if size >= ENOUGH_CYCLES else 0.1 * SMALL_SCATTER)
     if not (found.has_pattern or (small and found.period == 1)):
         return None
-    rests = fitted.map_rests and not _forecast_gains(found, fitted, NOISE_SHARE)
+    rests = fitted.map_rests and not _forecast_gains(found, float(fitted.nonlinear[0]), NOISE_SHARE)
     if not rests and beats_surrogates(found.residual):
         return None
     kind = "random" if found.random else "random, correlated"
@@ -338,35 +350,48 @@ def _open(found: Scatter, reason: str, error: SensorError | None) -> MeasuredVer
     return MeasuredVerdict(undetermined(reason, found.readings, **found.evidence()), error)
 
 
-def _is_chaotic(found: Scatter, fitted: Determinism) -> bool:
-    """Whether the map is chaotic, better than a fixed pattern and than in random surrogates, and no line drives it."""
-    better = _forecast_gains(found, fitted, LEAST_GAIN)
-    if not (better and fitted.map_is_chaotic):
+def is_chaotic(several: Sequence[Scatter], fitted: Determinism) -> bool:
+    """Whether maps of the sensors are chaotic, better than fixed patterns and random surrogates, and driven by no line.
+
+    What is asked of one sensor is asked of each of ``several``.
+    """
+    ordered = [several[place] for place in fitted.order]
+    if not (fitted.map_is_chaotic and all(map(_forecast_gains, ordered, fitted.nonlinear, repeat(LEAST_GAIN)))):
         return False
-    rest, _ = without_lines(found.readings, FEW_LINES, 0.0)
-    lines_explain = float(np.var(rest)) < LINES_REST * fitted.nonlinear * float(np.var(found.readings))
-    if lines_explain or drive(found.readings)[0] <= DRIVEN:
-        return False
-    return beats_surrogates(found.readings, (fitted.dimension,), (fitted.width,))
+    for found, nonlinear in zip(ordered, fitted.nonlinear, strict=True):
+        rest, _ = without_lines(found.readings, FEW_LINES, 0.0)
+        lines_explain = float(np.var(rest)) < LINES_REST * nonlinear * float(np.var(found.readings))
+        if lines_explain or drive(found.readings)[0] <= DRIVEN:
+            return False
+    return beats_surrogates(np.column_stack([found.readings for found in several]), fitted)
 
 
-def _forecast_gains(found: Scatter, fitted: Determinism, least: float) -> bool:
+def _forecast_gains(found: Scatter, nonlinear: float, least: float) -> bool:
     """Whether the forecast leaves less than this share of the scatter around the fixed pattern."""
-    return fitted.nonlinear < least * found.sigma**2 / float(np.var(found.readings))
+    return bool(nonlinear < least * found.sigma**2 / float(np.var(found.readings)))
 
 
-def _chaotic(found: Scatter, fitted: Determinism, told: SensorError | None) -> MeasuredVerdict:
+def chaotic(
+    several: Sequence[Scatter], fitted: Determinism, told: SensorError | None, names: Sequence[str] = ()
+) -> MeasuredVerdict:
+    """The verdict that readings are chaotic, in figures of the maps of one sensor, or of several with their names."""
+    found = several[0]
     low, middle = fitted.exponent
     last = "the last" if fitted.dimension == 1 else f"the last {fitted.dimension}"
+    made = f"a map of {last} forecasts"
+    beyond = _beyond(found, told)
+    if len(several) > 1:
+        made = f"maps of {last} readings of {' and '.join(names)} together forecast"
+        beyond = "irregular"
     reason = (
-        f"{_beyond(found, told)}: a map of {last} forecasts all but {100.0 * fitted.nonlinear:.2g} % of the variance "
-        f"(linear: all but {100.0 * fitted.linear:.2g} %), and without noise it is chaotic, exponent {middle:.2f} a "
-        f"cycle, above {low:.2f} in three of four refits"
+        f"{beyond}: {made} all but {_percents(fitted.nonlinear)} % of the variance (linear: all but "
+        f"{_percents(fitted.linear)} %), and without noise {'it is' if len(several) == 1 else 'they are'} chaotic, "
+        f"exponent {middle:.2f} a cycle, above {low:.2f} in three of four refits"
     )
     figures = {
         "map_dimension": fitted.dimension,
-        "linear_rest": fitted.linear,
-        "nonlinear_rest": fitted.nonlinear,
+        "linear_rest": float(fitted.linear.max()),
+        "nonlinear_rest": float(fitted.nonlinear.max()),
         "map_exponent": middle,
         "map_exponent_low": low,
     }
@@ -376,6 +401,11 @@ def _chaotic(found: Scatter, fitted: Determinism, told: SensorError | None) -> M
     return MeasuredVerdict(
         Diagnosis(nature="chaotic", margin=margin, reason=reason, horizon=size, evidence=evidence), told
     )
+
+
+def _percents(shares: Array) -> str:
+    """Shares in percent, one after the other."""
+    return " and ".join(f"{100.0 * share:.2g}" for share in shares)
 
 
 def _torus(found: Scatter, most: float, told: SensorError | None) -> MeasuredVerdict | None:

@@ -178,6 +178,35 @@ def measured_figure(peaks: Array, verdict: Diagnosis, title: str, unit: str = "N
     return figure
 
 
+MOST_THUMBNAILS, ACROSS = 60, 5
+"""Recordings on one page at the most, and beside each other."""
+
+
+@_styled
+def thumbnails(shown: list[tuple[str, Array, Diagnosis]]) -> Figure:
+    """Readings of many recordings (title, peaks, verdict) over the cycles on one page, coloured by nature."""
+    told = shown[:MOST_THUMBNAILS]
+    across = min(ACROSS, len(told))
+    rows = -(-len(told) // across)
+    figure = figure_of(2.6 * across, 1.7 * rows + 0.5)
+    for ax, (title, peaks, verdict) in zip(figure.subplots(rows, across, squeeze=False).flat, told, strict=False):
+        number = np.arange(1, len(peaks) + 1)
+        ax.plot(number, peaks, ".", ms=2, mew=0.0, color=NATURE_COLOURS[verdict.nature], rasterized=len(peaks) > 5000)
+        ax.set_title(f"{_shortened(title)}\n{verdict.words}", fontsize=7)
+        ax.tick_params(labelsize=6)
+        ax.margins(x=0.01)
+    for ax in figure.axes[len(told) :]:
+        ax.remove()
+    left_out = f", the first {len(told)} of {len(shown)}" if len(told) < len(shown) else ""
+    figure.suptitle(f"Readings over the cycles{left_out}", x=0.02, ha="left", fontsize=10.5, fontweight="bold")
+    return figure
+
+
+def _shortened(title: str, most: int = 34) -> str:
+    """The end of a title that is too long."""
+    return title if len(title) <= most else f"...{title[3 - most :]}"
+
+
 @_styled
 def sweep_figure(speeds: Array, peaks: Array, types: SweepTypes, label: str, title: str) -> Figure:
     """Measured peak forces over the speed, their means, and the regions of types, as in figure 3.16 of the thesis."""

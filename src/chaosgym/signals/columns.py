@@ -5,6 +5,7 @@ Instants follow from a rate, or from time stamps whose rounding is forgiven and 
 
 import math
 import re
+from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 import numpy as np
@@ -174,11 +175,30 @@ def choose_speed(recording: Recording, column: str | None = None) -> Signal:
 def forces(
     recording: Recording, column: str | None = None, unit: str | None = None, scale: str | None = None
 ) -> list[Signal]:
-    """Every column that could be a force [N], or the named one: one run a column."""
-    names = force_names(recording)
-    if column is not None or len(names) < 2:
-        return [choose_force(recording, column, unit, scale)]
+    """Every column that could be a force [N], or those that are named: one run a column.
+
+    ``column`` is a name, a number, a pattern such as ``"bearing*"``, or several of them with commas between.
+    """
+    names = force_names(recording) if column is None else named_columns(recording, column)
+    if column is None and len(names) < 2:
+        return [choose_force(recording, None, unit, scale)]
     return [_force(recording, name, unit, scale) for name in names]
+
+
+def named_columns(recording: Recording, column: str) -> list[str]:
+    """Columns that a name, a number, a pattern, or several of them with commas between mean; each once.
+
+    Raises
+    ------
+    DiagnosisError
+        If one of them means no column.
+    """
+    whole = [name for name in recording.columns if name.casefold() == column.strip().casefold()]
+    found = list(whole)
+    for part in [] if whole else column.split(","):
+        matching = [name for name in recording.columns if fnmatchcase(name.casefold(), part.strip().casefold())]
+        found += matching or [_named(recording, part)]
+    return list(dict.fromkeys(found))
 
 
 def _force(recording: Recording, name: str, unit: str | None, scale: str | None) -> Signal:
