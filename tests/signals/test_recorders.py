@@ -4,6 +4,7 @@ import contextlib
 import gc
 import io
 import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -69,14 +70,36 @@ def excel(path):
     book.save(path)
 
 
-@pytest.mark.parametrize("write", [tdms, mdf, hdf, matlab_of_version_7_3, matlab_structure, excel])
+def universal(path, binary=0):
+    """A universal file, data set 58, by pyuff."""
+    pyuff = pytest.importorskip("pyuff")
+    told = {"func_type": 1, "rsp_node": 1, "rsp_dir": 1, "ref_dir": 1, "ref_node": 0, "ord_data_type": 4}
+    kinds = {"abscissa_spec_data_type": 17, "ordinate_spec_data_type": 13, "orddenom_spec_data_type": 0}
+    shape = {"num_pts": 60, "abscissa_spacing": 1, "abscissa_inc": 1.0 / RATE, "abscissa_min": 0.0}
+    named = {"id1": "Force", "ordinate_axis_units_lab": "N", "rsp_ent_name": "rig", "ref_ent_name": "rig"}
+    one = pyuff.prepare_58(binary=binary, **told, **kinds, **shape, **named, data=FORCE, x=TIME)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)  # pyuff leaves its file to the collector
+        pyuff.UFF(str(path)).write_sets(one, mode="overwrite")
+        gc.collect()
+
+
+def universal_binary(path):
+    """The same with binary numbers, 58b."""
+    universal(path, 1)
+
+
+EVERY = [tdms, mdf, hdf, matlab_of_version_7_3, matlab_structure, excel, universal, universal_binary]
+
+
+@pytest.mark.parametrize("write", EVERY)
 def test_formats_give_force_and_rate(write, tmp_path):
     """Told by their first bytes, whatever the name ends in."""
     path = tmp_path / "record.mf4"
     write(path)
     path = path.rename(tmp_path / "record")
     recording = read_recording(path)
-    np.testing.assert_allclose(choose_force(recording).values, FORCE, rtol=1e-12)
+    np.testing.assert_allclose(choose_force(recording).values, FORCE, rtol=1e-11)
     assert sampling(recording, 60).step == pytest.approx(1.0 / RATE)
 
 
