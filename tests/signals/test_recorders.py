@@ -80,7 +80,7 @@ def universal(path, binary=0):
     one = pyuff.prepare_58(binary=binary, **told, **kinds, **shape, **named, data=FORCE, x=TIME)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ResourceWarning)  # pyuff leaves its file to the collector
-        pyuff.UFF(str(path)).write_sets(one, mode="overwrite")
+        pyuff.UFF(str(path)).write_sets(one, mode="add")
         gc.collect()
 
 

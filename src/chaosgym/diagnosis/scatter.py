@@ -93,10 +93,12 @@ ONE_LINE, LONE_LINE_PERIOD = 0.9, 5
 pattern must be longer than another for it."""
 
 FEW_LINES, LINES_REST = 2, 1.2
-"""Sinusoids that may explain the readings as well as a map, and the factor by which they must leave more than it."""
+"""Sinusoids that may explain the readings, or what a pattern leaves of them, as well as a map, and the factor by which
+they must leave more than it."""
 
-TORUS_REST = 0.3
-"""Share of its standard deviation that the lines of a torus may leave."""
+TORUS_REST, HUMMED_PATTERN = 0.3, 16
+"""Share of its standard deviation that the lines of a torus may leave, and the longest pattern under a hum: longer ones
+come near to any torus."""
 
 ENOUGH_CYCLES = 100
 """Cycles from which small random scatter is told from chaos without a stated error."""
@@ -359,8 +361,8 @@ def is_chaotic(several: Sequence[Scatter], fitted: Determinism) -> bool:
     if not (fitted.map_is_chaotic and all(map(_forecast_gains, ordered, fitted.nonlinear, repeat(LEAST_GAIN)))):
         return False
     for found, nonlinear in zip(ordered, fitted.nonlinear, strict=True):
-        rest, _ = without_lines(found.readings, FEW_LINES, 0.0)
-        lines_explain = float(np.var(rest)) < LINES_REST * nonlinear * float(np.var(found.readings))
+        least = min(float(np.var(without_lines(of, FEW_LINES, 0.0)[0])) for of in (found.readings, found.residual))
+        lines_explain = least < LINES_REST * nonlinear * float(np.var(found.readings))
         if lines_explain or drive(found.readings)[0] <= DRIVEN:
             return False
     return beats_surrogates(np.column_stack([found.readings for found in several]), fitted)
@@ -411,7 +413,7 @@ def _percents(shares: Array) -> str:
 def _torus(found: Scatter, most: float, told: SensorError | None) -> MeasuredVerdict | None:
     """Quasiperiodic, if a few lines leave no more than the sensor's error; None if they leave more, or for one line.
 
-    One line alone is as well a hum of the mains or a modulation of the load.
+    One line alone, or on a pattern, is as well a hum of the mains or a modulation of the load.
     """
     size = len(found.readings)
     if size < QUASIPERIODIC_CYCLES or found.forecast < 2.0 * RANDOM or found.relative < SMALL_SCATTER:
@@ -419,6 +421,9 @@ def _torus(found: Scatter, most: float, told: SensorError | None) -> MeasuredVer
     rest, lines = without_lines(found.readings, MAX_LINES, 0.5 * most if told is None else most)
     sigma = float(np.std(rest))
     if sigma > min(most, TORUS_REST * float(np.std(found.readings))) or correlation(rest) > 2.0 * RANDOM or lines < 2:
+        return None
+    hum = float(np.std(without_lines(found.residual, 1, 0.0)[0]))
+    if found.period <= HUMMED_PATTERN and hum < LINES_REST * sigma:
         return None
     reason = f"does not repeat; {lines} lines of the spectrum leave {newton(sigma)}, no more than the sensor's error"
     evidence = {"cycles": size, **found.evidence(), "spectral_lines": lines}
