@@ -93,8 +93,7 @@ ONE_LINE, LONE_LINE_PERIOD = 0.9, 5
 pattern must be longer than another for it."""
 
 FEW_LINES, LINES_REST = 2, 1.2
-"""Sinusoids that may explain the readings, or what a pattern leaves of them, as well as a map, and the factor by which
-they must leave more than it."""
+"""Sinusoids that may explain the readings as well as a map, and the factor by which they must leave more than it."""
 
 TORUS_REST, HUMMED_PATTERN = 0.3, 16
 """Share of its standard deviation that the lines of a torus may leave, and the longest pattern under a hum: longer ones
@@ -237,6 +236,13 @@ def scatter_of(readings: Array, floor: float) -> Scatter:
     return Scatter(level, period, drift, sigma, float(np.mean(np.abs(readings))), forecast)
 
 
+def left_by_hum(readings: Array) -> float:
+    """Standard deviation that a pattern of 1 to 16 cycles and one sinusoid leave at least."""
+    patterns = range(1, min(HUMMED_PATTERN, len(readings) // SEEN) + 1)
+    residuals = (class_residual(readings, period) for period in patterns)
+    return min(float(np.std(without_lines(residual, 1, 0.0)[0])) for residual in residuals)
+
+
 def judge_scatter(found: Scatter, told: SensorError | None, resolved: float) -> MeasuredVerdict:
     """Verdict on readings that do not repeat exactly; ``resolved`` is the half width of a reading's own step."""
     verdict = _judge(found, told, resolved)
@@ -361,8 +367,8 @@ def is_chaotic(several: Sequence[Scatter], fitted: Determinism) -> bool:
     if not (fitted.map_is_chaotic and all(map(_forecast_gains, ordered, fitted.nonlinear, repeat(LEAST_GAIN)))):
         return False
     for found, nonlinear in zip(ordered, fitted.nonlinear, strict=True):
-        least = min(float(np.var(without_lines(of, FEW_LINES, 0.0)[0])) for of in (found.readings, found.residual))
-        lines_explain = least < LINES_REST * nonlinear * float(np.var(found.readings))
+        least = min(float(np.std(without_lines(found.readings, FEW_LINES, 0.0)[0])), left_by_hum(found.readings))
+        lines_explain = least**2 < LINES_REST * nonlinear * float(np.var(found.readings))
         if lines_explain or drive(found.readings)[0] <= DRIVEN:
             return False
     return beats_surrogates(np.column_stack([found.readings for found in several]), fitted)
@@ -422,8 +428,7 @@ def _torus(found: Scatter, most: float, told: SensorError | None) -> MeasuredVer
     sigma = float(np.std(rest))
     if sigma > min(most, TORUS_REST * float(np.std(found.readings))) or correlation(rest) > 2.0 * RANDOM or lines < 2:
         return None
-    hum = float(np.std(without_lines(found.residual, 1, 0.0)[0]))
-    if found.period <= HUMMED_PATTERN and hum < LINES_REST * sigma:
+    if left_by_hum(found.readings) < LINES_REST * sigma:
         return None
     reason = f"does not repeat; {lines} lines of the spectrum leave {newton(sigma)}, no more than the sensor's error"
     evidence = {"cycles": size, **found.evidence(), "spectral_lines": lines}
