@@ -136,6 +136,6 @@ def show(counts):
 
 
 if __name__ == "__main__":
-    table, missed = counted(sys.argv[2:] or pairs.KINDS, range(9500, 9500 + int(sys.argv[1])))
+    table, missed = counted(sys.argv[2:] or pairs.KINDS, range(int(sys.argv[1])))
     show(table)
     print(*missed, sep="\n")
