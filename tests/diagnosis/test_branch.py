@@ -12,7 +12,8 @@ from chaosgym.diagnosis.bifurcation_curve import follow_bifurcation
 from chaosgym.diagnosis.bifurcation_diagram import follow
 from chaosgym.diagnosis.branch import stretch
 from chaosgym.diagnosis.orbit_family import family_of, with_noise
-from chaosgym.diagnosis.periodic_orbit import PRECISE, find_periodic_orbit
+from chaosgym.diagnosis.periodic_orbit import PRECISE, find_periodic_orbit, run_period
+from chaosgym.diagnosis.section import better_section
 from chaosgym.errors import ParameterError
 from chaosgym.machines import ImpactBeam
 from chaosgym.machines.linear_impact import linear_impact
@@ -49,13 +50,13 @@ def damper_of(restitution, stiffness):
     return 2.0 * math.sqrt(stiffness) * brentq(miss, 1e-6, 0.49)
 
 
-def branch_from(machine, field, low, high, state, period, sign):
+def branch_from(machine, field, low, high, state, period, sign, **how):
     """Stretch of the branch through a state near an orbit at the machine's own value, towards larger or smaller."""
     orbit = find_periodic_orbit(machine, state, period, iterations=20)
     family = with_noise(family_of(machine, field, low, high, orbit.state, period), orbit.state)
     s = (getattr(machine, field) - low) / (high - low)
     normal = np.append(np.zeros(len(orbit.state)), sign)
-    return family, stretch(family, family.solve(np.append(family.weight * orbit.state, s), normal))
+    return family, stretch(family, family.solve(np.append(family.weight * orbit.state, s), normal), **how)
 
 
 def bifurcations(found, *kinds):
@@ -279,18 +280,78 @@ def test_a_branch_is_the_same_from_either_end():
     """Followed forth, and back from its end, a branch has the same bifurcations to 1e-8 and no jump between orbits."""
     machine = oscillator(damping=0.02, stiffness=30.0, contact_damping=0.5, speed=0.1, force=1.2, stops="one")
     settled = simulate(machine, 1, transient=600).final_state
-    _, forth = branch_from(machine, "speed", 0.1, 0.5, settled.coordinates, 1, 1.0)
+    family, forth = branch_from(machine, "speed", 0.1, 0.5, settled.coordinates, 1, 1.0)
     assert forth.end == "end of the range at speed = 0.5"
     other = with_settings(machine, {"speed": 0.5})
     start = simulate(other, 1, transient=600).final_state
-    _, back = branch_from(other, "speed", 0.1, 0.5, start.coordinates, 1, -1.0)
+    other_family, back = branch_from(other, "speed", 0.1, 0.5, start.coordinates, 1, -1.0)
     assert back.end == "end of the range at speed = 0.1"
     kinds = ("fold", "grazing")
     assert bifurcations(back, *kinds)[::-1] == pytest.approx(bifurcations(forth, *kinds), rel=1e-8)
     assert len(bifurcations(forth, *kinds)) == 6
-    for found in (forth, back):
+    for of, found in ((family, forth), (other_family, back)):
         for a, b in pairwise(found.points):
-            assert np.linalg.norm(b.x - a.x) < 0.06 * max(1.0, np.linalg.norm(a.x[:-1]))
+            before = a.x if a.phase == b.phase else of.carried(a, b.phase)[0]
+            assert np.linalg.norm(b.x - before) < 0.06 * max(1.0, np.linalg.norm(before[:-1]))
+
+
+def test_an_orbit_is_the_same_on_every_section():
+    """Carried from phase to phase the beam's orbit closes to 1e-12, with its multipliers, and comes back to 1e-12."""
+    machine = ImpactBeam(excitation_frequency=12.0)
+    orbit = find_periodic_orbit(machine, diagnose(machine).evidence["final_state"], 1)
+    family = family_of(machine, "excitation_frequency", 4.0, 30.0, orbit.state, 1)
+    sideways = np.append(np.zeros(len(orbit.state)), 1.0)
+    point = family.solve(np.append(family.weight * orbit.state, 8.0 / 26.0), sideways)
+    for phase in (0.1, 0.37, 0.9):
+        x, tangent = family.carried(point, phase)
+        there = family.at_phase(phase)
+        assert np.linalg.norm(there.miss(x)) < 1e-12
+        other = there.solve(x, tangent)
+        assert other.multipliers[:2] == pytest.approx(point.multipliers[:2], rel=1e-8)
+        assert other.peaks == pytest.approx(point.peaks, rel=1e-10)
+        assert np.linalg.norm(other.tangent - tangent) < 1e-5
+        assert family.weight * there.start(other) == pytest.approx(point.x[:-1], abs=1e-12)
+    better, moved = better_section(family, point)
+    assert better.phase > 0.0
+    assert better_section(better, moved)[0] is better
+
+
+def test_a_part_of_a_cycle_is_the_free_motion_of_an_oscillator():
+    """From a phase of the drive for a share of a cycle, with two harmonics: SciPy's DOP853 without contact, to 1e-9."""
+    structure = Structure.of_modes([1.3], 0.05, {"mass": [1.0]})
+    drive = Drive("force", "mass", ((1, 1.0, 0.4), (2, 0.7, -1.1)))
+    machine = ModalMachine(modes=structure, joint="mass", drives=(drive,), speed=0.9, clearance=10.0)
+    phase, share = 0.3, 0.45
+    part = machine.section_at(phase, share)
+    end = run_period(part, np.array([0.2, -0.4]), 1).end
+    model, w = machine.reduce(), 2.0 * math.pi * 0.9
+
+    def right(t, y):
+        turns = [k * w * t for k in (1, 2)]
+        push = sum(
+            (model.drive[0, h, 0] + w * w * model.drive[1, h, 0]) * math.cos(turns[h])
+            + (model.drive[0, h, 1] + w * w * model.drive[1, h, 1]) * math.sin(turns[h])
+            for h in range(2)
+        )
+        return [y[1], float(push[0]) - model.damping[0, 0] * y[1] - model.stiffness[0] * y[0]]
+
+    span = phase / 0.9, (phase + share) / 0.9
+    exact = solve_ivp(right, span, [0.2, -0.4], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    assert end == pytest.approx(exact, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_the_first_branch_of_the_beam_reaches_from_4_to_30_hz():
+    """From 4 and from 12 Hz it ends at 30 Hz, and has the same folds to 1e-7."""
+    folds = []
+    for start in (4.0, 12.0):
+        machine = ImpactBeam(excitation_frequency=start)
+        orbit = diagnose(machine).evidence["final_state"]
+        _, found = branch_from(machine, "excitation_frequency", 4.0, 30.0, orbit, 1, 1.0, most_unstable=1e3)
+        assert found.end == "end of the range at excitation_frequency = 30"
+        folds.append([value for value in bifurcations(found, "fold") if value > 13.0])
+    assert len(folds[0]) > 40
+    assert folds[1] == pytest.approx(folds[0], rel=1e-7)
 
 
 def test_the_symmetric_orbit_of_the_beam_loses_its_symmetry_and_the_other_one_flips():

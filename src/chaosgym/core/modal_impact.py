@@ -25,7 +25,7 @@ from chaosgym.core.cycle import LOWER, UPPER, note_touch
 from chaosgym.core.event_tables import BOUND2
 from chaosgym.core.kernel import leaf
 from chaosgym.core.modal_model import FREE, LOWER_STOP, UPPER_STOP
-from chaosgym.core.modal_run import SPARE, WEIGHTS, change, enter, leave, make_run, regime_of, size_of
+from chaosgym.core.modal_run import SPARE, WEIGHTS, Run, change, enter, leave, make_run, regime_of, size_of
 from chaosgym.core.modal_stay import END, EXHAUSTED, FIRST, fly, hang, press
 from chaosgym.core.tangent import carry, orthonormalise, touch
 
@@ -157,3 +157,11 @@ def advance_model(model, step_phase, event_tolerance, state, episode, arrays, ev
     """
     run = make_run(model, step_phase, event_tolerance)
     return advance(run, model, state, episode, arrays, event_budget, tangents)
+
+
+@njit(cache=True, nogil=True)
+def advance_share(model, share, step_phase, event_tolerance, state, episode, arrays, event_budget, tangents):
+    """As ``advance_model``, where each row of ``arrays`` lasts a share of a cycle from phase zero of the drive."""
+    run = make_run(model, step_phase, event_tolerance)
+    part = Run(run.tables, run.own, run.at, share * run.period, run.omega, run.resolution, run.drifts)
+    return advance(part, model, state, episode, arrays, event_budget, tangents)

@@ -68,3 +68,12 @@ class ModalImpactModel(NamedTuple):
     drift: np.ndarray
     rest_penetration: np.ndarray
     tables: Tables
+
+
+def with_drive_from(model: ModalImpactModel, phase: float) -> ModalImpactModel:
+    """The model whose cycles begin at a phase of the drive, as a share of the cycle."""
+    angle = 2.0 * np.pi * phase * np.arange(1.0, model.drive.shape[1] + 1.0)
+    cosine, sine, turned = np.cos(angle)[:, None], np.sin(angle)[:, None], np.empty_like(model.drive)
+    turned[:, :, 0] = model.drive[:, :, 0] * cosine + model.drive[:, :, 1] * sine
+    turned[:, :, 1] = model.drive[:, :, 1] * cosine - model.drive[:, :, 0] * sine
+    return model._replace(drive=turned)

@@ -16,7 +16,7 @@ References
 Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., Springer 2004, chapter 10.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, Literal, NamedTuple
@@ -49,8 +49,11 @@ guessing at the most."""
 NEAREST = 1e-6
 """Shortest piece of a branch that is searched for multipliers that cross unseen."""
 
-ASIDE = 0.02
+ASIDE = 0.005
 """Share of the chord at which a crossing of branches is looked at from either side."""
+
+ROUNDING = 1e-11
+"""Length of the branch within which a root is placed, in scaled unknowns."""
 
 ROOT_ERROR, NOISY = 1e-9, 100.0
 """Error of a root, as a share of the field or of the range, and what the noise of a family adds to the latter."""
@@ -127,6 +130,20 @@ def between(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, share: float, clo
     slope = (1.0 - share) * a.slope + share * b.slope
     unit = chord / np.linalg.norm(chord)
     return family.solve(_interpolated(a, b, share), unit, slope, closed=closed, exact=False)
+
+
+def _on_plane(
+    family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, share: float, known: Mapping[float, OrbitPoint]
+) -> OrbitPoint:
+    """The orbit of ``between``, closely, sought from the nearest ones that are known by their share."""
+    chord = b.x - a.x
+    unit = chord / np.linalg.norm(chord)
+    low, high = max(one for one in known if one < share), min(one for one in known if one > share)
+    before, after = known[low], known[high]
+    part = (share - low) / (high - low)
+    guess = _interpolated(before, after, part)
+    guess += (share * np.linalg.norm(chord) - unit @ (guess - a.x)) * unit
+    return family.solve(guess, unit, (1.0 - part) * before.slope + part * after.slope, closed=CLOSELY, exact=False)
 
 
 def _interpolated(a: OrbitPoint, b: OrbitPoint, share: float) -> Array:
@@ -322,21 +339,23 @@ def _root(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, name: str, turns: b
     """
     from scipy.optimize import brentq
 
-    test, ends = TESTS[name], {0.0: a, 1.0: b}
+    test, known = TESTS[name], {0.0: a, 1.0: b}
 
-    @cache
     def orbit(share: float) -> OrbitPoint:
-        return ends.get(share) or between(family, a, b, share, CLOSELY)
+        if share not in known:
+            known[share] = _on_plane(family, a, b, share, known)
+        return known[share]
 
+    fine = max(1e-13, ROUNDING / float(np.linalg.norm(b.x - a.x)))
     try:
-        share = brentq(lambda one: test(orbit(one)), 0.0, 1.0, xtol=1e-13, rtol=1e-14, full_output=True, disp=False)[0]
+        share = brentq(lambda one: test(orbit(one)), 0.0, 1.0, xtol=fine, rtol=1e-14, full_output=True, disp=False)[0]
     except NotFollowedError:
         if float(np.linalg.norm(b.x - a.x)) > ROUGHLY_PLACED:
             raise
         share = abs(test(a)) / (abs(test(a)) + abs(test(b)))
         return share, float(a.x[-1] + share * (b.x[-1] - a.x[-1])), a if share < 0.5 else b
     point = orbit(share)
-    crosses = name == "one" and not turns and 0.0 < share < 1.0
+    crosses = name == "one" and not turns and 0.0 < share < 1.0 and not family.mirrored
     return share, _seen_from_aside(orbit, share, test) if crosses else float(point.x[-1]), point
 
 
@@ -361,7 +380,7 @@ def _bifurcation(
         error=max(ROOT_ERROR * abs(value), (ROOT_ERROR + NOISY * family.noise) * abs(family.high - family.low)),
         period=family.period // 2 if kind == "flip" and ends else family.period,
         multipliers=point.multipliers,
-        state=family.state(point.x),
+        state=family.start(point),
         impacts=(before.impacts, after.impacts),
         largest_peak=float(point.peaks.max()),
         loses_stability=(before.unstable == 0) != (after.unstable == 0),

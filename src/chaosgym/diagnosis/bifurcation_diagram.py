@@ -25,7 +25,7 @@ from chaosgym.diagnosis.orbit_family import (
     with_noise,
 )
 from chaosgym.diagnosis.periodic_orbit import find_periodic_orbit
-from chaosgym.errors import ParameterError
+from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
 from chaosgym.simulation import parallel_map
@@ -44,8 +44,9 @@ SHOWN_PEAKS = 60
 LONGEST_PERIOD = 4
 """Longest period of a doubled branch."""
 
-AMPLITUDES = (1e-3, 4e-3, 2e-4)
-"""Distances from a bifurcation, relative to the size of the motion, at which a new branch is looked for."""
+AMPLITUDES = {"flip": (5e-5, 2e-4, 1e-3, 4e-3), "symmetry breaking": (1e-3, 4e-3, 2e-4)}
+"""Distances from a bifurcation, relative to the size of the motion, at which a new branch is looked for: a doubled
+orbit may flip again soon, and one without symmetry is told from the symmetric one by its peaks."""
 
 SAME = 1e-5
 """Relative difference of peaks and multipliers below which two orbits are one, or mirror each other."""
@@ -331,6 +332,7 @@ class _Branches:
 
     def _switch(self, parent: OrbitFamily, family: OrbitFamily, at: Found, multiplier: float) -> None:
         """Follow the branch that begins at a bifurcation of another one, unless one ends there."""
+        parent, family = (one.at_phase(at.point.phase) for one in (parent, family))
         kind, value = at.bifurcation.kind, at.bifurcation.value
         if any(
             each.ends and each.kind == kind and abs(each.value - value) < SAME_PLACE * abs(value)
@@ -339,8 +341,11 @@ class _Branches:
             for each in branch.bifurcations
         ):
             return
-        normal = np.append(direction_of(at.point, multiplier), 0.0)
-        for amplitude in AMPLITUDES:
+        aside = np.append(direction_of(at.point, multiplier), 0.0)
+        # the branch that is left must not meet the planes on which the new one is looked for
+        aside -= (aside @ at.point.tangent) * at.point.tangent
+        normal = aside / np.linalg.norm(aside)
+        for amplitude in AMPLITUDES[kind]:
             try:
                 start = family.solve(at.point.x + amplitude * normal, normal)
             except NotFollowedError:
@@ -392,7 +397,7 @@ def _joined(family: OrbitFamily, back: Stretch, ahead: Stretch, begins: str) -> 
         begins=begins,
         ends=(back.end, ahead.end),
         values=np.array([family.value(point.x[-1]) for point in points]),
-        states=np.array([family.state(point.x) for point in points]),
+        states=np.array([family.start(point) for point in points]),
         multipliers=np.array([point.multipliers for point in points]),
         peaks=np.array([point.peaks for point in points]),
         impacts=np.array([point.impacts for point in points]),
@@ -416,11 +421,13 @@ def _orbits_at(branch: Branch, s: float, like: OrbitPoint) -> Iterator[OrbitPoin
         if np.any(sought > FAR_PEAKS * near.max(axis=0)) or np.any(FAR_PEAKS * sought < near.min(axis=0)):
             continue
         share = (s - places[i]) / (places[i + 1] - places[i]) if places[i + 1] != places[i] else 0.0
-        guess = a.x + share * (b.x - a.x)
-        guess[-1] = s
+        family = branch._family.at_phase(b.phase)
         try:
-            yield branch._family.solve(guess, normal)
-        except NotFollowedError:
+            before = a.x if a.phase == b.phase else branch._family.carried(a, b.phase)[0]
+            guess = before + share * (b.x - before)
+            guess[-1] = s
+            yield family.solve(guess, normal)
+        except (NotFollowedError, SimulationError):
             continue
 
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from chaosgym.diagnosis.bifurcation import Bifurcation, Found, between, bifurcations_between, grazing
 from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily, OrbitPoint
+from chaosgym.diagnosis.section import better_section
 
 Array = NDArray[np.float64]
 
@@ -34,14 +35,28 @@ MOST_POINTS = 4000
 LEAST_COSINE = 0.8
 """Of the angle by which the tangent may turn in one step."""
 
+BESIDE, LONG = 0.08, 1e-2
+"""Sine by which the chord of a step may lie beside the mean of the tangents at its ends, and the step above which that
+counts: near grazing tangents are not good enough for shorter ones."""
+
 NEAR, FAR = 0.05, 0.3
 """Share of a step by which the orbit should, and by which it may lie away from where it is expected."""
 
 BEYOND, FIRST_BEYOND = (1e-7, 1e-6, 1e-5, 1e-4), 1e-5
 """Distances at which a grazing ahead is looked for, and the orbit beyond it; and the first step after it."""
 
+LOOKED_AT = 10
+"""Orbits after which it is seen whether another section serves better."""
+
 MOST_UNSTABLE = 30.0
 """Largest multiplier up to which a branch is followed."""
+
+
+class Begun(NamedTuple):
+    """Unknowns (n + 1,) and tangent (n + 1,) of the first orbit, on the section of the last one."""
+
+    x: Array
+    tangent: Array
 
 
 class Bend(NamedTuple):
@@ -90,11 +105,18 @@ def stretch(
     closely
         Place every grazing to 1e-9, not only those that stability depends on.
     """
+    family, start = family.with_mirror(start)
     points: list[OrbitPoint] = [start]
     found: list[Found] = []
     at: list[int] = []
-    here, step, bend = start, first_step, Bend(np.zeros_like(start.x), np.zeros_like(start.slope))
+    straight = Bend(np.zeros_like(start.x), np.zeros_like(start.slope))
+    here, begun, step, bend = start, Begun(start.x, start.tangent), first_step, straight
     while len(points) < MOST_POINTS:
+        if len(points) % LOOKED_AT == 1:
+            moved, here = better_section(family, here)
+            if moved is not family:
+                family, bend = moved, straight
+                begun = Begun(*family.carried(start, family.phase))
         cap = longest_step * max(1.0, float(np.linalg.norm(here.x[:-1])))
         step = min(step, cap, longest_step / max(abs(here.tangent[-1]), 1e-12))
         try:
@@ -105,7 +127,7 @@ def stretch(
                 found.append(grazing(family, here, beyond))
                 at.append(len(points) - 1)
                 points.append(beyond)
-                here, step, bend = beyond, FIRST_BEYOND, Bend(np.zeros_like(start.x), np.zeros_like(start.slope))
+                here, step, bend = beyond, FIRST_BEYOND, straight
                 continue
             return Stretch(points, found, at, f"not followed beyond {_place(family, here)}: {reason}")
         leaves = not 0.0 <= there.x[-1] <= 1.0
@@ -128,7 +150,7 @@ def stretch(
         points.append(there)
         if leaves or there.x[-1] in (0.0, 1.0):
             return Stretch(points, found, at, f"end of the range at {_place(family, there)}")
-        if _returns(start, here, there) and len(points) > 3:
+        if _returns(begun, here, there) and len(points) > 3:
             return Stretch(points, found, at, "closed: the branch comes back to where it began")
         if there.largest_multiplier > most_unstable:
             return Stretch(points, found, at, f"multiplier {there.largest_multiplier:.3g} at {_place(family, there)}")
@@ -165,20 +187,33 @@ def _next(family: OrbitFamily, here: OrbitPoint, step: float, bend: "Bend") -> t
             reason = str(failed)
             step = 0.3 * min(step, length)
             continue
-        touching = min(there.peaks.max(), here.peaks.max()) > 0.0
-        if there.symmetric != here.symmetric and touching and step > 3.0 * LEAST_STEP:
+        if _crossing(here, there):
             reason = "another branch crosses"
             step = 0.3 * min(step, length)
             continue
         off = max(float(np.linalg.norm(there.x - here.x - ahead)) - max(ROUNDING, 10.0 * family.noise), 0.0)
         turned = float(there.tangent @ here.tangent)
-        if step > 3.0 * LEAST_STEP and (off > FAR * length or turned < LEAST_COSINE):
+        beside = _beside(here, there) if length > LONG else 0.0
+        if step > 3.0 * LEAST_STEP and (off > FAR * length or turned < LEAST_COSINE or beside > BESIDE):
             reason = "the branch turns too sharply"
             step = 0.4 * min(step, length)
             continue
         grows = float(np.clip(np.sqrt(NEAR * length / max(off, 1e-12)), 0.5, 2.0))
         return there, max(grows * step, 2.0 * LEAST_STEP)
     raise NotFollowedError(reason or "no step is short enough")
+
+
+def _crossing(here: OrbitPoint, there: OrbitPoint) -> bool:
+    """True if two orbits with contacts lie on branches that cross: one is symmetric or of half the period, one not."""
+    parts = there.symmetric != here.symmetric or there.halved != here.halved
+    return parts and min(there.peaks.max(), here.peaks.max()) > 0.0
+
+
+def _beside(here: OrbitPoint, there: OrbitPoint) -> float:
+    """How far the chord of two orbits lies beside the mean of their tangents: much if another branch was met."""
+    chord = there.x - here.x
+    unit = chord / max(float(np.linalg.norm(chord)), 1e-300)
+    return float(np.linalg.norm(unit - 0.5 * (here.tangent + there.tangent)))
 
 
 def _beyond_grazing(family: OrbitFamily, here: OrbitPoint) -> OrbitPoint | None:
@@ -196,7 +231,8 @@ def _beyond_grazing(family: OrbitFamily, here: OrbitPoint) -> OrbitPoint | None:
                 there = family.solve(here.x + sign * distance * tangent, sign * tangent)
             except NotFollowedError:
                 continue
-            if there.impacts != here.impacts and float(np.linalg.norm(there.x - here.x)) < 10.0 * distance:
+            near = float(np.linalg.norm(there.x - here.x)) < 10.0 * distance
+            if near and there.impacts != here.impacts and not _crossing(here, there):
                 return there
     return None
 
@@ -218,7 +254,7 @@ def _s_between(family: OrbitFamily, here: OrbitPoint, beyond: OrbitPoint, share:
     return float(point.x[-1])
 
 
-def _returns(start: OrbitPoint, here: OrbitPoint, there: OrbitPoint) -> bool:
+def _returns(start: Begun, here: OrbitPoint, there: OrbitPoint) -> bool:
     """True if a step passes by where the branch began, the same way."""
     chord = there.x - here.x
     length = float(np.linalg.norm(chord))

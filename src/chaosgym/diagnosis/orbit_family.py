@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.core.tangent import Tangents
 from chaosgym.diagnosis.periodic_orbit import Period, period_map, run_period
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
@@ -30,16 +31,25 @@ MOST_ITERATIONS = 14
 MOST_HALVINGS, ROUGH = 3, 1e-2
 """Halvings of a step of Newton's method that makes the miss larger, and the miss above which it is not worth them."""
 
-SLOPE_STEPS = (1e-6, 1e-7, 1e-8)
+SLOPE_STEPS = (1e-7, 1e-8)
 """Steps in s of the difference that stands for dP/ds, the next one where the map bends too much, as near grazing.
 
-It errs by 1e-7 or more, which steers the steps; it moves no orbit that is found, and no multiplier."""
+It errs by 1e-7 or more, and by more where the motion repels. It steers the steps, and moves no orbit that is found and
+no multiplier."""
 
 BENT = 0.01
 """Share of such a difference by which its two halves may differ."""
 
 UNMOVED = 1e-13
 """Change of s that changes nothing but the rounding of a model."""
+
+ALIKE, ALIKE_TIME = 1e-7, 1e-4
+"""Differences of peak forces and of contact times of both sides that count as none, as shares of the largest.
+
+The time of a grazing contact is good to the root of the orbit's miss only."""
+
+HALVED = 1e-6
+"""Distance, relative to the size of the motion, of states half a period apart that are one."""
 
 NOISE = 1e-12
 """Change of s that tells nothing of dP/ds."""
@@ -52,7 +62,7 @@ class OrbitPoint:
     Attributes
     ----------
     x : (n + 1,)
-        Scaled state z at the start of a cycle, and s.
+        Scaled state z on the section, and s.
     matrix : (n, n)
         Derivative of the map of one period in scaled coordinates; its eigenvalues are the Floquet multipliers.
     slope : (n,)
@@ -65,6 +75,10 @@ class OrbitPoint:
         Largest contact force of the period [N].
     symmetric
         True if both sides do the same, and something.
+    halved
+        True if the orbit closes after half the period too: it is one of half the period.
+    phase
+        Of the section, in cycles.
     """
 
     x: Array
@@ -74,6 +88,8 @@ class OrbitPoint:
     impacts: tuple[int, ...]
     peaks: Array
     symmetric: bool
+    halved: bool
+    phase: float
 
     @cached_property
     def multipliers(self) -> NDArray[np.complex128]:
@@ -102,7 +118,9 @@ class OrbitFamily:
 
     ``weight`` (n,) turns a state into scaled coordinates. ``machines`` gives the machine at a value. ``noise`` is how
     much the map jumps, in these coordinates, when the field moves by nothing to speak of: rounding of a model that is
-    computed anew for each value.
+    computed anew for each value. States lie on the section at ``phase`` cycles after the start of the period; another
+    one serves where that meets a contact (``section.py``). Orbits of a ``mirrored`` family do the same on both sides
+    half a period apart: their map is the mirror image of half a period, in which no other branch crosses theirs.
     """
 
     machine: Machine
@@ -113,6 +131,8 @@ class OrbitFamily:
     weight: Array
     machines: Callable[[float], Machine]
     noise: float = 0.0
+    phase: float = 0.0
+    mirrored: bool = False
 
     def value(self, s: float) -> float:
         """The field's value at s."""
@@ -126,11 +146,52 @@ class OrbitFamily:
         ParameterError
             If the field's own range ends before.
         """
-        return self.machines(self.value(s))
+        machine = self.machines(self.value(s))
+        return _on_section(machine, self.phase) if self.phase else machine
 
     def state(self, x: Array) -> Array:
-        """Physical state (n_states,) of scaled unknowns."""
+        """Physical state (n_states,) on the section of scaled unknowns."""
         return np.asarray(x[:-1] / self.weight)
+
+    def start(self, point: OrbitPoint) -> Array:
+        """Physical state (n_states,) of an orbit at the start of a cycle."""
+        return self._after(point.x, point.x[-1], point.phase, self.period) if point.phase else self.state(point.x)
+
+    def carried(self, point: OrbitPoint, phase: float) -> tuple[Array, Array]:
+        """Unknowns (n + 1,) and unit tangent (n + 1,) of an orbit on the section at another phase.
+
+        Raises
+        ------
+        SimulationError
+            If the motion can't be followed.
+        """
+        x, s, last = point.x, float(point.x[-1]), phase if phase > point.phase else phase + self.period
+        low, high = max(s - SLOPE_STEPS[0], 0.0), min(s + SLOPE_STEPS[0], 1.0)
+        slope = (self._after(x, high, point.phase, last) - self._after(x, low, point.phase, last)) / (high - low)
+        along = Tangents(np.ascontiguousarray((point.tangent[:-1] / self.weight)[None]), np.empty((1, 0)))
+        end = self.weight * self._after(x, s, point.phase, last, along)
+        moved = self.weight * (along.vectors[0] + slope * point.tangent[-1])
+        tangent = np.append(moved, point.tangent[-1])
+        return np.append(end, s), tangent / np.linalg.norm(tangent)
+
+    def _after(self, x: Array, s: float, begun: float, ended: float, along: Tangents | None = None) -> Array:
+        """Physical state (n_states,) at one phase of the motion from that of ``x`` at another, with the field at s."""
+        machine = _on_section(self.machines(self.value(s)), begun, ended - begun)
+        return run_period(machine, self.state(x), 1, along).end
+
+    def with_mirror(self, point: OrbitPoint) -> "tuple[OrbitFamily, OrbitPoint]":
+        """The mirrored family and an orbit of it, if the orbit and the machines along the field are symmetric."""
+        if not point.symmetric or self.mirrored or not all(self.machine_at(s).mirrors for s in (0.0, 0.5, 1.0)):
+            return self, point
+        other = replace(self, mirrored=True)
+        try:
+            return other, other.solve(point.x, point.tangent)
+        except NotFollowedError:
+            return self, point
+
+    def at_phase(self, phase: float) -> "OrbitFamily":
+        """The family on the section at another phase."""
+        return self if phase == self.phase else replace(self, phase=phase)
 
     def solve(
         self, guess: Array, normal: Array, slope: Array | None = None, *, closed: float = CLOSED, exact: bool = True
@@ -155,7 +216,7 @@ class OrbitFamily:
         """
         try:
             x, matrix, slope, run = self._solve(guess, normal, slope, closed)
-            return self._point(x, matrix, self.slope(x, run) if exact else slope, run, normal)
+            return self._point(x, matrix, self.slope(x, run.end) if exact else slope, run, normal)
         except (SimulationError, ParameterError) as error:
             raise NotFollowedError(str(error).split(";")[0]) from error
         except np.linalg.LinAlgError as error:
@@ -168,7 +229,7 @@ class OrbitFamily:
         x, last = guess, np.inf
         enough, closed = max(CLOSED, 4.0 * self.noise), max(closed, 4.0 * self.noise)
         miss, matrix, run = self._map(x)
-        slope = self.slope(x, run) if slope is None else slope
+        slope = self.slope(x, run.end) if slope is None else slope
         for _ in range(MOST_ITERATIONS):
             size = float(np.linalg.norm(miss)) / max(float(np.linalg.norm(x[:-1])), 1e-300)
             if not np.isfinite(size) or size > 2.0 * max(last, 1e-2):
@@ -200,36 +261,62 @@ class OrbitFamily:
     def _point(self, x: Array, matrix: Array, slope: Array, run: Period, along: Array) -> OrbitPoint:
         tangent = np.linalg.solve(_bordered(matrix, slope, along), np.append(np.zeros(len(matrix)), 1.0))
         force, spent = run.arrays.peak_force.max(axis=0), run.arrays.contact_time.sum(axis=0)
-        alike = all(np.all(np.abs(both[::2] - both[1::2]) <= 1e-7 * max(both.max(), 1e-300)) for both in (force, spent))
+        if self.mirrored:
+            force, spent = np.full_like(force, force.max()), np.full_like(spent, spent.sum())
+        alike = all(
+            np.all(np.abs(both[::2] - both[1::2]) <= share * max(both.max(), 1e-300))
+            for both, share in ((force, ALIKE), (spent, ALIKE_TIME))
+        )
         return OrbitPoint(
             x=x,
-            matrix=matrix,
+            matrix=matrix @ matrix if self.mirrored else matrix,
             slope=slope,
             tangent=tangent / np.linalg.norm(tangent),
-            impacts=contacts_of(run),
+            impacts=self._contacts(run),
             peaks=force,
             symmetric=alike and self.period % 2 == 1 and float(force.max()) > 0.0,
+            halved=self.period % 2 == 0 and self._same(run.arrays.section[self.period // 2], run.arrays.section[0]),
+            phase=self.phase,
         )
+
+    def _same(self, one: Array, other: Array) -> bool:
+        """True if two physical states are one."""
+        size = float(np.linalg.norm(self.weight * other))
+        return float(np.linalg.norm(self.weight * (one - other))) <= HALVED * max(size, 1e-300)
 
     def _map(self, x: Array) -> tuple[Array, Array, Period]:
         """Miss of a scaled state, derivative of the map and the run."""
-        run, matrix = period_map(self.machine_at(x[-1]), self.state(x), self.period, self.weight)
-        return self.weight * run.end - x[:-1], matrix * self.weight[:, None] / self.weight, run
+        sign, cycles, machine = self._turn(x[-1])
+        run, matrix = period_map(machine, self.state(x), cycles, self.weight)
+        return sign * self.weight * run.end - x[:-1], sign * matrix * self.weight[:, None] / self.weight, run
 
-    def slope(self, x: Array, run: Period) -> Array:
-        """dP/ds (n,) where ``run`` began, by a central difference; at an end of the range just inside."""
+    def _turn(self, s: float) -> tuple[float, int, Machine]:
+        """Sign of the map, and what runs for how many of its cycles."""
+        if self.mirrored:
+            return -1.0, 1, _on_section(self.machines(self.value(s)), self.phase, 0.5 * self.period)
+        return 1.0, self.period, self.machine_at(s)
+
+    def _contacts(self, run: Period) -> tuple[int, ...]:
+        """Contacts that begin in a period, of each side."""
+        counts = contacts_of(run)
+        return tuple(sum(counts) for _ in counts) if self.mirrored else counts
+
+    def slope(self, x: Array, ended: Array) -> Array:
+        """dP/ds (n,) where a run began that ``ended`` (n_states,), by a central difference; just inside the range."""
         least = np.cbrt(self.noise)
         for step in (max(step, least) for step in SLOPE_STEPS):
             middle = float(np.clip(x[-1], step, 1.0 - step))
             low, high = (self.end(x, middle + side) for side in (-step, step))
-            bend = np.linalg.norm(low + high - 2.0 * self.weight * run.end) if middle == x[-1] else 0.0
+            sign = -1.0 if self.mirrored else 1.0
+            bend = np.linalg.norm(low + high - 2.0 * sign * self.weight * ended) if middle == x[-1] else 0.0
             if bend < BENT * np.linalg.norm(high - low):
                 break
         return np.asarray((high - low) / (2.0 * step))
 
     def end(self, x: Array, s: float) -> Array:
-        """Scaled state (n,) after one period from that of ``x``, with the field at s."""
-        return np.asarray(self.weight * run_period(self.machine_at(s), self.state(x), self.period).end)
+        """Scaled state (n,) that the map makes of that of ``x``, with the field at s."""
+        sign, cycles, machine = self._turn(s)
+        return np.asarray(sign * self.weight * run_period(machine, self.state(x), cycles).end)
 
     def impacts(self, x: Array) -> tuple[int, ...]:
         """Contacts that begin in one period from scaled unknowns, of each side.
@@ -240,7 +327,8 @@ class OrbitFamily:
             If the motion can't be followed.
         """
         try:
-            return contacts_of(run_period(self.machine_at(x[-1]), self.state(x), self.period))
+            _, cycles, machine = self._turn(x[-1])
+            return self._contacts(run_period(machine, self.state(x), cycles))
         except (SimulationError, ParameterError) as error:
             raise NotFollowedError(str(error).split(";")[0]) from error
 
@@ -254,7 +342,7 @@ class OrbitFamily:
         """
         try:
             _, matrix, run = self._map(x)
-            slope = self.slope(x, run)
+            slope = self.slope(x, run.end)
             tangent = np.linalg.solve(_bordered(matrix, slope, along), np.append(np.zeros(len(matrix)), 1.0))
         except (SimulationError, ParameterError, np.linalg.LinAlgError) as error:
             raise NotFollowedError(str(error).split(";")[0]) from error
@@ -277,6 +365,13 @@ def _bordered(matrix: Array, slope: Array, normal: Array) -> Array:
     system.flat[: n * (n + 1) : n + 2] -= 1.0
     system[:n, n], system[n] = slope, normal
     return system
+
+
+def _on_section(machine: Machine, phase: float, share: float = 1.0) -> Machine:
+    """The machine whose cycles begin at a phase, for one that ``moves_section``."""
+    other = machine.section_at(phase, share)
+    assert other is not None
+    return other
 
 
 def contacts_of(run: Period) -> tuple[int, ...]:

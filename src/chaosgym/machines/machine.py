@@ -305,6 +305,23 @@ class Machine(ABC):
             return lambda value: self.at(clearance=value)
         return lambda value: with_settings(self, {field: value})
 
+    @property
+    def mirrors(self) -> bool:
+        """True if the mirror image of a motion, half a cycle later, is a motion too, and ``section_at`` serves."""
+        return False
+
+    def section_at(self, phase: float, share: float = 1.0) -> "Self | None":
+        """Return the machine whose cycles begin at a phase of the drive, for exact runs; None if it has none.
+
+        Parameters
+        ----------
+        phase
+            As a share of the cycle.
+        share
+            Of a cycle that each row of ``run`` lasts.
+        """
+        return None
+
     def _with_unchecked(self, **fields: Any) -> Self:
         """Return the machine with some fields replaced by values that are known to be allowed."""
         other = object.__new__(type(self))

@@ -9,7 +9,7 @@ from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,8 @@ from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays, Episode
 from chaosgym.core.event_tables import Tables, shortest_intervals, tabulate
 from chaosgym.core.fixed_step import advance_fixed_step
-from chaosgym.core.modal_impact import advance_model
-from chaosgym.core.modal_model import ModalImpactModel
+from chaosgym.core.modal_impact import advance_model, advance_share
+from chaosgym.core.modal_model import ModalImpactModel, with_drive_from
 from chaosgym.core.propagator import Regimes
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
@@ -390,6 +390,18 @@ class ModalImpactMachine(Machine):
         structure = -float(np.trace(model.damping)) * self.cycle_period
         return structure - float(model.contact_damping @ contact_time) * float(np.sum(model.tip_shape**2))
 
+    @property
+    def mirrors(self) -> bool:
+        """True for equal stops at equal distances, odd harmonics and no constant force."""
+        model = self.reduce()
+        stops = (model.contact_stiffness, model.contact_damping, np.abs(model.stops))
+        alike = all(both[0] == both[1] for both in stops) and model.stops[0] > model.stops[1]
+        return bool(alike and not model.static_force.any() and not model.drive[:, 1::2].any())
+
+    def section_at(self, phase: float, share: float = 1.0) -> Self:
+        """Return the machine whose cycles begin at a phase of the drive; see ``Machine.section_at``."""
+        return self._with_unchecked(_section=(phase % 1.0, share))
+
     def run(
         self,
         coordinates: Array,
@@ -400,11 +412,16 @@ class ModalImpactMachine(Machine):
     ) -> tuple[int, int]:
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
         model = self.reduce()
+        phase, share = self.__dict__.get("_section", (0.0, 1.0))
+        model = with_drive_from(model, phase) if phase else model
         motion = (coordinates, Episode(side=bouncing[:1], touch=bouncing[1:]), arrays)
         along = tangents or no_tangents(len(coordinates), len(arrays.section))
         if isinstance(integrator, ExactEvents):
             step, tolerance, budget = integrator.step_phase, integrator.event_tolerance, integrator.event_budget
-            outcome = call(advance_model, model, step, tolerance, *motion, budget, along)
+            if share != 1.0:
+                outcome = call(advance_share, model, share, step, tolerance, *motion, budget, along)
+            else:
+                outcome = call(advance_model, model, step, tolerance, *motion, budget, along)
         else:
             outcome = call(advance_fixed_step, model, *motion, integrator.steps_per_cycle)
         status, done = outcome
