@@ -303,7 +303,7 @@ class OrbitFamily:
 
     def slope(self, x: Array, ended: Array) -> Array:
         """dP/ds (n,) where a run began that ``ended`` (n_states,), by a central difference; just inside the range."""
-        least = np.cbrt(self.noise)
+        least = np.sqrt(self.noise)
         for step in (max(step, least) for step in SLOPE_STEPS):
             middle = float(np.clip(x[-1], step, 1.0 - step))
             low, high = (self.end(x, middle + side) for side in (-step, step))
