@@ -95,7 +95,10 @@ def _told(diagram: BifurcationDiagram, periodic: SweepPoint, chaotic: SweepPoint
         return "not told", "no branch was followed through the periodic point"
     end = _end_of_stability(*place, periodic.value, float(np.sign(chaotic.value - periodic.value)))
     if end is not None and end.kind == "symmetry breaking" and span[0] <= end.value <= span[1]:
-        end = _begun_at(diagram, end, end.period)
+        broken = end
+        end = _begun_at(diagram, broken, broken.period)
+        if end is None:
+            return "not told", f"the symmetry breaks at {broken.value:.6g}; where the new orbits end is not seen"
     if end is None:
         return "not told", "the periodic motion is not seen to lose its stability on the way"
     if not span[0] <= end.value <= span[1]:
