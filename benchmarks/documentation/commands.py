@@ -55,6 +55,7 @@ def index() -> str:
             "# Commands",
             "",
             "A command prints lines for people, or one JSON object with `--json`. Progress goes to standard error.",
+            "[answers.schema.json](../answers.schema.json) is the JSON schema of these objects, one for each command.",
             "",
             "Exit codes: 0 done, 1 a computation failed, 2 wrong usage, 130 stopped by Ctrl-C, 141 nobody reads the",
             "output.",

@@ -52,7 +52,8 @@ def design(
     from chaosgym.plotting import design_report as report
 
     if template is not None:
-        return click.echo(briefs.template(template), nl=False)
+        text = briefs.template(template)
+        return emit({"text": text}, as_json, lambda: [text.removesuffix("\n")])
     if beside and not (measured and briefs_given):
         raise click.UsageError("--beside needs a brief, and --peaks or --series")
     if len(briefs_given) > 1 or beside:

@@ -103,6 +103,8 @@ def show(machine: Any, markdown: bool, plot: str | None, as_json: bool) -> None:
 
     picture = picture_path(plot, f"show-{machine.name}")
 
+    if markdown and as_json:
+        raise click.UsageError("--markdown and --json exclude each other")
     if markdown:
         return click.echo("\n".join(markdown_table(machine)))
     described = parameters_of(machine)
