@@ -47,6 +47,7 @@ def compare(
     from chaosgym.control.comparison import compare as run
     from chaosgym.control.policies import TrainedPolicy, load_policy
 
+    drawn = None if figure is None else picture_path(str(figure), "")
     trained: dict[str, list[TrainedPolicy]] = {}
     for given in policies:
         name, separator, folder = given.partition("=")
@@ -57,10 +58,11 @@ def compare(
     keywords = {} if objective == OBJECTIVES[0] else {"objective": objective}
     scores = Scores(run(env, out, machines=machines, only=chosen, policies=trained, progress=True, **keywords))
     summary = scores.summary()
-    if figure is not None:
+    if drawn is not None:
         from chaosgym.plotting.played_job import comparison_figure
+        from chaosgym.plotting.style import save_picture
 
-        comparison_figure(summary, env).savefig(figure, dpi=130)
+        save_picture(comparison_figure(summary, env), drawn)
     emit({"env": env, "contenders": summary}, as_json, lambda: table_lines(summary))
 
 

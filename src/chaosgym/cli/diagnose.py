@@ -282,13 +282,12 @@ def overlay(machine: Any, measured: Measured, out: Path, as_json: bool) -> None:
         raise click.UsageError("give what was measured: --peaks FILE or --series FILE")
     from chaosgym.diagnosis.overlay import overlay as compare
     from chaosgym.plotting.commands import overlay_figure
+    from chaosgym.plotting.style import check_picture, save_picture
 
+    picture = check_picture(out)
     run = measured_run(measured)
     found = compare(machine, run.peaks, run.verdict.diagnosis, larger=bool(measured.series))
-    try:
-        overlay_figure(found).savefig(out, dpi=130)
-    except ValueError as error:
-        raise click.UsageError(f"--out {out}: {error}") from error
+    save_picture(overlay_figure(found), picture)
     result = {**found.as_dict(), "file": run.source, "out": str(out)}
     emit(result, as_json, lambda: _overlay_lines(result))
 

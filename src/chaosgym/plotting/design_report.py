@@ -304,15 +304,14 @@ def write_report(
     Raises
     ------
     DesignError
-        If one of them exists and ``overwrite`` is not set, or can't be written.
+        If one of them exists and ``overwrite`` is not set.
+    OSError
+        If one can't be written.
     """
     paths = report_paths(out, overwrite)
     text = json.dumps(numbers, allow_nan=False, indent=1)
     for path, content in zip(paths, (page, text + "\n"), strict=True):
-        try:
-            write_atomically(path, partial(_write, content=content))
-        except OSError as error:
-            raise DesignError(f"{path} can't be written: {error.strerror}") from None
+        write_atomically(path, partial(_write, content=content))
     return paths
 
 

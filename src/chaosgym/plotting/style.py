@@ -1,5 +1,6 @@
 """One look for every picture: colours that colour-blind readers tell apart, and files in PNG, SVG or PDF."""
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -83,4 +84,6 @@ def save_picture(figure: Figure, path: Path) -> None:
     """Write a figure; the same figure gives the same bytes."""
     kind = path.suffix.lower().removeprefix(".")
     dateless = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-    write_atomically(path, lambda file: figure.savefig(file, format=kind, dpi=DOTS_PER_INCH, metadata=dateless))
+    drawn = BytesIO()  # what writes PDF ends in another error where the disk is full
+    figure.savefig(drawn, format=kind, dpi=DOTS_PER_INCH, metadata=dateless)
+    write_atomically(path, lambda file: file.write_bytes(drawn.getvalue()))

@@ -1,0 +1,90 @@
+"""A full disk and an output that is closed end every command in one line, or without a word."""
+
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.cli.test_answers import BEAM, LONG, MAP, PEAKS, QUICK
+
+pytestmark = pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+
+TOO_LONG = {"train-classifier", "demo"}
+
+WRITING = (
+    "simulate impact-beam --cycles 300 --out p.csv",
+    "simulate impact-beam --cycles 300 --out p.parquet",
+    "simulate impact-beam --cycles 3 --series-out s.csv",
+    "new-machine --out a.toml",
+    f"diagnose {PEAKS} --plot d.pdf",
+    f"diagnose {PEAKS} --plot d.png",
+    f"overlay impact-beam {PEAKS} --out o.png",
+    f"{MAP} --out sweep",
+    f'design {PEAKS} --load-rating "500 N" --out r.html',
+    f"run-agent {BEAM} --out j.gif",
+    f'compare {BEAM} --machines 2 --only "follow the demand" --out s.parquet',
+)
+"""Commands that write more than a thousand bytes into a file."""
+
+
+def ended(command, **options):
+    """(Exit code, lines on standard error but for bars of progress) of a command of chaosgym."""
+    words = [sys.executable, "-m", "chaosgym", *shlex.split(command)]
+    done = subprocess.run(words, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False, **options)
+    lines = done.stderr.replace("\r", "\n").splitlines()
+    return done.returncode, [line for line in lines if line.strip() and "|" not in line]
+
+
+def say_no_space(code, told):
+    """One line on the disk, and the exit code of what could not be finished."""
+    return code == 1 and len(told) == 1 and told[0].startswith("Error: [Errno 2")
+
+
+@pytest.mark.parametrize("command", ["info", "show impact-beam --json", "design --template impact-beam", "--help"])
+def test_an_output_on_a_full_disk_is_one_line(command):
+    """/dev/full takes nothing: exit code 1, one line that says so."""
+    with Path("/dev/full").open("wb") as full:
+        assert say_no_space(*ended(command, stdout=full))
+
+
+def limited():
+    """Let this process write no file of more than a thousand bytes."""
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+
+
+def test_a_picture_on_a_full_disk_is_one_line(tmp_path):
+    """PDF, whose writer ends in an error of its own; nothing is left behind."""
+    told = ended(f"diagnose {PEAKS} --plot d.pdf", cwd=tmp_path, stdout=subprocess.DEVNULL, preexec_fn=limited)
+    assert say_no_space(*told)
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.slow
+def test_every_command_ends_cleanly_on_a_full_disk_and_with_a_closed_output(tmp_path):
+    """With /dev/full as output one line; with none at all nothing is said, and the work is done."""
+    ended(f"{MAP} --out map", cwd=tmp_path, stdout=subprocess.DEVNULL)
+    (tmp_path / "brief.toml").write_text('machine = "impact-beam"\n')
+    for name, forms in (QUICK | LONG).items():
+        words = name.replace("-", " ", 1) if name.startswith("dataset-") else name
+        command = f"{words} {forms.split(';')[0]}"
+        if name in TOO_LONG or "brief" in command or "--follow" in command:
+            continue
+        with Path("/dev/full").open("wb") as full:
+            assert say_no_space(*ended(command, cwd=tmp_path, stdout=full)), command
+        fresh = command.replace("p.csv", "p2.csv").replace("s.csv", "s2.csv").replace("--out o.csv", "")
+        assert ended(fresh, cwd=tmp_path, preexec_fn=lambda: os.close(1)) == (0, []), command
+
+
+@pytest.mark.slow
+def test_every_file_on_a_full_disk_is_one_line(tmp_path):
+    """No file may grow beyond a thousand bytes: one line, and none is left in parts."""
+    for command in WRITING:
+        code, told = ended(command, cwd=tmp_path, stdout=subprocess.DEVNULL, preexec_fn=limited)
+        assert say_no_space(code, told), (command, code, told)
+    left = [path for path in tmp_path.rglob("*") if path.is_file() and path.suffix not in (".json", ".lock", ".toml")]
+    assert left == []
