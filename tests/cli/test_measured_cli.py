@@ -5,6 +5,7 @@ import json
 import re
 import shlex
 import sys
+import time
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
@@ -401,3 +402,19 @@ def test_a_folder_or_a_pattern_gives_a_table(recordings):
         code, _, err = run("diagnose", "--peaks", source)
         assert (code, err.count("\n")) == (2, 1)
         assert message in err
+
+
+def test_a_recording_that_takes_long_shows_a_sign_of_life(tmp_path, monkeypatch):
+    """The reader says after a while that it goes on."""
+    from chaosgym.signals import read
+
+    def slow(source, found=read.read_recording):
+        time.sleep(1.0)
+        return found(source)
+
+    monkeypatch.setattr("chaosgym.cli.output.PATIENCE_SECONDS", 0.01)
+    monkeypatch.setattr(read, "read_recording", slow)
+    np.savetxt(tmp_path / "peaks.csv", np.linspace(10.0, 11.0, 40))
+    code, _, err = run("diagnose", "--peaks", tmp_path / "peaks.csv", "--sensor-error", "1 N")
+    assert code == 0
+    assert "read and judge the recording: " in err

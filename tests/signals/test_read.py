@@ -202,3 +202,11 @@ def test_a_file_that_is_too_large_is_refused_at_once(tmp_path):
         file.truncate(2**31)
     with pytest.raises(DiagnosisError, match=r"holds 2\.0 GiB; allowed: up to 1 GiB"):
         read_recording(path)
+
+
+def test_a_text_of_very_many_columns_is_refused_at_once(tmp_path):
+    """As many as no recorder has channels: one line that says how many there may be."""
+    path = tmp_path / "wide.csv"
+    path.write_text("\n".join(",".join(str(place % 7 + row) for place in range(5000)) for row in range(3)))
+    with pytest.raises(DiagnosisError, match="has 5000 columns; allowed: 4096"):
+        read_recording(path)

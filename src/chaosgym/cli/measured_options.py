@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import click
 
 from chaosgym.cli.machine_options import Quantity
-from chaosgym.cli.output import force_line, reading_line, verdict_lines
+from chaosgym.cli.output import force_line, patience, reading_line, verdict_lines
 
 
 class InUnit(float):
@@ -143,6 +143,7 @@ def _check(given: Measured, elsewhere: bool) -> None:
         raise click.UsageError("--tachometer and a stated cycle exclude each other")
 
 
+@patience("read and judge the recording")
 def measured_runs(given: Measured, *, several: bool = False, of_force: bool = False) -> list[Run]:
     """Read and judge what was measured: one run, or one a column where ``several`` are welcome or named.
 
@@ -234,6 +235,7 @@ def _ask_for_force(source: str, signal: Any) -> None:
         )
 
 
+@patience("read and judge the recording")
 def measured_sweep(source: str, speed: str | None, given: Measured) -> tuple[Any, Any, Any, dict[str, Any]]:
     """Read and judge peaks at many speeds: speeds, peaks, their types, and where they come from."""
     import numpy as np

@@ -24,6 +24,9 @@ DELIMITERS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": 
 HEADING = 2000
 """Lines among which a heading ends."""
 
+MOST_COLUMNS = 4096
+"""Columns that a text may have."""
+
 FOOTER, FEWEST_BEFORE_FOOTER = 50, 20
 """Most lines without numbers that may follow the data, and fewest lines of data before them."""
 
@@ -68,6 +71,8 @@ def read_text(data: bytes) -> dict[str, Any]:
         kept = [(number, "\t".join(line.split())) for number, line in kept]
     mark = "\t" if delimiter == " " else delimiter
     width = Counter(line.count(mark) + 1 for _, line in kept[-200:]).most_common(1)[0][0]
+    if width > MOST_COLUMNS:
+        raise DiagnosisError(f"has {width} columns; allowed: {MOST_COLUMNS}; keep those of forces, times and speeds")
     start, end, steady = _body([line for _, line in kept], mark, width)
     body = kept[start:end]
     heading = _heading(written[: body[0][0] - 1], body, width, None if delimiter == " " else mark)
