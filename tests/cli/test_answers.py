@@ -40,6 +40,16 @@ area = "20 mm^2"
 hardness = "2 GPa"
 coefficient = 1e-5
 uncertainty = 3
+[bending]
+at = "150 mm"
+amplitude = "250 MPa"
+cycles = "1 Mcycles"
+slope = 5
+ultimate = "600 MPa"
+mean_stress = "goodman"
+notch_factor = 1.5
+static_stress = "0 MPa"
+uncertainty = 3
 """
 QUICK = {
     "simulate": "impact-beam --cycles 3 --out p.csv --series-out s.csv --plot m.png; slider-crank --cycles 2",
@@ -67,7 +77,7 @@ LONG = {
     "tradeoff": "impact-beam --points 1 --cycles 20 --transient 20 --budget 0.05 --workers 1",
     "stability": "impact-beam --workers 1",
     "compare": f'{BEAM} --machines 2 --only "follow the demand" --out scores.parquet',
-    "design": "brief.toml --workers 1; brief.toml other.toml --workers 1",
+    "design": f"brief.toml --workers 1 --plot b.png; brief.toml other.toml --workers 1; brief.toml --workers 1 --beside {PEAKS}",
     "train-classifier": f"--data {DOCS.parent}/datasets/impact-beam --out learned",
     "demo": "--out demo",
 }

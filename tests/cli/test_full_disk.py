@@ -1,6 +1,7 @@
 """A full disk and an output that is closed end every command in one line, or without a word."""
 
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -31,11 +32,12 @@ WRITING = (
 
 
 def ended(command, **options):
-    """(Exit code, lines on standard error but for bars of progress) of a command of chaosgym."""
+    """(Exit code, lines on standard error but for signs of progress) of a command of chaosgym."""
     words = [sys.executable, "-m", "chaosgym", *shlex.split(command)]
     done = subprocess.run(words, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False, **options)
     lines = done.stderr.replace("\r", "\n").splitlines()
-    return done.returncode, [line for line in lines if line.strip() and "|" not in line]
+    progress = re.compile(r"\s*|.*\|.*|.*: \d+ s")
+    return done.returncode, [line for line in lines if not progress.fullmatch(line)]
 
 
 def say_no_space(code, told):

@@ -414,7 +414,7 @@ def test_a_recording_that_takes_long_shows_a_sign_of_life(tmp_path, monkeypatch)
 
     monkeypatch.setattr("chaosgym.cli.output.PATIENCE_SECONDS", 0.01)
     monkeypatch.setattr(read, "read_recording", slow)
-    np.savetxt(tmp_path / "peaks.csv", np.linspace(10.0, 11.0, 40))
+    np.savetxt(tmp_path / "peaks.csv", 10.0 + np.sin(np.arange(40.0)))
     code, _, err = run("diagnose", "--peaks", tmp_path / "peaks.csv", "--sensor-error", "1 N")
     assert code == 0
     assert "read and judge the recording: " in err
