@@ -77,7 +77,8 @@ LONG = {
     "tradeoff": "impact-beam --points 1 --cycles 20 --transient 20 --budget 0.05 --workers 1",
     "stability": "impact-beam --workers 1",
     "compare": f'{BEAM} --machines 2 --only "follow the demand" --out scores.parquet',
-    "design": f"brief.toml --workers 1 --plot b.png; brief.toml other.toml --workers 1; brief.toml --workers 1 --beside {PEAKS}",
+    "design": f"brief.toml --workers 1 --plot b.png; brief.toml other.toml --workers 1;"
+    f"brief.toml --workers 1 --beside {PEAKS}",
     "train-classifier": f"--data {DOCS.parent}/datasets/impact-beam --out learned",
     "demo": "--out demo",
 }
