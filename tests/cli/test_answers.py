@@ -57,6 +57,7 @@ QUICK = {
     "new-machine": "; four-bar --out four-bar.toml",
     "diagnose": f"impact-beam --frequency-hz 19 --types --step-check --margins --kicks 2; impact-beam;"
     f"impact-beam --test two-step --budget 400; slider-crank --test mut; {PEAKS};"
+    f"--peaks {DOCS}/data/peaks.csv --column 'upper,lower';"
     f'--sweep {DOCS}/data/sweep.csv --sensor-error "3 N"',
     "overlay": f"impact-beam {PEAKS} --out o.png",
     "classify": f"impact-beam --frequency-hz 19; impact-beam --budget-us 0; impact-beam {PEAKS}; impact-beam --follow",
