@@ -7,7 +7,6 @@ machine in contact, no rest positions, no bounds: nothing is shared with the ker
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from scipy.linalg import expm
@@ -30,13 +29,13 @@ class Balance:
 
 
 def _doubts(values, slopes, h):
-    """Between which neighbours (k + 1, rows) of a path a row may fall through zero, by the cubic through both: (k,)."""
+    """Between which neighbours (k + 1, rows) of a path which row may fall through zero, by the cubic through both."""
     shares = np.linspace(0.0, 1.0, 33)[:, None, None]
     rest = 1.0 - shares
     path = rest**2 * (values[:-1] * (1.0 + 2.0 * shares) + slopes[:-1] * h * shares)
     path += shares**2 * (values[1:] * (1.0 + 2.0 * rest) - slopes[1:] * h * rest)
     dips = (slopes[:-1] < 0.0) & (slopes[1:] > 0.0) & (path.min(axis=0) < 0.0)
-    return np.any((values[1:] < 0.0) | dips, axis=1)
+    return (values[1:] < 0.0) | dips
 
 
 class _Regime:
@@ -57,91 +56,101 @@ class _Regime:
 
 
 class Referee:
-    """Follows a ``ModalImpactModel`` cycle by cycle."""
+    """Follows a ``ModalImpactModel`` cycle by cycle.
+
+    Coordinates are turned so that the first moves the tip alone; beyond a stop it counts from there, so that a force of
+    contact is no difference of large numbers.
+    """
 
     def __init__(self, model):
         self.model, self.n = model, len(model.tip_shape)
         n, tip = self.n, model.tip_shape
         self.omega = 2.0 * np.pi * model.excitation_frequency
-        drive = model.drive[0] + self.omega**2 * model.drive[1]
+        self.turn = np.linalg.qr(np.column_stack([tip, np.eye(n)]))[0]
+        self.reach = float(self.turn[:, 0] @ tip)
+        stiffness, damping = (self.turn.T @ each @ self.turn for each in (np.diag(model.stiffness), model.damping))
+        drive = (model.drive[0] + self.omega**2 * model.drive[1]) @ self.turn
         harmonics = len(drive)
-        size = 2 * n + 1 + 2 * harmonics
-        base = np.zeros((size, size))
+        self.size = size = 2 * n + 1 + 2 * harmonics
+        base, load = np.zeros((size, size)), np.zeros((n, size))
         base[:n, n : 2 * n] = np.eye(n)
-        base[n : 2 * n, :n], base[n : 2 * n, n : 2 * n] = -np.diag(model.stiffness), -model.damping
-        load = np.zeros((n, size))
-        load[:, 2 * n] = model.static_force
+        base[n : 2 * n, :n], base[n : 2 * n, n : 2 * n] = -stiffness, -damping
+        load[:, 2 * n] = model.static_force @ self.turn
         for g in range(harmonics):
             c, s = 2 * n + 1 + 2 * g, 2 * n + 2 + 2 * g
             load[:, c], load[:, s] = drive[g]
             base[c, s], base[s, c] = -(g + 1) * self.omega, (g + 1) * self.omega
         base[n : 2 * n] += load
-        power = np.zeros((size, size))
+        power, loss = np.zeros((size, size)), np.zeros((size, size))
         power[n : 2 * n] = load
-        loss = np.zeros((size, size))
-        loss[n : 2 * n, n : 2 * n] = model.damping
-        self.x_row, self.v_row = np.zeros(size), np.zeros(size)
-        self.x_row[:n], self.v_row[n : 2 * n] = tip, tip
+        loss[n : 2 * n, n : 2 * n] = damping
         self.regimes = {}
         for side in (0, 1, -1):
-            if side and not np.isfinite(model.stops[(1 - side) // 2]):
+            if side and not np.isfinite(self.stop(side)):
                 continue
             for state in (GAP,) if side == 0 else (CONTACT, DETACHED):
                 a, lost = base.copy(), loss.copy()
+                a[n : 2 * n, 2 * n] -= stiffness[:, 0] * self.stop(side) / self.reach
                 if side:
-                    k, d, depth, force = self.contact(side)
+                    k, d, depth, force = self.contact(side, side)
                     if state == CONTACT:
-                        a[n : 2 * n] -= side * np.outer(tip, force)
-                        lost += d * np.outer(self.v_row, self.v_row)
+                        a[n] -= side * self.reach * force
+                        lost[n, n] += d * self.reach**2
                     else:
-                        lost -= k * np.outer(depth, side * self.v_row)
+                        lost[n] -= side * self.reach * k * depth
                 rate = max(np.max(np.abs(np.linalg.eigvals(a))), harmonics * self.omega)
                 self.regimes[state, side] = _Regime(a, power, lost, PHASE / rate)
 
-    def contact(self, side):
-        """Spring, damper, and the rows of penetration and force of a stop."""
-        i = (1 - side) // 2
-        k, d = self.model.contact_stiffness[i], self.model.contact_damping[i]
-        depth = side * self.x_row
-        depth[2 * self.n] -= side * self.model.stops[i]
-        return k, d, depth, k * depth + d * side * self.v_row
+    def stop(self, side):
+        """Position of a stop; 0 for none."""
+        return self.model.stops[(1 - side) // 2] if side else 0.0
+
+    def contact(self, side, frame):
+        """Spring, damper, and the rows of penetration and force of a stop, in coordinates of a frame."""
+        k, d = self.model.contact_stiffness[(1 - side) // 2], self.model.contact_damping[(1 - side) // 2]
+        depth, rate = np.zeros(self.size), np.zeros(self.size)
+        depth[0] = rate[self.n] = side * self.reach
+        depth[2 * self.n] = side * (self.stop(frame) - self.stop(side))
+        return k, d, depth, k * depth + d * rate
 
     def energy(self, state):
         """Energy [J] of modes and springs of the stops."""
         q, v = np.split(np.asarray(state), 2)
         total = 0.5 * float(v @ v + self.model.stiffness @ q**2)
         for side in (1, -1):
-            if np.isfinite(self.model.stops[(1 - side) // 2]):
-                k, _, depth, _ = self.contact(side)
-                beyond = max(0.0, float(depth[: self.n] @ q + depth[2 * self.n]))
-                total += 0.5 * k * beyond**2
+            if np.isfinite(self.stop(side)):
+                beyond = max(0.0, side * (float(self.model.tip_shape @ q) - self.stop(side)))
+                total += 0.5 * self.model.contact_stiffness[(1 - side) // 2] * beyond**2
         return total
 
     def start(self, state):
         """Augmented coordinates of a state at the start of a cycle."""
-        z = np.zeros(len(self.x_row))
-        z[: 2 * self.n], z[2 * self.n] = state, 1.0
+        z = np.zeros(self.size)
+        z[: 2 * self.n], z[2 * self.n] = (np.reshape(state, (2, -1)) @ self.turn).ravel(), 1.0
         z[2 * self.n + 1 :: 2] = 1.0
         return z
 
-    leaving: ClassVar = {
-        GAP: lambda self, side: [(-self.contact(s)[2], s) for s in (1, -1) if (CONTACT, s) in self.regimes],
-        CONTACT: lambda self, side: [(self.contact(side)[3], 0)],
-        DETACHED: lambda self, side: [(self.contact(side)[2], 0), (-self.contact(side)[3], side)],
-    }
+    def leaving(self, where, side):
+        """Rows that end a stay in a state where they fall to zero, and the sides of what comes next."""
+        if where == GAP:
+            return [(-self.contact(s, 0)[2], s) for s in (1, -1) if (CONTACT, s) in self.regimes]
+        _, _, depth, force = self.contact(side, side)
+        return [(force, 0)] if where == CONTACT else [(depth, 0), (-force, side)]
 
     def cycle(self, state):
         """(State after one cycle, ``Balance``, largest force, number of touches)."""
         z, balance, peak, touches, stays = self.start(state), Balance(), 0.0, 0, 0
-        where, side = GAP, 0
+        where, side, frame = GAP, 0, 0
         for s in (1, -1):
             if (CONTACT, s) in self.regimes:
-                _, _, depth, force = self.contact(s)
+                _, _, depth, force = self.contact(s, 0)
                 if depth @ z > 0.0:
                     where, side = (CONTACT if force @ z > 0.0 else DETACHED), s
         left = 1.0 / self.model.excitation_frequency
         while True:
-            regime, ends = self.regimes[where, side], self.leaving[where](self, side)
+            z[0] += (self.stop(frame) - self.stop(side)) / self.reach
+            frame = side
+            regime, ends = self.regimes[where, side], self.leaving(where, side)
             rows = np.array([row for row, _ in ends]).reshape(len(ends), len(z))
             z, spent, fired = self._until(regime, rows, z, left, balance)
             if where == CONTACT:
@@ -157,7 +166,8 @@ class Referee:
                 where = DETACHED
             else:
                 where, side = GAP, 0
-        return z[: 2 * self.n], balance, peak, touches
+        z[0] += self.stop(frame) / self.reach
+        return (z[: 2 * self.n].reshape(2, -1) @ self.turn.T).ravel(), balance, peak, touches
 
     def _until(self, regime, rows, z, left, balance):
         """Follow z until a row falls through zero or the time is up: (z, time, (row or None, largest first row)).
@@ -183,25 +193,28 @@ class Referee:
             return path[-1], max([largest, *(path[1:] @ rows[:1].T).ravel()])
 
         while spent + regime.h / 2 ** (HALVINGS - 1) <= left:
-            count = min(AHEAD, int((left - spent) / regime.h))
+            count, falls = min(AHEAD, int((left - spent) / regime.h)), np.zeros(len(rows), bool)
             if count:
                 path = np.vstack([z, regime.ahead[:count] @ z])
-                doubts = _doubts(path @ rows.T, path @ rates.T, regime.h)
+                doubts = _doubts(path @ rows.T, path @ rates.T, regime.h).any(axis=1)
                 passed = int(np.argmax(doubts)) if doubts.any() else count
                 z, largest = take(path[: passed + 1], 0)
                 spent += passed * regime.h
                 if passed == count:
                     continue
+                falls = rows @ path[passed + 1] < 0.0
             # into the step in which a row falls, or the rest of the time, by ever shorter steps in which none does
             for k in range(1, HALVINGS):
                 if spent + regime.h / 2**k > left:
                     continue
                 path = np.vstack([z, regime.steps[k] @ z])
-                if k < HALVINGS - 1 and _doubts(path @ rows.T, path @ rates.T, regime.h / 2**k)[0]:
+                doubts, below = _doubts(path @ rows.T, path @ rates.T, regime.h / 2**k)[0], rows @ path[1] < 0.0
+                falls = below if below.any() else falls
+                if doubts.any() and k < HALVINGS - 1:
                     continue
                 z, largest = take(path, k)
                 spent += regime.h / 2**k
-            fallen = rows @ z < 0.0
-            if fallen.any():
-                return z, spent, (int(np.argmax(fallen)), largest)
+                falls = doubts if doubts.any() else falls
+            if falls.any():
+                return z, spent, (int(np.argmax(falls)), largest)
         return z, spent, (None, largest)

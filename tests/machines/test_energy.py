@@ -1,5 +1,6 @@
 """No energy from nothing: the balance of machines of modes, cycle by cycle, by a referee that shares no equation."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -8,17 +9,12 @@ from click.testing import CliRunner
 
 from chaosgym import Drive, ModalMachine, Structure, simulate
 from chaosgym.cli import app
-from chaosgym.errors import SimulationError
 from chaosgym.explore.point import view_of
 from tests.machines.referee import Referee
 
-TOLERANCE, CRITICAL_TOLERANCE = 1e-8, 2e-6
+TOLERANCE = 1e-8
 """Largest gap in a cycle's balance, as a share of the work and the losses that went through, each without its sign, and
-of the energy stored; a mode that is critically damped to the last digit has its damping moved by a billionth."""
-
-ROUNDING = 4.0 * 2.0**-52
-"""Digits of a position: a static force would push a slow mode far away without contact, and the gap is a difference of
-such distances, as the machine's notes say. An impact makes that times its force of energy."""
+of the energy stored."""
 
 CYCLES = 3
 
@@ -70,16 +66,11 @@ def worst_gap(machine, cycles=CYCLES):
     model = machine.reduce()
     referee, record = Referee(model), simulate(machine, cycles)
     states = [*record.section, record.final_state.coordinates]
-    held = model.stiffness > 0.0
-    lost = ROUNDING * np.max(np.abs(model.tip_shape * model.static_force)[held] / model.stiffness[held], initial=0.0)
-    ratios = np.diag(model.damping)[held] / (2.0 * np.sqrt(model.stiffness[held]))
-    tolerance = CRITICAL_TOLERANCE if np.any(np.abs(ratios - 1.0) < 1e-7) else TOLERANCE
     worst = 0.0
-    forces = np.sum(record.impacts * record.peak_force, axis=1)
-    for (before, after), force in zip(pairwise(states), forces, strict=True):
+    for before, after in pairwise(states):
         stored, change = referee.energy(after), referee.energy(after) - referee.energy(before)
         balance = referee.cycle(before)[1]
-        allowed = tolerance * (balance.through + stored) + lost * force
+        allowed = TOLERANCE * (balance.through + stored)
         worst = max(worst, abs(change - balance.work + balance.dissipated) / max(allowed, 1e-300))
     return worst, int(record.impacts.sum())
 
@@ -92,21 +83,20 @@ def test_energy_comes_from_the_loads_alone(seed):
 
 @pytest.mark.slow
 def test_energy_comes_from_the_loads_alone_in_many_machines():
-    """The same of three hundred machines, but for a few with slow modes that lose digits.
-
-    Where they would rest lies up to 1e17 gaps away, or they are critically damped and equal. Seed 111, of 1e-9 of the
-    speed and critical, loses all digits, and seed 235 the instants of its events.
-    """
-    found = {}
-    for seed in range(MACHINES):
-        try:
-            found[seed] = worst_gap(drawn(seed))
-        except SimulationError:
-            found[seed] = np.inf, 0
-    lossy = {seed: gap for seed, (gap, _) in found.items() if not gap < 1.0}
-    print(lossy)
+    """The same of three hundred machines, whatever is slow, critical or equal in them, and half of which strike."""
+    found = {seed: worst_gap(drawn(seed)) for seed in range(MACHINES)}
     assert sum(impacts > 0 for _, impacts in found.values()) > 0.4 * MACHINES
-    assert set(lossy) <= {38, 91, 111, 146, 203, 221, 235, 266, 287}
+    assert {seed: gap for seed, (gap, _) in found.items() if not gap < 1.0} == {}
+
+
+@pytest.mark.parametrize("share", [2e-6, 1e-5, 1e-4])
+def test_a_slow_critical_mode_moves_as_a_free_body(share):
+    """A body on a spring and a critical damper so soft that it would rest a kilometre away bounces as a free one."""
+    of_slow, free = body(f"{40.0 * share}, 40 Hz"), body()
+    shapes = {"tip": [2.0, 1.5], "base": [0.5, 0.1]}
+    of_slow = replace(of_slow, modes=Structure.of_modes([40.0 * share, 40.0], [1.0, 0.0], shapes))
+    records = simulate(of_slow, 3), simulate(free, 3)
+    np.testing.assert_allclose(records[0].peak_force, records[1].peak_force, rtol=5.0 * share * 40.0)
 
 
 def body(frequencies="0, 40 Hz", **fields):
@@ -137,7 +127,8 @@ def test_a_nearly_rigid_mode_is_said_to_be_one():
     assert machine.natural_frequencies[0] == 0.0
     assert "1e-05 Hz" in machine.notes[0]
     assert body("1e-3, 40 Hz").natural_frequencies[0] == pytest.approx(1e-3)
-    assert "write 0 Hz" in body("1e-3, 40 Hz").notes[0]
+    assert body("1e-3, 40 Hz").notes == ()
+    assert "write 0 Hz" in body("0.02, 40 Hz", preload=100.0).notes[0]
     assert body("1e-3, 40 Hz", preload=0.0).notes == ()
     assert body("0, 40 Hz").notes == ()
 

@@ -46,7 +46,8 @@ class ModalImpactModel(NamedTuple):
     regimes : Regimes
         The free machine, and with its tip on the spring and damper of a stop.
     rest, drift : (R, 2, 2n)
-        Position of rest in modal coordinates, and for coordinates that have none their constant rate; STOP and LOAD.
+        Position of rest in modal coordinates, and their rate at the origin: of those that have no position of rest
+        for the STOP, of all under the LOAD.
     rest_penetration : (R,)
         How far beyond a stop the tip rests if it lies at unit distance and holds on; negative.
     tables : Tables

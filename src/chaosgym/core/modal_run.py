@@ -32,13 +32,24 @@ from chaosgym.core.modal_model import FREE, LOAD, LOWER_STOP, STOP, UPPER_STOP
 from chaosgym.core.propagator import exponential
 from chaosgym.core.tangent import ABREAST
 
-SHOWN_BEND, POSITION, STIFFNESS, DAMPING, SHORTEST, NUMBERS = range(5, 11)
-"""Numbers of FREE, UPPER_STOP and LOWER_STOP after the rows of ``now``, which are added to what coordinates show: rate
-of SHOWN_RATE; position, spring and damper of the stop; shortest interval [s]; how many numbers there are."""
+SLOW = 1e-2
+"""Angle [rad] by which a coordinate turns, or share by which it decays, in a cycle, below which it drifts: it has no
+position of rest under a static force, as that would be thousands of times as far away as it moves."""
 
-REST, DRIFT, BEND, INTO, BACK, CONSTANTS = range(6)
-"""Constants (2L,) of the same three, in modal coordinates: position of rest; rate of the coordinates that have none,
-and half of its own rate; of the change from FREE to the stop and back; how many there are."""
+POWERS = 6
+"""Powers of time in a drift: what is left out of its series is ``SLOW``^6 / 7! of it, which is rounding."""
+
+POSITION, STIFFNESS, DAMPING, SHORTEST, SHOWN_DRIFT = range(5, 10)
+SHOWN_BENDS = SHOWN_DRIFT + POWERS
+NUMBERS = SHOWN_BENDS + 4
+"""Numbers of FREE, UPPER_STOP and LOWER_STOP after the rows of ``now``, which are added to what coordinates show:
+position, spring and damper of the stop; shortest interval [s]; what the drift shows, by powers of time, and its share
+in each row of ``bounds``; how many numbers there are."""
+
+REST, INTO, BACK, DRIFT = range(4)
+CONSTANTS = DRIFT + POWERS
+"""Constants (2L,) of the same three, in modal coordinates: position of rest; of the change from FREE to the stop and
+back; of the coordinates that drift by powers of time; how many there are."""
 
 VALUES, SLOPES, SERIES, SPACE = 7, 23, 32, 64
 """Work space: what a regime shows, and its rate, now and at eight instants ahead, 9 numbers each; Taylor coefficients
@@ -75,7 +86,7 @@ class Run(NamedTuple):
     resolution : float
         Error of an event's instant, in shortest intervals.
     drifts : float
-        1 if a coordinate has no position of rest, else 0.
+        1 if a coordinate drifts, else 0.
     """
 
     tables: np.ndarray
@@ -151,10 +162,21 @@ def _places(n, harmonics, count, pressed):
 
 
 @njit(cache=True)
+def _drifts(generator, i, period):
+    """True if modal coordinate i turns and decays by less than ``SLOW`` in a cycle."""
+    n = generator.shape[1]
+    j = i % n
+    rate = abs(generator[0 if i < n else 3, j])
+    if generator[2, j] != 0.0:
+        rate = max(abs(generator[0, j]) + abs(generator[1, j]), abs(generator[2, j]) + abs(generator[3, j]))
+    return rate * period < SLOW
+
+
+@njit(cache=True)
 def _settle(model, tables, own, at):
-    """Fill constants and numbers; 1.0 if a coordinate has no position of rest, else 0.0."""
+    """Fill constants and numbers; 1.0 if a coordinate drifts, else 0.0."""
     n, lanes = at[BLOCKS], at[LANES_OF]
-    turned, drifts = np.empty(2 * n), 0.0
+    period, any_drifts = 1.0 / model.excitation_frequency, 0.0
     for g in range(3):
         r = model.pressed[g]
         stop = 0.0 if g == FREE else model.stops[g - 1]
@@ -163,28 +185,30 @@ def _settle(model, tables, own, at):
         if not math.isfinite(stop):
             continue
         output, generator = model.regimes.output[r], model.regimes.generator[r]
-        first = at[CONSTANT] + g * CONSTANTS * 2 * lanes
+        first, drifts = at[CONSTANT] + g * CONSTANTS * 2 * lanes, False
         for i in range(2 * n):
-            j, pair = i % n, (i // n) * 2
-            rest = stop * model.rest[r, STOP, i] + model.rest[r, LOAD, i]
-            drift = stop * model.drift[r, STOP, i] + model.drift[r, LOAD, i]
-            turned[i] = generator[pair, j] * (stop * model.drift[r, STOP, j] + model.drift[r, LOAD, j])
-            turned[i] += generator[pair + 1, j] * (stop * model.drift[r, STOP, n + j] + model.drift[r, LOAD, n + j])
-            lane = first + (i // n) * lanes + j
-            own[lane], own[lane + DRIFT * 2 * lanes], own[lane + BEND * 2 * lanes] = rest, drift, 0.5 * turned[i]
-            drifts = 1.0 if drift != 0.0 else drifts
-            tip[X] += output[i] * model.rest[r, LOAD, i]
-            tip[V] += output[i] * drift
-            tip[A] += output[i] * turned[i]
-        if g == FREE:
-            tip[SHOWN], tip[SHOWN_RATE], tip[SHOWN_BEND] = tip[X], tip[V], tip[A]
-            continue
-        # how far the tip rests beyond a stop is small against how far the stop is away
-        side, k, d = 1.0 if g == UPPER_STOP else -1.0, model.contact_stiffness[g - 1], model.contact_damping[g - 1]
-        penetration = side * (tip[X] + stop * model.rest_penetration[r])
-        tip[X] += stop * (1.0 + model.rest_penetration[r])
-        tip[SHOWN], tip[SHOWN_RATE] = k * penetration + d * side * tip[V], side * (k * tip[V] + d * tip[A])
-        tip[SHOWN_BEND], tip[STIFFNESS], tip[DAMPING] = k * side * tip[A], k, d
+            slow = _drifts(generator, i, period)
+            load = 0.0 if slow else model.rest[r, LOAD, i]
+            drift = stop * model.drift[r, STOP, i] + (model.drift[r, LOAD, i] if slow else 0.0)
+            lane = first + (i // n) * lanes + i % n
+            own[lane], own[lane + DRIFT * 2 * lanes] = stop * model.rest[r, STOP, i] + load, drift
+            drifts = drifts or drift != 0.0
+            tip[X] += output[i] * load
+        if drifts:
+            any_drifts = 1.0
+            _show_drift(output, generator, n, lanes, own, first + DRIFT * 2 * lanes, tip)
+        k, d, side = 0.0, 0.0, 1.0
+        if g != FREE:
+            # how far the tip rests beyond a stop is small against how far the stop is away
+            side, k, d = 1.0 if g == UPPER_STOP else -1.0, model.contact_stiffness[g - 1], model.contact_damping[g - 1]
+            penetration = side * (tip[X] + stop * model.rest_penetration[r])
+            tip[X] += stop * (1.0 + model.rest_penetration[r])
+            tip[SHOWN], tip[SHOWN_RATE] = k * penetration + d * side * tip[V], side * (k * tip[V] + d * tip[A])
+            tip[STIFFNESS], tip[DAMPING] = k, d
+        else:
+            tip[SHOWN], tip[SHOWN_RATE] = tip[X], tip[V]
+        if drifts:
+            _bound_drift(period, k, d, side, tip)
     for g in (UPPER_STOP, LOWER_STOP):
         columns = at[TABLE_ROW + g] + at[SWITCH]
         for which in range(2):
@@ -196,7 +220,44 @@ def _settle(model, tables, own, at):
                     value = tables[columns + (which * 2 * n + i) * 2 * lanes + lane]
                     total += value * own[rest + (i // n) * lanes + i % n]
                 own[at[CONSTANT] + (g * CONSTANTS + row) * 2 * lanes + lane] = total
-    return drifts
+    return any_drifts
+
+
+@njit(cache=True)
+def _show_drift(output, generator, n, lanes, own, first, tip):
+    """Fill the powers of time of coordinates whose rates are known, and of the tip, where they change its numbers."""
+    for power in range(POWERS):
+        row = first + power * 2 * lanes
+        shown = 0.0
+        for j in range(n):
+            a, b = own[row + j], own[row + lanes + j]
+            shown += output[j] * a + output[n + j] * b
+            if power + 1 < POWERS:
+                share = 1.0 / (power + 2)
+                own[row + 2 * lanes + j] = share * (generator[0, j] * a + generator[1, j] * b)
+                own[row + 3 * lanes + j] = share * (generator[2, j] * a + generator[3, j] * b)
+        tip[SHOWN_DRIFT + power] = shown
+    tip[V], tip[A] = tip[SHOWN_DRIFT], 2.0 * tip[SHOWN_DRIFT + 1]
+
+
+@njit(cache=True)
+def _bound_drift(period, k, d, side, tip):
+    """Fill what the drift shows, of a force if a spring k and a damper d press, and its share of ``bounds``."""
+    powers = tip[SHOWN_DRIFT : SHOWN_DRIFT + POWERS].copy()
+    for which in range(4):
+        tip[SHOWN_BENDS + which] = 0.0
+    for power in range(1, POWERS + 1):
+        if k > 0.0:
+            beyond = (power + 1) * powers[power] if power < POWERS else 0.0
+            tip[SHOWN_DRIFT + power - 1] = side * (k * powers[power - 1] + d * beyond)
+        for which in range(4):
+            # second and fourth derivative of what is shown, third and fifth of the displacement
+            order = 2 + 2 * (which % 2) + which // 2
+            size = abs(powers[power - 1] if which >= 2 else tip[SHOWN_DRIFT + power - 1])
+            for m in range(order):
+                size *= power - m
+            if power >= order:
+                tip[SHOWN_BENDS + which] += size * period ** (power - order)
 
 
 class Regime(NamedTuple):
@@ -339,15 +400,19 @@ def read(here, quantity, u):
 @part
 def size_of(here, which):
     """Bound of a derivative from now on, by row of ``bounds``."""
-    return dot_of_sizes(here.own, here.bounds + which * here.width, here.own, here.u, here.width)
+    moving = dot_of_sizes(here.own, here.bounds + which * here.width, here.own, here.u, here.width)
+    return moving + here.own[here.numbers + SHOWN_BENDS + which]
 
 
 @leaf
 def add_drift(own, constants, lanes, time, u):
-    """What a constant force adds to coordinates without a position of rest; ``constants`` are those of the regime."""
-    drift, bend = constants + DRIFT * 2 * lanes, constants + BEND * 2 * lanes
+    """What a constant force adds to coordinates that drift; ``constants`` are those of the regime."""
+    last = constants + (DRIFT + POWERS - 1) * 2 * lanes
     for lane in range(2 * lanes):
-        own[u + lane] += time * (own[drift + lane] + time * own[bend + lane])
+        total = own[last + lane]
+        for power in range(1, POWERS):
+            total = own[last - power * 2 * lanes + lane] + time * total
+        own[u + lane] += time * total
 
 
 @part
@@ -416,11 +481,15 @@ def look(here, level, scale, value, slope):
     free, driven = here.ahead + level * 4 * n * LANES, here.driven_ahead + level * 4 * harmonics * LANES
     sample(here.tables, free, own, driven, here.u, n, here.lanes, harmonics, scale, values + 1, slopes + 1)
     if here.drifts != 0.0:
-        rate, bend = here.shown_rate, own[here.numbers + SHOWN_BEND]
+        last = here.numbers + SHOWN_DRIFT + POWERS - 1
         for i in range(1, 9):
             time = i * math.ldexp(here.shortest, level)
-            own[values + i] += time * (rate + 0.5 * time * bend)
-            own[slopes + i] += rate + time * bend
+            moved, rate = own[last], POWERS * own[last]
+            for power in range(1, POWERS):
+                moved = own[last - power] + time * moved
+                rate = (POWERS - power) * own[last - power] + time * rate
+            own[values + i] += time * moved
+            own[slopes + i] += rate
     own[values], own[slopes] = value, slope
 
 
@@ -434,5 +503,7 @@ def expand(here, scale):
     free, driven, lanes = here.taylor, here.driven_taylor, here.lanes
     sample(here.tables, free, own, driven, here.u, n, lanes, harmonics, scale, series, series + 8)
     if here.drifts != 0.0:
-        own[series + 1] += shortest * here.shown_rate
-        own[series + 2] += 0.5 * shortest * shortest * own[here.numbers + SHOWN_BEND]
+        unit = 1.0
+        for power in range(POWERS):
+            unit *= shortest
+            own[series + power + 1] += unit * own[here.numbers + SHOWN_DRIFT + power]

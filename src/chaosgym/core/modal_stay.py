@@ -19,7 +19,6 @@ from chaosgym.core.modal_model import FREE, LOWER_STOP, UPPER_STOP
 from chaosgym.core.modal_run import (
     DAMPING,
     POSITION,
-    SHOWN_BEND,
     STIFFNESS,
     expand,
     jump,
@@ -47,12 +46,6 @@ ZOOM = 3
 
 
 @part
-def curvature_of(here):
-    """Bound of the second derivative of what the regime shows, from now on; a drift adds a constant one."""
-    return size_of(here, BOUND2) + abs(here.own[here.numbers + SHOWN_BEND])
-
-
-@part
 def choose_level(here, most, left, room):
     """Level up to ``most`` at which intervals are longest, their length, and how far the cubic through the ends of one
     may be from what the regime of g shows: at most ``room``, unless it is level 0.
@@ -75,7 +68,7 @@ def passed(here, h, low, high, doubt, most):
     i = first_doubt(own, values, slopes, h, low, high, doubt, 0)
     if i >= most:
         return most
-    curvature = curvature_of(here)
+    curvature = size_of(here, BOUND2)
     while i < most:
         value, slope = own[values + i], own[slopes + i]
         if not min(safe_time(high - value, -slope, curvature), safe_time(value - low, slope, curvature)) > h:
@@ -118,7 +111,7 @@ def fly(run, here, time, steps, sample, history):
                 continue
         # the shortest interval, or the rest of the cycle
         until = min(shortest, period - time)
-        curvature = curvature_of(here)
+        curvature = size_of(here, BOUND2)
         safe_upper, safe_lower = safe_time(high - x, -v, curvature), safe_time(x - low, v, curvature)
         ends, instant = END, until
         if min(safe_upper, safe_lower) < until:
@@ -226,7 +219,7 @@ def press(run, here, g, time, steps, sample, peak, history):
                 most = max(level - ZOOM, 0)
                 continue
         until = min(shortest, period - time)
-        curvature = curvature_of(here)
+        curvature = size_of(here, BOUND2)
         safe = safe_time(f - low, d, curvature)
         ends, instant = END, until
         if safe < until:
@@ -273,7 +266,7 @@ def hang(run, g, time, steps, sample, history):
         left = period - time
         x, v = read(here, SHOWN, u) - stop, read(here, SHOWN_RATE, u) + here.shown_rate
         a = read(here, A, u) + number(run, FREE, A)
-        curvature, pull2 = curvature_of(here), size_of(here, PULL2)
+        curvature, pull2 = size_of(here, BOUND2), size_of(here, PULL2)
         pull2 = k * curvature + damper * pull2
         e1, d1 = side * x, side * v
         e2, d2 = -side * (k * x + damper * v), -side * (k * v + damper * a)

@@ -6,6 +6,7 @@ displacements and n velocities. In the regime's own modal coordinates u, A consi
     a pair of complex eigenvalues a +- i b     [[a, -b], [b, a]]     turns and shrinks
     two real ones                              [[a, 0], [0, b]]      shrinks, or rests where one is zero
     an undamped motion of a rigid body         [[0, 1], [0, 0]]      drifts
+    a nearly critical mode, as (w q, q')       [[0, w], [-w, -d]]    has one eigenvector, or two that nearly agree
 
 The steady response to a harmonic of the force is taken off, and so is that to a constant force where there is one.
 What is left in u moves freely, so a step costs n small blocks whatever its length and has no truncation error.
@@ -46,7 +47,7 @@ class Regimes(NamedTuple):
 
 @njit(cache=True, inline="always")
 def turns(generator, j):
-    """True if block j holds a complex pair."""
+    """True if block j holds a complex pair, or a nearly critical mode: in both the square of its norm never grows."""
     return generator[2, j] != 0.0
 
 
@@ -54,10 +55,34 @@ def turns(generator, j):
 def exponential(p, q, r, s, time):
     """Entries (11, 12, 21, 22) of exp(B time) for a block B = [[p, q], [r, s]]."""
     if r != 0.0:
+        if p == 0.0 and s != 0.0:
+            return _critical(q, -s, time)
         decay, angle = math.exp(p * time), r * time
         cosine, sine = decay * math.cos(angle), decay * math.sin(angle)
         return cosine, -sine, sine, cosine
     return math.exp(p * time), q * time, 0.0, math.exp(s * time)
+
+
+@leaf
+def _critical(w, d, time):
+    """The same for B = [[0, w], [-w, -d]], whether it turns or not; both roots may be one."""
+    h = 0.5 * d
+    square = (h - w) * (h + w)
+    z = square * time * time
+    if abs(z) < 0.25:
+        decay = math.exp(-h * time)
+        even, odd = 1.0, 1.0
+        for k in range(16, 0, -2):
+            even, odd = 1.0 + z * even / (k * (k - 1)), 1.0 + z * odd / (k * (k + 1))
+        even, odd = decay * even, decay * time * odd
+    elif square < 0.0:
+        decay, rate = math.exp(-h * time), math.sqrt(-square)
+        even, odd = decay * math.cos(rate * time), decay * math.sin(rate * time) / rate
+    else:
+        rate = math.sqrt(square)
+        slow, fast = math.exp(-w * w / (h + rate) * time), math.exp(-(h + rate) * time)
+        even, odd = 0.5 * (slow + fast), 0.5 * (slow - fast) / rate
+    return even + h * odd, w * odd, -w * odd, even - h * odd
 
 
 @njit(cache=True, inline="always")

@@ -19,7 +19,7 @@ from chaosgym.core.cycle import CycleArrays, Episode
 from chaosgym.core.event_tables import Tables, shortest_intervals, tabulate
 from chaosgym.core.fixed_step import advance_fixed_step
 from chaosgym.core.modal_impact import advance_model, advance_share
-from chaosgym.core.modal_model import ModalImpactModel, with_drive_from
+from chaosgym.core.modal_model import LOAD, STOP, ModalImpactModel, with_drive_from
 from chaosgym.core.propagator import Regimes
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
@@ -44,6 +44,9 @@ RIGID_SHARE = 1e-6
 Programs of finite elements print rigid bodies so, at the rounding of their stiffness. A static force would push such a
 mode so far away that the gap drowns in the rounding of that distance.
 """
+
+UNCOUPLED = 1e-8
+"""Damping between two modes, as a share of their own, that counts as none where modes are nearly critical."""
 
 NEGLIGIBLE = 1e-13
 """Stiffness and damping, against the largest, of a direction that neither springs nor dampers resist."""
@@ -119,9 +122,10 @@ def _add_damped(
 ) -> None:
     """Add the blocks of coordinates, columns of ``basis``, that all have a spring or a damper.
 
-    A mode that is critically damped to the last digit has one eigenvector instead of two. Its damping is then moved by
-    a billionth, which separates the pair; where that leaves equal modes entangled, that of each by another amount. The
-    best set of eigenvectors that was found serves, unless it would leave no digits.
+    A mode that is critically damped to the last digit has one eigenvector instead of two. If damping couples no modes,
+    displacement and velocity of each serve as its coordinates. Else its damping is moved by a billionth, which
+    separates the pair; where that leaves equal modes entangled, that of each by another amount. The best set of
+    eigenvectors that was found serves, unless it would leave no digits.
     """
     n = len(stiffness)
     scale = math.sqrt(np.linalg.norm(stiffness, 2)) or 1.0
@@ -134,10 +138,13 @@ def _add_damped(
         system = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -(np.outer(roots, roots) * damping)]])
         values, vectors = np.linalg.eig(system)
         balanced = np.concatenate([weight @ vectors[:n], vectors[n:]])
-        condition = float(np.linalg.cond(balanced / np.linalg.norm(balanced, axis=0)))
+        lengths = np.linalg.norm(balanced, axis=0)
+        condition = float(np.linalg.cond(balanced / lengths)) if lengths.all() else math.inf
         found.append((condition, values, vectors))
         if condition < MAX_CONDITION:
             break
+        if len(found) == 1 and _add_uncoupled(stiffness, damping, basis, rigid, blocks, columns):
+            return
     condition, values, vectors = min(found, key=lambda each: each[0])
     if not condition < HOPELESS_CONDITION:
         raise ParameterError(
@@ -157,6 +164,37 @@ def _add_damped(
     for i, k in zip(decaying[::2], decaying[1::2], strict=True):
         blocks.append((min(values[i].real, 0.0), 0.0, 0.0, min(values[k].real, 0.0)))
         columns.append((vectors[:, i].real, vectors[:, k].real))
+
+
+def _add_uncoupled(
+    stiffness: Array,
+    damping: Array,
+    basis: Array,
+    rigid: bool,
+    blocks: list[tuple[float, float, float, float]],
+    columns: list[tuple[Array, Array]],
+) -> bool:
+    """Add the blocks of the modes that damping does not couple, in coordinates (w q, q'); False if it does couple them.
+
+    A mode of a ``rigid`` body without a spring creeps to rest, as two real eigenvalues.
+    """
+    if np.any(stiffness != np.diag(np.diag(stiffness))):
+        rates, shapes = np.linalg.eigh(stiffness)
+    else:
+        rates, shapes = np.diag(stiffness), np.eye(len(stiffness))
+    between = shapes.T @ damping @ shapes
+    own = np.diag(between)
+    held = rates > NEGLIGIBLE * np.max(rates)
+    if not (rigid or held.all()) or not np.all(own[held] >= 0.0) or not np.all(own[~held] > NEGLIGIBLE * np.max(own)):
+        return False
+    if np.any(np.abs(between - np.diag(own)) > UNCOUPLED * np.sqrt(np.outer(own, own))):
+        return False
+    for rate, resistance, has_spring, shape in zip(rates, own, held, (basis @ shapes).T, strict=True):
+        w = math.sqrt(rate) if has_spring else 0.0
+        blocks.append((0.0, w, -w, -resistance))
+        first, second = (shape / w, 0.0 * shape) if has_spring else (shape, -shape / resistance)
+        columns.append((np.concatenate([first, 0.0 * shape]), np.concatenate([second, shape])))
+    return True
 
 
 def _regimes(modes: Modes, *systems: tuple[Array, Array]) -> Regimes:
@@ -236,9 +274,10 @@ def flexible_model(
         parts = []
         for force in (stop.stiffness * tip, static):
             load = regimes.to_modal[r] @ np.concatenate([np.zeros(n), force])
-            parts.append(settled(regimes.generator[r], load))
+            parts.append((*settled(regimes.generator[r], load), load))
         rest.append([part[0] for part in parts])
-        drift.append([part[1] for part in parts])
+        # whether a coordinate rests under the static force or drifts is a question of the speed
+        drift.append([parts[STOP][1], parts[LOAD][2]])
         # (K + k p p') q = k c p at rest, so the tip rests at x with x - c = -c / (1 + k p' K^-1 p)
         penetration.append(-1.0 / (1.0 + stop.stiffness * compliance))
     of_regime = np.array([0.0, *(stop.stiffness for stop in stops)]), np.array([0.0, *(s.damping for s in stops)])

@@ -91,7 +91,13 @@ def _alike(models: list[ModalImpactModel]) -> bool:
         turning = model.regimes.generator[:, 2] != 0.0
         return [part.shape for part in _parts(model)], model.pressed.tolist(), turning.tolist(), model.tables.step_phase
 
-    return all(kind(model) == kind(models[0]) for model in models[1:])
+    return not any(map(_critical, models)) and all(kind(model) == kind(models[0]) for model in models[1:])
+
+
+def _critical(model: ModalImpactModel) -> bool:
+    """True if a mode is nearly critical: its eigenvectors vary with the root of a field."""
+    p, _, r, s = np.moveaxis(model.regimes.generator, 1, 0)
+    return bool(np.any((r != 0.0) & (p == 0.0) & (s != 0.0)))
 
 
 def _in_phase(model: ModalImpactModel, like: ModalImpactModel) -> ModalImpactModel:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.core.modal_model import ModalImpactModel
+from chaosgym.core.modal_run import SLOW
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Number, Option
 from chaosgym.machines.modal_impact import (
@@ -159,7 +160,9 @@ class ModalMachine(ModalImpactMachine):
         """What turns, modes that count as rigid, and digits that a static force costs."""
         hertz = self.frequency_factor * self.modes.angular_frequency / (2.0 * math.pi)
         model, far = self.structure, ""
-        held = (model.stiffness > 0.0) & (model.tip_shape * model.static_force != 0.0)
+        # slower modes drift from where they are, whatever their position of rest
+        held = np.sqrt(model.stiffness) >= SLOW * self.speed
+        held &= (model.stiffness > 0.0) & (model.tip_shape * model.static_force != 0.0)
         away = np.abs(model.tip_shape * model.static_force)[held] / model.stiffness[held]
         farthest = float(np.max(away, initial=0.0))
         if ROUNDING * farthest > FEWEST_DIGITS * max(self.clearance, 1e-6):
