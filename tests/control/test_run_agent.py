@@ -54,6 +54,10 @@ def test_kriging_plays_where_no_policy_is_shipped(tmp_path):
     told = run_json("run-agent", str(machine))
     assert told["agent"] == "Kriging"
     assert told["life"] == pytest.approx(told["follow"]["damage"] / told["damage"])
+    code, text, _ = run("run-agent", str(machine))
+    assert code == 0
+    assert f"life of the joint: x{told['life']:.2f}" in text
+    assert "so kriging played for the joint's life" in text
 
 
 @pytest.mark.parametrize(

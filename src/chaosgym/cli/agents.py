@@ -14,6 +14,14 @@ if TYPE_CHECKING:
 OBJECTIVES = ("irregular", "life", "both")
 """Of a task; the names are repeated here so that help needs no environment."""
 
+KRIGING = "kriging"
+
+NO_POLICY = (
+    "no policy is shipped for this machine, so kriging played for the joint's life; returns price life by load_rating, "
+    "100 N if [job] in the file says nothing, the ratio of lives does not depend on it"
+)
+"""What is said where no agent is given."""
+
 
 @click.command()
 @click.argument("env")
@@ -95,19 +103,19 @@ def run_agent(env: str, policy: Path | None, machine: int, plot: str | None, as_
     agent: Policy
     keywords: dict[str, Any]
     if policy is None and not shipped_folder(env).is_dir():
-        agent, keywords = Kriging(), {"objective": "life"}
+        name, agent, keywords = KRIGING, Kriging(), {"objective": "life"}
     else:
-        agent, keywords = load_policy(policy) if policy else shipped_policy(env), {}
+        name, agent, keywords = "agent", load_policy(policy) if policy else shipped_policy(env), {}
     with patience("run-agent"):
         job, follow = (play(player, env, [machine], **keywords) for player in (agent, Follow()))
     if out is not None:
         from chaosgym.plotting.played_job import save_job
 
-        save_job({"agent": job, "follow the demand": follow}, out)
+        save_job({name: job, "follow the demand": follow}, out)
     life = float(follow.damage[0] / job.damage[0]) if job.damage[0] > 0.0 else None
     result = {"agent": type(agent).__name__, **job.as_dict(), "life": life, "follow": follow.as_dict()}
     result |= {"plot": str(out)} if out else {}
-    emit(result, as_json, lambda: _job_lines(job, follow, out))
+    emit(result, as_json, lambda: _job_lines(name, job, follow, out))
 
 
 def _picture(plot: str | None, env: str) -> Path | None:
@@ -122,18 +130,20 @@ def _picture(plot: str | None, env: str) -> Path | None:
     return out
 
 
-def _job_lines(job: "Played", follow: "Played", out: Path | None) -> list[str]:
+def _job_lines(name: str, job: "Played", follow: "Played", out: Path | None) -> list[str]:
     told = job.as_dict()
     lines = [f"{'step':>5s} {'demand':>8s} {'speed [' + job.unit + ']':>12s} {'mean peak [N]':>14s}  Type III"]
     for step in range(0, len(told["speed"]), 10):
         demand, speed, peak = told["demand"][step], told["speed"][step], told["mean_peak_force_N"][step]
         lines.append(f"{step + 1:5d} {demand:8.2f} {speed:12.2f} {peak:14.1f} {told['type_iii'][step]:9.0%}")
-    for name, played in (("agent", told), ("following the demand", follow.as_dict())):
+    for who, played in ((name, told), ("following the demand", follow.as_dict())):
         lines.append(
-            f"{name}: {played['status'].replace('_', ' ')}, return {played['return']:.2f}, Type III in "
+            f"{who}: {played['status'].replace('_', ' ')}, return {played['return']:.2f}, Type III in "
             f"{played['type_iii_share']:.1%} of the cycles, {played['mean_deviation']:.2f} {job.unit} off the demand, "
             f"largest force {played['largest_force_N']:.1f} N"
         )
+    if name == KRIGING:
+        lines.append(NO_POLICY)
     if job.damage[0] > 0.0:
         lines.append(f"life of the joint: x{follow.damage[0] / job.damage[0]:.2f} of that under following the demand")
     return [*lines, *([f"picture: {out}"] if out else [])]
