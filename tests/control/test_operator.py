@@ -68,6 +68,7 @@ def test_it_runs_for_longer_than_a_job():
     ("peaks", "readings", "complaint"),
     [
         ([80.0] * 4, {}, r"peaks of shape \(4,\) are not usable; allowed: 5 or more finite forces"),
+        ("loud", {}, "peaks = 'loud' are no numbers; allowed: 5 or more forces"),
         ([80.0, np.nan] * 5, {}, "finite forces from 0 N on"),
         ([80.0] * 10, {"demand": 99.0}, "demand = 99.0 is out of range; allowed: 16 to 30"),
         ([80.0] * 10, {"bouncing": 2.0}, "bouncing = 2.0 is out of range; allowed: 0 to 1"),

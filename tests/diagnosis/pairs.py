@@ -4,6 +4,7 @@ Machines have noise on their speed and are read at both surfaces of a joint. Pro
 is a copy, a curved function, a delayed mixture or another draw of what the first one reads.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -76,9 +77,9 @@ def make(kind, seed):
             r, period, noise = ((2.7, 1, 0.04), (3.25, 2, 0.02), (3.5, 4, 0.004), (3.835, 3, 3e-4))[
                 int(rng.integers(4))
             ]
-            draw = lambda: noisy_logistic(rng, cycles, r, noise)  # noqa: E731
+            draw = partial(noisy_logistic, rng, cycles, r, noise)
         else:
-            draw = lambda: RANDOM[kind](rng, cycles)  # noqa: E731
+            draw = partial(RANDOM[kind], rng, cycles)
         first = draw()
         first = (first - first.mean()) / first.std()
         other = second(rng, first, draw) if nature == "periodic" and kind != "stable map" else first**2 - first

@@ -43,7 +43,7 @@ class Operator:
     Raises
     ------
     ModelFileError
-        If the policy can't be read, or is of another machine.
+        If the policy can't be read.
     ParameterError
         If a keyword is out of range.
 
@@ -77,6 +77,8 @@ class Operator:
         ------
         ParameterError
             If the speed or the demand lies outside the range of the drive.
+        ModelFileError
+            If the policy is of another machine.
         """
         job = np.zeros(1, self._job.dtype)
         job["speed"], job["done"] = self._within("speed", speed), BEFORE_THE_FIRST
@@ -115,7 +117,10 @@ class Operator:
         """
         if np.isnan(self.demand):
             raise ParameterError("the machine does not run; call start(speed=..., demand=...) first")
-        felt = np.asarray(peaks, float)
+        try:
+            felt = np.asarray(peaks, float)
+        except (TypeError, ValueError):
+            raise ParameterError(f"peaks = {peaks!r} are no numbers; allowed: {FEWEST} or more forces [N]") from None
         if felt.ndim != 1 or len(felt) < FEWEST or not np.isfinite(felt).all() or felt.min() < 0.0:
             raise ParameterError(
                 f"peaks of shape {felt.shape} are not usable; allowed: {FEWEST} or more finite forces from 0 N on"

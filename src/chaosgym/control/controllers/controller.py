@@ -64,6 +64,12 @@ def seen(observations: Observations, name: str) -> Array:
     return observations[:, _PLACE[name]].astype(float)
 
 
+def place_of(speeds: Array, task: Task) -> NDArray[np.int64]:
+    """Places of the nearest speeds of the task's grid, (n,)."""
+    places = np.rint((speeds - task.lowest_speed) / task.trim_step)
+    return np.asarray(places.clip(0, len(task.grid) - 1), np.int64)
+
+
 def irregular(observations: Observations, task: Task, threshold: float, softness: float) -> Array:
     """Probability (n,) that the motion is irregular, by what is felt in units of the sensor's error."""
     felt = irregularity(observations) / max(task.sensor_error, 1e-3 * task.load_rating)

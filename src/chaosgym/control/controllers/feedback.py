@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from chaosgym.control.controllers.controller import Array, Controller, Observations, irregular, seen
+from chaosgym.control.controllers.controller import Array, Controller, Observations, irregular, place_of, seen
 from chaosgym.control.maps import Maps
 
 
@@ -41,11 +41,6 @@ class BackOff(Controller):
         self._demand = np.full(self.count, np.nan)
         self._bad = np.zeros((self.count, len(task.grid)), np.bool_)
 
-    def _place(self, speeds: Array) -> Any:
-        task = self.task
-        place = np.rint((speeds - task.lowest_speed) / task.trim_step).astype(int)
-        return place.clip(0, self._bad.shape[1] - 1)
-
     def speeds(self, observations: Observations) -> Array:
         """The demand and the offset."""
         demand, speed, every = seen(observations, "demand"), seen(observations, "speed"), np.arange(self.count)
@@ -58,12 +53,12 @@ class BackOff(Controller):
         self._rung[new], self._wild[new] = 0, 0
         moves = self._wild >= self.patience
         if self.remembers:
-            self._bad[every[moves], self._place(speed)[moves]] = True
+            self._bad[every[moves], place_of(speed, self.task)[moves]] = True
         self._rung[moves] = (self._rung[moves] + 1) % len(self.ladder)
         self._wild[moves] = 0
         if self.remembers:
             for _ in self.ladder:
-                bad = self._bad[every, self._place(demand + self.ladder[self._rung])]
+                bad = self._bad[every, place_of(demand + self.ladder[self._rung], self.task)]
                 self._rung[bad] = (self._rung[bad] + 1) % len(self.ladder)
         return np.asarray(demand + self.ladder[self._rung])
 
