@@ -71,7 +71,7 @@ def page(name: str) -> str:
     env: Any = gym.make(name).unwrapped
     task, nominal = env.task, env.nominal
     unit = parameters_of(nominal)[nominal.speed_field].unit
-    widths = {parameter: f"+-{100 * width:g} %" for parameter, width in setup_of(nominal).tolerances.items()}
+    level = str(gym.spec(name).kwargs["level"])
     kind = kind_of(name)
     moves = [f"{task.trim_step * move:+g} {unit} of trim" if move else "hold" for move in MOVES]
     noise = []
@@ -106,7 +106,9 @@ def page(name: str) -> str:
         run_in=task.run_in_cycles,
         steps=task.steps,
         cycles=task.cycles_per_step,
-        tolerances="none" if kind == "" else ", ".join(f"`{field}` {width}" for field, width in widths.items()),
+        level=level,
+        levels=_table("level | tolerances | growth of the clearance in a job", _levels(nominal)),
+        tolerances=_widths(setup_of(nominal).levels[level]),
         disturbance=" ".join(noise),
         rung=nominal.rung or "none",
         model=_model(env),
@@ -120,6 +122,16 @@ def page(name: str) -> str:
 
 def _table(head: str, rows: list[str]) -> str:
     return "\n".join([f"| {head} |", "|---" * (head.count("|") + 1) + "|", *(f"| {row} |" for row in rows)])
+
+
+def _levels(nominal: Any) -> list[str]:
+    """Rows of the levels."""
+    setup = setup_of(nominal)
+    return [f"`{level}` | {_widths(widths)} | {setup.at(level)[1].wear:.0%}" for level, widths in setup.levels.items()]
+
+
+def _widths(widths: Any) -> str:
+    return ", ".join(f"`{field}` +-{100 * width:g} %" for field, width in widths.items()) or "none"
 
 
 def _model(env: Any) -> str:

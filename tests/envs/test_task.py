@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from chaosgym.envs.kernels.steps import TERMS, rewards_of, status_of
-from chaosgym.envs.task import LIFE_PRICE, Status, Task, UnknownKeywordError, demand_of, split
+from chaosgym.envs.task import LIFE_PRICE, Status, Task, UnknownKeywordError, demand_of, divided
 from chaosgym.errors import ParameterError
 from tests.plain_modes import PLAIN_BEAM
 
@@ -121,16 +121,16 @@ def test_a_demand_stays_in_a_range_that_is_smaller_than_its_changes():
 
 def test_keywords_go_to_the_task_or_to_the_machine():
     """The speed is the agent's; a keyword of neither is named with the one that was meant."""
-    task, fields = split(TASK, PLAIN_BEAM, {"steps": 5, "damping_ratio": 0.02, "fidelity": "standard"})
+    task, fields = divided(TASK, PLAIN_BEAM, {"steps": 5, "damping_ratio": 0.02, "fidelity": "standard"})
     assert (task.steps, task.load_rating, fields) == (5, 50.0, {"damping_ratio": 0.02, "fidelity": "standard"})
     with pytest.raises(ParameterError, match="is what the agent sets"):
-        split(TASK, PLAIN_BEAM, {"excitation_frequency": 20.0})
+        divided(TASK, PLAIN_BEAM, {"excitation_frequency": 20.0})
     meant = {"damping_ration": "damping_ratio", "step": "steps", "fidelty": "fidelity", "tolerance": "tolerances"}
     for wrong, right in (meant | {"model_fidelty": "model_fidelity"}).items():
         with pytest.raises(UnknownKeywordError, match=rf"'{wrong}'; did you mean {right}\?"):
-            split(TASK, PLAIN_BEAM, {wrong: 0.02})
+            divided(TASK, PLAIN_BEAM, {wrong: 0.02})
     with pytest.raises(UnknownKeywordError, match=r"known: action, steps, .* and the fields of impact-beam"):
-        split(TASK, PLAIN_BEAM, {"zzz": 0.02})
+        divided(TASK, PLAIN_BEAM, {"zzz": 0.02})
 
 
 def test_an_objective_is_a_set_of_weights():

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 
 OBJECTIVES = ("irregular", "life", "both")
+LEVELS, SPLITS = ("nominal", "clearance", "wear", "fleet"), ("train", "test", "outside")
 """Of a task; the names are repeated here so that help needs no environment."""
 
 KRIGING = "kriging"
@@ -28,10 +29,13 @@ NO_POLICY = (
 @click.option(
     "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="Parquet file; goes on from there."
 )
-@click.option("--machines", type=click.IntRange(2, 256), default=256, show_default=True, help="Of those kept for this.")
+@click.option("--machines", type=click.IntRange(2, 512), default=None, help="Of those kept for this; all by default.")
 @click.option(
     "--objective", type=click.Choice(OBJECTIVES), default=OBJECTIVES[0], show_default=True, help="What costs."
 )
+@click.option("--level", type=click.Choice(LEVELS), default=None, help="What differs from job to job.")
+@click.option("--split", type=click.Choice(SPLITS), default=None, help="Part of the level's machines.")
+@click.option("--sealed", is_flag=True, help="The 512 machines of this release; played once for each.")
 @click.option("--only", multiple=True, help="Name of a controller to run; all by default; may be repeated.")
 @click.option("--policy", "policies", multiple=True, help="NAME=FOLDER of a trained policy; one name, several seeds.")
 @click.option("--figure", type=click.Path(dir_okay=False, path_type=Path), default=None, help="Scores as a picture.")
@@ -39,8 +43,11 @@ NO_POLICY = (
 def compare(
     env: str,
     out: Path,
-    machines: int,
+    machines: int | None,
     objective: str,
+    level: str | None,
+    split: str | None,
+    sealed: bool,
     only: tuple[str, ...],
     policies: tuple[str, ...],
     figure: Path | None,
@@ -63,7 +70,9 @@ def compare(
             raise click.UsageError(f"--policy {given}: allowed: NAME=FOLDER")
         trained.setdefault(name, []).append(load_policy(folder))
     chosen = [ZERO, ONE, *(name for name in only if name not in (ZERO, ONE))] if only else None
-    keywords = {} if objective == OBJECTIVES[0] else {"objective": objective}
+    asked = {"level": level, "split": split, "sealed": sealed or None}
+    keywords: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
+    keywords |= {} if objective == OBJECTIVES[0] else {"objective": objective}
     scores = Scores(run(env, out, machines=machines, only=chosen, policies=trained, progress=True, **keywords))
     summary = scores.summary()
     if drawn is not None:

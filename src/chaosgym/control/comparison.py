@@ -38,6 +38,9 @@ ZERO, ONE = "follow the demand", "own map"
 COLUMNS = ("contender", "knows", "seed", "machine", "job_return", "type_iii", "deviation", "damage", "largest_force")
 """Columns of a comparison's table, one row a job."""
 
+SUBJECTS = ("objective", "level", "split", "sealed")
+"""Keywords that are part of what a comparison is of."""
+
 WORN_LEVELS = 5
 """Clearances at which a machine that wears is mapped."""
 
@@ -83,10 +86,16 @@ class Contenders:
         }
 
     @property
+    def _training(self) -> dict[str, Any]:
+        """Keywords of the machines that a contender may know: of a split those of training."""
+        given = {name: value for name, value in self.keywords.items() if name != "sealed"}
+        return given | ({"split": "train"} if given.get("split") else {})
+
+    @property
     def fleet(self) -> Maps:
         """Maps of simulated machines within the tolerances."""
         if self._fleet is None:
-            self._fleet = fleet_maps(self.env, progress=self._bar("maps of models"), **self.keywords)
+            self._fleet = fleet_maps(self.env, progress=self._bar("maps of models"), **self._training)
         return self._fleet
 
     def own(self, machines: Sequence[int]) -> list[Maps]:
@@ -110,10 +119,11 @@ class Contenders:
     def _exact_fleet(self) -> Maps:
         """As ``fleet``, of models as fine as the machine: what the belief is worth if the model is right."""
         seeds = [FLEET_SEED + k for k in range(FLEET)]
-        return maps_of(self.env, seeds=seeds, progress=self._bar("maps of exact models"), **self.keywords)
+        return maps_of(self.env, seeds=seeds, progress=self._bar("maps of exact models"), **self._training)
 
     def _nominal(self) -> Maps:
-        return maps_of(self.env, seeds=[0], **(model_keywords(self.env, **self.keywords) | {"tolerances": {}}))
+        known = {name: value for name, value in self._training.items() if name != "split"}
+        return maps_of(self.env, seeds=[0], **(model_keywords(self.env, **known) | {"tolerances": {}}))
 
     def _bar(self, name: str) -> str | None:
         return name if self.progress else None
@@ -131,7 +141,7 @@ def compare(
     env: str,
     out: Path,
     *,
-    machines: int = 256,
+    machines: int | None = None,
     only: Iterable[str] | None = None,
     policies: Mapping[str, Sequence[Policy]] | None = None,
     progress: bool = False,
@@ -146,7 +156,7 @@ def compare(
     out
         The file; a comparison that was interrupted goes on.
     machines
-        How many of those kept for evaluation.
+        How many of those kept for evaluation; all by default.
     only
         Names of the controllers to run; all by default.
     policies
@@ -170,14 +180,15 @@ def compare(
     known = native_envs(env, **keywords)
     kind = known.nominal
     subject = env if kind.definition == kind.name else f"{env} ({kind.definition})"
-    if keywords.get("objective", "irregular") != "irregular":
-        subject += f", objective {keywords['objective']}"
+    told = {name: keywords[name] for name in SUBJECTS if keywords.get(name) not in (None, False, "irregular")}
+    subject += "".join(f", {name} {value}" for name, value in told.items())
+    count = known.workplace.variants.count if machines is None else machines
     table = read_comparison(out, subject) if out.exists() else None
     work: list[tuple[str, int, Policy | None]] = [(name, 0, None) for name in chosen]
     work += [(name, seed, policy) for name, seeds in (policies or {}).items() for seed, policy in enumerate(seeds)]
     for name, seed, policy in work:
         often = name in CYCLE_BY_CYCLE
-        wanted = range(min(machines, CYCLE_BY_CYCLE_MACHINES) if often else machines)
+        wanted = range(min(count, CYCLE_BY_CYCLE_MACHINES) if often else count)
         missing = sorted(set(wanted) - _played(table, name, seed))
         if not missing:
             continue

@@ -16,7 +16,6 @@ from tqdm import trange
 
 from chaosgym.envs.observation import FELT, OBSERVATION_NAMES
 from chaosgym.envs.task import Status
-from chaosgym.envs.variants import HELD_OUT_SEED
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ParameterError
 from chaosgym.machines.parameters import parameters_of
@@ -162,8 +161,9 @@ def play(
     if machines is None and seeds is None:
         raise ParameterError("play needs machines or seeds")
     numbers = None if machines is None else np.asarray(machines, np.int64)
-    given = np.asarray(seeds if seeds is not None else HELD_OUT_SEED + np.asarray(machines), np.int64)
-    envs = native_envs(env, len(given), **(keywords | policy.keywords))
+    chosen = list(seeds if seeds is not None else machines or ())
+    envs = native_envs(env, len(chosen), **(keywords | policy.keywords))
+    given = np.asarray(chosen, np.int64) + (envs.workplace.variants.seed if seeds is None else 0)
     options = {} if numbers is None else {"machine": numbers}
     observations, info = envs.reset(seed=given.tolist(), options=options)
     policy.start(envs)

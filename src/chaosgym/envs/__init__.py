@@ -13,11 +13,11 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines import FILE_ENDING, MACHINES
 
 TASKS: dict[str, dict[str, Any]] = {
-    "": {"tolerances": {}},
-    "Tolerance": {},
-    "Wear": {"wear": 0.1},
+    "": {"level": "nominal"},
+    "Tolerance": {"level": "clearance"},
+    "Wear": {"level": "wear"},
 }
-"""Keywords of each task: the nominal machine, one drawn within tolerances, one whose clearance grows too."""
+"""Keywords of each task; ``chaosgym.envs.setups`` says what the levels are, "fleet" among them."""
 
 ENVIRONMENTS = tuple(f"chaosgym/{MACHINES.class_name(name)}{task}-v1" for name in MACHINES for task in TASKS)
 """Ids of chaosgym's own machines."""

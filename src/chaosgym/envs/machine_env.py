@@ -19,8 +19,8 @@ from chaosgym.envs.jobs import Indices, Jobs, Rules
 from chaosgym.envs.kernels.steps import INFO
 from chaosgym.envs.observation import Observation, observation_names, observation_space
 from chaosgym.envs.setups import setup_of
-from chaosgym.envs.task import Status, Task, split
-from chaosgym.envs.variants import Variants, checked_numbers
+from chaosgym.envs.task import Status, divided
+from chaosgym.envs.variants import Variants
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES
 from chaosgym.machines.machine import Machine
@@ -43,7 +43,7 @@ class Start(NamedTuple):
     machine: Indices | None
 
 
-def start_of(task: Task, options: Mapping[str, Any], count: int) -> Start:
+def start_of(rules: Rules, options: Mapping[str, Any], count: int) -> Start:
     """Return how ``count`` jobs start, by the options of a reset.
 
     Raises
@@ -54,11 +54,13 @@ def start_of(task: Task, options: Mapping[str, Any], count: int) -> Start:
     for name in options:
         if name not in ("machine", "speed"):
             raise ParameterError(f"options has no entry {name!r}; allowed: machine, speed")
+    task = rules.task
     speed, low, high = options.get("speed"), task.lowest_speed, task.highest_speed
     if speed is not None and (not isinstance(speed, int | float | np.number) or not low <= speed <= high):
         raise ParameterError(f"options['speed'] = {speed!r} is out of range; allowed: {low:g} to {high:g}")
     machine = options.get("machine")
-    return Start(None if speed is None else float(speed), None if machine is None else checked_numbers(machine, count))
+    numbers = None if machine is None else rules.variants.checked_numbers(machine, count)
+    return Start(None if speed is None else float(speed), numbers)
 
 
 class Workplace:
@@ -68,8 +70,14 @@ class Workplace:
     ----------
     machine
         Name of the machine on the command line, such as "impact-beam", or the file of your own, "my-machine.toml".
+    level
+        What differs from job to job: "nominal", "clearance", "wear" or "fleet".
+    split
+        Part of the level's machines: "train", "test" or "outside"; None for all within its tolerances.
+    sealed
+        Whether the machines kept for evaluation are the 512 of this release instead of the 256 of development.
     tolerances
-        Half width of each field that varies, as a share of its nominal value; {} for the nominal machine alone.
+        Half width of each field that varies, as a share of its nominal value, instead of the level's.
     fidelity, model_fidelity
         Rungs of the ladder: of the machine at work, and of ``model``, the nominal machine that controllers may use.
     keywords
@@ -87,6 +95,9 @@ class Workplace:
         self,
         machine: str,
         *,
+        level: str = "clearance",
+        split: str | None = None,
+        sealed: bool = False,
         tolerances: Mapping[str, float] | None = None,
         fidelity: str | None = None,
         model_fidelity: str | None = None,
@@ -96,8 +107,9 @@ class Workplace:
             raise ParameterError(f"machine = {machine!r} does not exist; {MACHINES.listed(machine)}")
         kind = MACHINES[machine]
         usual: Machine = kind()
-        setup, work = setup_of(usual), usual.work
-        self.task, fields = split(setup.task, usual, keywords)
+        work = usual.work
+        widths, task = setup_of(usual).at(level)
+        self.task, fields = divided(task, usual, keywords)
         base = {name: value for name, value in work.fields.items() if name not in fields}
         if fidelity is not None:
             base = {name: value for name, value in base.items() if name not in kind.fidelity_ladder.get(fidelity, {})}
@@ -105,7 +117,7 @@ class Workplace:
         nominal: Machine = with_settings(usual, base | fields)
         for speed in (self.task.lowest_speed, self.task.highest_speed):
             nominal.at(speed)
-        self.variants = Variants(nominal, setup.tolerances if tolerances is None else tolerances)
+        self.variants = Variants(nominal, widths if tolerances is None else tolerances, split, sealed=sealed)
         self.model = with_settings(nominal, work.model if model_fidelity is None else {"fidelity": model_fidelity})
         self.space = observation_space(self.task)
         self.actions = action_space(self.task)
@@ -197,7 +209,7 @@ class MachineEnv(gym.Env[Observation, Any]):
             If the machine can't be simulated at its starting speed.
         """
         super().reset(seed=seed)
-        start = start_of(self.task, options or {}, 1)
+        start = start_of(self.workplace.rules, options or {}, 1)
         self._runs = False
         observation, info = self._job.start(THE_ONE, [self.np_random], start.machine, start.speed)
         self._runs = True

@@ -1,4 +1,12 @@
-"""The machine at work: nominal machine, tolerances and numbers of the task, from what the machine says of itself."""
+"""The machine at work: nominal machine, tolerances and numbers of the task, from what the machine says of itself.
+
+A level says what differs from job to job:
+
+    nominal      nothing
+    clearance    the tolerances: of the beam and the crank the clearance alone
+    wear         the same, and the clearance grows by 10 % in the job
+    fleet        what no sensor tells as well: damping, contact, force, mass; and the clearance grows
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -9,13 +17,28 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameters_of, suggestion
 
+WEAR, WEARING = 0.1, ("wear", "fleet")
+"""Growth of the clearance over a job, as a share of it (assumed), and the levels that have it."""
+
 
 @dataclass(frozen=True)
 class Setup:
-    """A machine at work: ``task``, and ``tolerances``, half widths as shares of the nominal value."""
+    """A machine at work: ``task``, and half widths of a level as shares of the nominal value."""
 
-    tolerances: Mapping[str, float]
+    levels: Mapping[str, Mapping[str, float]]
     task: Task
+
+    def at(self, level: str) -> "tuple[Mapping[str, float], Task]":
+        """Tolerances and task of a level.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such level.
+        """
+        if level not in self.levels:
+            raise ParameterError(f"level = {level!r} is not one of {', '.join(self.levels)}")
+        return self.levels[level], replace(self.task, wear=WEAR) if level in WEARING else self.task
 
 
 def setup_of(machine: Machine) -> Setup:
@@ -33,7 +56,8 @@ def setup_of(machine: Machine) -> Setup:
             raise ParameterError(f"the job of {machine.name} has no number {name!r}{suggestion(name, known)}")
     numbers: dict[str, Any] = dict(work.task)
     task = replace(_usual_task(machine), **numbers)
-    return Setup(_shares(machine) if work.tolerances is None else work.tolerances, task)
+    usual = _shares(machine) if work.tolerances is None else work.tolerances
+    return Setup({"nominal": {}, "clearance": usual, "wear": usual, "fleet": {**usual, **work.fleet}}, task)
 
 
 def _shares(machine: Machine) -> dict[str, float]:

@@ -156,7 +156,7 @@ class UnknownKeywordError(ParameterError, TypeError):
     """A keyword that neither the task nor the machine has."""
 
 
-def split(task: Task, machine: Machine, keywords: Mapping[str, Any]) -> tuple[Task, dict[str, Any]]:
+def divided(task: Task, machine: Machine, keywords: Mapping[str, Any]) -> tuple[Task, dict[str, Any]]:
     """Return the task with the keywords that are its own, and those that are fields of the machine.
 
     The keyword ``objective`` sets weights; those that are given beside it stand.
@@ -179,7 +179,8 @@ def split(task: Task, machine: Machine, keywords: Mapping[str, Any]) -> tuple[Ta
         if name not in own and name not in theirs and name != "fidelity":
             from difflib import get_close_matches
 
-            near = get_close_matches(name, [*own, *theirs, "objective", "fidelity", "model_fidelity", "tolerances"])
+            ours = ("objective", "fidelity", "model_fidelity", "tolerances", "level", "split", "sealed")
+            near = get_close_matches(name, [*own, *theirs, *ours])
             hint = f"did you mean {near[0]}?" if near else f"known: {', '.join(own)}, and the fields of {machine.name}"
             raise UnknownKeywordError(f"unexpected keyword argument {name!r}; {hint}")
     mine = {name: value for name, value in keywords.items() if name in own}

@@ -150,7 +150,7 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         options = dict(options or {})
         which = self._masked(options.pop("reset_mask", None))
         seeds = self._seeds(seed)
-        start = start_of(self.task, options, self.num_envs)
+        start = start_of(self.workplace.rules, options, self.num_envs)
         observation, info = self._start(which, [seeds[i] for i in which.tolist()], start)
         if not self._has_begun:
             self._last = np.zeros(cast(tuple[int, ...], self.observation_space.shape), np.float32)

@@ -78,6 +78,8 @@ class Work(NamedTuple):
         Settings of the nominal machine that make it the coarser model which controllers may use; {} for the same.
     tolerances
         Half widths as shares of the nominal value; None for those of the machine.
+    fleet
+        More of them, of what no sensor tells, where a fleet is at work.
     task
         Numbers of the task that differ from what follows from the usual ranges.
     """
@@ -85,6 +87,7 @@ class Work(NamedTuple):
     fields: Mapping[str, Any] = {}
     model: Mapping[str, Any] = {}
     tolerances: Mapping[str, float] | None = None
+    fleet: Mapping[str, float] = {}
     task: Mapping[str, float] = {}
 
 

@@ -17,6 +17,14 @@ WORK = Work(
     # repeatability of the thesis' feeler gauges (3.4, printed). Damping and length move the calm speeds too, but no
     # sensor tells them
     tolerances={"clearance": 0.2},
+    # assumed: damping and contact are known to a factor of two at best, a shaker's force and a mass are measured
+    fleet={
+        "damping_ratio": 0.5,
+        "contact_damping": 0.5,
+        "contact_stiffness": 0.3,
+        "force_amplitude": 0.1,
+        "density": 0.02,
+    },
     task={
         "lowest_speed": 16.0,
         "highest_speed": 30.0,

@@ -1,0 +1,121 @@
+"""Levels say what differs between machines, splits share them out; today's ids keep their machines."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import chaosgym
+from chaosgym.control.rollout import play
+from chaosgym.envs.setups import setup_of
+from chaosgym.envs.variants import HELD_OUT_SEED, SPLITS, Variants, sealed_seed
+from chaosgym.envs.vector_env import native_envs
+from chaosgym.errors import ParameterError
+from chaosgym.machines import MACHINES
+
+BEAM, CRANK = "chaosgym/ImpactBeamTolerance-v1", "chaosgym/SliderCrankTolerance-v1"
+FLEET = setup_of(chaosgym.ImpactBeam()).levels["fleet"]
+
+
+def test_the_ids_are_levels():
+    """The three ids of a machine are its levels nominal, clearance and wear, with the machines that they had."""
+    by_id = {level: native_envs(f"chaosgym/ImpactBeam{task}-v1") for level, task in LEVELS.items()}
+    for level, envs in by_id.items():
+        same = native_envs("chaosgym/ImpactBeam-v1", level=level)
+        assert (envs.task, envs.workplace.variants.tolerances) == (same.task, same.workplace.variants.tolerances)
+    shares = np.random.default_rng([HELD_OUT_SEED, 13]).uniform(-1.0, 1.0, 1)
+    thirteen = by_id["clearance"].workplace.variants.held_out(13)
+    assert thirteen.clearance == pytest.approx(0.127e-3 * (1.0 + 0.2 * shares[0]), rel=1e-15)
+
+
+LEVELS = {"nominal": "", "clearance": "Tolerance", "wear": "Wear"}
+
+
+@pytest.mark.parametrize("env", [BEAM, CRANK])
+def test_a_fleet_varies_what_no_sensor_tells(env):
+    """Two machines of a fleet differ in every field of the level, and their clearance grows in the job."""
+    fleet = gym.make(env, level="fleet").unwrapped
+    fleet.reset(seed=1)
+    one = fleet.machine
+    fleet.reset(seed=2)
+    widths = fleet.workplace.variants.tolerances
+    assert len(widths) >= 5
+    assert all(getattr(one, field) != getattr(fleet.machine, field) for field in widths)
+    before = getattr(fleet.machine, fleet.nominal.clearance_field)
+    fleet.step(0)
+    assert getattr(fleet.machine, fleet.nominal.clearance_field) > before
+
+
+@given(seed=st.integers(0, 10**6), machine=st.integers(0, 255), level=st.sampled_from(["clearance", "fleet"]))
+def test_splits_share_no_machine(seed, machine, level):
+    """By a rule of its own: train and test are told by the cells of the draw, and outside has one field beyond."""
+    widths = setup_of(chaosgym.ImpactBeam()).levels[level]
+    for split in SPLITS:
+        variants = Variants(chaosgym.ImpactBeam(), widths, split)
+        for shares in (
+            variants.shares(np.random.default_rng(seed)),
+            variants.shares(np.random.default_rng([HELD_OUT_SEED, machine]), machine),
+        ):
+            beyond = np.abs(shares) > 1.0
+            assert beyond.sum() == (split == "outside")
+            cells = sum(int((share + 1.0) // 0.25) for share in shares)
+            if split != "outside":
+                assert (cells % 4 == 1) == (split == "test")
+
+
+def test_outside_goes_field_by_field():
+    """Machine k of outside has field k // 2 beyond its tolerance, above for even k and below for odd ones."""
+    variants = Variants(chaosgym.ImpactBeam(), FLEET, "outside")
+    nominal = chaosgym.ImpactBeam()
+    for number in range(2 * len(FLEET)):
+        machine = variants.held_out(number)
+        ratios = {field: getattr(machine, field) / getattr(nominal, field) for field in FLEET}
+        beyond = [field for field, width in FLEET.items() if not 1.0 - width <= ratios[field] <= 1.0 + width]
+        assert beyond == [list(FLEET)[number // 2]]
+        assert (ratios[beyond[0]] > 1.0) == (number % 2 == 0)
+        assert ratios[beyond[0]] > 0.0
+
+
+def test_sealed_machines_are_others():
+    """There are 512, the seed follows from the version alone, and none is a machine of development."""
+    open_ones, sealed = (Variants(chaosgym.ImpactBeam(), FLEET, "test", sealed=flag) for flag in (False, True))
+    assert (open_ones.count, sealed.count) == (256, 512)
+    assert sealed.seed == sealed_seed() != HELD_OUT_SEED
+    known = {open_ones.held_out(k) for k in range(256)}
+    assert not known & {sealed.held_out(k) for k in range(512)}
+    with pytest.raises(ParameterError, match="0 to 255"):
+        gym.make(BEAM, level="fleet").reset(options={"machine": 256})
+    gym.make(BEAM, level="fleet", sealed=True).reset(seed=0, options={"machine": 511})
+
+
+def test_who_plays_meets_the_machines_of_the_split():
+    """A rollout on outside runs machines that lie outside, with jobs of their own where they are sealed."""
+    follow = chaosgym.control.controllers.Follow()
+    played = {split: play(follow, BEAM, [0, 1], split=split, steps=3) for split in ("test", "outside")}
+    assert not np.array_equal(played["test"].felt, played["outside"].felt)
+    sealed = play(follow, BEAM, [0, 1], split="test", sealed=True, steps=3)
+    assert not set(sealed.seeds) & set(played["test"].seeds)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "message"),
+    [
+        ({"level": "hard"}, "level = 'hard' is not one of nominal, clearance, wear, fleet"),
+        ({"split": "other"}, "split = 'other' is not one of train, test, outside"),
+        ({"split": "test", "level": "nominal"}, "split = 'test' needs machines that differ"),
+        ({"spilt": "test"}, "did you mean split"),
+    ],
+)
+def test_what_is_refused_says_what_to_do(keywords, message):
+    """A level or a split that does not exist, one that has no machines, and a misspelt keyword."""
+    with pytest.raises(ParameterError, match=message):
+        native_envs(BEAM, **keywords)
+
+
+def test_every_machine_has_every_level():
+    """A machine that names nothing hidden has a fleet too: its tolerances and growing clearance."""
+    for name in MACHINES:
+        levels = setup_of(MACHINES[name]()).levels
+        assert list(levels) == ["nominal", "clearance", "wear", "fleet"]
+        assert levels["clearance"].items() <= levels["fleet"].items()
