@@ -14,7 +14,7 @@ import chaosgym.envs  # noqa: F401  (registers the environments)
 from chaosgym.version import __version__
 
 if TYPE_CHECKING:
-    from chaosgym.classifier import MachineClassifier, ResponseClassifier, default_classifier
+    from chaosgym.classifier import MachineClassifier, ResponseClassifier, classifier_for, default_classifier
     from chaosgym.control.evaluation import evaluate
     from chaosgym.control.operator import Operator
     from chaosgym.diagnosis import Diagnosis, diagnose, response_map, response_type, two_step_test
@@ -25,11 +25,12 @@ if TYPE_CHECKING:
     from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, ImpactBeam, SliderCrank
     from chaosgym.machines.modal_machine import Drive, Joint, ModalMachine, Structure, machine_with_joints, read_machine
     from chaosgym.monitor import Monitor
+    from chaosgym.signals.read import read_recording
     from chaosgym.simulation import CycleRecord, ExactEvents, RungeKutta4, simulate, simulate_many
     from chaosgym.sweeps import Axis, SweepPlan, read_sweep, run_sweep
 
 _HOME = {
-    "chaosgym.classifier": ("MachineClassifier", "ResponseClassifier", "default_classifier"),
+    "chaosgym.classifier": ("MachineClassifier", "ResponseClassifier", "classifier_for", "default_classifier"),
     "chaosgym.control.evaluation": ("evaluate",),
     "chaosgym.control.operator": ("Operator",),
     "chaosgym.diagnosis": ("Diagnosis", "diagnose", "response_map", "response_type", "two_step_test"),
@@ -47,6 +48,7 @@ _HOME = {
         "read_machine",
     ),
     "chaosgym.monitor": ("Monitor",),
+    "chaosgym.signals.read": ("read_recording",),
     "chaosgym.simulation": ("CycleRecord", "ExactEvents", "RungeKutta4", "simulate", "simulate_many"),
     "chaosgym.sweeps": ("Axis", "SweepPlan", "read_sweep", "run_sweep"),
 }
@@ -75,6 +77,7 @@ __all__ = [
     "Structure",
     "SweepPlan",
     "__version__",
+    "classifier_for",
     "default_classifier",
     "diagnose",
     "evaluate",
@@ -82,6 +85,7 @@ __all__ = [
     "judge_peaks",
     "machine_with_joints",
     "read_machine",
+    "read_recording",
     "read_sweep",
     "response_map",
     "response_type",

@@ -2,15 +2,42 @@
 
 
 class ChaosgymError(Exception):
-    """Base of all errors of this package; the message says what to do."""
+    """Base of all errors of this package; the message says what to do.
+
+    Examples
+    --------
+    >>> try:
+    ...     chaosgym.read_machine("missing.toml")
+    ... except chaosgym.ChaosgymError as error:
+    ...     print(error)
+    missing.toml can't be read: No such file or directory
+    """
 
 
 class ParameterError(ChaosgymError, ValueError):
-    """A parameter lies outside its allowed range; names the field, the value and the range."""
+    """A parameter lies outside its allowed range; names the field, the value and the range.
+
+    Examples
+    --------
+    >>> try:
+    ...     chaosgym.ImpactBeam(clearance=-1e-4)
+    ... except chaosgym.ParameterError as error:
+    ...     print(error)
+    clearance = -0.0001 m is out of range; allowed: 0 to 1 m
+    """
 
 
 class SimulationError(ChaosgymError, RuntimeError):
-    """A simulation could not be finished: diverged, too many contact events, or a step too coarse."""
+    """A simulation could not be finished: diverged, too many contact events, or a step too coarse.
+
+    Examples
+    --------
+    >>> try:
+    ...     chaosgym.simulate(chaosgym.ImpactBeam(), 5, integrator=chaosgym.ExactEvents(event_budget=2))
+    ... except chaosgym.SimulationError as error:
+    ...     print(str(error)[:40])
+    one cycle needed more contact events tha
+    """
 
 
 class DiagnosisError(ChaosgymError, ValueError):

@@ -155,6 +155,13 @@ class Monitor:
     ------
     DiagnosisError
         If the error is not a number above 0, or the period not one of 1 to 64.
+
+    Examples
+    --------
+    >>> monitor = chaosgym.Monitor(sensor_error=3.0)
+    >>> peaks = [30.0, 31.0] * 20 + [30.0, 52.0, 11.0, 44.0, 25.0, 58.0, 17.0, 39.0]
+    >>> [watch.cycle for watch in map(monitor.update, peaks) if watch.event == "alarm"]
+    [44]
     """
 
     def __init__(

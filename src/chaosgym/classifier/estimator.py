@@ -52,6 +52,15 @@ class ResponseClassifier:
         Divisor of the scores, from the rows that calibrate; 1 without any.
     plausible_ : (n_classes,)
         Probability from which on a class is plausible.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> points = rng.random((400, 2))
+    >>> labels = np.where(points[:, 0] > 0.5, "chaotic", "periodic")
+    >>> model = chaosgym.ResponseClassifier(rounds=20).fit(points, labels)
+    >>> model.predict([[0.9, 0.5], [0.1, 0.5]])
+    array(['chaotic', 'periodic'], dtype='<U8')
     """
 
     def __init__(

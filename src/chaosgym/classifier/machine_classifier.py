@@ -56,6 +56,13 @@ class MachineClassifier:
         Of "record-nature" and "record-irregular"; empty if the sweep had no signals.
     card
         Model card: data, split, metrics, limits, version, training command, hash.
+
+    Examples
+    --------
+    >>> classifier = chaosgym.default_classifier("impact-beam")
+    >>> answer = classifier.classify(chaosgym.ImpactBeam(excitation_frequency=16.0), types=False)
+    >>> answer.centre.nature, answer.centre.stage
+    ('periodic', 'certificate')
     """
 
     machine: Machine
@@ -308,6 +315,11 @@ def default_classifier(machine_name: str) -> MachineClassifier:
     ------
     ModelFileError
         If none is shipped for it.
+
+    Examples
+    --------
+    >>> chaosgym.default_classifier("slider-crank").machine.name
+    'slider-crank'
     """
     path = resources.files("chaosgym") / "weights" / f"{machine_name}.npz"
     if not path.is_file():
@@ -321,6 +333,12 @@ def classifier_for(machine: Machine) -> MachineClassifier:
 
     The general one takes proofs of periodic orbits, and reads peak forces as the beam's classifier of records does. It
     has no guess from parameters, and takes no measured records.
+
+    Examples
+    --------
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=12.0)
+    >>> chaosgym.classifier_for(beam).classify(beam).response_type
+    'I'
     """
     try:
         return default_classifier(machine.name)

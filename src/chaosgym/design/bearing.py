@@ -113,6 +113,13 @@ def variation_region(
     ------
     ParameterError
         If ``region`` is not 1 or 2, or wear is to be considered and the clearance has no tolerance.
+
+    Examples
+    --------
+    >>> from chaosgym.design import variation_region
+    >>> from chaosgym.diagnosis import Tolerance
+    >>> variation_region(chaosgym.ImpactBeam(), {"clearance": Tolerance(0.1)}, region=2)
+    {'clearance': Tolerance(value=0.2100000000000002, relative=True)}
     """
     if region not in (1, 2):
         raise ParameterError(f"region = {shown(region)} is out of range; allowed: 1 or 2 tolerances")

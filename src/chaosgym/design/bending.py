@@ -144,6 +144,12 @@ def stress_of_modes(machine: Machine, bending: Bending) -> Array:
     ------
     ParameterError
         If there is no such section on the machine.
+
+    Examples
+    --------
+    >>> from chaosgym.design.bending import Bending, Section, stress_of_modes
+    >>> stress_of_modes(chaosgym.ImpactBeam(), Bending(section=Section(at=0.1))).shape
+    (6,)
     """
     section = bending.section
     if section.at is not None:
@@ -203,6 +209,13 @@ def stressed(history: ArrayLike, cycles: int, bending: Bending, miss: float = 0.
         Material.
     miss
         Handed on.
+
+    Examples
+    --------
+    >>> from chaosgym.design.bending import Bending, Section, stressed
+    >>> line = Bending(section=Section(at=0.1), amplitude=2.5e8, cycles=1.0, slope=5.0, mean_stress="none")
+    >>> stressed([0.0, 2.5e8, 0.0, -2.5e8], cycles=1, bending=line).life
+    1.0
     """
     values = np.asarray(history, dtype=float)
     ranges, means, counts = rainflow_means(values)
@@ -299,6 +312,14 @@ def bending_life(runs: Sequence[SettledRun], bending: Bending, *, workers: int |
         If there is no such section on a machine.
     SimulationError
         If a run can't be finished.
+
+    Examples
+    --------
+    >>> from chaosgym.design import assess
+    >>> from chaosgym.design.bending import Bending, Section, bending_life
+    >>> found = assess(chaosgym.ImpactBeam(excitation_frequency=12.0), series_size=4)
+    >>> len(bending_life([found.nominal], Bending(section=Section(at=0.1))).lives)
+    1
     """
     found = parallel_map(lambda run: _of_run(run, bending), runs, workers=workers)
     return BendingLife(bending, found[0], tuple(one.life for one in found))
@@ -330,6 +351,13 @@ def read_bending(values: Mapping[str, Any], machine: Machine) -> Bending:
         If something is missing.
     ParameterError
         If a value is out of its range, or the section is none of the machine.
+
+    Examples
+    --------
+    >>> from chaosgym.design.bending import read_bending
+    >>> line = {"amplitude": 2.5e8, "cycles": 1.0, "slope": 5.0, "ultimate": 6e8}
+    >>> read_bending({"at": 0.1, **line}, chaosgym.ImpactBeam()).section.told
+    'at 100 mm'
     """
     given = dict(values)
     for name in REQUIRED:

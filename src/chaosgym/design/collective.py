@@ -59,6 +59,15 @@ def assess_duty(
     ------
     ParameterError
         If a speed is out of its range.
+
+    Examples
+    --------
+    >>> from chaosgym.design import Criteria
+    >>> from chaosgym.design.collective import assess_duty
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=10.0)
+    >>> found = assess_duty(beam, None, Criteria(load_rating=500.0), {1.0: 0.8, 1.2: 0.2}, series_size=4)
+    >>> [part.speed for part in found.collective]
+    [10.0, 12.0]
     """
     nominal = assess(machine, region, criteria, **options)
     if not duty:
@@ -133,7 +142,17 @@ def miner(lives: Sequence[float], shares: Sequence[float]) -> float:
 
 
 def damage_shares(parts: Sequence[AtSpeed]) -> list[float]:
-    """Share of the damage that is done at each speed; zeros where there is none."""
+    """Share of the damage that is done at each speed; zeros where there is none.
+
+    Examples
+    --------
+    >>> from chaosgym.design import Criteria
+    >>> from chaosgym.design.collective import assess_duty, damage_shares
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=10.0)
+    >>> found = assess_duty(beam, None, Criteria(load_rating=500.0), {1.0: 0.8, 1.2: 0.2}, series_size=4)
+    >>> round(sum(damage_shares(found.collective)), 12)
+    1.0
+    """
     done = [
         part.share / hours_of(part.assessment.evaluation.life, part.assessment.machine.cycle_period) for part in parts
     ]

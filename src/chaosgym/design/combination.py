@@ -155,7 +155,16 @@ def _told(found: Probability) -> str:
 
 
 def own_type(run: SettledRun, nominal_peak: float) -> Type:
-    """Type of one machine among those built to the tolerances, beside the nominal largest peak [N]."""
+    """Type of one machine among those built to the tolerances, beside the nominal largest peak [N].
+
+    Examples
+    --------
+    >>> from chaosgym.design.combination import own_type
+    >>> from chaosgym.design import Criteria, assess
+    >>> found = assess(chaosgym.ImpactBeam(excitation_frequency=12.0), series_size=4)
+    >>> own_type(found.nominal, nominal_peak=40.0)
+    'II'
+    """
     if run.nature == "undetermined":
         return "undetermined"
     if run.nature != "periodic":
@@ -193,6 +202,14 @@ def combination(
     ------
     SimulationError
         If a run can't be finished.
+
+    Examples
+    --------
+    >>> from chaosgym.design import assess
+    >>> from chaosgym.design.combination import combination
+    >>> found = assess(chaosgym.ImpactBeam(excitation_frequency=12.0), series_size=4)
+    >>> combination(found, base=16).types["I"].share
+    1.0
     """
     runs = found.series.runs or (found.nominal,)
     confidence = found.criteria.confidence
@@ -251,6 +268,15 @@ def influences(
     -------
     tuple of Influence
         Empty where there are none to tell, see ``Combination``.
+
+    Examples
+    --------
+    >>> from chaosgym.design.combination import influences
+    >>> from chaosgym.diagnosis import Tolerance
+    >>> region = {"clearance": Tolerance(0.05), "length": Tolerance(0.001)}
+    >>> found = influences(chaosgym.ImpactBeam(excitation_frequency=12.0), region, 10.0 / 3.0, base=16)
+    >>> [one.parameter for one in found]
+    ['clearance', 'length']
     """
     names = tuple(region)
     if not names:
@@ -289,6 +315,15 @@ def total_indices(
         Of the intervals.
     seed
         Of the sample and of the bootstrap.
+
+    Examples
+    --------
+    >>> from chaosgym.design.combination import total_indices
+    >>> def sum_of_two(points):
+    ...     return points[None, :, 0] + 2.0 * points[None, :, 1]
+    >>> [indices] = total_indices(sum_of_two, 2, base=256)
+    >>> [round(one.share, 1) for one in indices]
+    [0.2, 0.8]
     """
     from scipy import stats  # slow to import, and few questions need it
 

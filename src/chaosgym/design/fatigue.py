@@ -42,7 +42,14 @@ def _positive(name: str, value: float, unit: str) -> float:
 
 
 def rating_life(force: float, load_rating: float, exponent: float = LIFE_EXPONENT) -> float:
-    """Life [10^6 cycles] under a constant force [N], eq. 5.2; infinite without force."""
+    """Life [10^6 cycles] under a constant force [N], eq. 5.2; infinite without force.
+
+    Examples
+    --------
+    >>> from chaosgym.design.fatigue import rating_life
+    >>> rating_life(force=50.0, load_rating=500.0, exponent=3.0)
+    999.9999999999998
+    """
     _positive("load_rating", load_rating, " N")
     _positive("exponent", exponent, "")
     damage = float(damage_in_a_million(np.asarray(force), load_rating, exponent))
@@ -50,7 +57,14 @@ def rating_life(force: float, load_rating: float, exponent: float = LIFE_EXPONEN
 
 
 def required_load_rating(force: float, life: float, exponent: float = LIFE_EXPONENT) -> float:
-    """Load rating [N] for a life [10^6 cycles] under a force [N]: eq. 5.3, and eq. 5.5 with an equivalent force."""
+    """Load rating [N] for a life [10^6 cycles] under a force [N]: eq. 5.3, and eq. 5.5 with an equivalent force.
+
+    Examples
+    --------
+    >>> from chaosgym.design.fatigue import required_load_rating
+    >>> round(required_load_rating(force=50.0, life=1000.0, exponent=3.0), 6)
+    500.0
+    """
     return float(force * _positive("life", life, " million cycles") ** (1.0 / _positive("exponent", exponent, "")))
 
 
@@ -72,6 +86,12 @@ def equivalent_force(
     ------
     DesignError
         If a force is negative or the probabilities do not add up to 1.
+
+    Examples
+    --------
+    >>> from chaosgym.design.fatigue import equivalent_force
+    >>> round(equivalent_force([10.0, 10.0, 20.0], exponent=3.0), 3)
+    14.938
     """
     values = as_forces(forces)
     _positive("exponent", exponent, "")
@@ -90,12 +110,26 @@ def equivalent_force(
 def statistical_life(
     forces: ArrayLike, load_rating: float, exponent: float = LIFE_EXPONENT, probabilities: ArrayLike | None = None
 ) -> float:
-    """Life [10^6 cycles] by Palmgren-Miner over a distribution of forces, eq. 5.4."""
+    """Life [10^6 cycles] by Palmgren-Miner over a distribution of forces, eq. 5.4.
+
+    Examples
+    --------
+    >>> from chaosgym.design.fatigue import statistical_life
+    >>> round(statistical_life([10.0, 20.0], load_rating=100.0, exponent=3.0), 2)
+    222.22
+    """
     return rating_life(equivalent_force(forces, exponent, probabilities), load_rating, exponent)
 
 
 def conservative_life(forces: ArrayLike, load_rating: float, exponent: float = LIFE_EXPONENT) -> float:
-    """Life [10^6 cycles] under the largest of the forces, the first approach of 5.4.2."""
+    """Life [10^6 cycles] under the largest of the forces, the first approach of 5.4.2.
+
+    Examples
+    --------
+    >>> from chaosgym.design.fatigue import conservative_life
+    >>> conservative_life([10.0, 20.0], load_rating=100.0, exponent=3.0)
+    124.99999999999997
+    """
     return rating_life(float(np.max(as_forces(forces))), load_rating, exponent)
 
 
@@ -108,7 +142,14 @@ class RelativeLife(NamedTuple):
 
 
 def relative_life(forces: ArrayLike, reference: float, exponent: float = CUBIC_EXPONENT) -> RelativeLife:
-    """Life relative to that under a reference force [N], as figure 5.12 shows it."""
+    """Life relative to that under a reference force [N], as figure 5.12 shows it.
+
+    Examples
+    --------
+    >>> from chaosgym.design.fatigue import relative_life
+    >>> relative_life([10.0, 20.0], reference=20.0)
+    RelativeLife(lowest=1.0, highest=8.0, statistical=1.777777777777777)
+    """
     values = as_forces(forces)
     return RelativeLife(
         conservative_life(values, reference, exponent),
@@ -122,6 +163,12 @@ def rainflow_cycles(history: ArrayLike) -> tuple[Array, Array]:
 
     The history is turned round so that it begins and ends at its largest value; then every cycle closes and none is
     counted half (ASTM E1049, 5.4.5).
+
+    Examples
+    --------
+    >>> from chaosgym.design.fatigue import rainflow_cycles
+    >>> rainflow_cycles([0.0, 4.0, 1.0, 3.0, 0.0])
+    (array([2., 4.]), array([1., 1.]))
     """
     ranges, counts = np.transpose(rainflow.count_cycles(_closed(history).tolist()))
     return ranges, counts
@@ -164,6 +211,12 @@ def equivalent_force_of_history(history: ArrayLike, cycles: int, exponent: float
         Operating cycles that it covers.
     exponent
         p.
+
+    Examples
+    --------
+    >>> from chaosgym.design.fatigue import equivalent_force_of_history
+    >>> round(equivalent_force_of_history([0.0, 20.0, 0.0, 10.0], cycles=1, exponent=3.0), 3)
+    20.801
     """
     if cycles < 1:
         raise DesignError(f"cycles = {cycles} is out of range; allowed: 1 or more")

@@ -48,6 +48,13 @@ def case_of(found: Assessment, further: Sequence[Neighbour] = ()) -> Case:
     """Case of 5.5.1, over the machines of the series, the neighbourhood and those of ``further``.
 
     A machine that is undetermined is not known to be periodic, and counts as not periodic.
+
+    Examples
+    --------
+    >>> from chaosgym.design import assess
+    >>> from chaosgym.design.guidelines import case_of
+    >>> case_of(assess(chaosgym.ImpactBeam(excitation_frequency=12.0), series_size=4))
+    'I'
     """
     nature = found.nominal.nature
     if nature == "undetermined":
@@ -78,6 +85,14 @@ def guidelines(found: Assessment, further: Sequence[Neighbour] = ()) -> tuple[Gu
     tuple of Guideline
         Signs of chaos at the nominal machine (5.3); the case and what it means for the types (5.5.1), both with how
         often each was right on the shipped dataset; the evaluation and the next step (5.6).
+
+    Examples
+    --------
+    >>> from chaosgym.design import assess
+    >>> from chaosgym.design.guidelines import guidelines
+    >>> found = assess(chaosgym.ImpactBeam(excitation_frequency=12.0), series_size=4)
+    >>> [one.section for one in guidelines(found)][-2:]
+    ['5.6, phase VI', '5.6, phase VII']
     """
     said = [Guideline("5.3", sign.line) for sign in signs_of_chaos(found.response.centre)]
     case = case_of(found, further)

@@ -159,6 +159,15 @@ def evaluate_peaks(
     ------
     DesignError
         If a force is negative or not finite, all are zero, or there are too few cycles; says how many are needed.
+
+    Examples
+    --------
+    >>> from chaosgym.design import Criteria
+    >>> from chaosgym.design.measured import evaluate_peaks
+    >>> peaks = np.random.default_rng(0).normal(50.0, 2.0, 400)
+    >>> found = evaluate_peaks(peaks, Criteria(load_rating=500.0))
+    >>> round(found.evaluation.force, 1)
+    50.0
     """
     forces = as_forces(peaks)
     if not np.any(forces):

@@ -168,6 +168,9 @@ class Assessment:
     wear: WearLife | None = None
     collective: tuple[AtSpeed, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<{self.machine.name}: Type {self.response.type}, {self.verdict}>"
+
     @property
     def cycle_period(self) -> float:
         """Mean duration of a cycle in operation [s]."""
@@ -260,6 +263,13 @@ def assess(
         If a tolerance names no field, or leads out of the field's range.
     SimulationError
         If a run can't be finished.
+
+    Examples
+    --------
+    >>> from chaosgym.design import Criteria, assess
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=12.0)
+    >>> assess(beam, criteria=Criteria(load_rating=500.0), series_size=4)
+    <impact-beam: Type I, meets>
     """
     region = default_tolerances(machine) if tolerances is None else dict(tolerances)
     criteria = (criteria or Criteria()).at(machine.cycle_period)

@@ -80,6 +80,13 @@ def peak_impacts(
     ------
     SimulationError
         If the machine's contact stays in one place and the record has no time history.
+
+    Examples
+    --------
+    >>> from chaosgym.design.peak_impacts import peak_impacts
+    >>> record = chaosgym.simulate(chaosgym.SliderCrank(crank_speed=200.0), cycles=50, transient=50)
+    >>> len(peak_impacts(record).force)
+    50
     """
     sides = np.argmax(record.peak_force, axis=1) if side is None else np.full(len(record), side)
     peaks = record.peak_force[np.arange(len(record)), sides]
@@ -100,7 +107,14 @@ def peak_impacts(
 
 
 def worn_side(record: CycleRecord, exponent: float = LIFE_EXPONENT) -> int | None:
-    """Side for ``peak_impacts``: the surface that fatigues faster, or None if the bearing is one surface all around."""
+    """Side for ``peak_impacts``: the surface that fatigues faster, or None if the bearing is one surface all around.
+
+    Examples
+    --------
+    >>> from chaosgym.design.peak_impacts import worn_side
+    >>> worn_side(chaosgym.simulate(chaosgym.ImpactBeam(), cycles=50, transient=200))
+    1
+    """
     if getattr(record.machine, "round_bearing", False):
         return None
     return int(np.argmax(np.sum(record.peak_force**exponent, axis=0)))
@@ -126,7 +140,15 @@ def _unrolled(angle: Array) -> Array:
 
 
 def coverage(diagram: PeakImpactDiagram, sections: int = SECTIONS) -> Array:
-    """Share of impacts that fall into sections already visited, estimated after each impact, (impacts,)."""
+    """Share of impacts that fall into sections already visited, estimated after each impact, (impacts,).
+
+    Examples
+    --------
+    >>> from chaosgym.design.peak_impacts import coverage, peak_impacts
+    >>> record = chaosgym.simulate(chaosgym.SliderCrank(crank_speed=200.0), cycles=50, transient=50)
+    >>> float(coverage(peak_impacts(record))[-1])
+    1.0
+    """
     if len(diagram.force) == 0:
         raise DesignError("the Peak Impact Diagram is empty: no cycle has contact")
     cell = _section(diagram.location, sections) * sections + _section(diagram.force, sections)
@@ -141,7 +163,15 @@ def coverage(diagram: PeakImpactDiagram, sections: int = SECTIONS) -> Array:
 
 
 def filling_cycles(diagram: PeakImpactDiagram, sections: int = SECTIONS, share: float = COVERAGE) -> int | None:
-    """Impacts after which the diagram has taken shape for good; None if it has not."""
+    """Impacts after which the diagram has taken shape for good; None if it has not.
+
+    Examples
+    --------
+    >>> from chaosgym.design.peak_impacts import filling_cycles, peak_impacts
+    >>> record = chaosgym.simulate(chaosgym.SliderCrank(crank_speed=200.0), cycles=200, transient=50)
+    >>> filling_cycles(peak_impacts(record))
+    40
+    """
     low = np.flatnonzero(coverage(diagram, sections) < share)
     first = int(low[-1]) + 2 if len(low) else 1
     return first if first <= len(diagram.force) else None

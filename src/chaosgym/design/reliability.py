@@ -68,6 +68,12 @@ def hertz_pressure(forces: ArrayLike, radius: float, modulus: float) -> Array:
         Of the ball [m].
     modulus
         Contact modulus E* [Pa].
+
+    Examples
+    --------
+    >>> from chaosgym.design.reliability import hertz_pressure
+    >>> hertz_pressure([10.0, 80.0], radius=8e-3, modulus=1.15e11).round(-6)
+    array([7.370e+08, 1.473e+09])
     """
     if not (radius > 0.0 and modulus > 0.0):
         raise DesignError(f"radius = {radius:g} m and modulus = {modulus:g} Pa are out of range; allowed: above 0")
@@ -75,19 +81,40 @@ def hertz_pressure(forces: ArrayLike, radius: float, modulus: float) -> Array:
 
 
 def safety_factor(stress: float, strength: float, fatigue_factor: float = 1.0) -> float:
-    """Safety factor SF of eq. 5.6; infinite without stress."""
+    """Safety factor SF of eq. 5.6; infinite without stress.
+
+    Examples
+    --------
+    >>> from chaosgym.design.reliability import safety_factor
+    >>> safety_factor(stress=8e8, strength=1.6e9)
+    2.0
+    """
     return math.inf if stress == 0.0 else strength / (fatigue_factor * stress)
 
 
 def reliability(stresses: ArrayLike, strength: Strength) -> float:
-    """Reliability over recorded stresses [Pa], eq. 5.8."""
+    """Reliability over recorded stresses [Pa], eq. 5.8.
+
+    Examples
+    --------
+    >>> from chaosgym.design.reliability import Strength, reliability
+    >>> round(reliability([1.3e9, 1.5e9], Strength(1.6e9, 0.1e9)), 4)
+    0.92
+    """
     return float(np.mean(strength.exceeds(stresses)))
 
 
 def normal_reliability(
     stress_mean: float, stress_deviation: float, strength_mean: float, strength_deviation: float
 ) -> float:
-    """Reliability of normal stress and normal strength, eq. 5.9."""
+    """Reliability of normal stress and normal strength, eq. 5.9.
+
+    Examples
+    --------
+    >>> from chaosgym.design.reliability import normal_reliability
+    >>> round(normal_reliability(1.3e9, 0.1e9, 1.6e9, 0.1e9), 4)
+    0.9831
+    """
     spread = math.hypot(stress_deviation, strength_deviation)
     if spread == 0.0:
         return float(strength_mean > stress_mean)
@@ -102,7 +129,14 @@ class Interval(NamedTuple):
 
 
 def time_blocks(values: ArrayLike, blocks: int = BLOCKS) -> list[Array]:
-    """Cut a record into blocks of successive cycles, at least one cycle each."""
+    """Cut a record into blocks of successive cycles, at least one cycle each.
+
+    Examples
+    --------
+    >>> from chaosgym.design.reliability import time_blocks
+    >>> time_blocks([1.0, 2.0, 3.0, 4.0], blocks=2)
+    [array([1., 2.]), array([3., 4.])]
+    """
     record = np.asarray(values)
     return np.array_split(record, min(blocks, len(record)))
 
@@ -118,6 +152,12 @@ def mean_interval(blocks: Sequence[ArrayLike], confidence: float = 0.95, seed: i
         Probability that the interval holds the mean.
     seed
         Of the bootstrap; same seed, same interval.
+
+    Examples
+    --------
+    >>> from chaosgym.design.reliability import mean_interval
+    >>> mean_interval([[1.0, 3.0]] * 10)
+    Interval(low=2.0, high=2.0)
     """
     if not 0.0 < confidence < 1.0:
         raise DesignError(f"confidence = {confidence:g} is out of range; allowed: above 0, below 1")

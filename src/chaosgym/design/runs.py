@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,8 +63,8 @@ class SettledRun:
     nature: Nature
     period: int | None
     reason: str
-    peaks: Array
-    final_state: MotionState
+    peaks: Array = field(repr=False)
+    final_state: MotionState = field(repr=False)
 
     def worse_side(self, exponent: float = LIFE_EXPONENT) -> Array:
         """Peaks (cycles,) of the surface that fatigues faster."""

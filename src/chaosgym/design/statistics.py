@@ -50,6 +50,12 @@ def as_forces(forces: ArrayLike, minimum: int = 1) -> Array:
     ------
     DesignError
         If there are fewer than ``minimum``, or values that are negative or not finite.
+
+    Examples
+    --------
+    >>> from chaosgym.design.statistics import as_forces
+    >>> as_forces([10, 20])
+    array([10., 20.])
     """
     values = np.asarray(forces, dtype=float)
     if values.ndim != 1:
@@ -65,7 +71,14 @@ def as_forces(forces: ArrayLike, minimum: int = 1) -> Array:
 
 
 def summary(values: ArrayLike) -> dict[str, float]:
-    """Smallest, largest, mean and standard deviation of readings, for people and JSON."""
+    """Smallest, largest, mean and standard deviation of readings, for people and JSON.
+
+    Examples
+    --------
+    >>> from chaosgym.design.statistics import summary
+    >>> summary([1.0, 2.0, 3.0])
+    {'min': 1.0, 'max': 3.0, 'mean': 2.0, 'std': 0.816496580927726}
+    """
     readings = np.asarray(values, dtype=float)
     return {name: float(getattr(readings, name)()) for name in ("min", "max", "mean", "std")}
 
@@ -80,7 +93,14 @@ class RunningStatistics:
 
 
 def running_statistics(forces: ArrayLike) -> RunningStatistics:
-    """Mean and standard deviation after each cycle (thesis figure 5.14)."""
+    """Mean and standard deviation after each cycle (thesis figure 5.14).
+
+    Examples
+    --------
+    >>> from chaosgym.design.statistics import running_statistics
+    >>> running_statistics([1.0, 3.0, 5.0]).mean
+    array([1., 2., 3.])
+    """
     values = as_forces(forces, 1)
     count = np.arange(1, len(values) + 1)
     shift = float(np.mean(values))
@@ -117,7 +137,14 @@ class Convergence:
 
 
 def convergence(forces: ArrayLike) -> Convergence:
-    """Tell after how many cycles the statistics of a record have converged."""
+    """Tell after how many cycles the statistics of a record have converged.
+
+    Examples
+    --------
+    >>> from chaosgym.design.statistics import convergence
+    >>> convergence([10.0, 12.0] * 100)
+    Convergence(cycles=4, recorded=200, needed=80)
+    """
     values = as_forces(forces, 1)
     running = running_statistics(values)
     mean, deviation = running.mean[-1], running.deviation[-1]
@@ -133,6 +160,12 @@ def cycles_needed(forces: ArrayLike, mean_band: float = MEAN_BAND, deviation_ban
 
     n >= tau (1.96 s / (b m))^2 for the mean and n >= tau (1.96 / b)^2 (k - 1) / 4 for the deviation, where tau is the
     integrated autocorrelation time and k the kurtosis.
+
+    Examples
+    --------
+    >>> from chaosgym.design.statistics import cycles_needed
+    >>> cycles_needed(np.random.default_rng(0).normal(50.0, 5.0, 400))
+    99
     """
     values = as_forces(forces, 1)
     mean, deviation = float(np.mean(values)), float(np.std(values))
@@ -151,6 +184,12 @@ def correlation_time(values: ArrayLike) -> float:
     References
     ----------
     C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992), 473-483.
+
+    Examples
+    --------
+    >>> from chaosgym.design.statistics import correlation_time
+    >>> round(correlation_time(np.random.default_rng(0).normal(size=4000)), 1)
+    1.0
     """
     series = np.asarray(values, dtype=float)
     centred = series - np.mean(series)
@@ -173,6 +212,12 @@ def require_enough(forces: ArrayLike) -> Array:
     ------
     DesignError
         If they don't; says how many cycles are needed.
+
+    Examples
+    --------
+    >>> from chaosgym.design.statistics import require_enough
+    >>> require_enough([10.0, 12.0] * 100).shape
+    (200,)
     """
     values = as_forces(forces)
     needed = cycles_needed(values, COARSE_MEAN_BAND, COARSE_DEVIATION_BAND)
@@ -218,6 +263,12 @@ def histogram(forces: ArrayLike, bins: int | None = None) -> Histogram:
     A mode is a maximum of a Gaussian kernel density that stands out of its surroundings by three standard errors,
     sqrt(f / (2 sqrt(pi) n h)). The bandwidth h is half of Silverman's, which is made for one normal mode and would
     smooth several into one. Values that repeat exactly, as those of a periodic response, are modes each.
+
+    Examples
+    --------
+    >>> from chaosgym.design.statistics import histogram
+    >>> histogram([10.0] * 90 + [20.0] * 10, bins=2).count
+    array([90, 10])
     """
     values = as_forces(forces)
     low, high = float(np.min(values)), float(np.max(values))

@@ -100,6 +100,12 @@ def life_against(
         If the field does not exist or a value is out of its range.
     DesignError
         If there is contact at none of the values.
+
+    Examples
+    --------
+    >>> from chaosgym.design.trends import life_against
+    >>> life_against(chaosgym.ImpactBeam(), "excitation_frequency", [10.0, 20.0]).nature
+    ('periodic', 'chaotic')
     """
     chosen = np.atleast_1d(np.asarray(values, dtype=float))
     machines = [with_settings(machine, {field: float(value)}) for value in chosen]

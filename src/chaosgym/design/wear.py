@@ -178,6 +178,14 @@ def wear_life(machine: Machine, wear: Wear, *, workers: int | None = None, progr
         If the limit is out of the clearance's range.
     SimulationError
         If a run can't be finished.
+
+    Examples
+    --------
+    >>> from chaosgym.design.wear import Wear, wear_life
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=12.0)
+    >>> found = wear_life(beam, Wear(limit=2e-4, sliding=1e-4, area=1e-5))
+    >>> found.course[0].clearance, found.course[-1].clearance
+    (0.000127, 0.0002)
     """
     nominal = float(getattr(machine, machine.clearance_field))
     if parameters_of(machine)[machine.clearance_field].unit != "m":
@@ -210,6 +218,14 @@ def wear_over(found: Sequence[WearLife], shares: Sequence[float]) -> WearLife:
         Course at each speed, over the same clearances.
     shares
         Of the operating time, which add up to 1.
+
+    Examples
+    --------
+    >>> from chaosgym.design.wear import Wear, wear_life, wear_over
+    >>> wear = Wear(limit=2e-4, sliding=1e-4, area=1e-5)
+    >>> slow, fast = (wear_life(chaosgym.ImpactBeam(excitation_frequency=speed), wear) for speed in (8.0, 12.0))
+    >>> fast.hours < wear_over([slow, fast], [0.5, 0.5]).hours < slow.hours
+    True
     """
     with np.errstate(invalid="ignore"):
         steps = np.array([np.diff([one.hours for one in life.course]) for life in found])
@@ -245,6 +261,12 @@ def read_wear(values: Mapping[str, float]) -> Wear:
         If one of them is missing.
     ParameterError
         If one is out of its range.
+
+    Examples
+    --------
+    >>> from chaosgym.design.wear import read_wear
+    >>> read_wear({"limit": 2e-4, "sliding": 1e-4, "area": 1e-5}).limit
+    0.0002
     """
     for name in ("limit", "sliding", "area"):
         if name not in values:

@@ -121,6 +121,16 @@ def follow_bifurcation(
     ------
     ParameterError
         If a field does not vary continuously, or the machine's own value lies outside of the span.
+
+    Examples
+    --------
+    >>> from chaosgym.diagnosis.bifurcation_curve import follow_bifurcation
+    >>> beam = chaosgym.ImpactBeam()
+    >>> diagram = chaosgym.follow(beam, "speed", (20.0, 20.3))
+    >>> first = next(one for one in diagram.bifurcations if one.loses_stability)
+    >>> curve = follow_bifurcation(beam, first, "speed", "clearance", (1.2e-4, 1.3e-4), steps=3)
+    >>> curve.kind
+    'fold'
     """
     first, second = continuous_field(machine, along), continuous_field(machine, against)
     own = float(getattr(machine, second))

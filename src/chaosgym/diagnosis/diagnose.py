@@ -113,6 +113,14 @@ def diagnose(
         If the budget is below the first stage.
     SimulationError
         If the motion can't be followed.
+
+    Examples
+    --------
+    >>> verdict = chaosgym.diagnose(chaosgym.ImpactBeam(excitation_frequency=12.0))
+    >>> verdict.words, verdict.status
+    ('periodic, period 1', 'certified')
+    >>> chaosgym.diagnose(chaosgym.ImpactBeam(excitation_frequency=30.0)).words
+    'chaotic'
     """
     verdict = diagnose_alone(
         machine, initial_state=initial_state, budget=budget, sensor_error=sensor_error, integrator=integrator

@@ -16,7 +16,7 @@ G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9-30.
 M. T. Rosenstein, J. J. Collins, C. J. De Luca, Physica D 65 (1993) 117-134.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -77,7 +77,7 @@ class LyapunovExponent:
     per_cycle: float
     standard_error: float
     cycle_period: float
-    history: tuple[float, ...]
+    history: tuple[float, ...] = field(repr=False)
     cycles: int
     round_off: float = ROUND_OFF
 
@@ -216,6 +216,12 @@ def largest_lyapunov_exponent(
         Rest by default.
     integrator
         With ``RungeKutta4`` the beam too takes two trajectories.
+
+    Examples
+    --------
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=12.0)
+    >>> round(chaosgym.diagnosis.largest_lyapunov_exponent(beam, cycles=200).per_cycle, 3)
+    -3.437
     """
     deviation = Deviation(machine, initial_state, integrator)
     if transient:
@@ -233,6 +239,13 @@ def lyapunov_spectrum(
     """All exponents of a machine of modes per cycle, descending, (n_states,), and the sum that its damping demands.
 
     Where impacts take no time, rest on a surface forgets, which no sum shows.
+
+    Examples
+    --------
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=12.0)
+    >>> exponents, demanded = chaosgym.diagnosis.lyapunov_spectrum(beam)
+    >>> bool(np.isclose(exponents.sum(), demanded))
+    True
     """
     states = len(rest_state(machine).coordinates)
     first, vectors, _ = simulate_with_deviations(machine, max(1, transient), initial_state, deviations=np.eye(states))
@@ -267,6 +280,14 @@ def exponent_from_series(
     Good to about a fifth for strong chaos. It can't see a negative exponent: for a periodic series there is no
     divergence to follow. It underestimates where a step of one cycle already fills the attractor (exponents near or
     above 1), and takes sensor noise for divergence.
+
+    Examples
+    --------
+    >>> x = [0.3]
+    >>> for _ in range(1999):
+    ...     x.append(4.0 * x[-1] * (1.0 - x[-1]))  # the logistic map, whose exponent is ln 2 = 0.693
+    >>> round(chaosgym.diagnosis.exponent_from_series(x).per_cycle, 2)
+    0.69
     """
     x = as_samples(series, minimum=500)[:, 0]
     spread = float(np.std(x))

@@ -181,6 +181,16 @@ def margins(
     ------
     DiagnosisError
         If the orbit is not certified, or ``reach`` is not above 0.
+
+    Examples
+    --------
+    >>> from chaosgym.diagnosis import Tolerance, find_periodic_orbit
+    >>> from chaosgym.diagnosis.margins import margins
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=12.0)
+    >>> orbit = find_periodic_orbit(beam, chaosgym.simulate(beam, 1, transient=50).final_state, period=1)
+    >>> found = margins(beam, orbit, {"clearance": Tolerance(0.05)})
+    >>> found.nearest is None  # stable throughout the tolerance
+    True
     """
     if not orbit.certified:
         raise DiagnosisError("margins need a periodic orbit that is certified; allowed: one that closes and attracts")

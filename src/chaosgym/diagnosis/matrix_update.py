@@ -79,6 +79,12 @@ def matrix_update_test(
         If the machine's matrices are constant, or ``form`` is unknown.
     SimulationError
         If a run can't be finished.
+
+    Examples
+    --------
+    >>> crank = chaosgym.SliderCrank(crank_speed=200.0)
+    >>> chaosgym.diagnosis.matrix_update_test(crank).nature
+    'chaotic'
     """
     if not depends_on_configuration(machine):
         raise DiagnosisError(

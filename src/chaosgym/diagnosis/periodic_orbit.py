@@ -7,7 +7,7 @@ unit circle. Newton's method, like M itself, fails near grazing, where P is not 
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -53,10 +53,10 @@ class PeriodicOrbit:
     """
 
     period: int
-    state: Array
+    state: Array = field(repr=False)
     residual: float
-    multipliers: NDArray[np.complex128]
-    derivative: Array
+    multipliers: NDArray[np.complex128] = field(repr=False)
+    derivative: Array = field(repr=False)
     distance: float
 
     @property
@@ -100,6 +100,14 @@ def find_periodic_orbit(
     -------
     PeriodicOrbit or None
         The best fixed point found, which need not be certified; None if the motion could not be followed.
+
+    Examples
+    --------
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=12.0)
+    >>> near = chaosgym.simulate(beam, cycles=1, transient=50).final_state
+    >>> orbit = chaosgym.diagnosis.find_periodic_orbit(beam, near, period=1)
+    >>> orbit.certified, round(orbit.largest_multiplier, 4)
+    (True, 0.0321)
     """
     origin = np.array(start.coordinates if isinstance(start, MotionState) else start, dtype=float)
     state = origin.copy()

@@ -60,13 +60,21 @@ class Diagnosis:
         The motion on the proven orbit, whole periods of it; None where none was proven.
     condition
         What the nature rests on that was guessed, such as "if the cycle is 49.4 ms"; empty if nothing was.
+
+    Examples
+    --------
+    >>> verdict = chaosgym.diagnose(chaosgym.ImpactBeam(excitation_frequency=20.6))
+    >>> verdict.words, verdict.status
+    ('periodic, period 2', 'certified')
+    >>> sorted(verdict.votes)
+    ['lyapunov', 'newton', 'two_step']
     """
 
     nature: Nature
     period: int | None = None
     margin: float
     reason: str
-    evidence: Mapping[str, Any] = field(default_factory=lambda: _EMPTY)
+    evidence: Mapping[str, Any] = field(default_factory=lambda: _EMPTY, repr=False)
     transient: bool = False
     status: Status | None = None
     horizon: int | None = None

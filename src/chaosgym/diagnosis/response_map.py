@@ -64,6 +64,12 @@ def geometric_grid(low: float, high: float, tolerance: Tolerance, points_per_tol
     """Grid from ``low`` to at most ``high`` on which neighbourhoods share their points.
 
     Successive values are half a tolerance apart; fewer ``points_per_tolerance`` than 2 do not share all.
+
+    Examples
+    --------
+    >>> from chaosgym.diagnosis import Tolerance
+    >>> chaosgym.diagnosis.geometric_grid(10.0, 10.3, Tolerance(0.02)).round(3)
+    array([10. , 10.1, 10.2])
     """
     share = 1.0 / points_per_tolerance
     values = [low]
@@ -98,6 +104,14 @@ def response_map(
         As for ``response_type``. One initial state by default: more can't be shared.
     progress
         Show a progress bar on standard error.
+
+    Examples
+    --------
+    >>> beam = chaosgym.ImpactBeam()
+    >>> found = chaosgym.response_map(beam, speeds=[10.0, 19.0], clearances=[1e-4])
+    >>> found.type
+    array([['I'],
+           ['II']], dtype='<U12')
     """
     allowed = chosen_tolerances(machine, tolerances, "speed-clearance")
     check_initial_states(initial_states)

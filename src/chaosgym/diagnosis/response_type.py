@@ -8,7 +8,7 @@ What follows from that is the rule of ``type_rule``. Window, statistic and initi
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, Literal, NamedTuple
 
@@ -92,9 +92,9 @@ class ResponseType:
     reason: str
     centre: Diagnosis
     largest_peak: float
-    neighbours: tuple[Neighbour, ...]
+    neighbours: tuple[Neighbour, ...] = field(repr=False)
     coexisting_peaks: tuple[float, ...]
-    definition: Mapping[str, Any]
+    definition: Mapping[str, Any] = field(repr=False)
 
     def over(self, built: Sequence[Neighbour]) -> "ResponseType":
         """Return the type over more machines of the region."""
@@ -160,6 +160,12 @@ def response_type(
         If ``window``, ``start`` or ``initial_states`` is not allowed.
     SimulationError
         If a run can't be finished.
+
+    Examples
+    --------
+    >>> found = chaosgym.response_type(chaosgym.ImpactBeam(excitation_frequency=12.0))
+    >>> found.type, found.reason
+    ('I', 'periodic throughout the tolerances, peak force less than 10 % higher')
     """
     allowed = chosen_tolerances(machine, tolerances, window)
     check_initial_states(initial_states)

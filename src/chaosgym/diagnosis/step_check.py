@@ -153,6 +153,12 @@ def step_check(
         As in ``diagnose``.
     integrator
         ``machine.default_integrator`` by default.
+
+    Examples
+    --------
+    >>> check = chaosgym.step_check(chaosgym.ImpactBeam(excitation_frequency=12.0))
+    >>> check.nature_stays, check.settled
+    (True, True)
     """
     chosen = integrator or machine.default_integrator
     given = given or diagnose(machine, budget=budget, sensor_error=sensor_error, integrator=chosen)

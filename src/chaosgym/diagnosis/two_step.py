@@ -102,6 +102,17 @@ def two_step_test(
     -----
     Fails, and says so by "undetermined", on weak chaos in short records (below about 200 cycles in bands), on tori
     that nearly repeat in fewer than 1000 cycles, and where noise is larger than stated.
+
+    Examples
+    --------
+    >>> n = np.arange(200)
+    >>> chaosgym.two_step_test(10.0 + (n % 3)).words
+    'periodic, period 3'
+    >>> x = [0.3]
+    >>> for _ in range(999):
+    ...     x.append(4.0 * x[-1] * (1.0 - x[-1]))
+    >>> chaosgym.two_step_test(x).nature
+    'chaotic'
     """
     if not 0.0 <= sensor_error < np.inf:
         raise DiagnosisError(f"sensor_error = {sensor_error!r} is out of range; allowed: finite, 0 or more")

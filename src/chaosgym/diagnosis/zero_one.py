@@ -40,6 +40,14 @@ def zero_one_statistic(series: ArrayLike, *, remove_bands: bool = True) -> float
     -------
     float
         Median of the correlation over 100 values of c between pi/5 and 4 pi/5; 0 for a series that repeats.
+
+    Examples
+    --------
+    >>> x = [0.3]
+    >>> for _ in range(1999):
+    ...     x.append(4.0 * x[-1] * (1.0 - x[-1]))
+    >>> round(chaosgym.diagnosis.zero_one_statistic(x), 1)
+    1.0
     """
     x = as_samples(series)[-MAX_SAMPLES:, 0]
     rounding = 1e-9 * float(np.max(np.abs(x)))

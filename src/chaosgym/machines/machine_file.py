@@ -74,6 +74,12 @@ def read_machine(path: str | Path) -> Machine:
     ------
     ParameterError
         As ``machine_class``.
+
+    Examples
+    --------
+    >>> machine = chaosgym.read_machine("docs/machines/shaw-holmes-1983.toml")
+    >>> machine.joint, machine.stops
+    ('mass', 'one')
     """
     kind: Any = machine_class(path)
     machine: Machine = kind()

@@ -116,6 +116,13 @@ def choose_force(
     ------
     DiagnosisError
         If there is no such column, several could be meant, it can't be a force, or an entry is no finite number.
+
+    Examples
+    --------
+    >>> from chaosgym.signals.columns import choose_force
+    >>> force = choose_force(chaosgym.read_recording("docs/data/peaks.csv"), "upper")
+    >>> force.name, force.unit, len(force.values)
+    ('upper', 'N', 1000)
     """
     if column is None:
         names = force_names(recording)

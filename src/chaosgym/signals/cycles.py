@@ -270,6 +270,20 @@ def peaks_of_series(
         Operating cycle [s].
     tachometer
         Column of a tachometer that rises once a cycle.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from chaosgym.signals.cycles import peaks_of_series
+    >>> t = np.arange(2000) / 1000.0
+    >>> rows = "\\n".join(f"{s:.3f},{10.0 + np.sin(20.0 * np.pi * s):.6f}" for s in t)
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "series.csv"
+    ...     _ = file.write_text("time s,force N\\n" + rows)
+    ...     force, cycles = peaks_of_series(chaosgym.read_recording(file), period=0.1)
+    >>> len(cycles.peaks), float(cycles.peaks[5])
+    (19, 11.0)
     """
     if column is None and tachometer is not None:
         rest = {name: values for name, values in recording.columns.items() if name != tachometer}

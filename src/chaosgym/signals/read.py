@@ -65,6 +65,9 @@ class Recording:
     rate_hz: float | None = None
     named: bool = True
 
+    def __repr__(self) -> str:
+        return f"<{self.source}: {self.form}; {', '.join(self.columns)}>"
+
     def where(self, index: int) -> str:
         """Place of a reading, for people."""
         return f"line {self.lines[index]}" if index < len(self.lines) else f"reading {index + 1}"
@@ -77,6 +80,11 @@ def read_recording(source: str | Path) -> Recording:
     ------
     DiagnosisError
         If it can't be read, or holds no numbers.
+
+    Examples
+    --------
+    >>> chaosgym.read_recording("docs/data/peaks.csv")
+    <docs/data/peaks.csv: CSV, commas; cycle, upper, lower>
     """
     name = "standard input" if str(source) == "-" else str(source)
     try:

@@ -73,6 +73,16 @@ class CycleRecord:
     operation : (n_cycles,) with a column for each field, or None
         Values of the machine's fields that changed from cycle to cycle, such as ``operation["speed"]``; None if none
         did. ``machine`` is then that of the last cycle.
+
+    Examples
+    --------
+    >>> record = chaosgym.simulate(chaosgym.ImpactBeam(excitation_frequency=12.0), cycles=20, transient=200)
+    >>> record
+    <20 cycles of impact-beam>
+    >>> record.peak_force.shape
+    (20, 2)
+    >>> float(record.after(10).peak_force.max().round(1))
+    47.1
     """
 
     machine: Machine
@@ -96,6 +106,9 @@ class CycleRecord:
 
     def __len__(self) -> int:
         return len(self.section)
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} cycles of {self.machine.name}>"
 
     @property
     def time(self) -> Array:

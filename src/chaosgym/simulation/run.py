@@ -92,7 +92,14 @@ def _in_slices(
 
 
 def rest_state(machine: Machine) -> MotionState:
-    """Return the state of rest in the middle of the gap."""
+    """Return the state of rest in the middle of the gap.
+
+    Examples
+    --------
+    >>> beam = chaosgym.ImpactBeam()
+    >>> chaosgym.simulate(beam, 1, chaosgym.simulation.rest_state(beam)).section[0]
+    array([0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0.])
+    """
     return MotionState(np.zeros(machine.n_states), np.zeros(3 * max(1, len(machine.joints))))
 
 
@@ -166,9 +173,16 @@ def simulate(
 
     Examples
     --------
+    >>> record = chaosgym.simulate(chaosgym.ImpactBeam(excitation_frequency=12.0), cycles=50, transient=200)
+    >>> float(record.peak_force.max().round(1))
+    47.1
+
+    The speed drifts from 18 to 20 Hz:
+
     >>> drift = {"excitation_frequency": np.linspace(18.0, 20.0, 100)}
-    >>> simulate(ImpactBeam(), 100, operation=drift).operation["excitation_frequency"][-1]
-    np.float64(20.0)
+    >>> drifted = chaosgym.simulate(chaosgym.ImpactBeam(), 100, operation=drift)
+    >>> float(drifted.operation["excitation_frequency"][-1])
+    20.0
     """
     cycles = _count("cycles", cycles, 1)
     transient = _count("transient", transient, 0)
@@ -307,6 +321,12 @@ def simulate_many(
     Returns
     -------
     list of CycleRecord, in the order of ``machines``.
+
+    Examples
+    --------
+    >>> beams = [chaosgym.ImpactBeam(excitation_frequency=speed) for speed in (12.0, 19.0)]
+    >>> [float(record.peak_force.max().round(1)) for record in chaosgym.simulate_many(beams, 20, transient=200)]
+    [47.1, 54.0]
     """
 
     def one(machine: Machine) -> CycleRecord:
@@ -321,6 +341,12 @@ def parallel_map(
     """Apply a function that spends its time in kernels to every item, on threads; results in order.
 
     ``progress`` names a progress bar on standard error; None shows none.
+
+    Examples
+    --------
+    >>> from chaosgym.simulation import parallel_map
+    >>> parallel_map(lambda speed: chaosgym.SliderCrank(crank_speed=speed).cycle_period, [200.0, 300.0])
+    [0.3, 0.2]
     """
     items = list(items)
     with ThreadPoolExecutor(max_workers=workers or os.cpu_count() or 1) as pool:

@@ -25,6 +25,11 @@ class Axis:
     """One parameter of a sweep: its range, the number of grid points, and whether they are spaced by ratio.
 
     ``count`` is None unless on a grid.
+
+    Examples
+    --------
+    >>> chaosgym.Axis.parse("clearance=0.03mm:0.3mm:5:log", {"clearance": "m"})
+    Axis(field='clearance', low=3e-05, high=0.0003, count=5, scale='log')
     """
 
     field: str

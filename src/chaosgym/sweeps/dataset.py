@@ -166,6 +166,9 @@ class LabelledSweep:
     table: pa.Table
     settings: dict[str, Any]
 
+    def __repr__(self) -> str:
+        return f"<{len(self.table)} labelled points of {self.settings['machine']}>"
+
     def column(self, name: str) -> Any:
         """Return a column as a numpy array."""
         return self.table.column(name).to_numpy(zero_copy_only=False)
@@ -214,6 +217,16 @@ def read_sweep(folder: str | Path, columns: list[str] | None = None) -> Labelled
     ------
     DatasetError
         If the folder holds no finished sweep, or its file is damaged.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> speeds = chaosgym.Axis("excitation_frequency", 10.0, 20.0, 3)
+    >>> with TemporaryDirectory() as folder:
+    ...     made = chaosgym.run_sweep(chaosgym.SweepPlan(chaosgym.ImpactBeam(), (speeds,)), folder)
+    ...     sweep = chaosgym.read_sweep(folder, ["excitation_frequency", "period"])
+    >>> sweep.table.to_pydict()
+    {'excitation_frequency': [10.0, 15.0, 20.0], 'period': [1, 1, None]}
     """
     path = Path(folder) / DATA_FILE
     if not path.is_file():

@@ -71,6 +71,13 @@ class SweepPlan:
     full_types
         Share of the points whose response type is judged over all tolerances too, by runs of its own; only points with
         all their neighbours where these are points of the sweep.
+
+    Examples
+    --------
+    >>> speeds = chaosgym.Axis("excitation_frequency", 10.0, 20.0, 11)
+    >>> plan = chaosgym.SweepPlan(chaosgym.ImpactBeam(), (speeds,))
+    >>> len(plan)
+    11
     """
 
     machine: Machine

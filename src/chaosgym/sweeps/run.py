@@ -137,6 +137,15 @@ def run_sweep(
     UnfinishedError
         If the disk is full, the cluster is lost, or another process writes into the folder. What was kept stays; the
         same call goes on.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> speeds = chaosgym.Axis("excitation_frequency", 10.0, 20.0, 3)
+    >>> with TemporaryDirectory() as folder:
+    ...     sweep = chaosgym.run_sweep(chaosgym.SweepPlan(chaosgym.ImpactBeam(), (speeds,)), folder)
+    >>> sweep.table["nature"].to_pylist()
+    ['periodic', 'periodic', 'chaotic']
     """
     with (
         cluster_at(scheduler) if scheduler else nullcontext() as client,

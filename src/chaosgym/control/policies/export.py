@@ -32,6 +32,17 @@ def exported(model: Any, env: str, envs: Any, *, memory: bool = False) -> Traine
     ------
     ModelFileError
         If the policy has parts that can't be exported; names them.
+
+    Examples
+    --------
+    >>> from stable_baselines3 import PPO
+    >>> from chaosgym.control.policies.export import exported
+    >>> from chaosgym.envs.sb3 import SB3VecEnv
+    >>> env = "chaosgym/ImpactBeamTolerance-v1"
+    >>> venv = SB3VecEnv(env, 4)
+    >>> policy = exported(PPO("MlpPolicy", venv), env, venv)
+    >>> policy.env
+    'chaosgym/ImpactBeamTolerance-v1'
     """
     weights = {name: values.detach().cpu().numpy() for name, values in model.policy.state_dict().items()}
     if hasattr(model.policy, "actor") and hasattr(model.policy.actor, "latent_pi"):

@@ -201,6 +201,14 @@ def load_policy(folder: str | Path) -> TrainedPolicy:
     ------
     ModelFileError
         If a file is missing, damaged, of another version, or does not match its hash.
+
+    Examples
+    --------
+    >>> from importlib.resources import files
+    >>> from chaosgym.control.policies.policy import load_policy
+    >>> shipped = files("chaosgym") / "control" / "policies" / "shipped"
+    >>> load_policy(shipped / "ImpactBeamTolerance-v1").env
+    'chaosgym/ImpactBeamTolerance-v1'
     """
     folder = Path(folder)
     for name in (DESCRIPTION, WEIGHTS):

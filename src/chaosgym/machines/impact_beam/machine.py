@@ -25,6 +25,12 @@ class ImpactBeam(BeamParameters):
     ------
     ParameterError
         On construction, if a field is outside its range; names the field, the value and the range.
+
+    Examples
+    --------
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=20.0, clearance=3.2e-5)
+    >>> beam.cycle_period
+    0.05
     """
 
     @property

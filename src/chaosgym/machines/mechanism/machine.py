@@ -392,6 +392,26 @@ def machine_of(
     ------
     ParameterError
         If no joint has clearance, a name can't begin that of a field, or a value is out of range.
+
+    Examples
+    --------
+    >>> from chaosgym.machines.mechanism.machine import Clearance, machine_of
+    >>> from chaosgym.machines.mechanism.joints import Joint
+    >>> from chaosgym.machines.mechanism.links import Body, rigid_link
+    >>> from chaosgym.machines.mechanism.mechanism import Mechanism
+    >>> crank = rigid_link("crank", {"shaft": (0.0, 0.0), "pin": (0.05, 0.0)})
+    >>> rod = rigid_link("rod", {"big": (0.0, 0.0), "small": (0.2, 0.0)}, (Body(0.5, 1e-3, (0.1, 0.0)),))
+    >>> slider = rigid_link("slider", {"pivot": (0.0, 0.0)}, (Body(1.0, 1e-3, (0.0, 0.0)),))
+    >>> joints = (
+    ...     Joint("motor", "revolute", ("ground", "shaft"), ("crank", "shaft"), driven=True),
+    ...     Joint("big_end", "revolute", ("crank", "pin"), ("rod", "big")),
+    ...     Joint("small_end", "revolute", ("rod", "small"), ("slider", "pivot")),
+    ...     Joint("guide", "prismatic", ("ground", "shaft"), ("slider", "pivot"), opened=("across",)),
+    ... )
+    >>> mechanism = Mechanism((crank, rod, slider), joints, {"shaft": (0.0, 0.0)}, (0.0, -9.81))
+    >>> kind = machine_of(mechanism, {"guide": Clearance(1e-4, 1e8, 100.0)})
+    >>> kind(speed=10.0).sides
+    ('upper', 'lower')
     """
     from typing import get_type_hints
 

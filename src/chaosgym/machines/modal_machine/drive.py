@@ -31,6 +31,11 @@ class Drive(NamedTuple):
 
     ``kind`` of ``KINDS``; ``harmonics`` (order, cosine, sine) with amplitudes in the kind's unit; ``mean`` what is
     constant, and ``left_out`` by how much samples differ from their harmonics at the most, in that unit.
+
+    Examples
+    --------
+    >>> chaosgym.Drive.sine("force", "tip", 8.9).harmonics
+    ((1, 0.0, 8.9),)
     """
 
     kind: str

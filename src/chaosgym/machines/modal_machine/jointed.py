@@ -55,6 +55,11 @@ class Joint(NamedTuple):
     gap; ``stiffness`` [N/m] and ``damping`` [N s/m] of the upper stop, and factors of the lower one's; ``offset`` [m]
     of the middle of the gap; ``stops`` "two" or "one"; ``preload`` [N] towards the upper stop. ``turns`` says that m
     is rad and N is N m.
+
+    Examples
+    --------
+    >>> chaosgym.Joint("tip", clearance=1e-4, stiffness=1e6, damping=20.0).stops
+    'two'
     """
 
     at: str
@@ -375,6 +380,15 @@ def machine_with_joints(
     ------
     ParameterError
         If there is no joint, a name can't begin that of a field, or a value is out of range.
+
+    Examples
+    --------
+    >>> structure = chaosgym.Structure.of_modes([9.0, 61.0], 0.01, {"middle": [2.1, -1.9], "end": [1.2, 0.8]})
+    >>> joints = {name: chaosgym.Joint(name, 1e-4, 1e6, 20.0) for name in ("middle", "end")}
+    >>> kind = chaosgym.machine_with_joints(structure, joints, (chaosgym.Drive.sine("force", "end", 8.9),))
+    >>> machine = kind(speed=19.0, end_clearance=2e-4)
+    >>> machine.sides
+    ('middle upper', 'middle lower', 'end upper', 'end lower')
     """
     if not joints:
         raise ParameterError("a machine has no joint; allowed: one or more")

@@ -59,6 +59,14 @@ class ModalMachine(ModalImpactMachine):
     ------
     ParameterError
         On construction, if a field is outside its range or a point does not exist; names it and what is allowed.
+
+    Examples
+    --------
+    >>> structure = chaosgym.Structure.of_modes([9.0, 61.0], 0.01, {"tip": [2.1, -1.9]})
+    >>> drive = chaosgym.Drive.sine("force", "tip", 8.9)
+    >>> machine = chaosgym.ModalMachine(modes=structure, joint="tip", drives=(drive,), speed=19.0)
+    >>> chaosgym.simulate(machine, cycles=10, transient=100).peak_force.shape
+    (10, 2)
     """
 
     name: ClassVar[str] = "modal-machine"

@@ -49,6 +49,12 @@ class Structure:
         Modal damping [1/s].
     shapes
         Mass-normalised shapes (n,) [kg^-1/2] by the name of the point, and the participations "base" [kg^1/2].
+
+    Examples
+    --------
+    >>> structure = chaosgym.Structure.of_modes([9.0, 61.0], 0.01, {"tip": [2.1, -1.9]})
+    >>> structure.angular_frequency.round(1)
+    array([ 56.5, 383.3])
     """
 
     angular_frequency: Array

@@ -76,6 +76,12 @@ class SliderCrank(BinnedMachine):
     ------
     ParameterError
         On construction, if a field is outside its range; names the field, the value and the range.
+
+    Examples
+    --------
+    >>> crank = chaosgym.SliderCrank(crank_speed=200.0, slider_clearance=3.2e-5)
+    >>> crank.cycle_period
+    0.3
     """
 
     fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
@@ -477,7 +483,14 @@ THESIS_SLIDER_CRANK = SliderCrank(fitted_modes=0, matrix_update_interval=5.0)
 
 
 def frequencies_at(machine: SliderCrank, crank_angle: float) -> Array:
-    """Natural frequencies [Hz] of the mechanism at rest at a crank angle [deg], every joint tight."""
+    """Natural frequencies [Hz] of the mechanism at rest at a crank angle [deg], every joint tight.
+
+    Examples
+    --------
+    >>> from chaosgym.machines.slider_crank.parameters import frequencies_at
+    >>> frequencies_at(chaosgym.SliderCrank(), 90.0).round(1)
+    array([  75.6,  136.2,  549.5, 1167.6, 1542.4])
+    """
     from scipy.linalg import eigh
 
     bound = replace(machine, slider_joint="clearance", ball_joint="ideal", rod="flexible")
