@@ -1,4 +1,4 @@
-"""What does each environment's page say? One text, filled in from the task of each id: spaces, numbers, tolerances.
+"""What does the page of each machine's environments say? One text, filled in from the task: spaces, numbers, levels.
 
 python -m benchmarks.envs.documentation docs
 """
@@ -50,10 +50,10 @@ TEXT = (Path(__file__).parent / "page.md").read_text(encoding="utf-8")
 def pages() -> Iterator[tuple[str, str]]:
     """Names of the files, and the pages, in the format of Gymnasium's own (Markdown)."""
     rows = []
-    for name in ENVIRONMENTS:
-        file = f"environments/{name.removeprefix('chaosgym/')}.md"
-        yield file, page(name)
-        rows.append(f"| [{name}]({file}) | {KINDS[kind_of(name)]} |")
+    for machine, names in _by_machine().items():
+        file = f"environments/{machine}.md"
+        yield file, page(names)
+        rows += [f"| [`{name}`]({file}) | {KINDS[kind_of(name)]} |" for name in names]
     table = "\n".join(["| id | task |", "|---|---|", *rows])
     yield (
         "environments.md",
@@ -61,18 +61,25 @@ def pages() -> Iterator[tuple[str, str]]:
     )
 
 
+def _by_machine() -> dict[str, list[str]]:
+    """Ids by their machine, such as "ImpactBeam"; its nominal one first."""
+    return {
+        machine: [name for name in ENVIRONMENTS if name.startswith(f"chaosgym/{machine}")]
+        for machine in (name.removeprefix("chaosgym/").split("-")[0] for name in ENVIRONMENTS if not kind_of(name))
+    }
+
+
 def kind_of(name: str) -> str:
     """Return the key of ``KINDS`` for an id."""
     return next((kind for kind in KINDS if kind and f"{kind}-" in name), "")
 
 
-def page(name: str) -> str:
-    """Text of one environment's page."""
+def page(names: list[str]) -> str:
+    """Text of the page of one machine's ids, of which the first is the nominal machine's."""
+    name = names[0]
     env: Any = gym.make(name).unwrapped
     task, nominal = env.task, env.nominal
     unit = parameters_of(nominal)[nominal.speed_field].unit
-    level = str(gym.spec(name).kwargs["level"])
-    kind = kind_of(name)
     moves = [f"{task.trim_step * move:+g} {unit} of trim" if move else "hold" for move in MOVES]
     noise = []
     if task.speed_ripple:
@@ -81,7 +88,10 @@ def page(name: str) -> str:
         noise.append(f"Velocities are kicked by {task.kick:g} of their range (standard deviation) once a cycle.")
     return TEXT.format(
         name=name,
-        kind=KINDS[kind],
+        title=name.removeprefix("chaosgym/").split("-")[0],
+        ids=_table(
+            "id | level |", [f"`{one}` | `{gym.spec(one).kwargs['level']}` | {KINDS[kind_of(one)]}" for one in names]
+        ),
         machine=MACHINES[nominal.name],
         short=nominal.name,
         unit=unit,
@@ -106,9 +116,7 @@ def page(name: str) -> str:
         run_in=task.run_in_cycles,
         steps=task.steps,
         cycles=task.cycles_per_step,
-        level=level,
         levels=_table("level | tolerances | growth of the clearance in a job", _levels(nominal)),
-        tolerances=_widths(setup_of(nominal).levels[level]),
         disturbance=" ".join(noise),
         rung=nominal.rung or "none",
         model=_model(env),

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import gymnasium as gym
+
 from benchmarks.envs.documentation import pages
 from chaosgym.envs import ENVIRONMENTS
 
@@ -9,28 +11,26 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 def test_the_pages_are_current() -> None:
-    """Every page is what the command named in docs/environments.md writes, and every environment has one."""
+    """Every page is what the command named in docs/environments.md writes, and no other is there."""
     written = dict(pages())
-    assert len(written) == len(ENVIRONMENTS) + 1
+    assert {file for file in written if "/" in file} == {
+        f"environments/{one.name}" for one in DOCS.glob("environments/*")
+    }
     for file, page in written.items():
         assert (DOCS / file).read_text(encoding="utf-8") == page
 
 
-def test_every_page_makes_its_own_environment() -> None:
-    """The examples of a page name its id, not that of a sister."""
-    for name, page in zip(ENVIRONMENTS, dict(pages()).values(), strict=False):
-        assert f'gym.make("{name}")' in page
-        assert page.startswith(f"# {name}\n")
+def test_every_id_stands_on_its_machines_page_with_its_level() -> None:
+    """A reader finds each id, on one page alone, and what its machines differ in."""
+    written = [page for file, page in pages() if "/" in file]
+    for name in ENVIRONMENTS:
+        row = f"| `{name}` | `{gym.spec(name).kwargs['level']}` |"
+        assert sum(row in page for page in written) == 1
 
 
-def test_defaults_are_those_of_the_id() -> None:
-    """The clearance grows, and machines have tolerances, where the id says so."""
-    written = dict(pages())
-    for name, widths, wear in (
-        ("", "none", "0"),
-        ("Tolerance", "`slider_clearance` +-10 %", "0"),
-        ("Wear", "`s", "0.1"),
-    ):
-        page = written[f"environments/SliderCrank{name}-v1.md"]
-        assert f"Tolerances, uniform: {widths}" in page
-        assert f"| `wear` | `{wear}` " in page
+def test_levels_say_what_is_drawn() -> None:
+    """The clearance grows, and machines have tolerances, where the level says so."""
+    page = dict(pages())["environments/SliderCrank.md"]
+    assert "| `nominal` | none | 0% |" in page
+    assert "| `clearance` | `slider_clearance` +-10 % | 0% |" in page
+    assert "| `wear` | `slider_clearance` +-10 % | 10% |" in page
