@@ -10,8 +10,8 @@ from scipy.optimize import brentq
 from chaosgym.diagnosis import diagnose
 from chaosgym.diagnosis.bifurcation_curve import follow_bifurcation
 from chaosgym.diagnosis.bifurcation_diagram import follow
-from chaosgym.diagnosis.branch import stretch
-from chaosgym.diagnosis.orbit_family import family_of, with_noise
+from chaosgym.diagnosis.branch import _repeats, stretch
+from chaosgym.diagnosis.orbit_family import OrbitPoint, family_of, with_noise
 from chaosgym.diagnosis.periodic_orbit import PRECISE, find_periodic_orbit, run_period
 from chaosgym.diagnosis.section import better_section
 from chaosgym.errors import ParameterError
@@ -347,7 +347,7 @@ def test_the_first_branch_of_the_beam_reaches_from_4_to_30_hz():
     for start in (4.0, 12.0):
         machine = ImpactBeam(excitation_frequency=start)
         orbit = diagnose(machine).evidence["final_state"]
-        _, found = branch_from(machine, "excitation_frequency", 4.0, 30.0, orbit, 1, 1.0, most_unstable=1e3)
+        _, found = branch_from(machine, "excitation_frequency", 4.0, 30.0, orbit, 1, 1.0)
         assert found.end == "end of the range at excitation_frequency = 30"
         folds.append([value for value in bifurcations(found, "fold") if value > 13.0])
     assert len(folds[0]) > 40
@@ -355,7 +355,10 @@ def test_the_first_branch_of_the_beam_reaches_from_4_to_30_hz():
 
 
 def test_the_symmetric_orbit_of_the_beam_loses_its_symmetry_and_the_other_one_flips():
-    """Between 17.4 and 18.1 Hz: both ends of the symmetry breaking, and the flips that a sweep of 0.01 Hz shows."""
+    """Between 17.4 and 18.1 Hz: both ends of the symmetry breaking, and the flips that a sweep of 0.01 Hz shows.
+
+    Two folds lie 34 uHz apart, within one step of the branch.
+    """
     diagram = follow(ImpactBeam(), "speed", (17.4, 17.8), sweep=5, workers=1, longest_period=2)
     symmetric = diagram.branches[0]
     (breaking,) = [one for one in symmetric.bifurcations if one.kind == "symmetry breaking"]
@@ -363,6 +366,11 @@ def test_the_symmetric_orbit_of_the_beam_loses_its_symmetry_and_the_other_one_fl
     arm = next(branch for branch in diagram.branches if branch.begins.startswith("symmetry breaking"))
     assert arm.period == 1
     assert not np.allclose(arm.peaks[-1, 0], arm.peaks[-1, 1], rtol=1e-3)
+    ways = np.sign(np.diff(arm.values))
+    turned = np.flatnonzero(ways[1:] != ways[:-1])
+    folds = [at for one, at in zip(arm.bifurcations, arm.at, strict=True) if one.kind == "fold"]
+    assert len(turned) >= 2
+    assert all({i, i + 1} & set(folds) for i in turned), "the branch turns back at folds only"
     flips = [one.value for one in arm.bifurcations if one.kind == "flip"]
     for value in flips:
         below, above = (two_cycles_apart(value + side * 2e-4) for side in (-1.0, 1.0))
@@ -373,6 +381,31 @@ def two_cycles_apart(frequency):
     """Largest difference of the peaks of a settled beam in two cycles, relative to a peak; from the arm's own state."""
     peaks = simulate(ImpactBeam(excitation_frequency=frequency), 2, transient=4000).peak_force
     return float(np.max(np.abs(peaks[1] - peaks[0])) / peaks.max())
+
+
+def points_along(curve, places):
+    """Orbits, as far as their unknowns and tangents go, at places of a plane curve given as complex numbers."""
+    points = []
+    for place in places:
+        tangent = (curve(place + 1e-6) - curve(place - 1e-6)) / 2e-6
+        x, along = (np.array([z.real, z.imag]) for z in (curve(place), tangent / abs(tangent)))
+        kind = {"matrix": np.eye(1), "slope": np.zeros(1), "impacts": (0,), "peaks": np.ones(1)}
+        points.append(OrbitPoint(x=x, tangent=along, symmetric=False, halved=False, phase=0.0, **kind))
+    return points
+
+
+def test_a_branch_that_comes_back_to_itself_is_noticed():
+    """A curve that runs into a circle passes its own orbits again; a spiral and a parabola followed back do not."""
+
+    def lasso(t):
+        return np.exp(1j * t) if t > 0.0 else 1.0 + 1j * t
+
+    laps = points_along(lasso, np.arange(-2.0, 8.0, 0.07))
+    first = next(n for n in range(len(laps)) if _repeats(laps[:n]))
+    assert 2.0 * math.pi < 0.07 * first - 2.0 < 2.0 * math.pi + 0.3
+    for curve in (lambda t: (1.0 + 0.05 * t) * np.exp(1j * t), lambda t: complex(1e-3 * t, t * t)):
+        apart = points_along(curve, np.linspace(-2.0, 20.0, 400))
+        assert not any(_repeats(apart[:n]) for n in range(len(apart)))
 
 
 @pytest.mark.parametrize(

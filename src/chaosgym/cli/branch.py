@@ -36,7 +36,7 @@ SHOWN = 30
 @click.option(
     "--most-unstable",
     type=click.FloatRange(1.0, 1e6),
-    default=30.0,
+    default=1000.0,
     show_default=True,
     help="Largest multiplier up to which unstable orbits are followed.",
 )

@@ -129,7 +129,7 @@ def between(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, share: float, clo
     chord = b.x - a.x
     slope = (1.0 - share) * a.slope + share * b.slope
     unit = chord / np.linalg.norm(chord)
-    return family.solve(_interpolated(a, b, share), unit, slope, closed=closed, exact=False)
+    return family.solve(interpolated(a, b, share), unit, slope, closed=closed, exact=False)
 
 
 def _on_plane(
@@ -141,12 +141,12 @@ def _on_plane(
     low, high = max(one for one in known if one < share), min(one for one in known if one > share)
     before, after = known[low], known[high]
     part = (share - low) / (high - low)
-    guess = _interpolated(before, after, part)
+    guess = interpolated(before, after, part)
     guess += (share * np.linalg.norm(chord) - unit @ (guess - a.x)) * unit
     return family.solve(guess, unit, (1.0 - part) * before.slope + part * after.slope, closed=CLOSELY, exact=False)
 
 
-def _interpolated(a: OrbitPoint, b: OrbitPoint, share: float) -> Array:
+def interpolated(a: OrbitPoint, b: OrbitPoint, share: float) -> Array:
     """Unknowns on the cubic through two orbits and their tangents."""
     chord = b.x - a.x
     rise, run = share * share * (3.0 - 2.0 * share), share * (1.0 - share)
@@ -220,7 +220,7 @@ def _guess(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, resolution: float)
     low, high = 0.0, 1.0
     while high - low > resolution:
         middle = 0.5 * (low + high)
-        if family.impacts(_interpolated(a, b, middle)) == a.impacts:
+        if family.impacts(interpolated(a, b, middle)) == a.impacts:
             low = middle
         else:
             high = middle
@@ -263,7 +263,8 @@ def _smooth(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> Iterator[Found
             yield end
             return
     explained = abs(b.unstable - a.unstable) in {abs(change) for change in _changes(signs)}
-    if (explained and turns <= signs["one"]) or float(np.linalg.norm(b.x - a.x)) < NEAREST:
+    short = float(np.linalg.norm(b.x - a.x)) < NEAREST
+    if short or (explained and turns <= signs["one"] and (turns or not _turns_twice(a, b))):
         found = []
         for name in (name for name, changes in signs.items() if changes):
             share, s, point = _root(family, a, b, name, turns)
@@ -278,6 +279,17 @@ def _smooth(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> Iterator[Found
     middle = between(family, a, b, 0.5)
     for one, other in ((a, middle), (middle, b)):
         yield from bifurcations_between(family, one, other)
+
+
+def _turns_twice(a: OrbitPoint, b: OrbitPoint) -> bool:
+    """True if the cubic through two orbits turns back in the field and forth again: two folds, which no sign tells."""
+    chord = b.x - a.x
+    length = float(np.linalg.norm(chord))
+    first, last = (length * float(_along(one.tangent, chord)[-1]) for one in (a, b))
+    # ds/dshare = first + linear share + square share^2
+    linear, square = 6.0 * chord[-1] - 4.0 * first - 2.0 * last, 3.0 * (first + last) - 6.0 * chord[-1]
+    inside = 0.0 < -linear < 2.0 * square if first > 0.0 else 0.0 > -linear > 2.0 * square
+    return bool(inside and first * (first - linear**2 / (4.0 * square)) < 0.0)
 
 
 def _end_on_another(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> Found | None:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.diagnosis.bifurcation import Bifurcation, Found, between, bifurcations_between, grazing
+from chaosgym.diagnosis.bifurcation import Bifurcation, Found, between, bifurcations_between, grazing, interpolated
 from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily, OrbitPoint
 from chaosgym.diagnosis.section import better_section
 
@@ -46,10 +46,13 @@ BEYOND, FIRST_BEYOND = (1e-7, 1e-6, 1e-5, 1e-4), 1e-5
 """Distances at which a grazing ahead is looked for, and the orbit beyond it; and the first step after it."""
 
 LOOKED_AT = 10
-"""Orbits after which it is seen whether another section serves better."""
+"""Orbits after which it is seen whether another section serves better, and whether the branch repeats itself."""
 
-MOST_UNSTABLE = 30.0
+MOST_UNSTABLE = 1000.0
 """Largest multiplier up to which a branch is followed."""
+
+PASSED = 0.01
+"""Distance of an orbit passed before from the last step, as a share of its length, at which a branch repeats itself."""
 
 
 class Begun(NamedTuple):
@@ -113,6 +116,9 @@ def stretch(
     here, begun, step, bend = start, Begun(start.x, start.tangent), first_step, straight
     while len(points) < MOST_POINTS:
         if len(points) % LOOKED_AT == 1:
+            if _repeats(points):
+                reason = "a step left the branch, which comes back to an orbit passed before"
+                return Stretch(points, found, at, f"not followed beyond {_place(family, here)}: {reason}")
             moved, here = better_section(family, here)
             if moved is not family:
                 family, bend = moved, straight
@@ -252,6 +258,25 @@ def _at_end(family: OrbitFamily, here: OrbitPoint, beyond: OrbitPoint) -> OrbitP
 def _s_between(family: OrbitFamily, here: OrbitPoint, beyond: OrbitPoint, share: float) -> float:
     point = beyond if share == 1.0 else here if share == 0.0 else between(family, here, beyond, share)
     return float(point.x[-1])
+
+
+def _repeats(points: list[OrbitPoint]) -> bool:
+    """True if the last step passes by an orbit of the branch, the same way: on one curve that can't be."""
+    if len(points) < LOOKED_AT:
+        return False
+    *before, here, there = points
+    chord = there.x - here.x
+    length = float(np.linalg.norm(chord))
+    low, high = sorted((here.x[-1], there.x[-1]))
+    for one in before[:-1]:
+        if one.phase != there.phase or not low - PASSED * length <= one.x[-1] <= high + PASSED * length:
+            continue
+        share = float((one.x - here.x) @ chord) / length**2
+        if not 0.0 <= share <= 1.0 + PASSED or float(one.tangent @ there.tangent) < 0.5:
+            continue
+        if float(np.linalg.norm(interpolated(here, there, share) - one.x)) < PASSED * length:
+            return True
+    return False
 
 
 def _returns(start: Begun, here: OrbitPoint, there: OrbitPoint) -> bool:
