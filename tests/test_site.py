@@ -97,7 +97,8 @@ def test_pages_of_commands_say_what_commands_say():
 
 
 def words(text):
-    """A text without its numbers and bars: chaos lets the last digit of one processor become the first of another."""
+    """A text without numbers, bars and the worst surface: in chaos these hang on the last digit of a processor."""
+    text = re.sub(r"(worst surface:) (upper|lower)", r"\1", text)
     return " ".join(re.sub(r"[-+]?\d[\d.,e+-]*|#", " # ", text).replace("# ", "").split())
 
 
@@ -106,6 +107,7 @@ def test_commands_print_what_their_pages_show(tmp_path):
     """Examples without times or versions print today, word for word, what their page shows."""
     from benchmarks.documentation.commands import EXAMPLES, outputs_of
 
+    differing = []
     for name, examples in EXAMPLES.items():
         steady = [number for number, example in enumerate(examples) if example.get("steady", True)]
         (tmp_path / name).mkdir()
@@ -113,7 +115,9 @@ def test_commands_print_what_their_pages_show(tmp_path):
         page = (ROOT / "docs" / "commands" / f"{name}.md").read_text("utf-8")
         for number, output in zip(steady, outputs, strict=True):
             shown = page.split(f"$ {examples[number]['run']}\n")[1].split("```")[0]
-            assert words(output) == words(shown), (name, examples[number]["run"])
+            if words(output) != words(shown):
+                differing.append((examples[number]["run"], output, shown))
+    assert differing == []
 
 
 @pytest.mark.slow

@@ -60,19 +60,20 @@ plt.show()
 # ## How a common integrator fails
 #
 # Runge-Kutta with a fixed step steps over the instant of touch. The error is small and the same in every cycle, or it
-# is not, and then it kicks the motion at random. At 28.5 Hz that alone looks like chaos.
+# is not, and then it kicks the motion at random. At 28.5 Hz that alone makes chaos of a periodic motion.
 
 # %%
-fast = replace(beam, excitation_frequency=28.5)
+fast = chaosgym.ImpactBeam(excitation_frequency=28.5)
 for method in (chaosgym.RungeKutta4(steps_per_cycle=2000), chaosgym.ExactEvents()):
     verdict = chaosgym.diagnose(fast, integrator=method)
-    print(type(method).__name__, verdict.nature, "-", verdict.reason)
+    print(f"{type(method).__name__}: {verdict.words} ({verdict.status})")
 
 # %% [markdown]
 # `chaosgym.step_check` repeats a verdict with a finer step. A verdict that changes is worth nothing.
 
 # %%
-print(chaosgym.step_check(fast, integrator=chaosgym.RungeKutta4(steps_per_cycle=2000)).summary)
+check = chaosgym.step_check(fast, integrator=chaosgym.RungeKutta4(steps_per_cycle=2000))
+print(f"2000 steps: {check.given.words}; finer: {check.finer.words}; settled: {check.settled}")
 
 # %% [markdown]
 # ## Tests that vote
