@@ -122,6 +122,18 @@ def judges(env: str, machines: int, speeds: int, as_json: bool) -> None:
 
 
 @click.command()
+@click.option("--machines", type=click.IntRange(2, 10_000), default=64, show_default=True)
+@AS_JSON
+def mismatch(machines: int, as_json: bool) -> None:
+    """Play the shipped policy, guarded and not, on beams that differ from those it was trained on."""
+    from benchmarks.envs.mismatch import lines
+    from benchmarks.envs.mismatch import mismatch as run
+
+    found = run(machines)
+    emit({"rows": found}, as_json, lambda: lines(found))
+
+
+@click.command()
 @click.argument("env", type=click.Choice(ENVIRONMENTS))
 @click.option("--machines", type=click.IntRange(1, 256), default=64, show_default=True)
 @AS_JSON
@@ -251,6 +263,7 @@ for command in (
     cost,
     judges,
     audit,
+    mismatch,
     curves,
     headroom,
     classifier,

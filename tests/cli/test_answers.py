@@ -67,7 +67,7 @@ QUICK = {
     "dataset-map": "map --out map2.png",
     "dataset-noise": "map --points 3 --workers 1",
     "design": f'{PEAKS} --load-rating "500 N"; --template impact-beam',
-    "run-agent": f"{BEAM} --machine 13",
+    "run-agent": f"{BEAM} --machine 13; {BEAM} --plant docs.examples.rig:Rig",
     "info": "",
 }
 """Arguments of each command; several forms are divided by a semicolon, and run in this order in one folder."""

@@ -38,6 +38,7 @@ NO_POLICY = (
 @click.option("--sealed", is_flag=True, help="The 512 machines of this release; played once for each.")
 @click.option("--only", multiple=True, help="Name of a controller to run; all by default; may be repeated.")
 @click.option("--policy", "policies", multiple=True, help="NAME=FOLDER of a trained policy; one name, several seeds.")
+@click.option("--guard", is_flag=True, help="Let each policy play behind a guard too.")
 @click.option("--figure", type=click.Path(dir_okay=False, path_type=Path), default=None, help="Scores as a picture.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def compare(
@@ -50,6 +51,7 @@ def compare(
     sealed: bool,
     only: tuple[str, ...],
     policies: tuple[str, ...],
+    guard: bool,
     figure: Path | None,
     as_json: bool,
 ) -> None:
@@ -60,15 +62,19 @@ def compare(
     """
     from chaosgym.control.comparison import ONE, ZERO, Scores, table_lines
     from chaosgym.control.comparison import compare as run
-    from chaosgym.control.policies import TrainedPolicy, load_policy
+    from chaosgym.control.guard import GuardedPolicy
+    from chaosgym.control.policies import load_policy
+    from chaosgym.control.rollout import Policy
 
     drawn = None if figure is None else picture_path(str(figure), "")
-    trained: dict[str, list[TrainedPolicy]] = {}
+    trained: dict[str, list[Policy]] = {}
     for given in policies:
         name, separator, folder = given.partition("=")
         if not separator:
             raise click.UsageError(f"--policy {given}: allowed: NAME=FOLDER")
         trained.setdefault(name, []).append(load_policy(folder))
+        if guard:
+            trained.setdefault(f"{name}, guarded", []).append(GuardedPolicy(load_policy(folder)))
     chosen = [ZERO, ONE, *(name for name in only if name not in (ZERO, ONE))] if only else None
     asked = {"level": level, "split": split, "sealed": sealed or None}
     keywords: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
@@ -92,17 +98,25 @@ def compare(
     help="Folder with policy.json and weights.npz; default: the shipped policy of ENV, or kriging.",
 )
 @click.option("--machine", type=click.IntRange(0, 255), default=0, show_default=True, help="Of those kept for this.")
+@click.option("--plant", default=None, metavar="MODULE:CLASS", help="Your machine instead; - for lines of text.")
 @plot_option("--out", formats="figure .png, .svg, .pdf or animation .gif, .mp4")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def run_agent(env: str, policy: Path | None, machine: int, plot: str | None, as_json: bool) -> None:
+def run_agent(env: str, policy: Path | None, machine: int, plant: str | None, plot: str | None, as_json: bool) -> None:
     """Let an agent run one job beside following the demand.
 
     ENV is an id such as chaosgym/ImpactBeamTolerance-v1, or the file of a machine. Where no policy is shipped or given,
-    kriging looks for the speed of least load within reach: it needs no model and no training.
+    kriging looks for the speed of least load within reach: it needs no model and no training. It plays at a --plant
+    too if no policy is given: a class with reset() and run(speed, cycles), which returns the largest force of each
+    cycle [N].
     """
     from chaosgym.envs import environment
 
     environment(env)
+    if plant is not None:
+        if plot is not None:
+            raise click.UsageError("--out draws what a simulation tells; leave it out with --plant")
+        _at_plant(env, policy, machine, plant, as_json)
+        return
     out = _picture(plot, env)
     from chaosgym.control.controllers import Follow, Kriging
     from chaosgym.control.policies import load_policy, shipped_policy
@@ -125,6 +139,31 @@ def run_agent(env: str, policy: Path | None, machine: int, plot: str | None, as_
     result = {"agent": type(agent).__name__, **job.as_dict(), "life": life, "follow": follow.as_dict()}
     result |= {"plot": str(out)} if out else {}
     emit(result, as_json, lambda: _job_lines(name, job, follow, out))
+
+
+def _at_plant(env: str, policy: Path | None, machine: int, name: str, as_json: bool) -> None:
+    """A job at a machine of the user's, beside following the demand there."""
+    from chaosgym.control.controllers import Follow, Kriging
+    from chaosgym.control.operator import Operator
+    from chaosgym.control.plant import Lines, plant_of, work
+    from chaosgym.control.policies import load_policy
+    from chaosgym.control.rollout import Policy
+
+    agent: Policy = Kriging() if policy is None else load_policy(policy)
+    operators = Operator(agent, env), Operator(Follow(), env)
+    plant = plant_of(name)
+    job, follow = (work(plant, operator, machine, name) for operator in operators)
+    if isinstance(plant, Lines):
+        plant.done()
+    life = follow.damage / job.damage if job.damage > 0.0 else None
+    result = {"agent": type(agent).__name__, "env": env, "plant": name, "job": machine, **job.as_dict(), "life": life}
+    told = [
+        f"{who}: {worked.as_dict()['mean_deviation']:.2f} off the demand, mean peak {worked.mean_peak.mean():.1f} N, "
+        f"largest force {worked.largest_force:.1f} N"
+        for who, worked in ((type(agent).__name__, job), ("following the demand", follow))
+    ]
+    told += [] if life is None else [f"life of the joint: x{life:.2f} of that under following the demand"]
+    emit({**result, "follow": follow.as_dict()}, as_json, lambda: told)
 
 
 def _picture(plot: str | None, env: str) -> Path | None:

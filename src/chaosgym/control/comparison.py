@@ -78,6 +78,7 @@ class Contenders:
             "bandit": lambda: controllers.Bandit(self.fleet),
             "extremum seeking": controllers.ExtremumSeeking,
             "force feedback": controllers.ForceFeedback,
+            "table": lambda: controllers.Table(self._tables()),
             "belief": lambda: controllers.Belief(self.fleet),
             "belief, exact model": lambda: controllers.Belief(self._exact_fleet()),
             "receding horizon": controllers.RecedingHorizon,
@@ -120,6 +121,9 @@ class Contenders:
         """As ``fleet``, of models as fine as the machine: what the belief is worth if the model is right."""
         seeds = [FLEET_SEED + k for k in range(FLEET)]
         return maps_of(self.env, seeds=seeds, progress=self._bar("maps of exact models"), **self._training)
+
+    def _tables(self) -> Any:
+        return controllers.learned_tables(self.env, progress=self._bar("tables"), **self._training)
 
     def _nominal(self) -> Maps:
         known = {name: value for name, value in self._training.items() if name != "split"}
@@ -346,7 +350,7 @@ class Scores:
 def table_lines(summary: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Lines of a Markdown table."""
     lines = [
-        "| contender | knows | seeds | machines | return | score | 95 % | Type III | mean deviation | damage | life "
+        "| contender | knows | seeds | machines | return | score | 95 % | Type III | mean deviation | load | life "
         "| made worse |",
         "|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]
@@ -355,6 +359,6 @@ def table_lines(summary: Mapping[str, Mapping[str, Any]]) -> list[str]:
         lines.append(
             f"| {name} | {row['knows']} | {row['seeds']} | {row['machines']} | {row['return']:.2f} "
             f"| {row['score']:.2f} | {low:.2f} to {high:.2f} | {row['type_iii']:.1%} | {row['deviation']:.2f} "
-            f"| {row['damage']:.2f} | x{row['life']:.2f} | {row['made_worse']:.0%} |"
+            f"| x{row['load']:.2f} | x{row['life']:.2f} | {row['made_worse']:.0%} |"
         )
     return lines

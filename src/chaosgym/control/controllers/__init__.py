@@ -14,6 +14,7 @@ from chaosgym.control.controllers.planned import (
     Schedule,
     SkipBands,
 )
+from chaosgym.control.controllers.table import Table, learned_tables
 
 __all__ = [
     "OGY",
@@ -33,4 +34,6 @@ __all__ = [
     "RecedingHorizon",
     "Schedule",
     "SkipBands",
+    "Table",
+    "learned_tables",
 ]

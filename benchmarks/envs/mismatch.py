@@ -1,0 +1,88 @@
+"""What does a policy win on beams that are not those it was trained on, and does a guard keep its promise there?
+
+Each row changes what a job rests on, for all of the same machines. The promise: never worse than backing off by more
+than the interval of the paired difference.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from chaosgym.control.comparison import MADE_WORSE
+from chaosgym.control.controllers import BackOff, Follow
+from chaosgym.control.guard import GuardedPolicy
+from chaosgym.control.policies import shipped_policy
+from chaosgym.control.rollout import Policy, play
+from chaosgym.control.statistics import bootstrap_interval
+
+ENV = "chaosgym/ImpactBeamTolerance-v1"
+
+FIRST_SEED = 21_000_000
+"""Of the machines: neither those of training nor those of an evaluation, nor those on which the guard was chosen."""
+
+ROWS: Mapping[str, Mapping[str, Any]] = {
+    "as trained": {},
+    "structural damping x2": {"damping_ratio": 0.02},
+    "structural damping x0.5": {"damping_ratio": 0.005},
+    "contact stiffness x2": {"contact_stiffness": 3.0e7},
+    "contact stiffness x0.5": {"contact_stiffness": 0.75e7},
+    "contact damping x2": {"contact_damping": 40.0},
+    "contact damping x0.5": {"contact_damping": 10.0},
+    "force +20 %": {"force_amplitude": 21.36},
+    "force -20 %": {"force_amplitude": 14.24},
+    "clearance +30 %": {"clearance": 0.1651e-3},
+    "clearance -30 %": {"clearance": 0.0889e-3},
+    "density +2 %": {"density": 8007.0},
+    "speed ripple 1 %": {"speed_ripple": 0.01},
+    "sensor error 3 N": {"sensor_error": 3.0},
+}
+
+
+def mismatch(machines: int = 64, rows: Iterable[str] = ROWS) -> list[dict[str, Any]]:
+    """Returns of following, backing off, the shipped policy and the guarded one, and who is worse than backing off."""
+    found = []
+    for row in tqdm(list(rows), desc="rows", unit="row", leave=False):
+        agent = shipped_policy(ENV)
+        players: dict[str, Policy] = {
+            "follow": Follow(),
+            "back off": BackOff(),
+            "shipped": agent,
+            "guarded": GuardedPolicy(agent),
+        }
+        seeds = range(FIRST_SEED, FIRST_SEED + machines)
+        jobs = {name: play(player, ENV, seeds=seeds, **ROWS[row]).returns for name, player in players.items()}
+        found.append({"row": row, "returns": {name: float(returns.mean()) for name, returns in jobs.items()}})
+        for name in ("shipped", "guarded"):
+            found[-1][name] = against(jobs[name], jobs["back off"], jobs["follow"])
+    return found
+
+
+def against(mine: Any, backed: Any, followed: Any) -> dict[str, Any]:
+    """Paired difference to backing off with its interval, and the shares of machines that are made worse."""
+    more = mine - backed
+    low, high = bootstrap_interval(len(more), lambda drawn: np.asarray(more[drawn].mean(axis=-1)))
+    return {
+        "more_than_back_off": float(more.mean()),
+        "interval": [float(low), float(high)],
+        "worse": bool(high < 0.0),
+        "made_worse": float(np.mean(mine < followed - MADE_WORSE)),
+        "made_worse_than_back_off": float(np.mean(more < -MADE_WORSE)),
+    }
+
+
+def lines(found: Iterable[Mapping[str, Any]]) -> list[str]:
+    """A Markdown table; what is worse than backing off beyond the interval is bold."""
+    told = ["| beams | follow | back off | shipped | guarded | shipped less back off | guarded less back off |"]
+    told += ["|---" * 7 + "|"]
+    for row in found:
+        returns = " | ".join(f"{value:.1f}" for value in row["returns"].values())
+        told.append(f"| {row['row']} | {returns} | {_difference(row['shipped'])} | {_difference(row['guarded'])} |")
+    return told
+
+
+def _difference(against: Mapping[str, Any]) -> str:
+    low, high = against["interval"]
+    text = f"{against['more_than_back_off']:+.1f} ({low:.1f} to {high:.1f})"
+    return f"**{text}**" if against["worse"] else text

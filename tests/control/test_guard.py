@@ -1,0 +1,87 @@
+"""A guard asks a policy where the demand is irregular, and backs off where the policy is wrong."""
+
+import numpy as np
+import pytest
+
+from benchmarks.envs.mismatch import ENV, against, lines, mismatch
+from chaosgym.control.controllers import BackOff, Follow, Kriging
+from chaosgym.control.guard import GuardedPolicy
+from chaosgym.control.policies import shipped_policy
+from chaosgym.control.rollout import play
+from chaosgym.errors import ParameterError
+
+NOISE_FREE = {"sensor_error": 0.0, "bouncing_error": 0.0, "missed_impacts": 0.0}
+
+
+class Stubborn:
+    """Asks for the same move at every step."""
+
+    knows, keywords = "nothing", {"action": "trim"}
+
+    def __init__(self, action):
+        self.action = action
+
+    def begin(self, task, count):
+        """Begin jobs."""
+        self.count = count
+
+    def __call__(self, observations):
+        """The move."""
+        return np.full(self.count, self.action)
+
+
+def test_a_calm_demand_is_not_left():
+    """On a machine whose demand is calm whatever the policy asks for, the guard follows the demand."""
+    given = {"clearance": 0.06e-3, "tolerances": {}, "lowest_demand": 18.0, "highest_demand": 20.0, "steps": 60}
+    follow = play(Follow(), ENV, seeds=[1, 2, 3], **given)
+    assert follow.type_iii.max() == 0.0
+    for action in (1, 4):
+        guarded = play(GuardedPolicy(Stubborn(action)), ENV, seeds=[1, 2, 3], **given)
+        np.testing.assert_array_equal(guarded.speed, follow.speed)
+
+
+def test_it_stays_in_the_band():
+    """A policy that always asks for more is held at the largest trim."""
+    guard = GuardedPolicy(Stubborn(4), strikes=10**6)
+    played = play(guard, ENV, range(24), largest_trim=1.0, steps=60)
+    off = np.abs(played.speed - played.demand)
+    settled = (played.demand[2:] == played.demand[1:-1]) & (played.demand[1:-1] == played.demand[:-2])
+    assert off[2:][settled].max() == pytest.approx(1.0)
+
+
+def test_who_was_wrong_is_not_asked_again():
+    """A policy that holds irregular demands is distrusted, and what follows is at least near backing off."""
+    machines = range(24)
+    guard = GuardedPolicy(Stubborn(0))
+    guarded, follow, backed = (play(player, ENV, machines) for player in (guard, Follow(), BackOff()))
+    assert 0.0 < 1.0 - guard.trusted.mean() < 1.0
+    np.testing.assert_array_equal(guarded.returns[guard.trusted], follow.returns[guard.trusted])
+    assert guarded.returns.mean() > 0.5 * (follow.returns + backed.returns).mean()
+
+
+def test_the_shipped_policy_is_kept_from_harm():
+    """With structural damping doubled the shipped policy loses to following; guarded it does not."""
+    found = mismatch(16, ["structural damping x2"])[0]
+    returns = found["returns"]
+    assert returns["shipped"] < returns["follow"] - 5.0
+    assert returns["guarded"] > returns["follow"] - 1.0
+    assert found["shipped"]["worse"]
+    assert not found["guarded"]["worse"]
+    assert lines([found])[-1].count("**") == 2
+
+
+def test_differences_are_paired():
+    """Every machine worse by 2: the interval has no width, and all are made worse."""
+    backed = np.linspace(-30.0, 0.0, 12)
+    told = against(backed - 2.0, backed, backed)
+    assert told["interval"] == pytest.approx([-2.0, -2.0])
+    assert told["worse"]
+    assert told["made_worse"] == told["made_worse_than_back_off"] == 1.0
+
+
+def test_what_it_can_not_guard_is_refused():
+    """A controller, which sets speeds itself, and an objective in which irregular motion costs nothing."""
+    with pytest.raises(ParameterError, match="Kriging can't be guarded"):
+        play(GuardedPolicy(Kriging()), ENV, [0], steps=2)
+    with pytest.raises(ParameterError, match="a guard goes by irregular motion"):
+        play(GuardedPolicy(shipped_policy(ENV)), ENV, [0], objective="life", steps=2)
