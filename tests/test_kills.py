@@ -1,8 +1,8 @@
 """kill -9 and SIGTERM at random moments: the same command again ends with the result of an undisturbed run.
 
-Each command is first run undisturbed, which says how long it takes. Then it is started again and again in another
-folder and killed at moments drawn over that time, every third time by SIGTERM; where it ends first, the next start is
-in a new folder. ``CHAOSGYM_KILLS=30`` kills it twenty times by SIGKILL and ten by SIGTERM.
+Each command is first run undisturbed, which says how long it works after its first sign of progress. Then it is started
+again and again in another folder and killed at moments drawn over that time, every third time by SIGTERM; where it ends
+first, the next start is in a new folder. ``CHAOSGYM_KILLS=30`` kills it twenty times by SIGKILL and ten by SIGTERM.
 """
 
 import json
@@ -19,7 +19,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 MOMENTS = int(os.environ.get("CHAOSGYM_KILLS", "3"))
-"""Kills of each command; each takes half a run of it."""
+"""Kills of each command; each takes a start and half of the work after it."""
 
 SWEEP = "impact-beam --axis excitation_frequency=10:30 --axis clearance=5e-5:2e-4 --sobol 1200 --seed 2 --budget 100"
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
@@ -34,14 +34,15 @@ CROSSES = (
 SMALL = "--envs 16 --rollout 60 --batch 240 --every 960"
 SCRIPTS = {
     "ppo": TRAIN,
-    "recurrent_ppo": f"--env {BEAM} --steps 2880 {SMALL}",
+    "recurrent_ppo": f"--env {BEAM} --steps 960 --envs 4 --rollout 30 --batch 60 --every 120 --epochs 3 --units 16",
     "constrained_ppo": f"--env {BEAM} --steps 3840 {SMALL}",
     "sac": f"--env {BEAM} --steps 1600 --envs 8 --every 400 --gradient-steps 1",
 }
 LEARNED = (
-    "impact-beam --axis excitation_frequency=4:30:log --axis clearance=2e-5:2e-4:log --sobol 600 --seed 5 "
+    "impact-beam --axis excitation_frequency=4:30:log --axis clearance=2e-5:2e-4:log --sobol 120 --seed 5 "
     "--budget 200 --signals 1"
 )
+"""Sweep from which the classifier learns; made once, beside the folders of the runs."""
 BRIEF = """machine = "impact-beam"
 series = 8
 [parameters]
@@ -121,9 +122,11 @@ def _commands(*commands, unless):
 
 
 def _classifier(out):
-    sweep = ["-m", "chaosgym", "sweep", *LEARNED.split(), "--out", f"{out}/data"]
-    train = ["-m", "chaosgym", "train-classifier", "--data", f"{out}/data", "--out", f"{out}/learned"]
-    return _commands(sweep, train, unless=out / "learned")
+    data = out.parent / "data"
+    if not data.exists():
+        subprocess.run([sys.executable, "-m", "chaosgym", "sweep", *LEARNED.split(), "--out", str(data)], check=True)
+    train = ["-m", "chaosgym", "train-classifier", "--data", str(data), "--out", f"{out}/learned"]
+    return _commands(train, unless=out / "learned")
 
 
 def _learned(out):
@@ -173,12 +176,20 @@ WORK = {
 
 
 def _start(command, folder):
-    """The command in a process group of its own, which a kill ends whole."""
+    """The command in a process group of its own, which a kill ends whole; what it says goes into a file beside."""
     folder.mkdir(exist_ok=True)
     given = command(folder)
     words = given if isinstance(given, list) else given.split()
-    with (folder.parent / "log").open("ab") as log:
-        return subprocess.Popen([sys.executable, *words], cwd=ROOT, stdout=log, stderr=log, start_new_session=True)
+    log = folder.parent / "log"
+    with log.open("wb") as said:
+        return subprocess.Popen([sys.executable, *words], cwd=ROOT, stdout=said, stderr=said, start_new_session=True)
+
+
+def _working(process, log):
+    """Wait for the first bar of progress; tell whether the process still runs."""
+    while process.poll() is None and b"%|" not in log.read_bytes():
+        time.sleep(0.01)
+    return process.poll() is None
 
 
 @pytest.mark.slow
@@ -186,28 +197,31 @@ def _start(command, folder):
 def test_a_killed_command_ends_as_an_undisturbed_one(kind, tmp_path):
     """Rows, weights, constants, scores and pages are equal to the last digit, whenever the kills came.
 
-    Every kill meets a running process: where the command ended first, its result is compared and it starts anew.
+    Every kill meets a process at work: where the command ended first, its result is compared and it starts anew.
     """
-    command, result = WORK[kind]
-    assert _start(command, tmp_path / "warm").wait() == 0, (tmp_path / "log").read_text()[-2000:]
+    (command, result), log = WORK[kind], tmp_path / "log"
+    assert _start(command, tmp_path / "warm").wait() == 0, log.read_text()[-2000:]
+    undisturbed = _start(command, tmp_path / "undisturbed")
+    assert _working(undisturbed, log), "no sign of progress"
     began = time.monotonic()
-    assert _start(command, tmp_path / "undisturbed").wait() == 0
+    assert undisturbed.wait() == 0
     duration = time.monotonic() - began
     expected = result(tmp_path / "undisturbed")
     moments, killed, rounds = random.Random(kind), 0, 0
     while killed < MOMENTS:
         process = _start(command, tmp_path / f"killed-{rounds}")
-        try:
-            process.wait(moments.uniform(0.0, duration))
-        except subprocess.TimeoutExpired:
-            how = signal.SIGTERM if killed % 3 == 2 else signal.SIGKILL
-            os.killpg(process.pid, how)
-            if process.wait() == -how:
-                killed += 1
-                continue
-        assert process.returncode == 0, (tmp_path / "log").read_text()[-2000:]
+        if _working(process, log):
+            try:
+                process.wait(moments.uniform(0.0, duration))
+            except subprocess.TimeoutExpired:
+                how = signal.SIGTERM if killed % 3 == 2 else signal.SIGKILL
+                os.killpg(process.pid, how)
+                if process.wait() == -how:
+                    killed += 1
+                    continue
+        assert process.returncode == 0, log.read_text()[-2000:]
         assert result(tmp_path / f"killed-{rounds}") == expected
         rounds += 1
-    print(f"{kind}: ended {killed} times within {duration:.0f} s, in {rounds + 1} runs")
-    assert _start(command, tmp_path / f"killed-{rounds}").wait() == 0, (tmp_path / "log").read_text()[-2000:]
+    print(f"{kind}: ended {killed} times within {duration:.0f} s of work, in {rounds + 1} runs")
+    assert _start(command, tmp_path / f"killed-{rounds}").wait() == 0, log.read_text()[-2000:]
     assert result(tmp_path / f"killed-{rounds}") == expected
