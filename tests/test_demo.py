@@ -4,17 +4,15 @@ import pytest
 
 from chaosgym import demo
 from chaosgym.errors import DatasetError
-from chaosgym.sweeps import Axis
+from tests.small_demo import SMALL
 
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:CUDA initialization")
 def test_demo_computes_every_number_and_draws_the_figure(tmp_path, monkeypatch):
     """Three points of the printed natures, a typed sweep, a judged classifier, an agent beside two rules."""
-    axes = (Axis("excitation_frequency", 6.0, 30.0, 24, "log"), Axis("clearance", 1.07e-4, 1.47e-4, 5))
-    monkeypatch.setattr(demo, "AXES", axes)
-    monkeypatch.setattr(demo, "TRAINING_STEPS", 1600)
-    monkeypatch.setattr(demo, "MACHINES", 2)
+    for name, value in SMALL.items():
+        monkeypatch.setattr(demo, name, value)
     said = []
     result = demo.run_demo(tmp_path / "demo", say=said.append)
     assert [row["nature"] for row in result["points"].values()] == ["periodic", "periodic", "chaotic"]

@@ -15,13 +15,13 @@ BEAM = "chaosgym/ImpactBeamTolerance-v1"
 WORN = "chaosgym/ImpactBeamWear-v1"
 OWN = str(AGENTS.parent / "docs" / "machines" / "moon-shaw-1983.toml")
 SMALL = {
-    "ppo": ("--rollout", "60", "--batch", "240"),
-    "recurrent_ppo": ("--rollout", "60", "--batch", "240"),
-    "constrained_ppo": ("--rollout", "60", "--batch", "240"),
-    "sac": ("--gradient-steps", "1"),
+    "ppo": ("--envs", "32", "--rollout", "60", "--batch", "240"),
+    "recurrent_ppo": ("--envs", "8", "--rollout", "60", "--batch", "240"),
+    "constrained_ppo": ("--envs", "32", "--rollout", "60", "--batch", "240"),
+    "sac": ("--envs", "32", "--gradient-steps", "1"),
 }
-FEW = {"recurrent_ppo": 4_000}
-"""Steps of the first run, of which a recurrent network needs minutes; 11,000 for the others."""
+FEW = {"recurrent_ppo": 960}
+"""Steps of the first run: a job of each machine where the network is recurrent, which is slow; else 11,000."""
 
 
 def _train(script, out, steps, *options):
@@ -36,12 +36,12 @@ def _train(script, out, steps, *options):
 def test_a_script_trains_resumes_and_exports(script, tmp_path):
     """A row for every 10,000 steps or for fewer in all, a second run goes on, and the policy plays a job."""
     out, steps = tmp_path / "run", FEW.get(script, 11_000)
-    _train(script, out, steps, "--envs", "32", *SMALL[script])
+    _train(script, out, steps, *SMALL[script])
     rows = list(csv.DictReader((out / "progress.csv").read_text().splitlines()))
     assert len(rows) == 1
     assert float(rows[0]["return"]) < 0.0
     assert 0.0 <= float(rows[0]["type_iii"]) <= 1.0
-    _train(script, out, 2 * steps, "--envs", "32", *SMALL[script])
+    _train(script, out, 2 * steps, *SMALL[script])
     assert len((out / "progress.csv").read_text().splitlines()) >= 3
     assert play(load_policy(out), BEAM, range(2)).returns.max() < 0.0
 

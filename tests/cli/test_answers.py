@@ -13,8 +13,8 @@ from click.testing import CliRunner
 
 from chaosgym import demo
 from chaosgym.cli import app
-from chaosgym.sweeps import Axis
 from tests.cli.test_conventions import every_command
+from tests.small_demo import SMALL
 
 DOCS = Path(__file__).parents[2] / "docs"
 SCHEMA = json.loads((DOCS / "answers.schema.json").read_text("utf-8"))
@@ -33,6 +33,9 @@ clearance = "5 %"
 load_rating = "300 N"
 life = "2000 Mcycles"
 reliability = 0.999
+[changes]
+clearance = ["0.0635 mm"]
+excitation_frequency = ["7 Hz"]
 [archard]
 limit = "0.2 mm"
 sliding = "2 mm"
@@ -79,9 +82,9 @@ LONG = {
     "stability": "impact-beam --workers 1",
     "compare": f'{BEAM} --machines 2 --only "follow the demand" --out scores.parquet',
     "design": f"brief.toml --workers 1 --plot b.png; brief.toml other.toml --workers 1;"
-    f"brief.toml --workers 1 --beside {PEAKS}",
-    "train-classifier": f"--data {DOCS.parent}/datasets/impact-beam --out learned",
+    f"other.toml --workers 1 --beside {PEAKS}",
     "demo": "--out demo",
+    "train-classifier": "--data demo/sweep --out learned",
 }
 
 APART = {"explore"}
@@ -158,10 +161,9 @@ def test_an_answer_of_explore():
 def test_long_answers(tmp_path, monkeypatch):
     """The same of what takes longer; the demo with a smaller sweep and a shorter training."""
     monkeypatch.chdir(tmp_path)
-    axes = (Axis("excitation_frequency", 6.0, 30.0, 24, "log"), Axis("clearance", 1.07e-4, 1.47e-4, 5))
-    for name, value in (("AXES", axes), ("TRAINING_STEPS", 1600), ("MACHINES", 2)):
+    for name, value in SMALL.items():
         monkeypatch.setattr(demo, name, value)
-    for name in ("brief.toml", "other.toml"):
-        (tmp_path / name).write_text(BRIEF)
+    (tmp_path / "brief.toml").write_text(BRIEF)
+    (tmp_path / "other.toml").write_text(BRIEF.partition("[archard]")[0])
     for name, forms in LONG.items():
         check_forms(name, forms)
