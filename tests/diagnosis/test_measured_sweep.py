@@ -89,3 +89,24 @@ def test_a_machine_that_never_touches_has_no_irregular_speed():
     """All peaks zero: periodic, and nothing falls."""
     found = sweep_types(np.repeat([1.0, 2.0, 3.0], 16), np.zeros(48), sensor_error=0.0)
     assert [(one.type, one.speeds) for one in found.regions] == [("I", 3)]
+
+
+@pytest.mark.parametrize(
+    ("levels", "route"), [((2.8, 3.2, 3.5, 3.7), "period doubling"), ((2.8, 3.2, 3.7), "not told")]
+)
+@pytest.mark.parametrize("upwards", [True, False])
+def test_two_doublings_before_irregular_motion_name_the_route(levels, route, upwards):
+    """Peaks of the logistic map with errors of 0.5 %: periods 1, 2 and 4, then chaos; one doubling tells nothing."""
+    generator, speeds, peaks = np.random.default_rng(2), [], []
+    for number, r in enumerate(levels if upwards else levels[::-1], 1):
+        x = 0.3
+        for _ in range(500):
+            x = r * x * (1.0 - x)
+        for _ in range(60):
+            x = r * x * (1.0 - x)
+            peaks.append(100.0 * x + generator.uniform(-0.5, 0.5))
+            speeds.append(float(number))
+    (found,) = sweep_types(speeds, peaks, sensor_error=0.5).beginnings
+    assert found.route == route
+    assert found.because.startswith("periods: 1 at")
+    assert {found.periodic, found.irregular} == ({len(levels) - 1, len(levels)} if upwards else {1, 2})

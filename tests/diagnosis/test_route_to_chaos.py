@@ -5,7 +5,13 @@ import numpy as np
 import pytest
 
 from chaosgym.diagnosis.bifurcation_diagram import SweepPoint, follow
-from chaosgym.diagnosis.route_to_chaos import _intermittent, feigenbaum_ratios, laminar_phases, routes_to_chaos
+from chaosgym.diagnosis.route_to_chaos import (
+    _intermittent,
+    feigenbaum_ratios,
+    laminar_phases,
+    routes_in_sweep,
+    routes_to_chaos,
+)
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
 
@@ -70,6 +76,13 @@ def test_an_impact_oscillator_becomes_chaotic_by_doubling():
         assert np.max(np.abs(states[period:] - states[:-period])) > 1e-3
     (onset,) = routes_to_chaos(diagram)
     assert onset.route == "period doubling"
+
+
+def test_a_sweep_is_asked_between_its_neighbours_only():
+    """The soft stop doubles its period from 0.3855 on and is chaotic at 0.389: a calm pair before adds nothing."""
+    onsets, crises = routes_in_sweep(SOFT, "speed", (0.385, 0.3855, 0.389), ("periodic", "periodic", "chaotic"))
+    assert [(one.periodic, one.chaotic, one.route) for one in onsets] == [(0.3855, 0.389, "period doubling")]
+    assert crises == ()
 
 
 def test_what_is_beside_a_stable_motion_is_not_told():

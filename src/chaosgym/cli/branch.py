@@ -94,7 +94,7 @@ def branch(
 
         routes = routes_to_chaos(found)
         result["routes"] = [one.as_dict() for one in routes]
-        lines += _at_most([_route_line(one) for one in routes])
+        lines += _at_most([one.line for one in routes])
     if out:
         write_table(_columns(found), out)
         result["out"] = out
@@ -168,11 +168,6 @@ def _lines(diagram: Any) -> list[str]:
         ),
     ]
     return lines + [f"  {line}" for line in diagram.not_followed]
-
-
-def _route_line(one: Any) -> str:
-    told = "route not told" if one.route == "not told" else one.route
-    return f"chaos between {one.periodic:.6g} and {one.chaotic:.6g}: {told}; {one.because}"
 
 
 def _at_most(lines: list[str]) -> list[str]:

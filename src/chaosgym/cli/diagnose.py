@@ -136,6 +136,9 @@ def _sweep_lines(told: dict[str, Any], found: Any) -> list[str]:
         natures = f"irregular at {wild} of {len(inside)} speeds" if wild else "periodic"
         forces = f"mean peak {region.lowest_mean:.4g} to {region.highest_mean:.4g} N"
         rows.append(f"  Type {region.type:4s} {span:18s} {natures}, {forces}")
+    for one in found.beginnings:
+        route = "route not told" if one.route == "not told" else one.route
+        rows.append(f"  irregular between {one.periodic:g} and {one.irregular:g}{unit}: {route}; {one.because}")
     return [*rows, *(f"  {note}" for note in told["notes"])]
 
 

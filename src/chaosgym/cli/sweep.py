@@ -37,6 +37,7 @@ from chaosgym.cli.output import draw, emit, picture_path, plot_option
 @click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
 @click.option("--scheduler", metavar="tcp://HOST:PORT", help="Compute on a Dask cluster (extra [cluster]).")
 @click.option("--repair", is_flag=True, help="Compute damaged chunks again.")
+@click.option("--routes", is_flag=True, help="Of one axis: also name how chaos begins, and its sudden changes.")
 @click.option("--out", type=click.Path(file_okay=False), required=True, help="Folder for the labelled points.")
 @plot_option()
 def sweep(
@@ -53,6 +54,7 @@ def sweep(
     workers: int | None,
     scheduler: str | None,
     repair: bool,
+    routes: bool,
     out: str,
     plot: str | None,
     as_json: bool,
@@ -74,6 +76,8 @@ def sweep(
     axes = tuple("=".join([field_named(machine, field), *span]) for field, *span in (text.split("=") for text in axes))
     chosen = tuple(Axis.parse(text, units) for text in axes) or default_axes(machine, kind)
     plan = SweepPlan(machine, chosen, kind, sizes.get(kind) or 0, seed, budget, signals, full_types)
+    if routes and (kind != "grid" or len(chosen) != 1):
+        raise click.UsageError("--routes needs a grid of one axis: --axis FIELD=LOW:HIGH:COUNT once")
     for text in axes:
         _note_millimetres(machine, text)
     labelled = run_sweep(plan, out, workers=workers, scheduler=scheduler, repair=repair, progress=True)
@@ -98,8 +102,26 @@ def sweep(
         ),
         *(f"  {warning}" for warning in warnings),
     ]
+    if routes:
+        told, more = _routes(plan, labelled)
+        result |= told
+        lines += more
     draw(picture, lambda plots: plots.response.sweep_map(labelled), result, lines)
     emit(result, as_json, lambda: lines)
+
+
+def _routes(plan: Any, labelled: Any) -> tuple[dict[str, Any], list[str]]:
+    """Routes to chaos and crises along the one axis: for JSON, and as lines."""
+    from chaosgym.diagnosis.orbit_family import continuous_field
+    from chaosgym.diagnosis.route_to_chaos import routes_in_sweep
+
+    field = continuous_field(plan.machine, plan.fields[0])
+    values, natures = labelled.column(field).tolist(), [str(one) for one in labelled.column("nature")]
+    onsets, crises = routes_in_sweep(plan.machine, field, values, natures, progress=True)
+    told = {"routes": [one.as_dict() for one in onsets], "crises": [one.as_dict() for one in crises]}
+    lines = [f"  {one.line}" for one in onsets]
+    lines += [f"  crisis between {one.first:.8g} and {one.second:.8g}: {one.because}" for one in crises]
+    return told, lines or ["  no place where chaos begins or changes suddenly"]
 
 
 def _note_millimetres(machine: Any, text: str) -> None:

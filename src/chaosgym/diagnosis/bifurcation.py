@@ -197,7 +197,7 @@ def _change_of_contacts(
         apart = abs(float(b.x[-1] - a.x[-1]))
         if length < placed or (length < NEAR_ENOUGH and apart < placed):
             break
-        doubt = min(max(doubt, 0.1 * placed / length), 0.25)
+        doubt = min(max(doubt, 0.4 * placed / length), 0.25)
         guess = float(np.clip(_guess(family, a, b, doubt), 1.01 * doubt, 1.0 - 1.01 * doubt))
         try:
             below = between(family, a, b, guess - doubt, CLOSELY)

@@ -9,9 +9,9 @@ r"""Types I, II and III along a measured sweep: peaks at many speeds, as in figu
 Along one parameter this is section 5.5.1 for a whole sweep; ``type_rule`` judges one point within its tolerances.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,17 +56,28 @@ class Region(NamedTuple):
     highest_mean: float
 
 
+class Beginning(NamedTuple):
+    """Irregular motion that begins between two neighbouring speeds: "period doubling" or "not told", and why."""
+
+    periodic: float
+    irregular: float
+    route: Literal["period doubling", "not told"]
+    because: str
+
+
 class SweepTypes(NamedTuple):
-    """What a measured sweep says: every speed, upwards, and the regions of types."""
+    """What a measured sweep says: every speed, upwards, the regions of types, and where irregular motion begins."""
 
     speeds: tuple[SweptSpeed, ...]
     regions: tuple[Region, ...]
+    beginnings: tuple[Beginning, ...]
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         return {
             "regions": [region._asdict() for region in self.regions],
             "speeds": [speed._asdict() for speed in self.speeds],
+            "beginnings": [one._asdict() for one in self.beginnings],
         }
 
 
@@ -103,14 +114,16 @@ def sweep_types(
         raise DiagnosisError("a sweep needs the sensor's error: --sensor-error or --sensor-sigma (3 N in the thesis)")
     at, force = np.asarray(speeds, dtype=float), np.asarray(peaks, dtype=float)
     runs = _runs(at, force)
-    irregular = [_is_irregular(run, error.half_width, sensor_error, sensor_sigma) for _, run in runs]
+    judged = [_judged(run, error.half_width, sensor_error, sensor_sigma) for _, run in runs]
+    irregular = [wild for wild, _ in judged]
     means = [float(run.mean()) for _, run in runs]
     types = _types(irregular, means, error.half_width)
     found = tuple(
         SweptSpeed(speed, "irregular" if wild else "periodic", len(run), mean, float(run.min()), float(run.max()), kind)
         for (speed, run), wild, mean, kind in zip(runs, irregular, means, types, strict=True)
     )
-    return SweepTypes(found, _regions(found))
+    periods = [None if wild else period for wild, period in judged]
+    return SweepTypes(found, _regions(found), tuple(_beginnings([speed for speed, _ in runs], irregular, periods)))
 
 
 def _runs(speeds: Array, peaks: Array) -> list[tuple[float, Array]]:
@@ -137,10 +150,36 @@ def _runs(speeds: Array, peaks: Array) -> list[tuple[float, Array]]:
     return found
 
 
-def _is_irregular(run: Array, half_width: float, sensor_error: float | None, sensor_sigma: float | None) -> bool:
-    """Whether peaks vary by more than the sensor errs, at every short period."""
-    nature = judge_peaks(run, sensor_error=sensor_error, sensor_sigma=sensor_sigma).diagnosis.nature
-    return nature != "periodic" and irregularity(run, LONGEST_PERIOD) > half_width
+def _judged(
+    run: Array, half_width: float, sensor_error: float | None, sensor_sigma: float | None
+) -> tuple[bool, int | None]:
+    """Whether peaks vary by more than the sensor errs, at every short period; and after how many cycles they repeat."""
+    verdict = judge_peaks(run, sensor_error=sensor_error, sensor_sigma=sensor_sigma).diagnosis
+    return verdict.nature != "periodic" and irregularity(run, LONGEST_PERIOD) > half_width, verdict.period
+
+
+def _beginnings(
+    speeds: Sequence[float], irregular: Sequence[bool], periods: Sequence[int | None]
+) -> Iterator[Beginning]:
+    """Where a periodic speed has an irregular neighbour, and whether the period doubled twice on the way there."""
+    for step in (1, -1):
+        order = range(len(speeds)) if step > 0 else range(len(speeds) - 1, -1, -1)
+        passed: list[tuple[int, float]] = []
+        for place in order:
+            period = periods[place]
+            if not irregular[place]:
+                # a sequence of periods, each with the speed at which it was seen first; it begins anew where it breaks
+                if period is None or (passed and period not in (passed[-1][0], 2 * passed[-1][0])):
+                    passed = []
+                if period is not None and (not passed or period != passed[-1][0]):
+                    passed.append((period, speeds[place]))
+                continue
+            before = place - step
+            if 0 <= before < len(speeds) and not irregular[before]:
+                seen = ", ".join(f"{p} at {speed:g}" for p, speed in passed) or "unknown"
+                route: Any = "period doubling" if len(passed) > 2 else "not told"
+                yield Beginning(speeds[before], speeds[place], route, f"periods: {seen}")
+            passed = []
 
 
 def _types(irregular: Sequence[bool], means: Sequence[float], error: float) -> list[Type]:

@@ -5,8 +5,8 @@ r"""Routes to chaos: by which bifurcation a periodic response gives way to a cha
                       closer to the fold, with the distance to the power -1/2 (type I of Pomeau and Manneville)
     grazing           stability ends where a contact begins or ends at zero speed
     torus             stability ends in a Neimark-Sacker bifurcation
-    not told          anything else; the reason says what was seen. A crisis is not told from a jump to a chaos that
-                      was there before.
+    crisis            none of these; the chaotic motion, carried towards the periodic point, ends and leaves its range
+    not told          anything else; the reason says what was seen
 
 References
 ----------
@@ -14,14 +14,24 @@ M. J. Feigenbaum, J. Stat. Phys. 19 (1978) 25-52. Y. Pomeau, P. Manneville, Comm
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from itertools import groupby, pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
 from chaosgym.diagnosis.bifurcation import Bifurcation
-from chaosgym.diagnosis.bifurcation_diagram import SAME_PLACE, BifurcationDiagram, Branch, SweepPoint
+from chaosgym.diagnosis.bifurcation_diagram import (
+    PATIENCE,
+    SAME_PLACE,
+    BifurcationDiagram,
+    Branch,
+    SweepPoint,
+    follow,
+)
+from chaosgym.diagnosis.crisis import Crisis, boundary_crisis, carried, interior_crisis
 from chaosgym.errors import SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
@@ -29,7 +39,7 @@ from chaosgym.simulation import simulate
 
 Array = NDArray[np.float64]
 
-Route = Literal["period doubling", "intermittency", "grazing", "torus", "not told"]
+Route = Literal["period doubling", "intermittency", "grazing", "torus", "crisis", "not told"]
 
 SAME_PEAK = 0.02
 """Relative difference of peaks by which a point of a sweep lies on a branch, between two of its orbits."""
@@ -42,6 +52,9 @@ LAMINAR = 0.1
 
 FEWEST_PHASES, LONGER = 12, (2.0, 8.0)
 """Laminar phases that are needed, and how much longer they may be at a sixteenth of the distance: 4 by theory."""
+
+DOUBLED, UNSTABLE = 24, 10.0
+"""Longest period of a doubled branch between two points of a sweep, and its largest multiplier: stability counts."""
 
 PERIODS, SETTLED = 3000, 300
 """Periods of a motion that is searched for laminar phases, after those in which it settles."""
@@ -65,6 +78,12 @@ class Onset(NamedTuple):
     route: Route
     because: str
 
+    @property
+    def line(self) -> str:
+        """One line for people."""
+        told = "route not told" if self.route == "not told" else self.route
+        return f"chaos between {self.periodic:.6g} and {self.chaotic:.6g}: {told}; {self.because}"
+
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         return self._asdict()
@@ -83,8 +102,52 @@ def routes_to_chaos(diagram: BifurcationDiagram) -> tuple[Onset, ...]:
     for pair in pairwise(diagram.sweep):
         for one, other in (pair, pair[::-1]):
             if one.period is not None and other.nature == "chaotic":
-                found.append(Onset(one.value, other.value, *_told(diagram, one, other)))
+                found.append(Onset(one.value, other.value, *_told_or_crisis(diagram, one, other)))
     return tuple(found)
+
+
+def routes_in_sweep(
+    machine: Machine, field: str, values: Sequence[float], natures: Sequence[str], *, progress: bool = False
+) -> tuple[tuple[Onset, ...], tuple[Crisis, ...]]:
+    """Routes to chaos, and interior crises, between neighbouring points of a sweep along one field.
+
+    Each pair of a periodic and a chaotic point is followed by branches of its own; between chaotic ones the motion is
+    carried from one to the other, where its size changes.
+
+    Parameters
+    ----------
+    machine, field
+        What was swept.
+    values, natures : (n,)
+        Upwards, and what the machine does there from rest.
+    progress
+        Show a progress bar on standard error if it takes more than two seconds.
+    """
+    onsets: list[Onset] = []
+    crises, run = [], carried(machine, field)
+    pairs = list(pairwise(zip(values, natures, strict=True)))
+    for (low, below), (high, above) in tqdm(pairs, desc="routes", unit="pair", delay=PATIENCE, disable=not progress):
+        if {below, above} == {"periodic", "chaotic"}:
+            diagram = follow(
+                machine, field, (low, high), sweep=2, workers=1, longest_period=DOUBLED, most_unstable=UNSTABLE
+            )
+            onsets += routes_to_chaos(diagram)
+        elif below == above == "chaotic":
+            with suppress(SimulationError):
+                crises.append(interior_crisis(run, low, high))
+    return tuple(onsets), tuple(one for one in crises if one is not None)
+
+
+def _told_or_crisis(diagram: BifurcationDiagram, periodic: SweepPoint, chaotic: SweepPoint) -> tuple[Route, str]:
+    """Route between two points, and the reason; where the periodic motion tells none, that of the chaotic one."""
+    route, because = _told(diagram, periodic, chaotic)
+    if route == "not told":
+        run = carried(diagram.machine, diagram.field)
+        with suppress(SimulationError):
+            crisis = boundary_crisis(run, chaotic.value, periodic.value)
+            if crisis is not None:
+                return "crisis", f"{because}; {crisis.because}"
+    return route, because
 
 
 def _told(diagram: BifurcationDiagram, periodic: SweepPoint, chaotic: SweepPoint) -> tuple[Route, str]:
