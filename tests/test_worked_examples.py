@@ -49,6 +49,10 @@ def test_the_pipe_is_of_the_type_that_the_page_says():
     assert 1e-6 * found.bending.nominal.equivalent == pytest.approx(float(told), rel=0.1)
 
 
+LEFT_OPEN = {"fatigue life": 0.15, "reliability": 0.15, "load rating": 0.15, "bending life": 1.07**5 - 1.0}
+"""What chaos leaves open between computers: bending goes by the fifth power of the stress, known to 7 %."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_an_example_prints_what_the_page_shows(name, tmp_path):
@@ -60,5 +64,6 @@ def test_an_example_prints_what_the_page_shows(name, tmp_path):
         {key: float(value.replace(",", "")) for key, value in re.findall(pattern, text)} for text in (given, page)
     )
     assert new.keys() == old.keys()
-    assert new == pytest.approx(old, rel=0.15)
+    for key, value in new.items():
+        assert value == pytest.approx(old[key], rel=LEFT_OPEN[key]), key
     assert re.findall(r"  Type (\w+):", given) == re.findall(r"  Type (\w+):", page)
