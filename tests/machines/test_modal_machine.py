@@ -263,6 +263,7 @@ BAD = {
         [('"2.83, -2.79, 2.71', '"1, -1, 1'), ('"0.96, 2.02, -0.05', '"0.3, 0.7, 0')], "not mass-normalised"),
     "a reversed range": ([('"6 to 24 Hz"', '"24 to 6 Hz"')], "speed_range is no range"),
     "a wrong tolerance": ([("damping_factor =", "dampening =")], "no key 'dampening'"),
+    "a stiffness that varies": ([('"2 N/um"', '"1, 2, 3 N/um"')], "is several numbers; allowed: one, which holds at"),
     "two sources": ([('# matrices = "model.npz"', 'matrices = "my-machine.toml"')], "frequencies and matrices"),
     "no such file": (
         [("frequencies = ", "# frequencies = "), ('# matrices = "model.npz"', 'matrices = "gone.npz"')], "gone.npz"),

@@ -115,7 +115,12 @@ def parse_quantity(name: str, given: Any, unit: str, allowed: Mapping[str, float
     try:
         float(number)
     except ValueError:
-        raise ParameterError(f"{name} = {shown(given)} does not begin with a number") from None
+        what = (
+            "is several numbers; allowed: one, which holds at all times"
+            if "," in given
+            else "does not begin with a number"
+        )
+        raise ParameterError(f"{name} = {shown(given)} {what}") from None
     if written not in allowed:
         what = f"has the unknown unit {shown(written)}" if written else "has no unit"
         raise ParameterError(f"{name} = {shown(given)} {what} (allowed: {listed})")
