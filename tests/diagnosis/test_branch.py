@@ -128,9 +128,38 @@ def test_published_bifurcations_of_an_impact_oscillator(kind, omega, start, span
     assert without_square_root(values) == pytest.approx(published, abs=5e-9)
 
 
-def test_a_published_curve_of_folds_over_force_and_speed():
-    """The fold above, followed over the speed: A at w = 0.799301 by Ghosh and Simpson (pp2_omega0.8_SN.csv)."""
-    values = []
+FOLDS = {
+    0.7991009999999996: 0.3627147379941339,
+    0.7992009999999992: 0.3625895549187631,
+    0.7993009999999987: 0.3624594710373588,
+    0.7994009999999983: 0.3623244834212251,
+    0.7995009999999978: 0.3621845897763788,
+    0.7996009999999973: 0.3620397884720745,
+}
+FLIPS = {
+    0.8089900000000002: 0.3487660345670140,
+    0.8079900000000003: 0.3500227870570876,
+    0.8069900000000004: 0.3513161435200777,
+    0.8059900000000005: 0.3526465823434107,
+    0.8049900000000007: 0.3540145838443710,
+    0.8039900000000008: 0.3554206433583996,
+}
+"""Force at which the orbit folds, and flips, by w: Ghosh and Simpson, pp2_omega0.8_SN.csv and pp2_omega0.8_PD.csv."""
+
+
+@pytest.mark.parametrize(
+    ("kind", "omega", "start", "span", "published", "digits"),
+    [
+        ("fold", 0.799, (0.363, 0.034154055932653, 0.245022580357925), (0.3620, 0.3632), FOLDS, 1e-11),
+        ("flip", 0.81, (0.36, 7.755681336950062, 0.4090970364289), (0.347, 0.362), FLIPS, 1e-8),
+    ],
+)
+def test_a_published_diagram_over_force_and_speed(kind, omega, start, span, published, digits):
+    """Fold and flip above, followed over the speed: both curves of Ghosh and Simpson's diagram, from their data files.
+
+    Their multipliers miss -1 by up to 1e-5, which moves a flip by 1e-8; a fold moves with the square.
+    """
+    found = []
     for stiffness in (1e8, 4e8, 1.6e9, 6.4e9):
         machine = oscillator(
             damping=0.02,
@@ -138,17 +167,22 @@ def test_a_published_curve_of_folds_over_force_and_speed():
             contact_damping=damper_of(0.9, stiffness),
             stops="one",
             angle=-math.pi / 2.0,
-            speed=0.799 / (2.0 * math.pi),
-            force=0.363,
+            speed=omega / (2.0 * math.pi),
+            force=start[0],
         )
-        state = shaken(0.799, 0.363, 0.034154055932653, 0.245022580357925, 0.9)
-        _, found = branch_from(machine, "drive_level", 0.3625, 0.3632, state, 2, -1.0)
-        fold = next(each.bifurcation for each in found.found if each.bifurcation.kind == "fold")
-        span = 0.799 / (2.0 * math.pi), 0.7993009999999987 / (2.0 * math.pi)
-        curve = follow_bifurcation(machine, fold, "drive_level", "speed", span, steps=4)
-        assert curve.ends[1].startswith("end of the range")
-        values.append(float(curve.along_values[-1]))
-    assert without_square_root(values) == pytest.approx(0.3624594710373588, abs=5e-9)
+        state = shaken(omega, *start, 0.9)
+        _, branch = branch_from(machine, "drive_level", *span, state, 2, -1.0)
+        first = next(each.bifurcation for each in branch.found if each.bifurcation.kind == kind)
+        values = []
+        for other in published:
+            ends = sorted((omega / (2.0 * math.pi), other / (2.0 * math.pi)))
+            curve = follow_bifurcation(machine, first, "drive_level", "speed", ends, steps=4)
+            last = int(np.argmin(np.abs(curve.against_values - other / (2.0 * math.pi))))
+            assert curve.against_values[last] == pytest.approx(other / (2.0 * math.pi), rel=1e-12)
+            values.append(float(curve.along_values[last]))
+        found.append(values)
+    limits = [without_square_root(values) for values in zip(*found, strict=True)]
+    assert limits == pytest.approx(list(published.values()), abs=digits)
 
 
 def test_the_flip_of_shaw_and_holmes_in_the_limit_of_stiff_stops():
