@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chaosgym import read_machine
 from chaosgym.design import Criteria, assess
 from chaosgym.design.combination import combination, influences, own_type, probability, total_indices
 from chaosgym.design.guidelines import case_of, guidelines
@@ -108,6 +109,27 @@ def test_where_chaos_is_mixed_in_every_machine_is_of_type_three(calm):
     around = [Neighbour({"clearance": side}, "chaotic", 60.0) for side in (-0.5, 0.5)]
     assert combination(calm, around, base=8).types["III"].share == 1.0
     assert any("all are of Type III" in one.sentence for one in guidelines(calm, around))
+
+
+def test_motions_that_coexist_leave_no_other_type_and_are_judged_by_the_worst():
+    """The gear pair of Kahraman and Singh has two motions at 0.72 of its mesh frequency (their jump, from both sides).
+
+    Started at rest it runs one of them; the life may rest on neither's statistics, since no share of them is known.
+    """
+    gear = read_machine("docs/machines/kahraman-singh-1990.toml").at(720.0)
+    found = assess(gear, {"clearance": Tolerance(0.01)}, Criteria(load_rating=500.0, life=1000.0), series_size=8)
+    peaks = [found.response.largest_peak, *found.response.coexisting_peaks]
+    assert max(peaks) > 2.0 * min(peaks)
+    assert {run.nature for run in found.series.runs} == {"periodic"}
+    assert found.type == "III"
+    assert found.evaluation.force == pytest.approx(max(run.largest_peak for run in found.series.runs), rel=0.02)
+    assert found.evaluation.force >= max(peaks)
+    assert found.evaluation.life == pytest.approx((500.0 / found.evaluation.force) ** (10.0 / 3.0))
+    assert combination(found, base=8).types["III"].share == 1.0
+    told = " ".join(one.sentence for one in guidelines(found))
+    assert "so that all are of Type III" in told
+    assert "outcome (" not in told
+    assert "worst case found in the tolerances" in told
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,16 @@ def test_life_under_constant_force():
     assert rating_life(50.0, 100.0) == pytest.approx(2.0 ** (10.0 / 3.0))
 
 
+def test_the_catalogue_rating_of_a_published_bearing():
+    """Shigley's Mechanical Engineering Design, 9th ed., example 11-1: 5000 h at 1725 rev/min under 400 lbf.
+
+    The rating for a million revolutions is 3211 lbf, 14.3 kN, by the exponent 3 of ball bearings.
+    """
+    million_turns, force = 5000.0 * 60.0 * 1725.0 / 1e6, 400.0 * 4.4482216
+    assert required_load_rating(force, million_turns, 3.0) / 4.4482216 == pytest.approx(3211.0, abs=1.0)
+    assert rating_life(force, 14.3e3, 3.0) == pytest.approx(million_turns, rel=5e-3)
+
+
 def test_life_under_two_levels():
     """A quarter of the cycles at the rating and the rest without force use up a life in 4 million cycles (eq. 5.4)."""
     assert statistical_life([100.0, 0.0], 100.0, probabilities=[0.25, 0.75]) == pytest.approx(4.0)

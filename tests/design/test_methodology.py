@@ -15,6 +15,7 @@ from chaosgym.design.improve import Trial, _rank, change_cost, default_changes
 from chaosgym.design.methodology import Check, fit_trend
 from chaosgym.design.reliability import hertz_pressure, normal_reliability
 from chaosgym.design.runs import build_series, settled_run
+from chaosgym.design.told import CRITERIA
 from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES, ImpactBeam
@@ -164,9 +165,17 @@ def test_improve_finds_the_cheapest_change_that_meets_the_criteria(chaotic):
 
 
 def test_improve_says_so_when_nothing_suffices(chaotic):
-    """With changes that do nothing there is no best one."""
-    found = improve(chaotic, {"contact_damping": [22.0], "damping_ratio": [0.011]}, series_size=4)
+    """With changes that do nothing there is no best one, and a seed or value that is the nominal one is none."""
+    changes = {"contact_damping": [22.0, chaotic.machine.contact_damping], "damping_ratio": [0.011]}
+    same = [{"excitation_frequency": 30.0}, {"clearance": 0.127e-3, "damping_ratio": 0.0105}]
+    found = improve(chaotic, changes, seeds=same, series_size=4)
     assert found.best is None
+    assert all({"excitation_frequency", "clearance"}.isdisjoint(trial.changes) for trial in found.suggestions)
+    assert all(trial.cost > 0.0 for trial in found.suggestions)
+    nearest = found.suggestions[0]
+    missed = next(check for check in nearest.assessment.checks if not check.met)
+    assert nearest.told in found.told
+    assert f"{missed.name} {CRITERIA[missed.name](missed.reached)} of" in found.told
     assert len(found.suggestions) >= 2
     assert found.screened > 2
 

@@ -173,7 +173,10 @@ def test_worked_example_of_the_documentation(chaotic):
     """What the page prints is what the command gives, within what chaos leaves open between computers."""
     page = (DOCUMENTATION / "commands" / "design.md").read_text()
     shown, given = (
-        {name: float(value) for name, value in re.findall(r"  (fatigue life|reliability|load rating) +([\d.]+)", text)}
+        {
+            name: float(value.replace(",", ""))
+            for name, value in re.findall(r"  (fatigue life|reliability|load rating) +([\d.,]+)", text)
+        }
         for text in (page, "\n".join(chaotic.lines()))
     )
     assert shown.keys() == given.keys() == {"fatigue life", "reliability", "load rating"}

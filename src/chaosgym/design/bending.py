@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 from chaosgym.design.bearing import hours_of
 from chaosgym.design.fatigue import rainflow_means
 from chaosgym.design.runs import SettledRun
+from chaosgym.design.told import hours_told
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameter, parameters_of, validate
@@ -262,7 +263,7 @@ class BendingLife:
     def told(self, cycle_period: float) -> list[str]:
         """Lines for people; the period of a cycle in s."""
         own, asked = self.nominal, self.bending
-        lives = (_hours(life, cycle_period) for life in (self.lives[0], self.worst))
+        lives = (hours_told(hours_of(life, cycle_period)) for life in (self.lives[0], self.worst))
         lines = [
             f"bending {asked.section.told}: {1e-6 * own.lowest:.4g} to {1e-6 * own.highest:.4g} MPa, equivalent "
             f"amplitude {1e-6 * own.equivalent:.4g} MPa a cycle",
@@ -288,10 +289,6 @@ class BendingLife:
             "lives": [life if math.isfinite(life) else None for life in self.lives],
             "assured": self.assured if math.isfinite(self.assured) else None,
         }
-
-
-def _hours(life: float, cycle_period: float) -> str:
-    return f"{hours_of(life, cycle_period):,.4g} h" if math.isfinite(life) else "without end"
 
 
 def bending_life(runs: Sequence[SettledRun], bending: Bending, *, workers: int | None = None) -> BendingLife:

@@ -2,9 +2,9 @@ r"""What tolerances do in combination: how probable each type is, and which para
 
 Of the machines built to the tolerances each has a type of its own: III if its response does not repeat, II if it
 repeats and its largest peak force exceeds the nominal one by 10 %, I otherwise; III throughout where periodic and other
-responses are mixed (case III of 5.5.1). Shares of them are probabilities, with
-intervals of Clopper and Pearson; machines of a Sobol sequence lie more evenly than independent ones, for which these
-hold.
+responses are mixed (case III of 5.5.1), or where motions of different force coexist. Shares of them are probabilities,
+with intervals of Clopper and Pearson; machines of a Sobol sequence lie more evenly than independent ones, for which
+these hold.
 
 The total index of a parameter is the share of the variance that it takes part in, alone or together with others:
 
@@ -213,7 +213,7 @@ def combination(
     """
     runs = found.series.runs or (found.nominal,)
     confidence = found.criteria.confidence
-    mixed = case_of(found, further) == "III"
+    mixed = case_of(found, further) == "III" or found.response.coexists
     types = ["III" if mixed else own_type(run, found.nominal.largest_peak) for run in runs]
     natures = [run.nature for run in runs]
     return Combination(

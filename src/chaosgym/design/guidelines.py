@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 from chaosgym.design.methodology import Assessment
+from chaosgym.design.told import listed
 from chaosgym.diagnosis import Neighbour, Type, signs_of_chaos
 from chaosgym.diagnosis.precursors import measured_rates
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE, mixed
@@ -34,6 +35,9 @@ CASES: dict[Case, str] = {
     "III": "periodic and other responses are mixed in the tolerances, and all are of Type III",
     "undetermined": "the nominal response is undetermined, so that no case is told",
 }
+
+COEXISTING = "motions with forces more than 10 % apart coexist at the nominal machine, so that all are of Type III"
+"""What the case becomes where an initial state decides."""
 
 EVALUATION: dict[Type, str] = {
     "I": "the predicted trend, taken to the unfavourable corner of the tolerances, evaluates the machine",
@@ -104,12 +108,14 @@ def guidelines(found: Assessment, further: Sequence[Neighbour] = ()) -> tuple[Gu
     if case != "undetermined":
         told += _held(case, found)
     said.append(Guideline("5.5.1", told))
-    if case == "I":
+    if found.response.coexists:
+        said.append(Guideline("5.5.1", COEXISTING))
+    elif case == "I":
         above = sum(one.largest_peak > (1.0 + FORCE_CHANGE) * found.nominal.largest_peak for one in machines)
         some = f"(3): {len(machines) - above} are Type I and {above} Type II, 10 % of force above the nominal one"
         outcome = "(1): all are Type I" if not above else "(2): all are Type II" if above == len(machines) else some
         said.append(Guideline("5.5.1", f"outcome {outcome}"))
-    said.append(Guideline("5.6, phase VI", EVALUATION[found.type]))
+    said.append(Guideline("5.6, phase VI", EVALUATION["II" if found.response.coexists else found.type]))
     said.append(Guideline("5.6, phase VII", _next(found)))
     return tuple(said)
 
@@ -129,4 +135,4 @@ def _next(found: Assessment) -> str:
     if found.verdict == "undetermined":
         return "the nominal response is undetermined: settle it by more cycles or by other nominal values, then go on"
     missed = [check.name for check in found.checks if not check.met]
-    return f"{' and '.join(missed)} missed: change the machine, and go through phases I to VI again"
+    return f"{listed(missed)} missed: change the machine, and go through phases I to VI again"

@@ -26,6 +26,7 @@ from chaosgym.design.bearing import Evaluation, evaluate
 from chaosgym.design.collective import assess_duty
 from chaosgym.design.methodology import SERIES_SIZE, Assessment, Check
 from chaosgym.design.runs import deviating, sobol_shares, worse_side
+from chaosgym.design.told import CRITERIA, listed
 from chaosgym.diagnosis import default_tolerances
 from chaosgym.errors import DesignError, ParameterError, SimulationError
 from chaosgym.machines import Machine
@@ -64,6 +65,9 @@ MOST_VERIFIED = 8
 
 SPARE = 3
 """Of these, candidates beside the front of cost against life and robustness."""
+
+SAME = 6e-4
+"""Share of a value by which a candidate, rounded to four digits, may miss the nominal one that it stands for."""
 
 REFINEMENTS = 3
 """Bisections between the change that suffices and the nominal value."""
@@ -137,6 +141,22 @@ class Improvement:
         rows = [(-trial.cost, trial.life, trial.robustness) for trial in self.suggestions]
         kept = [trial for trial, keep in zip(self.suggestions, not_dominated(rows), strict=True) if keep]
         return tuple(sorted(kept, key=lambda trial: trial.cost))
+
+    @property
+    def told(self) -> str:
+        """What was found if nothing suffices, for people: the change that misses least, and what it misses."""
+        if not self.suggestions:
+            return "no change to try is stated"
+        nearest = self.suggestions[0]
+        missed = [
+            f"{check.name} {CRITERIA[check.name](check.reached)} of {CRITERIA[check.name](check.required)}"
+            for check in nearest.assessment.checks
+            if not check.met
+        ]
+        return (
+            f"none of {len(self.suggestions)} changes that were assessed meets all criteria; nearest: {nearest.told} "
+            f"with {listed(missed) or 'a nominal response that is undetermined'}"
+        )
 
 
 def not_dominated(rows: Sequence[Sequence[float]]) -> list[bool]:
@@ -301,11 +321,12 @@ def improve(
             return None
         return Trial(dict(change), change_cost(machine, change, weights, force), result)
 
-    singles: list[Mapping[str, float]] = [
-        {name: float(value)} for name, row in values.items() for value in row if _allowed(machine, {name: value}, force)
+    stated = [
+        {name: float(value)} for name, row in values.items() for value in row if value != getattr(machine, name, None)
     ]
-    proposed = [*seeds, *_between(machine, values, force)]
-    further = _distinct([one for one in proposed if _allowed(machine, one, force)], singles)
+    singles: list[Mapping[str, float]] = [one for one in stated if _allowed(machine, one, force)]
+    proposed = [_changed(machine, one) for one in (*seeds, *_between(machine, values, force))]
+    further = _distinct([one for one in proposed if one and _allowed(machine, one, force)], singles)
     pairs = _distinct([{**a, **b} for a, b in combinations([*singles, *further], 2) if a.keys().isdisjoint(b)], [])
     pairs = sorted(pairs, key=lambda one: change_cost(machine, one, weights, force))[:MOST_PAIRS]
     candidates = [*further, *pairs]
@@ -340,6 +361,15 @@ def _allowed(machine: Machine, change: Mapping[str, float], force: float) -> boo
     except ParameterError:
         return False
     return True
+
+
+def _changed(machine: Machine, change: Mapping[str, float]) -> dict[str, float]:
+    """The fields of a candidate that differ from the nominal ones by more than their rounding."""
+    return {
+        name: value
+        for name, value in change.items()
+        if not math.isclose(value, getattr(machine, name, math.nan), rel_tol=SAME)
+    }
 
 
 def _between(machine: Machine, values: Mapping[str, tuple[float, ...]], force: float) -> Iterable[dict[str, float]]:

@@ -10,8 +10,9 @@ r"""The design methodology of thesis 5.6: does a machine meet its criteria, what
 
 Type I: peak forces follow a trend, log F = log F_0 + sum b_i d_i with deviations d_i in tolerances; the evaluation
 takes the trend to the unfavourable corner of the region, or to the worst machine found if that is worse. With no
-tolerances it is the classical answer for the nominal machine. Type II: the largest peak found anywhere in the region.
-Type III: the peaks of all machines of the region together, each machine equally likely; the verdict takes the
+tolerances it is the classical answer for the nominal machine. Type II: the largest peak found anywhere in the region;
+so too where motions of different force coexist at the nominal machine, since no share of them is known. Type III
+otherwise: the peaks of all machines of the region together, each machine equally likely; the verdict takes the
 unfavourable end of the confidence interval.
 
 Together is not one by one: in a region of Type III some machines live much longer than others. So a share of the
@@ -329,8 +330,9 @@ def _by_type(
         return evaluate(
             [peaks], criteria, "Type I: the trend, taken to the unfavourable corner of the tolerances", seed
         )
-    if response.type == "II":
-        method = "Type II: the largest peak force found in the tolerances, in every cycle"
+    if response.type == "II" or response.coexists:
+        why = "motions coexist, and which one runs depends on how it started: " if response.type == "III" else ""
+        method = f"Type {response.type}: {why}the largest peak force found in the tolerances, in every cycle"
         return evaluate([np.array([worst])], criteria, method, seed)
     blocks = [run.worse_side(exponent) for run in (nominal, *series.runs)]
     if len(blocks) == 1:

@@ -15,6 +15,7 @@ from chaosgym.design.improve import Improvement, Trial, improve
 from chaosgym.design.methodology import Assessment, Check
 from chaosgym.design.peak_impacts import PeakImpactDiagram, filling_cycles, peak_impacts, worn_side
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
+from chaosgym.design.told import CRITERIA, hours_told
 from chaosgym.design.trends import HISTORY_SAMPLES, LifeTrend, life_against
 from chaosgym.diagnosis import Neighbour, ResponseMap, find_periodic_orbit, response_map
 from chaosgym.diagnosis.margins import Margins, margins
@@ -109,7 +110,7 @@ class DesignStudy:
             lines.append(f"  cheapest change that meets all criteria: {best.told}, cost {best.cost:.2f}")
             lines += [f"  dearer, and better: {one.told}, cost {one.cost:.2f}, {_better(one)}" for one in self.dearer]
         elif self.improvement is not None:
-            lines.append("  no change that was tried meets all criteria")
+            lines.append(f"  {self.improvement.told}")
         if self.life_over_speed is None:
             lines.append(f"  no life against speed: {NO_TREND}")
         return lines
@@ -122,7 +123,7 @@ class DesignStudy:
         for part, damage in zip(parts, damage_shares(parts), strict=True):
             found = part.assessment
             hours = hours_of(found.evaluation.life_interval.low, found.machine.cycle_period)
-            alone = f"{hours:,.4g} h if it ran at this speed alone" if np.isfinite(hours) else "no contact"
+            alone = f"{hours_told(hours)} if it ran at this speed alone" if np.isfinite(hours) else "no contact"
             speed = quantity_of(found.machine, found.machine.speed_field)
             lines.append(
                 f"{part.share:.0%} of the time at {speed}: Type {found.type}, {alone}, {damage:.0%} of the damage"
@@ -212,10 +213,11 @@ class DesignStudy:
 
 def _told(check: Check, cycle_period: float) -> str:
     """What a check reached of what is required; a life in hours first."""
-    told = f"{check.reached:.6g} of {check.required:g} {check.unit}".rstrip()
+    reached, required = (CRITERIA[check.name](value) for value in (check.reached, check.required))
+    told = f"{reached} of {required} {check.unit}".rstrip()
     if check.unit == "million cycles":
-        reached, required = (hours_of(life, cycle_period) for life in (check.reached, check.required))
-        told = f"{reached:,.4g} h of {required:,.4g} h in operation ({told})"
+        reached, required = (hours_told(hours_of(life, cycle_period)) for life in (check.reached, check.required))
+        told = f"{reached} of {required} in operation ({told})"
     return told + (" met" if check.met else " NOT met")
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.response import Diagnosis, Type
-from chaosgym.diagnosis.type_rule import FORCE_CHANGE, Neighbour, judge_type
+from chaosgym.diagnosis.type_rule import FORCE_CHANGE, Neighbour, apart, judge_type
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
@@ -95,6 +95,11 @@ class ResponseType:
     neighbours: tuple[Neighbour, ...] = field(repr=False)
     coexisting_peaks: tuple[float, ...]
     definition: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def coexists(self) -> bool:
+        """Whether the centre repeats, but with another force from another initial state."""
+        return self.centre.nature == "periodic" and any(apart(one, self.largest_peak) for one in self.coexisting_peaks)
 
     def over(self, built: Sequence[Neighbour]) -> "ResponseType":
         """Return the type over more machines of the region."""

@@ -80,7 +80,7 @@ def judge_type(
     if nature != "periodic":
         return "III", f"the nominal response is {nature}"
     for peak in coexisting_peaks:
-        if abs(peak - largest_peak) > FORCE_CHANGE * min(peak, largest_peak):
+        if apart(peak, largest_peak):
             return "III", f"another initial state leads to {peak:.3g} N instead of {largest_peak:.3g} N"
     restless = [point for point in points if point.nature != "periodic"]
     if restless:
@@ -97,6 +97,11 @@ def judge_type(
         more = highest.largest_peak / largest_peak - 1.0 if largest_peak > 0.0 else np.inf
         return "II", f"peak force {more:.0%} higher {highest.place}"
     return "I", "periodic throughout the tolerances, peak force less than 10 % higher"
+
+
+def apart(peak: float, other: float) -> bool:
+    """Whether two largest peak forces differ by what matters."""
+    return abs(peak - other) > FORCE_CHANGE * min(peak, other)
 
 
 def mixed(some: Sequence[Mapping[str, float]], others: Sequence[Mapping[str, float]]) -> bool:

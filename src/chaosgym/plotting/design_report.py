@@ -6,7 +6,6 @@ Figures are embedded as images, there is no script, and the page's own policy fo
 import base64
 import io
 import json
-import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -23,6 +22,7 @@ from chaosgym.design.fatigue import equivalent_force, rating_life
 from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.design.methodology import Assessment
 from chaosgym.design.study import DesignStudy
+from chaosgym.design.told import CRITERIA, hours_told, life_told, listed, number_told, percent_told, share_told
 from chaosgym.errors import DesignError
 from chaosgym.files import write_atomically
 from chaosgym.machines.parameters import Parameter, parameters_of, quantity_of
@@ -172,7 +172,7 @@ def agreement(studies: Mapping[str, DesignStudy], measured: MeasuredPeaks) -> st
             around.append(name)
     return (
         f"The equivalent force measured, {force:.1f} N, lies within what machines in the tolerances of "
-        f"{' and '.join(around) or 'no brief'} have"
+        f"{listed(around) or 'no brief'} have"
     )
 
 
@@ -197,16 +197,16 @@ def _column(study: DesignStudy) -> dict[str, str]:
         "nominal response": found.nominal.nature,
         "type over the tolerances": found.type,
         "machines in the tolerances": found.series.told.partition(" of ")[0],
-        "life in operation": _hours(hours_of(value.life_interval.low, period)),
-        "life required": _hours(hours_of(found.criteria.life, period)),
-        "reliability": _share(value.reliability_interval.low),
+        "life in operation": hours_told(hours_of(value.life_interval.low, period)),
+        "life required": hours_told(hours_of(found.criteria.life, period)),
+        "reliability": share_told(value.reliability_interval.low),
         "mean peak force, nominal": f"{np.mean(found.nominal.worse_side(exponent)):.1f} N",
         "largest peak force": f"{value.largest_force:.1f} N",
         "equivalent force": f"{value.force:.1f} N",
         "equivalent force of each machine": f"{min(forces):.1f} to {max(forces):.1f} N",
         "load rating needed": f"{value.required_load_rating:.0f} N",
-        "probability of meeting life and reliability": f"{_percent(meeting.share)} "
-        f"({_percent(meeting.low)} to {_percent(meeting.high)})",
+        "probability of meeting life and reliability": f"{percent_told(meeting.share)} "
+        f"({percent_told(meeting.low)} to {percent_told(meeting.high)})",
         "cheapest change that suffices": "none needed" if study.improvement is None else best.told if best else "none",
     }
 
@@ -218,15 +218,15 @@ def _measured_column(measured: MeasuredPeaks, study: DesignStudy) -> dict[str, s
     told = {
         "machine": measured.source.get("file", MEASURED),
         "nominal response": measured.verdict.diagnosis.nature,
-        "life in operation": _hours(hours_of(value.life_interval.low, period)),
-        "life required": _hours(hours_of(found.criteria.life, period)),
+        "life in operation": hours_told(hours_of(value.life_interval.low, period)),
+        "life required": hours_told(hours_of(found.criteria.life, period)),
         "mean peak force, nominal": f"{np.mean(measured.peaks):.1f} N",
         "largest peak force": f"{value.largest_force:.1f} N",
         "equivalent force": f"{value.force:.1f} N",
         "load rating needed": f"{value.required_load_rating:.0f} N",
     }
     if measured.strength_stated:
-        told["reliability"] = _share(value.reliability_interval.low)
+        told["reliability"] = share_told(value.reliability_interval.low)
     return told
 
 
@@ -267,6 +267,7 @@ def _rendered(template: str, command: str, **names: object) -> str:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
+    environment.filters["listed"] = listed
     environment.filters["words"] = environment.filters["named"] = lambda name: NAMES.get(name, name.replace("_", " "))
     known = {
         "version": __version__,
@@ -275,19 +276,12 @@ def _rendered(template: str, command: str, **names: object) -> str:
         "value_of": quantity_of,
         "tolerance_of": _tolerance,
         "newton": lambda value: f"{value:.2f} N",
-        "life": _life,
-        "hours": _hours,
-        "share": _share,
-        "number": _number,
-        "percent": _percent,
-        "shown": {
-            "fatigue life": _life,
-            "bending life": _life,
-            "wear life": _life,
-            "reliability": _share,
-            "safety factor": _number,
-            "machines that meet": _percent,
-        },
+        "life": life_told,
+        "hours": hours_told,
+        "share": share_told,
+        "number": number_told,
+        "percent": percent_told,
+        "shown": CRITERIA,
     }
     return environment.get_template(template).render(**known, **names) + "\n"
 
@@ -430,29 +424,3 @@ def _tolerance(found: Assessment, name: str) -> str:
     unit = parameters_of(found.machine)[name].unit
     value, unit = (1e3 * tolerance.value, "mm") if unit == "m" else (tolerance.value, unit)
     return f"±{value:.4g}" + ("" if unit == "-" else f" {unit}")
-
-
-def _number(value: float) -> str:
-    return f"{value:.3g}" if math.isfinite(value) else "no contact"
-
-
-def _life(value: float) -> str:
-    if not math.isfinite(value):
-        return "unlimited"
-    return f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"
-
-
-def _hours(value: float) -> str:
-    return f"{value:,.0f} h" if math.isfinite(value) else "no contact"
-
-
-def _share(value: float) -> str:
-    """Probability with as many nines as it has."""
-    if value >= 1.0 - 1e-9:
-        return "1.0000" if value == 1.0 else "> 0.99999999"
-    digits = max(4, math.ceil(-math.log10(1.0 - value)) + 1) if value > 0.0 else 4
-    return f"{value:.{min(digits, 9)}f}"
-
-
-def _percent(value: float) -> str:
-    return f"{100.0 * value:.0f} %"
