@@ -205,7 +205,7 @@ LINE = 'amplitude = "250 MPa"\ncycles = "1 Mcycles"\nslope = 5\nultimate = "600 
         ("impact-beam", 'at = "-1 mm"\n' + LINE, "outside the structure"),
         ("impact-beam", LINE, "no section; allowed: one of at"),
         ("impact-beam", 'at = "0.1 m"\nturn = "a"\n' + LINE, "has at and turn; allowed: one"),
-        ("impact-beam", 'at = "0.1 m"\nfibre = "1 mm"\n' + LINE, "has fibre, which goes with turn or curvatures"),
+        ("impact-beam", 'at = "0.1 m"\nfibre = "1 mm"\n' + LINE, "has fibre, which goes with turn, curvatures or link"),
         ("impact-beam", 'at = "0.1 m"\n' + LINE.replace('ultimate = "600 MPa"\n', ""), "lacks ultimate"),
         ("impact-beam", 'at = "0.1 m"\n' + LINE.replace("slope = 5", "slope = -5"), "slope = -5 is out of range"),
         ("impact-beam", 'at = "0.1 m"\nslop = 5\n' + LINE, "did you mean slope"),

@@ -59,7 +59,9 @@ class Section(NamedTuple):
     Attributes
     ----------
     at
-        Position [m] on the machine's own beam, from its pivot on.
+        Position [m] on the machine's own beam, from its pivot on; with ``link`` on that link, from its start on.
+    link
+        Name of a link of a mechanism that bends.
     turn, span
         Turn of one point against another, such as "turn2 - turn1", over the distance [m] between them.
     curvatures
@@ -67,6 +69,7 @@ class Section(NamedTuple):
     """
 
     at: float | None = None
+    link: str = ""
     turn: str = ""
     span: float = 0.0
     curvatures: tuple[float, ...] = ()
@@ -75,7 +78,7 @@ class Section(NamedTuple):
     def told(self) -> str:
         """Which one it is, for people."""
         if self.at is not None:
-            return f"at {1e3 * self.at:g} mm"
+            return f"at {1e3 * self.at:g} mm" + (f" of {self.link}" if self.link else "")
         return f"by the turn {self.turn}" if self.turn else "by the modal curvatures that are stated"
 
 
@@ -322,7 +325,38 @@ def bending_life(runs: Sequence[SettledRun], bending: Bending, *, workers: int |
     return BendingLife(bending, found[0], tuple(one.life for one in found))
 
 
+def fibres(machine: Machine, bending: Bending) -> Array:
+    """Stress (2, n) [Pa] at both outer fibres for each coordinate of a mechanism or each mode, without notch.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such section on the machine.
+    """
+    section = bending.section
+    if section.link and section.at is not None:
+        try:
+            return machine.fibre_stress(section.link, section.at, bending.fibre)
+        except ParameterError as error:
+            raise ParameterError(f"bending: {error}") from None
+    row = stress_of_modes(machine, bending)
+    return np.stack([row, -row])
+
+
+def _of_link(run: SettledRun, bending: Bending) -> Stressed:
+    """Of a section of a mechanism's link, whose kernel shows the stress itself."""
+    found = []
+    for row in fibres(run.machine, bending):
+        shown = simulate(run.machine.showing(row), CYCLES, run.final_state, samples_per_cycle=SAMPLES).history
+        assert shown is not None
+        history = bending.notch_factor * shown[:, :, 0].ravel() + bending.static_stress
+        found.append(stressed(history, CYCLES, bending))
+    return min(found, key=lambda one: one.life)
+
+
 def _of_run(run: SettledRun, bending: Bending) -> Stressed:
+    if bending.section.link:
+        return _of_link(run, bending)
     rows, samples = stress_of_modes(run.machine, bending), SAMPLES
     while True:
         record = simulate(run.machine, CYCLES, run.final_state, samples_per_cycle=samples)
@@ -365,21 +399,27 @@ def read_bending(values: Mapping[str, Any], machine: Machine) -> Bending:
         raise DesignError(
             f"[bending] has {' and '.join(kinds) or 'no section'}; allowed: one of at, turn (with span), curvatures"
         )
-    own = kinds[0] == "at"
+    on_link = "link" in given
+    if kinds == ["at"] and not on_link and machine.bending_links:
+        raise DesignError(f"[bending] lacks link, the one that bends; allowed: {', '.join(machine.bending_links)}")
+    if on_link and kinds != ["at"]:
+        raise DesignError("[bending] has link, which goes with at, the place of the section on it")
     if given.get("mean_stress", "goodman") != "none" and "ultimate" not in given:
         raise DesignError('[bending] lacks ultimate, the tensile strength; or say mean_stress = "none"')
-    for name in () if own else ("fibre", "modulus", *(["span"] if kinds[0] == "turn" else [])):
+    needed = {"at": ("fibre",) if on_link else (), "turn": ("fibre", "modulus", "span")}
+    for name in needed.get(kinds[0], ("fibre", "modulus")):
         if name not in given:
             raise DesignError(f"[bending] lacks {name}")
         if not given[name] > 0.0:
             raise ParameterError(f"bending.{name} = {given[name]:g} is out of range; allowed: above 0")
-    for name in ("fibre", "modulus", "span"):
-        if name in given and (own or (name == "span" and kinds[0] != "turn")):
-            raise DesignError(
-                f"[bending] has {name}, which goes with {'turn' if name == 'span' else 'turn or curvatures'}"
-            )
+    goes_with = {"fibre": "turn, curvatures or link", "modulus": "turn or curvatures", "span": "turn"}
+    for name in needed.get(kinds[0], ("fibre", "modulus")):
+        goes_with.pop(name)
+    for name, what in goes_with.items():
+        if name in given:
+            raise DesignError(f"[bending] has {name}, which goes with {what}")
     section = Section(**{name: given.pop(name) for name in Section._fields if name in given})
     bending = Bending(section=section, **given)
-    if not stress_of_modes(machine, bending).any():
+    if not fibres(machine, bending).any():
         raise ParameterError(f"[bending]: no mode bends the section {section.told}")
     return bending

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from chaosgym.design.bearing import Criteria, variation_region
-from chaosgym.design.bending import Bending, read_bending, stress_of_modes
+from chaosgym.design.bending import Bending, fibres, read_bending
 from chaosgym.design.improve import default_changes
 from chaosgym.design.methodology import SERIES_SIZE
 from chaosgym.design.runs import deviating
@@ -266,7 +266,7 @@ def _wear(values: Mapping[str, Any], machine: Machine) -> Wear | None:
     )
 
 
-OF_SECTION = {"at": "m", "span": "m", "turn": "", "curvatures": "kg^-1/2 m^-2"}
+OF_SECTION = {"at": "m", "link": "", "span": "m", "turn": "", "curvatures": "kg^-1/2 m^-2"}
 """Keys that state a section, and their units."""
 
 
@@ -280,7 +280,7 @@ def _bending(values: Mapping[str, Any], machine: Machine, region: Mapping[str, T
         name, unit = f"bending.{key}", OF_SECTION[key] if key in OF_SECTION else known[key].unit
         if key == "curvatures":
             read[key] = tuple(parse_row(name, given, unit))
-        elif key == "turn" or known.get(key, known["slope"]).choices:
+        elif key in ("turn", "link") or known.get(key, known["slope"]).choices:
             if not isinstance(given, str):
                 raise DesignError(f"{name} = {shown(given)} is out of range; allowed: a text")
             read[key] = given
@@ -288,7 +288,7 @@ def _bending(values: Mapping[str, Any], machine: Machine, region: Mapping[str, T
             read[key] = parse_quantity(name, given, unit)
     found = read_bending(read, machine)
     for end in (-1.0, 1.0):  # the section lies within every machine that may be built
-        stress_of_modes(deviating(machine, region, [end] * len(region)), found)
+        fibres(deviating(machine, region, [end] * len(region)), found)
     return found
 
 
@@ -399,7 +399,7 @@ def template(name: str) -> str:
         "[costs]  # weight of a change: weight * |ln(new / old)|; 1 if left out",
         f"{speed} = 2",
         *(_wear_lines(machine) if parameters_of(machine)[clearance].unit == "m" else ()),
-        *(_bending_lines(machine) if machine.flexible is not None else ()),
+        *(_bending_lines(machine) if machine.flexible is not None or machine.bending_links else ()),
     ]
     return "\n".join(lines) + "\n"
 
@@ -428,6 +428,12 @@ def _bending_lines(machine: Machine) -> list[str]:
         '# fibre = "5 mm"          # distance of the outer fibre from the neutral one',
         '# modulus = "210 GPa"',
     ]
+    for link in machine.bending_links[:1]:
+        where = [
+            f'# link = "{link}"           # that bends',
+            '# at = "50 mm"            # section of it, from its start on',
+            '# fibre = "5 mm"          # distance of the outer fibre from the neutral one',
+        ]
     if machine.swings:
         where = ['# at = "150 mm"           # section of the beam, from the pivot on']
     return [

@@ -5,21 +5,27 @@ from collections.abc import Sequence
 
 
 def hours_told(value: float) -> str:
-    """Hours of operation, whole ones from a hundred on.
+    """Hours of operation, in four digits.
 
     Examples
     --------
-    >>> hours_told(87600.4), hours_told(23.05), hours_told(float("inf"))
-    ('87,600 h', '23.1 h', 'without end')
+    >>> hours_told(87600.4), hours_told(float("inf"))
+    ('87,600 h', 'without end')
     """
     return f"{life_told(value)} h" if math.isfinite(value) else "without end"
 
 
 def life_told(value: float) -> str:
-    """A life in any unit, three digits and no fewer than the whole ones."""
+    """A life in any unit, in four digits.
+
+    Examples
+    --------
+    >>> life_told(260486.0), life_told(23.05)
+    ('260,500', '23.05')
+    """
     if not math.isfinite(value):
         return "without end"
-    return f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"
+    return f"{float(f'{value:.4g}'):,.0f}" if value >= 1000.0 else f"{value:.4g}"
 
 
 def share_told(value: float) -> str:

@@ -390,6 +390,40 @@ class Machine(ABC):
         """
         raise ParameterError(f"{self.name} has no named points; allowed: the file of a machine of modes or matrices")
 
+    @property
+    def bending_links(self) -> tuple[str, ...]:
+        """Names of the links whose sections may be asked for by ``fibre_stress``."""
+        return ()
+
+    def fibre_stress(self, link: str, position: float, fibre: float) -> Array:
+        """Stress (2, n) [Pa] at both outer fibres of a link that bends, for each coordinate, pull above zero.
+
+        Parameters
+        ----------
+        link
+            Its name.
+        position
+            Of the section [m] from the link's beginning on.
+        fibre
+            Distance [m] of the outer fibres from the neutral one.
+
+        Raises
+        ------
+        ParameterError
+            If the machine has no such link, or the position is outside it.
+        """
+        raise ParameterError(f"{self.name} has no links that bend; allowed: the file of a mechanism with a beam")
+
+    def showing(self, row: Array) -> Self:
+        """The machine whose time histories show a row (n,) of its coordinates in place of the joint's displacement.
+
+        Raises
+        ------
+        ParameterError
+            If the machine has no ``bending_links``.
+        """
+        raise ParameterError(f"{self.name} has no links that bend; allowed: the file of a mechanism with a beam")
+
     def stress_at(self, position: float) -> Array:
         """Bending stress (n,) at the outer fibre of its beam for each mode, at a position [m] from its beginning on.
 
@@ -400,7 +434,7 @@ class Machine(ABC):
         ParameterError
             If the machine has no beam of its own, or the position is outside it.
         """
-        raise ParameterError(f"{self.name} has no beam of its own; allowed: impact-beam")
+        raise ParameterError(f"{self.name} has no beam of its own; allowed: impact-beam, or a link that bends")
 
     @property
     def swings(self) -> bool:

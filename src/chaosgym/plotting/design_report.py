@@ -114,7 +114,8 @@ def _of_section(study: DesignStudy) -> dict[str, Parameter]:
     found = study.assessment.bending
     if found is None:
         return {}
-    own = ("fibre", "modulus") if found.bending.section.at is not None else ()
+    section = found.bending.section
+    own = () if section.at is None else ("modulus",) if section.link else ("fibre", "modulus")
     return {name: about for name, about in parameters_of(found.bending).items() if name not in own}
 
 

@@ -124,7 +124,44 @@ def beam_link(name: str, beam: Beam, ends: Mapping[str, tuple[Body, ...]], angle
         (STRETCH,) * first + tuple(f"mode {k + 1}" for k in range(beam.modes)),
         np.diag([spring] * first + squares.tolist()),
         np.diag([*damping, *(2.0 * beam.damping_ratio * np.sqrt(squares))]),
+        beam,
     )
+
+
+def fibre_stress(link: Link, beam: Beam, position: float, fibre: float) -> Array:
+    r"""Stress (2, e) [Pa] at the upper and the lower outer fibre for each elastic coordinate of a link.
+
+    Each mode of a uniform beam is w = c1 cos bx + c2 sin bx + c3 exp(-bx) + c4 exp(-b(l - x)), b^4 = rho A w_k^2 / E I.
+    It is zero at both ends, where its slopes are known; so its curvature needs no derivative of the elements. The
+    stretch pulls all of the section alike.
+
+    Parameters
+    ----------
+    link, beam
+        The link, and its beam.
+    position
+        Of the section [m] from the start on.
+    fibre
+        Distance [m] of the outer fibres from the neutral one.
+    """
+    first, length = int(beam.stretches), beam.length
+    pull = np.zeros(len(link.elastic))
+    pull[:first] = beam.youngs_modulus / length
+    squares, line = np.diag(link.stiffness)[first:], beam.density * beam.area
+    curvature = np.zeros(len(link.elastic))
+    for k, b in enumerate((line * squares / (beam.youngs_modulus * beam.second_moment)) ** 0.25):
+        cosine, sine, fade = math.cos(b * length), math.sin(b * length), math.exp(-b * length)
+        ends = [
+            [1.0, 0.0, 1.0, fade],
+            [cosine, sine, fade, 1.0],
+            [0.0, b, -b, b * fade],
+            [-b * sine, b * cosine, -b * fade, b],
+        ]
+        slopes = [link.points[end].slope[0, first + k] for end in (START, END)]
+        weights = np.linalg.solve(np.array(ends), np.array([0.0, 0.0, *slopes]))
+        shapes = [-math.cos(b * position), -math.sin(b * position), math.exp(-b * position)]
+        curvature[first + k] = b**2 * float(weights @ [*shapes, math.exp(-b * (length - position))])
+    return pull + beam.youngs_modulus * fibre * np.outer([-1.0, 1.0], curvature)
 
 
 def _drawn_in(slope: Array, length: float) -> tuple[Array, Array]:

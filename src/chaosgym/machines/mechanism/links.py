@@ -9,10 +9,13 @@ with its place rho, shape N and curve C in the axes of the link. In the nominal 
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Optional
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from chaosgym.machines.mechanism.beam import Beam
 
 Array = NDArray[np.float64]
 
@@ -120,6 +123,8 @@ class Link(NamedTuple):
         Names of the elastic coordinates.
     stiffness, damping : (e, e)
         Of the elastic coordinates.
+    beam
+        What bends, if it is a uniform beam.
     """
 
     name: str
@@ -131,6 +136,7 @@ class Link(NamedTuple):
     elastic: tuple[str, ...] = ()
     stiffness: Array = np.zeros((0, 0))
     damping: Array = np.zeros((0, 0))
+    beam: Optional["Beam"] = None
 
     @property
     def size(self) -> int:

@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS, Contact, Held, held, middles_and_nodes
 from chaosgym.machines.machine import Number, Option
+from chaosgym.machines.mechanism.beam import fibre_stress
 from chaosgym.machines.mechanism.equations import SmallMotion, small_motion
 from chaosgym.machines.mechanism.joints import ACROSS, ALONG, TURN, Joint
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism
@@ -98,6 +99,8 @@ class MechanismMachine(BinnedMachine):
     extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = {"no gravity": {"gravity_factor": 0.0}}
 
     mechanism: Mechanism
+    displayed: tuple[float, ...] = field(default=(), repr=False)
+    """What histories show in place of the displacement of the monitored joint, for each coordinate; none for that."""
     speed: float = _assumed(600.0, "rpm", 0.1, 1e5)
     """Constant speed of the crank [rpm]."""
     gravity_factor: float = _assumed(1.0, "-", 0.0, 100.0)
@@ -218,7 +221,32 @@ class MechanismMachine(BinnedMachine):
     @property
     def display(self) -> Array:
         """Displacement of the monitored joint: across it."""
-        return self.row_of(self.monitored, ACROSS)
+        return np.array(self.displayed) if self.displayed else self.row_of(self.monitored, ACROSS)
+
+    def showing(self, row: Array) -> Self:
+        """The machine whose histories show a row (n,) of its coordinates; see ``Machine.showing``."""
+        return replace(self, displayed=tuple(row.tolist()))
+
+    @property
+    def bending_links(self) -> tuple[str, ...]:
+        """Names of the links that bend."""
+        return tuple(link.name for link in self.mechanism.links if link.beam is not None)
+
+    def fibre_stress(self, link: str, position: float, fibre: float) -> Array:
+        """Stress (2, n) at the outer fibres of a link; see ``Machine.fibre_stress``."""
+        if link not in self.bending_links:
+            bend = ", ".join(self.bending_links) or "none, a [link.NAME.beam] does"
+            raise ParameterError(f"link {link!r} does not bend; allowed: {bend}")
+        found = self.mechanism.link(link)
+        beam: Any = found.beam
+        if not 0.0 <= position <= beam.length:
+            raise ParameterError(
+                f"section at {position:g} m is outside the link {link}; allowed: 0 to {beam.length:g} m"
+            )
+        names = [f"{link} {name}" for name in found.elastic]
+        stress = np.zeros((2, len(self.degrees_of_freedom)))
+        stress[:, [self.degrees_of_freedom.index(name) for name in names]] = fibre_stress(found, beam, position, fibre)
+        return stress
 
     @property
     def _watched(self) -> Joint:
