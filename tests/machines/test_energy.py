@@ -75,9 +75,12 @@ def worst_gap(machine, cycles=CYCLES):
     return worst, int(record.impacts.sum())
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", [*range(8), 255, 266])
 def test_energy_comes_from_the_loads_alone(seed):
-    """In every cycle the work of drive and preload is what is dissipated and the change of energy."""
+    """In every cycle the work of drive and preload is what is dissipated and the change of energy.
+
+    In the last two a joint beyond a stop that would pull turns to press again.
+    """
     assert worst_gap(drawn(seed))[0] < 1.0
 
 

@@ -25,19 +25,13 @@ def _taken(array, at, *shape):
     return array[at : at + int(np.prod(shape))].reshape(shape)
 
 
-def _coordinates(own, u_at, blocks, lanes, harmonics):
-    """First and second coordinate of each block (2, blocks), cosine and sine of each harmonic (2, harmonics)."""
-    return _taken(own, u_at, 2, lanes)[:, :blocks], _taken(own, u_at + 2 * lanes, 2, harmonics)
-
-
 @operation
-def sample(free, free_at, driven, driven_at, u_at, blocks, lanes, harmonics, scale, first_at, second_at):
+def sample(table, at, own, u_at, blocks, lanes, first_at, second_at):
     """What two quantities are at eight instants."""
-    u, drive = _coordinates(driven, u_at, blocks, lanes, harmonics)
-    shown = np.einsum("qkbi,kb->qi", _taken(free, free_at, 2, 2, blocks, LANES), u)
-    shown += np.einsum("qkhi,kh->qi", _taken(driven, driven_at, 2, 2, harmonics, LANES), drive)
-    for at, quantity in zip((first_at, second_at), shown, strict=True):
-        driven[at : at + LANES] = scale * quantity
+    u = _taken(own, u_at, 2, lanes)[:, :blocks]
+    shown = np.einsum("qkbi,kb->qi", _taken(table, at, 2, 2, blocks, LANES), u)
+    for place, quantity in zip((first_at, second_at), shown, strict=True):
+        own[place : place + LANES] = quantity
 
 
 @operation
@@ -50,12 +44,6 @@ def first_doubt(own, values_at, slopes_at, h, low, high, doubt, start):
     doubtful = ~((upper < high) & (lower > low))
     doubtful[:start] = False
     return int(np.argmax(doubtful)) if doubtful.any() else LANES
-
-
-@operation
-def largest(own, at, count, least):
-    """Largest of some values, or ``least``."""
-    return max(least, *own[at : at + count]) if count else least
 
 
 def _turned(entries, at, u, lanes):
@@ -77,16 +65,6 @@ def turn_and_expand(entries, at, generator_at, own, u_at, time, out_at, lanes):
     for term in range(TAYLOR_TERMS, 0, -1):
         moved = start + time / term * _turned(entries, generator_at, moved, lanes)
     own[out_at : out_at + 2 * lanes] = moved.ravel()
-
-
-@operation
-def combine(free, free_at, own, driven_at, constant_at, u_at, blocks, lanes, harmonics, out_at):
-    """A constant and columns times coordinates."""
-    u, drive = _coordinates(own, u_at, blocks, lanes, harmonics)
-    answer = own[constant_at : constant_at + 2 * lanes].copy()
-    answer += np.einsum("kbi,kb->i", _taken(free, free_at, 2, blocks, 2 * lanes), u)
-    answer += np.einsum("khi,kh->i", _taken(own, driven_at, 2, harmonics, 2 * lanes), drive)
-    own[out_at : out_at + 2 * lanes] = answer
 
 
 @operation

@@ -9,11 +9,9 @@ import numpy as np
 from numba import njit, prange
 
 from chaosgym.core.cycle import CycleArrays, Episode
-from chaosgym.core.event_tables import Tables
 from chaosgym.core.kernel import side_by_side
-from chaosgym.core.modal_impact import advance as advance_beam
-from chaosgym.core.modal_model import ModalImpactModel
-from chaosgym.core.modal_run import make_run
+from chaosgym.core.modal_impact import advance_model
+from chaosgym.core.modal_model import ModalImpactModel, Tables
 from chaosgym.core.propagator import Regimes
 from chaosgym.core.tangent import no_tangents
 
@@ -102,12 +100,13 @@ def advance_beams(batch, regimes, tables, which, motions, arrays, settings, outc
     """
     for k in prange(which.shape[0]):
         i = which[k]
-        model = beam_of(batch, regimes, tables, i)
-        outcome[k] = advance_beam(
-            make_run(model, settings.step_phase, settings.event_tolerance),
-            model,
+        outcome[k] = advance_model(
+            beam_of(batch, regimes, tables, i),
+            1.0,
+            settings.step_phase,
+            settings.event_tolerance,
             motions.coordinates[i],
-            episode_of(motions, i),
+            motions.bouncing[i],
             rows_of(arrays, k),
             settings.event_budget,
             no_tangents(motions.coordinates.shape[1], arrays.section.shape[1]),

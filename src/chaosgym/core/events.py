@@ -139,11 +139,12 @@ def settled(side, gap, two_sided, e0, d0, e1, d1, h, fourth):
 
 
 @leaf
-def opening(own, series, lanes, last, side, gap, lag, h, tolerance):
+def opening(own, series, lanes, last, side, gap, lag, least, h, tolerance):
     """First instant in [0, h] at which a closed channel opens, or inf.
 
     A force that is zero by rounding and grows does not open it; likewise in ``closing``. Else two channels that open at
-    one instant open and close each other without end.
+    one instant open and close each other without end. ``least`` is what is rounding at least: sums of large terms know
+    of more.
     """
     if h <= 0.0:
         return math.inf
@@ -164,7 +165,8 @@ def opening(own, series, lanes, last, side, gap, lag, h, tolerance):
             if length > tolerance:
                 length *= 0.5
                 continue
-            if e1 <= 0.0 and (d1 <= 0.0 or e1 < -ROUNDING * (gap + abs(y) + lag * abs(v))):
+            slack = least + ROUNDING * (abs(gap) + abs(y) + lag * abs(v))
+            if e1 <= 0.0 and (d1 <= 0.0 or e1 < -slack):
                 return high
         length *= 2.0
         low, e0, d0 = high, e1, d1
@@ -172,7 +174,7 @@ def opening(own, series, lanes, last, side, gap, lag, h, tolerance):
 
 
 @leaf
-def closing(own, series, lanes, last, side, gap, lag, h, tolerance):
+def closing(own, series, lanes, last, side, gap, lag, least, h, tolerance):
     """First instant in [0, h] at which an open channel closes on ``side``, or inf.
 
     Depth and pressure count from below here: what must become positive is looked at with its sign changed.
@@ -191,7 +193,7 @@ def closing(own, series, lanes, last, side, gap, lag, h, tolerance):
         y, v, a, _ = reading_at(own, series, lanes, last, high)
         p1, q1, e1, d1 = gap - side * y, -side * v, gap - side * (y + lag * v), -side * (v + lag * a)
         # outside, or inside without pressure: within rounding where the contact has just opened
-        slack = ROUNDING * (gap + abs(y) + lag * abs(v))
+        slack = least + ROUNDING * (abs(gap) + abs(y) + lag * abs(v))
         span = high - low
         place = judge(span, p0, q0, p1, q1, place_fourth) if p0 >= -slack else UNSURE
         if place == CROSSES:

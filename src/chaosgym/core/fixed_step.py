@@ -13,13 +13,23 @@ from numba import njit
 from chaosgym.core import status
 from chaosgym.core.contact import contact_force
 from chaosgym.core.cycle import LOWER, UPPER, note_touch
-from chaosgym.core.modal_impact import tip_of_state
 
 STABILITY_LIMIT = 2.7
 """Largest step times fastest angular frequency; the method grows undamped oscillations from 2.83 on."""
 
 RUNAWAY = 1e9
 """Tip displacement [m] that counts as divergence."""
+
+
+@njit(cache=True, inline="always")
+def tip_of_state(model, state):
+    """Tip displacement and velocity of a modal state (2n,)."""
+    n = model.tip_shape.shape[0]
+    x, v = 0.0, 0.0
+    for i in range(n):
+        x += model.tip_shape[i] * state[i]
+        v += model.tip_shape[i] * state[n + i]
+    return x, v
 
 
 @njit(cache=True, inline="always")

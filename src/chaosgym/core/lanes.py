@@ -6,8 +6,7 @@ are shorter, and calls a function for ``fma`` where the processor has none.
 
 Operations take arrays of one dimension, contiguous, each followed by the place at which something begins in it: an
 array of more dimensions costs a kernel's compilation three numbers a dimension wherever it is handed on. Coordinates u
-are (2 lanes + 2 harmonics, rounded up to a multiple of 8): the first and the second coordinate of each block, padded to
-``lanes``, then cosine and sine of each harmonic of the drive.
+are (2 lanes,), the first and then the second coordinate of each block; ``lanes`` is a multiple of 8.
 
 The file is long because it is a list: an operation for every shape of operands that a kernel has.
 """
@@ -177,29 +176,24 @@ def _operation(returns: Any = types.void) -> Callable[[Callable[..., Any]], Any]
 
 
 @_operation()
-def sample(e, free, free_at, driven, driven_at, u_at, blocks, lanes, harmonics, scale, first_at, second_at):
-    """Two quantities at eight instants, times ``scale``: into ``driven`` from ``first_at`` and ``second_at`` on.
+def sample(e, table, at, own, u_at, blocks, lanes, first_at, second_at):
+    """Two quantities of u at eight instants: into ``own`` from ``first_at`` and ``second_at`` on.
 
-    ``free`` (2, 2, blocks, 8) and ``driven`` (2, 2, harmonics, 8): what each coordinate contributes, by quantity,
-    coordinate of the block, block and instant. u is in ``driven`` too.
+    The table (2, 2, blocks, 8) is what each coordinate contributes, by quantity, coordinate of the block, block and
+    instant.
     """
     b = e.builder
     sums = [e.accumulator(e.constant(0.0)) for _ in range(4)]
-    tables = (
-        (free, free_at, blocks, u_at, lanes),
-        (driven, driven_at, harmonics, b.add(u_at, e.times(lanes, 2)), harmonics),
-    )
-    for table, begin, count, start, step in tables:
-        row = e.times(count, LANES)
-        with cgutils.for_range(b, count) as loop:
-            offset = b.add(begin, e.times(loop.index, LANES))
-            for k in range(2):
-                at = b.add(b.add(start, loop.index), step) if k else b.add(start, loop.index)
-                value = e.spread(e.number(driven, at))
-                for q in range(2):
-                    e.add_product(sums[2 * q + k], e.load(table, b.add(offset, e.times(row, 2 * q + k))), value)
-    for q, at in enumerate((first_at, second_at)):
-        e.store(b.fmul(e.total(*sums[2 * q : 2 * q + 2]), e.spread(scale)), driven, at)
+    row = e.times(blocks, LANES)
+    with cgutils.for_range(b, blocks) as loop:
+        offset = b.add(at, e.times(loop.index, LANES))
+        for k in range(2):
+            place = b.add(u_at, loop.index)
+            value = e.spread(e.number(own, b.add(place, lanes) if k else place))
+            for q in range(2):
+                e.add_product(sums[2 * q + k], e.load(table, b.add(offset, e.times(row, 2 * q + k))), value)
+    for q, target in enumerate((first_at, second_at)):
+        e.store(e.total(*sums[2 * q : 2 * q + 2]), own, target)
 
 
 @_operation(types.int64)
@@ -222,14 +216,6 @@ def first_doubt(e, own, values_at, slopes_at, h, low, high, doubt, start):
     within = b.or_(within, e.lanes_below(start))
     bits = b.zext(b.bitcast(b.not_(within), ir.IntType(LANES)), _INDEX)
     return b.cttz(b.or_(bits, e.index(1 << LANES)), ir.Constant(ir.IntType(1), 1))
-
-
-@_operation(types.float64)
-def largest(e, own, at, count, least):
-    """Largest of ``least`` and ``count`` values, at most eight."""
-    floors = e.spread(least)
-    chosen = e.builder.select(e.lanes_below(count), e.load(own, at), floors)
-    return e.folded(e.larger(chosen, floors), e.larger)
 
 
 def _turned(e, entries, at, own, u_at, lanes, offset):
@@ -270,35 +256,6 @@ def turn_and_expand(e, entries, at, generator_at, own, u_at, time, out_at, lanes
             x, y = e.fma(dx, share, first), e.fma(dy, share, second)
         e.store(x, own, b.add(out_at, places[0]))
         e.store(y, own, b.add(out_at, places[1]))
-
-
-@_operation()
-def combine(e, free, free_at, own, driven_at, constant_at, u_at, blocks, lanes, harmonics, out_at):
-    """Constant (2 lanes,) + columns ``free`` (2, blocks, 2 lanes) and driven (2, harmonics, 2 lanes) times u.
-
-    All but the free columns is in ``own``; the answer goes there from ``out_at`` on.
-    """
-    b = e.builder
-    double = e.times(lanes, 2)
-    tables = ((free, free_at, blocks, u_at, lanes), (own, driven_at, harmonics, b.add(u_at, double), harmonics))
-    with e.vectors(double, at_once=2) as chunk:
-        rows = [b.add(e.times(chunk.index, 2 * LANES), e.index(k * LANES)) for k in range(2)]
-        sums = [e.accumulator(e.constant(0.0)) for _ in range(4)]
-        for q in range(2):
-            b.store(e.load(own, b.add(constant_at, rows[q])), sums[2 * q])
-            b.store(e.constant(0.0), sums[2 * q + 1])
-        for table, begin, count, start, step in tables:
-            with cgutils.for_range(b, count) as loop:
-                for k in range(2):
-                    at, column = b.add(start, loop.index), loop.index
-                    if k:
-                        at, column = b.add(at, step), b.add(column, count)
-                    value = e.spread(e.number(own, at))
-                    base = b.add(begin, b.mul(column, double))
-                    for q in range(2):
-                        e.add_product(sums[2 * q + k], e.load(table, b.add(base, rows[q])), value)
-        for q in range(2):
-            e.store(e.total(*sums[2 * q : 2 * q + 2]), own, b.add(out_at, rows[q]))
 
 
 def _dot(e, table, at, width, other):

@@ -1,17 +1,6 @@
-r"""Exact motion of a few modes whose tip rattles between two stops, eight instants at a time.
+r"""Exact motion of a machine of a few modes with one gap (``modal_model``), by the kernel of several joints.
 
-Between contact events the machine is linear (``modal_model``), and the tip is in one of three states, each with its
-own quantities e(t) > 0 that end it:
-
-    GAP        between the stops, no force         e = upper - x     and   e = x - lower
-    CONTACT    a stop pushes with N > 0            e = N
-    DETACHED   beyond a stop that would pull       e = penetration   and   e = -N
-
-GAP and DETACHED share the free regime. In CONTACT the stop's spring and damper act at the tip. Motion is propagated
-exactly within a regime, so the only error is in the instant at which e vanishes, and that is polished to
-``event_tolerance``.
-
-A stay in a state is ``modal_stay``; a change of state is one product of a matrix and the coordinates.
+The tables of the structure serve every speed, force and gap; those of the drive are added at the beginning of a run.
 """
 
 import math
@@ -19,149 +8,92 @@ import math
 import numpy as np
 from numba import njit
 
-from chaosgym.core import status
-from chaosgym.core.contact import pressing_force
-from chaosgym.core.cycle import LOWER, UPPER, note_touch
-from chaosgym.core.event_tables import BOUND2
-from chaosgym.core.kernel import leaf
-from chaosgym.core.modal_model import FREE, LOWER_STOP, UPPER_STOP
-from chaosgym.core.modal_run import SPARE, WEIGHTS, Run, change, enter, leave, make_run, regime_of, size_of
-from chaosgym.core.modal_stay import END, EXHAUSTED, FIRST, fly, hang, press
-from chaosgym.core.tangent import carry, orthonormalise, touch
-
-GAP, CONTACT, DETACHED = 0, 1, 2
-
-STEPS_PER_EVENT = 1000
-"""Looks ahead that one cycle may take for each event that it may have."""
+from chaosgym.core.joints.cycle import advance_joints
+from chaosgym.core.joints.run import JointRun, new_space, work_space
+from chaosgym.core.joints.tables import MOST_LEVELS, ROW, layout, put_drive, put_structure
+from chaosgym.core.lanes import aligned, unset
+from chaosgym.core.modal_model import LOAD, LOWER_STOP, STOP, UPPER_STOP
 
 
-@njit(cache=True, inline="always")
-def tip_of_state(model, state):
-    """Tip displacement and velocity of a modal state (2n,)."""
-    n = model.tip_shape.shape[0]
-    x, v = 0.0, 0.0
-    for i in range(n):
-        x += model.tip_shape[i] * state[i]
-        v += model.tip_shape[i] * state[n + i]
-    return x, v
+@njit(cache=True)
+def shortest_intervals(regimes, step_phase, drive_rate):
+    """Shortest interval of each regime [s], in which neither its fastest mode nor the drive turns by more.
 
-
-@njit(cache=True, inline="always")
-def tip_state_of(model, x, v):
-    """Which of the three states holds, and the stop it concerns, for tip displacement x and velocity v."""
-    if model.stops[1] <= x <= model.stops[0]:
-        return GAP, UPPER_STOP
-    stop = UPPER_STOP if x > model.stops[0] else LOWER_STOP
-    side = 1.0 if stop == UPPER_STOP else -1.0
-    k, d = model.contact_stiffness[stop - 1], model.contact_damping[stop - 1]
-    force = pressing_force(side * (x - model.stops[stop - 1]), side * v, k, d)
-    return (CONTACT, stop) if force > 0.0 else (DETACHED, stop)
-
-
-@leaf
-def advance(run, model, state, episode, arrays, event_budget, tangents):
-    """Advance ``state`` (2n,) and ``episode`` in place by whole cycles, one for each row of ``arrays``.
-
-    Every cycle starts at phase zero of the drive. ``run`` is what ``make_run`` makes of the model; ``tangents`` travel
-    with the motion, and there may be none.
-
-    Returns
-    -------
-    (status, cycle) : the cycle is the first one not finished.
+    Where neither turns, as of a rigid body alone, it is that of the fastest regime.
     """
-    free = regime_of(run, FREE)
-    carries, spare = tangents.vectors.shape[0] > 0, run.own[run.at[SPARE] :]
-    weights = run.own[run.at[WEIGHTS] : run.at[WEIGHTS] + state.shape[0] // 2]
-    for cycle in range(arrays.section.shape[0]):
-        x, v = tip_of_state(model, state)
-        for i in range(state.shape[0]):
-            arrays.section[cycle, i] = state[i]
-        arrays.tip[cycle, 0], arrays.tip[cycle, 1] = x, v
-        for column in range(2):
-            arrays.peak_force[cycle, column] = 0.0
-            arrays.impacts[cycle, column] = 0
-            arrays.contact_time[cycle, column] = 0.0
-            arrays.bounce_time[cycle, column] = 0.0
-        for m in range(tangents.log_growth.shape[1]):
-            tangents.log_growth[cycle, m] = 0.0
-        tip_state, g = tip_state_of(model, x, v)
-        pressing = g if tip_state == CONTACT else FREE
-        enter(run, model.regimes.to_modal, pressing, model.pressed[pressing], state)
-        if not math.isfinite(size_of(free, BOUND2)):
-            return status.DIVERGED, cycle
-        events, sample, steps = 0, np.int64(0), STEPS_PER_EVENT * event_budget
-        time, carried = 0.0, 0.0
-        while True:
-            r = model.pressed[g] if tip_state == CONTACT else FREE
-            column = UPPER if g == UPPER_STOP else LOWER
-            begun = time
-            if tip_state == GAP:
-                ends, time, steps, sample = fly(run, free, time, steps, sample, arrays.history[cycle])
-            elif tip_state == CONTACT:
-                ends, time, steps, sample, arrays.peak_force[cycle, column] = press(
-                    run,
-                    regime_of(run, g),
-                    g,
-                    time,
-                    steps,
-                    sample,
-                    arrays.peak_force[cycle, column],
-                    arrays.history[cycle],
-                )
-                arrays.contact_time[cycle, column] += time - begun
-            else:
-                ends, time, steps, sample = hang(run, g, time, steps, sample, arrays.history[cycle])
-            if ends == EXHAUSTED:
-                return status.STEP_BUDGET, cycle
-            if ends == END:
-                break
-            events += 1
-            if events > event_budget:
-                return status.EVENT_BUDGET, cycle
-            if carries and not (tip_state == DETACHED and ends == FIRST):
-                carry(weights, model.regimes, r, time - carried, tangents, cycle, spare)
-                carried = time
-                if tip_state == GAP:
-                    touch(model.tip_shape, model.contact_damping[ends - 1], tangents.vectors)
-            if tip_state == CONTACT:
-                change(run, g, 1)
-                tip_state = DETACHED
-            elif tip_state == DETACHED and ends == FIRST:
-                tip_state = GAP
-            else:
-                if tip_state == GAP:
-                    g = UPPER_STOP if ends == FIRST else LOWER_STOP
-                change(run, g, 0)
-                tip_state = CONTACT
-                arrays.impacts[cycle, UPPER if g == UPPER_STOP else LOWER] += 1
-                note_touch(episode, 1.0 if g == UPPER_STOP else -1.0, time, arrays.bounce_time[cycle])
-        arrays.events[cycle] = events
-        leave(run, model.regimes.from_modal, g if tip_state == CONTACT else FREE, r, state)
-        if carries:
-            carry(weights, model.regimes, r, time - carried, tangents, cycle, spare)
-            orthonormalise(weights, tangents, cycle)
-        for i in range(state.shape[0]):
-            if not math.isfinite(state[i]):
-                return status.DIVERGED, cycle
-        episode.touch[0] -= run.period
-        episode.touch[1] -= run.period
-    return status.OK, arrays.section.shape[0]
+    fastest = np.max(regimes.fastest)
+    shortest = np.empty(regimes.fastest.shape[0])
+    for r in range(shortest.shape[0]):
+        rate = max(regimes.fastest[r], drive_rate)
+        shortest[r] = step_phase / (rate if rate > 0.0 else fastest if fastest > 0.0 else 1.0)
+    return shortest
+
+
+@njit(cache=True)
+def _lags(model):
+    """Damper over spring [s] of the surface that presses in each regime, 0 where none, (R, 1)."""
+    lags = np.zeros((model.regimes.generator.shape[0], 1))
+    for stop in (UPPER_STOP, LOWER_STOP):
+        lags[model.pressed[stop], 0] = model.contact_damping[stop - 1] / model.contact_stiffness[stop - 1]
+    return lags
+
+
+@njit(cache=True)
+def tabulate(model, shortest):
+    """``Tables.values`` of a model, for its number of harmonics and ``shortest`` intervals (R,) [s]."""
+    regimes, lags, shape = model.regimes, _lags(model), model.tip_shape.reshape((1, model.tip_shape.size))
+    count, n = lags.shape[0], model.tip_shape.size
+    at = layout(n, model.drive.shape[1], 1, MOST_LEVELS)
+    values, constants = aligned(count * at[ROW]).reshape((count, at[ROW])), np.empty((1, 1))
+    for r in range(count):
+        constants[0, 0] = model.rest_penetration[r] if r > 0 else 0.0
+        generator, to_modal, from_modal = regimes.generator[r], regimes.to_modal[r], regimes.from_modal[r]
+        rest, drift = model.rest[r, STOP].reshape((1, 2 * n)), model.drift[r, STOP].reshape((1, 2 * n))
+        put_structure(
+            at, generator, to_modal, from_modal, shape, lags[r], shortest[r], rest, drift, constants, values[r]
+        )
+    return values
+
+
+@njit(cache=True)
+def make_run(model, step_phase, event_tolerance):
+    """(Run, where the rows of its sets begin, weights of displacements) of a model, as ``advance_joints`` takes them.
+
+    ``step_phase`` is the angle [rad] by which the fastest mode turns in the shortest interval, ``event_tolerance`` the
+    error of an event's instant as such an angle. Tables are made anew if the model's are for another ``step_phase``
+    or number of harmonics, or too slow for the drive.
+    """
+    omega = 2.0 * math.pi * model.excitation_frequency
+    regimes, known, lags = model.regimes, model.tables.values, _lags(model)
+    count, n, harmonics = lags.shape[0], model.tip_shape.size, model.drive.shape[1]
+    at = layout(n, harmonics, 1, MOST_LEVELS)
+    slow = np.max(model.tables.shortest) * harmonics * omega > step_phase
+    if slow or model.tables.step_phase != step_phase or known.shape[1] != at[ROW]:
+        known = tabulate(model, shortest_intervals(regimes, step_phase, harmonics * omega))
+    values, rows = unset(count * at[ROW]), np.empty(count, np.int64)
+    shape, drive = model.tip_shape.reshape((1, n)), model.drive[0] + omega * omega * model.drive[1]
+    for r in range(count):
+        rows[r] = r * at[ROW]
+        row = values[rows[r] : rows[r] + at[ROW]]
+        row[:] = known[r]
+        generator, to_modal, from_modal = regimes.generator[r], regimes.to_modal[r], regimes.from_modal[r]
+        rest, load = model.rest[r, LOAD], model.drift[r, LOAD]
+        put_drive(at, generator, to_modal, from_modal, shape, lags[r], omega, drive, rest, load, row)
+    at = work_space(at, np.full(1, count))
+    stiffness, damping = model.contact_stiffness.reshape((1, 2)), model.contact_damping.reshape((1, 2))
+    own = new_space(at, shape, model.stops.reshape((1, 2)), stiffness, damping)
+    weights = np.where(model.stiffness != 0.0, model.stiffness, omega * omega)
+    return JointRun(values, own, at, 1.0 / model.excitation_frequency, event_tolerance / step_phase), rows, weights
 
 
 @njit(cache=True, nogil=True)
-def advance_model(model, step_phase, event_tolerance, state, episode, arrays, event_budget, tangents):
-    """As ``advance``, by what ``make_run`` makes of the model.
+def advance_model(model, share, step_phase, event_tolerance, state, bouncing, arrays, event_budget, tangents):
+    """Advance ``state`` (2n,) and ``bouncing`` (3,) in place, as ``advance_joints``: (status, first row not finished).
 
-    A kernel that Python calls must return plain numbers or arrays: numba has no guard against Ctrl-C while it makes a
-    named tuple.
+    Each row of ``arrays`` lasts a share of a cycle from phase zero of the drive. A kernel that Python calls must return
+    plain numbers or arrays: numba has no guard against Ctrl-C while it makes a named tuple.
     """
-    run = make_run(model, step_phase, event_tolerance)
-    return advance(run, model, state, episode, arrays, event_budget, tangents)
-
-
-@njit(cache=True, nogil=True)
-def advance_share(model, share, step_phase, event_tolerance, state, episode, arrays, event_budget, tangents):
-    """As ``advance_model``, where each row of ``arrays`` lasts a share of a cycle from phase zero of the drive."""
-    run = make_run(model, step_phase, event_tolerance)
-    part = Run(run.tables, run.own, run.at, share * run.period, run.omega, run.resolution, run.drifts)
-    return advance(part, model, state, episode, arrays, event_budget, tangents)
+    run, rows, weights = make_run(model, step_phase, event_tolerance)
+    run = JointRun(run.tables, run.own, run.at, share * run.period, run.resolution)
+    outcome = advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, tangents)
+    return outcome[0], outcome[1]

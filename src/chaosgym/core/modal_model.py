@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chaosgym.core.event_tables import Tables
 from chaosgym.core.propagator import Regimes
 
 FREE, UPPER_STOP, LOWER_STOP = np.int64(0), np.int64(1), np.int64(2)
@@ -13,6 +12,18 @@ numba compiles a kernel anew for each plain number that it is called with."""
 
 STOP, LOAD = 0, 1
 """Parts of a position of rest: per unit position of the stop that presses, and under the static force."""
+
+
+class Tables(NamedTuple):
+    """Tables of the structure, for R regimes.
+
+    ``step_phase`` [rad] is the angle by which the fastest mode of a regime turns in its ``shortest`` (R,) interval [s];
+    ``values`` (R, ...) are rows by ``joints.tables.put_structure``.
+    """
+
+    step_phase: float
+    shortest: np.ndarray
+    values: np.ndarray
 
 
 class ModalImpactModel(NamedTuple):

@@ -2,11 +2,10 @@
 
 from numba import njit, prange
 
-from chaosgym.core.batch import beam_of, episode_of
+from chaosgym.core.batch import beam_of
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.kernel import side_by_side
-from chaosgym.core.modal_impact import advance as advance_beam
-from chaosgym.core.modal_run import make_run
+from chaosgym.core.modal_impact import advance_model
 from chaosgym.core.tangent import Tangents
 
 
@@ -35,12 +34,13 @@ def cycle_of(arrays, k, c):
 def _vary_beam(batch, regimes, tables, i, speeds, motions, vectors, growth, arrays, settings, k):
     for c in range(speeds.shape[1]):
         batch.excitation_frequency[i] = speeds[k, c]
-        model = beam_of(batch, regimes, tables, i)
-        outcome = advance_beam(
-            make_run(model, settings.step_phase, settings.event_tolerance),
-            model,
+        outcome = advance_model(
+            beam_of(batch, regimes, tables, i),
+            1.0,
+            settings.step_phase,
+            settings.event_tolerance,
             motions.coordinates[i],
-            episode_of(motions, i),
+            motions.bouncing[i],
             cycle_of(arrays, k, c),
             settings.event_budget,
             Tangents(vectors[i], growth[k, c : c + 1]),

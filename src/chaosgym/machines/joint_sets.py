@@ -17,7 +17,7 @@ from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.joints.cycle import advance_joints
 from chaosgym.core.joints.run import JointRun, new_space, work_space
-from chaosgym.core.joints.tables import ROW, layout, tabulate
+from chaosgym.core.joints.tables import MOST_LEVELS, ROW, layout, tabulate
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents
@@ -33,9 +33,6 @@ MOST_BYTES = 500_000_000
 
 LIKELY = 12
 """Sets that are made at once at another speed or drive, those that were visited first."""
-
-MOST_LEVELS = 16
-"""Lengths of an interval."""
 
 
 class PressedSet(NamedTuple):
@@ -193,10 +190,7 @@ class JointTables:
         """Make the tables of a set; arrays in which a run may still be are left as they are."""
         found = self._sets.of(code)
         n = len(self._static)
-        rest, drift = np.zeros(2 * n), np.zeros(2 * n)
-        if self._static.any():
-            rest, drift = settled(found.generator, found.to_modal[:, n:] @ self._static)
-        under_load = (self._sets.shape @ found.from_modal[:n]) @ rest
+        load = found.to_modal[:, n:] @ self._static
         lag = np.divide(found.dampers, found.springs, out=np.zeros(len(found.springs)), where=found.springs > 0.0)
         row = call(
             tabulate,
@@ -207,11 +201,13 @@ class JointTables:
             self._sets.shape,
             lag,
             self._shortest(found.fastest),
+            found.rest,
+            found.drift,
+            found.constants,
             self._omega,
             self._drive,
-            np.vstack([rest, found.rest]),
-            np.vstack([drift, found.drift]),
-            np.column_stack([under_load, found.constants]),
+            settled(found.generator, load)[0],
+            load,
         )
         with self._lock:
             if self._rows[code] >= 0:

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays, Episode
-from chaosgym.core.event_tables import Tables, shortest_intervals, tabulate
 from chaosgym.core.fixed_step import advance_fixed_step
-from chaosgym.core.modal_impact import advance_model, advance_share
-from chaosgym.core.modal_model import LOAD, STOP, ModalImpactModel, with_drive_from
+from chaosgym.core.modal_impact import advance_model, shortest_intervals, tabulate
+from chaosgym.core.modal_model import LOAD, STOP, ModalImpactModel, Tables, with_drive_from
 from chaosgym.core.propagator import Regimes
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
@@ -241,9 +240,10 @@ def flexible_model(
     *,
     lower: Stop | None = None,
     static_force: Array | None = None,
+    drive: Array | None = None,
     step_phase: float = ExactEvents.step_phase,
 ) -> ModalImpactModel:
-    """Model of a machine with springs [N/m] and dampers [N s/m] for stops, under a sine of 1 N; not yet at a speed.
+    """Model of a machine with springs [N/m] and dampers [N s/m] for stops; not yet at a speed.
 
     Parameters
     ----------
@@ -253,6 +253,8 @@ def flexible_model(
         Of the upper stop, and of the lower one if ``lower`` is not given.
     static_force : (n,)
         Modal force that is always there [N kg^-1/2]; none by default.
+    drive : (2, H, 2, n)
+        As of the model; a sine of 1 N by default.
     step_phase
         For which the tables are made; see ``ExactEvents``.
     """
@@ -280,14 +282,13 @@ def flexible_model(
         drift.append([parts[STOP][1], parts[LOAD][2]])
         # (K + k p p') q = k c p at rest, so the tip rests at x with x - c = -c / (1 + k p' K^-1 p)
         penetration.append(-1.0 / (1.0 + stop.stiffness * compliance))
-    of_regime = np.array([0.0, *(stop.stiffness for stop in stops)]), np.array([0.0, *(s.damping for s in stops)])
-    shortest = call(shortest_intervals, regimes, step_phase, 0.0)
     both = [stops[0], stops[-1]]
-    unit_sine = np.zeros((2, 1, 2, n))
-    unit_sine[0, 0, 1] = modes.force_shape
-    return ModalImpactModel(
+    if drive is None:
+        drive = np.zeros((2, 1, 2, n))
+        drive[0, 0, 1] = modes.force_shape
+    model = ModalImpactModel(
         excitation_frequency=math.nan,
-        drive=unit_sine,
+        drive=drive,
         static_force=static,
         stops=np.full(2, math.nan),
         contact_stiffness=np.array([stop.stiffness for stop in both]),
@@ -300,8 +301,16 @@ def flexible_model(
         rest=np.array(rest),
         drift=np.array(drift),
         rest_penetration=np.array(penetration),
-        tables=Tables(step_phase, shortest, call(tabulate, regimes, *of_regime, shortest)),
+        tables=Tables(step_phase, np.empty(0), np.empty((0, 0))),
     )
+    return with_tables(model)
+
+
+def with_tables(model: ModalImpactModel) -> ModalImpactModel:
+    """Return the model with tables of its own, for the ``step_phase`` of those that it has."""
+    phase = model.tables.step_phase
+    shortest = call(shortest_intervals, model.regimes, phase, 0.0)
+    return model._replace(tables=Tables(phase, shortest, call(tabulate, model, shortest)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -453,16 +462,14 @@ class ModalImpactMachine(Machine):
         model = self.reduce()
         phase, share = self.__dict__.get("_section", (0.0, 1.0))
         model = with_drive_from(model, phase) if phase else model
-        motion = (coordinates, Episode(side=bouncing[:1], touch=bouncing[1:]), arrays)
         along = tangents or no_tangents(len(coordinates), len(arrays.section))
         if isinstance(integrator, ExactEvents):
             step, tolerance, budget = integrator.step_phase, integrator.event_tolerance, integrator.event_budget
-            if share != 1.0:
-                outcome = call(advance_share, model, share, step, tolerance, *motion, budget, along)
-            else:
-                outcome = call(advance_model, model, step, tolerance, *motion, budget, along)
+            motion = coordinates, bouncing, arrays, budget, along
+            outcome = call(advance_model, model, share, step, tolerance, *motion)
         else:
-            outcome = call(advance_fixed_step, model, *motion, integrator.steps_per_cycle)
+            episode = Episode(side=bouncing[:1], touch=bouncing[1:])
+            outcome = call(advance_fixed_step, model, coordinates, episode, arrays, integrator.steps_per_cycle)
         status, done = outcome
         return status, done
 

@@ -17,10 +17,9 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from chaosgym.core.compilation import call
-from chaosgym.core.event_tables import Tables, shortest_intervals, tabulate
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.core.propagator import Regimes
+from chaosgym.machines.modal_impact import with_tables
 
 Array = NDArray[np.float64]
 
@@ -155,11 +154,4 @@ def _model(like: ModalImpactModel, numbers: Array) -> ModalImpactModel:
         parts.append(np.ascontiguousarray(numbers[at : at + part.size].reshape(part.shape)))
         at += part.size
     given: dict[str, Any] = dict(zip(PARTS, parts, strict=False))
-    model = like._replace(**given, regimes=Regimes(*parts[len(PARTS) :]))
-    stiffness, damping = np.zeros(len(model.rest)), np.zeros(len(model.rest))
-    for stop in (1, 2):
-        stiffness[model.pressed[stop]] = model.contact_stiffness[stop - 1]
-        damping[model.pressed[stop]] = model.contact_damping[stop - 1]
-    phase = like.tables.step_phase
-    shortest = call(shortest_intervals, model.regimes, phase, 0.0)
-    return model._replace(tables=Tables(phase, shortest, call(tabulate, model.regimes, stiffness, damping, shortest)))
+    return with_tables(like._replace(**given, regimes=Regimes(*parts[len(PARTS) :])))

@@ -168,15 +168,15 @@ def first_change(motion, last, h, tolerance):
             if found <= instant:
                 first, towards, instant = j, to, found
         elif side != 0.0:
-            found = opening(own, series, lanes, last, side, gap, lag, instant, tolerance)
+            found = opening(own, series, lanes, last, side, gap, lag, 0.0, instant, tolerance)
             if found <= instant:
                 first, towards, instant = j, 0.0, found
         else:
-            found = closing(own, series, lanes, last, 1.0, gap, lag, instant, tolerance)
+            found = closing(own, series, lanes, last, 1.0, gap, lag, 0.0, instant, tolerance)
             if found <= instant:
                 first, towards, instant = j, 1.0, found
             if two_sided != 0.0:
-                found = closing(own, series, lanes, last, -1.0, gap, lag, instant, tolerance)
+                found = closing(own, series, lanes, last, -1.0, gap, lag, 0.0, instant, tolerance)
                 if found <= instant:
                     first, towards, instant = j, -1.0, found
     return first, towards, instant

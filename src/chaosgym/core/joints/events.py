@@ -31,6 +31,7 @@ from chaosgym.core.joints.run import (
     RATES,
     READING,
     READINGS,
+    ROUNDED,
     SERIES,
     SIDE,
     TOTALS,
@@ -112,7 +113,9 @@ def quiet_intervals(run, row, h, count):
             bend = bound_second(run.tables, own, run.at, row, j)
             while i < count:
                 value, slope = item(own, place + i), item(own, place + RATES + i)
-                if not min(safe_time(high - value, -slope, bend), safe_time(value - low, slope, bend)) > h:
+                # an open joint beyond a surface presses as soon as its pressure grows, wherever it goes
+                beyond = side == 0.0 and not low <= value <= high
+                if beyond or not min(safe_time(high - value, -slope, bend), safe_time(value - low, slope, bend)) > h:
                     count = i
                 i = first_doubt(own, place, place + RATES, h, low, high, doubt, i + 1)
     return count
@@ -229,7 +232,7 @@ def first_change(run, row, h, expanded, tolerance):
             if verdict == CROSSES:
                 found = crossing(own, series, 1, DEGREE, side, gap, lag, 0.0, h, e0, d0, e1, d1, tolerance)
             else:
-                found = opening(own, series, 1, DEGREE, side, gap, lag, instant, tolerance)
+                found = opening(own, series, 1, DEGREE, side, gap, lag, known(run, j, ROUNDED), instant, tolerance)
             if found <= instant:
                 first, towards, instant = j, 0.0, found
             continue
@@ -248,7 +251,8 @@ def first_change(run, row, h, expanded, tolerance):
             if verdict == CROSSES:
                 found = crossing(own, series, 1, DEGREE, way, gap, 0.0, 0.0, h, -p0, -q0, -p1, -q1, tolerance)
             else:
-                found = closing(own, series, 1, DEGREE, way, gap, lag_of(run, j, way), instant, tolerance)
+                lag, least = lag_of(run, j, way), known(run, j, ROUNDED)
+                found = closing(own, series, 1, DEGREE, way, gap, lag, least, instant, tolerance)
             if found <= instant:
                 first, towards, instant = j, way, found
     return first, towards, instant, expanded

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from chaosgym.core.events import ROUNDING
 from chaosgym.core.joints.tables import (
     AHEAD,
     BENDS,
@@ -54,26 +55,34 @@ from chaosgym.core.propagator import exponential
 UPPER_GAP, LOWER_GAP, UPPER_STIFFNESS, LOWER_STIFFNESS, UPPER_LAG, LOWER_LAG = range(6)
 """Numbers of a joint: distance [m] of its surfaces from where it rests; spring [N/m]; damper over spring [s]."""
 
-SIDE, AWAKE, BASE, RATE, BEND, READING_REST, READING_RATE, READING_BEND, FOURTH = range(6, 15)
+SIDE, AWAKE, BASE, READING_REST, FOURTH, READING_BEND, READING_FOURTH = range(6, 13)
 """More of them: the surface that presses, +1 or -1, or 0; 1 unless the joint surely reaches no surface in this set;
-where it rests [m]; first and second derivative of a drift; what the drift adds to the reading, and to its derivatives;
-bound of the reading's fourth derivative."""
+where it rests [m]; what the drift adds to the reading, to a bound of its second derivative, and of its fourth one after
+that bound itself."""
 
-UPPER_STOP, LOWER_STOP, UPPER_DAMPER, LOWER_DAMPER = range(15, 19)
+UPPER_STOP, LOWER_STOP, UPPER_DAMPER, LOWER_DAMPER = range(13, 17)
 """And more: positions of its surfaces [m], infinite where there is none; their dampers [N s/m]."""
 
-NUMBERS = 24
+POWERS = 6
+"""Powers of time in a drift: what is left out of its series is ``SLOW``^6 / 7! of it, which is rounding."""
+
+RATE, READING_RATE, ROUNDED = 17, 17 + POWERS, 17 + 2 * POWERS
+"""And last: what the drift adds to displacement and reading, by powers of time from the first on; how much of the
+displacement [m] is rounding of what it is the sum of."""
+
+NUMBERS = 32
 
 READINGS = 4 * LANES
 """Numbers of what a joint reads: seven to spare, now, after 1 to 8 intervals; and as many rates."""
 
 NOW, RATES = LANES - 1, 2 * LANES
 
-U, SPARE, STATE, JOINT, READING, SERIES, TOTALS, PEAKS, SHAPES, OWN, RADIX = range(PLACES, PLACES + 11)
+U, SPARE, STATE, JOINT, READING, SERIES, TOTALS, PEAKS, SHAPES, DRIFT, OWN, RADIX = range(PLACES, PLACES + 12)
 """Where coordinates and the constants after them, room for others, the state with what follows it, ``NUMBERS`` and
-``READINGS`` of the joints, their Taylor series, room for eight numbers, the largest forces of the cycle (2m,) and the
-displacements of the joints per unit modal coordinate (m, n) begin in ``own``; its length. RADIX is where in ``at`` the
-digits of a joint in the number of a set begin: 3 where its surfaces differ in spring or damper, else 2."""
+``READINGS`` of the joints, their Taylor series, room for eight numbers, the largest forces of the cycle (2m,), the
+displacements of the joints per unit modal coordinate (m, n) and the drift (POWERS, 2L) begin in ``own``; its length.
+RADIX is where in ``at`` the digits of a joint in the number of a set begin: 3 where its surfaces differ in spring or
+damper, else 2."""
 
 
 class JointRun(NamedTuple):
@@ -115,7 +124,8 @@ def work_space(layout, radix):
     at[TOTALS] = at[SERIES] + (DEGREE + 1) * m
     at[PEAKS] = at[TOTALS] + LANES
     at[SHAPES] = at[PEAKS] + padded(2 * m)
-    at[OWN] = at[SHAPES] + padded(m * at[MODES])
+    at[DRIFT] = at[SHAPES] + padded(m * at[MODES])
+    at[OWN] = at[DRIFT] + POWERS * width
     return at
 
 
@@ -222,8 +232,28 @@ def enter(run, row):
     add_columns(tables, row + at[TO], width, 2 * at[BLOCKS] + 1 + m, own, at[STATE], own, at[U], LANES)
     for c in range(1 + m):
         own[at[U] + width + c] = own[more + c]
+    if tables[row + DRIFTING] != 0.0:
+        _begin_drift(run, row)
     for j in range(m):
         _settle(run, row, j)
+
+
+@leaf
+def _begin_drift(run, row):
+    """Write how far coordinates without a position of rest drift, by powers of time."""
+    own, at, tables = run.own, run.at, run.tables
+    width, generator = at[WIDTH], row + at[GENERATOR]
+    for lane in range(2 * width):
+        own[at[DRIFT] + lane] = 0.0
+        for c in range(1 + at[JOINTS]):
+            rate = tables[row + at[DRIFTS] + c * 2 * width + lane]
+            own[at[DRIFT] + lane] += rate * own[at[U] + 2 * width + c]
+    for power in range(1, POWERS):
+        last, share = at[DRIFT] + (power - 1) * 2 * width, 1.0 / (power + 1)
+        for j in range(width):
+            a, b, k = own[last + j], own[last + width + j], generator + j
+            own[last + 2 * width + j] = share * (tables[k] * a + tables[k + width] * b)
+            own[last + 3 * width + j] = share * (tables[k + 2 * width] * a + tables[k + 3 * width] * b)
 
 
 @leaf
@@ -241,35 +271,39 @@ def _settle(run, row, j):
     else:
         own[first + (UPPER_GAP if side > 0.0 else LOWER_GAP)] = -side * rest
         own[first + BASE] = own[more + 1 + j] + rest
-    for k in range(RATE, READING_BEND + 1):
-        own[first + k] = 0.0
     own[first + AWAKE] = 1.0
-    rows = row + at[NOW_ROWS] + 4 * j * width
+    reach = dot_of_sizes(tables, row + at[SIZES] + j * width, own, at[U], width)
+    own[first + ROUNDED] = ROUNDING * (reach + abs(own[first + BASE]))
     if tables[row + DRIFTING] != 0.0:
-        for lane in range(width):
-            drift, bend = drift_of(run, row, lane)
-            own[first + RATE] += tables[rows + Y * width + lane] * drift
-            own[first + BEND] += tables[rows + Y * width + lane] * bend
-            own[first + READING_RATE] += tables[rows + E * width + lane] * drift
-            own[first + READING_BEND] += tables[rows + E * width + lane] * bend
-        own[first + READING_REST] = 0.0 if side == 0.0 else lag_of(run, j, side) * own[first + RATE]
-    elif side == 0.0:
-        reach = dot_of_sizes(tables, row + at[SIZES] + j * width, own, at[U], width)
-        if reach < own[first + UPPER_GAP] and reach < own[first + LOWER_GAP]:
-            own[first + AWAKE] = 0.0
+        _show_drift(run, row, j)
+        return
+    own[first + READING_REST] = own[first + READING_BEND] = own[first + READING_FOURTH] = 0.0
+    own[first + RATE] = own[first + READING_RATE] = 0.0
+    if side == 0.0 and reach < own[first + UPPER_GAP] and reach < own[first + LOWER_GAP]:
+        own[first + AWAKE] = 0.0
 
 
 @leaf
-def drift_of(run, row, lane):
-    """Rate of a coordinate without a position of rest, and the derivative of the rate."""
-    own, at, tables = run.own, run.at, run.tables
-    width, block, drift, bend = at[WIDTH], lane % at[WIDTH], 0.0, 0.0
-    pair = row + at[GENERATOR] + (2 * width if lane >= width else 0) + block
-    for c in range(1 + at[JOINTS]):
-        rates, factor = row + at[DRIFTS] + c * 2 * width, own[at[U] + 2 * width + c]
-        drift += tables[rates + lane] * factor
-        bend += (tables[pair] * tables[rates + block] + tables[pair + width] * tables[rates + width + block]) * factor
-    return drift, bend
+def _show_drift(run, row, j):
+    """Write what the drift adds to displacement and reading of joint j, and to the reading's bounds for a cycle."""
+    own, at, first = run.own, run.at, run.at[JOINT] + j * NUMBERS
+    width, side = 2 * at[WIDTH], known(run, j, SIDE)
+    lag = 0.0 if side == 0.0 else lag_of(run, j, side)
+    for k in range(POWERS):
+        shown = row + at[NOW_ROWS] + (4 * j + Y) * width
+        own[first + RATE + k] = dot(run.tables, shown, own, at[DRIFT] + k * width, width)
+    own[first + READING_REST] = lag * own[first + RATE]
+    own[first + READING_BEND] = own[first + READING_FOURTH] = 0.0
+    for k in range(POWERS):
+        power, beyond = k + 1, 0.0
+        if k + 1 < POWERS:
+            beyond = (power + 1) * own[first + RATE + k + 1]
+        own[first + READING_RATE + k] = own[first + RATE + k] + lag * beyond
+        bend = abs(own[first + READING_RATE + k]) * power * (power - 1)
+        if power >= 2:
+            own[first + READING_BEND] += bend * run.period ** (power - 2)
+        if power >= 4:
+            own[first + READING_FOURTH] += bend * (power - 2) * (power - 3) * run.period ** (power - 4)
 
 
 @leaf
@@ -306,13 +340,23 @@ def look(run, row, level, h):
         if known(run, j, AWAKE) == 0.0:
             continue
         ahead, place = row + at[AHEAD] + (level * m + j) * 4 * blocks * LANES, at[READING] + j * READINGS + NOW + 1
-        sample(run.tables, ahead, own, 0, at[U], blocks, at[WIDTH], 0, 1.0, place, place + RATES)
+        sample(run.tables, ahead, own, at[U], blocks, at[WIDTH], place, place + RATES)
         if run.tables[row + DRIFTING] != 0.0:
-            rest, rate, bend = known(run, j, READING_REST), known(run, j, READING_RATE), known(run, j, READING_BEND)
-            for i in range(LANES):
-                time = (i + 1) * h
-                own[place + i] += rest + time * (rate + 0.5 * time * bend)
-                own[place + RATES + i] += rate + time * bend
+            _add_drift_ahead(own, at[JOINT] + j * NUMBERS, h, place)
+
+
+@leaf
+def _add_drift_ahead(own, first, h, place):
+    """Add to the readings after 1 to 8 intervals what the drift of a joint adds."""
+    last = first + READING_RATE + POWERS - 1
+    for i in range(LANES):
+        time = (i + 1) * h
+        moved, rate = own[last], POWERS * own[last]
+        for k in range(1, POWERS):
+            moved = own[last - k] + time * moved
+            rate = (POWERS - k) * own[last - k] + time * rate
+        own[place + i] += own[first + READING_REST] + time * moved
+        own[place + RATES + i] += rate
 
 
 @part
@@ -323,7 +367,7 @@ def bound_fourth(run, row):
     for j in range(at[JOINTS]):
         if known(run, j, AWAKE) != 0.0:
             bound = dot_of_sizes(run.tables, row + at[BOUNDS] + j * width, own, at[U], width)
-            put(own, at[JOINT] + j * NUMBERS + FOURTH, bound)
+            put(own, at[JOINT] + j * NUMBERS + FOURTH, bound + known(run, j, READING_FOURTH))
 
 
 @leaf
@@ -331,7 +375,7 @@ def bound_second(tables, own, at, row, j):
     """Bound of the second derivative of what joint j reads, from now on."""
     width = 2 * at[WIDTH]
     bend = own[at[JOINT] + j * NUMBERS + READING_BEND]
-    return dot_of_sizes(tables, row + at[BENDS] + j * width, own, at[U], width) + abs(bend)
+    return dot_of_sizes(tables, row + at[BENDS] + j * width, own, at[U], width) + bend
 
 
 @part
@@ -348,7 +392,7 @@ def read_after(run, intervals):
 def add_drift(run, row, time, out):
     """Add to coordinates at ``out`` how far those without a position of rest drift in a time."""
     if run.tables[row + DRIFTING] != 0.0:
-        _drift(run, row, time, out)
+        _drift(run, time, out)
 
 
 @part
@@ -362,10 +406,14 @@ def read_next(run, intervals):
 
 
 @leaf
-def _drift(run, row, time, out):
-    for lane in range(2 * run.at[WIDTH]):
-        drift, bend = drift_of(run, row, lane)
-        run.own[out + lane] += time * (drift + 0.5 * time * bend)
+def _drift(run, time, out):
+    own, width = run.own, 2 * run.at[WIDTH]
+    last = run.at[DRIFT] + (POWERS - 1) * width
+    for lane in range(width):
+        total = own[last + lane]
+        for power in range(1, POWERS):
+            total = own[last - power * width + lane] + time * total
+        own[out + lane] += time * total
 
 
 @part
@@ -412,9 +460,10 @@ def expand(run, row):
         if known(run, j, AWAKE) == 0.0:
             continue
         series, first = at[SERIES] + j * (DEGREE + 1), row + at[TAYLOR] + 4 * j * blocks * LANES
-        sample(run.tables, first, own, 0, at[U], blocks, at[WIDTH], 0, 1.0, series, series + LANES)
-        own[series + 1] += known(run, j, RATE)
-        own[series + 2] += 0.5 * known(run, j, BEND)
+        sample(run.tables, first, own, at[U], blocks, at[WIDTH], series, series + LANES)
+        if run.tables[row + DRIFTING] != 0.0:
+            for k in range(POWERS):
+                own[series + 1 + k] += known(run, j, RATE + k)
 
 
 @leaf

@@ -18,6 +18,13 @@ from numba import njit
 from chaosgym.core.lanes import LANES, padded
 from chaosgym.core.propagator import block, bound, derivative, steady_response
 
+MOST_LEVELS = 16
+"""Lengths of an interval: the shortest one times 2^level."""
+
+SLOW = 1e-2
+"""Angle [rad] by which a coordinate turns, or share by which it decays, in a cycle, below which it drifts: it has no
+position of rest under a static force, as that would be thousands of times as far away as it moves."""
+
 FINE = 16
 """Instants within the shortest interval from which a Taylor series goes on."""
 
@@ -83,8 +90,8 @@ def layout(n, harmonics, m, levels):
 
 
 @njit(cache=True, nogil=True)
-def tabulate(at, generator, to_modal, from_modal, shape, lag, shortest, omega, drive, rest, drift, constants):
-    """Row (at[ROW],) of a set of pressed surfaces.
+def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, rest, drift, constants, values):
+    """Fill a row (at[ROW],) of zeros with what depends on neither drive nor constant force.
 
     Parameters
     ----------
@@ -96,27 +103,56 @@ def tabulate(at, generator, to_modal, from_modal, shape, lag, shortest, omega, d
         Displacement of each joint per unit modal coordinate.
     lag : (m,)
         Damper over spring [s] where a surface presses, else 0.
-    shortest, omega
-        Shortest interval [s]; rate of the drive [rad/s].
-    drive : (H, 2, n)
-        Modal forces that go with cosine and sine of each harmonic.
-    rest, drift : (1 + m, 2n)
-        Of the modal coordinates under the constant force, and per unit position of each pressed surface.
-    constants : (m, 1 + m)
-        As in ``layout``.
+    shortest
+        Shortest interval [s].
+    rest, drift : (m, 2n)
+        Of the modal coordinates, per unit position of each pressed surface.
+    constants : (m, m)
+        As in ``layout``, without the column of 1.
     """
-    n, harmonics, m, blocks, width = at[MODES], at[HARMONICS], at[JOINTS], at[BLOCKS], at[WIDTH]
-    values = np.zeros(at[ROW])
-    drifts = np.any(drift != 0.0)
+    n, m, width, states = at[MODES], at[JOINTS], at[WIDTH], at[STATES]
+    values[SHORTEST], values[DRIFTING] = shortest, 1.0 if np.any(drift != 0.0) else 0.0
     for j in range(n):
-        drifts = drifts or (generator[1, j] != 0.0 and generator[2, j] == 0.0)
-    values[SHORTEST], values[DRIFTING] = shortest, 1.0 if drifts else 0.0
-    whole, steady = np.zeros((4, blocks)), np.zeros((2 * n, 2 * harmonics))
-    whole[:, :n] = generator
+        if generator[1, j] != 0.0 and generator[2, j] == 0.0:
+            values[DRIFTING] = 1.0
+    _put_blocks(at, generator, shortest, 0, at[LEVELS], values)
+    rows, reading = np.empty((DEGREE + 1, 2 * n)), np.empty((5, 2 * n))
+    for j in range(m):
+        rows[0] = shape[j] @ np.ascontiguousarray(from_modal[:n])
+        for p in range(DEGREE):
+            derivative(generator, rows[p], rows[p + 1])
+        for p in range(5):
+            reading[p] = rows[p] + lag[j] * rows[p + 1]
+        _put_joint(at, generator, rows, reading, j, 0, at[LEVELS], values)
+    resting = from_modal @ np.ascontiguousarray(rest.T)
+    for i in range(2 * n):
+        for c in range(2 * n):
+            values[at[FROM] + ((c // n) * width + c % n) * states + i] = from_modal[i, c]
+            values[at[TO] + c * 2 * width + (i // n) * width + i % n] = to_modal[i, c]
+        for j in range(m):
+            values[at[FROM] + (2 * width + 1 + j) * states + i] = resting[i, j]
+            values[at[TO] + (2 * at[BLOCKS] + 1 + j) * 2 * width + (i // n) * width + i % n] = -rest[j, i]
+            values[at[DRIFTS] + (1 + j) * 2 * width + (i // n) * width + i % n] = drift[j, i]
+    for j in range(m):
+        for k in range(m):
+            values[at[CONSTANTS] + j * (1 + m) + 1 + k] = constants[j, k]
+
+
+@njit(cache=True, nogil=True)
+def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, rest, load, values):
+    """Add to a row by ``put_structure`` a drive (H, 2, n) at ``omega`` [rad/s] and a constant force.
+
+    ``drive`` are modal forces that go with cosine and sine of each harmonic; ``rest``, ``load`` (2n,) are position of
+    rest and rate at the origin of the modal coordinates under the constant force. Those that are ``SLOW`` drift.
+    """
+    n, harmonics, width, states = at[MODES], at[HARMONICS], at[WIDTH], at[STATES]
+    shortest, period = values[SHORTEST], 2.0 * math.pi / omega
+    levels = min(at[LEVELS], max(1, int(math.log2(period / shortest)) + 1))
+    turning, steady = np.zeros((4, harmonics)), np.zeros((2 * n, 2 * harmonics))
     response, cosine, sine = np.empty((2 * n, 2)), np.empty(2 * n), np.empty(2 * n)
     for h in range(harmonics):
         rate = (h + 1) * omega
-        whole[1, n + h], whole[2, n + h] = -rate, rate
+        turning[1, h], turning[2, h] = -rate, rate
         for i in range(2 * n):
             cosine[i], sine[i] = 0.0, 0.0
             for k in range(n):
@@ -124,87 +160,123 @@ def tabulate(at, generator, to_modal, from_modal, shape, lag, shortest, omega, d
                 sine[i] += to_modal[i, n + k] * drive[h, 1, k]
         steady_response(generator, cosine, sine, rate, response)
         steady[:, h], steady[:, harmonics + h] = response[:, 0], response[:, 1]
-    _put_blocks(at, whole, shortest, values)
-    for j in range(m):
-        _put_joint(at, whole, shape[j] @ np.ascontiguousarray(from_modal[:n]), steady, lag[j], shortest, j, values)
-    states = at[STATES]
+    _put_blocks(at, turning, shortest, n, levels, values)
     back = from_modal @ steady
-    resting = from_modal @ np.ascontiguousarray(rest.T)
+    rows, reading = np.empty((DEGREE + 1, 2 * harmonics)), np.empty((5, 2 * harmonics))
+    resting, settling = np.zeros(2 * n), np.zeros(2 * n)
+    for i in range(2 * n):
+        if _is_slow(generator, i, period):
+            lane = at[DRIFTS] + (i // n) * width + i % n
+            values[lane] = load[i]
+            values[DRIFTING] = 1.0 if load[i] != 0.0 else values[DRIFTING]
+        else:
+            settling[i] = rest[i]
     for i in range(2 * n):
         for c in range(2 * n):
-            values[at[FROM] + ((c // n) * width + c % n) * states + i] = from_modal[i, c]
-            values[at[TO] + c * 2 * width + (i // n) * width + i % n] = to_modal[i, c]
+            resting[i] += from_modal[i, c] * settling[c]
+    for j in range(at[JOINTS]):
+        for c in range(2 * harmonics):
+            rows[0, c] = 0.0
+            for i in range(n):
+                rows[0, c] += shape[j, i] * back[i, c]
+        for p in range(DEGREE):
+            derivative(turning, rows[p], rows[p + 1])
+        for p in range(5):
+            reading[p] = rows[p] + lag[j] * rows[p + 1]
+        _put_joint(at, turning, rows, reading, j, n, levels, values)
+        for i in range(n):
+            values[at[CONSTANTS] + j * (1 + at[JOINTS])] += shape[j, i] * resting[i]
+    for i in range(2 * n):
         for c in range(2 * harmonics):
             lane = (c // harmonics) * width + n + c % harmonics
             values[at[FROM] + lane * states + i] = back[i, c]
             values[at[TO] + (2 * n + c) * 2 * width + (i // n) * width + i % n] = -steady[i, c]
-        for c in range(1 + m):
-            values[at[FROM] + (2 * width + c) * states + i] = resting[i, c]
-            values[at[TO] + (2 * blocks + c) * 2 * width + (i // n) * width + i % n] = -rest[c, i]
-            values[at[DRIFTS] + c * 2 * width + (i // n) * width + i % n] = drift[c, i]
+        values[at[FROM] + 2 * width * states + i] = resting[i]
+        values[at[TO] + 2 * at[BLOCKS] * 2 * width + (i // n) * width + i % n] = -settling[i]
     for c in range(2 * harmonics):
         lane = (c // harmonics) * width + n + c % harmonics
         values[at[TO] + (2 * n + c) * 2 * width + lane] = 1.0
-    for j in range(m):
-        for c in range(1 + m):
-            values[at[CONSTANTS] + j * (1 + m) + c] = constants[j, c]
+
+
+@njit(cache=True, nogil=True)
+def tabulate(
+    at, generator, to_modal, from_modal, shape, lag, shortest, rest, drift, constants, omega, drive, load_rest, load
+):
+    """Row of a set of pressed surfaces under a drive and a constant force; see ``put_structure``, ``put_drive``."""
+    values = np.zeros(at[ROW])
+    put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, rest, drift, constants, values)
+    put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, load_rest, load, values)
     return values
 
 
 @njit(cache=True)
-def _put_blocks(at, whole, shortest, values):
-    """Fill TURN, FINER and GENERATOR."""
-    width = at[WIDTH]
-    for j in range(at[BLOCKS]):
-        for k in range(4):
-            values[at[GENERATOR] + k * width + j] = whole[k, j]
-        for f in range(FINE + 1):
-            for k, entry in enumerate(block(whole, j, shortest * f / FINE)):
-                values[at[FINER] + (4 * f + k) * width + j] = entry
-        for level in range(at[LEVELS]):
-            for i in range(LANES):
-                for k, entry in enumerate(block(whole, j, math.ldexp(shortest, level) * (i + 1))):
-                    values[at[TURN] + (4 * (LANES * level + i) + k) * width + j] = entry
+def _is_slow(generator, i, period):
+    """True if modal coordinate i turns and decays by less than ``SLOW`` in a cycle."""
+    n = generator.shape[1]
+    j = i % n
+    rate = abs(generator[0 if i < n else 3, j])
+    if generator[2, j] != 0.0:
+        rate = max(abs(generator[0, j]) + abs(generator[1, j]), abs(generator[2, j]) + abs(generator[3, j]))
+    return rate * period < SLOW
 
 
 @njit(cache=True)
-def _put_joint(at, whole, output, steady, lag, shortest, j, values):
-    """Fill AHEAD, TAYLOR, NOW_ROWS and bounds of joint j; ``output`` (2n,) is its displacement in modes."""
-    n, harmonics, m, blocks, width = at[MODES], at[HARMONICS], at[JOINTS], at[BLOCKS], at[WIDTH]
-    rows, reading, size = np.zeros((DEGREE + 1, 2 * blocks)), np.zeros((5, 2 * blocks)), np.empty(2 * blocks)
-    rows[0, :n], rows[0, blocks : blocks + n] = output[:n], output[n:]
-    for h in range(harmonics):
-        for i in range(2 * n):
-            rows[0, n + h] += output[i] * steady[i, h]
-            rows[0, blocks + n + h] += output[i] * steady[i, harmonics + h]
-    for p in range(DEGREE):
-        derivative(whole, rows[p], rows[p + 1])
-    for p in range(5):
-        reading[p] = rows[p] + lag * rows[p + 1]
+def _put_blocks(at, generator, shortest, first, levels, values):
+    """Fill TURN, FINER and GENERATOR of blocks (4, k) from lane ``first`` on."""
+    width = at[WIDTH]
+    for j in range(generator.shape[1]):
+        lane = first + j
+        for k in range(4):
+            values[at[GENERATOR] + k * width + lane] = generator[k, j]
+        for f in range(FINE + 1):
+            for k, entry in enumerate(block(generator, j, shortest * f / FINE)):
+                values[at[FINER] + (4 * f + k) * width + lane] = entry
+        for level in range(levels):
+            for i in range(LANES):
+                place = at[TURN] + 4 * (LANES * level + i) * width + lane
+                if level > 0 and i < LANES // 2:
+                    # the instants of the first half are every second one of the level before
+                    for k in range(4):
+                        values[place + k * width] = values[place + (4 * (i + 1 - LANES) + k) * width]
+                    continue
+                for k, entry in enumerate(block(generator, j, math.ldexp(shortest, level) * (i + 1))):
+                    values[place + k * width] = entry
+
+
+@njit(cache=True)
+def _put_joint(at, generator, rows, reading, j, first_block, levels, values):
+    """Fill AHEAD, TAYLOR, NOW_ROWS and bounds of joint j for blocks (4, k) from ``first_block`` on.
+
+    ``rows`` (DEGREE + 1, 2k) are the derivatives of its displacement, ``reading`` (5, 2k) those of its reading.
+    """
+    m, blocks, width, own = at[JOINTS], at[BLOCKS], at[WIDTH], generator.shape[1]
+    size = np.empty(2 * own)
     factorial = 1.0
     for p in range(DEGREE + 1):
         factorial *= max(p, 1)
-        for i in range(2 * blocks):
-            values[at[TAYLOR] + ((4 * j + 2 * (p // LANES)) * blocks + i) * LANES + p % LANES] = rows[p, i] / factorial
-    for i in range(2 * blocks):
-        lane = (i // blocks) * width + i % blocks
+        half = at[TAYLOR] + (4 * j + 2 * (p // LANES)) * blocks * LANES + p % LANES
+        for i in range(2 * own):
+            place = half + ((i // own) * blocks + first_block + i % own) * LANES
+            values[place] = rows[p, i] / factorial
+    for i in range(2 * own):
+        lane = (i // own) * width + first_block + i % own
         for q in range(4):
             row = rows[q] if q <= V else reading[q - E]
             values[at[NOW_ROWS] + (4 * j + q) * 2 * width + lane] = row[i]
     for which in range(3):
-        bound(whole, reading[4] if which == 0 else reading[2] if which == 1 else rows[0], size)
-        first = at[BOUNDS + which] + j * 2 * width
-        for i in range(2 * blocks):
-            values[first + (i // blocks) * width + i % blocks] = size[i]
-    for level in range(at[LEVELS]):
+        bound(generator, reading[4] if which == 0 else reading[2] if which == 1 else rows[0], size)
+        begin = at[BOUNDS + which] + j * 2 * width + first_block
+        for i in range(2 * own):
+            values[begin + (i // own) * width + i % own] = size[i]
+    for level in range(levels):
         first = at[AHEAD] + (level * m + j) * 4 * blocks * LANES
-        for b in range(blocks):
+        for b in range(own):
             for i in range(LANES):
-                instant = at[TURN] + 4 * (LANES * level + i) * width + b
+                instant = at[TURN] + 4 * (LANES * level + i) * width + first_block + b
                 e11, e12 = values[instant], values[instant + width]
                 e21, e22 = values[instant + 2 * width], values[instant + 3 * width]
                 for q in range(2):
-                    one, two = reading[q, b], reading[q, blocks + b]
-                    place = first + (2 * q * blocks + b) * LANES + i
+                    one, two = reading[q, b], reading[q, own + b]
+                    place = first + (2 * q * blocks + first_block + b) * LANES + i
                     values[place] = one * e11 + two * e21
                     values[place + blocks * LANES] = one * e12 + two * e22

@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.core.joints.tables import SLOW
 from chaosgym.core.modal_model import ModalImpactModel
-from chaosgym.core.modal_run import SLOW
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Number, Option
 from chaosgym.machines.modal_impact import (
@@ -226,4 +226,4 @@ def _structure(machine: ModalMachine) -> ModalImpactModel:
     upper = Stop(machine.contact_stiffness, machine.contact_damping)
     lower = Stop(machine.lower_stiffness_factor * upper.stiffness, machine.lower_damping_factor * upper.damping)
     load = static + machine.preload * joint
-    return flexible_model(modes, *upper, lower=lower, static_force=load)._replace(drive=harmonics)
+    return flexible_model(modes, *upper, lower=lower, static_force=load, drive=harmonics)
