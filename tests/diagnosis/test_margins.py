@@ -7,13 +7,14 @@ from click.testing import CliRunner
 
 from chaosgym.cli import app
 from chaosgym.diagnosis import Tolerance, diagnose, find_periodic_orbit
+from chaosgym.diagnosis.bifurcation_diagram import follow
 from chaosgym.diagnosis.margins import margins
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import ImpactBeam
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
 
-from .test_branch import oscillator
+from .test_branch import SOFT, oscillator
 
 
 def orbit_of(machine):
@@ -48,6 +49,20 @@ def test_a_fold_is_where_the_dragged_motion_jumps(field, side):
     ]
     assert peaks[1] == pytest.approx(peaks[0], rel=2e-3)
     assert peaks[2] != pytest.approx(peaks[0], rel=5e-3)
+
+
+def test_a_doubled_motion_ends_where_it_began():
+    """Between two flips the soft stop has period 12: it ends at the flip of its parent, and flips at its own."""
+    diagram = follow(SOFT, "speed", (0.3855, 0.389), sweep=2, workers=1, longest_period=12)
+    (first, _), (second, _) = (
+        (one.value, one.period) for one in diagram.bifurcations if one.kind == "flip" and not one.ends
+    )
+    machine = with_settings(SOFT, {"speed": 0.5 * (first + second)})
+    settled = simulate(machine, 1, transient=6000).final_state
+    orbit = find_periodic_orbit(machine, settled, 12)
+    below, above = margins(machine, orbit, {"speed": Tolerance(0.01)}).margins
+    assert (below.kind, above.kind) == ("flip", "flip")
+    assert (below.value, above.value) == pytest.approx((first, second), rel=1e-7)
 
 
 def test_nothing_is_near_a_calm_orbit():

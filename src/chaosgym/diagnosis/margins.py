@@ -67,7 +67,8 @@ class Margin(NamedTuple):
     value
         The parameter's value there.
     kind
-        Bifurcation at which stability ends; None if it does not so far.
+        Bifurcation at which stability ends, or at which the motion itself ends on the one that it once began at: a
+        doubled one at a flip, one without symmetry at a symmetry breaking. None if there is none so far.
     end
         Why it was not followed further; empty if stability ends or the reach is reached.
     """
@@ -293,7 +294,7 @@ def _followed(family: OrbitFamily, here: Array, side: int, name: str, tolerance:
         )
     except NotFollowedError as reason:
         return Margin(name, side, 0.0, nominal, None, f"not followed: {reason}")
-    lost = [each.bifurcation for each in ahead.found if each.bifurcation.loses_stability]
+    lost = [each.bifurcation for each in ahead.found if each.bifurcation.loses_stability or each.bifurcation.ends]
     if lost:
         return Margin(name, side, _share(tolerance, nominal, lost[0].value), lost[0].value, lost[0].kind)
     value = family.value(ahead.points[-1].x[-1])
