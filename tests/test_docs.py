@@ -48,7 +48,6 @@ def test_scorecard_page_shows_what_the_machines_do():
         "IBS-016",
         "IBS-020",
         "IBS-025",
-        "IBS-028",
         "IBS-034",
         "IBS-046",
         "SSC-045",
