@@ -7,15 +7,15 @@ than the interval of the paired difference.
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import numpy as np
 from tqdm import tqdm
 
 from chaosgym.control.comparison import MADE_WORSE
+from chaosgym.control.comparison_lines import difference
 from chaosgym.control.controllers import BackOff, Follow
 from chaosgym.control.guard import GuardedPolicy
 from chaosgym.control.policies import shipped_policy
 from chaosgym.control.rollout import Policy, play
-from chaosgym.control.statistics import bootstrap_interval
+from chaosgym.control.statistics import paired_difference
 
 ENV = "chaosgym/ImpactBeamTolerance-v1"
 
@@ -55,21 +55,10 @@ def mismatch(machines: int = 64, rows: Iterable[str] = ROWS) -> list[dict[str, A
         jobs = {name: play(player, ENV, seeds=seeds, **ROWS[row]).returns for name, player in players.items()}
         found.append({"row": row, "returns": {name: float(returns.mean()) for name, returns in jobs.items()}})
         for name in ("shipped", "guarded"):
-            found[-1][name] = against(jobs[name], jobs["back off"], jobs["follow"])
+            told = paired_difference(jobs[name], jobs["back off"], MADE_WORSE)
+            worse = float((jobs[name] < jobs["follow"] - MADE_WORSE).mean())
+            found[-1][name] = {"made_worse": worse, "against_back_off": told}
     return found
-
-
-def against(mine: Any, backed: Any, followed: Any) -> dict[str, Any]:
-    """Paired difference to backing off with its interval, and the shares of machines that are made worse."""
-    more = mine - backed
-    low, high = bootstrap_interval(len(more), lambda drawn: np.asarray(more[drawn].mean(axis=-1)))
-    return {
-        "more_than_back_off": float(more.mean()),
-        "interval": [float(low), float(high)],
-        "worse": bool(high < 0.0),
-        "made_worse": float(np.mean(mine < followed - MADE_WORSE)),
-        "made_worse_than_back_off": float(np.mean(more < -MADE_WORSE)),
-    }
 
 
 def lines(found: Iterable[Mapping[str, Any]]) -> list[str]:
@@ -78,11 +67,6 @@ def lines(found: Iterable[Mapping[str, Any]]) -> list[str]:
     told += ["|---" * 7 + "|"]
     for row in found:
         returns = " | ".join(f"{value:.1f}" for value in row["returns"].values())
-        told.append(f"| {row['row']} | {returns} | {_difference(row['shipped'])} | {_difference(row['guarded'])} |")
+        shipped, guarded = (difference(row[name]["against_back_off"]) for name in ("shipped", "guarded"))
+        told.append(f"| {row['row']} | {returns} | {shipped} | {guarded} |")
     return told
-
-
-def _difference(against: Mapping[str, Any]) -> str:
-    low, high = against["interval"]
-    text = f"{against['more_than_back_off']:+.1f} ({low:.1f} to {high:.1f})"
-    return f"**{text}**" if against["worse"] else text

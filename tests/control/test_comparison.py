@@ -6,7 +6,8 @@ from stable_baselines3 import PPO
 
 import chaosgym
 from chaosgym.control import comparison
-from chaosgym.control.comparison import ONE, ZERO, Scores, compare, read_comparison, table_lines
+from chaosgym.control.comparison import ONE, ZERO, Scores, compare, read_comparison
+from chaosgym.control.comparison_lines import table_lines
 from chaosgym.control.controllers import Follow
 from chaosgym.control.evaluation import policy_of
 from chaosgym.control.maps import model_keywords
@@ -36,6 +37,7 @@ def test_following_scores_0_and_the_own_map_1(table):
     assert low <= summary["back off"]["score"] <= high
     assert low < high
     assert len(table_lines(summary)) == 5
+    assert all(row["against_back_off"] is None for row in summary.values())  # with memory, which has not played
 
 
 def test_a_comparison_goes_on(table, monkeypatch):

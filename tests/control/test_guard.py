@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
-from benchmarks.envs.mismatch import ENV, against, lines, mismatch
+from benchmarks.envs.mismatch import ENV, lines, mismatch
+from chaosgym.control.comparison_lines import difference
 from chaosgym.control.controllers import BackOff, Follow, Kriging
 from chaosgym.control.guard import GuardedPolicy
 from chaosgym.control.policies import shipped_policy
 from chaosgym.control.rollout import play
+from chaosgym.control.statistics import paired_difference
 from chaosgym.errors import ParameterError
 
 NOISE_FREE = {"sensor_error": 0.0, "bouncing_error": 0.0, "missed_impacts": 0.0}
@@ -65,18 +67,20 @@ def test_the_shipped_policy_is_kept_from_harm():
     returns = found["returns"]
     assert returns["shipped"] < returns["follow"] - 5.0
     assert returns["guarded"] > returns["follow"] - 1.0
-    assert found["shipped"]["worse"]
-    assert not found["guarded"]["worse"]
+    assert (
+        found["shipped"]["against_back_off"]["interval"][1] < 0.0 < found["guarded"]["against_back_off"]["interval"][1]
+    )
     assert lines([found])[-1].count("**") == 2
 
 
 def test_differences_are_paired():
     """Every machine worse by 2: the interval has no width, and all are made worse."""
     backed = np.linspace(-30.0, 0.0, 12)
-    told = against(backed - 2.0, backed, backed)
+    told = paired_difference(backed - 2.0, backed, 1.0)
     assert told["interval"] == pytest.approx([-2.0, -2.0])
-    assert told["worse"]
-    assert told["made_worse"] == told["made_worse_than_back_off"] == 1.0
+    assert told["made_worse"] == 1.0
+    assert difference(told) == "**-2.0 (-2.0 to -2.0)**"
+    assert difference(paired_difference(backed, backed, 1.0)) == "+0.0 (0.0 to 0.0)"
 
 
 def test_what_it_can_not_guard_is_refused():

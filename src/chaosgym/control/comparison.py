@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from chaosgym.control import controllers
 from chaosgym.control.maps import FLEET, FLEET_SEED, Maps, fleet_maps, maps_of, model_keywords
 from chaosgym.control.rollout import Played, Policy, play
-from chaosgym.control.statistics import bootstrap_interval, performance_profile
+from chaosgym.control.statistics import bootstrap_interval, paired_difference, performance_profile
 from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.envs.task import Status
 from chaosgym.envs.vector_env import native_envs
@@ -34,6 +34,9 @@ Array = NDArray[np.float64]
 
 ZERO, ONE = "follow the demand", "own map"
 """Contenders that are worth 0 and 1."""
+
+SAFE = "back off, with memory"
+"""Contender that needs neither model nor training, against which the others are told too."""
 
 COLUMNS = ("contender", "knows", "seed", "machine", "job_return", "type_iii", "deviation", "damage", "largest_force")
 """Columns of a comparison's table, one row a job."""
@@ -72,7 +75,7 @@ class Contenders:
             "skip bands": lambda: controllers.SkipBands(self._nominal()),
             "best common schedule, demands known": lambda: controllers.CommonSchedule(self.fleet),
             "back off": partial(controllers.BackOff, remembers=False),
-            "back off, with memory": controllers.BackOff,
+            SAFE: controllers.BackOff,
             "hill climbing": controllers.HillClimbing,
             "kriging": controllers.Kriging,
             "bandit": lambda: controllers.Bandit(self.fleet),
@@ -290,6 +293,13 @@ class Scores:
         common = sorted(set.intersection(*(set(jobs) for jobs in found)))
         return np.array([[jobs[machine].mean() for machine in common] for jobs in found])
 
+    def against(self, name: str, other: str) -> dict[str, Any] | None:
+        """Return less that of another: mean, interval, and share of the machines that lose more than ``MADE_WORSE``."""
+        if other not in self.table["contender"].to_pylist():
+            return None
+        mine, theirs = self.paired(name, other)
+        return paired_difference(mine, theirs, MADE_WORSE)
+
     def summary(self) -> dict[str, dict[str, Any]]:
         """What each contender achieved, as plain values, best score last.
 
@@ -307,7 +317,8 @@ class Scores:
 
         ``life`` is the geometric mean over machines of the joint's life over that of following the demand, ``load`` the
         ratio of the constant forces of equal life, and ``made_worse`` the share of the machines whose return is below
-        that of following by more than ``MADE_WORSE``.
+        that of following by more than ``MADE_WORSE``. ``against_back_off`` compares with backing off; it is None
+        where that has not played.
         """
         mine, zero, one = self.paired(name, ZERO, ONE)
         if np.array_equal(zero, one):
@@ -340,25 +351,9 @@ class Scores:
             "life": float(life),
             "load": float(life ** (-1.0 / LIFE_EXPONENT)),
             "made_worse": float(np.mean(mine < zero - MADE_WORSE)),
+            "against_back_off": self.against(name, SAFE),
             "largest_force": float(np.max(rows["largest_force"].to_numpy())),
             "failed": float(np.mean(rows["failed"].to_numpy())),
             "better_than_following": float(np.mean(mine > zero)),
             "profile": performance_profile(single, PROFILE_SCORES).tolist(),
         }
-
-
-def table_lines(summary: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Lines of a Markdown table."""
-    lines = [
-        "| contender | knows | seeds | machines | return | score | 95 % | Type III | mean deviation | load | life "
-        "| made worse |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|",
-    ]
-    for name, row in summary.items():
-        low, high = row["score_interval"]
-        lines.append(
-            f"| {name} | {row['knows']} | {row['seeds']} | {row['machines']} | {row['return']:.2f} "
-            f"| {row['score']:.2f} | {low:.2f} to {high:.2f} | {row['type_iii']:.1%} | {row['deviation']:.2f} "
-            f"| x{row['load']:.2f} | x{row['life']:.2f} | {row['made_worse']:.0%} |"
-        )
-    return lines

@@ -6,6 +6,7 @@ Agarwal et al., Deep Reinforcement Learning at the Edge of the Statistical Preci
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +36,13 @@ def bootstrap_interval(count: int, statistic: Callable[[NDArray[np.int64]], Arra
     drawn = [statistic(generator.integers(0, count, (BATCH, count))) for _ in range(RESAMPLES // BATCH)]
     tail = 50.0 * (1.0 - CONFIDENCE)
     return np.asarray(np.nanpercentile(drawn, [tail, 100.0 - tail]))
+
+
+def paired_difference(mine: Array, other: Array, much: float) -> dict[str, Any]:
+    """Mean of ``mine`` less ``other``, (count,) each, its interval, and the share that loses more than ``much``."""
+    more = mine - other
+    low, high = bootstrap_interval(len(more), lambda drawn: np.asarray(more[drawn].mean(axis=-1))).tolist()
+    return {"more": float(more.mean()), "interval": [low, high], "made_worse": float(np.mean(more < -much))}
 
 
 def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Array:
