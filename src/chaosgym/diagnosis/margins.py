@@ -8,7 +8,7 @@ A margin follows this motion. Another attractor may coexist, which a kick reache
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +28,7 @@ from chaosgym.diagnosis.orbit_family import (
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit, run_period
 from chaosgym.diagnosis.response import Diagnosis
 from chaosgym.diagnosis.response_type import Tolerance, default_tolerances
+from chaosgym.diagnosis.section import better_section
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
@@ -251,18 +252,24 @@ def _along(
     family = family_of(machine, name, low, high, orbit.state, orbit.period)
     here = np.append(family.weight * orbit.state, (nominal - low) / (high - low))
     normal = np.append(np.zeros(len(orbit.state)), 1.0)
-    ends = [_calm_end(family, here, contacts, normal, border) for border in (0.0, 1.0)]
-    straight = all(ends) and _straight(here, *(end for end in ends if end is not None))
-    if not straight:
+    below = _calm_end(family, here, contacts, normal, 0.0)
+    above = _calm_end(family, here, contacts, normal, 1.0) if below is not None else None
+    start: OrbitPoint | None = None
+    if below is None or above is None or not _straight(here, below, above):
         family = with_noise(family, orbit.state)
+        try:
+            family, start = better_section(*family.with_mirror(family.solve(here, normal)))
+        except NotFollowedError as reason:
+            told = f"not followed: {reason}"
+            return [Margin(name, side, 0.0, nominal, None, told) for side in (-1, 1)]
     found = []
-    for side, end, value in ((-1, ends[0], low), (1, ends[1], high)):
+    for side, value in ((-1, low), (1, high)):
         if value == nominal:
             found.append(Margin(name, side, 0.0, value, None, "end of the field's range"))
-        elif end is not None and straight:
+        elif start is None:
             found.append(Margin(name, side, _share(tolerance, nominal, value), value, None))
         else:
-            found.append(_followed(family, here, side, name, tolerance, nominal))
+            found.append(_followed(family, start, side, name, tolerance, nominal))
     return found
 
 
@@ -285,12 +292,13 @@ def _straight(here: Array, below: OrbitPoint, above: OrbitPoint) -> bool:
     return float(np.linalg.norm(beside)) <= BENT * max(float(np.linalg.norm(way)), 1e-12)
 
 
-def _followed(family: OrbitFamily, here: Array, side: int, name: str, tolerance: Tolerance, nominal: float) -> Margin:
-    normal = np.append(np.zeros(len(here) - 1), float(side))
+def _followed(
+    family: OrbitFamily, start: OrbitPoint, side: int, name: str, tolerance: Tolerance, nominal: float
+) -> Margin:
+    begun = replace(start, tangent=side * start.tangent)
     try:
-        start = family.solve(here, normal)
         ahead = stretch(
-            family, start, longest_step=0.25, first_step=0.1, until=lambda one: one.loses_stability, closely=False
+            family, begun, longest_step=0.25, first_step=0.1, until=lambda one: one.loses_stability, closely=False
         )
     except NotFollowedError as reason:
         return Margin(name, side, 0.0, nominal, None, f"not followed: {reason}")
