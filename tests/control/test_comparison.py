@@ -57,6 +57,28 @@ def test_more_machines_are_added(table, tmp_path):
     assert compare(BEAM, out, machines=4, only=names).sort_by(order).equals(table[0].sort_by(order))
 
 
+def test_there_are_no_more_machines_than_are_kept(tmp_path):
+    """256 of development and 512 sealed ones; a level, a split and a seal are part of what a file is of."""
+    out = tmp_path / "beam.parquet"
+    for sealed, kept in ((False, 256), (True, 512)):
+        with pytest.raises(ParameterError, match=f"machines = {kept + 1} is out of range; allowed: up to {kept}"):
+            compare(BEAM, out, machines=kept + 1, only=[ZERO], sealed=sealed)
+    compare(BEAM, out, machines=2, only=[ZERO], level="fleet", split="test", sealed=True)
+    read_comparison(out, f"{BEAM}, level fleet, split test, sealed True")
+    with pytest.raises(DatasetError, match="level fleet, split test, sealed True"):
+        compare(BEAM, out, machines=2, only=[ZERO], level="fleet", split="test")
+
+
+def test_who_knows_machines_knows_those_of_training(monkeypatch):
+    """Of a split and of sealed machines, models, tables and maps of the fleet are of the training split alone."""
+    asked = []
+    monkeypatch.setattr(comparison, "fleet_maps", lambda env, **keywords: asked.append(keywords))
+    monkeypatch.setattr(comparison.controllers, "learned_tables", lambda env, **keywords: asked.append(keywords))
+    contenders = comparison.Contenders(BEAM, {"level": "fleet", "split": "outside", "sealed": True}, False)
+    assert contenders.fleet is contenders._tables() is None
+    assert asked == [{"progress": None, "level": "fleet", "split": "train"}] * 2
+
+
 def test_one_file_holds_all_jobs(table):
     """Its columns are named, its rows are those of every job, and a file of something else is refused."""
     found = read_comparison(table[1], BEAM)

@@ -174,7 +174,7 @@ def compare(
     Raises
     ------
     ParameterError
-        If a controller is unknown.
+        If a controller is unknown, or there are not as many machines.
     DatasetError
         If the file is no comparison of this environment.
     """
@@ -189,7 +189,10 @@ def compare(
     subject = env if kind.definition == kind.name else f"{env} ({kind.definition})"
     told = {name: keywords[name] for name in SUBJECTS if keywords.get(name) not in (None, False, "irregular")}
     subject += "".join(f", {name} {value}" for name, value in told.items())
-    count = known.workplace.variants.count if machines is None else machines
+    kept = known.workplace.variants.count
+    count = kept if machines is None else machines
+    if count > kept:
+        raise ParameterError(f"machines = {count} is out of range; allowed: up to {kept}, of those kept for evaluation")
     table = read_comparison(out, subject) if out.exists() else None
     work: list[tuple[str, int, Policy | None]] = [(name, 0, None) for name in chosen]
     work += [(name, seed, policy) for name, seeds in (policies or {}).items() for seed, policy in enumerate(seeds)]
