@@ -41,6 +41,17 @@ def margins(machine: Any, points: int, seed: int, as_json: bool) -> None:
     emit(found, as_json, lambda: [f"{count:5d}  {outcome}" for outcome, count in found["counts"].items()])
 
 
+@click.command()
+@click.argument("machine", default="impact-beam")
+@AS_JSON
+def report(machine: str, as_json: bool) -> None:
+    """Measure the processor time of the report of MACHINE's template, without a search for changes and with it."""
+    from benchmarks.performance.reports import report_seconds
+
+    found = {name: report_seconds(machine, name == "with search") for name in ("without search", "with search")}
+    emit(found, as_json, lambda: [f"{seconds:6.1f} s of processor time, {name}" for name, seconds in found.items()])
+
+
 @click.command("check-sweep")
 @FOLDER
 @click.option("--points", type=click.IntRange(1, 10**6), default=50, show_default=True, help="Rows to label again.")
@@ -270,6 +281,7 @@ for command in (
     monitors,
     general,
     exponents,
+    report,
 ):
     app.add_command(command)
 

@@ -16,6 +16,7 @@ from benchmarks.cli import app
 from benchmarks.performance import rates, scaling
 from benchmarks.performance.against_exudyn import Contest, against_exudyn, period_of
 from benchmarks.performance.exudyn_machines import ExudynSetting, load_exudyn, run_in_exudyn
+from benchmarks.performance.reports import report_seconds
 from benchmarks.performance.timing import processor_seconds, rate
 from chaosgym.errors import ChaosgymError
 from chaosgym.simulation import simulate
@@ -35,6 +36,12 @@ def test_a_rate_counts_units_of_work() -> None:
     assert 50.0 < measured.per_second <= 500.0
     assert measured.per_processor_second > 2.0 * measured.per_second
     assert processor_seconds(lambda: time.sleep(0.05)) < 0.04
+
+
+@pytest.mark.slow
+def test_a_report_without_search_takes_less_than_twenty_seconds() -> None:
+    """Processor time of the study of the beam's template and its page, warm; a search takes more than none."""
+    assert 0.1 < report_seconds("impact-beam", search=False) < 20.0
 
 
 def test_every_rate_comes_out_positive(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -160,10 +160,10 @@ def test_a_life_in_time_is_that_many_cycles_of_the_machine(life, hours):
     [
         ('[duty]\nhours_a_day = "25 h"', "at most 24 h"),
         ("[duty]\nhours_a_day = 8", 'write duty.hours_a_day = "8 h"'),
-        ('load_rating = "3 N"', r"the brief has no key 'load_rating'; it belongs into \[criteria\]"),
-        ('clearance = "1 mm"', r"the brief has no key 'clearance'; it belongs into \[parameters\]"),
-        ('[region]\nhours_a_day = "8 h"', r"it belongs into \[duty\]"),
-        ('[tolerances]\nlife = "1 h"', r"\[tolerances\] has no key 'life'; it belongs into \[criteria\]"),
+        ('load_rating = "3 N"', r"the brief has no key 'load_rating'; it belongs in \[criteria\]"),
+        ('clearance = "1 mm"', r"the brief has no key 'clearance'; it belongs in \[parameters\]"),
+        ('[region]\nhours_a_day = "8 h"', r"it belongs in \[duty\]"),
+        ('[tolerances]\nlife = "1 h"', r"\[tolerances\] has no key 'life'; it belongs in \[criteria\]"),
         ("joint = 3", "the file of the machine, which the brief names"),
     ],
 )

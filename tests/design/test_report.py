@@ -17,7 +17,8 @@ from chaosgym.design import Criteria, assess
 from chaosgym.design.bending import Bending, BendingLife, Section, stressed
 from chaosgym.design.brief import brief_from, template
 from chaosgym.design.measured import evaluate_peaks
-from chaosgym.design.study import contradictions, study
+from chaosgym.design.study import _map, contradictions, study
+from chaosgym.design.told import life_told
 from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import DesignError
 from chaosgym.plotting.design_report import (
@@ -208,9 +209,28 @@ def test_report_says_what_the_numbers_say(answered):
     assert answered.improvement.best is not None
     best = 1e3 * answered.improvement.best.changes["clearance"]
     assert f"clearance 0.127 mm &rarr; {best:.6g} mm" in page
-    assert f"{answered.assessment.evaluation.life:,.0f}" in page
+    assert life_told(answered.assessment.evaluation.life) in page
     assert page == design_report(answered)
     assert not re.search(r"<script|https?://", page)
+
+
+def test_motions_that_coexist_are_told_in_the_headline():
+    """Two motions of one gear pair: no word of statistics where the worst motion counts in every cycle."""
+    text = template("docs/machines/kahraman-singh-1990.toml").replace('speed = "700 Hz"', 'speed = "720 Hz"')
+    brief = brief_from(tomllib.loads(text.replace("series = 32", "series = 8")))
+    answer = study(replace(brief, region={"clearance": Tolerance(0.01)}, changes={}, costs={}))
+    page = design_report(answer)
+    assert answer.assessment.type == "III"
+    assert "how it was started decides" in page
+    assert "only statistics hold" not in page
+    assert "statistics over all machines" not in " ".join(answer.lines())
+    assert "no change to try is stated" in answer.lines()[-1]
+
+
+def test_a_share_of_no_clearance_is_no_map():
+    """A cam without a gap has no second axis: an empty map would be drawn."""
+    brief = brief_from(tomllib.loads(template("docs/machines/cam-follower.toml")))
+    assert _map(brief, 1, False) is None
 
 
 def test_a_load_collective_and_wear_are_told():

@@ -179,7 +179,7 @@ def _known(where: str, given: Iterable[str], known: Iterable[str], homes: Mappin
     known = list(known)
     for key in given:
         if key not in known:
-            home = f"; it belongs into {homes[key]}" if homes and key in homes else suggestion(key, known)
+            home = f"; it belongs in {homes[key]}" if homes and key in homes else suggestion(key, known)
             raise DesignError(f"{where} has no key {shown(key)}{home}")
 
 

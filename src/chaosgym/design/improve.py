@@ -26,7 +26,7 @@ from chaosgym.design.bearing import Evaluation, evaluate
 from chaosgym.design.collective import assess_duty
 from chaosgym.design.methodology import SERIES_SIZE, Assessment, Check
 from chaosgym.design.runs import deviating, sobol_shares, worse_side
-from chaosgym.design.told import CRITERIA, listed
+from chaosgym.design.told import listed
 from chaosgym.diagnosis import default_tolerances
 from chaosgym.errors import DesignError, ParameterError, SimulationError
 from chaosgym.machines import Machine
@@ -148,11 +148,7 @@ class Improvement:
         if not self.suggestions:
             return "no change to try is stated"
         nearest = self.suggestions[0]
-        missed = [
-            f"{check.name} {CRITERIA[check.name](check.reached)} of {CRITERIA[check.name](check.required)}"
-            for check in nearest.assessment.checks
-            if not check.met
-        ]
+        missed = [f"{check.name} {check.told}" for check in nearest.assessment.checks if not check.met]
         return (
             f"none of {len(self.suggestions)} changes that were assessed meets all criteria; nearest: {nearest.told} "
             f"with {listed(missed) or 'a nominal response that is undetermined'}"

@@ -33,6 +33,7 @@ from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.reliability import time_blocks
 from chaosgym.design.runs import DIAGNOSIS_BUDGET, NOMINAL_BUDGET, Series, SettledRun, build_series, settled_run
 from chaosgym.design.statistics import Convergence, convergence
+from chaosgym.design.told import CRITERIA
 from chaosgym.design.wear import Wear, WearLife, wear_life
 from chaosgym.diagnosis import Neighbour, ResponseType, Tolerance, Type, default_tolerances, diagnose, response_type
 from chaosgym.machines import Machine
@@ -104,6 +105,12 @@ class Check:
     def met(self) -> bool:
         """Whether the criterion is met."""
         return self.reached >= self.required
+
+    @property
+    def told(self) -> str:
+        """What is reached of what is required, for people."""
+        reached, required = (CRITERIA[self.name](value) for value in (self.reached, self.required))
+        return f"{reached} of {required} {self.unit}".rstrip()
 
 
 class AtSpeed(NamedTuple):

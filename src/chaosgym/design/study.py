@@ -15,7 +15,7 @@ from chaosgym.design.improve import Improvement, Trial, improve
 from chaosgym.design.methodology import Assessment, Check
 from chaosgym.design.peak_impacts import PeakImpactDiagram, filling_cycles, peak_impacts, worn_side
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
-from chaosgym.design.told import CRITERIA, hours_told
+from chaosgym.design.told import hours_told
 from chaosgym.design.trends import HISTORY_SAMPLES, LifeTrend, life_against
 from chaosgym.diagnosis import Neighbour, ResponseMap, find_periodic_orbit, response_map
 from chaosgym.diagnosis.margins import Margins, margins
@@ -55,7 +55,7 @@ class DesignStudy:
     improvement
         Ranked changes; None if the machine meets its criteria as it is.
     map
-        Types around the nominal speed and clearance; None where these have no tolerance or it leaves their range.
+        Types around the nominal speed and clearance; None where these do not vary or leave their range.
     life_over_speed
         Over the machine's usual range; None without contact anywhere in it.
     diagram
@@ -213,8 +213,7 @@ class DesignStudy:
 
 def _told(check: Check, cycle_period: float) -> str:
     """What a check reached of what is required; a life in hours first."""
-    reached, required = (CRITERIA[check.name](value) for value in (check.reached, check.required))
-    told = f"{reached} of {required} {check.unit}".rstrip()
+    told = check.told
     if check.unit == "million cycles":
         reached, required = (hours_told(hours_of(life, cycle_period)) for life in (check.reached, check.required))
         told = f"{reached} of {required} in operation ({told})"
@@ -426,8 +425,9 @@ def _every_impact(record: CycleRecord, side: int, brief: DesignBrief) -> float:
 
 def _map(brief: DesignBrief, workers: int | None, progress: bool) -> ResponseMap | None:
     machine, region = brief.machine, brief.region
-    if machine.speed_field not in region or machine.clearance_field not in region:
-        return None
+    for name in (machine.speed_field, machine.clearance_field):
+        if name not in region or not (getattr(machine, name) or not region[name].relative):  # a share of zero is zero
+            return None
     speeds, clearances = (
         [region[name].at(getattr(machine, name), share) for share in MAP_SHARES]
         for name in (machine.speed_field, machine.clearance_field)

@@ -300,7 +300,8 @@ def impact_diagram(diagram: PeakImpactDiagram, ax: Axes) -> Axes:
         widest = float(np.max(np.abs(lean)))
         dots.set_clim(-widest, widest)
         ax.figure.colorbar(dots, ax=ax, label="sideways lean [deg]")
-    ax.set(xlabel=label, ylabel="peak force [N]", title="Peak Impact Diagram", ylim=(0.0, None))
+    ax.set(xlabel=label, ylabel="peak force [N]", title="Peak Impact Diagram")
+    ax.set_ylim(0.0, 1.1 * float(np.max(diagram.force)) or 1.0)
     if np.ptp(place) < least:
         middle = 0.5 * (np.min(place) + np.max(place))
         ax.set_xlim(middle - 0.5 * least, middle + 0.5 * least)

@@ -49,6 +49,10 @@ WHAT_TYPES_MEAN = {
 }
 
 
+COEXISTING = "repeats, but how it was started decides which of several motions it is"
+"""What Type III means where motions of different force coexist."""
+
+
 class Picture(NamedTuple):
     """A figure as base64 of its SVG, with its caption."""
 
@@ -88,7 +92,7 @@ def design_report(study: DesignStudy, command: str = "", *, date: str = "", brie
         study=study,
         tone=tone,
         headline=headline,
-        meaning=WHAT_TYPES_MEAN[found.type],
+        meaning=COEXISTING if found.response.coexists else WHAT_TYPES_MEAN[found.type],
         missed=[check.name for check in found.checks if not check.met],
         met={check.name: check.met for check in found.checks},
         intervals={
