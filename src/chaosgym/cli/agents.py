@@ -98,7 +98,13 @@ def compare(
     default=None,
     help="Folder with policy.json and weights.npz; default: the shipped policy of ENV, or kriging.",
 )
-@click.option("--machine", type=click.IntRange(0, 255), default=0, show_default=True, help="Of those kept for this.")
+@click.option(
+    "--machine",
+    type=click.IntRange(0, 255),
+    default=0,
+    show_default=True,
+    help="Of those kept for this; with --plant it draws the demands.",
+)
 @click.option("--plant", default=None, metavar="MODULE:CLASS", help="Your machine instead; - for lines of text.")
 @plot_option("--out", formats="figure .png, .svg, .pdf or animation .gif, .mp4")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")

@@ -147,7 +147,7 @@ class Worked:
 
 
 def work(plant: Plant, operator: Operator, job: int = 0, name: str = "") -> Worked:
-    """Run a job of the operator's task at a plant, with the demands of job ``job`` of the evaluation.
+    """Run a job of the operator's task at a plant, with demands that the number ``job`` draws.
 
     Raises
     ------
