@@ -112,7 +112,7 @@ def test_published_bifurcations_of_an_impact_oscillator(kind, omega, start, span
     """
     amplitude, impact, speed = start
     values = []
-    for stiffness in (1e8, 4e8, 1.6e9, 6.4e9):
+    for stiffness in (1e8, 4e8, 1.6e9):
         machine = oscillator(
             damping=0.02,
             stiffness=stiffness,
@@ -160,7 +160,7 @@ def test_a_published_diagram_over_force_and_speed(kind, omega, start, span, publ
     Their multipliers miss -1 by up to 1e-5, which moves a flip by 1e-8; a fold moves with the square.
     """
     found = []
-    for stiffness in (1e8, 4e8, 1.6e9, 6.4e9):
+    for stiffness in (1e8, 4e8, 1.6e9):
         machine = oscillator(
             damping=0.02,
             stiffness=stiffness,
