@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
+from chaosgym.design.told import hours_told, life_told
 from chaosgym.design.trends import HISTORY_SAMPLES
 from chaosgym.diagnosis import Nature, diagnose
 from chaosgym.errors import DesignError, ParameterError
@@ -137,7 +138,7 @@ class WearLife:
             if not np.isfinite(hours):
                 return "never: a gap without contact does not wear"
             factor = self.wear.uncertainty
-            return f"{hours:,.4g} h ({hours / factor:,.3g} to {hours * factor:,.3g})"
+            return f"{hours_told(hours)} ({life_told(hours / factor)} to {life_told(hours * factor)})"
 
         lines = [f"wear to the limit of {1e3 * self.wear.limit:g} mm: {span(self.hours)}"]
         if self.change is not None:
