@@ -285,6 +285,13 @@ def test_impossible_readings_are_refused():
             judge_peaks(np.full(20, value))
 
 
+def test_readings_whose_squares_are_no_numbers_are_refused():
+    """1e-320 N is no force; 1e-100 N is judged."""
+    with pytest.raises(DiagnosisError, match="the largest reading is 1e-101 N; allowed: 0, or 1e-100 N and more"):
+        judge_peaks(np.full(60, 1e-101))
+    assert judge_peaks(np.tile([1e-100, 9e-101], 60)).diagnosis.nature != "chaotic"
+
+
 def test_no_contact_is_said():
     """All zeros are no periodic response."""
     verdict = judge_peaks(np.zeros(50)).diagnosis

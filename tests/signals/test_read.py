@@ -80,6 +80,9 @@ def test_a_hash_tells_files_apart(tmp_path):
     assert read_recording(path).sha256 == hashlib.sha256(b"1\n2\n2\n").hexdigest()
 
 
+MANY = "\n".join(",".join(row) for row in ([f"c{k}" for k in range(1000)], ["1"] * 1000, ["2"] * 1000, ["1"] * 1000))
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -90,6 +93,7 @@ def test_a_hash_tells_files_apart(tmp_path):
         ("", "no numbers"),
         ("a [N],a [N]\n1,2\n", "two columns alike"),
         ("left [N],right [N]\n1,2\n3,1\n", "several columns that could be forces: 'left', 'right'; use --column"),
+        (MANY, r"could be forces: 'c0', .* 'c11' and 988 more; use --column NAME"),
         ("cycle,rpm\n1,1140\n2,1141\n3,1139\n", "no column that could be a force"),
         ("1\n2\n3\n4\n5\n6\n", "rises like a counter"),
         ("angle [deg]\n1\n2\n1\n", "no column that could be a force"),

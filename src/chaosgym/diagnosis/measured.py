@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 FEWEST_CYCLES, SHORT_RECORD = 8, 16
 """Cycles below which a record is refused, and below which nothing is told of it."""
 
-LARGEST_FORCE = 1e9
-"""Force [N] beyond which a unit must be wrong."""
+LARGEST_FORCE, SMALLEST_FORCE = 1e9, 1e-100
+"""Force [N] beyond which a unit must be wrong, and below which its square is no number."""
 
 MOST_PARTS = 3
 """How often a record is cut in two."""
@@ -59,7 +59,7 @@ def judge_peaks(
     Raises
     ------
     DiagnosisError
-        If there are fewer than 8 readings, one is not finite or beyond 1e9, or the error is none.
+        If there are fewer than 8 readings, one is not finite or beyond 1e9, all are below 1e-100, or the error is none.
 
     Examples
     --------
@@ -130,6 +130,9 @@ def _checked(peaks: ArrayLike) -> Array:
             f"reading {readings[bad[0]]:g} in cycle {bad[0] + 1} is no force in newton; allowed: finite, up to "
             f"{LARGEST_FORCE:g} N"
         )
+    largest = float(np.max(np.abs(readings)))
+    if 0.0 < largest < SMALLEST_FORCE:
+        raise DiagnosisError(f"the largest reading is {largest:g} N; allowed: 0, or {SMALLEST_FORCE:g} N and more")
     return readings
 
 

@@ -35,6 +35,9 @@ _OTHERS = "g m/s² m/s2 m/s^2 m/s mm/s in/s m mm um µm μm in mil Pa kPa MPa ba
 OTHERS = frozenset(_OTHERS.split())
 """Units of force, and those of quantities that are judged in their own unit."""
 
+MOST_SHOWN = 12
+"""Columns that a message names."""
+
 VOLTS = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6}
 
 
@@ -127,12 +130,12 @@ def choose_force(
     if column is None:
         names = force_names(recording)
         if len(names) > 1:
-            shown = ", ".join(map(repr, names))
             raise DiagnosisError(
-                f"{recording.source} has several columns that could be forces: {shown}; use --column NAME"
+                f"{recording.source} has several columns that could be forces: {_first(list(map(repr, names)), ', ')}; "
+                "use --column NAME"
             )
         if not names:
-            why = "; ".join(f"{name!r} {_speaks_against(recording, name)}" for name in recording.columns)
+            why = _first([f"{name!r} {_speaks_against(recording, name)}" for name in recording.columns], "; ")
             raise DiagnosisError(f"{recording.source} has no column that could be a force ({why}); use --column NAME")
         name = names[0]
     else:
@@ -147,7 +150,7 @@ def _named(recording: Recording, column: str) -> str:
     if not matching and place and 1 <= int(column) <= len(recording.columns):
         matching = [list(recording.columns)[int(column) - 1]]
     if not matching:
-        listed = ", ".join(repr(name) for name in dict.fromkeys([*recording.columns, *recording.problems]))
+        listed = _first(list(map(repr, dict.fromkeys([*recording.columns, *recording.problems]))), ", ")
         raise DiagnosisError(f"{recording.source} has no column {column!r}; its columns: {listed}")
     return matching[0]
 
@@ -167,7 +170,7 @@ def choose_speed(recording: Recording, column: str | None = None) -> Signal:
             if recording.units.get(name, "") in SPEEDS or any(map(SPEED.fullmatch, re.split(r"[\W_\d]+", name)))
         ]
         if len(names) != 1:
-            several = f"several columns that could be the speed: {', '.join(map(repr, names))}"
+            several = f"several columns that could be the speed: {_first(list(map(repr, names)), ', ')}"
             told = several if names else "no column that says it is a speed"
             raise DiagnosisError(f"{recording.source} has {told}; use --speed-column NAME")
         name = names[0]
@@ -386,3 +389,9 @@ def _rounding(stamps: Array) -> float:
         if np.max(np.abs(np.round(stamps, decimals) - stamps)) <= 1e-9 * 10.0**-decimals + 4e-16 * abs(stamps[-1]):
             return float(10.0**-decimals)
     return 0.0
+
+
+def _first(texts: list[str], between: str) -> str:
+    """The first of many, and how many follow."""
+    more = len(texts) - MOST_SHOWN
+    return between.join(texts[:MOST_SHOWN]) + (f" and {more} more" if more > 0 else "")
