@@ -95,7 +95,8 @@ def test_matrix_market_as_scipy_writes_it(shape, dense, tmp_path):
     if shape == "general":
         wanted[0, 3] += 1.0
     path = tmp_path / "K.mtx"
-    mmwrite(path, wanted if dense else coo_array(wanted), comment="a comment", symmetry=shape, precision=17)
+    mmwrite(path, wanted if dense else coo_array(wanted), comment="a comment", symmetry="AUTO", precision=17)
+    assert shape in path.read_text().splitlines()[0]
     found = read_matrix(path)
     assert isinstance(found, np.ndarray) == dense
     np.testing.assert_array_equal(found if dense else found.toarray(), wanted)
@@ -107,7 +108,12 @@ def test_matrix_market_by_hand(tmp_path):
     assert read_matrix(market(tmp_path, text)).toarray().tolist() == [[0.0, 5.0], [-7.0, 0.0]]
     assert read_matrix(market(tmp_path, "coordinate real general\n2 2 0\n")).toarray().tolist() == [[0.0] * 2] * 2
     assert read_matrix(market(tmp_path, "coordinate real general\n2 2 0")).toarray().tolist() == [[0.0] * 2] * 2
-    assert read_matrix(market(tmp_path, "array real general\n1 1\n5\n")).tolist() == [[5.0]]
+    assert read_matrix(market(tmp_path, "array double general\n1 1\n5\n")).tolist() == [[5.0]]
+    assert read_matrix(market(tmp_path, "array real general\n2 2\n1\n2\n3\n4\n")).tolist() == [[1.0, 3.0], [2.0, 4.0]]
+    half = read_matrix(market(tmp_path, "array real symmetric\n3 3\n1\n2\n3\n4\n5\n6\n"))
+    assert half.tolist() == [[1.0, 2.0, 3.0], [2.0, 4.0, 5.0], [3.0, 5.0, 6.0]]
+    half = read_matrix(market(tmp_path, "coordinate real symmetric\n3 3 4\n1 1 1\n2 1 2\n3 3 3\n3 1 4\n"))
+    assert half.toarray().tolist() == [[1.0, 2.0, 4.0], [2.0, 0.0, 0.0], [4.0, 0.0, 3.0]]
 
 
 CLAIMS = {
@@ -130,7 +136,7 @@ CLAIMS = {
     "half a full one with more": ("array real symmetric\n2 2\n1\n2\n3\n4\n", "other entries than the 3 that it claims"),
     "a full one in rows": ("array real general\n2 2\n1 2\n3 4\n", "it holds other entries than the 4 that it claims"),
     "a word": ("array real general\n1 1\nx\n", "could not convert"),
-    "nothing": ("", ""),
+    "nothing": ("", "Line 1: "),
 }
 
 

@@ -10,6 +10,7 @@ from scipy.optimize import minimize_scalar
 
 import chaosgym
 from chaosgym.errors import ParameterError
+from chaosgym.machines.modal_machine.cycle_file import files_of, with_samples
 
 FILE = Path(__file__).parents[2] / "docs" / "machines" / "cam-follower.toml"
 MASS, SPRING, PRELOAD, LIFT, CAM, DAMPER = 0.6, 2e4, 120.0, 8e-3, 3e6, 400.0
@@ -152,6 +153,69 @@ def test_files_that_are_no_cycle_end_in_one_line(cam, case):
         chaosgym.read_machine(cam(*changes, table=table))
     assert message in str(told.value)
     assert "\n" not in str(told.value)
+
+
+def samples(folder, *rows, head="angle [deg],lift [mm]", **row):
+    """What a drive's displacement becomes, of a CSV file of these rows."""
+    (folder / "lift.csv").write_text("\n".join([head, *rows]))
+    return with_samples({"displacement": "lift.csv", "harmonic": 1} | row, folder)["displacement"]
+
+
+def refused(folder, *rows, **keywords):
+    """The line with which such a file is refused, after its name."""
+    with pytest.raises(ParameterError) as told:
+        samples(folder, *rows, **keywords)
+    assert str(told.value).startswith(f"{folder / 'lift.csv'} ")
+    return str(told.value).removeprefix(f"{folder / 'lift.csv'} ")
+
+
+def test_three_rows_are_a_cycle(tmp_path):
+    """With blank lines, a mark of byte order and letters of any size in the name; two rows are none."""
+    assert samples(tmp_path, "0,1", "", "120,2", "240,-3.5") == ["1.0 mm", "2.0 mm", "-3.5 mm"]
+    (tmp_path / "L.CSV").write_bytes("\ufeffangle [cycle] , lift [ mm ]\n0,1\n.25,2\n.5,3\n.75,4\n1,1".encode())
+    with pytest.raises(ParameterError, match=r"^drive\.column has no meaning without a CSV file; leave it out$"):
+        with_samples({"displacement": "1 mm", "column": "lift"}, tmp_path)
+    drive = {"displacement": "L.CSV", "column": "lift"}
+    assert with_samples(drive, tmp_path) == {"displacement": ["1.0 mm", "2.0 mm", "3.0 mm", "4.0 mm"]}
+    assert refused(tmp_path, "0,1", "180,2") == "is no cycle at equal steps from 0 to 360; allowed: 3 rows or more"
+
+
+def test_a_step_may_err_by_a_ten_thousandth(tmp_path):
+    """Of the step; that tells a table that was rounded from one that is uneven, or of another cycle."""
+    assert len(samples(tmp_path, "0,1", "90,2", "180,3", "270.00899,4")) == 4
+    assert "is no cycle" in refused(tmp_path, "0,1", "90,2", "180,3", "270.00901,4")
+    assert len(samples(tmp_path, "0.005,1", "90,2", "180,3", "270,4", "360.0052,1")) == 4, "closed, within a millionth"
+    assert "is no cycle" in refused(tmp_path, "0,1", "90,2", "180,3", "270,4", "360.0004,1")
+
+
+def test_a_cycle_closes_within_a_millionth_of_its_largest_value(tmp_path):
+    """The line says where it ends and begins."""
+    assert len(samples(tmp_path, "0,1", "120,2", "240,-3", "360,1.0000029")) == 3
+    line = refused(tmp_path, "0,1", "120,2", "240,-3", "360,1.5")
+    assert line == "ends at 1.5 and begins at 1; allowed: a cycle that closes"
+    assert "ends at 1 " in refused(tmp_path, "0,1", "120,2", "240,-3", "360,1.0000031")
+
+
+def test_the_first_column_of_angles_counts(tmp_path):
+    """Another one is not looked at, and none is a strength."""
+    head = "angle [deg],phase [rad],lift [mm]"
+    assert samples(tmp_path, "0,5,1", "120,5,2", "240,7,3", "360,7,1", head=head) == ["1.0 mm", "2.0 mm", "3.0 mm"]
+    line = refused(tmp_path, "0,1,1", "120,2,2", "240,3,3", head="angle [deg],lift [mm],pull [N]")
+    assert line == "has several columns; say column = ; known: lift, pull"
+
+
+def test_what_a_file_of_a_cycle_begins_with(tmp_path):
+    """The line shows it."""
+    line = "does not begin with names of columns and their units, as in: angle [deg],lift [mm]"
+    assert refused(tmp_path, "0,1", head="angle,lift") == line
+
+
+def test_the_files_of_drives():
+    """One drive, several, none; only what names a CSV file in the place of a strength."""
+    named = {"force": "a.csv", "at": "b.csv", "unbalance": "1 g mm"}
+    assert files_of({"drive": named}) == ["a.csv"]
+    assert files_of({"drive": [named, 5, {"displacement": "C.CSV"}]}) == ["a.csv", "C.CSV"]
+    assert files_of({}) == []
 
 
 def test_another_lift_is_another_machine(cam):

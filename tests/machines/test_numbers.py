@@ -64,6 +64,8 @@ def test_an_array_passes_as_floats():
     assert numbers("x", np.ones((2, 3), np.float32), 0.0, 1.0, shape=(2, None)).shape == (2, 3)
     assert numbers("x", np.ones(3, np.uint8), 1.0, 1.0, shape=(3,)).dtype == np.float64
     assert numbers("x", 1.5, 0.0, 2.0, shape=()).shape == ()
+    single = numbers("x", np.ones(2, np.float32), 0.0, 1.0)
+    assert single.dtype == np.float64
 
 
 @pytest.mark.parametrize(
@@ -101,4 +103,5 @@ def test_the_first_entry_out_of_range_is_named(bad):
     """As that of a single number; later ones are not."""
     line = refused(numbers, "x", [0.5, bad, 7.0], 0.0, 1.0, "mm")
     assert line == f"x = {bad:g} mm is out of range; allowed: 0 to 1 mm"
+    assert refused(numbers, "x", [0.0, 1.0, bad], 0.0, 1.0, "mm") == line, "the ends of the range are in it"
     assert re.fullmatch(r"x = \S+ is out of range; allowed: 0 to 1", refused(numbers, "x", [bad], 0.0, 1.0))

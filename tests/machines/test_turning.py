@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 import chaosgym
 from chaosgym.cli import app
 from chaosgym.errors import ParameterError
+from chaosgym.machines.modal_machine.turning import turning_joints
 from chaosgym.machines.units import ALTERNATIVES, TURNING, parse_quantity, parse_row
 
 TORSIONAL = """
@@ -193,6 +194,125 @@ def test_units_that_do_not_fit_end_in_one_line(file, case):
     with pytest.raises(ParameterError, match=message) as told:
         chaosgym.read_machine(file(text))
     assert "\n" not in str(told.value)
+
+
+def tables(**changed):
+    """Tables of a file in which all that has a unit turns, with some of them changed."""
+    shapes = {"motor": "1, 0 kg^-1/2 m^-1", "load": "0, 1 kg^-1/2 m^-1", "base": "1, 1 kg^1/2 m"}
+    joint = {"at": "motor - load", "clearance": "3 arcmin", "stiffness": "1 N m/rad"}
+    drive = {"at": "motor", "force": "2 N m"}
+    operation = {"speed": "8 Hz", "clearance_range": "1 to 10 arcmin"}
+    return {"structure": {"shapes": shapes}, "joint": joint, "drive": drive, "operation": operation} | changed
+
+
+SLIDES = {"at": "rack", "clearance": "0.1 mm", "stiffness": "1 N/um"}
+TURNS = {"name": "shaft", "at": "motor - load", "clearance": "3 arcmin"}
+RANGE_OF_GAPS = {"clearance_range": "0.1 to 1 mm"}
+
+
+def test_a_table_or_a_list_of_tables():
+    """One joint or several, one drive or several, shapes or none: each joint is told by itself."""
+    assert turning_joints(tables()) == [True]
+    assert turning_joints(tables(drive=[{"at": "motor", "force": "2 N m"}, {"at": "other", "force": "1 N"}])) == [True]
+    bare = tables(structure={}, operation={}, joint=[SLIDES, TURNS], drive={"at": "rack", "force": "1 N"})
+    assert turning_joints(bare) == [False, True]
+    assert turning_joints(tables(joint={"at": "motor", "stops": "one"}, operation={})) == [False]
+    somewhere = {"structure": {"shapes": {"base": "1, 1 kg^1/2"}}, "drive": {"force": "2 N m"}}
+    assert turning_joints(tables(**somewhere)) == [True], "a force acts at no base"
+
+
+def test_the_range_of_gaps_is_that_of_the_monitored_joint():
+    """By its name, by its number, or the first one."""
+    operation = RANGE_OF_GAPS | {"monitored": "joint_1"}
+    assert turning_joints(tables(joint=[SLIDES, TURNS], operation=operation)) == [False, True]
+    assert turning_joints(tables(joint=[SLIDES, TURNS], operation=RANGE_OF_GAPS)) == [False, True]
+    assert turning_joints(tables(joint=[TURNS, SLIDES], operation=RANGE_OF_GAPS | {"monitored": "joint_2"}))[0]
+    assert turning_joints(
+        tables(joint=[SLIDES, TURNS], operation={"clearance_range": "1, 9 deg", "monitored": "shaft"})
+    )
+    for joints, watched in (([SLIDES, TURNS], "shaft"), ([TURNS, SLIDES], "none"), ([TURNS, SLIDES], "shaft")):
+        with pytest.raises(ParameterError, match="clearance_range is of a joint that slides, and the joint does not"):
+            turning_joints(tables(joint=joints, operation=RANGE_OF_GAPS | {"monitored": watched}))
+
+
+SLIDING_SHAPES = {"motor": "1, 0 kg^-1/2", "load": "0, 1 kg^-1/2", "base": "1, 1 kg^1/2", "a-b": "1, 1 kg^-1/2"}
+SLIDING_BASE = {"base": "1, 1 kg^1/2"}
+LINE = "{} {}, and the shape of {} is of a point that {}; allowed: a shape in {}"
+TURN_SHAPE, TURN_BASE = "kg^-1/2 m^-1", "kg^1/2 m"
+WHOLE = {
+    "a joint": (
+        {"structure": {"shapes": SLIDING_SHAPES}},
+        LINE.format("drive at 'motor'", "turns", "'motor'", "slides", TURN_SHAPE),
+    ),
+    "a joint alone": (
+        {"structure": {"shapes": SLIDING_SHAPES}, "drive": {"at": "c", "force": "1 N"}},
+        LINE.format("joint at 'motor - load'", "turns", "'motor'", "slides", TURN_SHAPE),
+    ),
+    "the second point of a sum": (
+        {"structure": {"shapes": {"load": "0, 1 kg^-1/2"}}, "joint": TURNS | {"at": "motor+load"}},
+        LINE.format("joint at 'motor+load'", "turns", "'load'", "slides", TURN_SHAPE),
+    ),
+    "the second point of a difference without blanks": (
+        {"structure": {"shapes": {"load": "0, 1 kg^-1/2"}}, "joint": TURNS | {"at": "motor-load"}},
+        LINE.format("joint at 'motor-load'", "turns", "'load'", "slides", TURN_SHAPE),
+    ),
+    "a point whose name has a sign": (
+        {"structure": {"shapes": SLIDING_SHAPES}, "joint": TURNS | {"at": "a-b"}, "drive": {"at": "c", "force": "1 N"}},
+        LINE.format("joint at 'a-b'", "turns", "'a-b'", "slides", TURN_SHAPE),
+    ),
+    "a compliance": (
+        {"structure": {"shapes": SLIDING_SHAPES, "residual": {"at": "load", "compliance": "1 rad/(N m)"}}},
+        LINE.format("structure.residual at 'load'", "turns", "'load'", "slides", TURN_SHAPE),
+    ),
+    "a base that is moved": (
+        {"drive": {"displacement": "1 mm"}},
+        LINE.format("drive at 'base'", "slides", "'base'", "turns", "kg^1/2"),
+    ),
+    "a base that is accelerated": (
+        {"structure": {"shapes": SLIDING_BASE}, "drive": {"acceleration": "1 rad/s^2"}},
+        LINE.format("drive at 'base'", "turns", "'base'", "slides", TURN_BASE),
+    ),
+    "a base in the unit of a point": (
+        {"structure": {"shapes": {"base": "1, 1 kg^-1/2"}}},
+        "structure.shapes.base = '1, 1 kg^-1/2' has no unit; write it in kg^1/2, or in kg^1/2 m if it turns (none is "
+        "needed beside modal_masses)",
+    ),
+    "a point without a unit": (
+        {"structure": {"shapes": {"motor": "1, 0"}}},
+        "structure.shapes.motor = '1, 0' has no unit; write it in kg^-1/2, or in kg^-1/2 m^-1 if it turns (none is "
+        "needed beside modal_masses)",
+    ),
+    "a joint of both": (
+        {"joint": TURNS | {"stiffness": "1 N/m"}},
+        "joint.clearance = '3 arcmin' is of what turns and joint.stiffness = '1 N/m' of what slides; allowed: one of "
+        "the two",
+    ),
+    "stops of both": (
+        {"joint": TURNS | {"lower": {"stiffness": "1 N/m"}}},
+        "joint.lower slides and its joint turns; allowed: the same",
+    ),
+    "matrices in millimetres": (
+        {"structure": {"units": "t mm N"}},
+        "units = 't mm N' is of a structure that slides; allowed with rad or N m: 'kg m N'",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WHOLE)
+def test_each_mixture_is_told_in_whole(case):
+    """Table, point and units: what turns, what slides, and what is allowed there."""
+    changed, line = WHOLE[case]
+    with pytest.raises(ParameterError) as told:
+        turning_joints(tables(**changed))
+    assert str(told.value) == line
+
+
+def test_matrices_in_millimetres_go_with_what_slides():
+    """A drive that turns is enough to refuse them."""
+    millimetres, drive = {"units": "t mm N"}, {"at": "rack", "force": "1 N"}
+    assert turning_joints(tables(structure=millimetres, joint=SLIDES, drive=drive, operation={})) == [False]
+    with pytest.raises(ParameterError, match="units = 't mm N'"):
+        turning_joints(tables(structure=millimetres, joint=SLIDES, operation={}))
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,7 @@ def _column(path: Path, wanted: Any) -> list[str]:
 def _one_cycle(path: Path, angles: list[float], values: list[float], turn: float) -> list[float]:
     """Values without the one that closes the cycle, if they are at equal steps over it."""
     closed = abs(angles[-1] - angles[0] - turn) < 1e-6 * turn
-    if closed and not math.isclose(values[-1], values[0], rel_tol=1e-6, abs_tol=1e-6 * max(map(abs, values))):
+    if closed and abs(values[-1] - values[0]) > 1e-6 * max(map(abs, values)):
         raise ParameterError(f"{path} ends at {values[-1]:g} and begins at {values[0]:g}; allowed: a cycle that closes")
     count = len(values) - closed
     steps = [angle - turn * place / count for place, angle in enumerate(angles[:count])]
