@@ -78,6 +78,10 @@ def sweep(
     plan = SweepPlan(machine, chosen, kind, sizes.get(kind) or 0, seed, budget, signals, full_types)
     if routes and (kind != "grid" or len(chosen) != 1):
         raise click.UsageError("--routes needs a grid of one axis: --axis FIELD=LOW:HIGH:COUNT once")
+    if routes:
+        from chaosgym.diagnosis.orbit_family import continuous_field
+
+        continuous_field(machine, chosen[0].field)  # refused before the sweep, not after
     for text in axes:
         _note_millimetres(machine, text)
     labelled = run_sweep(plan, out, workers=workers, scheduler=scheduler, repair=repair, progress=True)
@@ -112,10 +116,9 @@ def sweep(
 
 def _routes(plan: Any, labelled: Any) -> tuple[dict[str, Any], list[str]]:
     """Routes to chaos and crises along the one axis: for JSON, and as lines."""
-    from chaosgym.diagnosis.orbit_family import continuous_field
     from chaosgym.diagnosis.route_to_chaos import routes_in_sweep
 
-    field = continuous_field(plan.machine, plan.fields[0])
+    (field,) = plan.fields
     values, natures = labelled.column(field).tolist(), [str(one) for one in labelled.column("nature")]
     onsets, crises = routes_in_sweep(plan.machine, field, values, natures, progress=True)
     told = {"routes": [one.as_dict() for one in onsets], "crises": [one.as_dict() for one in crises]}

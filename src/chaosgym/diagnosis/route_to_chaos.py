@@ -3,8 +3,8 @@ r"""Routes to chaos: by which bifurcation a periodic response gives way to a cha
     period doubling   the orbit flips, and its double flips in turn, towards the chaos
     intermittency     the orbit folds; beyond, the motion stays near the lost orbit again and again, the longer the
                       closer to the fold, with the distance to the power -1/2 (type I of Pomeau and Manneville)
-    grazing           stability ends where a contact begins or ends at zero speed
-    torus             stability ends in a Neimark-Sacker bifurcation
+    grazing           stability ends where a contact begins or ends at zero speed, and just beyond is chaos
+    torus             stability ends in a Neimark-Sacker bifurcation, and just beyond is quasiperiodic motion
     crisis            none of these; the chaotic motion, carried towards the periodic point, ends and leaves its range
     not told          anything else; the reason says what was seen
 
@@ -32,7 +32,8 @@ from chaosgym.diagnosis.bifurcation_diagram import (
     follow,
 )
 from chaosgym.diagnosis.crisis import Crisis, boundary_crisis, carried, interior_crisis
-from chaosgym.errors import SimulationError
+from chaosgym.diagnosis.diagnose import diagnose
+from chaosgym.errors import DiagnosisError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
@@ -45,7 +46,7 @@ SAME_PEAK = 0.02
 """Relative difference of peaks by which a point of a sweep lies on a branch, between two of its orbits."""
 
 NEAR_FOLD, FARTHER = 0.02, 0.32
-"""Shares of the way from a fold to the chaotic point at which laminar phases are measured."""
+"""Shares of the way from a bifurcation to the chaotic point at which laminar phases, and natures, are looked at."""
 
 LAMINAR = 0.1
 """Distance from the lost orbit, as a share of the largest that the motion has, within which a phase is laminar."""
@@ -55,6 +56,9 @@ FEWEST_PHASES, LONGER = 12, (2.0, 8.0)
 
 DOUBLED, UNSTABLE = 24, 10.0
 """Longest period of a doubled branch between two points of a sweep, and its largest multiplier: stability counts."""
+
+BUDGET = 3200
+"""Cycles that tell the nature of the motion just beyond a bifurcation."""
 
 PERIODS, SETTLED = 3000, 300
 """Periods of a motion that is searched for laminar phases, after those in which it settles."""
@@ -172,11 +176,23 @@ def _told(diagram: BifurcationDiagram, periodic: SweepPoint, chaotic: SweepPoint
         machine = with_settings(diagram.machine, {diagram.field: end.value})
         lengths = laminar_phases(_section(machine, diagram.field, end.period), end.state, end.value, chaotic.value)
         return _intermittent(lengths, f"the orbit folds at {end.value:.6g}")
-    if end.kind == "grazing":
-        return "grazing", f"stability ends in a grazing at {end.value:.6g}"
-    if end.kind == "Neimark-Sacker":
-        return "torus", f"Neimark-Sacker bifurcation at {end.value:.6g}"
-    return "not told", f"stability ends in a {end.kind} at {end.value:.6g}"
+    beyond = _nature_beyond(diagram, end, chaotic.value)
+    told = f"stability ends at {end.value:.6g} ({end.kind}); just beyond the motion is {beyond}"
+    if end.kind == "grazing" and beyond == "chaotic":
+        return "grazing", told
+    if end.kind == "Neimark-Sacker" and beyond == "quasiperiodic":
+        return "torus", told
+    return "not told", told
+
+
+def _nature_beyond(diagram: BifurcationDiagram, end: Bifurcation, chaotic: float) -> str:
+    """Nature of the motion from the orbit at a bifurcation, a fiftieth of the way to a chaotic value beyond it."""
+    value = end.value + NEAR_FOLD * (chaotic - end.value)
+    try:
+        machine = with_settings(diagram.machine, {diagram.field: value})
+        return diagnose(machine, initial_state=end.state, budget=BUDGET).nature
+    except (SimulationError, DiagnosisError):
+        return "unknown"
 
 
 def _on_a_branch(diagram: BifurcationDiagram, point: SweepPoint) -> tuple[Branch, int] | None:
