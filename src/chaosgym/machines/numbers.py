@@ -71,10 +71,7 @@ def numbers(
     if array.dtype.kind not in REAL:
         raise ParameterError(f"{name} holds {array.dtype.name} values; allowed: real numbers")
     array = array.astype(np.float64)
-    fits = array.ndim == len(shape) and all(
-        there > 0 and wanted in (None, there) for there, wanted in zip(array.shape, shape, strict=True)
-    )
-    if not fits:
+    if array.ndim != len(shape) or not all(map(_fits, array.shape, shape)):
         wanted = ", ".join("1 or more" if side is None else str(side) for side in shape)
         raise ParameterError(f"{name} has {_sides(array.shape)} entries; allowed: {wanted}")
     if not np.all((array >= low) & (array <= high)):
@@ -83,6 +80,10 @@ def numbers(
             f"{name} = {worst:g}{unit and ' '}{unit} is out of range; allowed: {low:g} to {high:g}{unit and ' '}{unit}"
         )
     return array
+
+
+def _fits(there: int, wanted: int | None) -> bool:
+    return there > 0 and wanted in (None, there)
 
 
 def _sides(shape: tuple[int, ...]) -> str:

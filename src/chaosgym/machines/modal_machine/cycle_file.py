@@ -24,7 +24,7 @@ _HEAD = re.compile(r"\s*(.*?)\s*\[(.*)\]\s*")
 
 def files_of(values: Mapping[str, Any]) -> list[str]:
     """Names of the CSV files that the drives of a machine's file name."""
-    rows = values.get("drive", [])
+    rows = values.get("drive")
     rows = rows if isinstance(rows, list) else [rows]
     return [given for row in rows if isinstance(row, dict) for kind, given in row.items() if _is_file(kind, given)]
 
@@ -55,7 +55,7 @@ def _column(path: Path, wanted: Any) -> list[str]:
         heads = [_HEAD.fullmatch(head) for head in rows[0]] if rows else []
         if not heads or not all(heads):
             raise ValueError("does not begin with names of columns and their units, as in: angle [deg],lift [mm]")
-        names, units = zip(*((head[1], head[2].strip()) for head in heads if head), strict=True)
+        names, units = [head[1] for head in heads if head], [head[2].strip() for head in heads if head]
         numbers = [[float(cell) for cell in row] for row in rows[1:]]
         if not numbers or any(len(row) != len(names) for row in numbers):
             raise ValueError(f"has rows of other lengths than its {len(names)} columns, or none")
