@@ -411,6 +411,17 @@ def test_the_symmetric_orbit_of_the_beam_loses_its_symmetry_and_the_other_one_fl
         assert min(below, above) < 1e-6 < max(below, above), value
 
 
+def test_bifurcations_within_one_step_are_judged_one_by_one():
+    """The arm is stable between its second flip and the fold 1 mHz above, in whatever steps it is followed."""
+    diagram = follow(ImpactBeam(), "speed", (17.0, 18.2), sweep=13, workers=1, longest_period=1)
+    arm = next(branch for branch in diagram.branches if branch.begins.startswith("symmetry breaking"))
+    found = [one for one in arm.bifurcations if one.kind in ("flip", "fold")]
+    assert [one.kind for one in found[:4]] == ["flip", "flip", "fold", "fold"]
+    assert all(one.loses_stability for one in found)
+    low, high = found[1].value, found[2].value
+    assert two_cycles_apart(0.5 * (low + high)) < 1e-6 < two_cycles_apart(low - 2e-4)
+
+
 def two_cycles_apart(frequency):
     """Largest difference of the peaks of a settled beam in two cycles, relative to a peak; from the arm's own state."""
     peaks = simulate(ImpactBeam(excitation_frequency=frequency), 2, transient=4000).peak_force

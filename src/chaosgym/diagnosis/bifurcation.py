@@ -17,8 +17,10 @@ Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 3rd ed., Springer 2004,
 """
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -274,11 +276,26 @@ def _smooth(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint) -> Iterator[Found
                 doubt = abs(family.value(b.x[-1]) - family.value(a.x[-1])) if point is a or point is b else 0.0
                 named = replace(named, value=family.value(s), error=max(named.error, doubt))
                 found.append((share, Found(named, point)))
-        yield from (each for _, each in sorted(found, key=lambda pair: pair[0]))
+        yield from _told_apart(family, a, b, sorted(found, key=lambda pair: pair[0]))
         return
     middle = between(family, a, b, 0.5)
     for one, other in ((a, middle), (middle, b)):
         yield from bifurcations_between(family, one, other)
+
+
+def _told_apart(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, found: list[tuple[float, Found]]) -> Iterator[Found]:
+    """Bifurcations at shares between two orbits; of several, each loses stability or not by the orbits beside it."""
+    shares = [share for share, _ in found]
+    beside: list[OrbitPoint] = []
+    if len(found) > 1:
+        with suppress(NotFollowedError):
+            beside = [a, *(between(family, a, b, 0.5 * sum(pair), CLOSELY) for pair in pairwise(shares)), b]
+    for place, (_, each) in enumerate(found):
+        if beside:
+            before, after = beside[place : place + 2]
+            loses = (before.unstable == 0) != (after.unstable == 0)
+            each = each._replace(bifurcation=replace(each.bifurcation, loses_stability=loses))
+        yield each
 
 
 def _turns_twice(a: OrbitPoint, b: OrbitPoint) -> bool:
