@@ -1,19 +1,51 @@
 """Peak Impact Diagrams: where impacts act, when the diagram has taken shape, and what spreading them is worth."""
 
+import tomllib
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from chaosgym import Drive, ModalMachine, Structure
-from chaosgym.design.peak_impacts import PeakImpactDiagram, coverage, filling_cycles, peak_impacts
+from chaosgym.design.brief import brief_from
+from chaosgym.design.peak_impacts import PeakImpactDiagram, coverage, filling_cycles, peak_impacts, worn_side
 from chaosgym.design.statistics import convergence
-from chaosgym.design.trends import life_against
-from chaosgym.errors import DesignError, SimulationError
+from chaosgym.design.trends import DIAGRAM_CYCLES, HISTORY_SAMPLES, impacts_against, life_against
+from chaosgym.errors import DesignError, ParameterError, SimulationError
 from chaosgym.machines import MACHINES, ImpactBeam
 from chaosgym.machines.parameters import with_settings
 from chaosgym.machines.slider_crank.kinematics import slider_position
 from chaosgym.plotting.design import impact_diagram
 from chaosgym.simulation import simulate
+
+
+def test_clearance_trades_force_against_spread():
+    """Thesis 5.4.1: with more clearance peaks grow; on the chaotic beam they spread, on the periodic one they do not.
+
+    Force and spread are those of a run of its own, and the lines name the clearance in its unit.
+    """
+    beam = ImpactBeam(excitation_frequency=30.0)
+    found = impacts_against(beam, [0.03175e-3, 0.127e-3])
+    assert found[1].force > found[0].force
+    assert found[1].spread > 10.0 > found[0].spread
+    at = replace(beam, clearance=0.127e-3)
+    record = simulate(at, DIAGRAM_CYCLES, transient=DIAGRAM_CYCLES, samples_per_cycle=HISTORY_SAMPLES)
+    assert found[1].spread == peak_impacts(record, worn_side(record)).spread
+    assert found[1].largest_peak == record.peak_force.max()
+    assert found[0].told(beam).startswith("at clearance 0.03175 mm: equivalent ")
+
+
+@pytest.mark.parametrize("given", ["[]", "3", '["0.1 kg"]', '["-1 mm"]', '"0.1 mm"', "[0.1]"])
+def test_clearances_that_are_none_are_one_line(given):
+    """A list of clearances, each with a unit and within its range; the section has no other key."""
+    head = 'machine = "impact-beam"\n[criteria]\nload_rating = "5 N"\nlife = "1 h"\nreliability = 0.9\n[impacts]\n'
+    with pytest.raises((DesignError, ParameterError), match="clearance") as caught:
+        brief_from(tomllib.loads(f"{head}clearances = {given}"))
+    assert "\n" not in str(caught.value)
+    with pytest.raises(DesignError, match="did you mean clearances"):
+        brief_from(tomllib.loads(f'{head}clearancess = ["1 mm"]'))
+    assert brief_from(tomllib.loads(f'{head}clearances = ["1 mm", "0.5 mm"]')).impacts == (1e-3, 0.5e-3)
 
 
 def test_a_periodic_response_gives_one_point():

@@ -217,6 +217,7 @@ def test_report_says_what_the_numbers_say(answered):
 def test_motions_that_coexist_are_told_in_the_headline():
     """Two motions of one gear pair: no word of statistics where the worst motion counts in every cycle."""
     text = template("docs/machines/kahraman-singh-1990.toml").replace('speed = "700 Hz"', 'speed = "720 Hz"')
+    text = text.replace("# [impacts]", "[impacts]").replace("# clearances", "clearances")
     brief = brief_from(tomllib.loads(text.replace("series = 32", "series = 8")))
     answer = study(replace(brief, region={"clearance": Tolerance(0.01)}, changes={}, costs={}))
     page = design_report(answer)
@@ -225,6 +226,9 @@ def test_motions_that_coexist_are_told_in_the_headline():
     assert "only statistics hold" not in page
     assert "statistics over all machines" not in " ".join(answer.lines())
     assert "no change to try is stated" in answer.lines()[-1]
+    assert len(answer.impacts) == 3
+    assert answer.impacts[0].told(answer.assessment.machine) in page
+    assert [one["clearance"] for one in answer.as_dict()["peak_impacts"]["over_clearance"]] == [0.5e-4, 1e-4, 1.5e-4]
 
 
 def test_a_share_of_no_clearance_is_no_map():

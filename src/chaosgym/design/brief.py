@@ -36,11 +36,15 @@ SECTIONS = (
     "costs",
     "archard",
     "bending",
+    "impacts",
 )
 
 DUTY = ("hours_a_day", "speeds")
 
 DAYS_A_YEAR = 365.25
+
+MOST_CLEARANCES = 64
+"""Clearances at which a brief may ask where impacts fall."""
 
 OF_MACHINE = ("structure", "joint", "joints", "drive", "operation")
 """Sections of a machine's file: what holds one is no brief."""
@@ -70,6 +74,8 @@ class DesignBrief:
         Data of Archard's law; None if wear is left out.
     bending
         A section of the flexible part and its material; None if bending is left out.
+    impacts
+        Clearances [m] at which the report says where impacts fall.
     stated
         Names of the criteria that the brief states itself.
     bending_stated
@@ -85,6 +91,7 @@ class DesignBrief:
     duty: Mapping[float, float] = field(default_factory=dict)
     wear: Wear | None = None
     bending: Bending | None = None
+    impacts: tuple[float, ...] = ()
     stated: tuple[str, ...] = field(default=())
     bending_stated: tuple[str, ...] = field(default=())
 
@@ -164,6 +171,7 @@ def brief_from(values: Mapping[str, Any]) -> DesignBrief:
         duty={speed / nominal: share for speed, share in duty.items()},
         wear=_wear(values, machine),
         bending=_bending(values, machine, tolerances),
+        impacts=_impacts(values, machine),
         stated=tuple(values.get("criteria", {})),
         bending_stated=tuple(values.get("bending", {})),
     )
@@ -292,6 +300,21 @@ def _bending(values: Mapping[str, Any], machine: Machine, region: Mapping[str, T
     return found
 
 
+def _impacts(values: Mapping[str, Any], machine: Machine) -> tuple[float, ...]:
+    if "impacts" not in values:
+        return ()
+    name = machine.clearance_field
+    given = _section(values, "impacts", ("clearances",), machine).get("clearances")
+    if not isinstance(given, list) or not 0 < len(given) <= MOST_CLEARANCES:
+        raise DesignError(
+            f"impacts.clearances = {shown(given)} is out of range; allowed: a list of 1 to {MOST_CLEARANCES} clearances"
+        )
+    found = tuple(parse_quantity("impacts.clearances", one, parameters_of(machine)[name].unit) for one in given)
+    for value in found:
+        with_settings(machine, {name: value})
+    return found
+
+
 def _life(given: Any, hours_a_day: float) -> dict[str, float]:
     """A life in cycles or in time, of which the duty leaves the hours of operation."""
     year = DAYS_A_YEAR * hours_a_day
@@ -355,7 +378,7 @@ def template(name: str) -> str:
     """
     machine = _machine(name)
     speed, clearance = machine.speed_field, machine.clearance_field
-    criteria = Criteria()
+    criteria, unit = Criteria(), parameters_of(machine)[clearance].unit
     lines = [
         "# Design brief for `chaosgym design`. Quantities are texts with a unit; % is a share of the nominal value.",
         "",
@@ -398,7 +421,8 @@ def template(name: str) -> str:
         "",
         "[costs]  # weight of a change: weight * |ln(new / old)|; 1 if left out",
         f"{speed} = 2",
-        *(_wear_lines(machine) if parameters_of(machine)[clearance].unit == "m" else ()),
+        *(_wear_lines(machine) if unit == "m" else ()),
+        *(_impact_lines(machine) if getattr(machine, clearance) else ()),
         *(_bending_lines(machine) if machine.flexible is not None or machine.bending_links else ()),
     ]
     return "\n".join(lines) + "\n"
@@ -416,6 +440,17 @@ def _wear_lines(machine: Machine) -> list[str]:
         '# hardness = "2 GPa"     # of the softer surface',
         "# coefficient = 1e-5     # K of lubricated steel",
         "# uncertainty = 3        # factor to which K is known",
+    ]
+
+
+def _impact_lines(machine: Machine) -> list[str]:
+    """The section on where impacts fall, commented out."""
+    name = machine.clearance_field
+    nominal, unit = getattr(machine, name), parameters_of(machine)[name].unit
+    return [
+        "",
+        "# [impacts]  # how large peaks are, and how far they spread over the bearing, at some clearances",
+        f"# clearances = [{', '.join(_written(factor * nominal, unit) for factor in (0.5, 1.0, 1.5))}]",
     ]
 
 

@@ -16,7 +16,14 @@ from chaosgym.design.methodology import Assessment, Check
 from chaosgym.design.peak_impacts import PeakImpactDiagram, filling_cycles, peak_impacts, worn_side
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
 from chaosgym.design.told import hours_told
-from chaosgym.design.trends import HISTORY_SAMPLES, LifeTrend, life_against
+from chaosgym.design.trends import (
+    DIAGRAM_CYCLES,
+    HISTORY_SAMPLES,
+    ImpactPlace,
+    LifeTrend,
+    impacts_against,
+    life_against,
+)
 from chaosgym.diagnosis import Neighbour, ResponseMap, find_periodic_orbit, response_map
 from chaosgym.diagnosis.margins import Margins, margins
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE
@@ -38,9 +45,6 @@ TREND_POINTS = 53
 NO_TREND = "the gap closes at no speed of the usual range"
 """Why life is not drawn against speed."""
 
-DIAGRAM_CYCLES = 200
-"""Cycles of the Peak Impact Diagram."""
-
 
 @dataclass(frozen=True)
 class DesignStudy:
@@ -60,6 +64,8 @@ class DesignStudy:
         Over the machine's usual range; None without contact anywhere in it.
     diagram
         Where the peak impacts act.
+    impacts
+        The same, in figures, at the clearances of the brief.
     combination
         What the tolerances do together.
     guidelines
@@ -78,6 +84,7 @@ class DesignStudy:
     map: ResponseMap | None
     life_over_speed: LifeTrend | None
     diagram: PeakImpactDiagram
+    impacts: tuple[ImpactPlace, ...]
     combination: Combination
     guidelines: tuple[Guideline, ...]
     margins: Margins | None
@@ -104,6 +111,7 @@ class DesignStudy:
         ]
         lines += [f"  {line}" for line in self.bending_told]
         lines += [f"  {line}" for line in ([] if found.wear is None else found.wear.told)]
+        lines += [f"  {one.told(found.machine)}" for one in self.impacts]
         lines.append(f"  {self.margin_told}")
         lines += [f"  {one.sentence} ({one.section})" for one in self.guidelines]
         if best is not None:
@@ -207,6 +215,7 @@ class DesignStudy:
                 "spread": self.diagram.spread,
                 "unit": self.diagram.unit,
                 "cycles_to_fill": self.cycles_to_fill,
+                "over_clearance": [one._asdict() for one in self.impacts],
             },
         }
 
@@ -290,6 +299,7 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
         around,
         trend,
         peak_impacts(record, worn_side(record, brief.criteria.life_exponent)),
+        impacts_against(machine, brief.impacts, brief.criteria.life_exponent, workers=workers),
         combination(assessment, _in_tolerance(around), seed=seed, workers=workers, progress=progress),
         guidelines(assessment, _in_tolerance(around)),
         _margins(assessment),

@@ -1,26 +1,79 @@
-r"""Life against speed or clearance, over a whole range (thesis figure 5.12).
+r"""Life against speed or clearance, over a whole range (thesis figure 5.12), and where impacts fall (5.4.1).
 
 Life is relative to the first value of the range, by the cubic law: the statistical mean life (eq. 5.4), and what the
 largest and the smallest peak alone would suggest. Where the response is chaotic the two are far apart.
+
+A larger clearance lets peaks grow, and may spread them over more of the bearing; life counts the force alone.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.design.fatigue import CUBIC_EXPONENT, equivalent_force, relative_life
-from chaosgym.design.runs import SettledRun, settled_run
+from chaosgym.design.peak_impacts import peak_impacts, worn_side
+from chaosgym.design.runs import SettledRun, settled_run, worse_side
 from chaosgym.diagnosis import Nature
 from chaosgym.errors import DesignError
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import with_settings
-from chaosgym.simulation import parallel_map
+from chaosgym.machines.parameters import quantity_of, with_settings
+from chaosgym.simulation import parallel_map, simulate
 
 Array = NDArray[np.float64]
 
 HISTORY_SAMPLES = 2880
 """Samples a cycle of a time history: an eighth of a degree, and about ten samples an impact of the beam at 30 Hz."""
+
+
+DIAGRAM_CYCLES = 200
+"""Cycles of a Peak Impact Diagram."""
+
+
+class ImpactPlace(NamedTuple):
+    """Where impacts fall at one clearance [m].
+
+    Forces are in N: the equivalent one and the largest. The spread of the peaks over the bearing is in ``unit``.
+    """
+
+    clearance: float
+    force: float
+    largest_peak: float
+    spread: float
+    unit: str
+
+    def told(self, machine: Machine) -> str:
+        """One line for people, on the machine at any clearance."""
+        size, unit = (1e3, "mm") if self.unit == "m" else (1.0, self.unit)
+        name = machine.clearance_field
+        clearance = quantity_of(with_settings(machine, {name: self.clearance}), name)
+        forces = f"equivalent {self.force:.4g} N, largest {self.largest_peak:.4g} N"
+        return f"at {name.replace('_', ' ')} {clearance}: {forces}, peaks spread over {size * self.spread:.3g} {unit}"
+
+
+def impacts_against(
+    machine: Machine, clearances: Sequence[float], exponent: float = CUBIC_EXPONENT, *, workers: int | None = None
+) -> tuple[ImpactPlace, ...]:
+    """Force and spread of the peak impacts at some clearances [m], each from rest, transient left out (thesis 5.4.1).
+
+    Raises
+    ------
+    ParameterError
+        If a clearance is out of its range.
+    SimulationError
+        If a run can't be finished.
+    """
+
+    def run(clearance: float) -> ImpactPlace:
+        at = with_settings(machine, {machine.clearance_field: clearance})
+        record = simulate(at, DIAGRAM_CYCLES, transient=DIAGRAM_CYCLES, samples_per_cycle=HISTORY_SAMPLES)
+        diagram = peak_impacts(record, worn_side(record, exponent))
+        force = equivalent_force(worse_side(record.peak_force, exponent), exponent)
+        return ImpactPlace(clearance, force, float(np.max(record.peak_force)), diagram.spread, diagram.unit)
+
+    return tuple(parallel_map(run, list(clearances), workers=workers))
 
 
 @dataclass(frozen=True)
