@@ -63,7 +63,7 @@ def test_who_was_wrong_is_not_asked_again():
 
 def test_the_shipped_policy_is_kept_from_harm():
     """With structural damping doubled the shipped policy loses to following; guarded it does not."""
-    found = mismatch(16, ["structural damping x2"])[0]
+    found = mismatch(32, ["structural damping x2"])[0]
     returns = found["returns"]
     assert returns["shipped"] < returns["follow"] - 5.0
     assert returns["guarded"] > returns["follow"] - 1.0
