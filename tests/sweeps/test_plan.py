@@ -2,6 +2,7 @@
 
 import json
 import time
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -106,6 +107,11 @@ def test_the_split_of_a_machine_does_not_depend_on_how_many_there_are():
     began = time.process_time()
     assert huge.splits(rows) == small.splits(rows)
     assert set(huge.splits(range(len(huge) - 255, len(huge)))) <= {"train", "validation", "test"}
+    tracemalloc.start()
+    assert len(huge.points(range(len(huge) - 255, len(huge)))["clearance"]) == 255
+    assert tracemalloc.get_traced_memory()[1] < 1_000_000
+    tracemalloc.stop()
+    assert len(huge.points(range(7, 7))["clearance"]) == 0
     assert time.process_time() - began < 0.5, "the cost of a chunk does not grow with the plan"
     assert 0.6 < parts.count("train") / len(parts) < 0.8
 

@@ -170,8 +170,8 @@ class SweepPlan:
             columns = self._axis_values(shares)
         elif self.sampling == "crosses":
             machine, place = np.divmod(index, len(CROSS))
-            first, last = int(machine.min(initial=0)), int(machine.max(initial=-1))
-            columns = self._axis_values(list(self._drawn(first, last + 1)[machine - first].T))
+            first = rows.start // len(CROSS)
+            columns = self._axis_values(list(self._drawn(first, -(-rows.stop // len(CROSS)))[machine - first].T))
             tolerances = default_tolerances(self.machine)
             for field, share in zip(self._cross_fields, np.array(CROSS, dtype=float)[place].T, strict=True):
                 columns[field] = np.array(
