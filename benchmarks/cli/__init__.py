@@ -134,13 +134,14 @@ def judges(env: str, machines: int, speeds: int, as_json: bool) -> None:
 
 @click.command()
 @click.option("--machines", type=click.IntRange(2, 10_000), default=64, show_default=True)
+@click.option("--fleets", is_flag=True, help="Fleets of beams and cranks instead of beams with one thing changed.")
 @AS_JSON
-def mismatch(machines: int, as_json: bool) -> None:
-    """Play the shipped policy, guarded and not, on beams that differ from those it was trained on."""
-    from benchmarks.envs.mismatch import lines
+def mismatch(machines: int, fleets: bool, as_json: bool) -> None:
+    """Play the shipped policies, guarded and not, on machines that differ from those they were trained on."""
+    from benchmarks.envs.mismatch import FLEETS, ROWS, lines
     from benchmarks.envs.mismatch import mismatch as run
 
-    found = run(machines)
+    found = run(machines, FLEETS if fleets else ROWS)
     emit({"rows": found}, as_json, lambda: lines(found))
 
 

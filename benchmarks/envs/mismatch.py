@@ -1,7 +1,7 @@
-"""What does a policy win on beams that are not those it was trained on, and does a guard keep its promise there?
+"""What does a policy win on machines that are not those it was trained on, and does a guard keep its promise there?
 
-Each row changes what a job rests on, for all of the same machines. The promise: never worse than backing off by more
-than the interval of the paired difference.
+Each row changes what a beam's job rests on, for all of the same machines; fleets are rows too. The promise: never worse
+than backing off by more than the interval of the paired difference.
 """
 
 from collections.abc import Iterable, Mapping
@@ -17,7 +17,7 @@ from chaosgym.control.policies import shipped_policy
 from chaosgym.control.rollout import Policy, play
 from chaosgym.control.statistics import paired_difference
 
-ENV = "chaosgym/ImpactBeamTolerance-v1"
+ENV, CRANK = "chaosgym/ImpactBeamTolerance-v1", "chaosgym/SliderCrankTolerance-v1"
 
 FIRST_SEED = 21_000_000
 """Of the machines: neither those of training nor those of an evaluation, nor those on which the guard was chosen."""
@@ -39,12 +39,20 @@ ROWS: Mapping[str, Mapping[str, Any]] = {
     "sensor error 3 N": {"sensor_error": 3.0},
 }
 
+FLEETS: Mapping[str, Mapping[str, Any]] = {
+    f"{kind}, {split}": {"env": env, "level": "fleet", "split": split}
+    for kind, env in (("beams of the fleet", ENV), ("cranks of the fleet", CRANK))
+    for split in ("test", "outside")
+}
+"""Rows of whole fleets."""
+
 
 def mismatch(machines: int = 64, rows: Iterable[str] = ROWS) -> list[dict[str, Any]]:
     """Returns of following, backing off, the shipped policy and the guarded one, and who is worse than backing off."""
     found = []
     for row in tqdm(list(rows), desc="rows", unit="row", leave=False):
-        agent = shipped_policy(ENV)
+        changed = {"env": ENV, **{**ROWS, **FLEETS}[row]}
+        agent = shipped_policy(changed["env"])
         players: dict[str, Policy] = {
             "follow": Follow(),
             "back off": BackOff(),
@@ -52,7 +60,7 @@ def mismatch(machines: int = 64, rows: Iterable[str] = ROWS) -> list[dict[str, A
             "guarded": GuardedPolicy(agent),
         }
         seeds = range(FIRST_SEED, FIRST_SEED + machines)
-        jobs = {name: play(player, ENV, seeds=seeds, **ROWS[row]).returns for name, player in players.items()}
+        jobs = {name: play(player, seeds=seeds, **changed).returns for name, player in players.items()}
         found.append({"row": row, "returns": {name: float(returns.mean()) for name, returns in jobs.items()}})
         for name in ("shipped", "guarded"):
             told = paired_difference(jobs[name], jobs["back off"], MADE_WORSE)
@@ -63,7 +71,7 @@ def mismatch(machines: int = 64, rows: Iterable[str] = ROWS) -> list[dict[str, A
 
 def lines(found: Iterable[Mapping[str, Any]]) -> list[str]:
     """A Markdown table; what is worse than backing off beyond the interval is bold."""
-    told = ["| beams | follow | back off | shipped | guarded | shipped less back off | guarded less back off |"]
+    told = ["| machines | follow | back off | shipped | guarded | shipped less back off | guarded less back off |"]
     told += ["|---" * 7 + "|"]
     for row in found:
         returns = " | ".join(f"{value:.1f}" for value in row["returns"].values())

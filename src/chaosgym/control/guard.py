@@ -4,7 +4,7 @@ Under each demand the guard goes to the demand. Where that is calm it stays. Whe
 ``patience`` steps it lets the policy set the speed, within the band of trims that the task allows. If what the policy
 finds is irregular too for ``strikes`` steps under this demand, backing off takes over, and does so at once under the
 demands to come. So a policy that fits the machine saves the search, and one that does not costs a few steps of a job.
-On beams it is nowhere worse than backing off with certainty, on cranks it is (docs/controllers.md).
+On beams it was nowhere worse than backing off with certainty, on some cranks it was (docs/controllers.md).
 """
 
 from typing import Any
