@@ -120,6 +120,14 @@ def test_the_stress_of_a_rod_is_moment_over_section_modulus(crank, speed, gravit
     assert np.abs(found - expected).max() < miss * largest
 
 
+def test_a_rigid_mechanism_says_which_links_bend():
+    """The compressor's links are rigid: one line says what a link needs."""
+    text = f'machine = "docs/machines/compressor.toml"\n{CRITERIA}{SECTION}'
+    with pytest.raises(ParameterError, match=r"link 'rod' does not bend; allowed: a link with a \[link.NAME.beam\]"):
+        brief_from(tomllib.loads(text))
+    assert "[bending]" not in template("docs/machines/compressor.toml")
+
+
 def test_a_round_pin_without_gap_leaves_the_stress_as_it_is(crank):
     """The same moment where the wrist's pin is a contact, whose motion is run by Taylor series."""
     contact = 'clearance = "0 mm"\nstiffness = "{} N/um"\ndamping = "{} N s/m"\n'

@@ -235,7 +235,7 @@ class MechanismMachine(BinnedMachine):
     def fibre_stress(self, link: str, position: float, fibre: float) -> Array:
         """Stress (2, n) at the outer fibres of a link; see ``Machine.fibre_stress``."""
         if link not in self.bending_links:
-            bend = ", ".join(self.bending_links) or "none, a [link.NAME.beam] does"
+            bend = ", ".join(self.bending_links) or "a link with a [link.NAME.beam]"
             raise ParameterError(f"link {link!r} does not bend; allowed: {bend}")
         found = self.mechanism.link(link)
         beam: Any = found.beam
