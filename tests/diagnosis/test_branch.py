@@ -376,14 +376,19 @@ def test_a_part_of_a_cycle_is_the_free_motion_of_an_oscillator():
 
 @pytest.mark.slow
 def test_the_first_branch_of_the_beam_reaches_from_4_to_30_hz():
-    """From 4 and from 12 Hz it ends at 30 Hz, and has the same folds to 1e-7."""
+    """From 4 and from 12 Hz it ends at 30 Hz, and turns at the same places to 1e-7.
+
+    Where a fold and a grazing lie within 3e-10 Hz, the last digit decides which of the two is named.
+    """
     folds = []
     for start in (4.0, 12.0):
         machine = ImpactBeam(excitation_frequency=start)
         orbit = diagnose(machine).evidence["final_state"]
         _, found = branch_from(machine, "excitation_frequency", 4.0, 30.0, orbit, 1, 1.0)
         assert found.end == "end of the range at excitation_frequency = 30"
-        folds.append([value for value in bifurcations(found, "fold") if value > 13.0])
+        grazed = [each.bifurcation for each in found.found if each.bifurcation.kind == "grazing"]
+        turns = [*bifurcations(found, "fold"), *(one.value for one in grazed if one.loses_stability)]
+        folds.append(sorted({round(value, 7) for value in turns if value > 13.0}))
     assert len(folds[0]) > 40
     assert folds[1] == pytest.approx(folds[0], rel=1e-7)
 

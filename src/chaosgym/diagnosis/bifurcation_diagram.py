@@ -44,6 +44,9 @@ SHOWN_PEAKS = 60
 LONGEST_PERIOD = 4
 """Longest period of a doubled branch."""
 
+BESIDE = 30.0
+"""Largest multiplier up to which a branch that begins at a bifurcation is followed: it is stable there, or nearly."""
+
 AMPLITUDES = {"flip": (5e-5, 2e-4, 1e-3, 4e-3), "symmetry breaking": (1e-3, 4e-3, 2e-4)}
 """Distances from a bifurcation, relative to the size of the motion, at which a new branch is looked for: a doubled
 orbit may flip again soon, and one without symmetry is told from the symmetric one by its peaks."""
@@ -245,7 +248,7 @@ def follow(
     longest_period
         Longest period of a branch that begins at a flip.
     most_unstable
-        Largest multiplier up to which unstable orbits are followed.
+        Largest multiplier up to which unstable orbits are followed; 30 at most where a branch begins at a bifurcation.
     workers
         Threads of the sweep; all processors by default.
     progress
@@ -357,7 +360,7 @@ class _Branches:
             return
         if not 0.0 <= start.x[-1] <= 1.0 or self._known(family, start):
             return
-        ahead = stretch(family, start, first_step=0.01, most_unstable=self._most_unstable)
+        ahead = stretch(family, start, first_step=0.01, most_unstable=min(self._most_unstable, BESIDE))
         named = f"{at.bifurcation.kind} at {self._name} = {at.bifurcation.value:.8g}"
         self._add(_joined(family, Stretch([start], [], [], named), ahead, named))
 
