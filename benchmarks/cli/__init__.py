@@ -41,6 +41,19 @@ def margins(machine: Any, points: int, seed: int, as_json: bool) -> None:
     emit(found, as_json, lambda: [f"{count:5d}  {outcome}" for outcome, count in found["counts"].items()])
 
 
+@click.command("learned-margin")
+@FOLDER
+@click.option("--points", type=click.IntRange(100, 10**6), default=3000, show_default=True, help="Machines to follow.")
+@AS_JSON
+def learned(folder: str, points: int, as_json: bool) -> None:
+    """Measure how well trees learn margins of the sweep in FOLDER, and what an exact margin costs."""
+    from benchmarks.classifier.learned_margin import learned_margin
+    from chaosgym.sweeps import read_sweep
+
+    found = learned_margin(read_sweep(folder), points, progress=True)
+    emit(found, as_json, lambda: [f"{name}: {value}" for name, value in found.items()])
+
+
 @click.command()
 @click.argument("machine", default="impact-beam")
 @AS_JSON
@@ -270,6 +283,7 @@ for command in (
     bench,
     agreement,
     margins,
+    learned,
     check,
     types,
     cost,
