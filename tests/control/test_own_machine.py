@@ -83,7 +83,7 @@ def test_a_machine_of_a_file_is_pickled_with_its_fields():
 
 def test_the_file_runs_within_its_tolerances(machine_file):
     """It is what MachineTolerance makes of it: the same jobs, step by step."""
-    assert environment(str(machine_file)).kwargs == {"machine": str(machine_file)}
+    assert environment(str(machine_file)).kwargs == {"machine": str(machine_file), "level": "clearance"}
     short = play(Follow(), str(machine_file), range(2), steps=6)
     long = play(Follow(), "chaosgym/MachineTolerance-v0", range(2), steps=6, machine=str(machine_file))
     np.testing.assert_array_equal(short.reward, long.reward)

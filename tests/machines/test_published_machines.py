@@ -71,7 +71,8 @@ def test_period_doubling_and_chaos_of_the_impact_oscillator():
     )
     assert np.ptp(before[-1]) < 0.002 * before[-1].mean()
     assert np.ptp(after[-1][::2]) < 0.002 * after[-1].mean() < np.ptp(after[-1])
-    assert diagnose(machine("shaw-holmes-1983").at(2.9), budget=800).nature == "chaotic"
+    # from 2.88 on the mass may stay at its stop, which ends the chaos on a long orbit, sooner or later
+    assert diagnose(machine("shaw-holmes-1983").at(2.85), budget=800).nature == "chaotic"
 
 
 def two_sided(ratio, gap, restitution=0.8):

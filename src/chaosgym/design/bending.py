@@ -332,6 +332,13 @@ def fibres(machine: Machine, bending: Bending) -> Array:
     ------
     ParameterError
         If there is no such section on the machine.
+
+    Examples
+    --------
+    >>> from chaosgym.design.bending import Bending, Section, fibres
+    >>> upper, lower = fibres(chaosgym.ImpactBeam(), Bending(section=Section(at=0.1)))
+    >>> bool(np.all(upper == -lower))
+    True
     """
     section = bending.section
     if section.link and section.at is not None:

@@ -112,8 +112,9 @@ def worn_side(record: CycleRecord, exponent: float = LIFE_EXPONENT) -> int | Non
     Examples
     --------
     >>> from chaosgym.design.peak_impacts import worn_side
-    >>> worn_side(chaosgym.simulate(chaosgym.ImpactBeam(), cycles=50, transient=200))
-    1
+    >>> one_stop = chaosgym.read_machine("docs/machines/moon-shaw-1983.toml")
+    >>> worn_side(chaosgym.simulate(one_stop, cycles=50, transient=200))
+    0
     """
     if getattr(record.machine, "round_bearing", False):
         return None

@@ -64,6 +64,13 @@ def impacts_against(
         If a clearance is out of its range.
     SimulationError
         If a run can't be finished.
+
+    Examples
+    --------
+    >>> from chaosgym.design.trends import impacts_against
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=12.0)
+    >>> [round(one.clearance * 1e3, 3) for one in impacts_against(beam, [5e-5, 1e-4])]
+    [0.05, 0.1]
     """
 
     def run(clearance: float) -> ImpactPlace:
