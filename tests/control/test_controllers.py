@@ -82,7 +82,7 @@ def test_backing_off_learns_from_measurements():
 )
 def test_others_stay_within_the_range_of_the_task(make):
     """Whatever they are worth, they finish their jobs near the demand."""
-    played = play(make(), BEAM, range(3), steps=40)
+    played = play(make(), BEAM, np.arange(3), steps=40)
     assert np.nanmax(np.abs(played.speed - played.demand)) <= 2.0 + 4.5
     assert np.all(played.status == 1)
 

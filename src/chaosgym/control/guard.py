@@ -12,13 +12,10 @@ from typing import Any
 import numpy as np
 
 from chaosgym.control.controllers import BackOff
-from chaosgym.control.controllers.controller import Array, Controller, Observations, irregular, seen
+from chaosgym.control.controllers.controller import THRESHOLD, Array, Controller, Observations, irregular, seen
 from chaosgym.control.rollout import Policy
 from chaosgym.envs.drive import BACK, MOVES
 from chaosgym.errors import ParameterError
-
-THRESHOLD = 1.17
-"""Felt irregularity, in units of the sensor's error, above which a step is irregular: that of backing off."""
 
 
 class GuardedPolicy(Controller):
@@ -29,9 +26,9 @@ class GuardedPolicy(Controller):
     policy
         Trained policy, or any other that sets trims.
     patience
-        Irregular steps at the demand before the policy is asked.
+        Irregular steps at the demand before the policy is asked; as of backing off.
     strikes
-        Irregular steps under the policy before backing off takes over.
+        Irregular steps under the policy before backing off takes over (calibrated, on beams of no evaluation).
 
     Examples
     --------
@@ -49,7 +46,7 @@ class GuardedPolicy(Controller):
     def __init__(self, policy: Policy, *, patience: int = 2, strikes: int = 3) -> None:
         super().__init__()
         self.policy, self.patience, self.strikes = policy, patience, strikes
-        self._back_off = BackOff(threshold=THRESHOLD, patience=patience)
+        self._back_off = BackOff(patience=patience)
 
     def begin(self, envs: Any) -> None:
         """Trust the policy.

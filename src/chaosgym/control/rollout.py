@@ -161,9 +161,9 @@ def play(
     if machines is None and seeds is None:
         raise ParameterError("play needs machines or seeds")
     numbers = None if machines is None else np.asarray(machines, np.int64)
-    chosen = list(seeds if seeds is not None else machines or ())
+    chosen = np.asarray(machines if seeds is None else seeds, np.int64)
     envs = native_envs(env, len(chosen), **(keywords | policy.keywords))
-    given = np.asarray(chosen, np.int64) + (envs.workplace.variants.seed if seeds is None else 0)
+    given = chosen + (envs.workplace.variants.seed if seeds is None else 0)
     options = {} if numbers is None else {"machine": numbers}
     observations, info = envs.reset(seed=given.tolist(), options=options)
     policy.start(envs)

@@ -36,7 +36,7 @@ CELLS, EVERY = 8, 4
 
 
 def sealed_seed() -> int:
-    """Seed of the sealed machines: another one for each release, known to nobody who developed it."""
+    """Seed of the sealed machines: another one for each release, so that no development has played them."""
     return 1_000_000_000 + int.from_bytes(sha256(f"chaosgym {__version__}".encode()).digest()[:3])
 
 

@@ -278,7 +278,7 @@ def series_life(assessment: Assessment, ax: Axes) -> Axes:
             if any(run.nature == kind for run in runs)
         ),
     ]
-    ax.legend(handles=handles, loc="upper left", ncols=2)
+    ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.16), ncols=3)
     finite = lives[np.isfinite(lives)]
     if len(finite):
         ax.set_ylim(0.6 * min(finite.min(), criteria.life), 2.5 * max(finite.max(), criteria.life))

@@ -70,6 +70,10 @@ def place_of(speeds: Array, task: Task) -> NDArray[np.int64]:
     return np.asarray(places.clip(0, len(task.grid) - 1), np.int64)
 
 
+THRESHOLD = 1.17
+"""Felt irregularity, in units of the sensor's error, above which motion is irregular (calibrated on other machines)."""
+
+
 def irregular(observations: Observations, task: Task, threshold: float, softness: float) -> Array:
     """Probability (n,) that the motion is irregular, by what is felt in units of the sensor's error."""
     felt = irregularity(observations) / max(task.sensor_error, 1e-3 * task.load_rating)

@@ -7,7 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from chaosgym.control.controllers.controller import Array, Controller, Observations, irregular, place_of, seen
+from chaosgym.control.controllers.controller import (
+    THRESHOLD,
+    Array,
+    Controller,
+    Observations,
+    irregular,
+    place_of,
+    seen,
+)
 from chaosgym.control.maps import Maps
 
 
@@ -18,8 +26,6 @@ class BackOff(Controller):
     ----------
     remembers
         Whether speeds that were irregular in this job are skipped.
-    threshold
-        Felt irregularity in units of the sensor's error.
     patience
         Steps before it moves on.
     spacing
@@ -28,9 +34,9 @@ class BackOff(Controller):
 
     knows = "measurements"
 
-    def __init__(self, *, remembers: bool = True, threshold: float = 1.17, patience: int = 2, spacing: int = 2) -> None:
+    def __init__(self, *, remembers: bool = True, patience: int = 2, spacing: int = 2) -> None:
         super().__init__()
-        self.remembers, self.threshold, self.patience, self.spacing = remembers, threshold, patience, spacing
+        self.remembers, self.patience, self.spacing = remembers, patience, spacing
 
     def begin(self, envs: Any) -> None:
         """Start at the demand."""
@@ -46,7 +52,7 @@ class BackOff(Controller):
         demand, speed, every = seen(observations, "demand"), seen(observations, "speed"), np.arange(self.count)
         wanted = np.clip(self._demand + self.ladder[self._rung], self.task.lowest_speed, self.task.highest_speed)
         there = np.abs(speed - wanted) < 0.01 * self.task.trim_step
-        wild = irregular(observations, self.task, self.threshold, 1e-3) > 0.5
+        wild = irregular(observations, self.task, THRESHOLD, 1e-3) > 0.5
         new = demand != self._demand
         self._demand = demand
         self._wild = np.where(there & wild & ~new, self._wild + 1, np.where(there, 0, self._wild))
@@ -133,7 +139,7 @@ class HillClimbing(Controller):
         """The demand and the trim."""
         task, demand = self.task, seen(observations, "demand")
         cost = task.deviation_weight * np.abs(seen(observations, "offset"))
-        self._sum += cost + task.type_iii_weight * irregular(observations, task, 1.17, 0.23)
+        self._sum += cost + task.type_iii_weight * irregular(observations, task, THRESHOLD, 0.23)
         new = demand != self._demand
         self._demand = demand
         self._trim[new], self._best[new], self._sum[new] = 0.0, np.inf, 0.0
@@ -167,7 +173,7 @@ class ExtremumSeeking(Controller):
         """The demand, the trim and the sine."""
         task = self.task
         cost = task.deviation_weight * np.abs(seen(observations, "offset"))
-        cost = cost + task.type_iii_weight * irregular(observations, task, 1.17, 0.23)
+        cost = cost + task.type_iii_weight * irregular(observations, task, THRESHOLD, 0.23)
         self._mean += (cost - self._mean) / self.period
         wave = np.sin(2.0 * np.pi * self._step / self.period)
         self._trim -= self.gain * task.trim_step * (cost - self._mean) * wave

@@ -17,10 +17,10 @@ from chaosgym.envs.task import Task
 from chaosgym.envs.vector_env import native_envs
 
 CLASSES = 25
-"""Classes of clearance, from the smallest to the largest that was met."""
+"""Classes of clearance, from the smallest to the largest that was met (assumed)."""
 
 JOBS, AT_ONCE, MOVES, FIRST_SEED = 1024, 128, 0.15, 88_000_000
-"""Jobs on training machines, how many run at once, share of the steps that go to another speed, and first seed."""
+"""Jobs on training machines, how many at once, part of the steps that go to another speed, and first seed (assumed)."""
 
 READINGS = ("mean_peak_force", "std_peak_force", "repeat_1", "impacts_per_cycle", "bouncing_share")
 FLOORS = np.array([0.03, 0.15, 0.15, 0.15, 0.01])

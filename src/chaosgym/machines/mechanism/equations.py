@@ -110,22 +110,10 @@ def small_motion(mechanism: Mechanism, revolution: Revolution, first: float, cou
     Examples
     --------
     >>> from chaosgym.machines.mechanism.equations import small_motion
-    >>> from chaosgym.machines.mechanism.joints import Joint
-    >>> from chaosgym.machines.mechanism.links import Body, rigid_link
-    >>> from chaosgym.machines.mechanism.mechanism import Mechanism
-    >>> crank = rigid_link("crank", {"shaft": (0.0, 0.0), "pin": (0.05, 0.0)})
-    >>> rod = rigid_link("rod", {"big": (0.0, 0.0), "small": (0.2, 0.0)}, (Body(0.5, 1e-3, (0.1, 0.0)),))
-    >>> slider = rigid_link("slider", {"pivot": (0.0, 0.0)}, (Body(1.0, 1e-3, (0.0, 0.0)),))
-    >>> joints = (
-    ...     Joint("motor", "revolute", ("ground", "shaft"), ("crank", "shaft"), driven=True),
-    ...     Joint("big_end", "revolute", ("crank", "pin"), ("rod", "big")),
-    ...     Joint("small_end", "revolute", ("rod", "small"), ("slider", "pivot")),
-    ...     Joint("guide", "prismatic", ("ground", "shaft"), ("slider", "pivot"), opened=("across",)),
-    ... )
-    >>> mechanism = Mechanism((crank, rod, slider), joints, {"shaft": (0.0, 0.0)}, (0.0, -9.81))
     >>> from chaosgym.machines.mechanism.nominal import revolution_of
-    >>> small_motion(mechanism, revolution_of(mechanism), first=0.0, count=36).mass.shape
-    (36, 1, 1)
+    >>> crank = chaosgym.read_machine("docs/machines/slider-crank-flores-guide.toml").mechanism
+    >>> small_motion(crank, revolution_of(crank), first=0.0, count=36).mass.shape
+    (36, 2, 2)
     """
     found, times = _smooth(mechanism, revolution, first, count)
     theta = _angles(first, times * count)
