@@ -12,7 +12,7 @@ from chaosgym.design.bending import Bending, fibres, read_bending
 from chaosgym.design.improve import default_changes
 from chaosgym.design.methodology import SERIES_SIZE
 from chaosgym.design.runs import deviating
-from chaosgym.design.wear import Wear, read_wear
+from chaosgym.design.wear import Wear, read_wear, worn_clearances
 from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError
 from chaosgym.files import toml_of
@@ -269,9 +269,11 @@ def _wear(values: Mapping[str, Any], machine: Machine) -> Wear | None:
     known = parameters_of(Wear)
     section = _section(values, "archard", known, machine)
     own = {"area": {"m^2": 1.0, "cm^2": 1e-4, "mm^2": 1e-6}}
-    return read_wear(
+    found = read_wear(
         {key: parse_quantity(f"archard.{key}", one, known[key].unit, own.get(key)) for key, one in section.items()}
     )
+    worn_clearances(machine, found)  # refused before the machine is assessed, not after
+    return found
 
 
 OF_SECTION = {"at": "m", "link": "", "span": "m", "turn": "", "curvatures": "kg^-1/2 m^-2"}

@@ -28,7 +28,7 @@ from chaosgym.design.trends import HISTORY_SAMPLES
 from chaosgym.diagnosis import Nature, diagnose
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import parameter, parameters_of, validate
+from chaosgym.machines.parameters import parameter, parameters_of, validate, with_settings
 from chaosgym.simulation import MotionState, parallel_map, rest_state, simulate
 
 Array = NDArray[np.float64]
@@ -157,6 +157,34 @@ class WearLife:
         }
 
 
+def worn_clearances(machine: Machine, wear: Wear) -> Array:
+    """Clearances [m] that a joint passes, from the machine's own to the limit, evenly spaced.
+
+    Raises
+    ------
+    DesignError
+        If the limit is no larger than the machine's clearance, or that is an angle.
+    ParameterError
+        If the limit is out of the clearance's range.
+
+    Examples
+    --------
+    >>> from chaosgym.design.wear import Wear, worn_clearances
+    >>> worn_clearances(chaosgym.ImpactBeam(), Wear(limit=2e-4, sliding=1e-4, area=1e-5))[[0, -1]]
+    array([0.000127, 0.0002  ])
+    """
+    name = machine.clearance_field
+    nominal = float(getattr(machine, name))
+    if parameters_of(machine)[name].unit != "m":
+        raise DesignError(f"[archard] needs a clearance that is a length; {name} is an angle")
+    if not wear.limit > nominal:
+        raise DesignError(
+            f"archard.limit = {wear.limit:g} m is out of range; allowed: above the clearance, {nominal:g} m"
+        )
+    with_settings(machine, {name: wear.limit})
+    return np.linspace(nominal, wear.limit, STEPS + 1)
+
+
 def wear_life(machine: Machine, wear: Wear, *, workers: int | None = None, progress: bool = False) -> WearLife:
     """Course of a joint's clearance as it wears, each clearance run from rest.
 
@@ -188,14 +216,7 @@ def wear_life(machine: Machine, wear: Wear, *, workers: int | None = None, progr
     >>> found.course[0].clearance, found.course[-1].clearance
     (0.000127, 0.0002)
     """
-    nominal = float(getattr(machine, machine.clearance_field))
-    if parameters_of(machine)[machine.clearance_field].unit != "m":
-        raise DesignError(f"[archard] needs a clearance that is a length; {machine.clearance_field} is an angle")
-    if not wear.limit > nominal:
-        raise DesignError(
-            f"archard.limit = {wear.limit:g} m is out of range; allowed: above the clearance, {nominal:g} m"
-        )
-    gaps = np.linspace(nominal, wear.limit, STEPS + 1)
+    gaps = worn_clearances(machine, wear)
     runs = parallel_map(
         _loads,
         [machine.at(clearance=float(gap)) for gap in gaps],
