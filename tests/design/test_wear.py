@@ -106,7 +106,7 @@ def test_a_brief_states_what_wears():
         ('limit = "0.3 mm"\nsliding = "1 mm"\narea = "1 mm^2"\nuncertainty = 0.5', "uncertainty = 0.5"),
         ('limit = "0.3 mm"\nsliding = "1 mm"\narea = "1 mm^2"\nhardnes = "1 GPa"', "did you mean hardness"),
         ('limit = "0.01 mm"\nsliding = "1 mm"\narea = "1 mm^2"', "above the clearance"),
-        ('limit = "3 m"\nsliding = "1 mm"\narea = "1 mm^2"', "clearance = 3 m is out of range"),
+        ('limit = "3 m"\nsliding = "1 mm"\narea = "1 mm^2"', "limit = 3 m is out of range"),
     ],
 )
 def test_wear_without_its_data_is_refused(text, message):
