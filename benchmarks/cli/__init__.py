@@ -196,6 +196,20 @@ def headroom(env: str, machines: int, keywords: str, as_json: bool) -> None:
     emit({"env": env, "machines": machines, "keywords": given, **found}, as_json, lambda: lines)
 
 
+@click.command("textbook-controllers")
+@click.argument("env", type=click.Choice(ENVIRONMENTS))
+@click.option("--machines", type=click.IntRange(2), default=32, show_default=True, help="Of those kept for evaluation.")
+@AS_JSON
+def textbook(env: str, machines: int, as_json: bool) -> None:
+    """Play ENV by hill climbing, extremum seeking, force feedback, delayed feedback and OGY (takes long)."""
+    from benchmarks.envs.textbook_controllers import textbook_scores
+    from chaosgym.control.comparison_lines import table_lines
+
+    found = textbook_scores(env, machines)
+
+    emit({"env": env, "machines": machines, "contenders": found}, as_json, lambda: table_lines(found))
+
+
 @click.command()
 @click.argument("runs", nargs=-1)
 @click.option("--table", type=click.Path(dir_okay=False, path_type=Path), required=True, help="CSV file of the curves.")
@@ -292,6 +306,7 @@ for command in (
     mismatch,
     curves,
     headroom,
+    textbook,
     classifier,
     monitors,
     general,

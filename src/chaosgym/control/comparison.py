@@ -47,9 +47,6 @@ SUBJECTS = ("objective", "level", "split", "sealed")
 WORN_LEVELS = 5
 """Clearances at which a machine that wears is mapped."""
 
-CYCLE_BY_CYCLE, CYCLE_BY_CYCLE_MACHINES = ("delayed feedback", "OGY"), 32
-"""Controllers that act in each cycle instead of each step, and for how many machines at most: they take long."""
-
 MADE_WORSE = 1.0
 """Return by which a job must fall short of that of following the demand for its machine to be counted as made worse."""
 
@@ -76,17 +73,12 @@ class Contenders:
             "best common schedule, demands known": lambda: controllers.CommonSchedule(self.fleet),
             "back off": partial(controllers.BackOff, remembers=False),
             SAFE: controllers.BackOff,
-            "hill climbing": controllers.HillClimbing,
             "kriging": controllers.Kriging,
             "bandit": lambda: controllers.Bandit(self.fleet),
-            "extremum seeking": controllers.ExtremumSeeking,
-            "force feedback": controllers.ForceFeedback,
             "table": lambda: controllers.Table(self._tables()),
             "belief": lambda: controllers.Belief(self.fleet),
             "belief, exact model": lambda: controllers.Belief(self._exact_fleet()),
             "receding horizon": controllers.RecedingHorizon,
-            "delayed feedback": controllers.DelayedFeedback,
-            "OGY": controllers.OGY,
         }
 
     @property
@@ -134,14 +126,6 @@ class Contenders:
 
     def _bar(self, name: str) -> str | None:
         return name if self.progress else None
-
-
-def cycle_keywords(task: Any) -> dict[str, Any]:
-    """Keywords of the same job with an action in each cycle instead of each step."""
-    n = task.cycles_per_step
-    whole = {name: n * getattr(task, name) for name in ("steps", "shortest_hold", "longest_hold")}
-    parts = ("type_iii_weight", "deviation_weight", "failure_weight", "slew_limit")
-    return {"cycles_per_step": 1, "speed_grid": 0.0, **whole, **{name: getattr(task, name) / n for name in parts}}
 
 
 def compare(
@@ -197,19 +181,11 @@ def compare(
     work: list[tuple[str, int, Policy | None]] = [(name, 0, None) for name in chosen]
     work += [(name, seed, policy) for name, seeds in (policies or {}).items() for seed, policy in enumerate(seeds)]
     for name, seed, policy in work:
-        often = name in CYCLE_BY_CYCLE
-        wanted = range(min(count, CYCLE_BY_CYCLE_MACHINES) if often else count)
-        missing = sorted(set(wanted) - _played(table, name, seed))
+        missing = sorted(set(range(count)) - _played(table, name, seed))
         if not missing:
             continue
         player = policy or contenders.makers(missing)[name]()
-        played = play(
-            player,
-            env,
-            missing,
-            progress=name if progress else None,
-            **(keywords | (cycle_keywords(known.task) if often else {})),
-        )
+        played = play(player, env, missing, progress=name if progress else None, **keywords)
         rows = job_rows(name, player.knows, seed, played, subject)
         table = rows if table is None else pa.concat_tables([table, rows])
         write_comparison(table, out)

@@ -1,4 +1,7 @@
-"""Control of chaos at the demanded speed: small corrections, once a cycle, may hold an unstable orbit.
+"""Textbook controllers that lose to following the demand or to backing off, and the command that shows it.
+
+Hill climbing, extremum seeking and force feedback act in every step of a job, from what is felt. Control of chaos acts
+in every cycle: small corrections of the speed may hold an unstable orbit at the demand.
 
 OGY, after Ott, Grebogi and Yorke: of the orbits of period 1 that the chaotic motion passes by, the least unstable one
 is found by Newton's method, and the speed is corrected by u = -K (x - x*), with x the state at the start of a cycle,
@@ -13,16 +16,21 @@ References
 Ott, Grebogi, Yorke, Controlling chaos, Physical Review Letters 64 (1990) 1196.
 Romeiras, Grebogi, Ott, Dayawansa, Controlling chaotic dynamical systems, Physica D 58 (1992) 165: pole placement.
 Pyragas, Continuous control of chaos by self-controlling feedback, Physics Letters A 170 (1992) 421.
+Krstic, Wang, Stability of extremum seeking for general nonlinear dynamic systems, Automatica 36 (2000) 595.
 Socolar, Sukow, Gauthier, Stabilizing unstable periodic orbits in fast dynamical systems, Phys. Rev. E 50 (1994) 3245.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
+import pyarrow as pa
 from scipy.linalg import LinAlgError, solve_discrete_are
 
-from chaosgym.control.controllers.controller import Array, Controller, Observations, seen
+from chaosgym.control.comparison import ONE, SAFE, ZERO, Contenders, Scores, job_rows
+from chaosgym.control.controllers.controller import THRESHOLD, Array, Controller, Observations, irregular, seen
+from chaosgym.control.rollout import play
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
+from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import SimulationError
 from chaosgym.machines.machine import Machine
 from chaosgym.simulation import simulate
@@ -131,3 +139,104 @@ def _hold(machine: Machine, orbit: PeriodicOrbit, spread: Array, limit: float) -
     except (LinAlgError, ValueError):
         return None
     return Hold(orbit.state, limit * gain / size)
+
+
+class HillClimbing(Controller):
+    """Perturb and observe: goes on while the felt cost falls, else turns; a step of the trim every three steps."""
+
+    knows = "measurements"
+    dwell = 3
+
+    def begin(self, envs: Any) -> None:
+        """Start at the demand."""
+        self._trim, self._sign = np.zeros(self.count), -np.ones(self.count)
+        self._best, self._sum, self._steps = np.full(self.count, np.inf), np.zeros(self.count), 0
+        self._demand = np.full(self.count, np.nan)
+
+    def speeds(self, observations: Observations) -> Array:
+        """The demand and the trim."""
+        task, demand = self.task, seen(observations, "demand")
+        cost = task.deviation_weight * np.abs(seen(observations, "offset"))
+        self._sum += cost + task.type_iii_weight * irregular(observations, task, THRESHOLD, 0.23)
+        new = demand != self._demand
+        self._demand = demand
+        self._trim[new], self._best[new], self._sum[new] = 0.0, np.inf, 0.0
+        self._steps += 1
+        if self._steps % self.dwell == 0:
+            mean = self._sum / self.dwell
+            climbs = mean >= 0.15
+            self._sign = np.where(climbs & (mean > self._best), -self._sign, self._sign)
+            moved = self._trim + self._sign * task.trim_step
+            self._trim = np.where(climbs, np.clip(moved, -task.largest_trim, task.largest_trim), self._trim)
+            self._best, self._sum = mean, np.zeros(self.count)
+        return np.asarray(demand + self._trim)
+
+
+class ExtremumSeeking(Controller):
+    """A slow sine on the trim, and a drift against the part of the felt cost that moves with it (Krstic and Wang)."""
+
+    knows = "measurements"
+    period = 8
+    gain = 2.0
+
+    def begin(self, envs: Any) -> None:
+        """Start at the demand."""
+        self._trim, self._mean, self._step = np.zeros(self.count), np.zeros(self.count), 0
+
+    def speeds(self, observations: Observations) -> Array:
+        """The demand, the trim and the sine."""
+        task = self.task
+        cost = task.deviation_weight * np.abs(seen(observations, "offset"))
+        cost = cost + task.type_iii_weight * irregular(observations, task, THRESHOLD, 0.23)
+        self._mean += (cost - self._mean) / self.period
+        wave = np.sin(2.0 * np.pi * self._step / self.period)
+        self._trim -= self.gain * task.trim_step * (cost - self._mean) * wave
+        self._trim = np.clip(self._trim, -task.largest_trim, task.largest_trim)
+        self._step += 1
+        ahead = np.sin(2.0 * np.pi * self._step / self.period)
+        return np.asarray(seen(observations, "demand") + self._trim + task.trim_step * ahead)
+
+
+class ForceFeedback(Controller):
+    """Integral control of the scatter of the peak forces: slower while it is above the sensor's own, else back."""
+
+    knows = "measurements"
+    gain = 1.0
+
+    def begin(self, envs: Any) -> None:
+        """Start at the demand."""
+        self._trim = np.zeros(self.count)
+
+    def speeds(self, observations: Observations) -> Array:
+        """The demand less what the scatter asks for."""
+        task = self.task
+        scatter = seen(observations, "std_peak_force") / max(task.sensor_error, 1e-3 * task.load_rating)
+        self._trim = np.clip(self._trim - self.gain * task.trim_step * (scatter - 1.0), -task.largest_trim, 0.0)
+        return np.asarray(seen(observations, "demand") + self._trim)
+
+
+BY_STEP = {"hill climbing": HillClimbing, "extremum seeking": ExtremumSeeking, "force feedback": ForceFeedback}
+BY_CYCLE = {"delayed feedback": DelayedFeedback, "OGY": OGY}
+"""Controllers that act once a step, and once a cycle."""
+
+
+def cycle_keywords(task: Any) -> dict[str, Any]:
+    """Keywords of the same job with an action in each cycle instead of each step."""
+    n = task.cycles_per_step
+    whole = {name: n * getattr(task, name) for name in ("steps", "shortest_hold", "longest_hold")}
+    parts = ("type_iii_weight", "deviation_weight", "failure_weight", "slew_limit")
+    return {"cycles_per_step": 1, "speed_grid": 0.0, **whole, **{name: getattr(task, name) / n for name in parts}}
+
+
+def textbook_scores(env: str, machines: int, progress: bool = True) -> dict[str, dict[str, Any]]:
+    """What the textbook controllers achieve on the first machines kept for evaluation, as ``Scores.summary``."""
+    numbers = range(machines)
+    known = Contenders(env, {}, progress).makers(numbers)
+    players: dict[str, Any] = {name: known[name] for name in (ZERO, ONE, SAFE)} | BY_STEP | BY_CYCLE
+    task = native_envs(env).task
+    rows = []
+    for name, make in players.items():
+        player, keywords = make(), cycle_keywords(task) if name in BY_CYCLE else {}
+        played = play(player, env, numbers, progress=name if progress else None, **keywords)
+        rows.append(job_rows(name, player.knows, 0, played, env))
+    return Scores(pa.concat_tables(rows)).summary()
