@@ -118,8 +118,6 @@ class Machine(ABC):
     """Names of the bearing surfaces whose contact force is recorded."""
     fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {"reference": {}}
     """Fields that each rung sets, from the cheapest rung to the reference."""
-    former_rungs: ClassVar[Mapping[str, str]] = {}
-    """Rungs of earlier versions, and what stands for them now."""
     options: ClassVar[Mapping[str, Option]] = {}
     """Options on the command line, in the order in which they take effect; other fields are reached by ``--set``."""
     scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = {"as it is": {}}

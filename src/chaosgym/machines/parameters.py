@@ -197,9 +197,6 @@ def expand_fidelity(machine: Any, settings: Mapping[str, Any]) -> dict[str, Any]
     if rung is None:
         return others
     ladder = getattr(machine, "fidelity_ladder", {})
-    former = getattr(machine, "former_rungs", {})
-    if rung in former:
-        raise ParameterError(f"fidelity = {rung!r} is no rung any more; allowed: {former[rung]}")
     if rung not in ladder:
         raise ParameterError(f"fidelity = {rung!r} is not one of {', '.join(ladder)}")
     for name, value in ladder[rung].items():

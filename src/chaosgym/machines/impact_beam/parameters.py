@@ -49,14 +49,6 @@ class BeamParameters(ModalImpactMachine):
             ("reference", 20, 2, "tightest"),
         )
     }
-    former_rungs: ClassVar[Mapping[str, str]] = {
-        "restitution": "n_modes=1, fitted_modes=0, whose impacts take the time that spring and damper give them",
-        "rigid": "n_modes=1, fitted_modes=0",
-        "modes-3": "fidelity='standard'",
-        "draft": "fidelity='standard', which costs no more",
-        "modes-5": "fidelity='standard', or n_modes=5, fitted_modes=0",
-        "modes-8": "fidelity='fine'",
-    }
 
     name: ClassVar[str] = "impact-beam"
     speed_field: ClassVar[str] = "excitation_frequency"

@@ -93,11 +93,6 @@ class SliderCrank(BinnedMachine):
             ("reference", 5, 1, 0.25),
         )
     }
-    former_rungs: ClassVar[Mapping[str, str]] = {
-        "rigid": "rod='rigid'",
-        "flexible-5deg": "fidelity='draft'",
-        "flexible-1deg": "fidelity='standard', or n_modes=3, fitted_modes=0, matrix_update_interval=1",
-    }
 
     name: ClassVar[str] = "slider-crank"
     speed_field: ClassVar[str] = "crank_speed"
