@@ -13,7 +13,7 @@ from tqdm import trange
 
 from chaosgym.diagnosis import diagnose
 from chaosgym.envs.judge import ExponentJudge, RecurrenceJudge
-from chaosgym.simulation.batch import batch_of
+from chaosgym.simulation.batch import VariedBatch, batch_of
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ def _verdicts(drawn: list[Any], grid: Array, task: Any, share: float, generator:
     batch, every = batch_of(drawn[0], len(drawn)), np.arange(len(drawn))
     for i, machine in enumerate(drawn):
         batch.start(i, machine.at(float(grid[0])))
-    carries = hasattr(batch, "run_varied")
+    carries = isinstance(batch, VariedBatch)
     exponent, recurrence = ExponentJudge(len(drawn)), RecurrenceJudge(len(drawn))
     result: dict[str, Any] = {"recurrence": np.zeros((len(drawn), len(grid)), np.bool_)}
     if carries:
@@ -74,7 +74,7 @@ def _verdicts(drawn: list[Any], grid: Array, task: Any, share: float, generator:
 def _run(batch: Any, every: Any, speed: float, task: Any, share: float, generator: Any) -> tuple[Array, Array]:
     """Peak forces and growth (machines, cycles) at a speed."""
     count, cycles = len(every), SETTLING + JUDGED
-    if hasattr(batch, "run_varied"):
+    if isinstance(batch, VariedBatch):
         speeds = speed * (1.0 + share * task.speed_ripple * generator.standard_normal((count, cycles)))
         done, growth = batch.run_varied(every, speeds)
         return done.peak_force[:, :, 0], growth

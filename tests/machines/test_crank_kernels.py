@@ -11,7 +11,7 @@ from chaosgym.core.binned.cycle import advance
 from chaosgym.core.binned.series import FORCING_TERMS, series_order
 from chaosgym.core.binned.tables import table_places, tables
 from chaosgym.core.cubic import cubic
-from chaosgym.core.cycle import Episode, cycle_arrays
+from chaosgym.core.cycle import cycle_arrays
 from chaosgym.core.events import KEEPS, UNSURE, judge
 from chaosgym.core.lanes import LANES, padded
 from chaosgym.core.tangent import Tangents
@@ -100,7 +100,7 @@ def test_energy_is_conserved_without_damping():
     state[n : 2 * n] = [0.02, 0.1, 0.01, 0.0, 0.0]
     arrays = cycle_arrays(cycles, 2 * n, travels=True)
     none = Tangents(np.empty((0, 2 * n)), np.empty((cycles, 0)))
-    outcome, _ = advance(model, state, Episode(np.zeros(1), np.zeros(2)), arrays, 1e-13, 10_000, none)
+    outcome, _ = advance(model, state, np.zeros(3), arrays, 1e-13, 10_000, none)
     assert outcome == 0
     assert arrays.impacts.sum() > 500
     p, v = arrays.section[:, :n], arrays.section[:, n:]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chaosgym.core.binned.taylor import advance
-from chaosgym.core.cycle import Episode, cycle_arrays
+from chaosgym.core.cycle import cycle_arrays
 from chaosgym.machines.binned.model import stepped_model
 from chaosgym.simulation import ExactEvents, simulate
 from tests.machines.crank_twin import rigid_ball_twin
@@ -30,7 +30,7 @@ def stepped(machine, cycles, step_phase):
     states = 2 * len(machine.degrees_of_freedom)
     arrays = cycle_arrays(cycles, states, travels=True)
     model = stepped_model(machine, step_phase)
-    outcome, _ = advance(model, np.zeros(states), Episode(np.zeros(1), np.zeros(2)), arrays, 1e-13, 10_000)
+    outcome, _ = advance(model, np.zeros(states), np.zeros(3), arrays, 1e-13, 10_000)
     assert outcome == 0
     return arrays
 

@@ -18,7 +18,6 @@ KERNEL = """
 import numpy as np
 from chaosgym import SliderCrank
 from chaosgym.core import status
-from chaosgym.core.cycle import Episode
 from chaosgym.core.tangent import no_tangents
 from chaosgym.core.binned.cycle import advance
 
@@ -27,7 +26,7 @@ model, state = crank.reduce(), np.zeros(crank.n_states)
 {spoil}
 arrays = crank.arrays(2)
 outcome = advance(
-    model, state, Episode(np.zeros(1), np.zeros(2)), arrays, 1e-12, 20_000, no_tangents(crank.n_states, 2)
+    model, state, np.zeros(3), arrays, 1e-12, 20_000, no_tangents(crank.n_states, 2)
 )
 print(outcome, status.DIVERGED)
 assert outcome[0] != status.OK

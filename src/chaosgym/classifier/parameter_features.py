@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from chaosgym.classifier.kernels.parameters import FREE, RINGING, fill_features
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import with_settings
+from chaosgym.machines.parameters import parameters_of, with_settings
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,8 @@ class SwingTable(NamedTuple):
 def swing_table(machine: Any, fields: tuple[str, ...], grid: Array) -> SwingTable:
     """Table for a beam whose ``fields`` vary, over lengths ``grid``; without modes for whatever has no such groups."""
     vary = {"excitation_frequency", "clearance"} <= set(fields) <= set(FIELDS)
-    if not (machine is not None and machine.swings and machine.n_modes >= FREE and vary):
+    is_beam = machine is not None and set(FIELDS) <= set(parameters_of(machine))
+    if not (is_beam and machine.n_modes >= FREE and vary):
         return SwingTable(np.full(len(FIELDS), -1), np.zeros(len(FIELDS)), np.zeros(1), np.empty((0, 1)))
     places = np.array([fields.index(name) if name in fields else -1 for name in FIELDS])
     fixed = np.array([getattr(machine, name) for name in FIELDS], dtype=float)

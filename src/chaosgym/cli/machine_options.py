@@ -181,7 +181,7 @@ def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...]
     from chaosgym.machines.parameters import with_settings
 
     owner = MACHINES[name]
-    known = owner.options
+    known: Mapping[str, Any] = owner.options
     fields: dict[str, Any] = {}
     redirects: dict[str, str] = {}
     numbers: dict[str, str] = {}
@@ -189,9 +189,10 @@ def build_machine(name: str, given: Mapping[str, Any], settings: tuple[str, ...]
     for option, kind in known.items():
         if option not in given:
             continue
-        joint = given.get("--clearance-joint", "slider")
-        if kind.joints and joint not in kind.joints:
-            raise click.UsageError(f"{option} goes with --clearance-joint {' or '.join(kind.joints)}, not with {joint}")
+        for other, words in kind.only.items():
+            word = given.get(other, next(iter(known[other].words)))
+            if word not in words:
+                raise click.UsageError(f"{option} goes with {other} {' or '.join(words)}, not with {word}")
         if isinstance(kind, Choice):
             fields |= kind.words[given[option]]
             redirects |= kind.redirects.get(given[option], {})

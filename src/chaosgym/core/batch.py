@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from chaosgym.core.cycle import CycleArrays, Episode
+from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.kernel import side_by_side
 from chaosgym.core.modal_impact import advance_model
 from chaosgym.core.modal_model import ModalImpactModel, Tables
@@ -47,12 +47,6 @@ def rows_of(arrays, k):
         arrays.peak_vector[k],
         arrays.channel_peak[k],
     )
-
-
-@njit(cache=True, inline="always")
-def episode_of(motions, i):
-    """Bouncing of machine i."""
-    return Episode(motions.bouncing[i, :1], motions.bouncing[i, 1:])
 
 
 @njit(cache=True, inline="always")

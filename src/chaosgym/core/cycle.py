@@ -9,17 +9,6 @@ from chaosgym.core.kernel import leaf
 UPPER, LOWER = 0, 1
 
 
-class Episode(NamedTuple):
-    """Bouncing on one surface, from the first touch until the other surface is touched.
-
-    ``side`` (1,): +1, -1, or 0 before the first touch; ``touch`` (2,): instants of the first and the last touch [s],
-    counted from the start of the coming cycle.
-    """
-
-    side: np.ndarray
-    touch: np.ndarray
-
-
 class CycleArrays(NamedTuple):
     """What the kernels write, one row a cycle; two columns are UPPER and LOWER, of each joint where there are several.
 
@@ -66,12 +55,24 @@ def cycle_arrays(
 
 
 @leaf
-def note_touch(episode, side, time, bounce_time):
-    """Extend the episode of bouncing, or close it and start the next one when the other surface is touched."""
-    if episode.side[0] != side:
-        if episode.side[0] != 0.0:
-            column = UPPER if episode.side[0] > 0.0 else LOWER
-            bounce_time[column] = max(bounce_time[column], episode.touch[1] - episode.touch[0])
-        episode.side[0] = side
-        episode.touch[0] = time
-    episode.touch[1] = time
+def note_touch(bouncing, joints, j, side, time, bounce_time):
+    """Go on bouncing at joint j, or end it and begin anew when the other surface is touched.
+
+    ``bouncing`` (3m,): of all m joints the surface, +1, -1, or 0 before the first touch; then of each the instants of
+    the first and the last touch of it [s], counted from the start of the coming cycle.
+    """
+    first = joints + 2 * j
+    if bouncing[j] != side:
+        if bouncing[j] != 0.0:
+            column = 2 * j + (UPPER if bouncing[j] > 0.0 else LOWER)
+            bounce_time[column] = max(bounce_time[column], bouncing[first + 1] - bouncing[first])
+        bouncing[j] = side
+        bouncing[first] = time
+    bouncing[first + 1] = time
+
+
+@leaf
+def let_pass(bouncing, joints, period):
+    """Count the instants of touches from the start of the next cycle."""
+    for i in range(joints, bouncing.shape[0]):
+        bouncing[i] -= period

@@ -12,7 +12,7 @@ from numba import njit
 
 from chaosgym.core import status
 from chaosgym.core.contact import contact_force
-from chaosgym.core.cycle import LOWER, UPPER, note_touch
+from chaosgym.core.cycle import LOWER, UPPER, let_pass, note_touch
 
 STABILITY_LIMIT = 2.7
 """Largest step times fastest angular frequency; the method grows undamped oscillations from 2.83 on."""
@@ -78,8 +78,8 @@ def _sample(model, state, history, cycle, sample):
 
 
 @njit(cache=True, nogil=True)
-def advance_fixed_step(model, state, episode, arrays, steps):
-    """Advance ``state`` and ``episode`` by whole cycles of ``steps`` equal steps; see ``modal_impact.advance``.
+def advance_fixed_step(model, state, bouncing, arrays, steps):
+    """Advance ``state`` and ``bouncing`` by whole cycles of ``steps`` equal steps; see ``modal_impact.advance``.
 
     Peaks and samples are taken at the ends of steps, a sample at the next one after its instant.
     """
@@ -131,7 +131,7 @@ def advance_fixed_step(model, state, episode, arrays, steps):
                 arrays.contact_time[cycle, column] += h
                 if before * side <= 0.0:
                     arrays.impacts[cycle, column] += 1
-                    note_touch(episode, side, (step + 1) * h, arrays.bounce_time[cycle])
+                    note_touch(bouncing, 1, 0, side, (step + 1) * h, arrays.bounce_time[cycle])
             before = force
         while sample < samples:
             _sample(model, state, arrays.history, cycle, sample)
@@ -139,6 +139,5 @@ def advance_fixed_step(model, state, episode, arrays, steps):
         arrays.events[cycle] = 0
         if not abs(x) < RUNAWAY:
             return status.DIVERGED, cycle
-        episode.touch[0] -= period
-        episode.touch[1] -= period
+        let_pass(bouncing, 1, period)
     return status.OK, arrays.section.shape[0]

@@ -471,7 +471,7 @@ def _bending_lines(machine: Machine) -> list[str]:
             '# at = "50 mm"            # section of it, from its start on',
             '# fibre = "5 mm"          # distance of the outer fibre from the neutral one',
         ]
-    if machine.swings:
+    if type(machine).stress_at is not Machine.stress_at:
         where = ['# at = "150 mm"           # section of the beam, from the pivot on']
     return [
         "",

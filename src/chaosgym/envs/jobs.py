@@ -18,7 +18,7 @@ from chaosgym.errors import SimulationError
 from chaosgym.machines.batch import Cycles
 from chaosgym.machines.machine import Machine
 from chaosgym.monitor import RepeatSums
-from chaosgym.simulation.batch import batch_of
+from chaosgym.simulation.batch import KickedBatch, VariedBatch, batch_of
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -74,7 +74,7 @@ class Jobs:
     def __init__(self, rules: Rules, count: int) -> None:
         task, nominal = rules.task, rules.variants.nominal
         self.rules, self.batch = rules, batch_of(nominal, count)
-        self.judge: Judge = (ExponentJudge if hasattr(self.batch, "run_varied") else RecurrenceJudge)(count)
+        self.judge: Judge = (ExponentJudge if isinstance(self.batch, VariedBatch) else RecurrenceJudge)(count)
         self._monitor = RepeatSums(count) if task.monitor == "on" else None
         self.machines: list[Machine] = [nominal] * count
         self.state = np.zeros(count, JOB)
@@ -175,16 +175,16 @@ class Jobs:
         if self.traced:
             for i in which[which < self.traced].tolist():
                 self.pieces[i] = []
-        if kicks is None and isinstance(self.judge, ExponentJudge):
+        if kicks is None and isinstance(self.batch, VariedBatch):
             self._trace(which, speeds)
-            cycles, growth = self.batch.run_varied(which, speeds)  # type: ignore[attr-defined]
+            cycles, growth = self.batch.run_varied(which, speeds)
             growth[cycles.failed] = 0.0
             return cycles, growth
         if kicks is None and task.speed_ripple == 0.0:
             self.batch.set_speeds(which, speed)
             self._trace(which, speeds)
             return self.batch.run(which, count), np.zeros(speeds.shape)
-        if task.speed_ripple == 0.0 and not self.traced and hasattr(self.batch, "run_kicked"):
+        if kicks is not None and task.speed_ripple == 0.0 and not self.traced and isinstance(self.batch, KickedBatch):
             self.batch.set_speeds(which, speed)
             return self.batch.run_kicked(which, kicks), np.zeros(speeds.shape)
         return self._run_cycles(which, speeds, kicks)
@@ -198,8 +198,8 @@ class Jobs:
                 self.batch.kick(which, kicks[:, cycle])
             column = speeds[:, cycle : cycle + 1]
             self._trace(which, column)
-            if isinstance(self.judge, ExponentJudge):
-                done, growth[:, cycle : cycle + 1] = self.batch.run_varied(which, column)  # type: ignore[attr-defined]
+            if isinstance(self.batch, VariedBatch):
+                done, growth[:, cycle : cycle + 1] = self.batch.run_varied(which, column)
             else:
                 self.batch.set_speeds(which, column[:, 0])
                 done = self.batch.run(which, 1)

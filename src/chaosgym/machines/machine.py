@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 class Number(NamedTuple):
     """A number: the field that it sets, its unit on the command line, and how many SI units that is.
 
-    ``joints`` are the words of ``--clearance-joint`` with which it makes sense; all if there are none.
+    ``only`` are the words of another option, a ``Choice``, with which it makes sense; all if it is empty.
     """
 
     field: str
     unit: str
     factor: float = 1.0
-    joints: tuple[str, ...] = ()
+    only: Mapping[str, tuple[str, ...]] = {}
 
 
 class Flexible(NamedTuple):
@@ -58,7 +58,7 @@ class Choice(NamedTuple):
 
     words: Mapping[str, Mapping[str, Any]]
     redirects: Mapping[str, Mapping[str, str]] = {}
-    joints: tuple[str, ...] = ()
+    only: Mapping[str, tuple[str, ...]] = {}
 
 
 Option = Number | Choice
@@ -433,11 +433,6 @@ class Machine(ABC):
             If the machine has no beam of its own, or the position is outside it.
         """
         raise ParameterError(f"{self.name} has no beam of its own; allowed: impact-beam, or a link that bends")
-
-    @property
-    def swings(self) -> bool:
-        """True for a beam, with the fields of ``ImpactBeam``, that flies from one spring to another as it rocks."""
-        return False
 
     def arrays(self, cycles: int, samples: int = 0) -> CycleArrays:
         """Return the arrays into which ``run`` writes what happens in some cycles, with samples of the history."""

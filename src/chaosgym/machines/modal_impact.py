@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.core.compilation import call
-from chaosgym.core.cycle import CycleArrays, Episode
+from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.fixed_step import advance_fixed_step
 from chaosgym.core.modal_impact import advance_model, shortest_intervals, tabulate
 from chaosgym.core.modal_model import LOAD, STOP, ModalImpactModel, Tables, with_drive_from
@@ -468,8 +468,7 @@ class ModalImpactMachine(Machine):
             motion = coordinates, bouncing, arrays, budget, along
             outcome = call(advance_model, model, share, step, tolerance, *motion)
         else:
-            episode = Episode(side=bouncing[:1], touch=bouncing[1:])
-            outcome = call(advance_fixed_step, model, coordinates, episode, arrays, integrator.steps_per_cycle)
+            outcome = call(advance_fixed_step, model, coordinates, bouncing, arrays, integrator.steps_per_cycle)
         status, done = outcome
         return status, done
 

@@ -8,7 +8,7 @@ cycles = batch.run(which, 5)             # one compiled call on all processors
 Every machine moves as ``simulate`` moves it, bit for bit.
 """
 
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from chaosgym.machines.machine import Machine
 from chaosgym.simulation.record import CycleRecord, MotionState
 from chaosgym.simulation.run import rest_state, simulate
 
-__all__ = ["Batch", "Cycles", "SerialBatch", "batch_of"]
+__all__ = ["Batch", "Cycles", "KickedBatch", "SerialBatch", "VariedBatch", "batch_of"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -62,6 +62,24 @@ class Batch(Protocol):
 
     def kick(self, which: Indices, shares: Array) -> None:
         """Change the velocities of the machines ``which`` (k,) by ``shares`` (k, n_states / 2) of their largest."""
+        ...
+
+
+@runtime_checkable
+class VariedBatch(Protocol):
+    """A batch whose machines take along a small deviation each, at a speed that changes from cycle to cycle."""
+
+    def run_varied(self, which: Indices, speeds: Array) -> tuple[Cycles, Array]:
+        """Run a cycle at each of the ``speeds`` (k, cycles); also the logarithms of what a deviation grew by."""
+        ...
+
+
+@runtime_checkable
+class KickedBatch(Protocol):
+    """A batch whose machines are kicked and run for many cycles in one call."""
+
+    def run_kicked(self, which: Indices, kicks: Array) -> Cycles:
+        """``kick`` the machines by each of the shares (k, cycles, n_states / 2) and run them a cycle."""
         ...
 
 

@@ -9,7 +9,7 @@ from numba import carray, njit, prange, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from chaosgym.core.batch import episode_of, rows_of
+from chaosgym.core.batch import rows_of
 from chaosgym.core.binned.cycle import BinnedModel
 from chaosgym.core.binned.cycle import advance as advance_binned
 from chaosgym.core.binned.tables import table_places
@@ -64,7 +64,7 @@ def advance_binned_machines(batch, which, motions, arrays, settings, outcome):
         outcome[k] = advance_binned(
             binned_model_of(batch, i),
             motions.coordinates[i],
-            episode_of(motions, i),
+            motions.bouncing[i],
             rows_of(arrays, k),
             settings.event_tolerance / batch.contact_rate[i],
             settings.event_budget,
@@ -74,7 +74,7 @@ def advance_binned_machines(batch, which, motions, arrays, settings, outcome):
 
 # cycles are looped over in a function of its own, as in ``core.varied``
 @njit(cache=True)
-def _kick_crank(model, kicks, coordinates, scale, episode, arrays, settings, k):
+def _kick_crank(model, kicks, coordinates, scale, bouncing, arrays, settings, k):
     half = kicks.shape[2]
     for cycle in range(kicks.shape[1]):
         for c in range(coordinates.shape[0]):
@@ -84,7 +84,7 @@ def _kick_crank(model, kicks, coordinates, scale, episode, arrays, settings, k):
         outcome = advance_binned(
             model,
             coordinates,
-            episode,
+            bouncing,
             cycle_of(arrays, k, cycle),
             settings.event_tolerance / model.contact_rate,
             settings.event_budget,
@@ -103,8 +103,10 @@ def advance_kicked_machines(batch, which, kicks, motions, scale, arrays, setting
     """
     for k in prange(which.shape[0]):
         i = which[k]
-        model, episode = binned_model_of(batch, i), episode_of(motions, i)
-        outcome[k] = _kick_crank(model, kicks, motions.coordinates[i], scale[i], episode, arrays, settings, k)
+        model = binned_model_of(batch, i)
+        outcome[k] = _kick_crank(
+            model, kicks, motions.coordinates[i], scale[i], motions.bouncing[i], arrays, settings, k
+        )
 
 
 @njit(cache=True, inline="always")
@@ -139,7 +141,7 @@ def advance_taylor_machines(batch, which, motions, arrays, settings, outcome):
         outcome[k] = advance_taylor(
             taylor_model_of(batch, i),
             motions.coordinates[i],
-            episode_of(motions, i),
+            motions.bouncing[i],
             rows_of(arrays, k),
             settings.event_tolerance / batch.contact_rate[i],
             settings.event_budget,

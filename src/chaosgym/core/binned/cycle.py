@@ -65,7 +65,7 @@ from chaosgym.core.binned.record import (
 )
 from chaosgym.core.binned.series import order_for, put_time
 from chaosgym.core.binned.tables import table_places
-from chaosgym.core.cycle import LOWER, UPPER, note_touch
+from chaosgym.core.cycle import LOWER, UPPER, let_pass, note_touch
 from chaosgym.core.events import CROSSES, KEEPS, closing, crossing, opening, settled
 from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import LANES, add_columns
@@ -254,13 +254,13 @@ def careful_step(motion, at, closed, row, duration, last, now, h, tolerance, pea
 
 
 @part
-def change_side(motion, changed, towards, now, episode, impacts, bounce_time):
+def change_side(motion, changed, towards, now, bouncing, impacts, bounce_time):
     """Close a channel on the side ``towards`` or open it at ``now`` in the revolution, and record a touch."""
     motion.own[places(motion.n, motion.m).sides + changed] = towards
     if towards != 0.0 and known(motion, changed, REACH) > 0.0:
         up = known(motion, changed, UP) * towards > 0.0
         impacts[UPPER if up else LOWER] += 1
-        note_touch(episode, 1.0 if up else -1.0, now, bounce_time)
+        note_touch(bouncing, 1, 0, 1.0 if up else -1.0, now, bounce_time)
 
 
 @leaf
@@ -348,7 +348,7 @@ def jump(motion, before, after, vectors):
 
 
 @leaf
-def turn(model, motion, peak, episode, arrays, cycle, tolerance, budget, vectors):
+def turn(model, motion, peak, bouncing, arrays, cycle, tolerance, budget, vectors):
     """Move through one revolution; how many changes of contact it had.
 
     Looks begin at the ends of intervals; what is left of one after a change of contact is a careful step.
@@ -431,7 +431,7 @@ def turn(model, motion, peak, episode, arrays, cycle, tolerance, budget, vectors
                     return events
                 since += h
                 time += h
-                change_side(motion, changed, towards, time, episode, impacts, bounce_time)
+                change_side(motion, changed, towards, time, bouncing, impacts, bounce_time)
                 touches = towards * own[here.readings + changed * READINGS + NOW + 1 + SLOPES] > 0.0
                 chosen, before = contact_set(motion, model.radix), at
                 at = (chosen * bins + b) * length
@@ -453,8 +453,8 @@ def turn(model, motion, peak, episode, arrays, cycle, tolerance, budget, vectors
 
 
 @njit(cache=True, nogil=True)
-def advance(model, state, episode, arrays, event_tolerance, event_budget, tangents):
-    """Advance ``state`` (2n,) and ``episode`` in place by whole revolutions, one for each row of ``arrays``.
+def advance(model, state, bouncing, arrays, event_tolerance, event_budget, tangents):
+    """Advance ``state`` (2n,) and ``bouncing`` in place by whole revolutions, one for each row of ``arrays``.
 
     Every revolution starts at angle zero of the drive. ``event_tolerance`` is the error [s] of an event's instant.
     ``tangents`` are ``core.tangent.Tangents``, of no vectors if none are wanted.
@@ -480,7 +480,7 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget, tangen
             model,
             motion,
             peak,
-            episode,
+            bouncing,
             arrays,
             cycle,
             event_tolerance,
@@ -496,6 +496,5 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget, tangen
         if tangents.log_growth.shape[1] > 0:
             tangents.log_growth[cycle] = 0.0
             orthonormalise(metric, tangents, cycle)
-        episode.touch[0] -= period
-        episode.touch[1] -= period
+        let_pass(bouncing, 1, period)
     return status.OK, arrays.section.shape[0]

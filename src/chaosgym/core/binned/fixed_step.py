@@ -21,7 +21,7 @@ from chaosgym.core.binned.taylor import (
     new_view,
     note_touch_of,
 )
-from chaosgym.core.cycle import LOWER, UPPER
+from chaosgym.core.cycle import LOWER, UPPER, let_pass
 from chaosgym.core.fixed_step import STABILITY_LIMIT
 from chaosgym.core.kernel import leaf
 
@@ -39,11 +39,11 @@ def slope_at(model, instant, z, closed, series, view, dz):
 
 
 @leaf
-def note_touches(model, before, closed, direction, episode, instant, impacts, bounce_time):
+def note_touches(model, before, closed, direction, bouncing, instant, impacts, bounce_time):
     """Record the joints that push now and did not ``before``."""
     for j in range(closed.shape[0]):
         if closed[j] and not before[j]:
-            note_touch_of(model, j, direction, episode, instant, impacts, bounce_time)
+            note_touch_of(model, j, direction, bouncing, instant, impacts, bounce_time)
         before[j] = closed[j]
 
 
@@ -58,8 +58,8 @@ def note_joint_peaks(model, closed, view, channel_peak):
 
 
 @njit(cache=True, nogil=True)
-def advance_binned_fixed_step(model, state, episode, arrays, steps, fastest):
-    """Advance ``state`` and ``episode`` by whole revolutions of ``steps`` equal steps; see ``slider_crank.advance``.
+def advance_binned_fixed_step(model, state, bouncing, arrays, steps, fastest):
+    """Advance ``state`` and ``bouncing`` by whole revolutions of ``steps`` equal steps; see ``slider_crank.advance``.
 
     ``fastest`` is the largest angular frequency with all contacts closed. Peaks and samples are taken at the ends of
     steps.
@@ -101,12 +101,11 @@ def advance_binned_fixed_step(model, state, episode, arrays, steps, fastest):
             note_peak(peak, now, force)
             note_joint_peaks(model, closed, view, arrays.channel_peak[cycle])
             impacts, bounce_time = arrays.impacts[cycle], arrays.bounce_time[cycle]
-            note_touches(model, before, closed, view.direction, episode, now, impacts, bounce_time)
+            note_touches(model, before, closed, view.direction, bouncing, now, impacts, bounce_time)
         write_peaks(peak, arrays, cycle)
         arrays.events[cycle] = 0
         for i in range(n2):
             if not abs(state[i]) < RUNAWAY:
                 return status.DIVERGED, cycle
-        episode.touch[0] -= period
-        episode.touch[1] -= period
+        let_pass(bouncing, 1, period)
     return status.OK, arrays.section.shape[0]

@@ -39,7 +39,7 @@ from chaosgym.core.binned.record import (
 )
 from chaosgym.core.binned.series import FORCING_TERMS, SHARES, shift_forcing
 from chaosgym.core.cubic import cubic, cubic_extremum
-from chaosgym.core.cycle import LOWER, UPPER, note_touch
+from chaosgym.core.cycle import LOWER, UPPER, let_pass, note_touch
 from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import LANES, add_columns, next_term, padded, sum_series
 
@@ -471,18 +471,18 @@ def grazes(h, closed, before, after):
 
 
 @leaf
-def note_touch_of(model, j, direction, episode, time, impacts, bounce_time):
+def note_touch_of(model, j, direction, bouncing, time, impacts, bounce_time):
     """Record a touch of joint j at ``time`` in the revolution if it is monitored."""
     if model.monitored[j]:
         up = 0.0
         for r in range(model.first[j], model.first[j + 1]):
             up += model.reading[r, 1] * direction[r]
         impacts[UPPER if up > 0.0 else LOWER] += 1
-        note_touch(episode, 1.0 if up > 0.0 else -1.0, time, bounce_time)
+        note_touch(bouncing, 1, 0, 1.0 if up > 0.0 else -1.0, time, bounce_time)
 
 
 @leaf
-def change_contacts(model, closed, view, episode, time, impacts, bounce_time):
+def change_contacts(model, closed, view, bouncing, time, impacts, bounce_time):
     """Open and close the joints whose margin is used up at ``time`` in the revolution; how many."""
     changes = 0
     for j in range(closed.shape[0]):
@@ -491,7 +491,7 @@ def change_contacts(model, closed, view, episode, time, impacts, bounce_time):
         changes += 1
         closed[j] = not closed[j]
         if closed[j]:
-            note_touch_of(model, j, view.direction, episode, time, impacts, bounce_time)
+            note_touch_of(model, j, view.direction, bouncing, time, impacts, bounce_time)
     return changes
 
 
@@ -534,7 +534,7 @@ def read_state(model, view, z):
 
 
 @leaf
-def turn(model, closed, series, views, whole, z, peak, episode, arrays, cycle, tolerance, budget):
+def turn(model, closed, series, views, whole, z, peak, bouncing, arrays, cycle, tolerance, budget):
     """Advance a revolution from the beginning of a series; its events, or a negative status.
 
     ``views`` are three of the readings; ``whole`` is one of all lanes, left at the end. z (2n,) is work space.
@@ -588,15 +588,15 @@ def turn(model, closed, series, views, whole, z, peak, episode, arrays, cycle, t
             for i in range(series.lanes.shape[1]):
                 series.lanes[0, i], series.lanes[1, i] = whole.lanes[0, i], whole.lanes[1, i]
             if found:
-                events += change_contacts(model, closed, before, episode, origin + time, impacts, bounce_time)
+                events += change_contacts(model, closed, before, bouncing, origin + time, impacts, bounce_time)
                 if events > budget:
                     return -status.EVENT_BUDGET
     return events
 
 
 @njit(cache=True, nogil=True)
-def advance(model, state, episode, arrays, event_tolerance, event_budget):
-    """Advance ``state`` (2n,) and ``episode`` in place by whole revolutions; see ``slider_crank.advance``."""
+def advance(model, state, bouncing, arrays, event_tolerance, event_budget):
+    """Advance ``state`` (2n,) and ``bouncing`` in place by whole revolutions; see ``slider_crank.advance``."""
     bins, _, lanes = model.acceleration.shape
     if model.steps * bins > STEP_BUDGET:
         return status.STEP_BUDGET, 0
@@ -611,7 +611,7 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
         begin(model, state, series)
         judge(model, series, closed, views[0])
         events = turn(
-            model, closed, series, views, whole, z, peak, episode, arrays, cycle, event_tolerance, event_budget
+            model, closed, series, views, whole, z, peak, bouncing, arrays, cycle, event_tolerance, event_budget
         )
         if events < 0:
             return -events, cycle
@@ -621,6 +621,5 @@ def advance(model, state, episode, arrays, event_tolerance, event_budget):
         for i in range(state.shape[0]):
             if not abs(state[i]) < RUNAWAY:
                 return status.DIVERGED, cycle
-        episode.touch[0] -= period
-        episode.touch[1] -= period
+        let_pass(bouncing, 1, period)
     return status.OK, arrays.section.shape[0]

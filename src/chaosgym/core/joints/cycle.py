@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from chaosgym.core import status
-from chaosgym.core.cycle import LOWER, UPPER
+from chaosgym.core.cycle import LOWER, UPPER, let_pass, note_touch
 from chaosgym.core.joints.events import (
     choose_level,
     first_change,
@@ -102,19 +102,6 @@ def add_contact_time(run, span, contact_time):
         side = known(run, j, SIDE)
         if side != 0.0:
             contact_time[2 * j + (UPPER if side > 0.0 else LOWER)] += span
-
-
-@leaf
-def note_touch(bouncing, joints, j, side, time, bounce_time):
-    """As ``cycle.note_touch`` for joint j: ``bouncing`` (3m,) are all sides, then first and last touch of each."""
-    first = joints + 2 * j
-    if bouncing[j] != side:
-        if bouncing[j] != 0.0:
-            column = 2 * j + (UPPER if bouncing[j] > 0.0 else LOWER)
-            bounce_time[column] = max(bounce_time[column], bouncing[first + 1] - bouncing[first])
-        bouncing[j] = side
-        bouncing[first] = time
-    bouncing[first + 1] = time
 
 
 @leaf
@@ -305,6 +292,5 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
             return outcome, cycle, code
         for i in range(state.shape[0]):
             state[i] = run.own[run.at[STATE] + i]
-        for i in range(run.at[JOINTS], bouncing.shape[0]):
-            bouncing[i] -= run.period
+        let_pass(bouncing, run.at[JOINTS], run.period)
     return status.OK, arrays.section.shape[0], 0

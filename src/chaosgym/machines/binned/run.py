@@ -12,7 +12,7 @@ from chaosgym.core.binned.fixed_step import advance_binned_fixed_step
 from chaosgym.core.binned.taylor import TaylorModel
 from chaosgym.core.binned.taylor import advance as advance_stepped
 from chaosgym.core.compilation import call, call_side_by_side
-from chaosgym.core.cycle import CycleArrays, Episode
+from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.machines.batch import CompiledBatch, Cycles, put, stacked
 from chaosgym.machines.binned.model import STEP_PHASE, ModelsBySpeed, fastest_rate, models_by_speed, stepped_model
@@ -36,7 +36,6 @@ def run(
     tangents: Tangents | None = None,
 ) -> tuple[int, int]:
     """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
-    episode = Episode(side=bouncing[:1], touch=bouncing[1:])
     settings: tuple[Any, ...]
     if isinstance(integrator, ExactEvents):
         model = machine.reduce(integrator.step_phase)
@@ -56,7 +55,7 @@ def run(
             part_settings = (*settings, Tangents(vectors, log_growth[done : done + at_once]))
         else:
             part_settings = settings
-        outcome, finished = call(kernel, model, coordinates, episode, part, *part_settings)
+        outcome, finished = call(kernel, model, coordinates, bouncing, part, *part_settings)
         done += finished
         if outcome != status.OK:
             return outcome, done

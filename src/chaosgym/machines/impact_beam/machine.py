@@ -64,11 +64,6 @@ class ImpactBeam(BeamParameters):
         return -0.5 * self.height * self.youngs_modulus * modal_curvatures(self, position)
 
     @property
-    def swings(self) -> bool:
-        """Always: the sensors are springs."""
-        return True
-
-    @property
     def structure(self) -> ModalImpactModel:
         """Model of the beam, whatever frequency, force and clearance; beams that differ in these alone share it."""
         return self.interpolated or _structure(

@@ -9,8 +9,10 @@ STANDARD_GRAVITY = 9.81
 
 _BALL_ALONE = {"slider_joint": "ideal", "gravity": STANDARD_GRAVITY}
 
+_JOINT = "--clearance-joint"
+
 OPTIONS: Mapping[str, Option] = {
-    "--clearance-joint": Choice(
+    _JOINT: Choice(
         {
             "slider": {"slider_joint": "clearance", "ball_joint": "ideal"},
             "ball-spherical": {"ball_joint": "spherical", **_BALL_ALONE},
@@ -24,16 +26,18 @@ OPTIONS: Mapping[str, Option] = {
     ),
     "--slider-model": Choice(
         {"plain": {"slider_joint": "clearance"}, "instrumented": {"slider_joint": "instrumented"}},
-        joints=("slider", "both"),
+        only={_JOINT: ("slider", "both")},
     ),
     "--ball-model": Choice(
         {"spherical": {"ball_joint": "spherical"}, "instrumented": {"ball_joint": "instrumented"}},
-        joints=("both",),
+        only={_JOINT: ("both",)},
     ),
     "--gravity": Choice({"on": {"gravity": STANDARD_GRAVITY}, "off": {"gravity": 0.0}}),
     "--speed-rpm": Number("crank_speed", "rpm"),
     "--clearance-mm": Number("slider_clearance", "mm", 1e-3),
-    "--ball-clearance-mm": Number("ball_clearance", "mm", 1e-3, ("ball-spherical", "ball-instrumented", "both")),
+    "--ball-clearance-mm": Number(
+        "ball_clearance", "mm", 1e-3, only={_JOINT: ("ball-spherical", "ball-instrumented", "both")}
+    ),
     "--motor-angle-deg": Number("motor_angle", "deg"),
     "--contact-damping-ratio": Number("contact_damping_ratio", "-"),
     "--friction": Number("friction_coefficient", "-"),
