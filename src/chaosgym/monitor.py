@@ -1,4 +1,4 @@
-"""A monitor of peak forces, one a cycle: an alarm as soon as they repeat no longer beyond the sensor's error.
+"""A monitor of peak forces, one a cycle: an alarm when they vary by more than the sensor's error.
 
 The rule is a cumulative sum (E. S. Page, Biometrika 41, 1954) for every lag k of 1 to 8 cycles, or more:
 
@@ -54,7 +54,7 @@ within which differences at two lags are the same."""
 DEAD = 32
 """Equal readings in succession that tell of a dead sensor, where readings differed before."""
 
-THE_ONE = np.zeros(1, np.int64)
+FIRST = np.zeros(1, np.int64)
 """Number of the one sensor of a monitor."""
 
 WINDOW, LEAST = 64, 3
@@ -193,7 +193,7 @@ class Monitor:
     def state(self) -> dict[str, Any]:
         """What is known so far, as plain values for JSON."""
         names = ("cycle", "alarm", "sensor_error", "stated", "missing", "dead")
-        return {**{name: getattr(self, name) for name in names}, "level": float(self._sums.level(THE_ONE)[0])}
+        return {**{name: getattr(self, name) for name in names}, "level": float(self._sums.level(FIRST)[0])}
 
     def update(self, peak: float) -> Watch:
         """Take the peak force [N] of one more cycle.
@@ -207,7 +207,7 @@ class Monitor:
             raise DiagnosisError(f"cycle {self.cycle + 1}: peak = {peak:g} N; allowed: finite forces of 0 N and more")
         died = self._note_equal(float(peak))
         self._learn(float(peak))
-        gaps = self._sums.add(THE_ONE, np.array([float(peak)]), self.sensor_error or math.inf)
+        gaps = self._sums.add(FIRST, np.array([float(peak)]), self.sensor_error or math.inf)
         # a gap to a peak that is not known yet is NaN, and larger than nothing
         changed = bool((gaps > NO_REPEAT).all()) and not self.alarm
         if changed:
@@ -215,7 +215,7 @@ class Monitor:
         self._since.append(peak)
         self.cycle += 1
         ready = self.cycle > 2 * self.longest_period and self.sensor_error is not None
-        level = float(self._sums.level(THE_ONE)[0])
+        level = float(self._sums.level(FIRST)[0])
         before, self.alarm = self.alarm, level > (CLEAR / LIMIT if self.alarm else 1.0)
         event: Event = "change" if changed and ready else "dead sensor" if died else ""
         if self.alarm != before:
@@ -225,9 +225,9 @@ class Monitor:
 
     def skip(self) -> Watch:
         """Count a cycle whose reading is missing or is no force; later readings keep their place in the period."""
-        self._sums.add(THE_ONE, np.array([math.nan]), self.sensor_error or math.inf)
+        self._sums.add(FIRST, np.array([math.nan]), self.sensor_error or math.inf)
         self.cycle, self.missing = self.cycle + 1, self.missing + 1
-        level = float(self._sums.level(THE_ONE)[0])
+        level = float(self._sums.level(FIRST)[0])
         return self._told(Watch(self.cycle, math.nan, self.alarm, level, None, "missing"))
 
     def _told(self, seen: Watch) -> Watch:

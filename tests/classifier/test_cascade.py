@@ -8,7 +8,7 @@ import pytest
 
 from chaosgym.classifier import classifier_for, default_classifier
 from chaosgym.classifier.answer import neighbours_of, type_probabilities
-from chaosgym.classifier.cascade import BACK, LONGEST_PERIOD, SEEN
+from chaosgym.classifier.cascade import LONGEST_PERIOD, REPEATS, RETURNED
 from chaosgym.diagnosis import diagnose
 from chaosgym.diagnosis.diagnose import returning_period
 from chaosgym.diagnosis.type_rule import type_of_cross
@@ -147,7 +147,7 @@ def test_an_unknown_machine_is_answered_by_proof_alone(beam):
 def test_the_returning_period_is_the_smallest(rate, period):
     """States of a period-k orbit come back after k cycles first."""
     series = settled(rate, 33)
-    assert returning_period(np.column_stack([series[:-1], series[1:]]), LONGEST_PERIOD, SEEN, BACK) == period
+    assert returning_period(np.column_stack([series[:-1], series[1:]]), LONGEST_PERIOD, REPEATS, RETURNED) == period
 
 
 def test_a_machine_of_ones_own_is_judged_by_proofs_and_by_its_forces():

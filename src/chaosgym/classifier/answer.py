@@ -1,4 +1,4 @@
-"""What the classifier says: of a machine, its type and nature; of a record, whether it is irregular, and its nature.
+"""Answers of the classifier: type and nature of a machine; irregularity and nature of a record.
 
 The type follows from the natures of a cross by the printed rule (``diagnosis.type_rule``). Where a nature is only
 probable, the type's probabilities are those of the rule over every combination of natures.

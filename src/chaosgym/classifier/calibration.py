@@ -1,4 +1,4 @@
-"""Probabilities that mean what they say: one temperature, sets of plausible classes, and the error that remains.
+"""Calibration: temperature scaling, conformal sets of plausible classes, and the calibration error that remains.
 
 Temperature scaling: C. Guo et al., On calibration of modern neural networks, ICML 2017. Class-conditional split
 conformal sets: M. Sadinle et al., J. Am. Stat. Assoc. 114 (2019).

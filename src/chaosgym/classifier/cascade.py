@@ -1,4 +1,4 @@
-"""The nature of one machine for as little time as it takes: a learned guess, a few cycles, a proof.
+"""The nature of one machine in stages of rising cost: a learned guess, a few cycles, a proof.
 
     parameters      boosted trees on dimensionless groups of the parameters
     8, 16, 32, 64   as many cycles from rest, and boosted trees on the parameters and the figures of these cycles
@@ -35,19 +35,19 @@ Array = NDArray[np.float64]
 STAGES = (8, 16, 32, 64)
 """Cycles from rest after which the cascade judges."""
 
-SURE = 0.99
+CONFIDENT = 0.99
 """Probability that is an answer before the last stage."""
 
 CLEAR, CLEAR_ELSEWHERE = 0.6, 0.8
 """Probability that is an answer at all, and on a machine that was not trained on."""
 
-HOPE = 0.3
+PROOF_WORTH_TRYING = 0.3
 """Probability of a periodic response from which on a proof is tried."""
 
-LONGEST_PERIOD, SEEN = 16, 2
+LONGEST_PERIOD, REPEATS = 16, 2
 """Longest period that a proof is tried for, and last cycles that must come back after it."""
 
-BACK = 1e-6
+RETURNED = 1e-6
 """Distance, relative to the size of the motion, at which a state has come back."""
 
 LEVEL, FINEST = 50.0, 0.02
@@ -127,7 +127,7 @@ def judge_nature(
     try:
         for cycles in sorted({*STAGES, *stages} - {0}):
             sure = _is_sure(now)
-            if sure and now.cycles >= least_cycles and not (prove and now.cycles == 0 and _hopeful(now)):
+            if sure and now.cycles >= least_cycles and not (prove and now.cycles == 0 and _may_be_periodic(now)):
                 break
             if not _affordable(machine, began, budget_us, cycles - now.cycles, 0):
                 break
@@ -135,7 +135,7 @@ def judge_nature(
             model = stages.get(cycles)
             if model is not None and (values is not None or model.inputs == "records"):
                 _judge(now, model, values, record, f"{cycles} cycles")
-            if prove and _hopeful(now):
+            if prove and _may_be_periodic(now):
                 now.orbit = _proof(machine, record, began, budget_us)
                 if now.orbit is not None:
                     break
@@ -147,7 +147,7 @@ def judge_nature(
 def _judge(
     now: _Progress, model: ResponseClassifier, values: Array | None, record: CycleRecord | None, stage: str
 ) -> None:
-    """Let one stage speak."""
+    """Replace the probabilities by those of one stage."""
     if record is not None and model.inputs == "records":
         now.clear = CLEAR_ELSEWHERE
         features = response_features(None, None, _as_measured(record), None, np.array([FINEST]))
@@ -171,11 +171,11 @@ def _as_measured(record: CycleRecord) -> Array:
 
 
 def _is_sure(now: _Progress) -> bool:
-    return max(now.probabilities.values(), default=0.0) >= SURE
+    return max(now.probabilities.values(), default=0.0) >= CONFIDENT
 
 
-def _hopeful(now: _Progress) -> bool:
-    return now.probabilities.get("periodic", 1.0) >= HOPE
+def _may_be_periodic(now: _Progress) -> bool:
+    return now.probabilities.get("periodic", 1.0) >= PROOF_WORTH_TRYING
 
 
 def _affordable(machine: Machine, began: float, budget_us: float | None, cycles: int, proofs: int) -> bool:
@@ -199,7 +199,7 @@ def _go_on(now: _Progress, machine: Machine, cycles: int) -> CycleRecord:
 
 def _proof(machine: Machine, record: CycleRecord, began: float, budget_us: float | None) -> PeriodicOrbit | None:
     """The periodic orbit that the run nears, if the budget holds Newton's method and it proves one."""
-    period = returning_period(record.section, LONGEST_PERIOD, SEEN, BACK)
+    period = returning_period(record.section, LONGEST_PERIOD, REPEATS, RETURNED)
     if not _affordable(machine, began, budget_us, 0, period):
         return None
     return proven_orbit(machine, record, period)[0]

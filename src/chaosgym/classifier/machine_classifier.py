@@ -1,4 +1,4 @@
-"""What chaosgym knows of a machine's responses: its trained classifiers behind one interface.
+"""The trained classifiers of a machine behind one interface.
 
     classifier = default_classifier("impact-beam")         the one that is shipped for a machine
     classifier = classifier_for(machine)                   the same, or a general one for machines that have none

@@ -1,4 +1,4 @@
-"""What trained classifiers say of records: irregular or not, nature, period and what contradicts it, as columns."""
+"""Answers of trained classifiers on records, as columns: irregular or not, nature, period, contradictions."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The commands ``classify`` and ``train-classifier``: what the classifier says, and how it is trained."""
+"""The commands ``classify`` and ``train-classifier``."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""The commands ``demo`` and ``explore``: what chaosgym does, in a few minutes or in the browser."""
+"""The commands ``demo``, a tour of a few minutes, and ``explore``, sliders in the browser."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""May a designer rely on the machine? ``design``."""
+"""The command ``design``: a machine within its tolerances, or a recording, judged by criteria."""
 
 import datetime
 from typing import TYPE_CHECKING, Any

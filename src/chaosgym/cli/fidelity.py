@@ -1,4 +1,4 @@
-"""The commands ``tradeoff`` and ``stability``: what accuracy costs, and where a model stops answering."""
+"""The commands ``tradeoff``, the cost of accuracy, and ``stability``, models at extreme parameters."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Ctrl-C that is heard at once, also while a kernel computes or threads are waited for."""
+"""Ctrl-C that ends a command at once, also while a kernel computes or threads are waited for."""
 
 import os
 import signal

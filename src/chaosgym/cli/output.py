@@ -1,4 +1,4 @@
-"""The answer of a command: a table for people or one JSON object, a picture, and a sign of life meanwhile."""
+"""Output of a command: a table for people or one JSON object, a picture, and progress meanwhile."""
 
 import json
 import os

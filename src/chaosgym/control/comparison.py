@@ -1,4 +1,4 @@
-"""Who is better, and how sure is that? Everybody plays the same machines, demands and disturbances.
+"""Comparison of controllers and policies, with intervals, on the same machines, demands and disturbances.
 
     score = (mean return - that of following the demand) / (that of the own map - that of following the demand)
 

@@ -1,4 +1,4 @@
-"""How good is a policy? One line: ``chaosgym.evaluate(policy, "chaosgym/ImpactBeamTolerance-v1")``."""
+"""Evaluation of a policy in one line: ``chaosgym.evaluate(policy, "chaosgym/ImpactBeamTolerance-v1")``."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

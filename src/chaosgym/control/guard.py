@@ -1,4 +1,4 @@
-"""A guard for any policy: the demand is felt first, and who has been wrong in this job is not asked again.
+"""A guard for any policy: it runs at the demand first, and replaces a policy that was wrong in this job.
 
 Under each demand the guard goes to the demand. Where that is calm it stays. Where the peaks miss themselves for
 ``patience`` steps it lets the policy set the speed, within the band of trims that the task allows. If what the policy

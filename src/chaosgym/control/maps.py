@@ -1,4 +1,4 @@
-"""What does every speed do to a machine? The share of irregular cycles as the running motion has it, speed by speed.
+"""Maps of a machine over speed: share of irregular cycles and mean peak of the running motion.
 
 The machine sweeps upwards through the speeds of its task, disturbed as in a job, and is judged as in a job once it has
 settled. Such maps are for planners, of models or of the machine itself, and for references; no agent is given one.

@@ -25,7 +25,7 @@ FEWEST = 5
 BEFORE_THE_FIRST = -1
 """Steps done before the machine was felt at the speed of the start."""
 
-_THE_ONE = np.zeros(1, np.int64)
+_FIRST = np.zeros(1, np.int64)
 
 
 class Operator:
@@ -136,7 +136,7 @@ class Operator:
         self._ask(self.demand if demand is None else demand)
         observation = self._observed(felt, impacts or 0.0, bouncing or 0.0)
         actions = checked_actions(self.task, self.policy(observation), 1)
-        call(drive, self.task.numbers, actions, MOVES, DEAD_BAND, _THE_ONE, self._envs.jobs.demand, self._job)
+        call(drive, self.task.numbers, actions, MOVES, DEAD_BAND, _FIRST, self._envs.jobs.demand, self._job)
         return self.speed
 
     def _count_a_step(self) -> None:
@@ -165,7 +165,7 @@ class Operator:
         period = np.array([float(self._envs.nominal.period_at(self.speed))])
         duration = np.full((1, cycles, 1), 0.5 * bouncing * period[0])
         values = np.empty((1, *space.shape), np.float32)
-        given = (self.task.numbers, _THE_ONE, self._envs.jobs.demand, self._job, peaks[None], duration, period)
+        given = (self.task.numbers, _FIRST, self._envs.jobs.demand, self._job, peaks[None], duration, period)
         drawn = (np.full((1, cycles + 1), 0.5), np.array([impacts * cycles]))
         call(observe, *given, *drawn, space.low, space.high, np.empty((1, cycles)), values)
         return values

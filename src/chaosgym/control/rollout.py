@@ -1,4 +1,4 @@
-"""What happens when a policy runs jobs: many machines side by side, one job each, step by step as arrays.
+"""Rollout of a policy: many machines side by side, one job each, step by step as arrays.
 
     played = play(policy, "chaosgym/ImpactBeamTolerance-v1", machines=range(64))
 

@@ -1,4 +1,4 @@
-"""How sure is a score? Bootstrap intervals and the performance profile.
+"""Bootstrap intervals of scores, and the performance profile.
 
 References
 ----------

@@ -1,4 +1,4 @@
-"""What the kernels know of a machine of a few modes whose tip rattles between two stops."""
+"""The model of a machine of a few modes whose tip rattles between two stops, as the kernels take it."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-r"""The design methodology of thesis 5.6: does a machine meet its criteria, whatever its tolerances do?
+r"""The design methodology of thesis 5.6: whether a machine meets its criteria anywhere within its tolerances.
 
     I    modelling           the machine: its parameters, with their provenance
     II   variation region    one or two tolerances of each parameter, wear included           ``variation_region``

@@ -1,4 +1,4 @@
-r"""Determinism of an irregular record: is there a map that makes the irregularity without any noise?
+r"""Determinism of an irregular record: whether a map without noise reproduces the irregularity.
 
 A random process and deterministic chaos both never repeat. Chaos differs in four ways, and all are asked for:
 

@@ -1,4 +1,4 @@
-r"""Lyapunov exponents, per cycle and per second: do neighbouring motions part or meet?
+r"""Lyapunov exponents, per cycle and per second: the rate at which neighbouring motions part or meet.
 
     value = lim  1/N  log |w(N)| / |w(0)|         w: a small deviation of the state, N cycles
 

@@ -1,4 +1,4 @@
-r"""Recurrence on the stroboscopic section, one sample of the motion a cycle: does a response repeat?
+r"""Recurrence on the stroboscopic section, one sample of the motion a cycle.
 
 A response has period k if the samples x(n), x(n + k), x(n + 2k), ... coincide. The residual of k is the largest half
 range of these k classes; half ranges rather than differences of neighbours, because a torus comes back almost, and its

@@ -1,14 +1,13 @@
-"""How does an agent set a machine's speed? It trims the speed that is demanded; a drive follows at a limited rate.
+"""Actions: an agent trims the demanded speed, and the drive follows at a limited rate.
 
-Three kinds of action say the same in different words:
+Three encodings of an action set the same trim:
 
     trim         a number from 0 to 5: hold; 1 down, 1 up, 2 down, 2 up, in units of ``trim_step``; back to the demand
     continuous   two numbers from -1 to 1: a change of the trim with a dead band, in units of 2 ``trim_step``; back to
                  the demand if the second one is above 0.5
     speed        the speed itself, for controllers
 
-Motion settles at a speed that is held. Actions that change the speed at every step keep it from settling, so each kind
-can hold a speed exactly.
+Each encoding can hold a speed exactly, because motion settles only at a speed that is held.
 """
 
 from typing import Any

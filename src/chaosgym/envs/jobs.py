@@ -1,4 +1,4 @@
-"""How do jobs go on? The bookkeeping of machines at work, whether one runs or a thousand side by side."""
+"""Jobs of one machine or a thousand side by side: start, step, reward and observation."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple

@@ -1,8 +1,8 @@
-"""When is a cycle irregular? The motion is judged as it runs, so that what costs is what happens.
+"""Irregular cycles, judged on the running motion by its exponent or its recurrence.
 
 A machine whose kernel carries small deviations along is judged by their growth: the mean over some ten cycles of the
-logarithm of the growth in a cycle, an exponent of the running motion. A cycle with a positive one is irregular. What
-transient motion damps is not charged, and chaos that dies out is charged while it lasts.
+logarithm of the growth in a cycle, an exponent of the running motion. A cycle with a positive one is irregular.
+Decaying transients do not count; transient chaos counts until it has decayed.
 
 Other machines are judged by recurrence with an amplitude: a step is irregular if, over its last cycles, peak forces
 miss those of the cycles before, at every period up to eight, by more than 2 % of their mean. The first eight cycles

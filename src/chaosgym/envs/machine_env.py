@@ -1,4 +1,4 @@
-"""How does an agent run a machine through a job? The one environment, for every machine and task.
+"""The Gymnasium environment, one class for every machine and task.
 
 A step is a whole number of operating cycles, so the phase of the force is zero wherever the speed changes and the
 motion goes on from the state in which the last step ended.
@@ -30,8 +30,8 @@ from chaosgym.simulation import CycleRecord
 if TYPE_CHECKING:
     from chaosgym.envs.rendering import Dashboard
 
-THE_ONE = np.zeros(1, np.int64)
-"""Number of the one job."""
+FIRST = np.zeros(1, np.int64)
+"""Index array of the only job."""
 
 METADATA: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}
 
@@ -211,7 +211,7 @@ class MachineEnv(gym.Env[Observation, Any]):
         super().reset(seed=seed)
         start = start_of(self.workplace.rules, options or {}, 1)
         self._runs = False
-        observation, info = self._job.start(THE_ONE, [self.np_random], start.machine, start.speed)
+        observation, info = self._job.start(FIRST, [self.np_random], start.machine, start.speed)
         self._runs = True
         if self.render_mode is not None:
             self._show().start()
@@ -232,7 +232,7 @@ class MachineEnv(gym.Env[Observation, Any]):
         if not self._runs:
             raise gym.error.ResetNeeded("no job is running; call reset() first")
         actions = checked_actions(self.task, [action], 1)
-        outcome = self._job.step(THE_ONE, actions, [self.np_random])
+        outcome = self._job.step(FIRST, actions, [self.np_random])
         info = dict(zip(INFO, outcome.report.item(), strict=True))
         self._runs = info["status"] == Status.RUNNING
         if self.render_mode is not None:

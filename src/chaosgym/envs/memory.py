@@ -1,4 +1,4 @@
-"""A memory for agents that have none: what was felt at which speed in this job, and how far from the usual that was.
+"""A wrapper that adds a memory: what was felt at which speed in this job, and how far that lies from the usual.
 
 env = VisitedSpeeds(gym.make("chaosgym/ImpactBeamTolerance-v1"))
 

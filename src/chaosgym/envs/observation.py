@@ -1,4 +1,4 @@
-"""What does the agent see? The speed, what is asked for, and what a force sensor reports of a step, with its errors."""
+"""Observations: speed, demand, and what a force sensor reports of a step, with its errors."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-r"""What is a job, what speed does it ask for, and what does it cost? Every number of a task, in one place.
+r"""The task: length of a job, demanded speeds, sensors, disturbances and costs, every number in one place.
 
 A step of a job costs
 

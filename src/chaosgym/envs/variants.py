@@ -1,4 +1,4 @@
-"""Which machine is at work? One drawn within tolerances, without limit, or one of those that are kept for evaluation.
+"""Machines of the jobs: drawn within tolerances, without limit, or kept for evaluation.
 
 A draw is a point of a cube: for each field that varies a share from -1 to 1 of its half width. A split is a part of
 that cube, or what lies around it, so that no two splits share a machine:

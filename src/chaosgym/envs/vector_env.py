@@ -1,4 +1,4 @@
-"""Many agents' machines at once: all jobs step in one compiled call, on all processors.
+"""The native vector environment: all jobs step in one compiled call, on all processors.
 
 envs = gym.make_vec("chaosgym/ImpactBeam-v1", num_envs=256)
 

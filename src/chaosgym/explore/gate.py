@@ -1,4 +1,4 @@
-"""The gate of the page's server: whom it answers, and what it does not print."""
+"""Requests that the page's server accepts, and what it does not print."""
 
 import logging
 from typing import Any

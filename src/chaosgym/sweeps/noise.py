@@ -1,4 +1,4 @@
-"""How often does a label change although it should not? Variants of a point that ought to leave its label alone.
+"""Label noise: how often a label changes under variations of a point that ought to leave it alone.
 
 Points are drawn from a sweep and diagnosed again: from two other initial states (the mirror image of the state that
 rest leads to, and half that state), with twice the cycles, and with 0.1 % in every parameter, at once with random signs

@@ -1,4 +1,4 @@
-"""How are a machine's parameters turned into features, row by row?"""
+"""Kernels that turn a machine's parameters into features, row by row."""
 
 import math
 

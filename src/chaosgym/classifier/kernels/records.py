@@ -1,4 +1,4 @@
-"""Which figures has one record? The loops behind ``classifier.features``."""
+"""Kernels that compute the features of one record, for ``classifier.features``."""
 
 import numpy as np
 from numba import njit

@@ -1,4 +1,4 @@
-"""Controllers that know measurements alone: they feel whether the peaks repeat, and try other speeds.
+"""Controllers that use measurements alone: where the peaks do not repeat, they try other speeds.
 
 Thresholds and rates are in units of the sensor's error. They were chosen on machines that no comparison uses.
 """

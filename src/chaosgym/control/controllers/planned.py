@@ -246,7 +246,7 @@ class Belief(Controller):
         self.fleet, self.spread, self.temper = fleet, spread, temper
 
     def begin(self, envs: Any) -> None:
-        """Believe in all simulated machines alike."""
+        """Start from a uniform prior over the simulated machines."""
         shape = (self.count, len(self.fleet.speeds))
         self._fit = np.zeros((self.count, len(self.fleet.share)))
         self._wild, self._visits = np.zeros(shape), np.zeros(shape)

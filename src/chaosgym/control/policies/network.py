@@ -1,4 +1,4 @@
-"""What does a trained network answer? Dense layers and an LSTM, computed by numpy alone."""
+"""Forward pass of a trained network, dense layers or an LSTM, by numpy alone."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""What is proven of a look of eight intervals by the readings at their ends, and recorded of it.
+"""Bounds over eight intervals ahead from the readings at their ends, and what is recorded of them.
 
 Between two ends a reading lies within 4/27 of the interval times the slopes that lead beyond them, and within
 ``VALUE_DOUBT`` times its fourth power and the bound of the fourth derivative (``events``).

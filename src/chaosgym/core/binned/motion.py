@@ -1,4 +1,4 @@
-"""Where the motion of a mechanism is, what its channels read, and how tables and series take it on."""
+"""State of a mechanism's motion, readings of its channels, and steps by tables and by series."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""What is proven of several joints over intervals ahead, what is recorded of them, and what ends an interval.
+"""Events of several joints: bounds over the intervals ahead, what is recorded of them, and what ends an interval.
 
 A joint's reading and the proofs are those of ``events``, with the gap and the lag of the surface in question. Readings
 are taken at the ends of intervals (``joints.run.look``), and within the shortest one on its Taylor series.

@@ -1,4 +1,4 @@
-"""What a step of k jobs comes to: speed, growth, recurrence, cost and observation, without small arrays.
+"""Kernels of a step of k jobs: speed, growth, recurrence, cost and observation, without small arrays.
 
 ``tasks`` is ``Task.numbers``, one record; ``jobs`` (N,) are records ``JOB``, ``demands`` (N, steps + 1) the speeds they
 are asked for, and ``which`` (k,) the jobs of the step.
