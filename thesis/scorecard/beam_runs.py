@@ -12,7 +12,7 @@ from chaosgym.diagnosis.stroboscopic import find_recurrence, scales
 from chaosgym.machines import ImpactBeam, Machine
 from chaosgym.machines.impact_beam.modes import modal_analysis
 from chaosgym.simulation import CycleRecord, simulate
-from thesis.scorecard.observation import DOT, READING_ERROR, plotted_peaks
+from thesis.scorecard.observation import DOT, READING_ERROR, initial_state, plotted_peaks
 
 Array = NDArray[np.float64]
 
@@ -20,8 +20,10 @@ MOTION_CYCLES, MOTION_SAMPLES = 50, 4000
 """Cycles of a long history, and samples in each."""
 
 
-def long_run(machine: Machine, cycles: int) -> dict[str, Any]:
-    """How long is a run from rest irregular, and with which period does it end?
+def long_run(machine: Machine, cycles: int, start: int = 0) -> dict[str, Any]:
+    """How long is a run irregular, from rest or another ``start``, and with which period does it end?
+
+    ``start`` is as in ``Effort``.
 
     Returns
     -------
@@ -29,7 +31,7 @@ def long_run(machine: Machine, cycles: int) -> dict[str, Any]:
         ``irregular_cycles``: cycles before the plotted peaks repeat within the reading error, all if they never do;
         ``period`` that they repeat with, None if they don't; ``nature`` of the whole run by the Two-Step Test.
     """
-    peaks = plotted_peaks(simulate(machine, cycles))[:, None]
+    peaks = plotted_peaks(simulate(machine, cycles, initial_state(machine, start)))[:, None]
     nature = two_step_test(peaks, sensor_error=READING_ERROR).nature
     tail = peaks[-100:]
     scale = scales(tail)

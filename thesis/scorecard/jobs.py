@@ -29,7 +29,8 @@ def observation(machine: Machine, *effort: int) -> dict[str, Any]:
 
 def as_observation(result: Mapping[str, Any]) -> Observation:
     """Result of an ``observation`` job."""
-    return Observation(**result)
+    other = result.get("other")
+    return Observation(**{**result, "other": other and as_observation(other)})
 
 
 def run_jobs(

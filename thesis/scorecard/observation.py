@@ -75,6 +75,8 @@ class Observation:
         Median duration of bouncing, as a share of half the cycle.
     settle_cycle
         Cycle from which on the run from rest repeats within the reading error; None if it does not.
+    other
+        The same of the other side of the bearing, where the machine is its own mirror image; None elsewhere.
     """
 
     nature: str
@@ -86,6 +88,12 @@ class Observation:
     high: float = 0.0
     bounce_share: float = 0.0
     settle_cycle: int | None = None
+    other: "Observation | None" = None
+
+    @property
+    def sides(self) -> "tuple[Observation, ...]":
+        """What each side shows that the thesis may have plotted: of two mirror images a last digit decides which."""
+        return (self,) if self.other is None else (self, self.other)
 
     @property
     def is_periodic(self) -> bool:
@@ -112,6 +120,17 @@ def plotted_peaks(record: CycleRecord) -> Array:
     return np.asarray(forces[:, 0] if isinstance(record.machine, ImpactBeam) else forces.max(axis=1))
 
 
+def _plotted_sides(record: CycleRecord) -> Array:
+    """Peaks (cycles, 1 or 2) that the thesis may have plotted: both sides where a machine is its own mirror image."""
+    own = plotted_peaks(record)[:, None]
+    return record.peak_force if isinstance(record.machine, ImpactBeam) and record.machine.mirrors else own
+
+
+def _seen(sides: list[Observation]) -> Observation:
+    """One or two sides in one."""
+    return replace(sides[0], other=sides[1]) if len(sides) > 1 else sides[0]
+
+
 def read_dots(peaks: Array) -> Diagnosis:
     """Judge plotted peaks (cycles,) [N] as a reader does: one dot or a few are periodic, a distribution is chaos.
 
@@ -126,14 +145,22 @@ def observe(machine: Machine, effort: Effort) -> Observation:
     if effort.hasty:
         return _glance(machine, effort)
     try:
-        record = simulate(machine, effort.transient + effort.cycles, _initial(machine, effort.start))
+        record = simulate(machine, effort.transient + effort.cycles, initial_state(machine, effort.start))
         certificate = diagnose(machine, budget=effort.budget).nature if effort.budget else ""
     except SimulationError:
         return Observation("failed")
-    settled, plotted = record.after(effort.transient), plotted_peaks(record)
-    peaks = plotted[effort.transient :]
-    read = read_dots(peaks)
+    settled = record.after(effort.transient)
     shares = settled.bounce_duration[settled.bounce_duration > 0.0] / (0.5 * machine.cycle_period)
+    bounce_share = float(np.median(shares)) if len(shares) else 0.0
+    return _seen(
+        [_watched(plotted, effort.transient, certificate, bounce_share) for plotted in _plotted_sides(record).T]
+    )
+
+
+def _watched(plotted: Array, transient: int, certificate: str, bounce_share: float) -> Observation:
+    """What the plotted peaks (cycles,) of one side show after a transient."""
+    peaks = plotted[transient:]
+    read = read_dots(peaks)
     return Observation(
         nature=read.nature,
         period=read.period,
@@ -142,12 +169,12 @@ def observe(machine: Machine, effort: Effort) -> Observation:
         low=float(peaks.min()),
         mean=float(peaks.mean()),
         high=float(peaks.max()),
-        bounce_share=float(np.median(shares)) if len(shares) else 0.0,
+        bounce_share=bounce_share,
         settle_cycle=two_step_test(plotted, sensor_error=READING_ERROR).settle_cycle if read.period else None,
     )
 
 
-def _initial(machine: Machine, cycles: int) -> MotionState | None:
+def initial_state(machine: Machine, cycles: int) -> MotionState | None:
     """State after some cycles at a speed 5 % higher; None, which is rest, after none."""
     if not cycles:
         return None
@@ -156,19 +183,27 @@ def _initial(machine: Machine, cycles: int) -> MotionState | None:
 
 def _glance(machine: Machine, effort: Effort) -> Observation:
     """What a hasty run shows: no longer than needed where the response settles soon; nature and forces alone."""
-    peaks, least = np.empty(0), np.inf
+    blocks, least, cycles = list[Array](), np.inf, 0
     try:
-        state = _initial(machine, effort.start)
-        while least > CLOSE and len(peaks) < effort.transient + effort.cycles:
+        state = initial_state(machine, effort.start)
+        while least > CLOSE and cycles < effort.transient + effort.cycles:
             record = simulate(machine, BLOCK, state)
-            state, peaks = record.final_state, np.concatenate([peaks, plotted_peaks(record)])
-            least = irregularity(peaks[-REPEATING:], 3)
+            state, cycles = record.final_state, cycles + BLOCK
+            blocks.append(_plotted_sides(record))
+            least = max(irregularity(peaks, 3) for peaks in blocks[-1][-REPEATING:].T)
     except SimulationError:
         return Observation("failed")
-    whole, peaks = peaks, peaks[-REPEATING:] if least <= CLOSE else peaks[-effort.cycles :]
+    shares = record.bounce_duration[record.bounce_duration > 0.0] / (0.5 * machine.cycle_period)
+    bounce_share = float(np.median(shares)) if len(shares) else 0.0
+    last = REPEATING if least <= CLOSE else effort.cycles
+    return _seen([_glimpsed(whole, last, bounce_share) for whole in np.concatenate(blocks).T])
+
+
+def _glimpsed(whole: Array, last: int, bounce_share: float) -> Observation:
+    """What the peaks (cycles,) of one side show by the last of them."""
+    peaks = whole[-last:]
     residuals = class_residuals(peaks[:, None], min(FEW, len(peaks) // MIN_REPEATS))
     period, spread = 1 + int(np.argmax(residuals <= max(CLOSE, residuals.min()))), float(residuals.min())
-    shares = record.bounce_duration[record.bounce_duration > 0.0] / (0.5 * machine.cycle_period)
     return Observation(
         nature="periodic" if spread <= READING_ERROR else "chaotic",
         period=period if spread <= READING_ERROR else None,
@@ -176,7 +211,7 @@ def _glance(machine: Machine, effort: Effort) -> Observation:
         low=float(peaks.min()),
         mean=float(peaks.mean()),
         high=float(peaks.max()),
-        bounce_share=float(np.median(shares)) if len(shares) else 0.0,
+        bounce_share=bounce_share,
         settle_cycle=_repeats_from(whole, period) if spread <= READING_ERROR else None,
     )
 

@@ -15,7 +15,9 @@ Each statement of the thesis about a simulation is computed
 from the machine's one set of constants; nothing is tuned for a single statement. *hit*: within the tolerance; *near*:
 within twice of it; *miss*: beyond, or a wrong nature. Of several conditions the worst decides. What the text itself
 contradicts is shown and not counted. Natures and forces are read off what the thesis plots, one dot a cycle: the beam's
-impact force on one side of the bearing, and of the crank's joints the resultant, the larger of both sides.
+impact force on one side of the bearing, and of the crank's joints the resultant, the larger of both sides. A beam of
+equal sides has a mirror image of each motion; a last digit decides which is seen. So what is printed of a single
+response is compared with the nearer side.
 
 A calibration is shown every statement, so the bare number of hits says little about the next one. Beside it stands the
 share of neighbours that hit it: the machine with every constant that is not in print up to 1 % off, at speeds up to

@@ -5,7 +5,7 @@ diagnosis says of a single response stands in the note beside it.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +16,7 @@ from chaosgym.machines.parameters import with_settings
 from thesis.scorecard.findings import Finding, Quantity, Results
 from thesis.scorecard.jobs import Job, as_observation, observation
 from thesis.scorecard.observation import READING_ERROR, Effort, Observation
+from thesis.scorecard.verdicts import error_of
 from thesis.statements import Comparison
 from thesis.statements.comparisons import Axis
 
@@ -26,29 +27,37 @@ def _at_point(machine: Machine, comparison: Comparison, effort: Effort) -> list[
     return [Job(observation, machine, effort)]
 
 
-def _nature(machine: Machine, comparison: Comparison, results: Results) -> Finding:
-    seen = as_observation(results[0])
+Reading = Callable[[Observation, Comparison], Finding]
+
+
+def _of_either_side(reading: Reading) -> Callable[[Machine, Comparison, Results], Finding]:
+    """Of two sides that mirror each other, what is nearer to print: the thesis does not say which it plots."""
+
+    def finding(machine: Machine, comparison: Comparison, results: Results) -> Finding:
+        found = [reading(one, comparison) for one in as_observation(results[0]).sides]
+        return min(found, key=lambda one: (error_of(comparison, one), one.deviation))
+
+    return finding
+
+
+def _nature(seen: Observation, comparison: Comparison) -> Finding:
     printed = str(comparison.printed)
     return Finding(seen.nature, seen.nature == printed, _shown(seen), _nature_deviation(seen, printed))
 
 
-def _periodic_force(machine: Machine, comparison: Comparison, results: Results) -> Finding:
-    seen = as_observation(results[0])
+def _periodic_force(seen: Observation, comparison: Comparison) -> Finding:
     return Finding(seen.mean, seen.is_periodic, _shown(seen), _nature_deviation(seen, "periodic"))
 
 
-def _chaotic_range(machine: Machine, comparison: Comparison, results: Results) -> Finding:
-    seen = as_observation(results[0])
+def _chaotic_range(seen: Observation, comparison: Comparison) -> Finding:
     return Finding((seen.low, seen.high), seen.is_chaotic, _shown(seen), _nature_deviation(seen, "chaotic"))
 
 
-def _chaotic_maximum(machine: Machine, comparison: Comparison, results: Results) -> Finding:
-    seen = as_observation(results[0])
+def _chaotic_maximum(seen: Observation, comparison: Comparison) -> Finding:
     return Finding(seen.high, seen.is_chaotic, _shown(seen), _nature_deviation(seen, "chaotic"))
 
 
-def _bounce_share(machine: Machine, comparison: Comparison, results: Results) -> Finding:
-    seen = as_observation(results[0])
+def _bounce_share(seen: Observation, comparison: Comparison) -> Finding:
     return Finding(seen.bounce_share, seen.is_periodic, _shown(seen))
 
 
@@ -300,11 +309,11 @@ def _boundary(comparison: Comparison, axis: Axis, rows: Sequence[Sequence[Observ
 
 
 RESPONSE_QUANTITIES = {
-    "nature": Quantity(_at_point, _nature),
-    "periodic_force": Quantity(_at_point, _periodic_force),
-    "chaotic_range": Quantity(_at_point, _chaotic_range),
-    "chaotic_maximum": Quantity(_at_point, _chaotic_maximum),
-    "bounce_share": Quantity(_at_point, _bounce_share),
+    "nature": Quantity(_at_point, _of_either_side(_nature)),
+    "periodic_force": Quantity(_at_point, _of_either_side(_periodic_force)),
+    "chaotic_range": Quantity(_at_point, _of_either_side(_chaotic_range)),
+    "chaotic_maximum": Quantity(_at_point, _of_either_side(_chaotic_maximum)),
+    "bounce_share": Quantity(_at_point, _of_either_side(_bounce_share)),
     "smooth_end": Quantity(_over_axes, _smooth_end),
     "chaos_begin": Quantity(_over_axes, _chaos_begin),
     "periodic_end": Quantity(_over_axes, _periodic_end),
