@@ -141,7 +141,7 @@ TOY = SearchSpace(
     ),
     lambda base, values: replace(base, **values),
 )
-STAGES = Stages((COMPARED["IBS-013"],), (COMPARED["IBS-020"],), ())
+STAGES = Stages((), (COMPARED["IBS-013"],), (COMPARED["IBS-020"],), ())
 
 
 def bowl(machine, stages, unprinted, *, workers=None):
@@ -156,10 +156,10 @@ def toy(monkeypatch):
     """The search with a known answer instead of simulations."""
     monkeypatch.setattr(calibration, "staged_costs", bowl)
 
-    def search(folder, candidates, seed=0):
-        found = calibration.open_journal(folder, {"seed": seed, "statements": list(STAGES.ids)})
+    def search(folder, candidates, seed=0, draws=0):
+        found = calibration.open_journal(folder, {"seed": seed, "statements": list(STAGES.ids), "draws": draws})
         journal = folder / calibration.JOURNAL_FILE
-        calibration.search(found, TOY, STAGES, Budget(candidates=candidates), seed, journal, 1, False)
+        calibration.search(found, TOY, STAGES, Budget(candidates=candidates), seed, journal, 1, False, draws=draws)
         return found
 
     return search
@@ -174,6 +174,30 @@ def test_search_finds_the_least_objective(toy, tmp_path):
     assert sum(one.basin == 1 for one in found) < 0.25 * len(found)
     assert sum(len(one.costs) == 1 for one in found) > 0.2 * len(found)
     assert len(calibration.complete_costs(tmp_path / "run")) == sum(len(one.costs) == 2 for one in found)
+
+
+def test_a_search_is_a_funnel(toy, tmp_path):
+    """Of 100 draws over the ranges of each of three structures few go on to all statements; the evolution begins at the
+    best draw, which is nearer to the answer than the structure's own start, and stopping changes nothing."""
+    whole = toy(tmp_path / "whole", 320, draws=100)
+    drawn = [one for one in whole if one.generation == calibration.DRAWN]
+    assert len(drawn) == 303
+    assert sum(len(one.costs) == 2 for one in drawn) < 0.15 * len(drawn)
+    for k, basin in enumerate(TOY.basins):
+        best = min((one for one in drawn if one.basin == k), key=lambda one: one.value)
+        first = next((one for one in whole if one.basin == k and one.generation == 0), None)
+        assert first is None or first.shares == best.shares
+        assert abs(basin.values(best.shares)["width"] - 20e-3) < min(1e-3, abs(basin.start["width"] - 20e-3))
+    toy(tmp_path / "parts", 150, draws=100)
+    assert toy(tmp_path / "parts", 320, draws=100) == whole
+
+
+def test_a_screen_costs_few_runs():
+    """The statements that screen are single runs, and those of the valley that hardly a beam shows."""
+    stages = searched_statements("impact-beam")
+    assert [one.id for one in stages.screen] == ["IBS-024", "IBS-025", "IBS-026"]
+    assert all(one.along is None for one in stages.screen)
+    assert searched_statements("slider-crank").screen == ()
 
 
 def test_a_stopped_search_goes_on_as_if_it_had_not_been_stopped(toy, tmp_path):

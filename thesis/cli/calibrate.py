@@ -22,6 +22,13 @@ UNFINISHED = 3
 @click.option("--out", type=click.Path(file_okay=False), required=True, help="Folder; the same command again resumes.")
 @click.option("--leave-out", multiple=True, metavar="FIGURE", help="Figure, such as 3.9, that the search does not see.")
 @click.option("--basin", metavar="NAME", help="Beginning of the names of the structures that are searched.")
+@click.option(
+    "--draws",
+    type=click.IntRange(0, 10**6),
+    default=0,
+    show_default=True,
+    help="Candidates drawn over all ranges of each structure, and judged by few runs; the best is where it begins.",
+)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -31,6 +38,7 @@ def calibrate(
     out: str,
     leave_out: tuple[str, ...],
     basin: str | None,
+    draws: int,
     seed: int,
     workers: int | None,
     as_json: bool,
@@ -46,6 +54,7 @@ def calibrate(
         seed=seed,
         left_out=frozenset(leave_out),
         basin=basin,
+        draws=draws,
         workers=workers,
         progress=True,
     )

@@ -1,8 +1,8 @@
 """The calibration: values of the parameters that are not in print which bring a machine closest to the thesis.
 
-The covariance matrix adaptation evolution strategy (CMA-ES) searches several basins, structures of the machine each
-with its own start (``search``). The best candidates of its quick runs are judged by thorough ones, and the one with the
-most hits wins.
+The covariance matrix adaptation evolution strategy (CMA-ES) searches several basins, structures of the machine, each
+from its own start or the best of many draws (``search``). The best candidates of its quick runs are judged by thorough
+ones, and the one with the most hits wins.
 """
 
 import json
@@ -124,6 +124,7 @@ def calibrate(
     seed: int = 0,
     left_out: frozenset[str] = frozenset(),
     basin: str | None = None,
+    draws: int = 0,
     workers: int | None = None,
     cache: Path | None = None,
     progress: bool = False,
@@ -145,6 +146,8 @@ def calibrate(
         come from fits to all statements.
     basin
         Beginning of the names of the structures that are searched; all by default.
+    draws
+        Beams or cranks drawn over the whole ranges of each structure, of which the best is where its search begins.
     workers
         Number of threads; all processors by default.
     cache
@@ -169,10 +172,10 @@ def calibrate(
         known = ", ".join(sorted(filter(None, figures)))
         raise ParameterError(f"no statement that is searched on is about figure {min(unknown)}; known: {known}")
     stages = stages.without(frozenset(one.id for stage in stages for one in stage if one.statement.figure in left_out))
-    plan = {"machine": name, "seed": seed, "version": __version__, "statements": list(stages.ids)}
+    plan = {"machine": name, "seed": seed, "version": __version__, "statements": list(stages.ids), "draws": draws}
     found = open_journal(folder, {**plan, "basins": [one.name for one in space.basins]})
     width = WIDE if left_out else WIDTH
-    search(found, space, stages, budget, seed, folder / JOURNAL_FILE, workers, progress, width=width)
+    search(found, space, stages, budget, seed, folder / JOURNAL_FILE, workers, progress, width=width, draws=draws)
     result = _judged(space, found, left_out, cache or default_folder(), workers, progress)
     text = json.dumps(result.as_dict(), indent=2, allow_nan=False) + "\n"
     write_atomically(folder / RESULT_FILE, lambda temporary: temporary.write_text(text))

@@ -4,8 +4,9 @@ A statement that is e tolerances off costs e / (1 + e): half at the edge of a hi
 so that no single statement rules the search. A wrong nature adds to it: 1 - (1 - e/(1+e)) (1 - d), with d how far the
 natures are from the printed ones. The objective is the mean, between 0 and 1.
 
-Statements of single runs come first; a candidate that they rule out is not run over curves, and counts what it is not
-run for as wholly missed. Curves and maps are thinned: a boundary is sought near where it is printed.
+The few statements of ``SCREEN`` come first, then those of single runs; a candidate that they rule out is not run over
+curves, and counts what it is not run for as wholly missed. Curves and maps are thinned: a boundary is sought near where
+it is printed.
 """
 
 import math
@@ -39,6 +40,9 @@ WITHOUT_A_SLOPE = frozenset(
 )
 """Quantities that one trajectory decides, so that no search can follow them; the scorecard judges them all the same."""
 
+SCREEN: Mapping[str, tuple[str, ...]] = {"impact-beam": ("IBS-024", "IBS-025", "IBS-026")}
+"""By machine: statements of which hardly a candidate hits all, and that cost a few runs; the valley of figure 3.8."""
+
 BEYOND = 2.0
 """Steps beyond a printed boundary up to which a quick run looks for it."""
 
@@ -50,8 +54,9 @@ HASTENED: Mapping[str, Mapping[str, Any]] = {"slider-crank": {"matrix_update_int
 
 
 class Stages(NamedTuple):
-    """Statements of a search: single runs, full curves, then maps and other sweeps."""
+    """Statements of a search: those that screen, other single runs, full curves, then maps and other sweeps."""
 
+    screen: tuple[Comparison, ...]
     points: tuple[Comparison, ...]
     curves: tuple[Comparison, ...]
     maps: tuple[Comparison, ...]
@@ -69,9 +74,10 @@ class Stages(NamedTuple):
 def searched_statements(machine: str, joint: str | None = None) -> Stages:
     """Statements that a search of a machine follows; of those with clearance in one ``joint`` if it is named."""
     seen = [_thinned(one) for one in statements_of(machine, joint) if one.quantity not in WITHOUT_A_SLOPE]
-    points = tuple(one for one in seen if one.along is None)
+    screen = tuple(one for one in seen if one.id in SCREEN.get(machine, ()))
+    points = tuple(one for one in seen if one.along is None and one not in screen)
     curves = tuple(one for one in seen if one.along is not None and one.quantity in FULL_CURVES)
-    return Stages(points, curves, tuple(one for one in seen if one not in points and one not in curves))
+    return Stages(screen, points, curves, tuple(one for one in seen if one not in (*screen, *points, *curves)))
 
 
 def statements_of(machine: str, joint: str | None = None) -> tuple[Comparison, ...]:
@@ -130,6 +136,6 @@ def staged_costs(
 ) -> Iterator[dict[str, float]]:
     """Costs of the statements of one stage after the other, by quick runs."""
     machine = with_settings(machine, HASTENED.get(machine.name, {}))
-    for stage in stages:
+    for stage in filter(None, stages):
         judged = evaluate(stage, {machine.name: machine}, efforts=QUICK, workers=workers, unprinted=unprinted)
         yield {one.comparison.id: cost(one) for one in judged}

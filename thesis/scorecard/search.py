@@ -1,8 +1,11 @@
 """The search behind a calibration: candidates of several basins, tried in generations, and their journal.
 
-Every basin gets some generations; then the worse half of them gets no more, until two are left. Candidates that the
-single runs rule out are given up before the curves. The journal has a line for every candidate, and every basin draws
-from its own seed, so that a stopped search goes on as if it had not been stopped.
+A search is a funnel. If it is asked to, it draws machines over the whole ranges of every basin and judges them by their
+cheapest statements; those among the best of the draws go on to all statements. The evolution begins from the best of
+them, or from the basin's own start. Every basin gets some generations; then the worse half of them gets no more, until
+two are left. Candidates that the first statements rule out are given up before the rest. The journal has a line for
+every candidate, and every basin draws from its own seed, so that a stopped search goes on as if it had not been
+stopped.
 
 References
 ----------
@@ -11,7 +14,7 @@ N. Hansen, A. Ostermeier, Completely derandomized self-adaptation in evolution s
 
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,6 +34,15 @@ WIDTH = 0.03
 
 WIDE = 0.25
 """The same for a search that begins in the middle of the ranges."""
+
+DRAWN = -1
+"""Generation of the candidates that are drawn."""
+
+GO_ON, HALF = 0.02, 0.5
+"""Shares of the draws that go on after the statements that screen, and of all candidates after further ones."""
+
+COMPARED = 1000
+"""Draws to which a new one is compared."""
 
 TRIED = 4
 """Generations that every basin gets before some get no more."""
@@ -111,7 +123,7 @@ def open_journal(folder: Path, plan: dict[str, Any]) -> list[Candidate]:
     return found
 
 
-def _evolution(basin: Basin, seed: Sequence[int], width: float) -> Any:
+def _evolution(basin: Basin, seed: Sequence[int], width: float, shares: Sequence[float]) -> Any:
     try:
         from cmaes import CMA
     except ImportError as error:
@@ -119,7 +131,49 @@ def _evolution(basin: Basin, seed: Sequence[int], width: float) -> Any:
     size = len(basin.dimensions)
     first = int(np.random.SeedSequence(seed).generate_state(1)[0])
     bounds = np.tile([0.0, 1.0], (size, 1))
-    return CMA(np.clip(basin.shares(), 0.02, 0.98), width, bounds=bounds, seed=first)
+    return CMA(np.clip(shares, 0.02, 0.98), width, bounds=bounds, seed=first)
+
+
+class _Trials:
+    """Candidates tried one after the other, those of an earlier call first; kept in ``found`` and a journal."""
+
+    def __init__(
+        self, found: list[Candidate], space: SearchSpace, stages: Stages, budget: Budget, journal: Path
+    ) -> None:
+        self.found, self._space, self._stages, self._budget, self._journal = found, space, stages, budget, journal
+        self._replayed, self._began = list(found), time.monotonic()
+        found.clear()
+
+    def minutes(self) -> float:
+        """How long this call has lasted."""
+        return (time.monotonic() - self._began) / 60.0
+
+    def next(
+        self, k: int, generation: int, shares: Sequence[float], go_on: float, workers: int | None
+    ) -> Candidate | None:
+        """Try the shares in basin k: of its generation's kind, a share ``go_on`` passes the first statements.
+
+        None if the budget is spent.
+        """
+        if self._replayed:
+            one = self._replayed.pop(0)
+        elif self._spent():
+            return None
+        else:
+            drawn = generation == DRAWN
+            recent = [each for each in self.found if each.basin == k and (each.generation == DRAWN) == drawn]
+            recent = recent[-(COMPARED if drawn else 20) :]
+            value, costs = _tried(self._space, self._space.basins[k], shares, self._stages, recent, go_on, workers)
+            one = Candidate(k, generation, tuple(float(share) for share in shares), value, costs)
+            with self._journal.open("a") as file:
+                file.write(json.dumps(one) + "\n")
+        self.found.append(one)
+        return one
+
+    def _spent(self) -> bool:
+        if self._budget.candidates is not None:
+            return len(self.found) >= self._budget.candidates
+        return self.minutes() >= (self._budget.minutes or 0.0)
 
 
 def search(
@@ -133,41 +187,73 @@ def search(
     progress: bool,
     *,
     width: float = WIDTH,
+    draws: int = 0,
 ) -> None:
     """Try candidates until the budget is spent; they are added to those found and to the journal.
 
-    ``width`` is the standard deviation of the first generation, as a share of the ranges.
+    ``width`` is the standard deviation of the first generation, as a share of the ranges; so many ``draws`` over the
+    ranges of every basin come before it.
     """
-    evolutions = [_evolution(basin, (seed, k), width) for k, basin in enumerate(space.basins)]
-    replayed, began = list(found), time.monotonic()
-    found.clear()
+    trials = _Trials(found, space, stages, budget, journal)
+    everyone = 1.0 if stages.screen else HALF  # of an evolution, what screens the draws rules out none
     total = float(budget.candidates or budget.minutes or 0.0)
     with tqdm(
         total=total, desc="calibrate", disable=not progress, unit="candidate" if budget.candidates else "min"
     ) as bar:
+
+        def tried(k: int, generation: int, shares: Sequence[float], go_on: float) -> Candidate | None:
+            one = trials.next(k, generation, shares, go_on, workers)
+            if one is not None:
+                bar.update(1 if budget.candidates else round(trials.minutes() - bar.n, 3))
+                bar.set_postfix_str(f"{len(found)} tried, best {_best(found, space)}")
+            return one
+
+        starts = []
+        for k, basin in enumerate(space.basins):
+            best = _start(k, basin, draws, seed, tried)
+            if best is None:
+                return
+            starts.append(best)
+        evolutions = [
+            _evolution(basin, (seed, k), width, start)
+            for k, (basin, start) in enumerate(zip(space.basins, starts, strict=True))
+        ]
         while True:
             k = _next_basin(found, len(space.basins), [one.population_size for one in evolutions])
-            evolution, basin = evolutions[k], space.basins[k]
-            generation = sum(one.basin == k for one in found) // evolution.population_size
+            evolution = evolutions[k]
+            generation = len(_evolved(found, k)) // evolution.population_size
             told = []
             for place in range(evolution.population_size):
                 shares = evolution.ask()
-                if not generation and not place:
-                    shares = np.array(basin.shares())
-                if replayed:
-                    one = replayed.pop(0)
-                elif _spent(budget, len(found), began):
+                one = tried(k, generation, shares if generation or place else starts[k], everyone)
+                if one is None:
                     return
-                else:
-                    value, costs = _tried(space, basin, shares, stages, _recent(found, k), workers)
-                    one = Candidate(k, generation, tuple(float(share) for share in shares), value, costs)
-                    with journal.open("a") as file:
-                        file.write(json.dumps(one) + "\n")
-                found.append(one)
                 told.append((np.array(one.shares), one.value))
-                bar.update(1 if budget.candidates else round((time.monotonic() - began) / 60.0 - bar.n, 3))
-                bar.set_postfix_str(f"{len(found)} tried, best {_best(found, space)}")
             evolution.tell(told)
+
+
+def _start(
+    k: int,
+    basin: Basin,
+    draws: int,
+    seed: int,
+    tried: Callable[[int, int, Sequence[float], float], Candidate | None],
+) -> Sequence[float] | None:
+    """Where the evolution of basin k begins: the best of its own start and the draws; None if the budget is spent."""
+    if not draws:
+        return basin.shares()
+    best = tried(k, DRAWN, basin.shares(), 1.0)
+    for shares in np.random.default_rng((seed, k)).random((draws, len(basin.dimensions))):
+        one = tried(k, DRAWN, shares, GO_ON)
+        if one is None or best is None:
+            return None
+        best = min(best, one, key=lambda each: each.value)
+    return None if best is None else best.shares
+
+
+def _evolved(found: Sequence[Candidate], basin: int) -> Sequence[Candidate]:
+    """Candidates of a basin that are no draws."""
+    return [one for one in found if one.basin == basin and one.generation != DRAWN]
 
 
 def _best(found: Sequence[Candidate], space: SearchSpace) -> str:
@@ -177,7 +263,7 @@ def _best(found: Sequence[Candidate], space: SearchSpace) -> str:
 
 def _next_basin(found: Sequence[Candidate], count: int, sizes: Sequence[int]) -> int:
     """Basin of the next generation: of those still in the race, the one that has had the fewest."""
-    had = [sum(one.basin == k for one in found) // sizes[k] for k in range(count)]
+    had = [len(_evolved(found, k)) // sizes[k] for k in range(count)]
     best = [min((one.value for one in found if one.basin == k), default=0.0) for k in range(count)]
     racing, rounds = list(range(count)), TRIED
     while len(racing) > 2 and min(had[k] for k in racing) >= rounds:
@@ -186,37 +272,31 @@ def _next_basin(found: Sequence[Candidate], count: int, sizes: Sequence[int]) ->
     return min(racing, key=lambda k: (had[k], k))
 
 
-def _recent(found: Sequence[Candidate], basin: int) -> Sequence[Candidate]:
-    """Candidates of a basin to which a new one is compared."""
-    return [one for one in found if one.basin == basin][-20:]
-
-
 def _tried(
     space: SearchSpace,
     basin: Basin,
     shares: Sequence[float],
     stages: Stages,
     recent: Sequence[Candidate],
+    go_on: float,
     workers: int | None,
 ) -> tuple[float, dict[str, float]]:
-    """Objective and costs; a candidate whose first statements are worse than most recent ones' is given up."""
+    """Objective and costs; a candidate is given up whose statements so far are worse than those of the ``recent`` ones.
+
+    After the first stage a share ``go_on`` is kept, after the others a half.
+    """
     count, costs = len(stages.ids), dict[str, float]()
     try:
         machine = space.machine(basin, shares)
         for part in staged_costs(machine, stages, space.conditions(basin, shares), workers=workers):
             costs.update(part)
             others = [sum(one.costs[name] for name in costs) for one in recent if costs.keys() <= one.costs.keys()]
-            if len(others) >= 5 and sum(costs.values()) > float(np.median(others)):
+            if len(others) >= 5 and sum(costs.values()) > float(np.quantile(others, go_on)):
                 break
+            go_on = HALF
     except ParameterError:
         return 1.0, {}
     return (sum(costs.values()) + count - len(costs)) / count, costs
-
-
-def _spent(budget: Budget, candidates: int, began: float) -> bool:
-    if budget.candidates is not None:
-        return candidates >= budget.candidates
-    return time.monotonic() - began >= 60.0 * (budget.minutes or 0.0)
 
 
 def complete_costs(folder: Path) -> list[Mapping[str, float]]:
