@@ -13,18 +13,28 @@ from chaosgym.cli.output import emit
 @click.option("--against", type=click.Choice(["exudyn"]), help="Run the same machines there; needs chaosgym[peers].")
 @click.option("--scenes", is_flag=True, help="The scenes of the slider crank instead: degrees of freedom and cost.")
 @click.option("--set-up", "set_up", is_flag=True, help="The times to make a slider crank ready instead.")
+@click.option("--mechanisms", is_flag=True, help="Mechanisms from files against the crank of the thesis instead.")
 @click.option("--scaling", is_flag=True, help="What threads and wrapping make of the vector environments instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def bench(repeats: int, against: str | None, scenes: bool, set_up: bool, scaling: bool, as_json: bool) -> None:
+def bench(
+    repeats: int, against: str | None, scenes: bool, set_up: bool, mechanisms: bool, scaling: bool, as_json: bool
+) -> None:
     """Rates on this computer: cycles, environment steps, sweep points, classifier rows; or against a peer."""
-    if (against is not None) + scenes + set_up + scaling > 1:
-        raise click.UsageError("--against, --scenes, --set-up and --scaling exclude each other")
+    if (against is not None) + scenes + set_up + mechanisms + scaling > 1:
+        raise click.UsageError("--against, --scenes, --set-up, --mechanisms and --scaling exclude each other")
     if against is not None:
         from benchmarks.performance.against_exudyn import against_exudyn
 
         rows = against_exudyn(repeats=repeats, progress=True)
         return emit({"against": against, "settings": rows}, as_json, lambda: _comparison(rows))
-    from benchmarks.performance import benchmark, scene_costs, set_up_times, vector_scaling
+    from benchmarks.performance import (
+        assembly_times,
+        benchmark,
+        cycle_costs,
+        scene_costs,
+        set_up_times,
+        vector_scaling,
+    )
 
     if scenes:
         costs = scene_costs()
@@ -36,6 +46,10 @@ def bench(repeats: int, against: str | None, scenes: bool, set_up: bool, scaling
             as_json,
             lambda: [f"{name:40s} {value:10.1f} us" for name, value in times.items()],
         )
+    if mechanisms:
+        cycles, times = cycle_costs(repeats), assembly_times(repeats)
+        found = {"cycles": [cost._asdict() for cost in cycles], "assembly_milliseconds": times}
+        return emit(found, as_json, lambda: _mechanism_table(cycles, times))
     if scaling:
         measured = vector_scaling(repeats)
         return emit({"scaling": [asdict(each) for each in measured]}, as_json, lambda: _scaling_table(measured))
@@ -89,6 +103,19 @@ def _scene_table(costs: list[Any]) -> list[str]:
         for cost in costs
     ]
     return [head, *rows, "the degrees of freedom of a scene by name: chaosgym show slider-crank, and --json"]
+
+
+def _mechanism_table(rows: list[Any], times: dict[str, float]) -> list[str]:
+    from benchmarks.performance.mechanisms import ASSEMBLY
+
+    head = f"{'cycle, against one of the crank of the thesis':46s}{'DOF':>5s}{'contacts':>10s}{'us':>8s}{'ratio':>8s}"
+    lines = [
+        f"{row.machine:46s}{row.coordinates:5d}{row.contacts:10d}{row.microseconds:8.0f}{row.ratio:8.2f}"
+        f"{row.target:8.1f}"
+        for row in rows
+    ]
+    made = [f"{f'assemble, {name}':69s}{value:8.1f} ms{ASSEMBLY[name]:5.0f}" for name, value in times.items()]
+    return [f"{head}{'target':>8s}", *lines, *made]
 
 
 def _scaling_table(measured: list[Any]) -> list[str]:

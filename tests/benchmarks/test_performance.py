@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from benchmarks.cli import app
-from benchmarks.performance import rates, scaling
+from benchmarks.performance import mechanisms, rates, scaling
 from benchmarks.performance.against_exudyn import Contest, against_exudyn, period_of
 from benchmarks.performance.exudyn_machines import ExudynSetting, load_exudyn, run_in_exudyn
 from benchmarks.performance.reports import report_seconds
@@ -87,6 +87,20 @@ def test_threads_and_wrapping_of_vector_environments(monkeypatch: pytest.MonkeyP
         assert each["wrapper"] > 0.0
         assert each["physics"] + each["wrapper"] <= 1.01 * each["one_thread"]
         assert each["efficiency"] == pytest.approx(each["one_thread"] / each["all_threads"] / each["threads"])
+
+
+def test_mechanisms_are_timed_against_the_crank(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every mechanism costs some cycles of the crank, one that slides less than one that rolls in a round hole."""
+    monkeypatch.setattr(mechanisms, "SETTLED", 2)
+    monkeypatch.setattr(mechanisms, "BLOCK", 5)
+    run = CliRunner().invoke(app, ["bench", "--mechanisms", "--repeats", "1", "--json"])
+    assert run.exit_code == 0, run.output
+    result = json.loads(run.stdout)
+    ratios = {row["machine"]: row["ratio"] for row in result["cycles"]}
+    assert set(ratios) == set(mechanisms.CYCLES)
+    assert 0.0 < ratios["slider-crank-flores-guide"] < ratios["four-bar-akhadkar"]
+    assert set(result["assembly_milliseconds"]) == set(mechanisms.ASSEMBLY)
+    assert all(value > 0.0 for value in result["assembly_milliseconds"].values())
 
 
 _points = rates._points
