@@ -158,7 +158,7 @@ def test_files_that_are_no_cycle_end_in_one_line(cam, case):
 def samples(folder, *rows, head="angle [deg],lift [mm]", **row):
     """What a drive's displacement becomes, of a CSV file of these rows."""
     (folder / "lift.csv").write_text("\n".join([head, *rows]))
-    return with_samples({"displacement": "lift.csv", "harmonic": 1} | row, folder)["displacement"]
+    return with_samples("drive", {"displacement": "lift.csv", "harmonic": 1} | row, folder)["displacement"]
 
 
 def refused(folder, *rows, **keywords):
@@ -174,9 +174,9 @@ def test_three_rows_are_a_cycle(tmp_path):
     assert samples(tmp_path, "0,1", "", "120,2", "240,-3.5") == ["1.0 mm", "2.0 mm", "-3.5 mm"]
     (tmp_path / "L.CSV").write_bytes("\ufeffangle [cycle] , lift [ mm ]\n0,1\n.25,2\n.5,3\n.75,4\n1,1".encode())
     with pytest.raises(ParameterError, match=r"^drive\.column has no meaning without a CSV file; leave it out$"):
-        with_samples({"displacement": "1 mm", "column": "lift"}, tmp_path)
+        with_samples("drive", {"displacement": "1 mm", "column": "lift"}, tmp_path)
     drive = {"displacement": "L.CSV", "column": "lift"}
-    assert with_samples(drive, tmp_path) == {"displacement": ["1.0 mm", "2.0 mm", "3.0 mm", "4.0 mm"]}
+    assert with_samples("drive", drive, tmp_path) == {"displacement": ["1.0 mm", "2.0 mm", "3.0 mm", "4.0 mm"]}
     assert refused(tmp_path, "0,1", "180,2") == "is no cycle at equal steps from 0 to 360; allowed: 3 rows or more"
 
 

@@ -263,7 +263,7 @@ BAD = {
         [('"2.83, -2.79, 2.71', '"1, -1, 1'), ('"0.96, 2.02, -0.05', '"0.3, 0.7, 0')], "not mass-normalised"),
     "a reversed range": ([('"6 to 24 Hz"', '"24 to 6 Hz"')], "speed_range is no range"),
     "a wrong tolerance": ([("damping_factor =", "dampening =")], "no key 'dampening'"),
-    "a stiffness that varies": ([('"2 N/um"', '"1, 2, 3 N/um"')], "is several numbers; allowed: one, which holds at"),
+    "a damper that varies": ([('"60 N s/m"', '"1, 2, 3 N s/m"')], "is several numbers; allowed: one, which holds at"),
     "two sources": ([('# matrices = "model.npz"', 'matrices = "my-machine.toml"')], "frequencies and matrices"),
     "no such file": (
         [("frequencies = ", "# frequencies = "), ('# matrices = "model.npz"', 'matrices = "gone.npz"')], "gone.npz"),
@@ -396,7 +396,7 @@ def test_a_base_that_is_moved_for_good_changes_nothing(machine_file):
 
 
 WORDS = {
-    "friction": ([("preload = ", "friction = ")], "friction does not fit"),
+    "friction": ([("preload = ", "mu = ")], "slides is the point that it pulls"),
     "torque": ([("force = ", "torque = ")], "forces in N m, springs in N m/rad"),
     "a random drive": ([("force = ", "psd = ")], "repeats with every cycle"),
     "backlash": ([('clearance = "0.15', 'backlash = "0.15')], "clearance is half the gap"),

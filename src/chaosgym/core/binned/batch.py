@@ -46,6 +46,7 @@ def binned_model_of(batch, i):
         batch.gap[i],
         batch.stiffness[i],
         batch.damping[i],
+        batch.share[i],
         batch.two_sided[i],
         batch.radix[i],
         batch.reading[i],

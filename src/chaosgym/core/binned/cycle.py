@@ -50,6 +50,7 @@ from chaosgym.core.binned.motion import (
     places,
     put_evaluated,
     put_sides,
+    put_stiffness,
     read_after,
     read_now,
     side_of,
@@ -108,6 +109,8 @@ class BinnedModel(NamedTuple):
         Displacement of each channel per unit coordinate.
     gap, stiffness, damping : (m,)
         Clearance [m], contact stiffness [N/m] and damping [N s/m] of each channel.
+    share : (bins, m)
+        Factor of both in each bin; no rows where it is 1 in all.
     two_sided : (m,) bool
         True if the channel has a surface on either side, False if only where row . p is positive.
     radix : int
@@ -135,6 +138,7 @@ class BinnedModel(NamedTuple):
     gap: np.ndarray
     stiffness: np.ndarray
     damping: np.ndarray
+    share: np.ndarray
     two_sided: np.ndarray
     radix: int
     reading: np.ndarray
@@ -370,6 +374,8 @@ def turn(model, motion, peak, bouncing, arrays, cycle, tolerance, budget, vector
         begin = b * duration
         at = (chosen * bins + b) * length
         put_time(own, time_at, 0.0)
+        if model.share.shape[0] > 0:
+            put_stiffness(motion, model.stiffness, model.share[b])
         if b == 0 or chosen > 0:
             # damping reads the acceleration, which jumps with the matrices
             read_now(motion, at)

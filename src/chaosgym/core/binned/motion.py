@@ -213,6 +213,13 @@ def put_sides(motion, anchor):
             own[here.rest + i] += anchor[i, j] * own[clearances + j]
 
 
+@leaf
+def put_stiffness(motion, stiffness, share):
+    """Write the stiffness of every channel in a bin: its ``share`` (m,) of all. Its lag stays as it is."""
+    for j in range(motion.m):
+        motion.own[places(motion.n, motion.m).surfaces + j * SURFACE + STIFFNESS] = stiffness[j] * share[j]
+
+
 @part
 def read_now(motion, at):
     """Write what every channel reads in z; the row of tables of its bin and contact set begins at ``at``."""

@@ -88,15 +88,20 @@ class BinnedMachine(Machine):
         """Duration of one operating cycle [s] at a speed [rpm], or at many."""
         return 60.0 / speed
 
+    @staticmethod
+    def rate_at(speed: float) -> float:
+        """Angular velocity [rad/s] of the drive at a speed [rpm]."""
+        return speed * math.pi / 30.0
+
     @property
     def drive_speed(self) -> float:
-        """Speed of the drive [rpm]."""
+        """Speed of the drive, in the unit of the speed field."""
         return float(getattr(self, self.speed_field))
 
     @property
     def crank_rate(self) -> float:
-        """Angular velocity of the crank [rad/s]."""
-        return self.drive_speed * math.pi / 30.0
+        """Angular velocity of the drive [rad/s]."""
+        return self.rate_at(self.drive_speed)
 
     @property
     def n_states(self) -> int:

@@ -72,6 +72,10 @@ class Contact(NamedTuple):
         Recorded force (along, upward or across, sideways) per newton along each row; zero of another joint.
     slides
         Whether friction acts along the guide.
+    drag : (n,) or None
+        What friction drives per newton of contact force, on surfaces that slide past steadily.
+    share : (bins,) or None
+        Factor of stiffness and damping over the cycle.
     """
 
     row: Array
@@ -81,6 +85,8 @@ class Contact(NamedTuple):
     two_sided: bool
     reading: Array
     slides: bool = False
+    drag: Array | None = None
+    share: Array | None = None
 
 
 class Held(NamedTuple):
@@ -168,8 +174,12 @@ class ModelsBySpeed:
         self._step_phase, self._structure = step_phase, structure
 
     def at(self, speed: float) -> BinnedModel:
-        """Return the model at a speed [rpm]; its gaps are zero."""
-        return _recent.get((speed, self), lambda: _at_speed(speed, self._step_phase, _structure(*self._structure)))
+        """Return the model at a speed, in the unit of the speed field; its gaps are zero."""
+        return _recent.get((speed, self), lambda: self._made(speed))
+
+    def _made(self, speed: float) -> BinnedModel:
+        kind, *_ = self._structure
+        return _at_rate(kind.rate_at(speed), self._step_phase, _structure(*self._structure))
 
 
 @lru_cache(maxsize=KEPT_STRUCTURES)
@@ -290,7 +300,7 @@ def fastest_rate(machine: "BinnedMachine", model: TaylorModel) -> float:
 
 
 class Channels(NamedTuple):
-    """Contacts of one row each; see ``BinnedModel``. ``slides`` (m,): friction acts along the guide."""
+    """Contacts of one row each, as in ``BinnedModel`` and ``Contact``: ``slides`` (m,), ``drag`` (m, n)."""
 
     row: Array
     stiffness: Array
@@ -298,10 +308,14 @@ class Channels(NamedTuple):
     two_sided: NDArray[np.bool_]
     reading: Array
     slides: NDArray[np.bool_]
+    drag: Array
+    share: Array
 
 
 def channels_of(contacts: Sequence[Contact]) -> Channels:
-    """Contacts that have one row each, as arrays."""
+    """Contacts that have one row each, as arrays; ``share`` is given for all or for none."""
+    n = contacts[0].row.shape[1]
+    shares = [contact.share for contact in contacts if contact.share is not None]
     return Channels(
         row=np.concatenate([contact.row for contact in contacts]),
         stiffness=np.array([contact.stiffness for contact in contacts]),
@@ -309,6 +323,8 @@ def channels_of(contacts: Sequence[Contact]) -> Channels:
         two_sided=np.array([contact.two_sided for contact in contacts]),
         reading=np.concatenate([contact.reading for contact in contacts]),
         slides=np.array([contact.slides for contact in contacts]),
+        drag=np.array([np.zeros(n) if contact.drag is None else contact.drag for contact in contacts]),
+        share=np.array(shares).T if shares else np.empty((0, len(contacts))),
     )
 
 
@@ -353,8 +369,10 @@ def _push(inverse_mass: Array, channels: Channels, radix: int, friction: Array) 
             digit = chosen // radix**j % radix
             if digit:
                 row, sign = channels.row[j], 1.0 if digit == 1 else -1.0
-                force = row + sign * channels.slides[j] * friction
+                force = row + sign * channels.drag[j] + sign * channels.slides[j] * friction
                 answer = np.einsum("bij,bj->bi", inverse_mass, force)[:, None, :]
+                if len(channels.share):
+                    answer = channels.share[:, j, None, None] * answer
                 push[chosen, :, :n] -= channels.stiffness[j] * row[:, None] * answer
                 push[chosen, :, n : 2 * n] -= channels.damping[j] * row[:, None] * answer
                 push[chosen, :, 2 * n + j] += channels.stiffness[j] * answer[:, 0]
@@ -418,8 +436,8 @@ def _closed(channels: Channels, radix: int) -> tuple[Array, Array]:
     return lag, anchor
 
 
-def _at_speed(speed: float, step_phase: float, parts: _Structure) -> BinnedModel:
-    rate, bins = speed * math.pi / 30.0, parts.bins
+def _at_rate(rate: float, step_phase: float, parts: _Structure) -> BinnedModel:
+    bins = parts.bins
     duration = 2.0 * math.pi / (bins * rate)
     steps = max(1, math.ceil(duration * parts.spectrum / (2.0 * LANES * step_phase)))
     order = series_order(parts.spectrum * duration / (LANES * steps))
@@ -435,6 +453,7 @@ def _at_speed(speed: float, step_phase: float, parts: _Structure) -> BinnedModel
         gap=np.zeros(len(parts.channels.row)),
         stiffness=parts.channels.stiffness,
         damping=parts.channels.damping,
+        share=parts.channels.share,
         two_sided=parts.channels.two_sided,
         radix=parts.radix,
         reading=parts.channels.reading,

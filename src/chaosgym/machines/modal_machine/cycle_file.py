@@ -1,4 +1,4 @@
-"""CSV files of one cycle, a force or a lift over the angle: a drive is read as if their samples were written out."""
+"""CSV files of one cycle, a force, lift or stiffness over the angle, read as if their samples were written out."""
 
 import csv
 import math
@@ -23,14 +23,14 @@ _HEAD = re.compile(r"\s*(.*?)\s*\[(.*)\]\s*")
 
 
 def files_of(values: Mapping[str, Any]) -> list[str]:
-    """Names of the CSV files that the drives of a machine's file name."""
-    rows = values.get("drive")
-    rows = rows if isinstance(rows, list) else [rows]
+    """Names of the CSV files that the drives, joints and springs of a machine's file name."""
+    tables = (values.get(name, ()) for name in ("drive", "joint", "spring"))
+    rows = [row for table in tables for row in (table if isinstance(table, list) else [table])]
     return [given for row in rows if isinstance(row, dict) for kind, given in row.items() if _is_file(kind, given)]
 
 
-def with_samples(row: Any, folder: Path) -> Any:
-    """A [[drive]] whose strength is the name of a CSV file, with the samples of that file in its place.
+def with_samples(table: str, row: Any, folder: Path) -> Any:
+    """A row of a table, such as "drive", with the samples of a CSV file in place of its name.
 
     Raises
     ------
@@ -41,12 +41,12 @@ def with_samples(row: Any, folder: Path) -> Any:
         return row
     found = {kind: _column(folder / given, row.get("column")) for kind, given in row.items() if _is_file(kind, given)}
     if "column" in row and not found:
-        raise ParameterError("drive.column has no meaning without a CSV file; leave it out")
+        raise ParameterError(f"{table}.column has no meaning without a CSV file; leave it out")
     return {name: found.get(name, given) for name, given in row.items() if name != "column"}
 
 
 def _is_file(kind: str, given: Any) -> bool:
-    return kind in KINDS and isinstance(given, str) and given.lower().endswith(".csv")
+    return kind in (*KINDS, "stiffness") and isinstance(given, str) and given.lower().endswith(".csv")
 
 
 def _column(path: Path, wanted: Any) -> list[str]:

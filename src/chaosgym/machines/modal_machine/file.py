@@ -20,12 +20,16 @@ from chaosgym.machines.modal_machine.keys import KEYS
 from chaosgym.machines.modal_machine.machine import ModalMachine, clearance_option
 from chaosgym.machines.modal_machine.structure import BASE, Structure
 from chaosgym.machines.modal_machine.turning import turning_joints
+from chaosgym.machines.modal_machine.varying import Spring, VaryingMachine, checked_samples
 from chaosgym.machines.parameters import parameter, parameters_of, suggestion
 from chaosgym.machines.stated import range_of, reduced, tolerances_of
 from chaosgym.machines.units import TURNING
 
 FIELDS = {"stiffness": "contact_stiffness", "damping": "contact_damping"}
 """Fields of the machine by key of [joint], where they have other names."""
+
+SAMPLED = ("drive", "joint", "spring")
+"""Tables that take samples of a cycle."""
 
 MOST_SAMPLED = 16
 """Harmonics of a sampled cycle by default, at most."""
@@ -40,7 +44,7 @@ def tables_of(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         If a table or a key is missing or unknown, or a unit or a value is wrong.
     """
     data: dict[str, Any] = {}
-    drives: list[Any] = []
+    sampled: dict[str, list[Any]] = {name: _rows(values.get(name, []), name, folder) for name in SAMPLED}
     for name in KEYS.required:
         if name not in values:
             raise ParameterError(f"[[{name}]] is missing" if name == "drive" else f"[{name}] is missing")
@@ -48,25 +52,35 @@ def tables_of(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         outer, _, inner = path.rpartition(".")
         if outer == "joint":
             continue
+        if path in SAMPLED:
+            data[path] = (
+                _joints(sampled[path]) if path == "joint" else [KEYS.checked(path, row) for row in sampled[path]]
+            )
+            continue
         given = values.get(outer, {}).get(inner, {}) if outer else values.get(path, {}) if path else values
-        if path == "drive":
-            drives = [cycle_file.with_samples(row, folder) for row in (given if isinstance(given, list) else [given])]
-            data[path] = [KEYS.checked(path, row) for row in drives]
-        else:
-            data[path] = KEYS.checked(path, given) if path != "joint" else _joints(given)
-    for joint, moves in zip(data["joint"], turning_joints({**values, "drive": drives}), strict=True):
+        data[path] = KEYS.checked(path, given)
+    for joint, moves in zip(data["joint"], turning_joints({**values, **sampled}), strict=True):
         joint["turns"] = moves
     return data
 
 
-def _joints(given: Any) -> list[dict[str, Any]]:
-    """Values of each [joint] or [[joint]], those of its lower stop as "lower"."""
-    rows = given if isinstance(given, list) else [given]
+def _rows(given: Any, name: str, folder: Path) -> list[Any]:
+    """Rows of a table or a list of tables, with the samples of the CSV files that they name."""
+    return [cycle_file.with_samples(name, row, folder) for row in (given if isinstance(given, list) else [given])]
+
+
+def _joints(rows: list[Any]) -> list[dict[str, Any]]:
+    """Values of each [joint] or [[joint]], those of its lower stop as "lower"; a stiffness that varies as "samples"."""
     if not rows:
         raise ParameterError("[[joint]] is missing")
     found = []
     for row in rows:
         values = KEYS.checked("joint", row)
+        if "stiffness" in values:
+            varies = checked_samples("joint.stiffness", values["stiffness"], -math.inf)
+            values["stiffness"] = float(np.mean(varies))
+            if len(varies) > 1:
+                values["samples"] = tuple(varies.tolist())
         found.append({**values, "lower": KEYS.checked("joint.lower", row.get("lower", {}))})
     return found
 
@@ -96,6 +110,7 @@ def built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type
     types: dict[str, Any] = {"name": path, "__doc__": title, "__reduce__": reduced}
     made: Any
     if len(data["joint"]) > 1:
+        _refuse_varying(data)
         about = {"provenance": "stated", "source": path}
         watched = {"monitored": operation["monitored"]} if "monitored" in operation else {}
         made = machine_with_joints(
@@ -110,13 +125,29 @@ def built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type
             **watched,
         )
     else:
+        springs = tuple(_spring(row) for row in data["spring"])
         if "monitored" in operation:
             raise ParameterError("operation.monitored needs several [[joint]]; allowed with one: leave it out")
-        made = _with_one_joint(structure, data["joint"][0], drives, speed, usual, types, definition, path)
+        made = _with_one_joint(structure, data["joint"][0], drives, springs, speed, usual, types, definition, path)
     made.tolerances = tolerances_of(data["tolerances"], made())
-    made.work = Work(task=data["job"])
+    made.work = Work(task={**made.work.task, **data["job"]})
     kind: type[Machine] = made
     return kind
+
+
+def _refuse_varying(data: Mapping[str, Any]) -> None:
+    """Refuse what goes with one joint only."""
+    for row in data["joint"]:
+        for key, name in (("friction", "friction"), ("slides", "slides"), ("samples", "stiffness over the cycle")):
+            if key in row:
+                raise ParameterError(f"joint.{name} does not go with several [[joint]]; allowed: with one")
+    if data["spring"]:
+        raise ParameterError("[[spring]] does not go with several [[joint]]; allowed: with one")
+
+
+def _spring(row: Mapping[str, Any]) -> Spring:
+    at, values = needed("spring", row, "at", "stiffness")
+    return Spring(at, tuple(checked_samples("spring.stiffness", values, 0.0).tolist()))
 
 
 def _stated_of(joint: Mapping[str, Any], name: str, structure: Structure) -> dict[str, Any]:
@@ -143,6 +174,8 @@ def _with_damper(joint: Mapping[str, Any], name: str, structure: Structure) -> d
     ``linear_impact``).
     """
     at, stiffness, restored = needed(name, joint, "at", "stiffness", "restitution")
+    if "samples" in joint:
+        raise ParameterError(f"{name}.restitution needs one stiffness; allowed with samples of a cycle: damping")
     if "damping" in joint or "damping" in joint["lower"]:
         raise ParameterError(f"{name} has restitution and damping; allowed: one of them")
     if not 1e-3 <= restored <= 1.0 or not stiffness > 0.0:
@@ -171,6 +204,7 @@ def _with_one_joint(
     structure: Structure,
     joint: Mapping[str, Any],
     drives: tuple[Drive, ...],
+    springs: tuple[Spring, ...],
     speed: float,
     usual: Mapping[str, Any],
     types: Mapping[str, Any],
@@ -178,26 +212,31 @@ def _with_one_joint(
     path: str,
 ) -> Any:
     stated = _stated_of(joint, "joint", structure)
-    turning = stated.pop("turns")
+    turning, samples, slides = stated.pop("turns"), stated.pop("samples", ()), stated.pop("slides", "")
+    if slides and "friction" not in stated:
+        raise ParameterError("joint.slides has no meaning without joint.friction; leave it out")
+    base: Any = VaryingMachine if samples or springs or "friction" in stated else ModalMachine
     fields: dict[str, Any] = {
         "modes": structure,
         "joint": stated.pop("at"),
         "drives": drives,
         "definition": definition,
     }
-    known = parameters_of(ModalMachine)
+    if base is VaryingMachine:
+        fields |= {"samples": samples, "springs": springs, "slides": slides}
+    known = parameters_of(base)
     values = {"speed": speed, **{FIELDS.get(name, name): value for name, value in stated.items()}}
     for field in known:
         about = {**vars(known[field]), **({"provenance": "stated", "source": path} if field in values else {})}
         if turning:
             about["unit"] = TURNING.get(about["unit"], about["unit"])
-        fields[field] = parameter(values.get(field, getattr(ModalMachine, field)), **about)
+        fields[field] = parameter(values.get(field, getattr(base, field)), **about)
     options = {"--speed-hz": ModalMachine.options["--speed-hz"], **clearance_option("clearance", turning)}
     types = {**types, "usual_ranges": usual, "turning": ("joint",) if turning else (), "options": options}
     annotations: dict[str, Any] = dict.fromkeys(fields, Any)
     annotations |= {name: ClassVar[Any] for name in types if not name.startswith("__")}
     namespace = {"__module__": __name__, "__annotations__": annotations, **fields, **types}
-    return dataclass(frozen=True, kw_only=True)(type("ModalMachine", (ModalMachine,), namespace))
+    return dataclass(frozen=True, kw_only=True)(type(base.__name__, (base,), namespace))
 
 
 def _drive(row: Mapping[str, Any]) -> Drive:

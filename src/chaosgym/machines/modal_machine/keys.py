@@ -48,14 +48,22 @@ TABLES: Mapping[str, Mapping[str, Key]] = {
         "clearance": Key("half the gap; with one stop its distance", "m"),
         "offset": Key("middle of the gap, from where the joint rests unloaded", "m"),
         "stops": Key("two, or one on the upper side", kind=TEXT, choices=("two", "one")),
-        "stiffness": Key("spring of a stop", "N/m"),
-        "damping": Key("damper of a stop", "N s/m"),
+        "stiffness": Key("spring of a stop; samples of one cycle, or a CSV file of them, if it varies", "N/m", "row"),
+        "column": Key("of the CSV file, if it has several beside its angles", kind=TEXT),
+        "damping": Key("damper of a stop; it varies as the spring does", "N s/m"),
+        "friction": Key("coefficient of Coulomb friction on surfaces that slide past in one direction"),
+        "slides": Key("point that friction pulls to where it grows, 'shaft' or '-shaft'", kind=TEXT),
         "restitution": Key("speed after over speed before an impact, 0.001 to 1, in place of damping"),
         "preload": Key("constant force towards the upper stop", "N"),
     },
     "joint.lower": {
         "stiffness": Key("spring of the lower stop, if it differs", "N/m"),
         "damping": Key("damper of the lower stop, if it differs", "N s/m"),
+    },
+    "spring": {
+        "at": Key("point that it holds, or 'pinion - wheel'", kind=TEXT),
+        "stiffness": Key("beside the structure's own; samples of one cycle, or a CSV file of them", "N/m", "row"),
+        "column": Key("of the CSV file, if it has several beside its angles", kind=TEXT),
     },
     "drive": {
         "at": Key("point where it acts; 'base' for a motion of the base, with which the stops move", kind=TEXT),
@@ -91,7 +99,7 @@ def _unit_of(name: str, given: Any, key: Key) -> str:
 KEYS = Keys(
     TABLES,
     required=("structure", "joint", "drive", "operation"),
-    lists=("drive",),
+    lists=("drive", "spring"),
     either=("joint",),
     unknown=told_of,
     misfit=hint,

@@ -8,10 +8,10 @@ TURNS = "what turns has a gap in rad or arcmin, forces in N m, springs in N m/ra
 
 LIMITS = {
     "torque moment inertia rad arcmin": TURNS,
-    "friction coulomb stribeck mu": "friction does not fit: the motion between contacts is linear",
+    "coulomb stribeck mu": "friction of [joint] is Coulomb's, and slides is the point that it pulls",
     "random psd noise seed white": "a random drive does not fit: what drives repeats with every cycle",
     "flow fluid velocity wind": "forces that depend on the motion, as of a flow, do not fit",
-    "time_varying mesh parametric stiffness_samples": "stiffness that varies in time does not fit; its mean does",
+    "time_varying mesh parametric stiffness_samples": "stiffness of [joint] or [[spring]] takes samples of one cycle",
     "chirp ramp step impulse": "a drive that does not repeat with every cycle does not fit; sweep over the speed",
     "control controller pid feedback": "a controller within the machine does not fit; an agent trims the speed only",
     "gap backlash play": "clearance is half the gap: of a backlash, its half",

@@ -44,6 +44,10 @@ def turning_joints(values: Mapping[str, Any]) -> list[bool]:
             raise ParameterError(f"joint.lower {MOTION[below]} and its joint {MOTION[not below]}; allowed: the same")
         _agree("joint", moves, str(row.get("at", "")), points)
         found.append(bool(moves))
+        if "slides" in row:
+            _agree("joint.slides", bool(moves), str(row["slides"]), points)
+    for row in values.get("spring", ()):
+        _agree("spring", _motion("spring", row), str(row.get("at", "")), points)
     operation = values["operation"]
     names = [row.get("name", f"joint_{number}") for number, row in enumerate(joints, 1)]
     watched = names.index(operation["monitored"]) if operation.get("monitored") in names else 0
