@@ -6,9 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from scipy.integrate import solve_ivp
 
 import chaosgym
+from chaosgym.cli import app
+from chaosgym.design.bending import Bending, Section, stress_of_modes
 from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_machine.varying import Spring, VaryingMachine, means
 from chaosgym.simulation.batch import batch_of
@@ -394,3 +397,25 @@ def test_lightly_loaded_gears_are_chaotic():
     for speed in (1200.0, 1500.0):
         assert chaosgym.diagnose(replace(gears, preload=10.0).at(speed), budget=800).nature == "chaotic"
         assert chaosgym.diagnose(gears.at(speed), budget=800).nature == "periodic"
+
+
+def test_gears_that_stay_in_mesh_do_not_lack_contact(tmp_path):
+    """A sweep over settled motions that press all the time, without an impact, does not tell of no contact at all."""
+    given = [
+        str(MACHINES / "kahraman-singh-1991.toml"),
+        "--axis",
+        "speed=2125Hz:2200Hz:2",
+        "--out",
+        str(tmp_path / "sweep"),
+    ]
+    result = CliRunner().invoke(app, ["sweep", *given], catch_exceptions=False)
+    assert "periodic 2" in result.output
+    assert "no contact" not in result.output
+
+
+def test_bending_of_a_joint_that_rubs_is_refused(tmp_path):
+    """Fatigue of the flexible part follows from forces along the joint alone; with friction a line refuses it."""
+    rubs = read(tmp_path, ("damping = ", 'friction = 0.2\nslides = "side"\ndamping = '))
+    section = Section(curvatures=(0.7, 4.2))
+    with pytest.raises(ParameterError, match="constant stiffness and without friction"):
+        stress_of_modes(rubs, Bending(section=section))

@@ -143,7 +143,7 @@ def _note_millimetres(machine: Any, text: str) -> None:
 def _warnings(plan: Any, labelled: Any) -> list[str]:
     """What the counts do not say: points without contact, and why there are no response types."""
     found = []
-    silent = sum(value == 0.0 for value in labelled.column("impacts_per_cycle").tolist())
+    silent = sum(value == 0.0 for value in labelled.column("contact_fraction").tolist())
     if silent:
         found.append(f"{silent} of {len(labelled.table)} points have no contact at all: the gap is never closed")
     if plan.sampling == "grid" and not plan.type_reach() and plan.full_types < 1.0:

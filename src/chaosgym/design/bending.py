@@ -162,7 +162,8 @@ def stress_of_modes(machine: Machine, bending: Bending) -> Array:
         except ParameterError as error:
             raise ParameterError(f"bending.at: {error}") from None
     if machine.flexible is None:
-        raise ParameterError(f"[bending] is for a machine of modes or matrices; {machine.name} is none")
+        kind = "modes or matrices, of constant stiffness and without friction"
+        raise ParameterError(f"[bending] is for a machine of {kind}; {machine.name} is none")
     bent = np.array(section.curvatures)
     if section.turn:
         try:
