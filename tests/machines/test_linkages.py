@@ -156,4 +156,4 @@ def test_no_peak_is_passed_over_where_bounds_spare_looks(name):
     np.testing.assert_allclose(np.abs(force).max(axis=1), peaks.max(axis=1), rtol=1e-3)
     for side, sign in enumerate((1.0, -1.0)):
         np.testing.assert_allclose((sign * force).max(axis=1), peaks[:, side], rtol=0.03)
-        np.testing.assert_allclose((sign * force > 0.0).mean(axis=1), record.contact_fraction[:, side], atol=2e-3)
+        np.testing.assert_allclose((sign * force > 0.0).mean(axis=1), record.contact_fraction[:, side], atol=5e-3)

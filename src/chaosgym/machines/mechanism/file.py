@@ -17,7 +17,7 @@ from chaosgym.machines.mechanism.keys import KEYS
 from chaosgym.machines.mechanism.links import Body, Link, rigid_link
 from chaosgym.machines.mechanism.machine import CLEARANCE_FIELDS, Clearance, MechanismMachine, machine_of, opened_by
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism, Spring
-from chaosgym.machines.mechanism.nominal import nominal, revolution_of
+from chaosgym.machines.mechanism.nominal import places, revolution_of
 from chaosgym.machines.numbers import number
 from chaosgym.machines.parameters import parameter
 from chaosgym.machines.stated import range_of, reduced, tolerances_of
@@ -227,7 +227,7 @@ def _gas(row: Mapping[str, Any], mechanism: Mechanism) -> Force:
     gas = Gas(math.pi / 4.0 * bore**2, dead, low, high, behind, exponent)
     direction, point = np.array(_direction(row.get("direction", 0.0))), _end("gas.at", at)
     theta: Any = np.arange(STROKE_ANGLES) * (2.0 * math.pi / STROKE_ANGLES)
-    place = mechanism.point(nominal(mechanism, revolution_of(mechanism), theta).z, point)[0] @ direction
+    place = mechanism.point(places(mechanism, revolution_of(mechanism), theta), point)[0] @ direction
     return Force(point, Sampled(gas.force(place), direction).at)
 
 
@@ -284,6 +284,6 @@ def built(path: str, digest: str, data: Mapping[str, Any], _folder: Path) -> typ
     made.usual_ranges = {field: range_of(made, f"operation.{key}", field, given) for key, field, given in named}
     made.tolerances = tolerances_of(data["tolerances"], machine)
     made.work = Work(task=data["job"])
-    machine.held()  # what can't move is refused here, by name
+    machine.reduce()  # what can't move is refused here, by name, and the rest is kept for the first run
     kind: type[MechanismMachine] = made
     return kind

@@ -144,6 +144,43 @@ class Link(NamedTuple):
         return RIGID + len(self.elastic)
 
 
+class Inertia(NamedTuple):
+    """Inertia of a link with e coordinates in its own axes, where it does not depend on the crank angle.
+
+    Attributes
+    ----------
+    translating, gyroscopic, turning : (e, e)
+        Sum m H^T H and sum m H^T Q H of the particles, which move in axes of the link by H per unit coordinate; Q turns
+        by a quarter. What turns with the particles.
+    pull : (4, e)
+        Sum m H^T a of four accelerations of the points: 1 along x, 1 along y, Q rho and rho.
+    bent : (4, e, e)
+        Likewise, the second derivatives of the points times m a.
+    """
+
+    translating: Array
+    gyroscopic: Array
+    turning: Array
+    pull: Array
+    bent: Array
+
+
+def inertia_of(link: Link) -> Inertia:
+    """Inertia of a link in its own axes."""
+    still, places, count = np.zeros((1, link.size)), link.masses, len(link.mass)
+    motion = places.gradient(still)[0]
+    unit = np.broadcast_to(np.eye(2)[:, None], (2, count, 2))
+    pushed = link.mass[:, None] * np.concatenate([unit, [places.place @ _QUARTER.T, places.place]])
+    row = np.hstack([np.zeros((count, 2)), np.ones((count, 1)), places.slope])
+    return Inertia(
+        np.einsum("k,kiz,kiy->zy", link.mass, motion, motion),
+        np.einsum("k,kiz,ij,kjy->zy", link.mass, motion, _QUARTER, motion),
+        row.T @ (link.inertia[:, None] * row),
+        np.einsum("fki,kiz->fz", pushed, motion),
+        places.bent(still, pushed[:, None])[:, 0],
+    )
+
+
 def rigid_link(
     name: str, points: Mapping[str, tuple[float, float]], bodies: tuple[Body, ...] = (), angle: float = 0.0
 ) -> Link:

@@ -14,10 +14,10 @@ from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS, Contact, Held, held, middles_and_nodes
 from chaosgym.machines.machine import Number, Option
 from chaosgym.machines.mechanism.beam import fibre_stress
-from chaosgym.machines.mechanism.equations import SmallMotion, small_motion
+from chaosgym.machines.mechanism.equations import SmallMotion, loads, small_motion
 from chaosgym.machines.mechanism.joints import ACROSS, ALONG, TURN, Joint
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism
-from chaosgym.machines.mechanism.nominal import Revolution, nominal, revolution_of
+from chaosgym.machines.mechanism.nominal import Revolution, places, revolution_of
 from chaosgym.machines.parameters import parameter
 
 Array = NDArray[np.float64]
@@ -143,7 +143,7 @@ class MechanismMachine(BinnedMachine):
 
     def nominal_places(self, theta: Array) -> Array:
         """Coordinates (B, z) of all links at crank angles (B,) [rad] with every gap in its middle."""
-        return nominal(self.mechanism, self.revolution, theta).z
+        return places(self.mechanism, self.revolution, theta)
 
     def equations(self, first: float, count: int) -> SmallMotion:
         """Equations of small motions on a uniform grid of crank angles; see ``small_motion``."""
@@ -169,7 +169,7 @@ class MechanismMachine(BinnedMachine):
         middles, nodes = middles_and_nodes(self.bins)
         found = self.equations(float(middles[0]), len(middles))
         self._refuse_massless(found.mass)
-        return held(found.mass, found.damping, found.stiffness, self.equations(0.0, len(nodes)).load)
+        return held(found.mass, found.damping, found.stiffness, loads(self._scaled(), self.revolution, 0.0, len(nodes)))
 
     def _refuse_massless(self, mass: Array) -> None:
         """Refuse mass matrices (bins, n, n) in which some motion moves no mass."""
@@ -276,7 +276,8 @@ class MechanismMachine(BinnedMachine):
         joint = self._watched
         if self.round_bearing:
             return np.degrees(np.arctan2(force[:, 1], force[:, 0])), "deg"
-        return self.mechanism.motions(self.nominal_places(phase), joint)[ALONG][0], "m"
+        which = self.mechanism.joints.index(joint)
+        return self.mechanism.motions(self.nominal_places(phase))[0][:, which, 0], "m"
 
     @property
     def stiffest(self) -> float:

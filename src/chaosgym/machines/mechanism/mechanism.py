@@ -11,6 +11,7 @@ are the compatibility matrix of the thesis (2.3): dz = B dp.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -194,36 +195,46 @@ class Mechanism:
         angle = np.zeros(len(z)) if frame == GROUND else z[:, self.at[frame].start + 2]
         return rotation(angle + joint.axis)
 
-    def motions(self, z: Array, joint: Joint) -> dict[str, tuple[Array, Array]]:
-        """Value (B,) and derivatives (B, z) of each motion of a joint, whether it holds it or not."""
-        apart, gradient = self.apart(z, joint.first, joint.second)
-        turn, frame = self._turn_of(joint, z), joint.measured_in
-        value = np.einsum("bji,bj->bi", turn, apart)
-        slope = np.swapaxes(turn, -1, -2) @ gradient
-        if frame != GROUND:
-            slope[:, :, self.at[frame].start + 2] += np.einsum("bji,bj->bi", quarter_after(turn), apart)
-        turned, by = np.full(len(z), -joint.turn), np.zeros((len(z), self.size))
-        for end, sign in ((joint.first, -1.0), (joint.second, 1.0)):
-            if end[0] != GROUND:
-                own = self.at[end[0]]
-                by[:, own.start + 2] += sign
-                by[:, own.start + 3 : own.stop] += sign * self.places(end).slope[0]
-                turned += sign * z[:, own.start + 2]
-        return {ALONG: (value[:, 0], slope[:, 0]), ACROSS: (value[:, 1], slope[:, 1]), TURN: (turned, by)}
+    @cached_property
+    def _ends(self) -> "_Ends":
+        return _ends_of(self)
+
+    def motions(self, z: Array) -> tuple[Array, Array]:
+        """Value (B, J, 3) and derivatives (B, J, 3, z) of every joint: along, across and turn, held or not."""
+        ends = self._ends
+        base = z[:, ends.base] * ends.moves
+        turn = rotation(base[:, :, 2])
+        apart, gradient = np.zeros((len(z), len(ends.turn), 2)), np.tile(ends.shift, (len(z), 1, 1, 1))
+        which = np.arange(len(ends.turn))
+        for sign, link, place, shape in zip((-1.0, 1.0), ends.link, ends.place, ends.shape, strict=True):
+            own = turn[:, link]
+            apart += sign * (base[:, link, :2] + (own @ place[..., None])[..., 0])
+            gradient[..., : self.size] += sign * (own @ shape)
+            gradient[:, which, :, ends.spin[link]] += (
+                sign * np.swapaxes(quarter_after(own) @ place[..., None], 0, 1)[..., 0]
+            )
+        axes = turn[:, ends.frame] @ ends.axes
+        value, slope = np.empty((*apart.shape[:2], 3)), np.empty((*apart.shape[:2], 3, self.size + 1))
+        back = np.swapaxes(axes, -1, -2)
+        value[..., :2], slope[..., :2, :] = (back @ apart[..., None])[..., 0], back @ gradient
+        across = np.swapaxes(quarter_after(axes), -1, -2) @ apart[..., None]
+        slope[:, which, :2, ends.spin[ends.frame]] += np.swapaxes(across, 0, 1)[..., 0]
+        value[..., 2], slope[..., 2, : self.size] = z @ ends.slope.T - ends.turn, ends.slope
+        return value, slope[..., : self.size]
 
     def functions(self, z: Array, theta: Array) -> tuple[Array, Array]:
         """Functions c (B, z) of coordinates (B, z) at crank angles (B,), and A = dc/dz (B, z, z).
 
         The driver is first, then come ``rows`` and the elastic coordinates.
         """
-        motions = {joint.name: self.motions(z, joint) for joint in self.joints}
-        turned, slope = motions[self.driver.name][TURN]
-        rows = [(turned - theta, slope), *(motions[row.joint.name][row.motion] for row in self.rows())]
-        unit = np.eye(self.size)
-        for link in self.links:
-            for at in range(self.at[link.name].start + 3, self.at[link.name].stop):
-                rows.append((z[:, at], np.broadcast_to(unit[at], z.shape)))
-        return np.stack([row[0] for row in rows], 1), np.stack([row[1] for row in rows], 1)
+        ends, (every, slopes) = self._ends, self.motions(z)
+        count = len(ends.picked)
+        value, slope = np.empty_like(z), np.empty((len(z), self.size, self.size))
+        value[:, :count] = every.reshape(len(z), -1)[:, ends.picked]
+        value[:, 0] -= theta
+        slope[:, :count] = slopes.reshape(len(z), -1, self.size)[:, ends.picked]
+        value[:, count:], slope[:, count:] = z[:, ends.elastic], np.eye(self.size)[ends.elastic]
+        return value, slope
 
     def add_bent_rows(self, z: Array, forces: Array, total: Array) -> None:
         """Add the second derivatives of the functions times forces (..., B, z) to ``total`` (..., B, z, z)."""
@@ -245,3 +256,68 @@ class Mechanism:
                 total[..., f, :] += cross
                 total[..., :, f] += cross
                 total[..., f, f] -= np.einsum("...bi,bi->...b", ground, apart)
+
+
+class _Ends(NamedTuple):
+    """Both ends of J joints as arrays; the ground is the last of the links, and stands still.
+
+    ``base`` (links + 1, 3) columns of the places and turns of the links in z, times ``moves`` (links + 1, 1); ``spin``
+    (links + 1,) column of the turn, that of the ground behind all; of first and second ends ``link`` (2, J), ``place``
+    (2, J, 2) and ``shape`` (2, J, 2, z); ``shift`` (J, 2, z + 1) derivatives by places of links; ``frame`` (J,) link of
+    the axes and ``axes`` (J, 2, 2) in it; ``turn`` (J,) and its derivatives ``slope`` (J, z); ``picked`` rows of all
+    motions that are functions, ``elastic`` columns of the elastic coordinates.
+    """
+
+    base: NDArray[np.int64]
+    moves: Array
+    spin: NDArray[np.int64]
+    link: NDArray[np.int64]
+    place: Array
+    shape: Array
+    shift: Array
+    frame: NDArray[np.int64]
+    axes: Array
+    turn: Array
+    slope: Array
+    picked: NDArray[np.int64]
+    elastic: NDArray[np.int64]
+
+
+def _ends_of(mechanism: Mechanism) -> _Ends:
+    joints, size = mechanism.joints, mechanism.size
+    names = [*mechanism.at, GROUND]
+    starts = np.array([own.start for own in mechanism.at.values()])
+    link = np.array([[names.index(end[0]) for end in (joint.first, joint.second)] for joint in joints]).T
+    place, shape = np.zeros((2, len(joints), 2)), np.zeros((2, len(joints), 2, size))
+    shift, slope = np.zeros((len(joints), 2, size + 1)), np.zeros((len(joints), size))
+    for j, joint in enumerate(joints):
+        for side, (end, sign) in enumerate(((joint.first, -1.0), (joint.second, 1.0))):
+            places = mechanism.places(end)
+            place[side, j] = places.place[0]
+            if end[0] == GROUND:
+                continue
+            own = mechanism.at[end[0]]
+            shape[side, j, :, own.start + 3 : own.stop] = places.shape[0]
+            shift[j, [0, 1], [own.start, own.start + 1]] += sign
+            slope[j, own.start + 2] += sign
+            slope[j, own.start + 3 : own.stop] += sign * places.slope[0]
+    numbers = {joint.name: 3 * j for j, joint in enumerate(joints)}
+    motions = (ALONG, ACROSS, TURN)
+    picked = [numbers[mechanism.driver.name] + 2]
+    picked += [numbers[row.joint.name] + motions.index(row.motion) for row in mechanism.rows()]
+    moving = np.append(np.ones(len(starts)), 0.0)
+    return _Ends(
+        base=np.append(starts, 0)[:, None] + np.arange(3),
+        moves=moving[:, None],
+        spin=np.append(starts + 2, size),
+        link=link,
+        place=place,
+        shape=shape,
+        shift=shift,
+        frame=np.array([names.index(joint.measured_in) for joint in joints]),
+        axes=rotation(np.array([joint.axis for joint in joints])),
+        turn=np.array([joint.turn for joint in joints]),
+        slope=slope,
+        picked=np.array(picked),
+        elastic=np.array([i for own in mechanism.at.values() for i in range(own.start + 3, own.stop)], dtype=np.int64),
+    )
