@@ -25,7 +25,7 @@ from chaosgym.machines.joint_sets import JointTables, PressedSets
 from chaosgym.machines.machine import Flexible, Machine, Number, Option, refuse_fixed_steps
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
-from chaosgym.machines.modal_machine.machine import ModalMachine, clearance_option, rigid_note, turning_note
+from chaosgym.machines.modal_machine.machine import ModalMachine, as_there, clearance_option, rigid_note, turning_note
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import parameter, parameters_of
 from chaosgym.machines.units import TURNING
@@ -74,11 +74,6 @@ class Joint(NamedTuple):
     turns: bool = False
 
 
-def _as_there(name: str) -> Any:
-    """Field of the same name and default as that of ``ModalMachine``."""
-    return parameter(getattr(ModalMachine, name), **vars(parameters_of(ModalMachine)[name]))
-
-
 @dataclass(frozen=True, kw_only=True)
 class JointedMachine(Machine):
     """A structure of a few modes with several joints and a periodic drive; made by ``machine_with_joints``.
@@ -109,13 +104,13 @@ class JointedMachine(Machine):
 
     modes: Structure
     drives: tuple[Drive, ...] = field(default=())
-    speed: float = _as_there("speed")
+    speed: float = as_there("speed")
     """Operating cycles a second [Hz]."""
-    drive_level: float = _as_there("drive_level")
+    drive_level: float = as_there("drive_level")
     """Factor of all harmonics of the drive."""
-    damping_factor: float = _as_there("damping_factor")
+    damping_factor: float = as_there("damping_factor")
     """Factor of the structure's damping."""
-    frequency_factor: float = _as_there("frequency_factor")
+    frequency_factor: float = as_there("frequency_factor")
     """Factor of all natural frequencies."""
     monitored: str = parameter(LARGEST, choices=(LARGEST,), provenance="assumed", source="default")
     """Joint whose motion is shown and whose force is judged; "largest": the one with the largest force of a run."""

@@ -27,7 +27,7 @@ from chaosgym.machines.modal_impact import (
 )
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.structure import Structure
-from chaosgym.machines.parameters import parameter
+from chaosgym.machines.parameters import parameter, parameters_of
 
 Array = NDArray[np.float64]
 
@@ -196,6 +196,11 @@ class ModalMachine(ModalImpactMachine):
         stiffest, damper = float(np.max(model.contact_stiffness)), float(np.max(model.contact_damping))
         force = (math.sqrt(stiffest) + damper * float(np.linalg.norm(model.tip_shape))) * speed
         return max(float(np.max(np.sqrt(energy[1:]) / speed)), float(np.max(peak_force.max(axis=1) / force)))
+
+
+def as_there(name: str) -> Any:
+    """Field of the same name and default as that of ``ModalMachine``."""
+    return parameter(getattr(ModalMachine, name), **vars(parameters_of(ModalMachine)[name]))
 
 
 def turning_note(joints: tuple[str, ...]) -> str:

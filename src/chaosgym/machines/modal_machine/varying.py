@@ -29,10 +29,10 @@ from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.machine import Option, Work, refuse_fixed_steps
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
-from chaosgym.machines.modal_machine.machine import ModalMachine, rigid_note, turning_note
+from chaosgym.machines.modal_machine.machine import ModalMachine, as_there, rigid_note, turning_note
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.numbers import numbers
-from chaosgym.machines.parameters import parameter, parameters_of
+from chaosgym.machines.parameters import parameter
 
 Array = NDArray[np.float64]
 
@@ -95,11 +95,6 @@ def means(values: Array, bins: int) -> Array:
     return np.asarray(np.diff(area) * (bins / count))
 
 
-def _as_there(name: str) -> Any:
-    """Field of the same name and default as that of ``ModalMachine``."""
-    return parameter(getattr(ModalMachine, name), **vars(parameters_of(ModalMachine)[name]))
-
-
 def _assumed(default: float, unit: str, low: float, high: float) -> Any:
     return parameter(default, unit=unit, low=low, high=high, provenance="assumed", source="default")
 
@@ -159,18 +154,18 @@ class VaryingMachine(BinnedMachine):
     springs: tuple[Spring, ...] = field(default=())
     samples: tuple[float, ...] = field(default=())
     slides: str = field(default="")
-    speed: float = _as_there("speed")
-    clearance: float = _as_there("clearance")
-    offset: float = _as_there("offset")
-    stops: str = _as_there("stops")
-    contact_stiffness: float = _as_there("contact_stiffness")
-    contact_damping: float = _as_there("contact_damping")
-    lower_stiffness_factor: float = _as_there("lower_stiffness_factor")
-    lower_damping_factor: float = _as_there("lower_damping_factor")
-    preload: float = _as_there("preload")
-    drive_level: float = _as_there("drive_level")
-    damping_factor: float = _as_there("damping_factor")
-    frequency_factor: float = _as_there("frequency_factor")
+    speed: float = as_there("speed")
+    clearance: float = as_there("clearance")
+    offset: float = as_there("offset")
+    stops: str = as_there("stops")
+    contact_stiffness: float = as_there("contact_stiffness")
+    contact_damping: float = as_there("contact_damping")
+    lower_stiffness_factor: float = as_there("lower_stiffness_factor")
+    lower_damping_factor: float = as_there("lower_damping_factor")
+    preload: float = as_there("preload")
+    drive_level: float = as_there("drive_level")
+    damping_factor: float = as_there("damping_factor")
+    frequency_factor: float = as_there("frequency_factor")
     friction: float = _assumed(0.0, "-", 0.0, 10.0)
     """Coefficient of Coulomb friction at the stops."""
     variation: float = _assumed(1.0, "-", 0.0, 100.0)
