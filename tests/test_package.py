@@ -2,6 +2,7 @@
 
 import ast
 import json
+import re
 import subprocess
 import sys
 import venv
@@ -119,6 +120,24 @@ def test_compiled_kernels_are_cached_by_their_sources():
 
     assert Path(KERNEL_CACHE).name == kernel_digest()
     assert Path(advance_model.stats.cache_path) == Path(KERNEL_CACHE, "core")
+
+
+def test_every_kernel_takes_its_decorator_from_one_place():
+    """``core.kernel`` tells numba where to cache; numba's own ``njit`` would cache by the place of the sources."""
+    sources = [path for path in (ROOT / "src/chaosgym").rglob("*.py") if path.name != "kernel.py"]
+    guilty = [path for path in sources if re.search(r"^from numba import .*\bnjit\b", path.read_text(), re.MULTILINE)]
+    assert guilty == []
+
+
+@pytest.mark.parametrize("words", ["info", "show impact-beam", "show slider-crank", "--help"])
+def test_commands_without_kernels_do_not_import_numba(words):
+    """What runs no machine does not wait for the compiler."""
+    program = "import sys; from chaosgym.cli import app; app(sys.argv[1:], standalone_mode=False)"
+    told = [sys.executable, "-c", f"import atexit, sys; atexit.register(lambda: print(*sys.modules)); {program}"]
+    found = subprocess.run([*told, *words.split()], check=True, capture_output=True, text=True).stdout
+    loaded = found.splitlines()[-1].split()
+    assert "chaosgym.cli" in loaded
+    assert "numba" not in loaded
 
 
 def test_kernels_of_the_classifier_are_cached_by_their_content():

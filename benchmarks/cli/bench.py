@@ -7,6 +7,9 @@ import click
 
 from chaosgym.cli.output import emit
 
+SHOWN_FUNCTIONS = 15
+"""Functions of a cold start that are shown; ``--json`` has all."""
+
 
 @click.command()
 @click.option("--repeats", type=click.IntRange(1, 100), default=5, show_default=True, help="Timed runs per figure.")
@@ -15,18 +18,33 @@ from chaosgym.cli.output import emit
 @click.option("--set-up", "set_up", is_flag=True, help="The times to make a slider crank ready instead.")
 @click.option("--mechanisms", is_flag=True, help="Mechanisms from files against the crank of the thesis instead.")
 @click.option("--scaling", is_flag=True, help="What threads and wrapping make of the vector environments instead.")
+@click.option("--first-use", "first_use", is_flag=True, help="What commands take at first, and to compile, instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def bench(
-    repeats: int, against: str | None, scenes: bool, set_up: bool, mechanisms: bool, scaling: bool, as_json: bool
+    repeats: int,
+    against: str | None,
+    scenes: bool,
+    set_up: bool,
+    mechanisms: bool,
+    scaling: bool,
+    first_use: bool,
+    as_json: bool,
 ) -> None:
     """Rates on this computer: cycles, environment steps, sweep points, classifier rows; or against a peer."""
-    if (against is not None) + scenes + set_up + mechanisms + scaling > 1:
-        raise click.UsageError("--against, --scenes, --set-up, --mechanisms and --scaling exclude each other")
+    if (against is not None) + scenes + set_up + mechanisms + scaling + first_use > 1:
+        raise click.UsageError(
+            "--against, --scenes, --set-up, --mechanisms, --scaling and --first-use exclude each other"
+        )
     if against is not None:
         from benchmarks.performance.against_exudyn import against_exudyn
 
         rows = against_exudyn(repeats=repeats, progress=True)
         return emit({"against": against, "settings": rows}, as_json, lambda: _comparison(rows))
+    if first_use:
+        from benchmarks.performance.first_use import cold_start, warm_start
+
+        found = {"warm_seconds": warm_start(repeats=repeats), "cold": cold_start()}
+        return emit(found, as_json, lambda: _first_use_lines(found))
     from benchmarks.performance import (
         assembly_times,
         benchmark,
@@ -55,6 +73,16 @@ def bench(
         return emit({"scaling": [asdict(each) for each in measured]}, as_json, lambda: _scaling_table(measured))
     result = benchmark(repeats, progress=True)
     return emit(result, as_json, lambda: _rates(result))
+
+
+def _first_use_lines(found: dict[str, Any]) -> list[str]:
+    lines = [f"{seconds:8.2f} s  {command}, compiled" for command, seconds in found["warm_seconds"].items()]
+    for command, cost in found["cold"].items():
+        lines.append(
+            f"{cost['seconds']:8.2f} s  {command}, first ever: {len(cost['functions'])} functions, the dearest"
+        )
+        lines += [f"{seconds:12.2f} s  {name}" for name, seconds in cost["functions"][:SHOWN_FUNCTIONS]]
+    return lines
 
 
 def _rates(result: dict[str, Any]) -> list[str]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from chaosgym.core.binned.taylor import TaylorModel
+from chaosgym.core.binned.model import TaylorModel
 from chaosgym.machines.slider_crank import SliderCrank
 from chaosgym.simulation import simulate
 

@@ -8,7 +8,8 @@ import pytest
 
 from chaosgym import SliderCrank
 from chaosgym.core.binned.cycle import advance
-from chaosgym.core.binned.series import FORCING_TERMS, series_order
+from chaosgym.core.binned.model import FORCING_TERMS
+from chaosgym.core.binned.series import series_order
 from chaosgym.core.binned.tables import table_places, tables
 from chaosgym.core.cubic import cubic
 from chaosgym.core.cycle import cycle_arrays

@@ -8,8 +8,7 @@ import pytest
 
 import chaosgym
 from chaosgym import simulate
-from chaosgym.core.binned.cycle import BinnedModel
-from chaosgym.core.binned.taylor import TaylorModel
+from chaosgym.core.binned.model import BinnedModel, TaylorModel
 from chaosgym.machines.parameters import with_settings
 from tests.machines import linkage_twins
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from chaosgym.core.binned.cycle import BinnedModel
-from chaosgym.core.binned.taylor import TaylorModel
+from chaosgym.core.binned.model import BinnedModel, TaylorModel
 from chaosgym.machines.slider_crank.equations import degrees_of_freedom, equations
 from chaosgym.machines.slider_crank.joints import InstrumentedSlider
 from chaosgym.machines.slider_crank.kinematics import crank_pin, slider_position, slider_rate

@@ -5,7 +5,9 @@ standard error. Exit codes: 0 done, 1 a computation failed, 2 wrong usage, 130 e
 output. Nothing is coloured, so NO_COLOR holds.
 """
 
+import atexit
 import errno
+import gc
 import os
 import sys
 from importlib import import_module
@@ -38,6 +40,9 @@ COMMANDS = {
     "info": "info:info",
 }
 """Module in this folder and function of every command."""
+
+RARELY = 50_000
+"""New objects after which garbage is looked for: imports make many that stay, and a search each 700 takes a tenth."""
 
 BEYOND_THE_USER = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EFBIG)
 """Errors of a disk that no other way of asking would have avoided."""
@@ -73,6 +78,8 @@ def main() -> None:
 def run_command(command: click.Command) -> None:
     """Run a command line: one clear line instead of a traceback for every error that chaosgym raises on purpose."""
     _use_one_blas_thread()
+    gc.set_threshold(RARELY, 50, 100)
+    atexit.register(gc.freeze)  # a last search for garbage takes as long as a short question
     try:
         with heard_at_once():
             command(standalone_mode=False)

@@ -6,13 +6,12 @@ A batch of models is a model whose fields have one more axis, the machines, in f
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 
 from chaosgym.core.cycle import CycleArrays
-from chaosgym.core.kernel import side_by_side
+from chaosgym.core.kernel import njit, side_by_side
 from chaosgym.core.modal_impact import advance_model
-from chaosgym.core.modal_model import ModalImpactModel, Tables
-from chaosgym.core.propagator import Regimes
+from chaosgym.core.modal_model import ModalImpactModel, Regimes, Tables
 from chaosgym.core.tangent import no_tangents
 
 

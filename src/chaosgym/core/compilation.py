@@ -24,7 +24,10 @@ from typing import Any
 import numba
 from filelock import FileLock
 from numba.core import event
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
+from numba.core.registry import cpu_target
+from numba.core.runtime import rtsys
 from tqdm import tqdm
 
 from chaosgym.core.kernel import SideBySide
@@ -118,11 +121,24 @@ def _loaded(kernel: Any, signature: tuple[Any, ...]) -> bool:
     if not files or not all(map(_is_sound, files)):
         return False
     try:
-        with event.install_listener("numba:compile", _Refusal()):
+        with event.install_listener("numba:compile", _Refusal()), _without_registries():
             kernel.compile(signature)
     except Exception:  # not there, or whatever reading a damaged pickle raises: the lock's holder sees to it
         return False
     return True
+
+
+@contextmanager
+def _without_registries() -> Iterator[None]:
+    """Spare numba what it imports to compile: machine code needs the counts of references alone."""
+    context = cpu_target.target_context
+    with global_compiler_lock:
+        rtsys.initialize(context)
+        context.refresh = lambda: None
+        try:
+            yield
+        finally:
+            del context.refresh
 
 
 class _Count(event.Listener):  # type: ignore[misc] # numba has no types

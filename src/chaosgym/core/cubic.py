@@ -2,9 +2,7 @@
 
 import math
 
-from numba import njit
-
-from chaosgym.core.kernel import leaf
+from chaosgym.core.kernel import leaf, njit
 
 
 @njit(cache=True, inline="always")

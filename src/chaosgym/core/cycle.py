@@ -4,8 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chaosgym.core.kernel import leaf
-
 UPPER, LOWER = 0, 1
 
 
@@ -52,27 +50,3 @@ def cycle_arrays(
         peak_vector=np.empty((rows, 2, 3)),
         channel_peak=np.empty((cycles, channels, 2)),
     )
-
-
-@leaf
-def note_touch(bouncing, joints, j, side, time, bounce_time):
-    """Go on bouncing at joint j, or end it and begin anew when the other surface is touched.
-
-    ``bouncing`` (3m,): of all m joints the surface, +1, -1, or 0 before the first touch; then of each the instants of
-    the first and the last touch of it [s], counted from the start of the coming cycle.
-    """
-    first = joints + 2 * j
-    if bouncing[j] != side:
-        if bouncing[j] != 0.0:
-            column = 2 * j + (UPPER if bouncing[j] > 0.0 else LOWER)
-            bounce_time[column] = max(bounce_time[column], bouncing[first + 1] - bouncing[first])
-        bouncing[j] = side
-        bouncing[first] = time
-    bouncing[first + 1] = time
-
-
-@leaf
-def let_pass(bouncing, joints, period):
-    """Count the instants of touches from the start of the next cycle."""
-    for i in range(joints, bouncing.shape[0]):
-        bouncing[i] -= period

@@ -8,11 +8,11 @@ That can turn a periodic response into chaos and the reverse.
 import math
 
 import numpy as np
-from numba import njit
 
 from chaosgym.core import status
-from chaosgym.core.contact import contact_force
-from chaosgym.core.cycle import LOWER, UPPER, let_pass, note_touch
+from chaosgym.core.contact import contact_force, let_pass, note_touch
+from chaosgym.core.cycle import LOWER, UPPER
+from chaosgym.core.kernel import njit
 
 STABILITY_LIMIT = 2.7
 """Largest step times fastest angular frequency; the method grows undamped oscillations from 2.83 on."""

@@ -1,15 +1,47 @@
 """Decorators of kernels: those that only compute, pieces of others, and those that move many machines.
 
+Kernels take ``njit`` from here, so that numba caches them where ``kernel_cache`` says.
+
 Numba counts references to every array that a function is handed, two atomic operations each, which cost more than the
 arithmetic of a short kernel. One that neither allocates nor returns an array needs no count: its caller keeps what it
 works on alive.
 """
 
 from collections.abc import Callable
+from pathlib import Path
 from types import FunctionType
 from typing import Any, NamedTuple
 
 from numba import njit
+from numba.core import caching
+
+from chaosgym.core.kernel_cache import cache_folder
+
+__all__ = ["SideBySide", "leaf", "njit", "part", "side_by_side"]
+
+# with an underscore in older versions of numba
+_Locator: Any = getattr(caching, "UserProvidedCacheLocator", None) or caching._UserProvidedCacheLocator
+
+
+class _ByContent(_Locator):  # type: ignore[misc] # numba has no types
+    """Tells numba the folder of a kernel by ``kernel_cache``."""
+
+    def __init__(self, py_func: Any, py_file: str) -> None:
+        self._py_file = py_file
+        self._lineno = py_func.__code__.co_firstlineno
+        self._cache_path = cache_folder(Path(py_file))
+
+    def get_source_stamp(self) -> str:
+        """Of every kernel the same: the folder's name tells the sources."""
+        return ""
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> Any:
+        """Locator of a kernel; None for functions of others."""
+        return super(_Locator, cls).from_function(py_func, py_file) if cache_folder(Path(py_file)) else None
+
+
+caching.CacheImpl._locator_classes = [_ByContent, *caching.CacheImpl._locator_classes]
 
 
 def leaf(function: Callable[..., Any]) -> Callable[..., Any]:

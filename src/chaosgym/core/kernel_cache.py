@@ -10,12 +10,9 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any
-
-import numba
-from numba.core import caching
 
 CORE = Path(__file__).parent
 
@@ -28,10 +25,11 @@ def source_digest(*folders: Path) -> str:
     return _digest(path for folder in folders for path in sorted(folder.rglob("*.py")))
 
 
+@cache
 def kernel_digest(*folders: Path) -> str:
     """Hash of numba's version and of the sources of kernels: those of ``core``, and of some folders and below."""
     sources = (path for folder in (CORE, *folders) for path in sorted(folder.rglob("*.py")) if path != NO_KERNELS)
-    return _digest(sources, numba.__version__)
+    return _digest(sources, version("numba"))
 
 
 def _digest(sources: Iterator[Path], *words: str) -> str:
@@ -59,42 +57,18 @@ _ROOT = WANTED_CACHE if _is_writable(WANTED_CACHE) else tempfile.mkdtemp(prefix=
 KERNEL_CACHE = os.path.join(_ROOT, kernel_digest())
 """Folder of the compiled kernels: in a new temporary folder where the wanted one is read-only or the disk is full."""
 
-_folders: list[str] = []
-"""Those of the kernels that are being imported, the innermost last."""
-
-# with an underscore in older versions of numba
-_Locator: Any = getattr(caching, "UserProvidedCacheLocator", None) or caching._UserProvidedCacheLocator
+_kernels: dict[Path, tuple[Path, ...]] = {CORE: ()}
+"""Folders of kernels, and the folders whose sources count beside those of ``core``."""
 
 
-class _ByContent(_Locator):  # type: ignore[misc] # numba has no types
-    """Tells numba the folder of a kernel that is imported by ``cached_by_content``."""
-
-    def __init__(self, py_func: Any, py_file: str) -> None:
-        self._py_file = py_file
-        self._lineno = py_func.__code__.co_firstlineno
-        self._cache_path = os.path.join(_folders[-1], Path(py_file).parent.name)
-
-    def get_source_stamp(self) -> str:
-        """Of every kernel the same: the folder's name tells the sources."""
-        return ""
-
-    @classmethod
-    def from_function(cls, py_func: Any, py_file: str) -> Any:
-        """Locator of a kernel; None for functions of others."""
-        return super(_Locator, cls).from_function(py_func, py_file) if _folders else None
+def cached_by_content(folder: Path) -> None:
+    """Cache the kernels of a folder outside ``core`` by the content of its sources and of those of ``core``."""
+    _kernels[folder] = (folder,)
 
 
-caching.CacheImpl._locator_classes = [_ByContent, *caching.CacheImpl._locator_classes]
-
-
-@contextmanager
-def cached_by_content(*folders: Path) -> Iterator[None]:
-    """Kernels imported meanwhile, those of ``core`` or of some folders, are cached by the content of these.
-
-    Kernels outside ``core`` call those inside, so that the sources of both count.
-    """
-    _folders.append(os.path.join(_ROOT, kernel_digest(*folders)))
-    try:
-        yield
-    finally:
-        _folders.pop()
+def cache_folder(source: Path) -> str | None:
+    """Where the kernels of a source are kept; None for those of others."""
+    for folder, counted in _kernels.items():
+        if source.is_relative_to(folder):
+            return os.path.join(_ROOT, kernel_digest(*counted), source.parent.name)
+    return None

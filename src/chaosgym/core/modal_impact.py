@@ -6,11 +6,11 @@ The tables of the structure serve every speed, force and gap; those of the drive
 import math
 
 import numpy as np
-from numba import njit
 
 from chaosgym.core.joints.cycle import advance_joints
 from chaosgym.core.joints.run import JointRun, new_space, work_space
 from chaosgym.core.joints.tables import MOST_LEVELS, ROW, layout, put_drive, put_structure
+from chaosgym.core.kernel import njit
 from chaosgym.core.lanes import aligned, unset
 from chaosgym.core.modal_model import LOAD, LOWER_STOP, STOP, UPPER_STOP
 

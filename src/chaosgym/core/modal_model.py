@@ -4,14 +4,36 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chaosgym.core.propagator import Regimes
-
 FREE, UPPER_STOP, LOWER_STOP = np.int64(0), np.int64(1), np.int64(2)
 """Where the tip is pressed: nowhere, or against a stop; rows of what differs between the three. Integers of numpy, as
 numba compiles a kernel anew for each plain number that it is called with."""
 
 STOP, LOAD = 0, 1
 """Parts of a position of rest: per unit position of the stop that presses, and under the static force."""
+
+
+class Regimes(NamedTuple):
+    """R linear regimes of one system with n degrees of freedom, each in its own n modal blocks.
+
+    Modal coordinates (2n,) are the first ones of all blocks, then the second ones.
+
+    Attributes
+    ----------
+    generator : (R, 4, n)
+        Entries 11, 12, 21, 22 of each block [1/s]; none grows.
+    to_modal, from_modal : (R, 2n, 2n)
+        Modal coordinates from y, and y from modal coordinates.
+    output : (R, 2n)
+        Displacement of the tip [m] per unit modal coordinate.
+    fastest : (R,)
+        Largest modulus of an eigenvalue [1/s].
+    """
+
+    generator: np.ndarray
+    to_modal: np.ndarray
+    from_modal: np.ndarray
+    output: np.ndarray
+    fastest: np.ndarray
 
 
 class Tables(NamedTuple):

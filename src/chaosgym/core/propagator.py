@@ -13,36 +13,8 @@ What is left in u moves freely, so a step costs n small blocks whatever its leng
 """
 
 import math
-from typing import NamedTuple
 
-import numpy as np
-from numba import njit
-
-from chaosgym.core.kernel import leaf
-
-
-class Regimes(NamedTuple):
-    """R linear regimes of one system with n degrees of freedom, each in its own n modal blocks.
-
-    Modal coordinates (2n,) are the first ones of all blocks, then the second ones.
-
-    Attributes
-    ----------
-    generator : (R, 4, n)
-        Entries 11, 12, 21, 22 of each block [1/s]; none grows.
-    to_modal, from_modal : (R, 2n, 2n)
-        Modal coordinates from y, and y from modal coordinates.
-    output : (R, 2n)
-        Displacement of the tip [m] per unit modal coordinate.
-    fastest : (R,)
-        Largest modulus of an eigenvalue [1/s].
-    """
-
-    generator: np.ndarray
-    to_modal: np.ndarray
-    from_modal: np.ndarray
-    output: np.ndarray
-    fastest: np.ndarray
+from chaosgym.core.kernel import leaf, njit
 
 
 @njit(cache=True, inline="always")

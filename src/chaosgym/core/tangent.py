@@ -19,10 +19,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
-from chaosgym.core.kernel import leaf
+from chaosgym.core.kernel import leaf, njit
 
 MAX_CONTRACTION = 8.0
 """Logarithm of the largest contraction between two orthonormalisations of several deviations."""

@@ -1,10 +1,10 @@
 """Many machines with modal impacts at once, each cycle at a speed of its own, with a small deviation carried along."""
 
-from numba import njit, prange
+from numba import prange
 
 from chaosgym.core.batch import beam_of
 from chaosgym.core.cycle import CycleArrays
-from chaosgym.core.kernel import side_by_side
+from chaosgym.core.kernel import njit, side_by_side
 from chaosgym.core.modal_impact import advance_model
 from chaosgym.core.tangent import Tangents
 

@@ -55,7 +55,6 @@ def section_shape(points: ArrayLike, bands: int = 1) -> Shape:
     'closed curve'
     """
     from scipy.sparse.csgraph import minimum_spanning_tree
-    from scipy.spatial.distance import pdist, squareform
 
     samples = np.asarray(points, dtype=float)
     samples = samples[:, None] if samples.ndim == 1 else samples
@@ -67,7 +66,7 @@ def section_shape(points: ArrayLike, bands: int = 1) -> Shape:
     moving = spread > 1e-9 * np.max(np.abs(samples), axis=0, initial=0.0)
     if len(kept) < FEWEST_POINTS or not moving.any():
         return "too few points"
-    apart = squareform(pdist(kept[:, moving] / spread[moving]))
+    apart = np.sqrt(sum((x[:, None] - x) ** 2 for x in (kept[:, moving] / spread[moving]).T))
     apart[apart == 0.0] = 1e-12  # the graph takes 0 for no edge
     np.fill_diagonal(apart, 0.0)
     tree = minimum_spanning_tree(apart)

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
-from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.parameters import check_parameter, expand_fidelity, validate, with_settings
 
 if TYPE_CHECKING:
+    from chaosgym.core.tangent import Tangents
     from chaosgym.machines.batch import CompiledBatch
 
 
@@ -191,7 +191,7 @@ class Machine(ABC):
         bouncing: Array,
         arrays: CycleArrays,
         integrator: Integrator,
-        tangents: Tangents | None = None,
+        tangents: "Tangents | None" = None,
     ) -> tuple[int, int]:
         """Run as many cycles as ``arrays`` has rows; ``coordinates`` (n_states,), ``bouncing`` (3m,) change in place.
 

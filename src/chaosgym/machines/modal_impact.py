@@ -14,19 +14,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays
-from chaosgym.core.fixed_step import advance_fixed_step
-from chaosgym.core.modal_impact import advance_model, shortest_intervals, tabulate
-from chaosgym.core.modal_model import LOAD, STOP, ModalImpactModel, Tables, with_drive_from
-from chaosgym.core.propagator import Regimes
-from chaosgym.core.tangent import Tangents, no_tangents
+from chaosgym.core.modal_model import LOAD, STOP, ModalImpactModel, Regimes, Tables, with_drive_from
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.machine import Flexible, Machine
 from chaosgym.machines.parameters import check_parameter, refuse_not_finite
 
 if TYPE_CHECKING:
+    from chaosgym.core.tangent import Tangents
     from chaosgym.machines.batch import CompiledBatch
 
 Array = NDArray[np.float64]
@@ -308,6 +304,9 @@ def flexible_model(
 
 def with_tables(model: ModalImpactModel) -> ModalImpactModel:
     """Return the model with tables of its own, for the ``step_phase`` of those that it has."""
+    from chaosgym.core.compilation import call
+    from chaosgym.core.modal_impact import shortest_intervals, tabulate
+
     phase = model.tables.step_phase
     shortest = call(shortest_intervals, model.regimes, phase, 0.0)
     return model._replace(tables=Tables(phase, shortest, call(tabulate, model, shortest)))
@@ -456,9 +455,14 @@ class ModalImpactMachine(Machine):
         bouncing: Array,
         arrays: CycleArrays,
         integrator: Integrator,
-        tangents: Tangents | None = None,
+        tangents: "Tangents | None" = None,
     ) -> tuple[int, int]:
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
+        from chaosgym.core.compilation import call
+        from chaosgym.core.fixed_step import advance_fixed_step
+        from chaosgym.core.modal_impact import advance_model
+        from chaosgym.core.tangent import no_tangents
+
         model = self.reduce()
         phase, share = self.__dict__.get("_section", (0.0, 1.0))
         model = with_drive_from(model, phase) if phase else model

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from chaosgym.core.modal_model import ModalImpactModel
-from chaosgym.core.propagator import Regimes
+from chaosgym.core.modal_model import ModalImpactModel, Regimes
 from chaosgym.machines.modal_impact import with_tables
 
 Array = NDArray[np.float64]

@@ -4,5 +4,4 @@ from pathlib import Path
 
 from chaosgym.core.kernel_cache import cached_by_content
 
-with cached_by_content(Path(__file__).parent):
-    from chaosgym.classifier.kernels import parameters, records, trees  # noqa: F401
+cached_by_content(Path(__file__).parent)

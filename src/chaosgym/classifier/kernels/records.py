@@ -1,8 +1,9 @@
 """Kernels that compute the features of one record, for ``classifier.features``."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from chaosgym.core.kernel import njit
 
 Array = NDArray[np.float64]
 

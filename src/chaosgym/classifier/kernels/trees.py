@@ -1,8 +1,9 @@
 """Evaluation of boosted trees, row by row."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from chaosgym.core.kernel import njit
 
 Array = NDArray[np.float64]
 

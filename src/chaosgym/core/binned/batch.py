@@ -5,17 +5,16 @@ it.
 """
 
 import numpy as np
-from numba import carray, njit, prange, types
+from numba import carray, prange, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
 from chaosgym.core.batch import rows_of
-from chaosgym.core.binned.cycle import BinnedModel
 from chaosgym.core.binned.cycle import advance as advance_binned
+from chaosgym.core.binned.model import BinnedModel, TaylorModel
 from chaosgym.core.binned.tables import table_places
-from chaosgym.core.binned.taylor import TaylorModel
 from chaosgym.core.binned.taylor import advance as advance_taylor
-from chaosgym.core.kernel import side_by_side
+from chaosgym.core.kernel import njit, side_by_side
 from chaosgym.core.tangent import no_tangents
 from chaosgym.core.varied import cycle_of
 

@@ -15,10 +15,7 @@ in its Taylor series, on which changes of contact and crests are found. Recordin
 change the motion by a bit.
 """
 
-from typing import NamedTuple
-
 import numpy as np
-from numba import njit
 
 from chaosgym.core import status
 from chaosgym.core.binned.look import (
@@ -66,9 +63,10 @@ from chaosgym.core.binned.record import (
 )
 from chaosgym.core.binned.series import order_for, put_time
 from chaosgym.core.binned.tables import table_places
-from chaosgym.core.cycle import LOWER, UPPER, let_pass, note_touch
+from chaosgym.core.contact import let_pass, note_touch
+from chaosgym.core.cycle import LOWER, UPPER
 from chaosgym.core.events import CROSSES, KEEPS, closing, crossing, opening, settled
-from chaosgym.core.kernel import leaf, part
+from chaosgym.core.kernel import leaf, njit, part
 from chaosgym.core.lanes import LANES, add_columns
 from chaosgym.core.tangent import orthonormalise
 
@@ -86,66 +84,6 @@ CREST_SEARCHES = 2
 
 NEAR_PEAK = 0.99
 """Share of the peak so far that the cubic must reach for a crest to be worth a search."""
-
-
-class BinnedModel(NamedTuple):
-    """All that the kernels know of a mechanism with n coordinates and m contact channels.
-
-    Attributes
-    ----------
-    bin_duration : float
-        Time [s] in which the drive turns through one bin.
-    bins : int
-        How many there are.
-    steps : int
-        Looks in a bin, of eight intervals each.
-    contact_rate : float
-        Angular frequency of the masses next to the closed contacts [rad/s].
-    order : int
-        Order of the Taylor series that sums an interval to round-off.
-    spectrum : float
-        Largest modulus of an eigenvalue of the motion [1/s].
-    row : (m, n)
-        Displacement of each channel per unit coordinate.
-    gap, stiffness, damping : (m,)
-        Clearance [m], contact stiffness [N/m] and damping [N s/m] of each channel.
-    share : (bins, m)
-        Factor of both in each bin; no rows where it is 1 in all.
-    two_sided : (m,) bool
-        True if the channel has a surface on either side, False if only where row . p is positive.
-    radix : int
-        2 where both sides of a channel share their matrices, 3 where friction sets them apart.
-    reading : (m, 3)
-        Contact force of the monitored joint (along, upward or across, sideways) per newton on a channel's positive
-        side; zero for the channels of another joint.
-    reach : (m,)
-        Length of each channel's reading.
-    display : (n,)
-        Displacement of the monitored joint per unit coordinate.
-    anchor : (radix^m, n, m)
-        Places of the coordinates, per unit of clearance, at which the closed channels just touch.
-    table : (radix^m * bins * length,)
-        Rows of ``TablePlaces`` for every contact set and bin.
-    """
-
-    bin_duration: float
-    bins: int
-    steps: int
-    contact_rate: float
-    order: int
-    spectrum: float
-    row: np.ndarray
-    gap: np.ndarray
-    stiffness: np.ndarray
-    damping: np.ndarray
-    share: np.ndarray
-    two_sided: np.ndarray
-    radix: int
-    reading: np.ndarray
-    reach: np.ndarray
-    display: np.ndarray
-    anchor: np.ndarray
-    table: np.ndarray
 
 
 @part

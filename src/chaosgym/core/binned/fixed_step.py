@@ -6,7 +6,6 @@ of the bin of the angle in which a stage falls.
 """
 
 import numpy as np
-from numba import njit
 
 from chaosgym.core import status
 from chaosgym.core.binned.cycle import RUNAWAY, STEP_BUDGET
@@ -23,7 +22,7 @@ from chaosgym.core.binned.taylor import (
 )
 from chaosgym.core.cycle import LOWER, UPPER, let_pass
 from chaosgym.core.fixed_step import STABILITY_LIMIT
-from chaosgym.core.kernel import leaf
+from chaosgym.core.kernel import leaf, njit
 
 
 @leaf

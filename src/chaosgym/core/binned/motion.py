@@ -3,11 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from chaosgym.core.binned.series import FORCING_TERMS, expand, put_time
+from chaosgym.core.binned.model import FORCING_TERMS
+from chaosgym.core.binned.series import expand, put_time
 from chaosgym.core.binned.tables import table_places
-from chaosgym.core.kernel import leaf, part
+from chaosgym.core.kernel import leaf, njit, part
 from chaosgym.core.lanes import (
     LANES,
     add_columns,

@@ -15,11 +15,11 @@ summed to round-off; squared three times it is that of a look. Eight bins are wo
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
-from chaosgym.core.binned.series import FORCING_TERMS, SHARES
-from chaosgym.core.kernel import leaf, part
+from chaosgym.core.binned.model import FORCING_TERMS
+from chaosgym.core.binned.series import SHARES
+from chaosgym.core.kernel import leaf, njit, part
 from chaosgym.core.lanes import (
     LANES,
     add_rows,

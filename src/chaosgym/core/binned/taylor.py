@@ -22,11 +22,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from chaosgym.core import status
 from chaosgym.core.binned.cycle import RUNAWAY, STEP_BUDGET
+from chaosgym.core.binned.model import FORCING_TERMS, LINEAR
 from chaosgym.core.binned.record import (
     begin_cycle,
     channel_crest,
@@ -37,13 +37,12 @@ from chaosgym.core.binned.record import (
     write_peaks,
     write_sample,
 )
-from chaosgym.core.binned.series import FORCING_TERMS, SHARES, shift_forcing
+from chaosgym.core.binned.series import SHARES, shift_forcing
+from chaosgym.core.contact import let_pass, note_touch
 from chaosgym.core.cubic import cubic, cubic_extremum
-from chaosgym.core.cycle import LOWER, UPPER, let_pass, note_touch
-from chaosgym.core.kernel import leaf, part
+from chaosgym.core.cycle import LOWER, UPPER
+from chaosgym.core.kernel import leaf, njit, part
 from chaosgym.core.lanes import LANES, add_columns, next_term, padded, sum_series
-
-LINEAR, HERTZ = 0, 1
 
 ORDER = 16
 """Last power of time in a series: fewer cost more spans, more cost more than they save."""
@@ -68,65 +67,6 @@ LEAST_DEPTH = 1e-12
 
 DEPTH, RATE, MARGIN, FORCE, CHANGE = range(5)
 """Columns of ``View.joint``."""
-
-
-class TaylorModel(NamedTuple):
-    """All that the kernels know of a mechanism with n coordinates, J joints and R rows.
-
-    Lanes are what the R rows read, then the n coordinates, rounded up to a multiple of 8.
-
-    Attributes
-    ----------
-    bin_duration : float
-        Time [s] in which the drive turns through one bin.
-    steps : int
-        Length of a bin over that of the longest piece.
-    longest : float
-        Longest span [s] for which a series is stable.
-    tolerance : float
-        Last terms of the series of velocities at the end of a span [m/s].
-    contact_rate : float
-        Angular frequency of the masses next to the closed contacts [rad/s].
-    acceleration : (bins, 2n + 4 + R + 1, lanes)
-        Second derivative per unit (p, p', 1, x, x^2, x^3), x being the time in the bin over its duration, per newton
-        on the surface along each row, and per newton that slides.
-    first : (J + 1,) int
-        Joint j owns the rows first[j] to first[j + 1] - 1.
-    row : (R, n)
-        Displacement in each direction of a joint per unit coordinate.
-    gap, stiffness, damping : (J,)
-        Clearance [m]; k [N/m] and d [N s/m], or K [N/m^1.5] and chi [s/m].
-    law : int
-        LINEAR or HERTZ.
-    slides : (J,)
-        Share of a joint's force that has friction.
-    two_sided : (J,) bool
-        False if a joint with one row has a surface only where row . p is positive.
-    reading : (R, 3)
-        Contact force of the monitored joint (along, upward or across, sideways) per newton along each row.
-    monitored : (J,) bool
-        True for the joints that are recorded.
-    display : (n,)
-        Displacement of the monitored joint per unit coordinate.
-    """
-
-    bin_duration: float
-    steps: int
-    longest: float
-    tolerance: float
-    contact_rate: float
-    acceleration: np.ndarray
-    first: np.ndarray
-    row: np.ndarray
-    gap: np.ndarray
-    stiffness: np.ndarray
-    damping: np.ndarray
-    law: int
-    slides: np.ndarray
-    two_sided: np.ndarray
-    reading: np.ndarray
-    monitored: np.ndarray
-    display: np.ndarray
 
 
 class Series(NamedTuple):

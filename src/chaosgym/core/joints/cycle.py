@@ -13,10 +13,10 @@ Recording only reads: a time history does not change the motion by a bit.
 import math
 
 import numpy as np
-from numba import njit
 
 from chaosgym.core import status
-from chaosgym.core.cycle import LOWER, UPPER, let_pass, note_touch
+from chaosgym.core.contact import let_pass, note_touch
+from chaosgym.core.cycle import LOWER, UPPER
 from chaosgym.core.joints.events import (
     choose_level,
     first_change,
@@ -57,7 +57,7 @@ from chaosgym.core.joints.run import (
     write_samples,
 )
 from chaosgym.core.joints.tables import FROM, GENERATOR, HARMONICS, JOINTS, MODES, SHORTEST, STATES, TO, WIDTH
-from chaosgym.core.kernel import leaf, part
+from chaosgym.core.kernel import leaf, njit, part
 from chaosgym.core.lanes import LANES, add_columns
 from chaosgym.core.tangent import MAX_CONTRACTION, orthonormalise
 

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from chaosgym.core.events import ROUNDING
 from chaosgym.core.joints.tables import (
@@ -36,7 +35,7 @@ from chaosgym.core.joints.tables import (
     V,
     Y,
 )
-from chaosgym.core.kernel import leaf, part
+from chaosgym.core.kernel import leaf, njit, part
 from chaosgym.core.lanes import (
     LANES,
     add_columns,

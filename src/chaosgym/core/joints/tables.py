@@ -13,8 +13,8 @@ and e_j at instants ahead, its Taylor series and a bound of its fourth derivativ
 import math
 
 import numpy as np
-from numba import njit
 
+from chaosgym.core.kernel import njit
 from chaosgym.core.lanes import LANES, padded
 from chaosgym.core.propagator import block, bound, derivative, steady_response
 

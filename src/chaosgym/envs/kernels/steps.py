@@ -5,7 +5,8 @@ are asked for, and ``which`` (k,) the jobs of the step.
 """
 
 import numpy as np
-from numba import njit
+
+from chaosgym.core.kernel import njit
 
 RUNNING, JOB_DONE, FRACTURE, SIMULATION_FAILED = range(4)
 

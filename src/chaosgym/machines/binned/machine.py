@@ -4,20 +4,20 @@ import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.core.binned.cycle import BinnedModel
-from chaosgym.core.binned.taylor import LINEAR, TaylorModel
+from chaosgym.core.binned.model import LINEAR, BinnedModel, TaylorModel
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
-from chaosgym.core.tangent import Tangents
-from chaosgym.machines.batch import CompiledBatch
-from chaosgym.machines.binned import run as running
 from chaosgym.machines.binned.model import STEP_PHASE, Contact, Held, exact_model, fastest_rate, stepped_model
 from chaosgym.machines.integrators import Integrator
 from chaosgym.machines.machine import Machine
+
+if TYPE_CHECKING:
+    from chaosgym.core.tangent import Tangents
+    from chaosgym.machines.batch import CompiledBatch
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ class BinnedMachine(Machine):
 
     @property
     def law(self) -> int:
-        """Law of all contacts, one of ``core.binned.taylor``."""
+        """Law of all contacts, one of ``core.binned.model``."""
         return LINEAR
 
     @property
@@ -133,10 +133,12 @@ class BinnedMachine(Machine):
         bouncing: Array,
         arrays: CycleArrays,
         integrator: Integrator,
-        tangents: Tangents | None = None,
+        tangents: "Tangents | None" = None,
     ) -> tuple[int, int]:
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
-        return running.run(self, coordinates, bouncing, arrays, integrator, tangents)
+        from chaosgym.machines.binned.run import run
+
+        return run(self, coordinates, bouncing, arrays, integrator, tangents)
 
     @property
     def carries_deviations(self) -> bool:
@@ -147,6 +149,8 @@ class BinnedMachine(Machine):
         """Phase and components of each peak force."""
         return {"peak_phase": arrays.peak_instant * self.crank_rate, "peak_vector": arrays.peak_vector}
 
-    def batch(self, count: int) -> CompiledBatch:
+    def batch(self, count: int) -> "CompiledBatch":
         """Return ``count`` variants that move in one compiled call."""
-        return (running.BinnedBatch if self.has_propagators else running.TaylorBatch)(self, count)
+        from chaosgym.machines.binned.run import BinnedBatch, TaylorBatch
+
+        return (BinnedBatch if self.has_propagators else TaylorBatch)(self, count)

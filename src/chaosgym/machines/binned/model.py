@@ -20,11 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.core.binned.cycle import BinnedModel
-from chaosgym.core.binned.series import FORCING_TERMS, series_order
-from chaosgym.core.binned.tables import tables
-from chaosgym.core.binned.taylor import TaylorModel
-from chaosgym.core.lanes import LANES, padded
+from chaosgym.core.binned.model import FORCING_TERMS, BinnedModel, TaylorModel
 from chaosgym.machines.parameters import refuse_not_finite
 
 if TYPE_CHECKING:
@@ -280,6 +276,8 @@ def stepped_model(machine: "BinnedMachine", step_phase: float) -> TaylorModel:
 
 def _with_readings(accelerations: Array, row: Array) -> Array:
     """Lanes of ``TaylorModel`` of accelerations (..., n)."""
+    from chaosgym.core.lanes import padded
+
     rows, n = row.shape
     lanes = np.zeros((*accelerations.shape[:-1], padded(rows + n)))
     lanes[..., :rows] = accelerations @ row.T
@@ -418,6 +416,8 @@ def _structure(kind: type, *structure: Any) -> _Structure:
 
 def side_by_side(bins: Array) -> Array:
     """Matrices (..., bins, columns, rows) of eight bins each, (..., groups, rows, columns, 8); the last one repeats."""
+    from chaosgym.core.lanes import LANES
+
     missing = -bins.shape[-3] % LANES
     if missing:
         bins = np.concatenate([bins, np.repeat(bins[..., -1:, :, :], missing, axis=-3)], axis=-3)
@@ -437,6 +437,10 @@ def _closed(channels: Channels, radix: int) -> tuple[Array, Array]:
 
 
 def _at_rate(rate: float, step_phase: float, parts: _Structure) -> BinnedModel:
+    from chaosgym.core.binned.series import series_order
+    from chaosgym.core.binned.tables import tables
+    from chaosgym.core.lanes import LANES
+
     bins = parts.bins
     duration = 2.0 * math.pi / (bins * rate)
     steps = max(1, math.ceil(duration * parts.spectrum / (2.0 * LANES * step_phase)))

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from chaosgym.core import status
 from chaosgym.core.binned.batch import advance_binned_machines, advance_kicked_machines, advance_taylor_machines
-from chaosgym.core.binned.cycle import BinnedModel, advance
+from chaosgym.core.binned.cycle import advance
 from chaosgym.core.binned.fixed_step import advance_binned_fixed_step
-from chaosgym.core.binned.taylor import TaylorModel
+from chaosgym.core.binned.model import BinnedModel, TaylorModel
 from chaosgym.core.binned.taylor import advance as advance_stepped
 from chaosgym.core.compilation import call, call_side_by_side
 from chaosgym.core.cycle import CycleArrays

@@ -1,5 +1,6 @@
 """The Impact Beam System: finite elements, the modes that are kept, and the model that the kernels integrate."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -37,6 +38,13 @@ class ImpactBeam(BeamParameters):
     def n_states(self) -> int:
         """Displacement and velocity of every mode."""
         return 2 * (self.n_modes + self.fitted_modes)
+
+    @property
+    def natural_frequencies(self) -> Array:
+        """Natural frequencies [Hz] of the kept modes between the surfaces, (n_modes,)."""
+        if self.interpolated is not None:
+            return super().natural_frequencies
+        return np.asarray(modal_analysis(self).angular_frequency / (2.0 * math.pi))
 
     @property
     def default_integrator(self) -> ExactEvents:

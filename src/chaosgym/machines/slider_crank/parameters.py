@@ -28,7 +28,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.core.binned.taylor import HERTZ, LINEAR
+from chaosgym.core.binned.model import HERTZ, LINEAR
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.machine import BinnedMachine

@@ -1,0 +1,93 @@
+"""What the first use costs: a command with and without compiled kernels, and the functions that it compiles.
+
+Each command runs in a process of its own. Kernels are compiled into a new folder, which is removed; the user's is left
+alone. All figures are processor time.
+"""
+
+import contextlib
+import io
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from numba.core import event
+
+COLD = (("diagnose", "impact-beam"), ("diagnose", "slider-crank"))
+WARM = (("info",), ("show", "impact-beam"), ("show", "slider-crank"), ("simulate", "impact-beam"), *COLD)
+REPEATS = 5
+
+_CHILD = "import sys; from benchmarks.performance.first_use import compiled; compiled(sys.argv[1:])"
+
+
+class _Spent(event.Listener):  # type: ignore[misc] # numba has no types
+    """Processor time of this thread in each function that is compiled, without that of those within."""
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[str, float]] = []
+        self._open: list[list[float]] = []
+
+    def on_start(self, event: event.Event) -> None:
+        self._open.append([time.thread_time(), 0.0])
+
+    def on_end(self, event: event.Event) -> None:
+        began, within = self._open.pop()
+        whole = time.thread_time() - began
+        if self._open:
+            self._open[-1][1] += whole
+        function = event.data["dispatcher"].py_func
+        self.rows.append((f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}", whole - within))
+
+
+def compiled(words: Sequence[str]) -> None:
+    """Run a command of this package and print what each function took that it compiled [s], as rows of a table."""
+    from chaosgym.cli import app
+
+    spent = _Spent()
+    with event.install_listener("numba:compile", spent), contextlib.redirect_stdout(io.StringIO()):
+        app(list(words), standalone_mode=False)
+    for name, seconds in spent.rows:
+        print(f"{seconds:.3f} {name}")
+
+
+def _processor_seconds(command: Sequence[str], environment: dict[str, str] | None = None) -> tuple[float, str]:
+    """Processor time [s] of a process and its children, and what it printed."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    found = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return seconds, found.stdout.decode()
+
+
+def cold_start(commands: Sequence[Sequence[str]] = COLD) -> dict[str, Any]:
+    """Run commands without any compiled kernels.
+
+    Returns
+    -------
+    dict
+        By command: ``seconds`` of the process and ``functions``, a list of (name, seconds without those within), the
+        dearest first; a function that is compiled for several types is there as often.
+    """
+    result = {}
+    for words in commands:
+        with tempfile.TemporaryDirectory() as folder:
+            environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
+            seconds, printed = _processor_seconds([sys.executable, "-c", _CHILD, *words], environment)
+        rows = [line.split() for line in printed.splitlines()]
+        functions = sorted(((name, float(spent)) for spent, name in rows), key=lambda row: -row[1])
+        result[" ".join(words)] = {"seconds": seconds, "functions": functions}
+    return result
+
+
+def warm_start(commands: Sequence[Sequence[str]] = WARM, repeats: int = REPEATS) -> dict[str, float]:
+    """Least processor time [s] of some runs of commands whose kernels are compiled; the first run is not counted."""
+    result = {}
+    for words in commands:
+        command = [sys.executable, "-m", "chaosgym", *words]
+        _processor_seconds(command)
+        result[" ".join(words)] = min(_processor_seconds(command)[0] for _ in range(repeats))
+    return result
