@@ -43,8 +43,8 @@ def bench(
     if first_use:
         from benchmarks.performance.first_use import cold_start, warm_start
 
-        found = {"warm_seconds": warm_start(repeats=repeats), "cold": cold_start()}
-        return emit(found, as_json, lambda: _first_use_lines(found))
+        spent: dict[str, Any] = {"warm_seconds": warm_start(repeats=repeats), "cold": cold_start()}
+        return emit(spent, as_json, lambda: _first_use_lines(spent))
     from benchmarks.performance import (
         assembly_times,
         benchmark,

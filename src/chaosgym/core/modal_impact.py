@@ -71,18 +71,25 @@ def make_run(model, step_phase, event_tolerance):
     if slow or model.tables.step_phase != step_phase or known.shape[1] != at[ROW]:
         known = tabulate(model, shortest_intervals(regimes, step_phase, harmonics * omega))
     values, rows = unset(count * at[ROW]), np.empty(count, np.int64)
-    shape, drive = model.tip_shape.reshape((1, n)), model.drive[0] + omega * omega * model.drive[1]
+    shape, drive = model.tip_shape.reshape((1, n)), np.empty((harmonics, 2, n))
+    for h in range(harmonics):
+        for k in range(2):
+            for i in range(n):
+                drive[h, k, i] = model.drive[0, h, k, i] + omega * omega * model.drive[1, h, k, i]
     for r in range(count):
         rows[r] = r * at[ROW]
         row = values[rows[r] : rows[r] + at[ROW]]
-        row[:] = known[r]
+        for i in range(at[ROW]):
+            row[i] = known[r, i]
         generator, to_modal, from_modal = regimes.generator[r], regimes.to_modal[r], regimes.from_modal[r]
         rest, load = model.rest[r, LOAD], model.drift[r, LOAD]
         put_drive(at, generator, to_modal, from_modal, shape, lags[r], omega, drive, rest, load, row)
     at = work_space(at, np.full(1, count))
     stiffness, damping = model.contact_stiffness.reshape((1, 2)), model.contact_damping.reshape((1, 2))
     own = new_space(at, shape, model.stops.reshape((1, 2)), stiffness, damping)
-    weights = np.where(model.stiffness != 0.0, model.stiffness, omega * omega)
+    weights = np.empty(n)
+    for i in range(n):
+        weights[i] = model.stiffness[i] if model.stiffness[i] != 0.0 else omega * omega
     return JointRun(values, own, at, 1.0 / model.excitation_frequency, event_tolerance / step_phase), rows, weights
 
 

@@ -305,7 +305,7 @@ def turn(model, motion, peak, bouncing, arrays, cycle, tolerance, budget, vector
     share = 1.0 / most
     interval = share * duration
     spacing = bins * duration / max(history.shape[0], 1)
-    events, sample, carries = 0, 0, vectors.shape[0] > 0
+    events, sample, carries = 0, np.int64(0), vectors.shape[0] > 0
     chosen = contact_set(motion, model.radix)
     put_sides(motion, anchors[chosen])
     for b in range(bins):
@@ -319,7 +319,7 @@ def turn(model, motion, peak, bouncing, arrays, cycle, tolerance, budget, vector
             read_now(motion, at)
         if b == 0:
             note_peak(peak, 0.0, joint_force(motion, NOW))
-        done, since = 0, 0.0
+        done, since = np.int64(0), 0.0
         while done < most:
             # ``since``: what has passed of the interval, where a contact has changed in it
             if since == 0.0:
@@ -338,7 +338,7 @@ def turn(model, motion, peak, bouncing, arrays, cycle, tolerance, budget, vector
                     move(motion, at, z, count, done * share, share)
                     if carries:
                         if count == LANES:
-                            carry(motion, at + tables.look, 1, vectors)
+                            carry(motion, at + tables.look, np.int64(1), vectors)
                         else:
                             carry(motion, at + tables.interval, count, vectors)
                     read_after(motion, count)

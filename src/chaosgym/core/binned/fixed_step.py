@@ -20,7 +20,8 @@ from chaosgym.core.binned.taylor import (
     new_view,
     note_touch_of,
 )
-from chaosgym.core.cycle import LOWER, UPPER, let_pass
+from chaosgym.core.contact import let_pass
+from chaosgym.core.cycle import LOWER, UPPER
 from chaosgym.core.fixed_step import STABILITY_LIMIT
 from chaosgym.core.kernel import leaf, njit
 

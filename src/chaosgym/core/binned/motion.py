@@ -26,7 +26,7 @@ READINGS = 4 * LANES
 SLOPES = 2 * LANES
 """How far the slope of a channel lies behind its reading."""
 
-SPARE, NOW = 0, LANES - 1
+SPARE, NOW = np.int64(0), np.int64(LANES - 1)
 """Which of a channel's readings are those of any state, and of now; those after k intervals are ``NOW`` + k."""
 
 
@@ -143,7 +143,8 @@ def motion_of(model):
         surface[GAP], surface[STIFFNESS] = model.gap[j], model.stiffness[j]
         surface[LAG] = model.damping[j] / model.stiffness[j]
         surface[TWO_SIDED] = 1.0 if model.two_sided[j] else 0.0
-        surface[ALONG:REACH] = model.reading[j]
+        for k in range(REACH - ALONG):
+            surface[ALONG + k] = model.reading[j, k]
         surface[REACH] = model.reach[j]
     return Motion(model.table, own, n, m)
 

@@ -264,7 +264,7 @@ def _put_channels(space, row, lag, anchor, s, duration, interval, count, table, 
         for k in range(LANES):
             given = first + 3 * k * width
             _fill(space, given + 3 * width, 3 * width, 0.0)
-            _through(space, space.one, share, given, given + 3 * width, 3)
+            _through(space, space.one, share, given, given + 3 * width, np.int64(3))
             _note_largest(space, anchor[s], given + 5 * width, largest)
         for c in range(columns):
             for q in range(2):

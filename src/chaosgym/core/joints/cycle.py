@@ -258,6 +258,14 @@ def run_cycle(run, rows, weights, bouncing, arrays, cycle, event_budget, tangent
     return status.OK, code
 
 
+@leaf
+def keep(vectors, kept):
+    """Copy deviations (k, 2n): an assignment of arrays would compile what it says of shapes that differ."""
+    for k in range(vectors.shape[0]):
+        for i in range(vectors.shape[1]):
+            kept[k, i] = vectors[k, i]
+
+
 @njit(cache=True, nogil=True)
 def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, tangents):
     """Advance ``state`` (2n,) and ``bouncing`` (3m,) in place by whole cycles, one for each row of ``arrays``.
@@ -275,7 +283,7 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
     for cycle in range(arrays.section.shape[0]):
         for i in range(bouncing.shape[0]):
             bounced[i] = bouncing[i]
-        vectors[:] = tangents.vectors
+        keep(tangents.vectors, vectors)
         begin_cycle(run, state, arrays, cycle)
         for k in range(tangents.log_growth.shape[1]):
             tangents.log_growth[cycle, k] = 0.0
@@ -288,7 +296,7 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
         if outcome != status.OK:
             for i in range(bouncing.shape[0]):
                 bouncing[i] = bounced[i]
-            tangents.vectors[:] = vectors
+            keep(vectors, tangents.vectors)
             return outcome, cycle, code
         for i in range(state.shape[0]):
             state[i] = run.own[run.at[STATE] + i]

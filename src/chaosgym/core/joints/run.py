@@ -74,7 +74,7 @@ NUMBERS = 32
 READINGS = 4 * LANES
 """Numbers of what a joint reads: seven to spare, now, after 1 to 8 intervals; and as many rates."""
 
-NOW, RATES = LANES - 1, 2 * LANES
+NOW, RATES = np.int64(LANES - 1), 2 * LANES
 
 U, SPARE, STATE, JOINT, READING, SERIES, TOTALS, PEAKS, SHAPES, DRIFT, OWN, RADIX = range(PLACES, PLACES + 12)
 """Where coordinates and the constants after them, room for others, the state with what follows it, ``NUMBERS`` and
@@ -112,7 +112,10 @@ class JointRun(NamedTuple):
 def work_space(layout, radix):
     """``JointRun.at``, the ``layout`` (PLACES,) of a row and then that of the work space; ``radix`` (m,)."""
     at = np.zeros(RADIX + radix.shape[0], np.int64)
-    at[:PLACES], at[RADIX:] = layout, radix
+    for i in range(PLACES):
+        at[i] = layout[i]
+    for j in range(radix.shape[0]):
+        at[RADIX + j] = radix[j]
     m, width = at[JOINTS], 2 * at[WIDTH]
     at[U] = 0
     at[SPARE] = width + padded(1 + m)

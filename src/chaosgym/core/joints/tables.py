@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from chaosgym.core.kernel import njit
+from chaosgym.core.kernel import leaf, njit
 from chaosgym.core.lanes import LANES, padded
 from chaosgym.core.propagator import block, bound, derivative, steady_response
 
@@ -111,19 +111,24 @@ def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, res
         As in ``layout``, without the column of 1.
     """
     n, m, width, states = at[MODES], at[JOINTS], at[WIDTH], at[STATES]
-    values[SHORTEST], values[DRIFTING] = shortest, 1.0 if np.any(drift != 0.0) else 0.0
+    values[SHORTEST], values[DRIFTING] = shortest, 0.0
+    for j in range(m):
+        for i in range(2 * n):
+            if drift[j, i] != 0.0:
+                values[DRIFTING] = 1.0
     for j in range(n):
         if generator[1, j] != 0.0 and generator[2, j] == 0.0:
             values[DRIFTING] = 1.0
-    _put_blocks(at, generator, shortest, 0, at[LEVELS], values)
+    _put_blocks(at, generator, shortest, np.int64(0), at[LEVELS], values)
     rows, reading = np.empty((DEGREE + 1, 2 * n)), np.empty((5, 2 * n))
     for j in range(m):
-        rows[0] = shape[j] @ np.ascontiguousarray(from_modal[:n])
+        moved = shape[j] @ np.ascontiguousarray(from_modal[:n])
+        for i in range(2 * n):
+            rows[0, i] = moved[i]
         for p in range(DEGREE):
             derivative(generator, rows[p], rows[p + 1])
-        for p in range(5):
-            reading[p] = rows[p] + lag[j] * rows[p + 1]
-        _put_joint(at, generator, rows, reading, j, 0, at[LEVELS], values)
+        _read(rows, lag[j], reading)
+        _put_joint(at, generator, rows, reading, j, np.int64(0), at[LEVELS], values)
     resting = from_modal @ np.ascontiguousarray(rest.T)
     for i in range(2 * n):
         for c in range(2 * n):
@@ -159,7 +164,8 @@ def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, res
                 cosine[i] += to_modal[i, n + k] * drive[h, 0, k]
                 sine[i] += to_modal[i, n + k] * drive[h, 1, k]
         steady_response(generator, cosine, sine, rate, response)
-        steady[:, h], steady[:, harmonics + h] = response[:, 0], response[:, 1]
+        for i in range(2 * n):
+            steady[i, h], steady[i, harmonics + h] = response[i, 0], response[i, 1]
     _put_blocks(at, turning, shortest, n, levels, values)
     back = from_modal @ steady
     rows, reading = np.empty((DEGREE + 1, 2 * harmonics)), np.empty((5, 2 * harmonics))
@@ -181,8 +187,7 @@ def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, res
                 rows[0, c] += shape[j, i] * back[i, c]
         for p in range(DEGREE):
             derivative(turning, rows[p], rows[p + 1])
-        for p in range(5):
-            reading[p] = rows[p] + lag[j] * rows[p + 1]
+        _read(rows, lag[j], reading)
         _put_joint(at, turning, rows, reading, j, n, levels, values)
         for i in range(n):
             values[at[CONSTANTS] + j * (1 + at[JOINTS])] += shape[j, i] * resting[i]
@@ -207,6 +212,14 @@ def tabulate(
     put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, rest, drift, constants, values)
     put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, load_rest, load, values)
     return values
+
+
+@leaf
+def _read(rows, lag, reading):
+    """Derivatives ``reading`` (5, 2k) of a joint's reading, of those ``rows`` of its displacement."""
+    for p in range(5):
+        for i in range(rows.shape[1]):
+            reading[p, i] = rows[p, i] + lag * rows[p + 1, i]
 
 
 @njit(cache=True)
