@@ -2,10 +2,13 @@
 
 import math
 
+import numpy as np
+
 from chaosgym.machines.mechanism.beam import Beam, beam_link
 from chaosgym.machines.mechanism.joints import Joint
 from chaosgym.machines.mechanism.links import Body, rigid_link
 from chaosgym.machines.mechanism.mechanism import Mechanism
+from chaosgym.machines.slider_crank.equations import mode_damping, rod_of
 
 
 def thesis_crank(machine, ball_frame="rod"):
@@ -26,8 +29,10 @@ def thesis_crank(machine, ball_frame="rod"):
     rod = rigid_link("rod", points, (bar, end(0.0, "housing"), end(length, "yoke")))
     if machine.rod == "flexible":
         second = math.pi * machine.rod_diameter**4 / 64.0
-        beam = Beam(length, area, second, machine.youngs_modulus, machine.density, machine.n_modes)
+        steel = machine.youngs_modulus, machine.density
+        beam = Beam(length, area, second, *steel, machine.n_modes, fitted=machine.fitted_modes)
         rod = beam_link("rod", beam, {"start": (end(0.0, "housing"),), "end": (end(0.0, "yoke"),)})
+        rod = rod._replace(damping=np.diag(mode_damping(machine, rod_of(machine))[1]))
     opened = {"ideal": (), "clearance": ("across",), "instrumented": ("across", "turn")}[machine.slider_joint]
     ball = () if machine.ball_joint == "ideal" else ("along", "across")
     turned = math.radians(machine.gravity_angle)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.machines.beam_element import POINTS, bending_matrices, interpolation
+from chaosgym.machines.beam_element import POINTS, bending_matrices, fitted_modes, interpolation
 from chaosgym.machines.mechanism.links import Body, Link, Places, together
 
 Array = NDArray[np.float64]
@@ -47,6 +47,8 @@ class Beam(NamedTuple):
         Of every mode, and of the stretch.
     stretches
         Whether its length changes.
+    fitted
+        Modes that stand for all others, as inertia that the beam's end feels.
     """
 
     length: float
@@ -57,6 +59,7 @@ class Beam(NamedTuple):
     modes: int
     damping_ratio: float = 0.0
     stretches: bool = True
+    fitted: int = 0
 
 
 def beam_link(name: str, beam: Beam, ends: Mapping[str, tuple[Body, ...]], angle: float = 0.0) -> Link:
@@ -83,14 +86,24 @@ def beam_link(name: str, beam: Beam, ends: Mapping[str, tuple[Body, ...]], angle
     for end, bodies in ends.items():
         for body in bodies:
             mass[slopes[end], slopes[end]] += body.inertia + body.mass * float(np.dot(body.centre, body.centre))
+            # felt by fitted modes alone: the modes themselves do not move the ends
+            mass[slopes[end], slopes[end] - 1] += body.mass * body.centre[0]
     inner = [i for i in range(size) if i not in (0, size - 2)]
     at = np.ix_(inner, inner)
-    squares, shapes = eigh(stiffness[at], mass[at], subset_by_index=[0, beam.modes - 1])
-    basis = np.zeros((size, beam.modes))
+    kept, modes = beam.modes, beam.modes + beam.fitted
+    squares, shapes = eigh(stiffness[at], mass[at], subset_by_index=[0, (len(inner) if beam.fitted else kept) - 1])
+    if beam.fitted:
+        straight = np.full(size, 1.0 / beam.length)
+        straight[::2] = np.linspace(0.0, 1.0, count + 1)
+        driven = shapes.T @ (mass @ straight)[inner]
+        angular, mix = fitted_modes(np.sqrt(squares[kept:]), driven[kept:], beam.fitted)
+        squares = np.concatenate([squares[:kept], angular**2])
+        shapes = np.hstack([shapes[:, :kept], shapes[:, kept:] @ mix])
+    basis = np.zeros((size, modes))
     basis[inner] = shapes * np.where(shapes[0] < 0.0, -1.0, 1.0)
     short, whole = _drawn_in(points.slope @ basis, beam.length / count)
     first = int(beam.stretches)
-    elastic = first + beam.modes
+    elastic = first + modes
 
     def places(along: Array, across: Array, slope: Array, drawn: Array) -> Places:
         shape, curve = np.zeros((len(along), 2, elastic)), np.zeros((len(along), 2, elastic, elastic))
@@ -101,12 +114,12 @@ def beam_link(name: str, beam: Beam, ends: Mapping[str, tuple[Body, ...]], angle
         full = np.concatenate([np.zeros((len(slope), first)), slope], axis=1)
         return Places(np.stack([along, np.zeros_like(along)], axis=1), shape, full, curve)
 
-    none = np.zeros((len(points.position), beam.modes))
+    none = np.zeros((len(points.position), modes))
     bar = places(points.position, points.deflection @ basis, none, short)
     named, masses, weights, inertias = {}, [bar], list(line * points.weight), [0.0] * len(points.position)
     for end, place in ((START, 0.0), (END, beam.length)):
         slope = basis[slopes[end]][None]
-        named[end] = places(np.array([place]), np.zeros((1, beam.modes)), slope, whole[None] * float(end == END))
+        named[end] = places(np.array([place]), np.zeros((1, modes)), slope, whole[None] * float(end == END))
         for body in ends.get(end, ()):
             masses.append(_offset(named[end], np.array(body.centre)))
             weights.append(body.mass)
@@ -121,7 +134,7 @@ def beam_link(name: str, beam: Beam, ends: Mapping[str, tuple[Body, ...]], angle
         np.array(weights),
         np.array(inertias),
         angle,
-        (STRETCH,) * first + tuple(f"mode {k + 1}" for k in range(beam.modes)),
+        (STRETCH,) * first + tuple(f"mode {k + 1}" for k in range(modes)),
         np.diag([spring] * first + squares.tolist()),
         np.diag([*damping, *(2.0 * beam.damping_ratio * np.sqrt(squares))]),
         beam,
