@@ -7,6 +7,7 @@ The same command goes on with a run that was interrupted, and ends as if it had 
 """
 
 import argparse
+import json
 import sys
 import time
 from pathlib import Path
@@ -32,6 +33,11 @@ HOLD_BIAS = 2.0
 ROW = ("step", "return", "type_iii", "deviation", "processor_seconds")
 
 
+def keywords(text: str) -> dict[str, Any]:
+    """Keywords that an object of JSON names."""
+    return dict(json.loads(text))
+
+
 def arguments() -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -40,6 +46,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--steps", type=int, default=300_000)
     parser.add_argument("--out", type=Path, default=Path("runs/recurrent"))
     parser.add_argument("--fidelity", default=None, help="Rung of the machines in training; default: the task's.")
+    parser.add_argument("--keywords", type=keywords, default={}, help="Of the environment in training, as JSON.")
     parser.add_argument("--envs", type=int, default=64)
     parser.add_argument("--every", type=int, default=10_000, help="Steps between rows and checkpoints.")
     parser.add_argument("--rollout", type=int, default=60)
@@ -114,7 +121,8 @@ def main() -> None:
 
 def train(asked: argparse.Namespace) -> None:
     """Train, or go on, until the steps are done."""
-    envs = VecNormalize(VecMonitor(SB3VecEnv(asked.env, asked.envs, fidelity=asked.fidelity)), gamma=asked.gamma)
+    native = SB3VecEnv(asked.env, asked.envs, **({"fidelity": asked.fidelity} | asked.keywords))
+    envs = VecNormalize(VecMonitor(native), gamma=asked.gamma)
     model, kept = load_checkpoint(asked.out, RecurrentPPO, envs) or (None, None)
     if model is None:
         model = RecurrentPPO(
