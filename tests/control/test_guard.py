@@ -5,7 +5,8 @@ import pytest
 
 from benchmarks.envs.mismatch import ENV, lines, mismatch
 from chaosgym.control.comparison_lines import difference
-from chaosgym.control.controllers import BackOff, Follow, Kriging
+from chaosgym.control.controllers import BackOff, Follow
+from chaosgym.control.evaluation import policy_of
 from chaosgym.control.guard import GuardedPolicy
 from chaosgym.control.policies import shipped_policy
 from chaosgym.control.rollout import play
@@ -51,6 +52,13 @@ def test_it_stays_in_the_band():
     assert off[2:][settled].max() == pytest.approx(1.0)
 
 
+def test_a_controller_is_guarded_too():
+    """One that asks for the demand alone, guarded, follows it until it is distrusted."""
+    guard = GuardedPolicy(Follow(), strikes=10**6)
+    guarded, follow = (play(player, ENV, range(6), steps=40) for player in (guard, Follow()))
+    np.testing.assert_array_equal(guarded.speed, follow.speed)
+
+
 def test_who_was_wrong_is_not_asked_again():
     """A policy that holds irregular demands is distrusted, and what follows is at least near backing off."""
     machines = range(24)
@@ -84,8 +92,8 @@ def test_differences_are_paired():
 
 
 def test_what_it_can_not_guard_is_refused():
-    """A controller, which sets speeds itself, and an objective in which irregular motion costs nothing."""
-    with pytest.raises(ParameterError, match="Kriging can't be guarded"):
-        play(GuardedPolicy(Kriging()), ENV, [0], steps=2)
+    """A function, which may do anything, and an objective in which irregular motion costs nothing."""
+    with pytest.raises(ParameterError, match="_Function can't be guarded"):
+        play(GuardedPolicy(policy_of(lambda observation: 0)), ENV, [0], steps=2)
     with pytest.raises(ParameterError, match="a guard goes by irregular motion"):
         play(GuardedPolicy(shipped_policy(ENV)), ENV, [0], objective="life", steps=2)

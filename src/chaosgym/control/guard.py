@@ -24,7 +24,7 @@ class GuardedPolicy(Controller):
     Parameters
     ----------
     policy
-        Trained policy, or any other that sets trims.
+        Trained policy of trims, or a controller.
     patience
         Irregular steps at the demand before the policy is asked; as of backing off.
     strikes
@@ -59,9 +59,14 @@ class GuardedPolicy(Controller):
         if self.task.type_iii_weight == 0.0:
             raise ParameterError("a guard goes by irregular motion; allowed: type_iii_weight above 0")
         begin: Any = getattr(self.policy, "begin", None)
-        if begin is None or self.policy.keywords.get("action") != "trim":
-            raise ParameterError(f"{type(self.policy).__name__} can't be guarded; allowed: a trained policy of trims")
-        begin(self.task, self.count)
+        if isinstance(self.policy, Controller):
+            self.policy.start(envs)
+        elif begin is None or self.policy.keywords.get("action") != "trim":
+            raise ParameterError(
+                f"{type(self.policy).__name__} can't be guarded; allowed: a controller, or a trained policy of trims"
+            )
+        else:
+            begin(self.task, self.count)
         self._back_off.start(envs)
         self.trusted, self._asked = np.ones(self.count, np.bool_), np.zeros(self.count, np.bool_)
         self._wild, self._demand = np.zeros(self.count, int), np.full(self.count, np.nan)
@@ -71,7 +76,11 @@ class GuardedPolicy(Controller):
         demand, trim = seen(observations, "demand"), seen(observations, "trim")
         wild = irregular(observations, self.task, THRESHOLD, 1e-3) > 0.5
         backed = self._back_off.speeds(observations)
-        wanted = self._trims(np.asarray(self.policy(observations)), trim)
+        band = self.task.largest_trim
+        if isinstance(self.policy, Controller):
+            wanted = np.clip(self.policy.speeds(observations) - demand, -band, band)
+        else:
+            wanted = self._trims(np.asarray(self.policy(observations)), trim)
         new = demand != self._demand
         at_demand = np.abs(seen(observations, "offset")) < 0.01 * self.task.trim_step
         self._demand = demand
