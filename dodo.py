@@ -93,6 +93,7 @@ SWEEPS = {
 }
 LARGE = "--units 128 --batch 1920 --rollout 120"
 START = f"python agents/ppo.py --env chaosgym/ImpactBeamTolerance-v1 --seed 1 --steps 900000 {LARGE} --out {RUNS}/start"
+FLEET = """--keywords '{"level": "fleet", "split": "train"}'"""
 POLICIES = {
     "ImpactBeamTolerance-v1": [f"python agents/ppo.py --seed 0 --steps 900000 {LARGE}"],
     "ImpactBeamWear-v1": [
@@ -100,9 +101,14 @@ POLICIES = {
         f"python agents/ppo.py --start {RUNS}/start --seed 0 --steps 300000 {LARGE} --learning-rate 5e-4",
     ],
     "SliderCrankTolerance-v1": [f"python agents/ppo.py --fidelity draft --seed 0 --steps 240000 {LARGE}"],
+    "ImpactBeamTolerance-v1-fleet": [f"python agents/learn_map.py {FLEET} --seed 0 --steps 300000"],
+    "SliderCrankTolerance-v1-fleet": [
+        f"python agents/ppo.py {FLEET} --fidelity draft --seed 0 --steps 240000 {LARGE}",
+    ],
 }
-"""Commands of the shipped policies; the last of each writes the policy."""
+"""Commands of the shipped policies, by id and level; the last of each writes the policy."""
 
+ON_FLEET = "--level fleet --split test " + " ".join(f"--only '{name}'" for name in ("back off, with memory", "belief"))
 SCORES = {
     "ImpactBeamTolerance-v1": "--machines 256",
     "ImpactBeamWear-v1": "--machines 256",
@@ -110,6 +116,8 @@ SCORES = {
     "SliderCrankTolerance-v1": "--machines 128",
     "SliderCrankWear-v1": "--machines 16",
     "SliderCrank-v1": "--machines 16",
+    "ImpactBeamTolerance-v1-fleet": f"--machines 64 {ON_FLEET} --only kriging --only table",
+    "SliderCrankTolerance-v1-fleet": f"--machines 16 {ON_FLEET}",
 }
 """How many of the machines kept for evaluation the shipped comparisons have."""
 
@@ -126,6 +134,11 @@ LADDER_OPTIONS = {
 def sources(*folders: str) -> list[str]:
     """Python files in some folders and below."""
     return [str(path) for folder in folders for path in sorted(Path(folder).rglob("*.py"))]
+
+
+def id_of(name: str) -> str:
+    """Id of what is named by it and a level."""
+    return f"chaosgym/{name.removesuffix('-fleet')}"
 
 
 def task(name: str, uses: Iterable[str], makes: Iterable[str], *commands: str) -> dict[str, Any]:
@@ -166,7 +179,7 @@ def task_policy():
         folder, run = SHIPPED / name, f"{RUNS}/{name}"
         made = [f"{folder}/{file}" for file in ("policy.json", "weights.npz", "progress.csv")]
         copies = [f"cp {run}/{Path(file).name} {file}" for file in made]
-        full = f"{command} --env chaosgym/{name} --out {run}"
+        full = f"{command} --env {id_of(name)} --out {run}"
         yield task(name, TASKS, made, *before, full, *copies)
 
 
@@ -177,8 +190,9 @@ def task_scores():
         used = TASKS + sources("src/chaosgym/control/controllers")
         if name in POLICIES:
             used.append(f"{SHIPPED}/{name}/weights.npz")
-            options += f" --policy ppo={SHIPPED}/{name}"
-        compare = f"chaosgym compare chaosgym/{name} {options} --out {run}"
+            kind = "map" if "learn_map" in POLICIES[name][-1] else "ppo"
+            options += f" --policy {kind}={SHIPPED}/{name}"
+        compare = f"chaosgym compare {id_of(name)} {options} --out {run}"
         yield task(name, used, [made], f"mkdir -p {RUNS}", compare, f"cp {run} {made}")
 
 

@@ -96,7 +96,7 @@ def test_cards_of_shipped_policies_say_what_the_pages_say():
     pages = " ".join(Path("docs", name).read_text(encoding="utf-8") for name in ("agents.md", "controllers.md"))
     pages = " ".join(pages.split())
     cards = list(Path("src/chaosgym/control/policies/shipped").glob("*/card.md"))
-    assert len(cards) == 3
+    assert len(cards) == 5
     for card in cards:
         text = " ".join(card.read_text(encoding="utf-8").replace("95 % over machines ", "").split())
         for score in re.findall(r"\d\.\d\d \(-?\d\.\d\d to \d\.\d\d\)", text):

@@ -61,6 +61,23 @@ def test_a_training_begins_with_another_policy(env, tmp_path):
 
 
 @pytest.mark.slow
+def test_a_map_is_learned_from_jobs_that_are_not_run_again(tmp_path):
+    """A run that goes on has the bytes of one that never stopped, and its policy plays both objectives."""
+    small = ("--envs", "4", "--epochs", "2", "--units", "16", "--keywords", '{"level": "fleet", "split": "train"}')
+    _train("learn_map", tmp_path / "whole", 960, *small)
+    _train("learn_map", tmp_path / "parts", 480, *small)
+    first = (tmp_path / "parts" / "weights.npz").read_bytes()
+    _train("learn_map", tmp_path / "parts", 960, *small)
+    whole = (tmp_path / "whole" / "weights.npz").read_bytes()
+    assert first != (tmp_path / "parts" / "weights.npz").read_bytes() == whole
+    rows = list(csv.DictReader((tmp_path / "whole" / "progress.csv").read_text().splitlines()))
+    assert [row["epoch"] for row in rows] == ["1", "2"]
+    for objective in ("irregular", "life"):
+        job = play(load_policy(tmp_path / "whole"), BEAM, range(2), level="fleet", objective=objective, steps=20)
+        assert job.deviation.max() < 3.0
+
+
+@pytest.mark.slow
 def test_minari_export_is_read_back(tmp_path, monkeypatch):
     """As many whole jobs as were asked for."""
     pytest.importorskip("minari")
@@ -72,10 +89,13 @@ def test_minari_export_is_read_back(tmp_path, monkeypatch):
     assert told.stdout.split()[-1] == "240"
 
 
-@pytest.mark.parametrize("text", ["{", "[1]", '{"tolerancs": 1}'])
-def test_keywords_that_are_none_end_in_one_line(text, tmp_path):
+@pytest.mark.parametrize(
+    ("script", "text"),
+    [("ppo", "{"), ("ppo", "[1]"), *((script, '{"tolerancs": 1}') for script in ("ppo", "recurrent_ppo", "learn_map"))],
+)
+def test_keywords_that_are_none_end_in_one_line(script, text, tmp_path):
     """No JSON, no object, no keyword of the environment: exit code 2 and one line that says so."""
-    command = [sys.executable, AGENTS / "ppo.py", "--keywords", text, "--out", tmp_path / "run"]
+    command = [sys.executable, AGENTS / f"{script}.py", "--keywords", text, "--out", tmp_path / "run"]
     done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "keyword" in done.stderr.splitlines()[-1]

@@ -13,7 +13,7 @@ from chaosgym.control.policies import TrainedPolicy, load_policy, save_policy, s
 from chaosgym.control.policies.export import exported
 from chaosgym.control.policies.network import Dense, Network
 from chaosgym.control.policies.policy import Normalisation
-from chaosgym.control.policies.shipped import shipped_folder
+from chaosgym.control.policies.shipped import shipped_folder, shipped_name
 from chaosgym.envs import ENVIRONMENTS, SB3VecEnv
 from chaosgym.envs.sb3 import SB3VisitedSpeeds
 from chaosgym.errors import ModelFileError, ParameterError
@@ -143,12 +143,19 @@ def test_an_environment_without_a_policy_says_so():
         shipped_policy("chaosgym/Nothing-v1")
 
 
+@pytest.mark.parametrize("level", [None, "fleet"])
 @pytest.mark.parametrize("name", ENVIRONMENTS)
-def test_shipped_policies_load_and_have_a_card(name):
+def test_shipped_policies_load_and_have_a_card(name, level):
     """Whatever is shipped can be loaded and says how it scores."""
-    if not shipped_folder(name).is_dir():
+    if not shipped_folder(name, level).is_dir():
         with pytest.raises(ModelFileError, match="no policy is shipped"):
-            shipped_policy(name)
+            shipped_policy(name, level)
         return
-    assert shipped_policy(name).env == name
-    assert "score" in (shipped_folder(name) / "card.md").read_text()
+    assert shipped_policy(name, level).env == name
+    assert "score" in (shipped_folder(name, level) / "card.md").read_text()
+
+
+def test_the_own_level_of_an_id_has_the_policy_of_the_id():
+    """Asking for what an id plays anyway asks for nothing else."""
+    assert shipped_name("chaosgym/ImpactBeamWear-v1", "wear") == shipped_name("chaosgym/ImpactBeamWear-v1")
+    assert shipped_name("chaosgym/ImpactBeamWear-v1", "clearance") == "ImpactBeamWear-v1-clearance"

@@ -47,6 +47,15 @@ def test_a_film_is_written(folder, tmp_path):
     assert out.read_bytes()[4:8] == b"ftyp"
 
 
+def test_a_level_is_played(folder):
+    """Machine 4 of the fleet is another machine than machine 4 of the id; a plant has no level."""
+    one, other = (
+        run_json("run-agent", ENV, "--policy", str(folder), "--level", level) for level in ("nominal", "fleet")
+    )
+    assert one["mean_peak_force_N"] != other["mean_peak_force_N"]
+    assert "--level is of simulated machines" in run("run-agent", ENV, "--plant", "-", "--level", "fleet")[2]
+
+
 def test_kriging_plays_where_no_policy_is_shipped(tmp_path):
     """The file of a machine is enough: no training, no model; what it wins is told as life."""
     machine = tmp_path / "own.toml"

@@ -96,7 +96,7 @@ def compare(
     "--policy",
     type=click.Path(file_okay=False, path_type=Path),
     default=None,
-    help="Folder with policy.json and weights.npz; default: the shipped policy of ENV, or kriging.",
+    help="Folder with policy.json and weights.npz; default: the shipped policy of ENV and level, or kriging.",
 )
 @click.option(
     "--machine",
@@ -105,10 +105,19 @@ def compare(
     show_default=True,
     help="Of those kept for this; with --plant it draws the demands.",
 )
+@click.option("--level", type=click.Choice(LEVELS), default=None, help="What differs from job to job.")
 @click.option("--plant", default=None, metavar="MODULE:CLASS", help="Your machine instead; - for lines of text.")
 @plot_option("--out", formats="figure .png, .svg, .pdf or animation .gif, .mp4")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def run_agent(env: str, policy: Path | None, machine: int, plant: str | None, plot: str | None, as_json: bool) -> None:
+def run_agent(
+    env: str,
+    policy: Path | None,
+    machine: int,
+    level: str | None,
+    plant: str | None,
+    plot: str | None,
+    as_json: bool,
+) -> None:
     """Let an agent run one job beside following the demand.
 
     ENV is an id such as chaosgym/ImpactBeamTolerance-v1, or the file of a machine. Where no policy is shipped or given,
@@ -120,6 +129,8 @@ def run_agent(env: str, policy: Path | None, machine: int, plant: str | None, pl
 
     environment(env)
     if plant is not None:
+        if level is not None:
+            raise click.UsageError("--level is of simulated machines; leave it out with --plant")
         if plot is not None:
             raise click.UsageError("--out draws what a simulation tells; leave it out with --plant")
         _at_plant(env, policy, machine, plant, as_json)
@@ -131,11 +142,11 @@ def run_agent(env: str, policy: Path | None, machine: int, plant: str | None, pl
     from chaosgym.control.rollout import Policy, play
 
     agent: Policy
-    keywords: dict[str, Any]
-    if policy is None and not shipped_folder(env).is_dir():
-        name, agent, keywords = KRIGING, Kriging(), {"objective": "life"}
+    keywords: dict[str, Any] = {} if level is None else {"level": level}
+    if policy is None and not shipped_folder(env, level).is_dir():
+        name, agent, keywords = KRIGING, Kriging(), keywords | {"objective": "life"}
     else:
-        name, agent, keywords = "agent", load_policy(policy) if policy else shipped_policy(env), {}
+        name, agent = "agent", load_policy(policy) if policy else shipped_policy(env, level)
     with patience("run-agent"):
         job, follow = (play(player, env, [machine], **keywords) for player in (agent, Follow()))
     if out is not None:

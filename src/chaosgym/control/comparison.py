@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from chaosgym.control import controllers
 from chaosgym.control.maps import FLEET, FLEET_SEED, Maps, fleet_maps, maps_of, model_keywords
+from chaosgym.control.policies.shipped import shipped_name
 from chaosgym.control.rollout import Played, Policy, play
 from chaosgym.control.statistics import bootstrap_interval, paired_difference, performance_profile
 from chaosgym.design.rating_life import LIFE_EXPONENT
@@ -170,9 +171,7 @@ def compare(
             raise ParameterError(f"there is no controller {name!r}; known: {', '.join(known_names)}")
     known = native_envs(env, **keywords)
     kind = known.nominal
-    subject = env if kind.definition == kind.name else f"{env} ({kind.definition})"
-    told = {name: keywords[name] for name in SUBJECTS if keywords.get(name) not in (None, False, "irregular")}
-    subject += "".join(f", {name} {value}" for name, value in told.items())
+    subject = subject_of(env if kind.definition == kind.name else f"{env} ({kind.definition})", **keywords)
     kept = known.workplace.variants.count
     count = kept if machines is None else machines
     if count > kept:
@@ -244,10 +243,26 @@ def read_comparison(path: Path, env: str | None = None) -> pa.Table:
     return table
 
 
-def shipped_comparison(env: str) -> pa.Table | None:
-    """The comparison that comes with chaosgym for an environment, if there is one."""
-    path = Path(str(resources.files("chaosgym.control"))) / "results" / f"{env.rpartition('/')[2]}.parquet"
-    return read_comparison(path, env) if path.is_file() else None
+def shipped_comparison(env: str, **keywords: Any) -> pa.Table | None:
+    """The comparison that comes with chaosgym for an environment with these keywords, if there is one."""
+    level = keywords.get("level")
+    if keywords not in ({}, {"level": level, "split": "test"}):
+        return None
+    path = Path(str(resources.files("chaosgym.control"))) / "results" / f"{shipped_name(env, level)}.parquet"
+    return read_comparison(path, subject_of(env, **keywords)) if path.is_file() else None
+
+
+def subject_of(env: str, **keywords: Any) -> str:
+    """What a comparison is of: the environment, and what sets it apart from the id's own.
+
+    Examples
+    --------
+    >>> from chaosgym.control.comparison import subject_of
+    >>> subject_of("chaosgym/ImpactBeamTolerance-v1", level="fleet", split="test")
+    'chaosgym/ImpactBeamTolerance-v1, level fleet, split test'
+    """
+    told = {name: keywords[name] for name in SUBJECTS if keywords.get(name) not in (None, False, "irregular")}
+    return env + "".join(f", {name} {value}" for name, value in told.items())
 
 
 @dataclass(frozen=True)

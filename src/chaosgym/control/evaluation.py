@@ -175,7 +175,7 @@ def evaluate(
         Show progress bars on standard error.
     keywords
         Of the environment. The scale of the default ones is shipped for the beam's tolerances, and for fewer machines
-        of other ids; any other scale is computed first, in minutes.
+        of other ids and of the fleet's test split; any other scale is computed first, in minutes.
 
     Examples
     --------
@@ -185,7 +185,7 @@ def evaluate(
     """
     runs = policy_of(policy, **keywords)
     played = play(runs, env, range(machines), progress=NAME if progress else None, **keywords)
-    scale = None if keywords else shipped_comparison(env)
+    scale = shipped_comparison(env, **keywords)
     if scale is None or pa.compute.max(scale["machine"]).as_py() < machines - 1:
         makers = Contenders(env, keywords, progress).makers(range(machines))
         scale = pa.concat_tables(

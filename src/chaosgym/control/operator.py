@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.control.controllers import Controller
 from chaosgym.control.evaluation import policy_of
+from chaosgym.control.policies.learned_map import LearnedMap
 from chaosgym.core.compilation import call
 from chaosgym.envs.drive import DEAD_BAND, MOVES, checked_actions
 from chaosgym.envs.kernels.steps import drive, observe
@@ -125,7 +126,8 @@ class Operator:
             raise ParameterError(
                 f"peaks of shape {felt.shape} are not usable; allowed: {FEWEST} or more finite forces from 0 N on"
             )
-        if not isinstance(self.policy, Controller) and (impacts is None or bouncing is None):
+        looks = isinstance(self.policy, LearnedMap) or not isinstance(self.policy, Controller)
+        if looks and (impacts is None or bouncing is None):
             raise ParameterError("a trained policy looks at impacts and bouncing too; give both, or use Kriging()")
         for name, value, high in (("impacts", impacts, np.inf), ("bouncing", bouncing, 1.0)):
             if value is not None and not 0.0 <= value <= high:

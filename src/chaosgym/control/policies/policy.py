@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.control.policies.learned_map import LearnedMap
 from chaosgym.control.policies.network import Dense, Lstm, Network, State
 from chaosgym.envs import environment
 from chaosgym.envs.drive import BACK
@@ -163,7 +164,11 @@ class TrainedPolicy:
         return np.asarray(np.tanh(answer) if self.squashed else np.clip(answer, -1.0, 1.0), np.float32)
 
 
-def save_policy(policy: TrainedPolicy, folder: str | Path) -> None:
+MAP = "map"
+"""Kind of what a ``LearnedMap`` answers with: numbers of every speed."""
+
+
+def save_policy(policy: "TrainedPolicy | LearnedMap", folder: str | Path) -> None:
     """Write ``policy.json`` and ``weights.npz`` into a folder that exists; the same policy gives the same bytes."""
     network = policy.network
     arrays: dict[str, Array] = {}
@@ -171,22 +176,26 @@ def save_policy(policy: TrainedPolicy, folder: str | Path) -> None:
         arrays |= {f"lstm.{name}": values for name, values in network.lstm._asdict().items()}
     for place, layer in enumerate(network.layers):
         arrays |= {f"layer{place}.weight": layer.weight, f"layer{place}.bias": layer.bias}
-    if policy.normalisation:
-        arrays |= {"mean": policy.normalisation.mean, "deviation": policy.normalisation.deviation}
-    if policy.usual:
-        arrays |= {f"usual.{name}": values for name, values in vars(policy.usual).items()}
+    description: dict[str, Any] = {"format": FORMAT, "env": policy.env, "machine": policy.machine}
+    if isinstance(policy, LearnedMap):
+        arrays |= {"mean": policy.mean, "deviation": policy.deviation}
+        description |= {"action": MAP}
+    else:
+        if policy.normalisation:
+            arrays |= {"mean": policy.normalisation.mean, "deviation": policy.normalisation.deviation}
+        if policy.usual:
+            arrays |= {f"usual.{name}": values for name, values in vars(policy.usual).items()}
+        description |= {
+            "action": policy.action,
+            "lstm": network.lstm is not None,
+            "normalisation_limit": policy.normalisation.limit if policy.normalisation else None,
+            "memory": policy.usual is not None,
+            "squashed": policy.squashed,
+        }
     buffer = BytesIO()
     np.savez(buffer, **arrays)  # type: ignore[arg-type]
-    description = {
-        "format": FORMAT,
-        "env": policy.env,
-        "machine": policy.machine,
-        "action": policy.action,
-        "lstm": network.lstm is not None,
+    description |= {
         "activations": [layer.activation for layer in network.layers],
-        "normalisation_limit": policy.normalisation.limit if policy.normalisation else None,
-        "memory": policy.usual is not None,
-        "squashed": policy.squashed,
         "sha256": sha256(buffer.getvalue()).hexdigest(),
     }
     text = json.dumps(description, indent=1) + "\n"
@@ -194,7 +203,7 @@ def save_policy(policy: TrainedPolicy, folder: str | Path) -> None:
     write_atomically(Path(folder) / DESCRIPTION, lambda path: path.write_text(text, encoding="utf-8"))
 
 
-def load_policy(folder: str | Path) -> TrainedPolicy:
+def load_policy(folder: str | Path) -> TrainedPolicy | LearnedMap:
     """Read what ``save_policy`` wrote; nothing in it is executed or imported.
 
     Raises
@@ -226,13 +235,16 @@ def load_policy(folder: str | Path) -> TrainedPolicy:
         raise ModelFileError(f"{folder} can't be read as a policy: {told}") from error
 
 
-def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPolicy:
-    limit = description["normalisation_limit"]
-    lstm = Lstm(*(arrays[f"lstm.{name}"] for name in Lstm._fields)) if description["lstm"] else None
+def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPolicy | LearnedMap:
     layers = tuple(
         Dense(arrays[f"layer{place}.weight"], arrays[f"layer{place}.bias"], activation)
         for place, activation in enumerate(description["activations"])
     )
+    env, machine = str(description["env"]), str(description.get("machine", ""))
+    if description["action"] == MAP:
+        return LearnedMap(env, Network(None, layers), arrays["mean"], arrays["deviation"], machine)
+    limit = description["normalisation_limit"]
+    lstm = Lstm(*(arrays[f"lstm.{name}"] for name in Lstm._fields)) if description["lstm"] else None
     usual = None
     if description["memory"]:
         usual = Usual(len(arrays["usual.count"]))
@@ -242,13 +254,13 @@ def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPol
                 raise ModelFileError(f"usual.{name} has shape {given.shape}; expected: {values.shape}, all finite")
             setattr(usual, name, given)
     return TrainedPolicy(
-        env=str(description["env"]),
+        env=env,
         action=description["action"],
         network=Network(lstm, layers),
         normalisation=None if limit is None else Normalisation(arrays["mean"], arrays["deviation"], float(limit)),
         usual=usual,
         squashed=bool(description["squashed"]),
-        machine=str(description.get("machine", "")),
+        machine=machine,
     )
 
 

@@ -1,0 +1,167 @@
+"""A learned map: from what was felt in this job, how irregular and how loaded this machine is at every speed.
+
+A network was trained to tell, for machines of a fleet, what they did at all speeds where they were run, from what had
+been felt at some of them. At work its answer takes the place of the map that nobody has of this machine, and the speed
+of least expected cost within reach is the next one. The weights of the task come in there alone, so one network plays
+every objective.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.control.controllers.controller import Array, Controller, Observations, place_of, seen
+from chaosgym.control.policies.network import Network
+from chaosgym.design.rating_life import damage_in_a_million
+from chaosgym.envs import environment
+from chaosgym.envs.memory import irregularity
+from chaosgym.envs.task import Task
+from chaosgym.errors import ModelFileError
+
+READINGS = ("mean peak", "scatter", "irregularity", "impacts", "bouncing")
+"""What is remembered of a speed; the first three as logarithms [log N]."""
+
+NOISE = (1.0, 0.3, 0.3)
+"""Forces [N] that are added before the logarithm of the first three (assumed)."""
+
+LARGEST = 5.0
+"""Readings are cut off here, in standard deviations from what is usual at a speed."""
+
+CHANNELS = 2 + len(READINGS)
+"""Numbers remembered of each speed: visited, settled there, and the readings."""
+
+AFRESH = 0.5
+"""Weight of the last settled step at a speed against those before it there."""
+
+
+def readings_of(observations: NDArray[Any]) -> Array:
+    """Readings (n, 5) of observations (n, 14)."""
+    forces = [seen(observations, "mean_peak_force"), seen(observations, "std_peak_force"), irregularity(observations)]
+    others = [seen(observations, "impacts_per_cycle"), seen(observations, "bouncing_share")]
+    return np.column_stack([*np.log(np.column_stack(forces) + NOISE).T, *others])
+
+
+class FeltSpeeds:
+    """What N jobs felt at each speed of a task's grid.
+
+    Parameters
+    ----------
+    task
+        Whose speeds they are.
+    count
+        N.
+    mean, deviation
+        Of the readings at each speed over the machines of training, (speeds, 5).
+
+    Attributes
+    ----------
+    settled : (N,)
+        Whether the last step held the speed of the one before.
+    """
+
+    def __init__(self, task: Task, count: int, mean: Array, deviation: Array) -> None:
+        self.task, self.mean, self.deviation = task, mean, deviation
+        self._felt = np.zeros((count, len(task.grid), CHANNELS), np.float32)
+        self._last, self._jobs = np.full(count, np.nan), np.arange(count)
+        self.settled = np.zeros(count, np.bool_)
+
+    def add(self, observations: Observations) -> NDArray[np.float32]:
+        """Take in a step (N, 14); return all that is remembered and the share of the job to do, (N, 7 speeds + 1)."""
+        speed = seen(observations, "speed")
+        place = place_of(speed, self.task)
+        readings = (readings_of(observations) - self.mean[place]) / self.deviation[place]
+        self.settled = np.abs(speed - self._last) < 0.3 * self.task.trim_step
+        self._last = speed
+        before = self._felt[self._jobs, place]
+        had = before[:, 1] > 0.0
+        # a step on the way counts only until the speed was held
+        weight = np.where(self.settled, np.where(had, AFRESH, 1.0), np.where(had, 0.0, 1.0))[:, None]
+        self._felt[self._jobs, place, 0] = 1.0
+        self._felt[self._jobs, place, 1] = self.settled | had
+        mixed = (1.0 - weight) * before[:, 2:] + weight * readings.clip(-LARGEST, LARGEST)
+        self._felt[self._jobs, place, 2:] = mixed
+        left = observations[:, 4:5].astype(np.float32)
+        return np.concatenate([self._felt.reshape(len(speed), -1), left], axis=1)
+
+
+@dataclass
+class LearnedMap(Controller):
+    """Goes to the speed of least expected cost within the band of trims, by a network's map of this machine.
+
+    Attributes
+    ----------
+    env
+        Environment of the training: its id, or the file of the machine.
+    network
+        From what ``FeltSpeeds`` remembers to 2 numbers for each speed: the logit of the share of irregular cycles, and
+        the logarithm of the mean peak [log N].
+    mean, deviation
+        As for ``FeltSpeeds``.
+    machine
+        ``definition`` of the machine that it was trained on; by default the name in the environment's id.
+
+    Raises
+    ------
+    ModelFileError
+        If the parts do not fit each other.
+
+    Examples
+    --------
+    >>> from chaosgym.control.policies import shipped_policy
+    >>> policy = shipped_policy("chaosgym/ImpactBeamTolerance-v1", "fleet")
+    >>> len(policy.mean)  # speeds of which it knows what is usual
+    57
+    """
+
+    env: str
+    network: Network
+    mean: Array
+    deviation: Array
+    machine: str = ""
+    knows: str = "measurements"
+    _felt: FeltSpeeds = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__init__()
+        self.machine = self.machine or environment(self.env).kwargs["machine"]
+        shape = (len(self.mean), len(READINGS))
+        for name, values in (("mean", self.mean), ("deviation", self.deviation)):
+            if values.shape != shape or not np.isfinite(values).all():
+                raise ModelFileError(f"the {name} of the readings is {values.shape}; expected: {shape}, all finite")
+        if not (self.deviation > 0.0).all():
+            raise ModelFileError("a deviation of the readings is not positive")
+        self.network.check(CHANNELS * shape[0] + 1, 2 * shape[0])
+
+    def begin(self, envs: Any) -> None:
+        """Forget the last jobs.
+
+        Raises
+        ------
+        ModelFileError
+            If it is of another machine, or knows other speeds than those of the task.
+        """
+        here = envs.nominal.definition
+        if here != self.machine:
+            raise ModelFileError(
+                f"the policy was trained on {self.env} (machine {self.machine}); this is {envs.nominal.name} "
+                f"(machine {here})"
+            )
+        if len(self.mean) != len(self.task.grid):
+            raise ModelFileError(
+                f"the policy of {self.env} knows {len(self.mean)} speeds; this task has {len(self.task.grid)}"
+            )
+        self._felt = FeltSpeeds(self.task, self.count, self.mean, self.deviation)
+
+    def speeds(self, observations: Observations) -> Array:
+        """The speed of least expected cost."""
+        task, grid = self.task, self.task.grid
+        answer, _ = self.network(self._felt.add(observations), None)
+        share = 0.5 + 0.5 * np.tanh(0.5 * answer[:, : len(grid)].astype(float))
+        peak = np.exp(answer[:, len(grid) :].astype(float).clip(-10.0, 20.0))
+        lost = damage_in_a_million(peak, task.load_rating) * task.life_share / task.steps
+        demand = seen(observations, "demand")
+        cost = self.cost(share, lost, demand, grid)
+        cost[np.abs(grid - demand[:, None]) > task.largest_trim + 0.5 * task.trim_step] = np.inf
+        return np.asarray(grid[cost.argmin(axis=1)])
