@@ -226,7 +226,7 @@ def task_picture():
     rattle = "benchmarks/documentation/rattle.py"
     yield task("rattle", [rattle], ["docs/rattle.gif"], "python -m benchmarks.documentation.rattle docs/rattle.gif")
     used = ["thesis/figures/type_two.py", "thesis/scorecard/candidates.json"]
-    yield task("type-two", used, ["docs/type-two.png"], "python -m thesis.figures.type_two C docs/type-two.png")
+    yield task("type-two", used, ["docs/type-two.png"], "python -m thesis.figures.type_two E docs/type-two.png")
     play = "chaosgym run-agent chaosgym/ImpactBeamTolerance-v1 --machine 13 --out docs/agent.gif"
     yield task("agent", [*TASKS, *LEARNED], ["docs/agent.gif"], play)
     curves, drawn = "docs/data/training.csv", "docs/training.png"

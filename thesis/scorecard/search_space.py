@@ -261,7 +261,7 @@ SEARCH_SPACES: Mapping[str, SearchSpace] = {
                 "soft pivot, uniform damping",
                 {"damping_family": "uniform"},
                 BEAM_FIELDS,
-                _numbers(BEAM_FIELDS, 0.0241601, 0.2032894, 63.79745, 13.54897, 20249.14, 0.0),
+                _numbers(BEAM_FIELDS, 0.01796204, 0.2079303, 53.17532, 24.02252, 14981.86, 0.03966861),
             ),
             Basin(
                 "soft pivot, damping by frequency",
