@@ -19,6 +19,7 @@ SHOWN_FUNCTIONS = 15
 @click.option("--mechanisms", is_flag=True, help="Mechanisms from files against the crank of the thesis instead.")
 @click.option("--scaling", is_flag=True, help="What threads and wrapping make of the vector environments instead.")
 @click.option("--first-use", "first_use", is_flag=True, help="What commands take at first, and to compile, instead.")
+@click.option("--waits", is_flag=True, help="Short questions, training and memory of a batch instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def bench(
     repeats: int,
@@ -28,12 +29,13 @@ def bench(
     mechanisms: bool,
     scaling: bool,
     first_use: bool,
+    waits: bool,
     as_json: bool,
 ) -> None:
     """Rates on this computer: cycles, environment steps, sweep points, classifier rows; or against a peer."""
-    if (against is not None) + scenes + set_up + mechanisms + scaling + first_use > 1:
+    if (against is not None) + scenes + set_up + mechanisms + scaling + first_use + waits > 1:
         raise click.UsageError(
-            "--against, --scenes, --set-up, --mechanisms, --scaling and --first-use exclude each other"
+            "--against, --scenes, --set-up, --mechanisms, --scaling, --first-use and --waits exclude each other"
         )
     if against is not None:
         from benchmarks.performance.against_exudyn import against_exudyn
@@ -45,6 +47,11 @@ def bench(
 
         spent: dict[str, Any] = {"warm_seconds": warm_start(repeats=repeats), "cold": cold_start()}
         return emit(spent, as_json, lambda: _first_use_lines(spent))
+    if waits:
+        from benchmarks.performance.waits import waits as measure
+
+        waited = measure(repeats)
+        return emit({"waits": waited}, as_json, lambda: [f"{value:12.1f}  {name}" for name, value in waited.items()])
     from benchmarks.performance import (
         assembly_times,
         benchmark,

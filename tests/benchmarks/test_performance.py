@@ -18,6 +18,7 @@ from benchmarks.performance.against_exudyn import Contest, against_exudyn, perio
 from benchmarks.performance.exudyn_machines import ExudynSetting, load_exudyn, run_in_exudyn
 from benchmarks.performance.reports import report_seconds
 from benchmarks.performance.timing import processor_seconds, rate
+from benchmarks.performance.waits import waits
 from chaosgym.errors import ChaosgymError
 from chaosgym.simulation import simulate
 from tests.plain_modes import PLAIN_BEAM, PLAIN_CRANK
@@ -167,3 +168,11 @@ def test_a_contest_reports_speed_beside_verdict() -> None:
     for side in ("chaosgym", "exudyn"):
         assert (row["right_class"][side], row["right_period"][side], row["wrong_at"][side]) == (1, 1, [])
     assert row["mean_peak_force"]["exudyn"] == pytest.approx(row["mean_peak_force"]["chaosgym"], rel=0.02)
+
+
+def test_what_people_wait_for_is_measured() -> None:
+    """A type takes no less than a nature, and a batch keeps more than the states of its machines."""
+    found = waits(1)
+    assert all(value > 0.0 for value in found.values())
+    assert found["classify a random beam, types"] > 0.5 * found["classify a random beam, nature"]
+    assert found["memory, bytes a machine of a batch"] > 8 * PLAIN_BEAM.n_states

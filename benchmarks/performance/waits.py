@@ -1,0 +1,76 @@
+"""Where people wait beside the kernels: short questions in a running process, training, and memory of a batch.
+
+All times are processor time, medians of runs in one process after one that is not counted.
+"""
+
+import statistics
+import tempfile
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.performance.timing import processor_seconds
+from chaosgym.classifier import classifier_for
+from chaosgym.machines import ImpactBeam
+from chaosgym.simulation import simulate
+from chaosgym.simulation.batch import batch_of
+from chaosgym.sweeps import SweepPlan, run_sweep
+from chaosgym.sweeps.plan import default_axes
+
+MACHINES, CYCLES, POINTS = 64, 10, 16
+
+
+def waits(repeats: int = 5) -> dict[str, float]:
+    """Measure what the impact beam's questions take.
+
+    Returns
+    -------
+    dict
+        By what is asked, microseconds of processor time; of ``memory``, bytes a machine.
+    """
+    beam = ImpactBeam()
+    classifier = classifier_for(beam)
+    low, high = zip(*(beam.usual_ranges[name] for name in (beam.speed_field, beam.clearance_field)), strict=True)
+    random = np.random.default_rng(1)
+
+    def classify(types: bool) -> None:
+        for point in random.uniform(low, high, (POINTS, 2)).tolist():  # others in each run: nothing is remembered
+            classifier.classify(beam.at(*point), types=types)
+
+    plan = SweepPlan(beam, default_axes(beam, "random"), "random", POINTS)
+
+    def sweep() -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            run_sweep(plan, Path(folder) / "sweep", workers=1)
+
+    found = {
+        "simulate one cycle": _median(lambda: simulate(beam, 1), 20 * repeats),
+        "classify a random beam, nature": _median(lambda: classify(types=False), repeats) / POINTS,
+        "classify a random beam, types": _median(lambda: classify(types=True), repeats) / POINTS,
+        "point of a sweep": _median(sweep, repeats) / POINTS,
+    }
+    batch: Any = batch_of(beam, MACHINES)
+    for i in range(MACHINES):
+        batch.start(i, beam)
+    which, speeds = np.arange(MACHINES), np.random.default_rng(0).uniform(8.0, 30.0, (MACHINES, CYCLES))
+
+    def own_speeds() -> None:
+        batch.run_varied(which, speeds)
+
+    found["cycle with deviation, a speed of its own"] = _median(own_speeds, repeats) / speeds.size
+    found["cycle of ten at one speed"] = _median(lambda: batch.run(which, CYCLES), repeats) / speeds.size
+    tracemalloc.start()
+    kept = batch_of(beam, MACHINES)
+    for i in range(MACHINES):
+        kept.start(i, beam)
+    found["memory, bytes a machine of a batch"] = tracemalloc.get_traced_memory()[0] / MACHINES
+    tracemalloc.stop()
+    return found
+
+
+def _median(work: Callable[[], object], repeats: int) -> float:
+    work()
+    return 1e6 * statistics.median(processor_seconds(work) for _ in range(repeats))
