@@ -159,6 +159,30 @@ def mismatch(machines: int, fleets: bool, as_json: bool) -> None:
 
 
 @click.command()
+@click.option("--machines", type=click.IntRange(6, 128), default=64, show_default=True, help="Of the larger sets.")
+@click.option("--folder", type=click.Path(exists=True, path_type=Path), default="docs/machines", show_default=True)
+@AS_JSON
+def life(machines: int, folder: Path, as_json: bool) -> None:
+    """Play kriging for the joint's life on machines of which nobody has a model."""
+    from benchmarks.envs.life import life as run
+    from benchmarks.envs.life import lines
+
+    found = run(machines, folder)
+    emit({"rows": found}, as_json, lambda: lines(found))
+
+
+@click.command()
+@click.option("--out", type=click.Path(dir_okay=False, path_type=Path), default="src/chaosgym/envs/pool.csv")
+@AS_JSON
+def pool(out: Path, as_json: bool) -> None:
+    """Draw and filter the machines of chaosgym/AnyMachine-v0 anew."""
+    from benchmarks.envs.pool import write_pool
+
+    found = write_pool(out)
+    emit({"machines": len(found)}, as_json, lambda: [f"{len(found)} machines: {out}"])
+
+
+@click.command()
 @click.argument("env", type=click.Choice(ENVIRONMENTS))
 @click.option("--machines", type=click.IntRange(1, 256), default=64, show_default=True)
 @AS_JSON
@@ -304,6 +328,8 @@ for command in (
     judges,
     audit,
     mismatch,
+    life,
+    pool,
     curves,
     headroom,
     textbook,

@@ -24,6 +24,9 @@ KINDS = {
 }
 """What each task adds, by the end of the id's name."""
 
+ANY_MACHINE = "A machine of a broad family for each job, in shares of its own range of speed and of its rated force."
+"""What the id says of which the page is written by hand."""
+
 MACHINES = {
     "impact-beam": "A steel beam on a flexure pivot is shaken between pivot and tip, and its tip rattles between two "
     "force sensors. It is the Impact Beam System of P. Gu's thesis (MIT, 1994, chapter 3), shaken twice as hard as "
@@ -54,6 +57,7 @@ def pages() -> Iterator[tuple[str, str]]:
         file = f"environments/{machine}.md"
         yield file, page(names)
         rows += [f"| [`{name}`]({file}) | {KINDS[kind_of(name)]} |" for name in names]
+    rows.append(f"| [`chaosgym/AnyMachine-v0`](environments/AnyMachine.md) | {ANY_MACHINE} |")
     table = "\n".join(["| id | task |", "|---|---|", *rows])
     yield (
         "environments.md",

@@ -6,7 +6,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, DotProduct, Matern, WhiteKernel
 
 from chaosgym.control.controllers import Follow, Kriging, MapFollower
-from chaosgym.control.controllers.kriging import CONSTANT, POWER
+from chaosgym.control.controllers.kriging import CONSTANT, HORIZON, POWER, _values
 from chaosgym.control.maps import maps_of
 from chaosgym.control.rollout import play
 from chaosgym.envs.observation import OBSERVATION_NAMES
@@ -99,6 +99,32 @@ def test_life_is_won_on_fresh_beams():
     own = play(MapFollower([maps_of(BEAM, seeds=seeds)]), BEAM, seeds=seeds, objective="life")
     assert np.log(follow.damage / rule.damage).mean() > np.log(1.1)
     assert follow.returns.mean() < rule.returns.mean() < own.returns.mean()
+
+
+def test_what_a_try_may_save_is_that_of_many_draws():
+    """Expected cost and expected improvement of log-normal costs, by drawing them."""
+    rng = np.random.default_rng(0)
+    distance, log_price, deviation = np.array([0.0, 0.1, 0.2]), np.array([-0.4, -1.0, -0.2]), np.array([0.1, 0.6, 1.2])
+    expected, value = _values(distance[None], log_price[None], deviation[None], np.zeros((1, 3), bool))
+    costs = distance + np.exp(log_price + deviation * rng.standard_normal((400_000, 3)))
+    saved = np.maximum(costs.mean(axis=0).min() - costs, 0.0).mean(axis=0)
+    assert expected[0] == pytest.approx(costs.mean(axis=0), rel=0.01)
+    assert value[0] == pytest.approx(costs.mean(axis=0) - HORIZON * saved, abs=0.06)
+
+
+def test_the_demand_is_felt_before_it_is_left():
+    """Twelve beams: the first step is at the demand; later ones are not."""
+    played = play(Kriging(), BEAM, seeds=range(52_000, 52_012), objective="life")
+    first = np.abs(played.speed[0] - played.demand[0])
+    assert first.max() < 1e-4
+    assert np.abs(played.speed - played.demand)[6:].mean() > 0.2
+
+
+def test_life_without_a_price_is_not_played_for():
+    """The task's own price under the objective irregular is next to nothing: all speeds are those demanded."""
+    seeds = range(53_000, 53_006)
+    rule, follow = (play(one, BEAM, seeds=seeds) for one in (Kriging(price=None), Follow()))
+    np.testing.assert_array_equal(rule.speed, follow.speed)
 
 
 def test_a_sensor_that_tells_nothing_holds_nobody():

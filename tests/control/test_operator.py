@@ -19,12 +19,12 @@ def plant(envs):
     run = jobs._run
 
     def recorded(*given):
-        cycles, growth = run(*given)
+        cycles, growth, period = run(*given)
         last = envs.task.cycles_per_step
         seen["peaks"] = envs.nominal.sensed(cycles.peak_force)[0, -last:]
         seen["impacts"] = cycles.impacts[0, -last:].sum() / last
         seen["bounce"] = cycles.bounce_duration[0, -last:]
-        return cycles, growth
+        return cycles, growth, period
 
     jobs._run = recorded
     return seen

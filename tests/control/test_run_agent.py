@@ -34,7 +34,7 @@ def test_a_figure_is_drawn_beside_a_table(folder, tmp_path):
     out = tmp_path / "job.png"
     code, text, _ = run("run-agent", ENV, "--policy", str(folder), "--out", str(out))
     assert code == 0
-    assert len(text.splitlines()) == 1 + 12 + 2 + 1 + 1
+    assert len(text.splitlines()) == 1 + 12 + 2 + 2 + 1
     with Image.open(out) as figure:
         assert figure.size == (1440, 840)
 
@@ -65,7 +65,11 @@ def test_kriging_plays_where_no_policy_is_shipped(tmp_path):
     assert told["life"] == pytest.approx(told["follow"]["damage"] / told["damage"])
     code, text, _ = run("run-agent", str(machine))
     assert code == 0
-    assert f"life of the joint: x{told['life']:.2f}" in text
+    life, other = told["life_h"], told["follow"]["life_h"]
+    assert f"life of the joint: {life:.3g} h, {other:.3g} h under following the demand: x{told['life']:.2f}" in text
+    ratio = told["follow"]["equivalent_force_N"] / told["equivalent_force_N"]
+    assert ratio ** (10.0 / 3.0) == pytest.approx(told["life"], rel=1e-6)
+    assert life / other == pytest.approx(told["life"], rel=0.2)  # hours of a job follow its speeds
     assert "so kriging played for the joint's life" in text
 
 

@@ -18,8 +18,8 @@ LEVELS, SPLITS = ("nominal", "clearance", "wear", "fleet"), ("train", "test", "o
 KRIGING = "kriging"
 
 NO_POLICY = (
-    "no policy is shipped for this machine, so kriging played for the joint's life; returns price life by load_rating, "
-    "100 N if [job] in the file says nothing, the ratio of lives does not depend on it"
+    "no policy is shipped for this machine, so kriging played for the joint's life; returns and hours are by "
+    "load_rating, 100 N if [job] in the file says nothing; forces and the ratio of lives do not depend on it"
 )
 """What is said where no agent is given."""
 
@@ -211,5 +211,12 @@ def _job_lines(name: str, job: "Played", follow: "Played", out: Path | None) -> 
     if name == KRIGING:
         lines.append(NO_POLICY)
     if job.damage[0] > 0.0:
-        lines.append(f"life of the joint: x{follow.damage[0] / job.damage[0]:.2f} of that under following the demand")
+        forces, lives = (
+            [float(getattr(one, name)[0]) for one in (job, follow)] for name in ("equivalent_force", "life")
+        )
+        lines.append(f"equivalent force: {forces[0]:.1f} N, {forces[1]:.1f} N under following the demand")
+        lines.append(
+            f"life of the joint: {lives[0]:.3g} h, {lives[1]:.3g} h under following the demand: "
+            f"x{follow.damage[0] / job.damage[0]:.2f}"
+        )
     return [*lines, *([f"picture: {out}"] if out else [])]

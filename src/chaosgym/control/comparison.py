@@ -26,6 +26,7 @@ from chaosgym.control.policies.shipped import shipped_name
 from chaosgym.control.rollout import Played, Policy, play
 from chaosgym.control.statistics import bootstrap_interval, paired_difference, performance_profile
 from chaosgym.design.rating_life import LIFE_EXPONENT
+from chaosgym.envs.pool import Pool
 from chaosgym.envs.task import Status
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import DatasetError, ParameterError
@@ -44,6 +45,9 @@ COLUMNS = ("contender", "knows", "seed", "machine", "job_return", "type_iii", "d
 
 SUBJECTS = ("objective", "level", "split", "sealed")
 """Keywords that are part of what a comparison is of."""
+
+WITHOUT_MODELS = (ZERO, ONE, "own map, demands known", "back off", SAFE, "kriging")
+"""Contenders on a pool of machines, of which nobody has a model."""
 
 WORN_LEVELS = 5
 """Clearances at which a machine that wears is mapped."""
@@ -65,7 +69,7 @@ class Contenders:
 
     def makers(self, machines: Sequence[int] = ()) -> dict[str, Callable[[], Policy]]:
         """What makes each contender for these machines, in the order in which they are run."""
-        return {
+        known: dict[str, Callable[[], Policy]] = {
             ZERO: controllers.Follow,
             ONE: lambda: controllers.MapFollower(self.own(machines)),
             "own map, demands known": lambda: controllers.Schedule(self.own(machines)),
@@ -74,13 +78,16 @@ class Contenders:
             "best common schedule, demands known": lambda: controllers.CommonSchedule(self.fleet),
             "back off": partial(controllers.BackOff, remembers=False),
             SAFE: controllers.BackOff,
-            "kriging": controllers.Kriging,
+            "kriging": lambda: controllers.Kriging(price=None),
             "bandit": lambda: controllers.Bandit(self.fleet),
             "table": lambda: controllers.Table(self._tables()),
             "belief": lambda: controllers.Belief(self.fleet),
             "belief, exact model": lambda: controllers.Belief(self._exact_fleet()),
             "receding horizon": controllers.RecedingHorizon,
         }
+        if isinstance(native_envs(self.env, **self.keywords).workplace.variants, Pool):
+            return {name: maker for name, maker in known.items() if name in WITHOUT_MODELS}
+        return known
 
     @property
     def _training(self) -> dict[str, Any]:
@@ -102,12 +109,17 @@ class Contenders:
             known = native_envs(self.env, **self.keywords)
             wear, nominal = known.task.wear, known.nominal
             field, levels = nominal.clearance_field, WORN_LEVELS if wear > 0.0 else 1
+
+            def worn(level: int) -> dict[str, float]:
+                factor = 1.0 + wear * level / max(1, levels - 1)
+                return {field: getattr(nominal, field) * factor} if levels > 1 else {}
+
             self._own[key] = [
                 maps_of(
                     self.env,
                     machines=machines,
                     progress=self._bar("own maps"),
-                    **(self.keywords | {field: getattr(nominal, field) * (1.0 + wear * k / max(1, levels - 1))}),
+                    **(self.keywords | worn(k)),
                 )
                 for k in range(levels)
             ]

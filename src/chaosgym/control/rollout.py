@@ -18,7 +18,6 @@ from chaosgym.envs.observation import FELT, OBSERVATION_NAMES
 from chaosgym.envs.task import Status
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ParameterError
-from chaosgym.machines.parameters import parameters_of
 
 Array = NDArray[np.float64]
 
@@ -63,6 +62,8 @@ class Played:
         What the sensors reported, in the order of ``FELT``.
     damage, largest_force : (n,)
         Share of its life that the joint used up, and largest true force [N].
+    equivalent_force, hours : (n,)
+        Constant peak force [N] that wears as much in each cycle, and how long the job took [h].
     status : (n,)
         How the jobs ended.
     cycles_per_step
@@ -80,6 +81,8 @@ class Played:
     felt: Array
     damage: Array
     largest_force: Array
+    equivalent_force: Array
+    hours: Array
     status: NDArray[np.int64]
     cycles_per_step: int
 
@@ -98,6 +101,12 @@ class Played:
         """Mean distance of speed and demand in each job, (n,)."""
         return np.asarray(np.nanmean(np.abs(self.speed - self.demand), axis=0))
 
+    @property
+    def life(self) -> Array:
+        """Hours (n,) after which such jobs have used up the joint's life; infinite without wear."""
+        endless = np.full(len(self.hours), np.inf)
+        return np.asarray(np.divide(self.hours, self.damage, out=endless, where=self.damage > 0.0))
+
     def column(self, name: str) -> Array:
         """One entry of ``FELT`` at every step, (steps, n)."""
         return np.asarray(self.felt[:, :, FELT.index(name)])
@@ -114,6 +123,8 @@ class Played:
             "mean_deviation": float(self.deviation[0]),
             "damage": float(self.damage[0]),
             "largest_force_N": float(self.largest_force[0]),
+            "equivalent_force_N": float(self.equivalent_force[0]),
+            "life_h": float(self.life[0]) if self.damage[0] > 0.0 else None,
             "unit": self.unit,
             "speed": _plain(self.speed),
             "demand": _plain(self.demand),
@@ -171,6 +182,7 @@ def play(
     kept = {name: np.full((steps, count), np.nan) for name in ("speed", "demand", "type_iii", "reward")}
     felt = np.full((steps, count, len(FELT)), np.nan)
     damage, force, status = np.zeros(count), np.zeros(count), np.zeros(count, np.int64)
+    seconds, done = np.zeros(count), np.zeros(count)
     runs = np.ones(count, np.bool_)
     for step in trange(steps, desc=progress, unit="step", disable=progress is None, leave=False):
         observations, rewards, ended, _, info = envs.step(policy(observations))
@@ -180,18 +192,21 @@ def play(
         felt[step, runs] = observations[runs, len(OBSERVATION_NAMES) - len(FELT) :]
         damage[runs], status[runs] = info["damage"][runs], info["status"][runs]
         force[runs] = np.maximum(force[runs], info["largest_force"][runs])
+        seconds[runs] += task.cycles_per_step * envs.jobs.period[runs]
+        done += runs
         runs &= ~ended
         if not runs.any():
             break
-    machine: Any = envs.nominal
     return Played(
         env=env,
-        unit=parameters_of(machine)[machine.speed_field].unit,
+        unit=envs.workplace.unit,
         machines=np.full(count, -1) if numbers is None else numbers,
         seeds=given,
         felt=felt,
         damage=damage,
         largest_force=force,
+        equivalent_force=envs.jobs.force * task.force_of(damage * steps / np.maximum(done, 1.0)),
+        hours=seconds / 3600.0,
         status=status,
         cycles_per_step=task.cycles_per_step,
         **kept,

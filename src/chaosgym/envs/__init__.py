@@ -40,6 +40,7 @@ def register_environments() -> None:
             _register(f"chaosgym/{MACHINES.class_name(machine)}{task}-v1", {"machine": machine, **keywords})
     for task, keywords in TASKS.items():
         _register(f"chaosgym/Machine{task}-v0", keywords)
+    _register("chaosgym/AnyMachine-v0", {"machine": "any", "objective": "life"})
 
 
 def _register(name: str, keywords: dict[str, Any]) -> None:

@@ -12,6 +12,7 @@ from chaosgym.envs.drive import DEAD_BAND, MOVES
 from chaosgym.envs.judge import ExponentJudge, Judge, RecurrenceJudge
 from chaosgym.envs.kernels.steps import JOB, REPORT, drive, observe, settle
 from chaosgym.envs.observation import Observation, sensed
+from chaosgym.envs.pool import Pool
 from chaosgym.envs.task import Status, Task, demand_of
 from chaosgym.envs.variants import DRAWN, Variants
 from chaosgym.errors import SimulationError
@@ -30,10 +31,10 @@ LEAST_ERROR = 1e-6
 
 
 class Rules(NamedTuple):
-    """What all jobs have in common: ``task``, ``variants`` of the machine, ``space`` of an observation."""
+    """What all jobs have in common: ``task``, where machines come from, ``space`` of an observation."""
 
     task: Task
-    variants: Variants
+    variants: Variants | Pool
     space: Box
 
 
@@ -67,6 +68,8 @@ class Jobs:
         Of every step of the job.
     damage : (N, sides)
         Share of its life that each surface has used up.
+    force, period : (N,)
+        What a force of the task is a share of [N], and duration of a cycle of the last step [s].
     traced
         Number of the first jobs of which ``pieces`` keeps where the last step began, for pictures; a list each.
     """
@@ -81,19 +84,24 @@ class Jobs:
         self.state["speed"], self.state["machine"] = task.lowest_speed, DRAWN
         self.demand = np.zeros((count, task.steps + 1))
         self.damage = np.zeros((count, len(nominal.sides)))
-        self._job_time = task.job_cycles * float(nominal.period_at(task.highest_speed))
+        self._lowest, self._span, self.force = np.zeros(count), np.ones(count), np.ones(count)
+        self._job_time, self.period = np.ones((2, count))
         self._velocities = nominal.n_states // 2
         self.traced = 0
         self.pieces: list[list[Piece]] = [[] for _ in range(count)]
 
     @property
     def speed(self) -> Array:
-        """Speeds (N,) of the last step, in the unit of the machine's speed field."""
+        """Speeds (N,) of the last step, in the unit of the task."""
         return self.state["speed"]
 
     def machine_at(self, i: int) -> Machine:
         """Machine of job i at its current speed and clearance."""
-        return self.machines[i].at(float(self.speed[i]), float(self.state["worn"][i]))
+        return self.machines[i].at(self._speed_of(i), float(self.state["worn"][i]))
+
+    def _speed_of(self, i: int) -> float:
+        """Speed of job i, in the unit of its machine."""
+        return float(self._lowest[i] + self._span[i] * self.speed[i])
 
     def start(
         self, which: Indices, generators: Generators, numbers: Indices | None = None, speed: float | None = None
@@ -119,6 +127,9 @@ class Jobs:
             self.demand[i] = demand_of(task, generator)
             self.machines[i] = drawn if numbers is None else variants.held_out(int(numbers[k]))
             self.state["clearance"][i] = getattr(self.machines[i], drawn.clearance_field)
+            self._lowest[i], self._span[i], self.force[i] = units = variants.units(self.machines[i])
+            top = units.lowest + units.span * task.highest_speed
+            self._job_time[i] = task.job_cycles * float(self.machines[i].period_at(top))
         wanted = self.demand[which, 0] - task.start_below if speed is None else np.full(len(which), speed)
         speeds = np.clip(wanted, task.lowest_speed, task.highest_speed)
         if task.speed_grid > 0.0:
@@ -131,12 +142,12 @@ class Jobs:
         if self._monitor is not None:
             self._monitor.forget(which)
         for i in which.tolist():
-            self.batch.start(i, self.machines[i].at(float(self.speed[i])))
+            self.batch.start(i, self.machines[i].at(self._speed_of(i)))
         count = max(task.run_in_cycles, task.cycles_per_step)
-        cycles, growth = self._run(which, speeds, count, generators)
+        cycles, growth, period = self._run(which, count, generators)
         if cycles.failed.any():
             first = int(which[int(cycles.failed.argmax())])
-            raise SimulationError(f"a job can't start at a speed of {self.speed[first]:g}; {self.machines[first]}")
+            raise SimulationError(f"a job can't start at a speed of {self._speed_of(first):g}; {self.machines[first]}")
         self.judge.verdict(which, growth, variants.nominal.sensed(cycles.peak_force))
         info = {
             "speed": speeds.copy(),
@@ -146,25 +157,36 @@ class Jobs:
             "machine": state["machine"],
             "clearance": state["clearance"],
         }
-        return self._observe(which, cycles, variants.nominal.period_at(speeds), generators), info
+        return self._observe(which, cycles, period, generators), info
 
     def step(self, which: Indices, actions: Array, generators: Generators) -> Outcome:
         """Run the jobs ``which`` (k,) for a step by checked actions; a simulation that fails ends its job."""
         task, demands, state = self.rules.task, self.demand, self.state
         call(drive, task.numbers, actions, MOVES, DEAD_BAND, which, demands, state)
-        speed = state["speed"][which]
         if task.wear > 0.0:
             self.batch.set_clearances(which, state["worn"][which])
-        cycles, growth = self._run(which, speed, task.cycles_per_step, generators)
-        peaks, period = cycles.peak_force, self.rules.variants.nominal.period_at(speed)
+        cycles, growth, period = self._run(which, task.cycles_per_step, generators)
+        peaks = cycles.peak_force
         verdict = self.judge.verdict(which, growth, self.rules.variants.nominal.sensed(peaks))
         report, reward = np.empty(len(which), REPORT), np.empty(len(which))
         given = (task.numbers, self._job_time, which, demands, cycles.failed, peaks, task.damage(peaks), period)
         call(settle, *given, *verdict, state, self.damage, report, reward)
+        report["largest_force"] *= self.force[which]
         return Outcome(self._observe(which, cycles, period, generators), reward, report)
 
-    def _run(self, which: Indices, speed: Array, count: int, generators: Generators) -> tuple[Cycles, Array]:
-        """Run machines at speeds (k,) that ripple, with kicks; growth is zero where it is not known."""
+    def _run(self, which: Indices, count: int, generators: Generators) -> tuple[Cycles, Array, Array]:
+        """Run machines for cycles whose speed ripples, with kicks; forces are in the task's unit.
+
+        Returns cycles, their growth, which is zero where it is not known, and the period (k,) [s].
+        """
+        speed = self._lowest[which] + self._span[which] * self.speed[which]
+        cycles, growth = self._moved(which, speed, count, generators)
+        cycles.peak_force[:] /= self.force[which][:, None, None]
+        self.period[which] = self.rules.variants.nominal.period_at(speed)
+        return cycles, growth, self.period[which]
+
+    def _moved(self, which: Indices, speed: Array, count: int, generators: Generators) -> tuple[Cycles, Array]:
+        """Cycles of machines at speeds (k,), and their growth."""
         task = self.rules.task
         speeds = speed[:, None].repeat(count, axis=1)
         if task.speed_ripple > 0.0:

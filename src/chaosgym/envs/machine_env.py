@@ -18,13 +18,14 @@ from chaosgym.envs.drive import action_space, checked_actions
 from chaosgym.envs.jobs import Indices, Jobs, Rules
 from chaosgym.envs.kernels.steps import INFO
 from chaosgym.envs.observation import Observation, observation_names, observation_space
+from chaosgym.envs.pool import ANY, Pool, pool_task
 from chaosgym.envs.setups import setup_of
-from chaosgym.envs.task import Status, divided
+from chaosgym.envs.task import Status, UnknownKeywordError, divided
 from chaosgym.envs.variants import Variants
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES
 from chaosgym.machines.machine import Machine
-from chaosgym.machines.parameters import with_settings
+from chaosgym.machines.parameters import parameters_of, with_settings
 from chaosgym.simulation import CycleRecord
 
 if TYPE_CHECKING:
@@ -69,11 +70,13 @@ class Workplace:
     Parameters
     ----------
     machine
-        Name of the machine on the command line, such as "impact-beam", or the file of your own, "my-machine.toml".
+        Name of the machine on the command line, such as "impact-beam", the file of your own, "my-machine.toml", or
+        "any" for one of the pool in each job, which takes ``split`` and fields of ``Task`` alone.
     level
         What differs from job to job: "nominal", "clearance", "wear" or "fleet".
     split
-        Part of the level's machines: "train", "test" or "outside"; None for all within its tolerances.
+        Part of the level's machines: "train", "test" or "outside"; None for all within its tolerances. Of any machine:
+        "train", "test" or "other_machines"; None trains on the first and keeps the second for evaluation.
     sealed
         Whether the machines kept for evaluation are the 512 of this release instead of the 256 of development.
     tolerances
@@ -91,7 +94,31 @@ class Workplace:
         If a keyword is unknown.
     """
 
-    def __init__(
+    def __init__(self, machine: str, **keywords: Any) -> None:
+        self.variants: Variants | Pool
+        if machine == ANY:
+            self._take_any(**keywords)
+        else:
+            self._take(machine, **keywords)
+        self.space = observation_space(self.task)
+        self.actions = action_space(self.task)
+        self.rules = Rules(self.task, self.variants, self.space)
+
+    def _take_any(self, *, split: str | None = None, **keywords: Any) -> None:
+        """A machine of the pool in each job; nobody has a model of it."""
+        self.variants = Pool(split)
+        self.model = nominal = self.variants.nominal
+        self.unit = "of the range"
+        task = pool_task()
+        own = (*parameters_of(task), "objective")
+        for name in keywords:
+            if name not in own:
+                raise UnknownKeywordError(
+                    f"{name} is nothing that can be set: each job draws a machine; known: split, {', '.join(own)}"
+                )
+        self.task, _ = divided(task, nominal, keywords)
+
+    def _take(
         self,
         machine: str,
         *,
@@ -119,14 +146,18 @@ class Workplace:
             nominal.at(speed)
         self.variants = Variants(nominal, widths if tolerances is None else tolerances, split, sealed=sealed)
         self.model = with_settings(nominal, work.model if model_fidelity is None else {"fidelity": model_fidelity})
-        self.space = observation_space(self.task)
-        self.actions = action_space(self.task)
-        self.rules = Rules(self.task, self.variants, self.space)
+        self.unit = parameters_of(nominal)[nominal.speed_field].unit
 
 
 def first_of(info: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
     """Return the info of the one job as plain numbers."""
     return {name: values.item() for name, values in info.items()}
+
+
+def refuse_pictures(workplace: Workplace, render_mode: str | None) -> None:
+    """Raise ``ParameterError`` where motion is asked for as pictures that have no unit."""
+    if render_mode is not None and isinstance(workplace.variants, Pool):
+        raise ParameterError(f"render_mode = {render_mode!r} is not possible with any machine; allowed: None")
 
 
 class MachineEnv(gym.Env[Observation, Any]):
@@ -155,6 +186,7 @@ class MachineEnv(gym.Env[Observation, Any]):
             raise ParameterError(f"render_mode = {render_mode!r} is not one of None, human, rgb_array")
         self.render_mode = render_mode
         self.workplace = Workplace(machine, **keywords)
+        refuse_pictures(self.workplace, render_mode)
         self.task, self.model = self.workplace.task, self.workplace.model
         self.nominal = self.workplace.variants.nominal
         self.observation_names = observation_names(self.task)

@@ -10,7 +10,7 @@ that cube, or what lies around it, so that no two splits share a machine:
 
 from collections.abc import Mapping
 from hashlib import sha256
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,22 +97,43 @@ class Variants:
         """Return machine ``number`` of the evaluation."""
         return self.drawn(np.random.default_rng([self.seed, number]), number)
 
-    def checked_numbers(self, given: Any, count: int) -> np.ndarray:
-        """Return numbers of held-out machines for ``count`` jobs, (count,).
+    def units(self, machine: Machine) -> "Units":
+        """Speeds and forces of a task are the machine's own."""
+        return OWN
 
-        Raises
-        ------
-        ParameterError
-            If they are not one whole number below that of the machines, or one for each job.
-        """
-        numbers = np.asarray(given)
-        whole = np.issubdtype(numbers.dtype, np.integer) and numbers.shape in ((), (count,))
-        if not whole or numbers.min() < 0 or numbers.max() >= self.count:
-            raise ParameterError(
-                f"options['machine'] = {given!r} is out of range; allowed: a whole number from 0 to {self.count - 1}"
-                + (f", or {count} of them" if count > 1 else "")
-            )
-        return np.broadcast_to(numbers, count).astype(np.int64)
+    def checked_numbers(self, given: Any, count: int) -> NDArray[np.int64]:
+        """Return numbers of held-out machines for ``count`` jobs, (count,); raises as ``numbers_of``."""
+        return numbers_of(given, count, self.count)
+
+
+class Units(NamedTuple):
+    """What a task's speeds and forces are on a machine: its speed is ``lowest + span`` times that of the task, in the
+    unit of its speed field, and a force of the task is a share of ``force`` [N]."""
+
+    lowest: float
+    span: float
+    force: float
+
+
+OWN = Units(0.0, 1.0, 1.0)
+
+
+def numbers_of(given: Any, count: int, kept: int) -> NDArray[np.int64]:
+    """Return numbers of held-out machines, of which there are ``kept``, for ``count`` jobs, (count,).
+
+    Raises
+    ------
+    ParameterError
+        If they are not one whole number below that of the machines, or one for each job.
+    """
+    numbers = np.asarray(given)
+    whole = np.issubdtype(numbers.dtype, np.integer) and numbers.shape in ((), (count,))
+    if not whole or numbers.min() < 0 or numbers.max() >= kept:
+        raise ParameterError(
+            f"options['machine'] = {given!r} is out of range; allowed: a whole number from 0 to {kept - 1}"
+            + (f", or {count} of them" if count > 1 else "")
+        )
+    return np.broadcast_to(numbers, count).astype(np.int64)
 
 
 def in_test(shares: NDArray[np.float64]) -> bool:

@@ -21,7 +21,7 @@ from chaosgym.envs import environment
 from chaosgym.envs.drive import checked_actions
 from chaosgym.envs.jobs import Indices, Jobs
 from chaosgym.envs.kernels.steps import INFO
-from chaosgym.envs.machine_env import METADATA, Start, Workplace, start_of
+from chaosgym.envs.machine_env import METADATA, Start, Workplace, refuse_pictures, start_of
 from chaosgym.envs.observation import Observation, observation_names
 from chaosgym.envs.task import Status
 from chaosgym.errors import ParameterError
@@ -96,6 +96,7 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         if autoreset_mode not in (*AutoresetMode, *modes):
             raise ParameterError(f"autoreset_mode = {autoreset_mode!r} is not one of {', '.join(modes)}")
         self.workplace = Workplace(machine, **keywords)
+        refuse_pictures(self.workplace, render_mode)
         self.task, self.model = self.workplace.task, self.workplace.model
         self.nominal = self.workplace.variants.nominal
         self.observation_names = observation_names(self.task)

@@ -105,7 +105,7 @@ def settle(
     """Count a step as done, and write its ``report`` (k,), records ``REPORT``, and ``rewards`` (k,).
 
     ``failed``, ``period`` [s], ``type_iii`` and ``irregularity`` (k,), ``peaks`` (k, cycles, sides) [N]; ``wear``
-    (k, sides) adds to ``damage`` (N, sides). ``job_time`` [s] of a job at top speed.
+    (k, sides) adds to ``damage`` (N, sides). ``job_time`` (N,) [s] of a job at top speed.
     """
     task = tasks[0]
     for k, i in enumerate(which):
@@ -123,7 +123,7 @@ def settle(
         row["status"] = status_of(task["steps"], failed[k], job["done"], row["damage"])
         row["is_success"] = row["status"] == JOB_DONE
         row["machine"], row["clearance"] = job["machine"], job["worn"]
-        worse, time = row["damage"] - before, task["cycles_per_step"] * period[k] / job_time
+        worse, time = row["damage"] - before, task["cycles_per_step"] * period[k] / job_time[i]
         gone = row["status"] >= FRACTURE
         terms = rewards_of(task, row["deviation"], row["type_iii"], worse, time, gone, steps_left)
         row["reward_deviation"], row["reward_type_iii"], row["reward_damage"] = terms[:3]
