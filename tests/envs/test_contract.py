@@ -148,11 +148,11 @@ def test_a_failed_simulation_ends_the_job(name: str, monkeypatch: pytest.MonkeyP
     run = env._job._run
 
     def failing(*arguments: Any) -> Any:
-        cycles, growth = run(*arguments)
+        cycles, growth, period = run(*arguments)
         cycles.failed[:] = True
         for values in (*cycles[1:], growth):
             values[:] = 0
-        return cycles, growth
+        return cycles, growth, period
 
     monkeypatch.setattr(env._job, "_run", failing)
     observation, _, terminated, truncated, info = env.step(env.action_space.sample())

@@ -133,11 +133,11 @@ def test_a_failed_simulation_ends_its_job_alone(monkeypatch: pytest.MonkeyPatch)
     run = envs.unwrapped.jobs._run
 
     def fail_second(*arguments: Any) -> Any:
-        cycles, growth = run(*arguments)
+        cycles, growth, period = run(*arguments)
         cycles.failed[1] = True
         for values in (*cycles[1:], growth):
             values[1] = 0
-        return cycles, growth
+        return cycles, growth, period
 
     monkeypatch.setattr(envs.unwrapped.jobs, "_run", fail_second)
     observation, reward, terminated, truncated, infos = envs.step(np.zeros(3, int))
