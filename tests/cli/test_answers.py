@@ -76,6 +76,7 @@ QUICK = {
 """Arguments of each command; several forms are divided by a semicolon, and run in this order in one folder."""
 
 LONG = {
+    "diagnose": f"impact-beam --frequency-hz 30 {PEAKS} --estimate clearance",
     "branch": 'impact-beam --along "speed=17:18.2 Hz:5" --workers 1 --out o.csv;'
     'impact-beam --along "speed=17.3:17.7 Hz:3" --against "clearance=0.120mm:0.134mm:3" --workers 1',
     "tradeoff": "impact-beam --points 1 --cycles 20 --transient 20 --budget 0.05 --workers 1",

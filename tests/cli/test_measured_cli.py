@@ -404,6 +404,26 @@ def test_a_folder_or_a_pattern_gives_a_table(recordings):
         assert message in err
 
 
+PEAKS = Path(__file__).parents[2] / "docs" / "data" / "peaks.csv"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--peaks", PEAKS, "--column", "upper", "--estimate", "clearance"], "--estimate needs a machine"),
+        (["impact-beam", "--estimate", "clearance"], "--estimate needs a machine and what was measured"),
+        (["impact-beam", "--peaks", PEAKS, "--column", "upper", "--estimate", "hue"], "'hue' can't be estimated"),
+        (["impact-beam", "--peaks", PEAKS, "--column", "upper", "--types"], "go without --test, --types"),
+        (["impact-beam", "--peaks", PEAKS, "--column", "upper", "--sensor-sigma", "-1"], "out of range"),
+    ],
+)
+def test_a_record_beside_a_machine_is_refused_in_one_line(arguments, message):
+    """What does not go together, and what is no parameter."""
+    code, _, err = run("diagnose", *arguments)
+    assert (code, err.count("\n")) == (2, 1)
+    assert message in err
+
+
 def test_a_recording_that_takes_long_shows_a_sign_of_life(tmp_path, monkeypatch):
     """The reader says after a while that it goes on."""
     from chaosgym.signals import read

@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.measured_model import compared
 from chaosgym.cli.measured_options import (
     Measured,
     measured_options,
@@ -44,6 +45,12 @@ from chaosgym.machines import MACHINES
 @click.option("--step-check", is_flag=True, help="Repeat with a finer step and say whether the verdict stays.")
 @click.option("--sweep", metavar="FILE", help="Peak forces at many speeds, with a column of speeds: Types I, II, III.")
 @click.option("--speed-column", metavar="NAME", help="Column of the speed of --sweep, where there are several.")
+@click.option(
+    "--estimate",
+    multiple=True,
+    metavar="FIELD",
+    help="With a machine and what was measured: tell this parameter, such as clearance; repeatable.",
+)
 @measured_options
 @plot_option()
 def diagnose(
@@ -57,16 +64,22 @@ def diagnose(
     step_check: bool,
     sweep: str | None,
     speed_column: str | None,
+    estimate: tuple[str, ...],
     measured: Measured,
     plot: str | None,
     as_json: bool,
 ) -> None:
-    """Tell periodic from chaotic: a machine by simulation, or a measured signal; or the types of a measured sweep."""
+    """Tell periodic from chaotic: a machine by simulation, a measured signal, or one by the other.
+
+    With --sweep, the types of a measured sweep.
+    """
     picture = picture_path(plot, f"diagnose-{machine.name if machine else 'measured'}")
     if kicks and not margins:
         raise click.UsageError("--kicks belongs to --margins")
     if speed_column and not sweep:
         raise click.UsageError("--speed-column belongs to --sweep")
+    if estimate and not (machine and measured):
+        raise click.UsageError("--estimate needs a machine and what was measured: MACHINE --peaks FILE")
     if sweep:
         if machine or measured or types or margins or step_check or test != "adaptive":
             raise click.UsageError(
@@ -79,9 +92,9 @@ def diagnose(
         title = f"Types of {Path(told['file']).name}"
         draw(picture, lambda plots: plots.sweep_figure(speeds, peaks, found, label, title), result, lines)
     elif measured:
-        if machine or types or margins or step_check:
-            raise click.UsageError("--peaks and --series go without a machine, --types, --margins and --step-check")
-        result, lines = _measured(measured, picture)
+        if types or margins or step_check or test != "adaptive":
+            raise click.UsageError("--peaks and --series go without --test, --types, --margins and --step-check")
+        result, lines = _compared(machine, measured, estimate, picture) if machine else _measured(measured, picture)
     elif machine is None:
         raise click.UsageError(f"give a machine ({', '.join(MACHINES)}), --peaks FILE, --series FILE or --sweep FILE")
     elif test == "two-step":
@@ -122,6 +135,16 @@ def _measured(measured: Measured, picture: Path | None) -> tuple[dict[str, Any],
     result, lines = table_as_dict(found), table_lines(found)
     shown = [(f"{Path(run.source).name}, {run.name}", run.peaks, run.verdict.diagnosis) for run in all_runs(found)]
     draw(picture, lambda plots: plots.thumbnails(shown), result, lines)
+    return result, lines
+
+
+def _compared(
+    machine: Any, measured: Measured, estimate: tuple[str, ...], picture: Path | None
+) -> tuple[dict[str, Any], list[str]]:
+    """A measured run beside a machine, with the picture of the run."""
+    run, result, lines = compared(machine, measured, estimate)
+    name = f"{Path(run.source).name}, {run.name}"
+    draw(picture, lambda plots: plots.measured_figure(run.peaks, run.verdict.diagnosis, name, run.unit), result, lines)
     return result, lines
 
 

@@ -237,10 +237,11 @@ def _stretches(machine: Machine, table: NDArray[Any]) -> list[tuple[Machine, int
     fields = table.dtype.names or ()
     changes = np.any([np.diff(table[field]) != 0.0 for field in fields], axis=0)
     bounds = [0, *(1 + np.flatnonzero(changes)).tolist(), len(table)]
-    return [
-        (with_settings(machine, {field: float(table[field][begin]) for field in fields}), end - begin)
-        for begin, end in pairwise(bounds)
-    ]
+    # a machine whose values come again is built once
+    kept = {
+        row: with_settings(machine, dict(zip(fields, row, strict=True))) for row in set(table[bounds[:-1]].tolist())
+    }
+    return [(kept[table[begin].item()], end - begin) for begin, end in pairwise(bounds)]
 
 
 def simulate_with_deviations(
