@@ -67,6 +67,12 @@ def checked_samples(name: str, values: Any, low: float) -> Array:
     ------
     ParameterError
         If there are too few or too many, or one is below ``low``.
+
+    Examples
+    --------
+    >>> from chaosgym.machines.modal_machine.varying import checked_samples
+    >>> checked_samples("stiffness", 2e6, 0.0)
+    array([2000000.])
     """
     given = numbers(name, np.atleast_1d(values), low, STIFFEST, "N/m")
     if len(given) != 1 and not FEWEST <= len(given) <= MOST:
