@@ -200,6 +200,7 @@ FREE = 'kind = "slot"\nbetween = ["crank.pin"'
 
 REFUSED = [
     (('wrist = "235, 0 mm"', 'wrist = "35, 0 mm"'), r"crank can't turn beyond \d+\.\d deg|does not close"),
+    (('pin = "50, 0 mm"', 'pin = "0, 0 mm"'), "only the crank turns and no other link moves"),
     (("driven = true", "driven = false"), "0 joints are driven"),
     (('kind = "revolute"\nbetween = ["crank.pin"', FREE), "mobility 2: .*pin 1"),
     (('"rod.pin"]', '"rod.pn"]'), "rod has no point 'pn'; known: pin, wrist"),

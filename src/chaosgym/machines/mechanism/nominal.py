@@ -153,7 +153,8 @@ def revolution_of(mechanism: Mechanism) -> Revolution:
     Raises
     ------
     ParameterError
-        If a loop does not close, the crank can't turn, or the mechanism does not come back; says where.
+        If a loop does not close, the crank can't turn, nothing else moves, or the mechanism does not come back; says
+        where.
     """
     loops = _Loops(mechanism)
     angles, places = [0.0], [_start(loops)]
@@ -184,6 +185,10 @@ def revolution_of(mechanism: Mechanism) -> Revolution:
         raise ParameterError(
             "the mechanism does not come back after a revolution of the crank: its links pass a dead centre; allowed: "
             "a motion that repeats with every revolution"
+        )
+    if len(mechanism.links) > 1 and np.sum(np.ptp(np.concatenate(places), axis=0) / loops.scale > CLOSED) <= 1:
+        raise ParameterError(
+            "only the crank turns and no other link moves; allowed: a crank whose pin lies away from its shaft"
         )
     return Revolution(
         np.array(angles), np.concatenate(places), np.concatenate(tangents), turns[: mechanism.size], loops.length
