@@ -22,7 +22,8 @@ def compared(machine: Any, measured: Measured, estimate: Sequence[str]) -> tuple
     import numpy as np
 
     from chaosgym.diagnosis.measured import judge_peaks
-    from chaosgym.diagnosis.model_fit import fields_to_estimate, model_fit, with_record
+    from chaosgym.diagnosis.model_draws import fields_to_estimate
+    from chaosgym.diagnosis.model_fit import model_fit, with_record
     from chaosgym.errors import DiagnosisError
     from chaosgym.signals.noise import stated_error
 

@@ -25,23 +25,28 @@ from numpy.typing import ArrayLike, NDArray
 
 from chaosgym.diagnosis.diagnose import diagnose_alone
 from chaosgym.diagnosis.measured import unsteady
+from chaosgym.diagnosis.model_draws import (
+    AFRESH,
+    Draw,
+    Prior,
+    compared,
+    near,
+    other_start,
+    prior_of,
+    simulated,
+    weights_of,
+)
 from chaosgym.diagnosis.record_figures import figures, names_of
 from chaosgym.diagnosis.response import Nature
-from chaosgym.diagnosis.response_type import Tolerance, default_tolerances
 from chaosgym.diagnosis.scatter import MeasuredVerdict
-from chaosgym.errors import DiagnosisError, ParameterError, SimulationError
+from chaosgym.errors import DiagnosisError
 from chaosgym.machines.machine import Machine
-from chaosgym.machines.parameters import field_named, parameters_of, with_settings
 from chaosgym.signals.noise import repair, stated_error
-from chaosgym.simulation import MotionState, simulate
 
 Array = NDArray[np.float64]
 
 FEWEST_CYCLES, MOST_CYCLES = 32, 200
 """Cycles below which a record is refused, and cycles that each draw is simulated for; longer records are averaged."""
-
-TRANSIENT = 100
-"""Cycles that each draw runs before those that count."""
 
 BATCHES = 6
 """Parts of a record whose figures tell how much sampling moves them."""
@@ -50,20 +55,8 @@ FIRST, LATER, ROUNDS = 120, 60, 6
 """Draws of the first round, from the prior, and of each later one, around the best; rounds at the most. Each parameter
 that is estimated doubles the first."""
 
-BEST, AFRESH = 24, 0.2
-"""Draws around which the next round draws, and the share of its draws that are from the prior all the same."""
-
-SPEED_NOISE, NOISE, SENSOR_NOISE = (1e-5, 0.01), (1e-5, 0.03), (1e-5, 0.03)
-"""Standard deviations, as shares, of noise on speed, on forces and gaps, and on readings (prior: log-uniform)."""
-
-MOST_PERSISTENT = 0.9
-"""Largest correlation of the noise of one cycle and the next (prior: uniform)."""
-
-LEVELS = 8
-"""Values that the noise of a draw takes: so many models are made for it."""
-
-WIDE = 2.0
-"""Factor either way within which an estimated parameter is looked for."""
+BEST = 24
+"""Draws around which the next round draws."""
 
 FITS, FEWEST, MOST, ENOUGH = 1.0, 8, 40, 0.5
 """Root mean square difference up to which a draw agrees with the record, how many must, how many count at most, and the
@@ -157,60 +150,6 @@ def with_record(found: ModelFit, alone: MeasuredVerdict) -> ModelFit:
     return replace(found, nature="undetermined", period=None, reason=reason)
 
 
-class _Prior(NamedTuple):
-    """What draws are made of: numbers from 0 to 1 for tolerances, then for levels of noise, then its persistence."""
-
-    machine: Machine
-    tolerances: Mapping[str, Tolerance]
-    wide: tuple[str, ...]
-    noisy: tuple[str, ...]
-
-    @property
-    def size(self) -> int:
-        return len(self.tolerances) + len(self.noisy) + 1
-
-    def value(self, field: str, number: float) -> float:
-        """The value of a field at a number from 0 to 1."""
-        nominal, share = float(getattr(self.machine, field)), 2.0 * number - 1.0
-        if field not in self.wide:
-            return float(self.tolerances[field].at(nominal, share))
-        low, high = self.ends(field)
-        return float(low * (high / low) ** number)
-
-    def ends(self, field: str) -> tuple[float, float]:
-        """Ends within which an estimated parameter is looked for."""
-        nominal, about = float(getattr(self.machine, field)), parameters_of(self.machine)[field]
-        return max(nominal / WIDE, about.low), min(nominal * WIDE, about.high)
-
-    def machine_at(self, place: Array) -> Machine:
-        """The machine of a draw without its noise."""
-        values = {field: self.value(field, float(u)) for field, u in zip(self.tolerances, place, strict=False)}
-        return with_settings(self.machine, values)
-
-    def levels(self, place: Array) -> dict[str, float]:
-        """Standard deviations of the noise, as shares, by field."""
-        numbers = place[len(self.tolerances) : -1]
-        return {field: _level(_range_of(self, field), float(u)) for field, u in zip(self.noisy, numbers, strict=True)}
-
-
-def _range_of(prior: _Prior, field: str) -> tuple[float, float]:
-    return SPEED_NOISE if field == prior.machine.speed_field else NOISE
-
-
-def _level(ends: tuple[float, float], number: float) -> float:
-    return float(ends[0] * (ends[1] / ends[0]) ** number)
-
-
-class _Draw(NamedTuple):
-    """A simulated record's place in the prior, its difference from the measured one, and where its motion ended."""
-
-    place: Array
-    difference: float
-    parts: Array
-    sensor: float
-    final: MotionState
-
-
 def model_fit(
     machine: Machine,
     peaks: ArrayLike,
@@ -257,7 +196,7 @@ def model_fit(
     ('periodic', 1)
     """
     measured = _checked(peaks)
-    prior = _prior(machine, estimate)
+    prior = prior_of(machine, estimate)
     if surfaces is not None and len(surfaces) != measured.shape[1]:
         raise DiagnosisError(f"{len(surfaces)} surfaces are named for {measured.shape[1]} sensors; needed: as many")
     for surface in surfaces or ():
@@ -279,7 +218,7 @@ def model_fit(
         return np.asarray(forces.max(axis=1) if larger else machine.sensed(forces))[:, None]
 
     share = None if told is None else told.sigma / float(measured.mean())
-    draws: list[_Draw] = []
+    draws: list[Draw] = []
     proposals: list[tuple[int, Array, Array]] = []
     for number in range(ROUNDS):
         count = LATER if number else FIRST * 2 ** len(prior.wide)
@@ -293,11 +232,11 @@ def model_fit(
         for k in range(count):
             afresh = not best or rng.uniform() < AFRESH
             parent = None if afresh else best[int(rng.integers(len(best)))]
-            place = rng.uniform(size=prior.size) if parent is None else _near(parent.place, widths, rng)
-            start = parent.final if parent else _other_start(draws, k)
-            drawn = _drawn(prior, place, start, length, rng, read)
+            place = rng.uniform(size=prior.size) if parent is None else near(parent.place, widths, rng)
+            start = parent.final if parent else other_start(draws, k)
+            drawn = simulated(prior, place, start, length, rng, read)
             if drawn is not None:
-                draws.append(_compared(place, *drawn, wanted, scale, share, rng))
+                draws.append(compared(place, *drawn, wanted, scale, share, rng))
     if not draws:
         raise DiagnosisError(f"no machine of {machine.name} within the tolerances can be simulated")
     return _concluded(prior, draws, proposals, names_of(measured.shape[1])[0], wanted)
@@ -320,32 +259,6 @@ def _checked(peaks: ArrayLike) -> Array:
     return measured if any(one.gaps for one in whole) else np.column_stack([one.values for one in whole])
 
 
-def fields_to_estimate(machine: Machine, names: Sequence[str]) -> tuple[str, ...]:
-    """Fields of a machine that are meant by ``estimate`` of ``model_fit``.
-
-    Raises
-    ------
-    DiagnosisError
-        If one is no number of the machine, or not above 0.
-    """
-    known, found = parameters_of(machine), list[str]()
-    for name in names:
-        field = machine.clearance_field if name == "clearance" else field_named(machine, name)
-        if field not in known or known[field].choices or isinstance(getattr(machine, field), int):
-            raise DiagnosisError(f"{name!r} can't be estimated; allowed: clearance, or a number of {machine.name}")
-        if not getattr(machine, field) > 0.0:
-            raise DiagnosisError(f"{field} is {getattr(machine, field):g}; only what is above 0 can be estimated")
-        found += [field] if field not in found else []
-    return tuple(found)
-
-
-def _prior(machine: Machine, estimate: Sequence[str]) -> _Prior:
-    wide = fields_to_estimate(machine, estimate)
-    tolerances = {**{field: Tolerance(0.0) for field in wide}, **default_tolerances(machine)}
-    noisy = tuple(field for field in machine.operating_fields if getattr(machine, field) != 0.0)
-    return _Prior(machine, tolerances, wide, noisy)
-
-
 def _sampling(measured: Array, length: int, pieces: int) -> Array:
     """Standard errors of the difference of two records' figures, from sampling: those of noise, or by batch means."""
     names, plain = names_of(measured.shape[1])[0], 1.5 / math.sqrt(length)
@@ -360,76 +273,6 @@ def _sampling(measured: Array, length: int, pieces: int) -> Array:
     return np.asarray(errors * math.sqrt(1.0 + 1.0 / pieces))
 
 
-def _other_start(draws: Sequence[_Draw], turn: int) -> MotionState | None:
-    """In turn rest, where the last draw ended, and its mirror image: motions that coexist are all to be found."""
-    if not draws or turn % 3 == 0:
-        return None
-    coordinates, bouncing = draws[-1].final
-    return MotionState(coordinates if turn % 3 == 1 else -coordinates, bouncing)
-
-
-def _near(centre: Array, widths: Array, rng: np.random.Generator) -> Array:
-    """A place beside another one, reflected at the ends of the prior."""
-    place = np.abs(centre + widths * rng.normal(size=len(centre)))
-    return np.asarray(np.clip(1.0 - np.abs(1.0 - place), 0.0, 1.0))
-
-
-def _drawn(
-    prior: _Prior, place: Array, start: MotionState | None, length: int, rng: np.random.Generator, read: Any
-) -> tuple[Array, MotionState] | None:
-    """A noisy record (length, sensors) and where it ends; None if the machine can't be run."""
-    try:
-        machine = prior.machine_at(place)
-        about = parameters_of(machine)
-        table = {}
-        jumps = rng.uniform(size=length) >= MOST_PERSISTENT * place[-1]
-        chosen = rng.integers(LEVELS, size=length)
-        kept = chosen[np.maximum.accumulate(np.where(jumps, np.arange(length), 0))]
-        for field, level in prior.levels(place).items():
-            nominal = float(getattr(machine, field))
-            values = nominal * (1.0 + level * rng.normal(size=LEVELS))
-            table[field] = np.clip(values, about[field].low, about[field].high)[kept]
-        record = simulate(machine, length, start, TRANSIENT, operation=table)
-    except (ParameterError, SimulationError):
-        return None
-    return read(record), record.final_state
-
-
-def _compared(
-    place: Array,
-    record: Array,
-    final: MotionState,
-    wanted: Array,
-    scale: Array,
-    share: float | None,
-    rng: np.random.Generator,
-) -> _Draw:
-    """A draw with its difference; unknown noise on the readings makes up for the scatter that is missing."""
-    mean = record.mean(axis=0)
-    if share is None:
-        missing = math.exp(2.0 * wanted[1]) - float((record[:, 0].std() / max(mean[0], 1e-300)) ** 2)
-        share = float(np.clip(math.sqrt(max(missing, 0.0)), *SENSOR_NOISE))
-    parts = (figures(record + share * mean * rng.normal(size=record.shape)) - wanted) / scale
-    difference = float(np.sqrt(np.mean(parts**2)))
-    return _Draw(place, difference if np.isfinite(difference) else math.inf, parts, share, final)
-
-
-def _weights(accepted: Sequence[_Draw], proposals: Sequence[tuple[int, Array, Array]]) -> Array:
-    """Prior over the mixture of all rounds, truncated, with sum 1."""
-    places = np.array([draw.place for draw in accepted])
-    density = np.zeros(len(places))
-    for count, centres, widths in proposals:
-        if not len(centres):
-            density += count
-            continue
-        apart = (places[:, None, :] - centres) / widths
-        kernels = np.exp(-0.5 * np.sum(apart**2, axis=2)) / np.prod(widths * math.sqrt(2.0 * math.pi))
-        density += count * ((1.0 - AFRESH) * kernels.mean(axis=1) + AFRESH)
-    weights = 1.0 / density
-    weights = np.minimum(weights, math.sqrt(len(weights)) * weights.mean())
-    return np.asarray(weights / weights.sum())
-
-
 def _quantiles(values: Array, weights: Array) -> list[float]:
     order = np.argsort(values)
     below = np.cumsum(weights[order]) - 0.5 * weights[order]
@@ -437,8 +280,8 @@ def _quantiles(values: Array, weights: Array) -> list[float]:
 
 
 def _concluded(
-    prior: _Prior,
-    draws: Sequence[_Draw],
+    prior: Prior,
+    draws: Sequence[Draw],
     proposals: Sequence[tuple[int, Array, Array]],
     names: Sequence[str],
     wanted: Array,
@@ -449,7 +292,7 @@ def _concluded(
     if len(accepted) < FEWEST:
         reason = f"the model does not fit: of {len(draws)} simulated records {_worst(nearest, names)}"
         return ModelFit("undetermined", None, reason, False, {}, len(draws), len(accepted), nearest.difference, {}, {})
-    weights = _weights(accepted, proposals)
+    weights = weights_of(accepted, proposals)
     natures: dict[str, float] = {}
     periods: dict[int, float] = {}
     for draw, weight in zip(accepted, weights.tolist(), strict=True):
@@ -464,7 +307,7 @@ def _concluded(
     noise["sensor"] = _quantiles(np.array([draw.sensor for draw in accepted]), weights)[1]
     # the nearest are near each other too: an interval takes all that agree
     agreeing = [draw for draw in ordered if draw.difference < FITS]
-    estimates = {field: _estimate(prior, field, agreeing, _weights(agreeing, proposals)) for field in prior.wide}
+    estimates = {field: _estimate(prior, field, agreeing, weights_of(agreeing, proposals)) for field in prior.wide}
     leading = max(natures, key=lambda name: natures[name])
     told = ", ".join(f"{name} {100.0 * share:.3g} %" for name, share in sorted(natures.items(), key=lambda n: -n[1]))
     among = f"of {len(draws)} simulated records {len(accepted)} agree; without noise their machines are {told}"
@@ -478,7 +321,7 @@ def _concluded(
     )
 
 
-def _worst(nearest: _Draw, names: Sequence[str]) -> str:
+def _worst(nearest: Draw, names: Sequence[str]) -> str:
     """In what the nearest draw differs most."""
     if not math.isfinite(nearest.difference):
         return "none has a force where the sensor reads one"
@@ -490,7 +333,7 @@ def _worst(nearest: _Draw, names: Sequence[str]) -> str:
     )
 
 
-def _estimate(prior: _Prior, field: str, accepted: Sequence[_Draw], weights: Array) -> Estimate:
+def _estimate(prior: Prior, field: str, accepted: Sequence[Draw], weights: Array) -> Estimate:
     place = list(prior.tolerances).index(field)
     values = np.array([prior.value(field, float(draw.place[place])) for draw in accepted])
     low, middle, high = _quantiles(values, weights)
