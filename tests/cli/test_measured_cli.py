@@ -208,11 +208,18 @@ def test_millimetres_taken_for_metres_and_no_contact_are_said():
 
 
 def test_commands_of_the_documentation_run(tmp_path, monkeypatch):
-    """Three commands from the sample file to a report, one that makes such a file, and both sensors together."""
+    """Three commands from the sample to a report, one that makes such a file, both sensors, and the model beside it."""
     root = Path(__file__).parent.parent.parent
     section = (root / "docs" / "diagnosis.md").read_text().split("## Measured data")[1]
     commands = [shlex.split(line)[1:] for line in re.findall(r"^    (chaosgym .*)$", section, re.MULTILINE)]
-    assert [command[0] for command in commands] == ["diagnose", "classify", "design", "simulate", "diagnose"]
+    assert [command[0] for command in commands] == [
+        "diagnose",
+        "classify",
+        "design",
+        "simulate",
+        "diagnose",
+        "diagnose",
+    ]
     monkeypatch.chdir(tmp_path)
     (tmp_path / "docs" / "data").mkdir(parents=True)
     sample = tmp_path / "docs" / "data" / "peaks.csv"
@@ -223,6 +230,7 @@ def test_commands_of_the_documentation_run(tmp_path, monkeypatch):
         assert "random or chaotic, this record cannot tell" in out
     assert (tmp_path / "report.html").is_file()
     assert "together  chaotic" in run(*commands[4])[1]
+    assert "agree; without noise their machines are" in run(*commands[5])[1]
     shipped = sample.read_text().splitlines()
     assert run(*commands[3], "--overwrite")[0] == 0
     made = sample.read_text().splitlines()

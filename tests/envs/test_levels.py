@@ -7,15 +7,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import chaosgym
+from chaosgym.control.controllers import Follow
 from chaosgym.control.rollout import play
-from chaosgym.envs.setups import setup_of
+from chaosgym.envs import setups
+from chaosgym.envs.setups import tolerances_of
 from chaosgym.envs.variants import HELD_OUT_SEED, SPLITS, Variants, sealed_seed
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES
 
 BEAM, CRANK = "chaosgym/ImpactBeamTolerance-v1", "chaosgym/SliderCrankTolerance-v1"
-FLEET = setup_of(chaosgym.ImpactBeam()).levels["fleet"]
+FLEET = tolerances_of(chaosgym.ImpactBeam(), "fleet")
 
 
 def test_the_ids_are_levels():
@@ -50,7 +52,7 @@ def test_a_fleet_varies_what_no_sensor_tells(env):
 @given(seed=st.integers(0, 10**6), machine=st.integers(0, 255), level=st.sampled_from(["clearance", "fleet"]))
 def test_splits_share_no_machine(seed, machine, level):
     """By a rule of its own: train and test are told by the cells of the draw, and outside has one field beyond."""
-    widths = setup_of(chaosgym.ImpactBeam()).levels[level]
+    widths = tolerances_of(chaosgym.ImpactBeam(), level)
     for split in SPLITS:
         variants = Variants(chaosgym.ImpactBeam(), widths, split)
         for shares in (
@@ -91,7 +93,7 @@ def test_sealed_machines_are_others():
 
 def test_who_plays_meets_the_machines_of_the_split():
     """A rollout on outside runs machines that lie outside, with jobs of their own where they are sealed."""
-    follow = chaosgym.control.controllers.Follow()
+    follow = Follow()
     played = {split: play(follow, BEAM, [0, 1], split=split, steps=3) for split in ("test", "outside")}
     assert not np.array_equal(played["test"].felt, played["outside"].felt)
     sealed = play(follow, BEAM, [0, 1], split="test", sealed=True, steps=3)
@@ -116,6 +118,5 @@ def test_what_is_refused_says_what_to_do(keywords, message):
 def test_every_machine_has_every_level():
     """A machine that names nothing hidden has a fleet too: its tolerances and growing clearance."""
     for name in MACHINES:
-        levels = setup_of(MACHINES[name]()).levels
-        assert list(levels) == ["nominal", "clearance", "wear", "fleet"]
+        levels = {level: tolerances_of(MACHINES[name](), level) for level in setups.LEVELS}
         assert levels["clearance"].items() <= levels["fleet"].items()
