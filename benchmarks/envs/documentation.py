@@ -14,7 +14,7 @@ from chaosgym.envs import ENVIRONMENTS
 from chaosgym.envs.drive import MOVES
 from chaosgym.envs.judge import ExponentJudge
 from chaosgym.envs.observation import MEANINGS
-from chaosgym.envs.setups import setup_of
+from chaosgym.envs.setups import LEVELS, task_of, tolerances_of
 from chaosgym.machines.parameters import parameters_of
 
 KINDS = {
@@ -138,8 +138,8 @@ def _table(head: str, rows: list[str]) -> str:
 
 def _levels(nominal: Any) -> list[str]:
     """Rows of the levels."""
-    setup = setup_of(nominal)
-    return [f"`{level}` | {_widths(widths)} | {setup.at(level)[1].wear:.0%}" for level, widths in setup.levels.items()]
+    known = [(level, _widths(tolerances_of(nominal, level)), task_of(nominal, level).wear) for level in LEVELS]
+    return [f"`{level}` | {widths} | {wear:.0%}" for level, widths, wear in known]
 
 
 def _widths(widths: Any) -> str:

@@ -30,15 +30,7 @@ LEAST_ERROR = 1e-6
 """Error [N] that the monitor of ideal sensors reckons with."""
 
 
-class Rules(NamedTuple):
-    """What all jobs have in common: ``task``, where machines come from, ``space`` of an observation."""
-
-    task: Task
-    variants: Variants | Pool
-    space: Box
-
-
-class Outcome(NamedTuple):
+class StepResult(NamedTuple):
     """What a step of k jobs gave: (k, ...) observations, (k,) rewards, and (k,) records ``REPORT``, the info."""
 
     observation: Observation
@@ -56,7 +48,7 @@ class Piece(NamedTuple):
 
 
 class Jobs:
-    """Jobs on machines that run side by side.
+    """Jobs of a ``task`` on machines that run side by side, with observations of a ``space``.
 
     Attributes
     ----------
@@ -74,9 +66,9 @@ class Jobs:
         Number of the first jobs of which ``pieces`` keeps where the last step began, for pictures; a list each.
     """
 
-    def __init__(self, rules: Rules, count: int) -> None:
-        task, nominal = rules.task, rules.variants.nominal
-        self.rules, self.batch = rules, batch_of(nominal, count)
+    def __init__(self, task: Task, variants: Variants | Pool, space: Box, count: int) -> None:
+        nominal = variants.nominal
+        self.task, self.variants, self.space, self.batch = task, variants, space, batch_of(nominal, count)
         self.judge: Judge = (ExponentJudge if isinstance(self.batch, VariedBatch) else RecurrenceJudge)(count)
         self._monitor = RepeatSums(count) if task.monitor == "on" else None
         self.machines: list[Machine] = [nominal] * count
@@ -121,7 +113,7 @@ class Jobs:
         SimulationError
             If a machine can't be simulated at its starting speed.
         """
-        task, variants = self.rules.task, self.rules.variants
+        task, variants = self.task, self.variants
         for k, (i, generator) in enumerate(zip(which.tolist(), generators, strict=True)):
             drawn = variants.drawn(generator)
             self.demand[i] = demand_of(task, generator)
@@ -159,20 +151,20 @@ class Jobs:
         }
         return self._observe(which, cycles, period, generators), info
 
-    def step(self, which: Indices, actions: Array, generators: Generators) -> Outcome:
+    def step(self, which: Indices, actions: Array, generators: Generators) -> StepResult:
         """Run the jobs ``which`` (k,) for a step by checked actions; a simulation that fails ends its job."""
-        task, demands, state = self.rules.task, self.demand, self.state
+        task, demands, state = self.task, self.demand, self.state
         call(drive, task.numbers, actions, MOVES, DEAD_BAND, which, demands, state)
         if task.wear > 0.0:
             self.batch.set_clearances(which, state["worn"][which])
         cycles, growth, period = self._run(which, task.cycles_per_step, generators)
         peaks = cycles.peak_force
-        verdict = self.judge.verdict(which, growth, self.rules.variants.nominal.sensed(peaks))
+        verdict = self.judge.verdict(which, growth, self.variants.nominal.sensed(peaks))
         report, reward = np.empty(len(which), REPORT), np.empty(len(which))
         given = (task.numbers, self._job_time, which, demands, cycles.failed, peaks, task.damage(peaks), period)
         call(settle, *given, *verdict, state, self.damage, report, reward)
         report["largest_force"] *= self.force[which]
-        return Outcome(self._observe(which, cycles, period, generators), reward, report)
+        return StepResult(self._observe(which, cycles, period, generators), reward, report)
 
     def _run(self, which: Indices, count: int, generators: Generators) -> tuple[Cycles, Array, Array]:
         """Run machines for cycles whose speed ripples, with kicks; forces are in the task's unit.
@@ -182,12 +174,12 @@ class Jobs:
         speed = self._lowest[which] + self._span[which] * self.speed[which]
         cycles, growth = self._moved(which, speed, count, generators)
         cycles.peak_force[:] /= self.force[which][:, None, None]
-        self.period[which] = self.rules.variants.nominal.period_at(speed)
+        self.period[which] = self.variants.nominal.period_at(speed)
         return cycles, growth, self.period[which]
 
     def _moved(self, which: Indices, speed: Array, count: int, generators: Generators) -> tuple[Cycles, Array]:
         """Cycles of machines at speeds (k,), and their growth."""
-        task = self.rules.task
+        task = self.task
         speeds = speed[:, None].repeat(count, axis=1)
         if task.speed_ripple > 0.0:
             speeds *= 1.0 + task.speed_ripple * np.array([g.standard_normal(count) for g in generators])
@@ -240,11 +232,11 @@ class Jobs:
             self.pieces[i].append(Piece(self.machine_at(i), speeds[k], *self.batch.motion(i)))
 
     def _observe(self, which: Indices, cycles: Cycles, period: Array, generators: Generators) -> Observation:
-        space, task = self.rules.space, self.rules.task
+        space, task = self.space, self.task
         last = task.cycles_per_step
         drawn = sensed(task, cycles.impacts[:, -last:], generators)
         measured, values = np.empty((len(which), last)), np.empty((len(which), *space.shape), np.float32)
-        sensed_peaks = self.rules.variants.nominal.sensed(cycles.peak_force)
+        sensed_peaks = self.variants.nominal.sensed(cycles.peak_force)
         given = (task.numbers, which, self.demand, self.state, sensed_peaks, cycles.bounce_duration, period)
         call(observe, *given, *drawn, space.low, space.high, measured, values)
         if self._monitor is not None:

@@ -6,7 +6,7 @@ motion goes on from the state in which the last step ended.
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -15,11 +15,11 @@ from gymnasium.spaces import Space
 from numpy.typing import NDArray
 
 from chaosgym.envs.drive import action_space, checked_actions
-from chaosgym.envs.jobs import Indices, Jobs, Rules
+from chaosgym.envs.jobs import Indices, Jobs
 from chaosgym.envs.kernels.steps import INFO
 from chaosgym.envs.observation import Observation, observation_names, observation_space
 from chaosgym.envs.pool import ANY, Pool, pool_task
-from chaosgym.envs.setups import setup_of
+from chaosgym.envs.setups import task_of, tolerances_of
 from chaosgym.envs.task import Status, UnknownKeywordError, divided
 from chaosgym.envs.variants import Variants
 from chaosgym.errors import ParameterError
@@ -37,15 +37,10 @@ FIRST = np.zeros(1, np.int64)
 METADATA: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}
 
 
-class Start(NamedTuple):
-    """How jobs start: ``speed``, and ``machine`` numbers (N,) of those kept for evaluation; None for the usual."""
+def start_of(workplace: "Workplace", options: Mapping[str, Any], count: int) -> tuple[float | None, Indices | None]:
+    """Return how ``count`` jobs start, by the options of a reset: speed, and numbers (count,) of kept machines.
 
-    speed: float | None
-    machine: Indices | None
-
-
-def start_of(rules: Rules, options: Mapping[str, Any], count: int) -> Start:
-    """Return how ``count`` jobs start, by the options of a reset.
+    Either is None where the reset leaves it to the task.
 
     Raises
     ------
@@ -55,17 +50,17 @@ def start_of(rules: Rules, options: Mapping[str, Any], count: int) -> Start:
     for name in options:
         if name not in ("machine", "speed"):
             raise ParameterError(f"options has no entry {name!r}; allowed: machine, speed")
-    task = rules.task
+    task = workplace.task
     speed, low, high = options.get("speed"), task.lowest_speed, task.highest_speed
     if speed is not None and (not isinstance(speed, int | float | np.number) or not low <= speed <= high):
         raise ParameterError(f"options['speed'] = {speed!r} is out of range; allowed: {low:g} to {high:g}")
     machine = options.get("machine")
-    numbers = None if machine is None else rules.variants.checked_numbers(machine, count)
-    return Start(None if speed is None else float(speed), numbers)
+    numbers = None if machine is None else workplace.variants.checked_numbers(machine, count)
+    return None if speed is None else float(speed), numbers
 
 
 class Workplace:
-    """Rules, spaces and models of an environment, from its keywords.
+    """Task, machines, spaces and model of an environment, from its keywords.
 
     Parameters
     ----------
@@ -102,7 +97,10 @@ class Workplace:
             self._take(machine, **keywords)
         self.space = observation_space(self.task)
         self.actions = action_space(self.task)
-        self.rules = Rules(self.task, self.variants, self.space)
+
+    def jobs(self, count: int) -> Jobs:
+        """Make the jobs of this many machines."""
+        return Jobs(self.task, self.variants, self.space, count)
 
     def _take_any(self, *, split: str | None = None, **keywords: Any) -> None:
         """A machine of the pool in each job; nobody has a model of it."""
@@ -135,8 +133,8 @@ class Workplace:
         kind = MACHINES[machine]
         usual: Machine = kind()
         work = usual.work
-        widths, task = setup_of(usual).at(level)
-        self.task, fields = divided(task, usual, keywords)
+        widths = tolerances_of(usual, level)
+        self.task, fields = divided(task_of(usual, level), usual, keywords)
         base = {name: value for name, value in work.fields.items() if name not in fields}
         if fidelity is not None:
             base = {name: value for name, value in base.items() if name not in kind.fidelity_ladder.get(fidelity, {})}
@@ -192,7 +190,7 @@ class MachineEnv(gym.Env[Observation, Any]):
         self.observation_names = observation_names(self.task)
         self.observation_space = cast(Space[Observation], self.workplace.space)
         self.action_space = cast(Space[Any], self.workplace.actions)
-        self._job = Jobs(self.workplace.rules, 1)
+        self._job = self.workplace.jobs(1)
         self._job.traced = 0 if render_mode is None else 1
         self._runs = False
         self._dashboard: Dashboard | None = None
@@ -241,9 +239,9 @@ class MachineEnv(gym.Env[Observation, Any]):
             If the machine can't be simulated at its starting speed.
         """
         super().reset(seed=seed)
-        start = start_of(self.workplace.rules, options or {}, 1)
+        speed, numbers = start_of(self.workplace, options or {}, 1)
         self._runs = False
-        observation, info = self._job.start(FIRST, [self.np_random], start.machine, start.speed)
+        observation, info = self._job.start(FIRST, [self.np_random], numbers, speed)
         self._runs = True
         if self.render_mode is not None:
             self._show().start()

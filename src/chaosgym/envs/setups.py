@@ -9,7 +9,7 @@ A level says what differs from job to job:
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from chaosgym.envs.task import Task
@@ -21,43 +21,39 @@ WEAR, WEARING = 0.1, ("wear", "fleet")
 """Growth of the clearance over a job, as a share of it (assumed), and the levels that have it."""
 
 
-@dataclass(frozen=True)
-class Setup:
-    """A machine at work: ``task``, and half widths of a level as shares of the nominal value."""
-
-    levels: Mapping[str, Mapping[str, float]]
-    task: Task
-
-    def at(self, level: str) -> "tuple[Mapping[str, float], Task]":
-        """Tolerances and task of a level.
-
-        Raises
-        ------
-        ParameterError
-            If there is no such level.
-        """
-        if level not in self.levels:
-            raise ParameterError(f"level = {level!r} is not one of {', '.join(self.levels)}")
-        return self.levels[level], replace(self.task, wear=WEAR) if level in WEARING else self.task
+LEVELS = ("nominal", "clearance", "wear", "fleet")
 
 
-def setup_of(machine: Machine) -> Setup:
-    """Setup of a machine by its ``work``; what that leaves open follows from its usual ranges and its tolerances.
+def tolerances_of(machine: Machine, level: str) -> Mapping[str, float]:
+    """Half widths of a level of a machine, as shares of the nominal values, by field.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such level.
+    """
+    if level not in LEVELS:
+        raise ParameterError(f"level = {level!r} is not one of {', '.join(LEVELS)}")
+    if level == "nominal":
+        return {}
+    usual = _shares(machine) if machine.work.tolerances is None else machine.work.tolerances
+    return {**usual, **machine.work.fleet} if level == "fleet" else usual
+
+
+def task_of(machine: Machine, level: str) -> Task:
+    """Task of a level of a machine by its ``work``; what that leaves open follows from its usual ranges.
 
     Raises
     ------
     ParameterError
         If the machine's ``work`` has a number that no task has, or one out of its range.
     """
-    work = machine.work
     known = parameters_of(Task)
-    for name in work.task:
+    for name in machine.work.task:
         if name not in known:
             raise ParameterError(f"the job of {machine.name} has no number {name!r}{suggestion(name, known)}")
-    numbers: dict[str, Any] = dict(work.task)
-    task = replace(_usual_task(machine), **numbers)
-    usual = _shares(machine) if work.tolerances is None else work.tolerances
-    return Setup({"nominal": {}, "clearance": usual, "wear": usual, "fleet": {**usual, **work.fleet}}, task)
+    numbers: dict[str, Any] = {**machine.work.task, **({"wear": WEAR} if level in WEARING else {})}
+    return replace(_usual_task(machine), **numbers)
 
 
 def _shares(machine: Machine) -> dict[str, float]:

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from chaosgym.envs import environment
 from chaosgym.envs.drive import checked_actions
-from chaosgym.envs.jobs import Indices, Jobs
+from chaosgym.envs.jobs import Indices
 from chaosgym.envs.kernels.steps import INFO
-from chaosgym.envs.machine_env import METADATA, Start, Workplace, refuse_pictures, start_of
+from chaosgym.envs.machine_env import METADATA, Workplace, refuse_pictures, start_of
 from chaosgym.envs.observation import Observation, observation_names
 from chaosgym.envs.task import Status
 from chaosgym.errors import ParameterError
@@ -100,7 +100,7 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         self.task, self.model = self.workplace.task, self.workplace.model
         self.nominal = self.workplace.variants.nominal
         self.observation_names = observation_names(self.task)
-        self.jobs = Jobs(self.workplace.rules, num_envs)
+        self.jobs = self.workplace.jobs(num_envs)
         self.render_mode = render_mode
         self.jobs.traced = 0 if render_mode is None else min(num_envs, DRAWN)
         self._dashboards: list[Dashboard] = []
@@ -151,8 +151,8 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         options = dict(options or {})
         which = self._masked(options.pop("reset_mask", None))
         seeds = self._seeds(seed)
-        start = start_of(self.workplace.rules, options, self.num_envs)
-        observation, info = self._start(which, [seeds[i] for i in which.tolist()], start)
+        start = start_of(self.workplace, options, self.num_envs)
+        observation, info = self._start(which, [seeds[i] for i in which.tolist()], *start)
         if not self._has_begun:
             self._last = np.zeros(cast(tuple[int, ...], self.observation_space.shape), np.float32)
             self._has_begun = True
@@ -218,13 +218,16 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         self._add(infos, fresh, started)
 
     def _start(
-        self, which: Indices, seeds: Sequence[int | None], start: Start | None = None
+        self,
+        which: Indices,
+        seeds: Sequence[int | None],
+        speed: float | None = None,
+        machine: Indices | None = None,
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start jobs, below their first demand and on machines drawn by default."""
+        """Start jobs, below their first demand and on machines drawn by default; ``machine`` has all N numbers."""
         for i, seed in zip(which.tolist(), seeds, strict=True):
             if seed is not None or self._generators[i] is None:
                 self._generators[i] = np_random(seed)[0]
-        speed, machine = start or Start(None, None)
         numbers = None if machine is None else machine[which]
         result = self.jobs.start(which, self._generators_of(which), numbers, speed)
         self._elapsed[which] = 0
