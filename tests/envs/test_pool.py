@@ -1,6 +1,7 @@
 """Any machine: each job draws one of a pool, and speeds and forces are shares of its own range and rated force."""
 
 import gymnasium as gym
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
@@ -13,6 +14,7 @@ from chaosgym.control.rollout import play
 from chaosgym.envs.pool import SPLITS, Pool, machine_of, read_pool
 from chaosgym.errors import ParameterError
 from chaosgym.machines.family import KINDS, MODES
+from chaosgym.plotting.played_job import draw_forces
 from chaosgym.simulation import simulate
 
 ANY = "chaosgym/AnyMachine-v0"
@@ -112,3 +114,11 @@ def test_what_does_not_fit_is_refused_in_one_line(keywords, told):
     """Machines are drawn: their fields and levels can't be chosen."""
     with pytest.raises(ParameterError, match=told):
         gym.make(ANY, **keywords)
+
+
+def test_a_picture_of_a_job_names_the_units_of_what_is_felt():
+    """Forces of any machine are shares of its rated one, those of a beam newtons."""
+    for env, unit in ((ANY, "of the rated one"), ("chaosgym/ImpactBeam-v1", "N")):
+        played = play(Follow(), env, [0], steps=2)
+        assert f"peak force [{unit}]" in draw_forces(played, plt.figure().add_subplot()).get_ylabel()
+    plt.close("all")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tqdm import trange
 
 from chaosgym.envs.observation import FELT, OBSERVATION_NAMES
+from chaosgym.envs.pool import SHARE
 from chaosgym.envs.task import Status
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ParameterError
@@ -100,6 +101,11 @@ class Played:
     def deviation(self) -> Array:
         """Mean distance of speed and demand in each job, (n,)."""
         return np.asarray(np.nanmean(np.abs(self.speed - self.demand), axis=0))
+
+    @property
+    def felt_unit(self) -> str:
+        """Unit of the forces that are felt: newtons, or shares of a rated force that each machine has."""
+        return "of the rated one" if self.unit == SHARE else "N"
 
     @property
     def life(self) -> Array:

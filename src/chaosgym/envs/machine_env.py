@@ -18,7 +18,7 @@ from chaosgym.envs.drive import action_space, checked_actions
 from chaosgym.envs.jobs import Indices, Jobs
 from chaosgym.envs.kernels.steps import INFO
 from chaosgym.envs.observation import Observation, observation_names, observation_space
-from chaosgym.envs.pool import ANY, Pool, pool_task
+from chaosgym.envs.pool import ANY, SHARE, Pool, pool_task
 from chaosgym.envs.setups import task_of, tolerances_of
 from chaosgym.envs.task import Status, UnknownKeywordError, divided
 from chaosgym.envs.variants import Variants
@@ -106,7 +106,7 @@ class Workplace:
         """A machine of the pool in each job; nobody has a model of it."""
         self.variants = Pool(split)
         self.model = nominal = self.variants.nominal
-        self.unit = "of the range"
+        self.unit = SHARE
         task = pool_task()
         own = (*parameters_of(task), "objective")
         for name in keywords:

@@ -24,6 +24,9 @@ from chaosgym.machines.machine import Machine
 ANY = "any"
 """What ``machine`` is where each job draws one of the pool."""
 
+SHARE = "of the range"
+"""Unit of its speeds; a force that is felt is a share of the rated one."""
+
 SPLITS = ("train", "test", "other_machines")
 
 POOL_SEED = 51_000_000

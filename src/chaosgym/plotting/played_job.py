@@ -79,7 +79,7 @@ def draw_forces(job: Played, ax: Axes, steps: int | None = None) -> Axes:
         ax.errorbar(
             step[chosen], mean[chosen], 2.0 * spread[chosen], fmt=".", color=colour, markersize=3, linewidth=0.8
         )
-    ax.set(xlim=(0, len(job.speed)), xlabel="step", ylabel="peak force [N]\nmean ± 2 SD")
+    ax.set(xlim=(0, len(job.speed)), xlabel="step", ylabel=f"peak force [{job.felt_unit}]\nmean ± 2 SD")
     return ax
 
 
