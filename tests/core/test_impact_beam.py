@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from chaosgym.errors import SimulationError
@@ -170,6 +170,7 @@ def test_a_step_too_coarse_for_contact_is_an_error():
     n_modes=st.sampled_from([1, 2, 5, 9]),
     family=st.sampled_from(["uniform", "stiffness"]),
 )
+@example(30.243093490877083, 0.0, 1000.0, 1000.0, 1.0, 20.0, 8.9, 5, "stiffness")
 def test_extreme_machines_end_in_an_answer_or_in_a_named_error(
     frequency, clearance, contact_stiffness, contact_damping, damping_ratio, shaker_damping, force, n_modes, family
 ):
@@ -192,4 +193,6 @@ def test_extreme_machines_end_in_an_answer_or_in_a_named_error(
     assert np.all(np.isfinite(record.section))
     assert np.all(np.isfinite(record.history))
     assert np.all(record.peak_force >= 0.0)
-    assert np.all(record.history[..., 2] * record.history[..., 0] >= 0.0)
+    pushed = record.history[..., 2] * record.history[..., 0]
+    # a tip that passes the middle of no gap is there but for rounding
+    assert np.all(pushed >= -1e-14 * np.abs(pushed).max())
