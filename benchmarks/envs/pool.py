@@ -8,6 +8,7 @@ free.
 from collections.abc import Iterator
 from itertools import count, islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,14 +40,15 @@ CONTACT, LEAST_GAIN = 0.9, 0.05
 def swept(machines: list[Ranged], rng: np.random.Generator) -> tuple[Array, NDArray[np.bool_]]:
     """Mean load (n, s, sides) [N^10/3] of machines at each speed, and whose simulation failed (n,)."""
     grid, n = pool_task().grid, len(machines)
-    batch, every = batch_of(machines[0].machine, n), np.arange(n)
+    batch: Any = batch_of(machines[0].machine, n)
+    every = np.arange(n)
     low, high = (np.array([getattr(one, name) for one in machines]) for name in ("lowest", "highest"))
     for i, one in enumerate(machines):
         batch.start(i, one.machine.at(one.lowest))
     load, failed = np.zeros((n, len(grid), 2)), np.zeros(n, np.bool_)
     for place, share in enumerate(grid):
         speeds = (low + share * (high - low))[:, None] * (1.0 + 0.002 * rng.standard_normal((n, SETTLING + JUDGED)))
-        cycles, _ = batch.run_varied(every, speeds)  # type: ignore[attr-defined]
+        cycles, _ = batch.run_varied(every, speeds)
         failed |= cycles.failed
         load[:, place] = (cycles.peak_force[:, SETTLING:] ** LIFE_EXPONENT).mean(axis=1)
     return load, failed

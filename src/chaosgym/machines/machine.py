@@ -445,8 +445,3 @@ class Machine(ABC):
     def batch(self, count: int) -> "CompiledBatch | None":
         """Return ``count`` variants that move in one compiled call; None if there is no such kernel."""
         return None
-
-
-def refuse_fixed_steps(integrator: Integrator, machine: Machine) -> ParameterError:
-    """Error for an integrator that a machine's model can't be run with."""
-    return ParameterError(f"integrator = {integrator} does not run {machine.name}; allowed: ExactEvents(...)")

@@ -48,6 +48,8 @@ def _run(
     bar: Any = None,
 ) -> tuple[int, int, CycleRecord]:
     """Status of the kernel, number of cycles that it finished, and the record."""
+    if not (isinstance(integrator, ExactEvents) or machine.runs_fixed_steps):
+        raise ParameterError(f"integrator = {integrator} does not run {machine.name}; allowed: ExactEvents(...)")
     arrays = machine.arrays(cycles, samples)
     final = MotionState(state.coordinates.copy(), state.bouncing.copy())
     outcome, done = _in_slices(machine, final, arrays, integrator, tangents, bar)

@@ -22,7 +22,7 @@ from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.joint_sets import JointTables, PressedSets
-from chaosgym.machines.machine import Flexible, Machine, Number, Option, refuse_fixed_steps
+from chaosgym.machines.machine import Flexible, Machine, Number, Option
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.machine import ModalMachine, as_there, clearance_option, rigid_note, turning_note
@@ -257,8 +257,7 @@ class JointedMachine(Machine):
         tangents: Tangents | None = None,
     ) -> tuple[int, int]:
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
-        if not isinstance(integrator, ExactEvents):
-            raise refuse_fixed_steps(integrator, self)
+        assert isinstance(integrator, ExactEvents), "runs_fixed_steps is False"
         # gaps are no part of the tables
         gaps = {f"{name}_{what}": 0.0 for name in self.joints for what in ("clearance", "offset")}
         tables = _tables(self._with_unchecked(**gaps, monitored=LARGEST), integrator.step_phase)

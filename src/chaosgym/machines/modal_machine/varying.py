@@ -21,12 +21,10 @@ from numpy.typing import NDArray
 
 from chaosgym.core.binned.tables import table_places
 from chaosgym.core.cycle import CycleArrays
-from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.machines.binned.model import KEPT_BYTES, Contact, Held, held, middles_and_nodes
-from chaosgym.machines.integrators import ExactEvents, Integrator
-from chaosgym.machines.machine import Option, Work, refuse_fixed_steps
+from chaosgym.machines.machine import Option, Work
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.machine import ModalMachine, as_there, rigid_note, turning_note
@@ -327,19 +325,6 @@ class VaryingMachine(BinnedMachine):
     def runs_fixed_steps(self) -> bool:
         """Never."""
         return False
-
-    def run(
-        self,
-        coordinates: Array,
-        bouncing: Array,
-        arrays: CycleArrays,
-        integrator: Integrator,
-        tangents: Tangents | None = None,
-    ) -> tuple[int, int]:
-        """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
-        if not isinstance(integrator, ExactEvents):
-            raise refuse_fixed_steps(integrator, self)
-        return super().run(coordinates, bouncing, arrays, integrator, tangents)
 
     def further_results(self, arrays: CycleArrays) -> dict[str, Any]:
         """Return nothing more: contact stays in one place."""
