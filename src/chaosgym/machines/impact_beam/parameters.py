@@ -108,18 +108,18 @@ class BeamParameters(ModalImpactMachine):
         source="pinned-pinned frequency 288.2 Hz at 284.0 mm, thesis table 3.1",
     )
     """Thickness in the direction of bending [m]."""
-    width: float = parameter(0.02761151664658319, unit="m", low=1e-4, high=1.0, provenance="calibrated", source=_FIT)
+    width: float = parameter(0.01796203652149064, unit="m", low=1e-4, high=1.0, provenance="calibrated", source=_FIT)
     """Across the direction of bending [m]."""
     youngs_modulus: float = parameter(2.0e11, unit="Pa", low=1e8, high=1e13, provenance="assumed", source="steel")
     """Young's modulus [Pa]."""
     density: float = parameter(7850.0, unit="kg/m^3", low=10.0, high=1e5, provenance="assumed", source="steel")
     """Mass density [kg/m^3]."""
     force_position: float = parameter(
-        0.18567884341609547, unit="m", low=1e-3, high=10.0, provenance="calibrated", source=_FIT
+        0.20793028156308968, unit="m", low=1e-3, high=10.0, provenance="calibrated", source=_FIT
     )
     """Distance of the shaker's push rod from the pivot, at most the length [m]."""
     pivot_rotational_stiffness: float = parameter(
-        144.9738,
+        208.7018,
         unit="N m/rad",
         low=0.0,
         high=1e9,
@@ -128,23 +128,25 @@ class BeamParameters(ModalImpactMachine):
     )
     """Rotational spring of the flexure pivot [N m/rad]."""
     pivot_translational_stiffness: float = parameter(
-        18144014.029233065, unit="N/m", low=1.0, high=1e13, provenance="calibrated", source=_FIT
+        14981.859396355085, unit="N/m", low=1.0, high=1e13, provenance="calibrated", source=_FIT
     )
     """Translational spring of the flexure pivot [N/m]."""
     shaker_stiffness: float = parameter(
-        97.33696421978397, unit="N/m", low=0.0, high=1e9, provenance="calibrated", source=_FIT
+        24.022515293504412, unit="N/m", low=0.0, high=1e9, provenance="calibrated", source=_FIT
     )
     """Suspension spring of the shaker [N/m]."""
     shaker_damping: float = parameter(
-        57.46776610827452, unit="N s/m", low=0.0, high=1e6, provenance="calibrated", source=_FIT
+        53.17532038056393, unit="N s/m", low=0.0, high=1e6, provenance="calibrated", source=_FIT
     )
     """Suspension damper of the shaker [N s/m]."""
-    shaker_mass: float = parameter(0.0, unit="kg", low=0.0, high=1e3, provenance="calibrated", source=_FIT)
+    shaker_mass: float = parameter(
+        0.03966858811540816, unit="kg", low=0.0, high=1e3, provenance="calibrated", source=_FIT
+    )
     """Moving mass of the shaker and its push rod [kg]."""
     damping_ratio: float = parameter(0.01, low=0.0, high=100.0, provenance="printed", source="thesis 3.5.1 and 5.3.1")
     """Structural damping ratio of the first bending mode."""
     damping_family: str = parameter(
-        "beam", choices=("uniform", "stiffness", "beam"), provenance="calibrated", source=_FIT
+        "uniform", choices=("uniform", "stiffness", "beam"), provenance="calibrated", source=_FIT
     )
     """"uniform": the same ratio in every mode; "stiffness": proportional to the mode's frequency; "beam": proportional
     to the stiffness of the beam alone, pivot and shaker springs left out, with the ratio at its first pinned-pinned
