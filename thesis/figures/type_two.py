@@ -48,12 +48,12 @@ def force_curve(beam: ImpactBeam, speeds: Array) -> tuple[Array, Array]:
 
 
 def figure(name: str) -> Figure:
-    """Draw the candidate beside the shipped beam, with what is printed."""
+    """Draw the candidate beside the former default, of a hard pivot, with what is printed."""
     speeds = np.arange(2.0, 30.01, 0.25)
     drawn = Figure(figsize=(8.0, 4.5), layout="constrained")
     panel = drawn.subplots()
     beam = read_candidate(name)
-    for one, colour, label in ((ImpactBeam(), "0.65", "shipped beam"), (beam, "C0", f"candidate {name}")):
+    for one, colour, label in ((read_candidate("former"), "0.65", "hard pivot"), (beam, "C0", f"candidate {name}")):
         low, high = force_curve(one, speeds)
         panel.fill_between(speeds, low, high, color=colour, alpha=0.4, lw=0)
         panel.plot(speeds, 0.5 * (low + high), color=colour, label=label)
