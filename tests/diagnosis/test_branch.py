@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +21,7 @@ from chaosgym.machines.linear_impact import linear_impact
 from chaosgym.machines.modal_machine import Drive, ModalMachine, Structure
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
+from tests.plain_modes import HARD_BEAM
 
 from .oscillators import RigidImpact
 
@@ -382,7 +384,7 @@ def test_the_first_branch_of_the_beam_reaches_from_4_to_30_hz():
     """
     folds = []
     for start in (4.0, 12.0):
-        machine = ImpactBeam(excitation_frequency=start)
+        machine = replace(HARD_BEAM, excitation_frequency=start)
         orbit = diagnose(machine).evidence["final_state"]
         _, found = branch_from(machine, "excitation_frequency", 4.0, 30.0, orbit, 1, 1.0)
         assert found.end == "end of the range at excitation_frequency = 30"
@@ -398,7 +400,7 @@ def test_the_symmetric_orbit_of_the_beam_loses_its_symmetry_and_the_other_one_fl
 
     Two folds lie 34 uHz apart, within one step of the branch.
     """
-    diagram = follow(ImpactBeam(), "speed", (17.4, 17.8), sweep=5, workers=1, longest_period=2)
+    diagram = follow(HARD_BEAM, "speed", (17.4, 17.8), sweep=5, workers=1, longest_period=2)
     symmetric = diagram.branches[0]
     (breaking,) = [one for one in symmetric.bifurcations if one.kind == "symmetry breaking"]
     assert breaking.loses_stability
@@ -418,7 +420,7 @@ def test_the_symmetric_orbit_of_the_beam_loses_its_symmetry_and_the_other_one_fl
 
 def test_bifurcations_within_one_step_are_judged_one_by_one():
     """The arm is stable between its second flip and the fold 1 mHz above, in whatever steps it is followed."""
-    diagram = follow(ImpactBeam(), "speed", (17.0, 18.2), sweep=13, workers=1, longest_period=1)
+    diagram = follow(HARD_BEAM, "speed", (17.0, 18.2), sweep=13, workers=1, longest_period=1)
     arm = next(branch for branch in diagram.branches if branch.begins.startswith("symmetry breaking"))
     found = [one for one in arm.bifurcations if one.kind in ("flip", "fold")]
     assert [one.kind for one in found[:4]] == ["flip", "flip", "fold", "fold"]
@@ -429,7 +431,7 @@ def test_bifurcations_within_one_step_are_judged_one_by_one():
 
 def two_cycles_apart(frequency):
     """Largest difference of the peaks of a settled beam in two cycles, relative to a peak; from the arm's own state."""
-    peaks = simulate(ImpactBeam(excitation_frequency=frequency), 2, transient=4000).peak_force
+    peaks = simulate(replace(HARD_BEAM, excitation_frequency=frequency), 2, transient=4000).peak_force
     return float(np.max(np.abs(peaks[1] - peaks[0])) / peaks.max())
 
 
@@ -478,7 +480,7 @@ def changes_in_a_sweep(low, high, step, *, upwards):
     values = np.arange(low, high + step / 2.0, step)
     state, last, found = None, None, []
     for value in values if upwards else values[::-1]:
-        record = simulate(ImpactBeam(excitation_frequency=float(value)), 16, state, transient=800)
+        record = simulate(replace(HARD_BEAM, excitation_frequency=float(value)), 16, state, transient=800)
         state, peaks = record.final_state, record.peak_force
         repeats = (k for k in (1, 2, 3, 4, 8) if np.max(np.abs(peaks[k:] - peaks[:-k])) < 1e-4 * peaks.max())
         period = next(repeats, None)
@@ -497,7 +499,7 @@ def test_every_change_that_a_fine_sweep_shows_is_on_the_branches():
     """Beam, 17 to 18.2 Hz, up and down: each jump or change of period lies at an end of stability."""
     seen = [each for up in (True, False) for each in changes_in_a_sweep(17.0, 18.2, 0.01, upwards=up)]
     assert len(seen) >= 8
-    diagram = follow(ImpactBeam(), "speed", (17.0, 18.2), sweep=13, workers=1)
+    diagram = follow(HARD_BEAM, "speed", (17.0, 18.2), sweep=13, workers=1)
     ends = np.array([one.value for one in diagram.bifurcations if one.loses_stability])
     for low, high in seen:
         assert np.any((ends > low - 0.005) & (ends < high + 0.005)), (low, high)

@@ -10,9 +10,9 @@ from chaosgym.diagnosis import Tolerance, diagnose, find_periodic_orbit
 from chaosgym.diagnosis.bifurcation_diagram import follow
 from chaosgym.diagnosis.margins import margins
 from chaosgym.errors import DiagnosisError
-from chaosgym.machines import ImpactBeam
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
+from tests.plain_modes import HARD_BEAM
 
 from .test_branch import SOFT, oscillator
 
@@ -32,8 +32,8 @@ def dragged(machine, state, field, values):
 
 @pytest.mark.parametrize(("field", "side"), [("excitation_frequency", -1), ("clearance", 1)])
 def test_a_fold_is_where_the_dragged_motion_jumps(field, side):
-    """The beam at 19 Hz: its motion follows a field up to the margin, and jumps within the next 0.02 %."""
-    beam = ImpactBeam(excitation_frequency=19.0)
+    """The beam on a hard pivot at 19 Hz: its motion follows a field up to the margin, and jumps within the next 0.02 %."""
+    beam = replace(HARD_BEAM, excitation_frequency=19.0)
     orbit = orbit_of(beam)
     found = margins(beam, orbit, {field: Tolerance(0.02 if field == "excitation_frequency" else 0.05)})
     (end,) = [margin for margin in found.margins if margin.side == side]

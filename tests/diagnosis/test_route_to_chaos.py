@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,9 +14,9 @@ from chaosgym.diagnosis.route_to_chaos import (
     routes_to_chaos,
 )
 from chaosgym.diagnosis.section_shape import section_shape
-from chaosgym.machines import ImpactBeam
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
+from tests.plain_modes import HARD_BEAM
 
 from .test_branch import SOFT
 
@@ -88,16 +89,16 @@ def test_a_sweep_is_asked_between_its_neighbours_only():
 
 
 def test_a_torus_is_told_where_the_motion_beyond_is_one():
-    """Beam at 30 Hz from +-0.2 mm down: beyond the Neimark-Sacker bifurcation at 0.1976 mm states fill a closed curve.
+    """Beam on a hard pivot at 30 Hz from +-0.2 mm down: beyond the Neimark-Sacker bifurcation at 0.1976 mm states fill a closed curve.
 
     Were the motion chaotic there, the same bifurcation would tell no route.
     """
-    diagram = follow(ImpactBeam(), "clearance", (0.18e-3, 0.2e-3), sweep=2, workers=1, most_unstable=10.0)
+    diagram = follow(HARD_BEAM, "clearance", (0.18e-3, 0.2e-3), sweep=2, workers=1, most_unstable=10.0)
     first, last = diagram.sweep
     object.__setattr__(diagram, "sweep", (SweepPoint(first.value, "chaotic", None, first.peaks, first.state), last))
     (onset,) = routes_to_chaos(diagram)
     assert onset.route == "torus"
-    near = simulate(ImpactBeam(clearance=0.1974e-3), 2000, transient=2000)
+    near = simulate(replace(HARD_BEAM, clearance=0.1974e-3), 2000, transient=2000)
     assert section_shape(near.section) == "closed curve"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("chaosgym.diagnosis.route_to_chaos._nature_beyond", lambda *_: "chaotic")
