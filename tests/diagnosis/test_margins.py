@@ -32,7 +32,7 @@ def dragged(machine, state, field, values):
 
 @pytest.mark.parametrize(("field", "side"), [("excitation_frequency", -1), ("clearance", 1)])
 def test_a_fold_is_where_the_dragged_motion_jumps(field, side):
-    """The beam on a hard pivot at 19 Hz: its motion follows a field up to the margin, and jumps within the next 0.02 %."""
+    """A beam on a hard pivot, 19 Hz: its motion follows a field up to the margin, and jumps within 0.02 % more."""
     beam = replace(HARD_BEAM, excitation_frequency=19.0)
     orbit = orbit_of(beam)
     found = margins(beam, orbit, {field: Tolerance(0.02 if field == "excitation_frequency" else 0.05)})

@@ -37,7 +37,7 @@ def test_precursors_of_a_period(period, doubling, three):
 
 
 def test_long_bouncing_announces_chaos_on_the_beam():
-    """A quarter of the half cycle at 16 Hz, +-0.032 mm, three quarters at 30 Hz, +-0.127 mm (a seventh at 18 Hz in 5.6)."""
+    """A quarter of the half cycle at 16 Hz, +-0.032 mm (a seventh at 18 Hz in 5.6); three quarters at 30 Hz."""
     calm = bounce_fraction(simulate(ImpactBeam(excitation_frequency=16.0, clearance=0.032e-3), 50, transient=200))
     wild = bounce_fraction(simulate(ImpactBeam(), 50, transient=200))
     assert calm == pytest.approx(0.24, abs=0.02)

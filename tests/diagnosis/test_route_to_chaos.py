@@ -89,7 +89,7 @@ def test_a_sweep_is_asked_between_its_neighbours_only():
 
 
 def test_a_torus_is_told_where_the_motion_beyond_is_one():
-    """Beam on a hard pivot at 30 Hz from +-0.2 mm down: beyond the Neimark-Sacker bifurcation at 0.1976 mm states fill a closed curve.
+    """Hard pivot, 30 Hz, from +-0.2 mm down: beyond the Neimark-Sacker bifurcation at 0.1976 mm states fill a curve.
 
     Were the motion chaotic there, the same bifurcation would tell no route.
     """

@@ -68,8 +68,8 @@ def test_dots_are_the_series_that_the_thesis_plots():
 
 
 def test_either_of_two_mirrored_sides_is_what_the_thesis_plots():
-    """Printed is 70 N, periodic, at 29 Hz (IBS-028); with a hard pivot one side shows 69.2 N and the other 75.4 N, and a last
-    digit decides which is the upper one. Whichever it is, the nearer side counts, in thorough and in hasty runs; a
+    """Printed is 70 N, periodic, at 29 Hz (IBS-028); with a hard pivot one side shows 69.2 N, the other 75.4 N, and a
+    last digit decides which is the upper one. Whichever it is, the nearer side counts, in thorough and in hasty runs; a
     crank has one resultant."""
     modes = {"reduction": "interfaces", "n_modes": 5, "fitted_modes": 0}
     beam = replace(HARD_BEAM, **modes, excitation_frequency=29.0, clearance=0.127e-3)
