@@ -3,8 +3,8 @@
 from chaosgym.machines.machine import Work
 
 WORK = Work(
-    # twice the thesis' force, and speeds about the onset of chaos (assumed): with less force, or at higher speeds, chaos
-    # fills whole ranges that no trim leaves (docs/development/tasks.md)
+    # twice the thesis' force, and speeds about the onset of chaos (assumed): with less force, or at higher speeds,
+    # chaos fills whole ranges that no trim leaves (docs/development/tasks.md)
     fields={"force_amplitude": 17.8, "clearance": 0.127e-3},
     # one fitted mode less than the rung standard, whatever the machine's own model
     model={
