@@ -18,7 +18,7 @@ MODULES = sorted(
     for file in (ROOT / "src").rglob("*.py")
     if ">>>" in file.read_text(encoding="utf-8")
 )
-CONSTANTS = {"THESIS_IMPACT_BEAM", "THESIS_SLIDER_CRANK", "__version__"}
+CONSTANTS = {"THESIS_SLIDER_CRANK", "__version__"}
 OPTIONS = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
 
 

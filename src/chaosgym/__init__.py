@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from chaosgym.diagnosis.measured import judge_peaks
     from chaosgym.diagnosis.step_check import step_check
     from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
-    from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, ImpactBeam, SliderCrank
+    from chaosgym.machines import THESIS_SLIDER_CRANK, ImpactBeam, SliderCrank
     from chaosgym.machines.modal_machine import Drive, Joint, ModalMachine, Structure, machine_with_joints, read_machine
     from chaosgym.monitor import Monitor
     from chaosgym.signals.read import read_recording
@@ -38,7 +38,7 @@ _HOME = {
     "chaosgym.diagnosis.measured": ("judge_peaks",),
     "chaosgym.diagnosis.step_check": ("step_check",),
     "chaosgym.errors": ("ChaosgymError", "ParameterError", "SimulationError"),
-    "chaosgym.machines": ("THESIS_IMPACT_BEAM", "THESIS_SLIDER_CRANK", "ImpactBeam", "SliderCrank"),
+    "chaosgym.machines": ("THESIS_SLIDER_CRANK", "ImpactBeam", "SliderCrank"),
     "chaosgym.machines.modal_machine": (
         "Drive",
         "Joint",
@@ -55,7 +55,6 @@ _HOME = {
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
-    "THESIS_IMPACT_BEAM",
     "THESIS_SLIDER_CRANK",
     "Axis",
     "ChaosgymError",

@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from chaosgym.errors import ChaosgymError
-from chaosgym.machines import THESIS_IMPACT_BEAM
+from chaosgym.machines import ImpactBeam
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
 from tests.plain_modes import PLAIN_BEAM
@@ -45,7 +45,7 @@ def test_a_periodic_figure_says_what_the_simulation_says(tmp_path):
     """The beam repeats every cycle at 19 Hz and +-0.127 mm; the figure's finding is the nature of that very run."""
     (one,) = draw_figures(chosen(["3.6"]), tmp_path, resolution=0.1, workers=1)
     assert one.path.read_bytes().startswith(b"\x89PNG")
-    peaks = simulate(replace(THESIS_IMPACT_BEAM, excitation_frequency=19.0), 100, transient=200).peak_force[:, 0]
+    peaks = simulate(replace(ImpactBeam(), excitation_frequency=19.0), 100, transient=200).peak_force[:, 0]
     assert one.findings[0].here.startswith(f"{peaks.mean():.3g} N, periodic")
     assert one.findings[0].agrees is True
 

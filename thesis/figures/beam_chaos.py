@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from chaosgym.design.statistics import histogram
-from chaosgym.machines import THESIS_IMPACT_BEAM
+from chaosgym.machines import ImpactBeam
 from chaosgym.plotting.style import ACCENT, NATURE_COLOURS
 from thesis import plotting as thesis
 from thesis.figures.beam import DAMPING, LARGE, SMALL, TRANSIENT, runs, sweep
@@ -32,7 +32,7 @@ HISTOGRAM_FREQUENCIES = (22.0, 25.0, 30.0)
 
 def transient_chaos(resolution: float) -> Mapping[str, Computation]:
     """Runs from rest at the two printed dampings, and over the dampings around them."""
-    beam = replace(THESIS_IMPACT_BEAM, excitation_frequency=30.0, clearance=LARGE)
+    beam = replace(ImpactBeam(), excitation_frequency=30.0, clearance=LARGE)
     around = steps(0.0090, 0.0130, 0.0001 / resolution, BRIEF_DAMPING, ENDLESS_DAMPING)
     return {
         "printed": sweep(beam, "damping_ratio", (BRIEF_DAMPING, ENDLESS_DAMPING), cycles=LONGEST, transient=0),
@@ -130,8 +130,8 @@ TRANSIENT_CHAOS = ThesisFigure(
 def bouncing(resolution: float) -> Mapping[str, Computation]:
     """Impact force of a periodic and of a chaotic response."""
     beams = {
-        "a": replace(THESIS_IMPACT_BEAM, excitation_frequency=18.0, clearance=SMALL),
-        "b": replace(THESIS_IMPACT_BEAM, excitation_frequency=30.0, clearance=LARGE),
+        "a": replace(ImpactBeam(), excitation_frequency=18.0, clearance=SMALL),
+        "b": replace(ImpactBeam(), excitation_frequency=30.0, clearance=LARGE),
     }
     return {
         name: History(machine=beam, cycles=4, transient=TRANSIENT, samples=4000) for name, beam in beams.items()
@@ -190,7 +190,7 @@ def beam_histograms(resolution: float) -> Mapping[str, Computation]:
     return {
         "long": runs(
             [
-                replace(THESIS_IMPACT_BEAM, excitation_frequency=frequency, clearance=LARGE)
+                replace(ImpactBeam(), excitation_frequency=frequency, clearance=LARGE)
                 for frequency in HISTOGRAM_FREQUENCIES
             ],
             "excitation_frequency",

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from chaosgym.machines import THESIS_IMPACT_BEAM
+from chaosgym.machines import ImpactBeam
 from chaosgym.machines.impact_beam.modes import pinned_pinned_frequency
 from chaosgym.plotting.style import ACCENT, MUTED
 from thesis import plotting as thesis
@@ -29,7 +29,7 @@ def flexibility(resolution: float) -> Mapping[str, Computation]:
     values = steps(1.0, 30.0, 0.15 / resolution)
     curves = {
         f"{1e3 * length:g}": sweep(
-            replace(THESIS_IMPACT_BEAM, clearance=TINY, length=length),
+            replace(ImpactBeam(), clearance=TINY, length=length),
             "excitation_frequency",
             values,
             cycles=50,
@@ -51,8 +51,8 @@ def _length_curves(parts: Parts) -> list[tuple[float, Array, Array]]:
 def length_curves(parts: Parts, ax: Axes, *, ratio: bool) -> None:
     """Largest peak against frequency or frequency ratio, for the three lengths."""
     for (length, frequency, force), colour in zip(_length_curves(parts), (ACCENT, "#d1495b", MUTED), strict=True):
-        unit = pinned_pinned_frequency(THESIS_IMPACT_BEAM, length) if ratio else 1.0
-        name = f"{1e3 * length:g} mm ({pinned_pinned_frequency(THESIS_IMPACT_BEAM, length):.1f} Hz)"
+        unit = pinned_pinned_frequency(ImpactBeam(), length) if ratio else 1.0
+        name = f"{1e3 * length:g} mm ({pinned_pinned_frequency(ImpactBeam(), length):.1f} Hz)"
         thesis.curve(frequency / unit, force, ax, label=name, color=colour)
     if not ratio:
         thesis.printed_span(*printed("IBS-036"), ax, "fluctuates, printed")
@@ -82,14 +82,14 @@ def collapse(parts: Parts) -> Sequence[Finding]:
     """By which factor must frequencies be divided for the crests of two lengths to coincide best?"""
     curves = _length_curves(parts)
     length, frequency, force = curves[0]
-    base = pinned_pinned_frequency(THESIS_IMPACT_BEAM, length)
+    base = pinned_pinned_frequency(ImpactBeam(), length)
     low, high = printed("IBS-036")
     inside = (frequency >= low) & (frequency <= 0.95 * high)
     scales = np.linspace(0.94, 1.06, 241)
     found = []
     for other, grid, values in curves[1:]:
         match = [np.corrcoef(force[inside], np.interp(frequency[inside] * s, grid, values))[0, 1] for s in scales]
-        expected = pinned_pinned_frequency(THESIS_IMPACT_BEAM, other) / base
+        expected = pinned_pinned_frequency(ImpactBeam(), other) / base
         best = float(scales[int(np.argmax(match))])
         agreement = float(np.interp(expected, scales, match))
         found.append(

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.machines import THESIS_IMPACT_BEAM
+from chaosgym.machines import ImpactBeam
 from thesis.figures.beam import DAMPING, LARGE, LENGTH, SMALL, sweep
 from thesis.figures.computations import Computation
 from thesis.figures.figure import Finding, Parts, ThesisFigure, steps
@@ -28,7 +28,7 @@ def force_against_frequency(resolution: float) -> Mapping[str, Computation]:
     """Both halves of figure 3.8."""
     values = steps(1.0, 30.0, 0.5 / resolution, 18.0, 19.0, 20.0, 29.0)
     curves = {
-        name: sweep(replace(THESIS_IMPACT_BEAM, clearance=clearance), "excitation_frequency", values)
+        name: sweep(replace(ImpactBeam(), clearance=clearance), "excitation_frequency", values)
         for name, clearance in (("a", SMALL), ("b", LARGE))
     }
     return {**curves, **scored("IBS-020", "IBS-021", "IBS-022", "IBS-023")}
@@ -92,7 +92,7 @@ FORCE_AGAINST_FREQUENCY = ThesisFigure(
 
 def length_sweep(resolution: float) -> Mapping[str, Computation]:
     """Beam lengths 279 to 304 mm."""
-    beam = replace(THESIS_IMPACT_BEAM, excitation_frequency=29.0, clearance=LARGE)
+    beam = replace(ImpactBeam(), excitation_frequency=29.0, clearance=LARGE)
     return {"lengths": sweep(beam, "length", steps(0.279, 0.304, 0.0025 / max(1, round(resolution))))}
 
 
@@ -134,7 +134,7 @@ FORCE_AGAINST_LENGTH = ThesisFigure(
 
 def damping_sweep(resolution: float) -> Mapping[str, Computation]:
     """Structural damping 1 to 8 %."""
-    beam = replace(THESIS_IMPACT_BEAM, excitation_frequency=30.0, clearance=LARGE)
+    beam = replace(ImpactBeam(), excitation_frequency=30.0, clearance=LARGE)
     values = steps(0.01, 0.08, 0.0025 / resolution)
     return {"dampings": sweep(beam, "damping_ratio", values), **scored("IBS-045")}
 

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from chaosgym.machines import THESIS_IMPACT_BEAM
+from chaosgym.machines import ImpactBeam
 from chaosgym.machines.impact_beam.modes import static_tip_deflection
 from thesis import plotting as thesis
 from thesis.figures.beam import LARGE
@@ -23,11 +23,11 @@ Array = NDArray[np.float64]
 
 def beam_map(resolution: float) -> Mapping[str, Computation]:
     """Natures and types over frequency and dimensionless clearance."""
-    unit = static_tip_deflection(THESIS_IMPACT_BEAM)
+    unit = static_tip_deflection(ImpactBeam())
     shares = steps(0.005, 0.05, 0.005 / resolution)
     return {
         "map": Types(
-            machine=THESIS_IMPACT_BEAM,
+            machine=ImpactBeam(),
             speeds=steps(2.0, 30.0, 2.0 / resolution),
             clearances=tuple(unit * share for share in shares),
         ),
@@ -38,7 +38,7 @@ def beam_map(resolution: float) -> Mapping[str, Computation]:
 def map_axes(parts: Parts, ax: Axes) -> None:
     """Draw the beam's map on the axes of the thesis."""
     data = parts["map"]
-    share = data["clearance"] / static_tip_deflection(THESIS_IMPACT_BEAM)
+    share = data["clearance"] / static_tip_deflection(ImpactBeam())
     thesis.nature_plane(data["speed"], share, data["nature"], ax, types=data["type"])
     corner = printed("IBS-031").low, printed("IBS-030").low
     ax.plot([corner[0], corner[0], 30.5], [0.0525, corner[1], corner[1]], lw=1.6, ls="--", **thesis.PRINTED)
@@ -48,7 +48,7 @@ def map_axes(parts: Parts, ax: Axes) -> None:
 def with_measured(parts: Parts, ax: Axes) -> None:
     """The same, with the points of the measured curves that the text gives."""
     map_axes(parts, ax)
-    unit = static_tip_deflection(THESIS_IMPACT_BEAM)
+    unit = static_tip_deflection(ImpactBeam())
     ax.plot(printed("IBS-065").low, LARGE / unit, "s", ms=8, mfc="none", mew=1.8, **thesis.PRINTED)
     ends = [printed("IBS-054").high, printed("IBS-056").high]
     ax.plot(ends, [0.016e-3 / unit, LARGE / unit], "^", ms=8, mfc="none", mew=1.8, **thesis.PRINTED)
@@ -58,7 +58,7 @@ def criterion(parts: Parts) -> Sequence[Finding]:
     """Chaos only above the printed clearance and frequency?"""
     data = parts["map"]
     places = [(s, c) for s in data["speed"] for c in data["clearance"]]
-    machines = [replace(THESIS_IMPACT_BEAM, excitation_frequency=float(s), clearance=float(c)) for s, c in places]
+    machines = [replace(ImpactBeam(), excitation_frequency=float(s), clearance=float(c)) for s, c in places]
     rate = criterion_rate(machines, [str(kind) for kind in data["nature"].ravel()])  # type: ignore[misc]
     return [
         scored_finding(parts, "IBS-030", "chaos only above dimensionless clearance 0.02", sensitivity="clearance"),

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from chaosgym.machines import THESIS_IMPACT_BEAM
+from chaosgym.machines import ImpactBeam
 from thesis import plotting as thesis
 from thesis.figures.beam import LARGE, TRANSIENT, runs
 from thesis.figures.computations import Computation, ForcePointHistory, History
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 def one_response(frequency: float, resolution: float) -> Mapping[str, Computation]:
     """Time history, spectrum, section and nature of the beam at the large clearance."""
-    beam = replace(THESIS_IMPACT_BEAM, excitation_frequency=frequency, clearance=LARGE)
+    beam = replace(ImpactBeam(), excitation_frequency=frequency, clearance=LARGE)
     return {
         "history": History(machine=beam, cycles=6, transient=TRANSIENT, samples=2000),
         "long": History(machine=beam, cycles=256, transient=TRANSIENT, samples=128),
@@ -78,7 +78,7 @@ CHAOTIC_RESPONSE = ThesisFigure(
 
 def force_point(resolution: float) -> Mapping[str, Computation]:
     """Motion where the shaker pushes."""
-    beam = replace(THESIS_IMPACT_BEAM, excitation_frequency=30.0, clearance=LARGE)
+    beam = replace(ImpactBeam(), excitation_frequency=30.0, clearance=LARGE)
     return {
         "motion": ForcePointHistory(machine=beam, cycles=12, transient=TRANSIENT),
         "response": runs([beam]),

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from chaosgym.machines import THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK, Machine
+from chaosgym.machines import THESIS_SLIDER_CRANK, ImpactBeam, Machine
 from chaosgym.machines.parameters import with_settings
 from thesis.scorecard.jobs import Job, run_jobs
 from thesis.scorecard.observation import Effort
@@ -11,7 +11,7 @@ from thesis.scorecard.quantities import QUANTITIES
 from thesis.scorecard.verdicts import Judged, judge
 from thesis.statements import Comparison, conditions, read_comparisons
 
-THESIS_MACHINES: Mapping[str, Machine] = {one.name: one for one in (THESIS_IMPACT_BEAM, THESIS_SLIDER_CRANK)}
+THESIS_MACHINES: Mapping[str, Machine] = {one.name: one for one in (ImpactBeam(), THESIS_SLIDER_CRANK)}
 """By name: what the scorecard judges and the figures show."""
 
 

@@ -5,7 +5,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from chaosgym.machines.impact_beam import THESIS_IMPACT_BEAM, ImpactBeam
+    from chaosgym.machines.impact_beam import ImpactBeam
     from chaosgym.machines.machine import Machine
     from chaosgym.machines.slider_crank import THESIS_SLIDER_CRANK, SliderCrank
 
@@ -66,7 +66,6 @@ def register_machine(machine: "type[Machine]") -> "type[Machine]":
 
 __all__ = [
     "MACHINES",
-    "THESIS_IMPACT_BEAM",
     "THESIS_SLIDER_CRANK",
     "ImpactBeam",
     "Machine",
@@ -76,10 +75,10 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name in ("ImpactBeam", "THESIS_IMPACT_BEAM"):
-        from chaosgym.machines import impact_beam
+    if name == "ImpactBeam":
+        from chaosgym.machines.impact_beam import ImpactBeam
 
-        return getattr(impact_beam, name)
+        return ImpactBeam
     if name in ("SliderCrank", "THESIS_SLIDER_CRANK"):
         from chaosgym.machines import slider_crank
 

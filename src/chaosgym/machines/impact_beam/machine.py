@@ -79,10 +79,6 @@ class ImpactBeam(BeamParameters):
         )
 
 
-THESIS_IMPACT_BEAM = ImpactBeam(reduction="interfaces", n_modes=5, fitted_modes=0)
-"""The default beam in the thesis' own reduction (2.2.1, 5.2.3), in which its constants were fitted."""
-
-
 @lru_cache(maxsize=256)
 def _structure(beam: ImpactBeam) -> ModalImpactModel:
     modes, contact = modal_analysis(beam), (beam.contact_stiffness, beam.contact_damping)
