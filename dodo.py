@@ -84,13 +84,9 @@ TASKS = ["src/chaosgym/envs/setups.py", "src/chaosgym/envs/judge.py"]
 TASKS += sorted(map(str, Path("src/chaosgym/machines").glob("*/work.py")))
 """What says how machines are used in the environments, and when they cost."""
 
-SWEEPS = {
-    "impact-beam": "--axis length=0.26505:0.29295 --axis damping_ratio=0.005:0.08:log --axis contact_damping=10:40:log "
-    "--axis excitation_frequency=1:40 --axis clearance=1e-05:0.0003:log --crosses 20000 --seed 10 --budget 400",
-    "slider-crank": "--axis rod_length=0.22325:0.24675 --axis contact_damping_ratio=0.01:0.08:log "
-    "--axis friction_coefficient=0:0.1 --axis crank_speed=50:300 --axis slider_clearance=1.6e-05:0.0003:log "
-    "--crosses 3000 --seed 1 --budget 200",
-}
+DATASETS = ("impact-beam", "slider-crank")
+"""Machines whose datasets are made; the options stand in ``chaosgym.sweeps.build``."""
+
 LARGE = "--units 128 --batch 1920 --rollout 120"
 START = f"python agents/ppo.py --env chaosgym/ImpactBeamTolerance-v1 --seed 1 --steps 900000 {LARGE} --out {RUNS}/start"
 FLEET = """--keywords '{"level": "fleet", "split": "train"}'"""
@@ -121,7 +117,7 @@ SCORES = {
 }
 """How many of the machines kept for evaluation the shipped comparisons have."""
 
-LEARNED = [f"src/chaosgym/weights/{machine}.npz" for machine in SWEEPS]
+LEARNED = [f"src/chaosgym/weights/{machine}.npz" for machine in DATASETS]
 LEARNED += [f"{SHIPPED}/{name}/weights.npz" for name in POLICIES]
 """What answers and plays in commands and tutorials."""
 
@@ -146,31 +142,46 @@ def task(name: str, uses: Iterable[str], makes: Iterable[str], *commands: str) -
     return {"name": name, "file_dep": [GOLDEN, *uses], "targets": [*makes], "actions": [*commands]}
 
 
+def whole(machine: str) -> str:
+    """Folder of the whole dataset: where it is finished, or else where it is made."""
+    places = [f"{RUNS}/{machine}", f"datasets/{machine}/whole"]
+    return next((place for place in places if Path(place, "sweep.parquet").is_file()), places[0])
+
+
+def kept(machine: str) -> list[str]:
+    """What Git keeps of a dataset; what is trained on the whole rests on these, so that a clone needs no more.
+
+    They are rows of the whole and the plan of all others, so that no other whole has the same.
+    """
+    return [f"datasets/{machine}/sample/sweep.parquet", f"datasets/{machine}/plan.json"]
+
+
 def task_dataset():
-    """Labelled crosses of independent machines."""
-    for machine, options in SWEEPS.items():
-        made = [f"datasets/{machine}/{name}" for name in ("sweep.parquet", "plan.json", "CARD.md")]
+    """Labelled crosses of independent machines; a sample of them is kept."""
+    for machine in DATASETS:
         run = f"{RUNS}/{machine}"
-        sweep = f"chaosgym sweep {machine} {options} --signals 1 --out {run}"
-        copies = [f"cp {run}/{Path(file).name} {file}" for file in made]
-        yield task(machine, [], made, sweep, f"chaosgym dataset card {run}", *copies)
+        build = f"chaosgym dataset build {machine} --no-check --out {run}"
+        made = [*kept(machine), f"datasets/{machine}/CARD.md"]
+        yield task(machine, ["src/chaosgym/sweeps/build.py"], made, build, f"python -m benchmarks ship-dataset {run}")
 
 
 def task_classifier():
-    """The classifier of each machine, from its dataset."""
-    for machine in SWEEPS:
-        used = [f"datasets/{machine}/sweep.parquet", *sources("src/chaosgym/classifier")]
-        made, run = f"src/chaosgym/weights/{machine}.npz", f"{RUNS}/classifier-{machine}"
-        train = f"chaosgym train-classifier --data datasets/{machine} --out {run}"
-        yield task(machine, used, [made], f"rm -rf {run}", train, f"cp {run}/*.npz {made}")
+    """The classifier of each machine, from its whole dataset."""
+    for machine in DATASETS:
+        used = [*kept(machine), *sources("src/chaosgym/classifier")]
+        made, run, data = f"src/chaosgym/weights/{machine}.npz", f"{RUNS}/classifier-{machine}", whole(machine)
+        build = f"chaosgym dataset build {machine} --out {data}"
+        train = f"chaosgym train-classifier --data {data} --out {run}"
+        yield task(machine, used, [made], build, f"rm -rf {run}", train, f"cp {run}/*.npz {made}")
 
 
 def task_signs():
-    """How often the signs of chaos of thesis 5.3 were right on the datasets."""
-    used = [f"datasets/{machine}/sweep.parquet" for machine in SWEEPS]
+    """How often the signs of chaos of thesis 5.3 were right on the whole datasets."""
+    used = [file for machine in DATASETS for file in kept(machine)]
     used += ["src/chaosgym/diagnosis/precursors.py", "benchmarks/sweeps/signs.py"]
-    count = "python -m benchmarks.sweeps.signs " + " ".join(f"datasets/{machine}" for machine in SWEEPS)
-    yield task("rates", used, ["src/chaosgym/diagnosis/signs.json"], count)
+    builds = [f"chaosgym dataset build {machine} --out {whole(machine)}" for machine in DATASETS]
+    count = "python -m benchmarks.sweeps.signs " + " ".join(map(whole, DATASETS))
+    yield task("rates", used, ["src/chaosgym/diagnosis/signs.json"], *builds, count)
 
 
 def task_policy():
@@ -238,7 +249,7 @@ def task_picture():
     curves, drawn = "docs/data/training.csv", "docs/training.png"
     draw = f"python -m benchmarks curves --table {curves} --figure {drawn}"
     yield task("training", [curves, "benchmarks/envs/curves.py"], [drawn], draw)
-    for machine in SWEEPS:
+    for machine in DATASETS:
         for kind, options in (("tradeoff", LADDER_OPTIONS[machine]), ("stability", "")):
             folder = "docs/development" if kind == "stability" else "docs"
             made, run = f"{folder}/{kind}-{machine}.png", f"{RUNS}/{kind}-{machine}"

@@ -112,7 +112,7 @@ BY_ARCHIVE = MESH.format('matrices = "m.npz"')
 BY_MARKET = MESH.format('mass = "m.mtx"\nstiffness = "m.mtx"\ndegrees_of_freedom = { tip = 1, motor = 0 }')
 RECORD = "time [s];force [N]\n" + "".join(f"{k};{np.sin(k):.4f}\n" for k in range(80))
 POLICY = shipped_folder("chaosgym/ImpactBeamTolerance-v1")
-DATA = HERE / "datasets" / "impact-beam" / "sweep.parquet"
+DATA = HERE / "datasets" / "impact-beam" / "sample" / "sweep.parquet"
 
 
 def _machine(folder, content):

@@ -76,17 +76,20 @@ def check(folder: str, points: int, seed: int | None, as_json: bool) -> None:
     from chaosgym.sweeps import read_sweep
 
     found = check_rows(read_sweep(folder), points, seed=seed, progress=True)
-    platform = "the same packages and processor" if found.same_platform else "other packages or another processor"
-    emit(
-        found.as_dict(),
-        as_json,
-        lambda: [
-            f"{folder}: {found.identical} of {points} rows identical, {found.same_nature} of the same nature "
-            f"({platform})"
-        ],
-    )
+    emit(found.as_dict(), as_json, lambda: [f"{folder}: {found.line}"])
     if not found.sound:
         raise SystemExit(1)
+
+
+@click.command("ship-dataset")
+@FOLDER
+@AS_JSON
+def ship(folder: str, as_json: bool) -> None:
+    """Write sample, plan and card of the whole dataset in FOLDER into datasets/MACHINE."""
+    from benchmarks.sweeps.ship import ship_dataset
+
+    files = [str(path) for path in ship_dataset(Path(folder))]
+    emit({"wrote": files}, as_json, lambda: [f"wrote {file}" for file in files])
 
 
 @click.command("check-types")
@@ -323,6 +326,7 @@ for command in (
     margins,
     learned,
     check,
+    ship,
     types,
     cost,
     judges,

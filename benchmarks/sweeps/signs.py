@@ -5,7 +5,7 @@ the response is not periodic at some point of its cross: one tolerance of speed 
 told from the four arms of a cross, is right of its middle where that is periodic in case I, and not periodic in the
 others.
 
-    python -m benchmarks.sweeps.signs datasets/impact-beam datasets/slider-crank
+    python -m benchmarks.sweeps.signs datasets/impact-beam/whole datasets/slider-crank/whole
 """
 
 import json

@@ -17,7 +17,7 @@ from chaosgym.sweeps import read_sweep
 from chaosgym.sweeps.card import dataset_info
 from tests.cli.test_cli import run
 
-DATASET = Path(__file__).parents[2] / "datasets" / "impact-beam"
+DATASET = Path(__file__).parents[2] / "datasets" / "impact-beam" / "sample"
 
 
 def _bomb(members: int = 1, bytes_each: int = LARGEST + 1) -> bytes:

@@ -15,7 +15,7 @@ from chaosgym.sweeps import read_sweep
 from tests.sweeps.test_readers import PLAN, run_sweep
 
 ROOT = Path(__file__).parents[2]
-SHIPPED = [ROOT / "datasets" / machine for machine in ("impact-beam", "slider-crank")]
+SHIPPED = [ROOT / "datasets" / machine / "sample" for machine in ("impact-beam", "slider-crank")]
 
 READ = """
 import json, sys, pyarrow, pyarrow.parquet as pq
@@ -53,7 +53,7 @@ def test_no_column_is_a_list_of_fixed_size():
 @pytest.mark.slow
 @pytest.mark.parametrize("version", [lowest_admitted(), "25.0.0"])
 def test_other_versions_read_every_value(version, tmp_path):
-    """Both shipped datasets, and one half of whose rows have no signals: rows, nulls, and a value in the middle."""
+    """Both shipped samples, and a sweep made here, without half of the signals: nulls, and a value in the middle."""
     run_sweep(PLAN, tmp_path / "halves")
     folders = [*SHIPPED, tmp_path / "halves"]
     assert 0 < _expected(folders[-1])[1] < len(PLAN)

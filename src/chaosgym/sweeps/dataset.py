@@ -77,8 +77,8 @@ LABELS: Mapping[str, Column] = {
     "irregularity": _figure(
         "N",
         "half range of the peak force within the classes of the best period up to 16, largest class, of the settled "
-        "signal or, where that is not kept, of the last 64 judged cycles: what a sensor must resolve to see that the "
-        "response does not repeat",
+        "signal or, in a sweep that keeps none, of the last 64 judged cycles: what a sensor must resolve to see that "
+        "the response does not repeat",
     ),
     "resolvable": Column(
         pa.bool_(), "-", f"irregularity above {SENSOR_ERROR:g} N: irregular to the sensor of the thesis"
@@ -231,7 +231,8 @@ def read_sweep(folder: str | Path, columns: list[str] | None = None) -> Labelled
     path = Path(folder) / DATA_FILE
     if not path.is_file():
         raise DatasetError(
-            f"{folder} holds no finished sweep (no {DATA_FILE}); run `chaosgym sweep` again to finish it"
+            f"{folder} holds no finished sweep (no {DATA_FILE}); run `chaosgym sweep` again to finish it, or "
+            "`chaosgym dataset build MACHINE` for a whole dataset of the repository"
         )
     try:
         return _understood(parquet_of(path, columns))

@@ -20,7 +20,7 @@ from chaosgym.diagnosis.type_rule import CROSS, type_of_cross, types_on_grid
 from chaosgym.errors import DiagnosisError, ParameterError, SimulationError, UnfinishedError
 from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, simulate
-from chaosgym.sweeps.dataset import SENSOR_ERROR, SIGNALS, WINDOW, WINDOWS, fixed_fields, schema
+from chaosgym.sweeps.dataset import SENSOR_ERROR, SIGNALS, WINDOW, WINDOWS, fixed_fields, schema, signal_columns
 from chaosgym.sweeps.plan import SweepPlan
 from chaosgym.version import __version__
 
@@ -131,7 +131,7 @@ def label_rows(plan: SweepPlan, rows: range, stop: Event | None = None) -> pa.Ta
         If ``stop`` is set meanwhile.
     """
     points = plan.points(rows)
-    fixed, lines = fixed_fields(plan), list[dict[str, Any]]()
+    fixed, signals, lines = fixed_fields(plan), signal_columns(), list[dict[str, Any]]()
     with_signals, with_full_type = plan.with_signals(rows), plan.with_full_type(rows)
     for index in range(len(rows)):
         if stop is not None and stop.is_set():
@@ -142,7 +142,9 @@ def label_rows(plan: SweepPlan, rows: range, stop: Event | None = None) -> pa.Ta
         except ParameterError as error:
             lines.append({**fixed, **point, "status": "failed", "reason": str(error)})
             continue
-        label = label_point(machine, plan.budget, signals=bool(with_signals[index]))
+        label = label_point(machine, plan.budget, signals=plan.signals > 0.0)
+        if not with_signals[index]:
+            label = {name: value for name, value in label.items() if name not in signals}
         if with_full_type[index]:
             label["full_response_type"] = _full_type(machine, plan.budget)
         lines.append(fixed | point | label)

@@ -199,6 +199,10 @@ class SweepPlan:
             return np.asarray(sequence.fast_forward(start).random(stop - start))
         return np.asarray(sequence.random_base2(max(0, int(np.ceil(np.log2(max(1, stop)))))))[:stop]
 
+    def drawn(self) -> Array:
+        """Numbers that place random or Sobol points, or crosses, on the axes: (size, axes) in 0 to 1."""
+        return self._drawn(0, self.size)
+
     def machine_at(self, point: dict[str, float]) -> Machine:
         """Build the machine of one point."""
         return with_settings(
