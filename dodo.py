@@ -88,13 +88,14 @@ DATASETS = ("impact-beam", "slider-crank")
 """Machines whose datasets are made; the options stand in ``chaosgym.sweeps.build``."""
 
 LARGE = "--units 128 --batch 1920 --rollout 120"
-START = f"python agents/ppo.py --env chaosgym/ImpactBeamTolerance-v1 --seed 1 --steps 900000 {LARGE} --out {RUNS}/start"
+BEAM = "ImpactBeamTolerance-v1"
+START = f"python agents/ppo.py --env chaosgym/{BEAM} --seed 0 --steps 900000 {LARGE} --out {RUNS}/{BEAM}"
 FLEET = """--keywords '{"level": "fleet", "split": "train"}'"""
 POLICIES = {
     "ImpactBeamTolerance-v1": [f"python agents/ppo.py --seed 0 --steps 900000 {LARGE}"],
     "ImpactBeamWear-v1": [
         START,
-        f"python agents/ppo.py --start {RUNS}/start --seed 0 --steps 300000 {LARGE} --learning-rate 5e-4",
+        f"python agents/ppo.py --start {RUNS}/{BEAM} --seed 0 --steps 300000 {LARGE} --learning-rate 5e-4",
     ],
     "SliderCrankTolerance-v1": [f"python agents/ppo.py --fidelity draft --seed 0 --steps 240000 {LARGE}"],
     "ImpactBeamTolerance-v1-fleet": [f"python agents/learn_map.py {FLEET} --seed 0 --steps 300000"],
@@ -243,7 +244,7 @@ def task_picture():
     rattle = "benchmarks/documentation/rattle.py"
     yield task("rattle", [rattle], ["docs/rattle.gif"], "python -m benchmarks.documentation.rattle docs/rattle.gif")
     used = ["thesis/figures/type_two.py", "thesis/scorecard/candidates.json"]
-    yield task("type-two", used, ["docs/type-two.png"], "python -m thesis.figures.type_two E docs/type-two.png")
+    yield task("type-two", used, ["docs/type-two.png"], "python -m thesis.figures.type_two docs/type-two.png")
     play = "chaosgym run-agent chaosgym/ImpactBeamTolerance-v1 --machine 13 --out docs/agent.gif"
     yield task("agent", [*TASKS, *LEARNED], ["docs/agent.gif"], play)
     curves, drawn = "docs/data/training.csv", "docs/training.png"
