@@ -8,6 +8,7 @@ import ast
 import hashlib
 import io
 import tokenize
+import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -84,8 +85,9 @@ TASKS = ["src/chaosgym/envs/setups.py", "src/chaosgym/envs/judge.py"]
 TASKS += sorted(map(str, Path("src/chaosgym/machines").glob("*/work.py")))
 """What says how machines are used in the environments, and when they cost."""
 
-DATASETS = ("impact-beam", "slider-crank")
-"""Machines whose datasets are made; the options stand in ``chaosgym.sweeps.build``."""
+RECIPES = "src/chaosgym/sweeps/datasets.toml"
+DATASETS = tuple(tomllib.loads(Path(RECIPES).read_text()))
+"""Machines whose datasets are made; the options stand in ``RECIPES``."""
 
 LARGE = "--units 128 --batch 1920 --rollout 120"
 BEAM = "ImpactBeamTolerance-v1"
@@ -108,7 +110,7 @@ POLICIES = {
 ON_FLEET = "--level fleet --split test " + " ".join(f"--only '{name}'" for name in ("back off, with memory", "belief"))
 SCORES = {
     "ImpactBeamTolerance-v1": "--machines 256",
-    "ImpactBeamWear-v1": "--machines 256",
+    "ImpactBeamWear-v1": "--machines 96",
     "ImpactBeam-v1": "--machines 64",
     "SliderCrankTolerance-v1": "--machines 128",
     "SliderCrankWear-v1": "--machines 16",
@@ -163,7 +165,7 @@ def task_dataset():
         run = f"{RUNS}/{machine}"
         build = f"chaosgym dataset build {machine} --no-check --out {run}"
         made = [*kept(machine), f"datasets/{machine}/CARD.md"]
-        yield task(machine, ["src/chaosgym/sweeps/build.py"], made, build, f"python -m benchmarks ship-dataset {run}")
+        yield task(machine, [RECIPES], made, build, f"python -m benchmarks ship-dataset {run}")
 
 
 def task_classifier():

@@ -7,8 +7,10 @@ to the last bit on the same platform only; elsewhere natures are compared (``agr
 
 import hashlib
 import json
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,33 +36,15 @@ class Recipe(NamedTuple):
     axes: tuple[str, ...]
 
 
-RECIPES: Mapping[str, Recipe] = {
-    "impact-beam": Recipe(
-        20_000,
-        10,
-        400,
-        (
-            "length=0.26505:0.29295",
-            "damping_ratio=0.005:0.08:log",
-            "contact_damping=10:40:log",
-            "excitation_frequency=1:40",
-            "clearance=1e-05:0.0003:log",
-        ),
-    ),
-    "slider-crank": Recipe(
-        3_000,
-        1,
-        200,
-        (
-            "rod_length=0.22325:0.24675",
-            "contact_damping_ratio=0.01:0.08:log",
-            "friction_coefficient=0:0.1",
-            "crank_speed=50:300",
-            "slider_clearance=1.6e-05:0.0003:log",
-        ),
-    ),
-}
-"""By name of the machine; the base machine is its default."""
+def _recipes() -> dict[str, Recipe]:
+    text = resources.files("chaosgym.sweeps").joinpath("datasets.toml").read_text(encoding="utf-8")
+    return {
+        name: Recipe(**{**options, "axes": tuple(options["axes"])}) for name, options in tomllib.loads(text).items()
+    }
+
+
+RECIPES: Mapping[str, Recipe] = _recipes()
+"""By name of the machine."""
 
 SAMPLE_CROSSES = 1000
 """Crosses of a sample, all of a smaller dataset."""
