@@ -110,7 +110,7 @@ POLICIES = {
 ON_FLEET = "--level fleet --split test " + " ".join(f"--only '{name}'" for name in ("back off, with memory", "belief"))
 SCORES = {
     "ImpactBeamTolerance-v1": "--machines 256",
-    "ImpactBeamWear-v1": "--machines 256",
+    "ImpactBeamWear-v1": "--machines 96",
     "ImpactBeam-v1": "--machines 64",
     "SliderCrankTolerance-v1": "--machines 128",
     "SliderCrankWear-v1": "--machines 16",

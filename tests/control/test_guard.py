@@ -35,7 +35,7 @@ class Stubborn:
 
 def test_a_calm_demand_is_not_left():
     """On a machine whose demand is calm whatever the policy asks for, the guard follows the demand."""
-    given = {"clearance": 0.06e-3, "tolerances": {}, "lowest_demand": 18.0, "highest_demand": 20.0, "steps": 60}
+    given = {"clearance": 0.06e-3, "tolerances": {}, "lowest_demand": 14.0, "highest_demand": 16.0, "steps": 60}
     follow = play(Follow(), ENV, seeds=[1, 2, 3], **given)
     assert follow.type_iii.max() == 0.0
     for action in (1, 4):

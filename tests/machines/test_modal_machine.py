@@ -16,11 +16,19 @@ from scipy.sparse import csc_matrix
 import chaosgym
 from chaosgym import Drive, ImpactBeam, ModalMachine, Structure, simulate
 from chaosgym.cli import app
+from chaosgym.design import variation_region
+from chaosgym.design.brief import brief_from
+from chaosgym.diagnosis import Tolerance
+from chaosgym.diagnosis.model_draws import fields_to_estimate
+from chaosgym.diagnosis.orbit_family import continuous_field
+from chaosgym.envs.variants import Variants
 from chaosgym.errors import ChaosgymError, ParameterError
 from chaosgym.machines.beam_element import bending_matrices
 from chaosgym.machines.impact_beam.modes import modal_analysis
 from chaosgym.machines.machine_file import schema_text, template
+from chaosgym.machines.parameters import with_settings
 from chaosgym.plotting import response
+from chaosgym.sweeps import read_sweep
 
 FIELDS = ("section", "peak_force", "impacts", "contact_fraction", "bounce_duration")
 
@@ -411,3 +419,28 @@ def test_what_does_not_fit_is_said_where_it_is_met(machine_file, case):
     with pytest.raises(ParameterError, match=message) as told:
         chaosgym.read_machine(machine_file(*changes))
     assert "docs/own-machine.md" in str(told.value)
+
+
+def test_fields_of_the_only_joint_have_its_name(machine_file, tmp_path):
+    """Axes, settings, tolerances, estimates and briefs know joint.stiffness, or pin.stiffness, as its field."""
+    file = machine_file(("[joint]", '[joint]\nname = "pin"'), ("[tolerances]", '[tolerances]\npin.damping = "7 %"'))
+    machine = chaosgym.read_machine(file)
+    assert machine.tolerances["contact_damping"] == (0.07, True)
+    for name in ("joint.stiffness", "pin.stiffness", "contact_stiffness"):
+        assert with_settings(machine, {name: 2e6}).contact_stiffness == 2e6
+    with pytest.raises(ParameterError, match=r"pin\.clearance: given twice"):
+        with_settings(machine, {"clearance": 1e-4, "pin.clearance": 1e-4})
+    with pytest.raises(ParameterError, match=r"no field 'joint\.speed'"):
+        with_settings(machine, {"joint.speed": 9.0})
+    assert fields_to_estimate(machine, ["pin.damping"]) == ("contact_damping",)
+    assert continuous_field(machine, "pin.clearance") == "clearance"
+    assert list(variation_region(machine, {"pin.clearance": Tolerance(0.1)})) == ["clearance"]
+    assert list(Variants(machine, {"joint.clearance": 0.1}).tolerances) == ["clearance"]
+    criteria = {"load_rating": "500 N", "life": "2000 h", "reliability": "90 %"}
+    given = {"machine": str(file), "criteria": criteria, "tolerances": {"pin": {"clearance": "3 %"}}}
+    brief = brief_from(given)
+    assert brief.region == {"clearance": Tolerance(0.03)}
+    words = ["--axis", "joint.clearance=0.1mm:0.2mm:2", "--set", "pin.damping=30", "--budget", "100", "--json"]
+    done = CliRunner().invoke(app, ["sweep", str(file), *words, "--out", str(tmp_path / "out")], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    assert read_sweep(tmp_path / "out").column("clearance").tolist() == [1e-4, 2e-4]

@@ -22,7 +22,7 @@ from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.numbers import shown
-from chaosgym.machines.parameters import parameter, validate
+from chaosgym.machines.parameters import by_field, parameter, validate
 
 _STEEL = "hardened steel, surface endurance strength 2.76 HB - 70 MPa at 600 HB (Shigley)"
 
@@ -123,6 +123,7 @@ def variation_region(
     """
     if region not in (1, 2):
         raise ParameterError(f"region = {shown(region)} is out of range; allowed: 1 or 2 tolerances")
+    tolerances = by_field(machine, tolerances)
     if wear and machine.clearance_field not in tolerances:
         raise ParameterError(f"wear needs a tolerance of {machine.clearance_field}")
     factors = {name: 2 if wear and name == machine.clearance_field else region for name in tolerances}

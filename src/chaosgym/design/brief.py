@@ -18,7 +18,8 @@ from chaosgym.errors import DesignError
 from chaosgym.files import toml_of
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
 from chaosgym.machines.numbers import shown
-from chaosgym.machines.parameters import parameters_of, suggestion, with_settings
+from chaosgym.machines.parameters import by_field, parameters_of, suggestion, with_settings
+from chaosgym.machines.stated import flat
 from chaosgym.machines.units import parse_quantity, parse_row, units_of
 
 REQUIRED_CRITERIA = ("load_rating", "life", "reliability")
@@ -207,6 +208,7 @@ def _section(
     section = values.get(name, {})
     if not isinstance(section, Mapping):
         raise DesignError(f"{name} = {shown(section)} is not a table; write [{name}] and one line a value below it")
+    section = by_field(machine, flat(section)) if machine else section
     _known(f"[{name}]", section, known, _homes(machine))
     return section
 

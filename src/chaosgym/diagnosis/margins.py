@@ -27,7 +27,7 @@ from chaosgym.diagnosis.orbit_family import (
 )
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit, run_period
 from chaosgym.diagnosis.response import Diagnosis
-from chaosgym.diagnosis.response_type import Tolerance, default_tolerances
+from chaosgym.diagnosis.response_type import Tolerance, chosen_tolerances
 from chaosgym.diagnosis.section import better_section
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
@@ -198,7 +198,7 @@ def margins(
         raise DiagnosisError("margins need a periodic orbit that is certified; allowed: one that closes and attracts")
     if not reach > 0.0:
         raise DiagnosisError(f"reach = {reach:g} tolerances is out of range; allowed: above 0")
-    chosen = default_tolerances(machine) if tolerances is None else dict(tolerances)
+    chosen = chosen_tolerances(machine, tolerances, "parameters")
     contacts = contacts_of(run_period(machine, orbit.state, orbit.period))
     found = tuple(
         margin

@@ -19,7 +19,7 @@ from chaosgym.diagnosis.response import Diagnosis, Type
 from chaosgym.diagnosis.type_rule import FORCE_CHANGE, Neighbour, apart, judge_type
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import parameters_of, with_settings
+from chaosgym.machines.parameters import by_field, parameters_of, with_settings
 from chaosgym.simulation import MotionState, parallel_map, rest_state
 
 Window = Literal["parameters", "speed-clearance"]
@@ -225,7 +225,7 @@ def chosen_tolerances(
     """Tolerances that a window uses, all of them fields of the machine."""
     if window not in ("parameters", "speed-clearance"):
         raise DiagnosisError(f"window = {window!r} is not one of 'parameters', 'speed-clearance'")
-    given = default_tolerances(machine) if tolerances is None else dict(tolerances)
+    given = default_tolerances(machine) if tolerances is None else by_field(machine, tolerances)
     for name in given:
         with_settings(machine, {name: getattr(machine, name, 0.0)})
     if window == "parameters":

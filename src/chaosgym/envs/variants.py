@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
-from chaosgym.machines.parameters import with_settings
+from chaosgym.machines.parameters import by_field, with_settings
 from chaosgym.version import __version__
 
 HELD_OUT, SEALED = 256, 512
@@ -66,6 +66,7 @@ class Variants:
         for name, width in tolerances.items():
             if isinstance(width, str | bool) or not hasattr(width, "__float__") or not 0.0 <= float(width) <= 0.9:
                 raise ParameterError(f"tolerances[{name!r}] = {width!r} is out of range; allowed: 0 to 0.9")
+        tolerances = by_field(nominal, tolerances)
         with_settings(nominal, {name: getattr(nominal, name, None) for name in tolerances})
         if split is not None and split not in SPLITS:
             raise ParameterError(f"split = {split!r} is not one of {', '.join(SPLITS)}")

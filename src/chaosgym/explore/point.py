@@ -13,7 +13,7 @@ from chaosgym.classifier import classifier_for
 from chaosgym.diagnosis import Diagnosis, diagnose
 from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
-from chaosgym.machines.parameters import changes_of, parameters_of, with_settings
+from chaosgym.machines.parameters import by_field, changes_of, parameters_of, with_settings
 from chaosgym.monitor import Monitor
 from chaosgym.plotting.design import axis_label
 from chaosgym.simulation import simulate
@@ -110,7 +110,7 @@ def machine_from(name: str, settings: Mapping[str, str], served: str = "") -> Ma
         raise ParameterError(f"machine = {name!r} is not one of {', '.join(known)}")
     described = parameters_of(MACHINES[name])
     values: dict[str, Any] = {}
-    for field, text in settings.items():
+    for field, text in by_field(MACHINES[name], settings).items():
         chosen = field in described and described[field].choices
         try:
             values[field] = text if chosen else float(text)

@@ -120,6 +120,8 @@ class Machine(ABC):
     """Fields that each rung sets, from the cheapest rung to the reference."""
     options: ClassVar[Mapping[str, Option]] = {}
     """Options on the command line, in the order in which they take effect; other fields are reached by ``--set``."""
+    aliases: ClassVar[Mapping[str, str]] = {}
+    """Fields by other names, those of the only joint: ``joint.stiffness`` for ``contact_stiffness``."""
     scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = {"as it is": {}}
     """Scenes whose cost the trade-off shows: the fields in which they differ from the default."""
     extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = {}

@@ -100,9 +100,24 @@ def validate(machine: Any) -> None:
 
 
 def field_named(owner: Any, name: str) -> str:
-    """Name of a field that may be written with dots, as in ``left.clearance`` for ``left_clearance``."""
-    plain = name.replace(".", "_")
+    """Name of a field that may be written as of a joint: ``left.clearance``, or ``joint.clearance`` of the only one."""
+    plain = getattr(owner, "aliases", {}).get(name, name.replace(".", "_"))
     return plain if plain in parameters_of(owner) else name
+
+
+def by_field(owner: Any, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is given by ``field_named`` names, by the fields' own.
+
+    Raises
+    ------
+    ParameterError
+        If a field is given by two names.
+    """
+    found = {field_named(owner, name): value for name, value in given.items()}
+    if len(found) < len(given):
+        names = [name for name in given if field_named(owner, name) != name]
+        raise ParameterError(f"{', '.join(names)}: given twice; allowed: one of the names of a field")
+    return found
 
 
 def refuse_not_finite(what: str, *arrays: Any) -> None:
@@ -137,7 +152,7 @@ def with_settings(machine: M, settings: Mapping[str, Any]) -> M:
         given together with a field that it sets.
     """
     known = parameters_of(machine)
-    settings = {field_named(machine, name): value for name, value in expand_fidelity(machine, settings).items()}
+    settings = by_field(machine, expand_fidelity(machine, settings))
     for name in settings:
         if name not in known:
             raise ParameterError(f"{type(machine).__name__} has no field {name!r}{suggestion(name, known)}")

@@ -6,7 +6,7 @@ from typing import Any
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
-from chaosgym.machines.parameters import check_parameter, field_named, parameters_of, suggestion
+from chaosgym.machines.parameters import by_field, check_parameter, parameters_of, suggestion
 from chaosgym.machines.units import parse_quantity
 
 
@@ -34,8 +34,7 @@ def tolerances_of(given: Mapping[str, Any], machine: Machine) -> dict[str, tuple
     """
     known = {name: about for name, about in parameters_of(machine).items() if not about.choices}
     found = {}
-    for key, text in _flat(given).items():
-        name = field_named(machine, key)
+    for name, text in by_field(machine, flat(given)).items():
         if name not in known:
             raise ParameterError(f"[tolerances] has no key {name!r}{suggestion(name, known)}")
         relative = isinstance(text, str) and text.strip().endswith("%")
@@ -49,13 +48,13 @@ def tolerances_of(given: Mapping[str, Any], machine: Machine) -> dict[str, tuple
     return found
 
 
-def _flat(given: Mapping[str, Any]) -> dict[str, Any]:
+def flat(given: Mapping[str, Any]) -> dict[str, Any]:
     """Entries of a table with those of tables in it, such as left.clearance, by their dotted keys."""
-    flat: dict[str, Any] = {}
+    found: dict[str, Any] = {}
     for key, value in given.items():
-        inner = _flat(value) if isinstance(value, dict) else {"": value}
-        flat |= {f"{key}.{name}" if name else key: each for name, each in inner.items()}
-    return flat
+        inner = flat(value) if isinstance(value, dict) else {"": value}
+        found |= {f"{key}.{name}" if name else key: each for name, each in inner.items()}
+    return found
 
 
 def reduced(machine: Any) -> Any:

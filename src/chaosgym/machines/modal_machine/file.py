@@ -17,16 +17,13 @@ from chaosgym.machines.modal_machine.archives import read_archive, read_matrix
 from chaosgym.machines.modal_machine.drive import KINDS, Drive
 from chaosgym.machines.modal_machine.jointed import Joint, machine_with_joints
 from chaosgym.machines.modal_machine.keys import KEYS
-from chaosgym.machines.modal_machine.machine import ModalMachine, clearance_option
+from chaosgym.machines.modal_machine.machine import OF_JOINT, ModalMachine, aliases_of, clearance_option
 from chaosgym.machines.modal_machine.structure import BASE, Structure
 from chaosgym.machines.modal_machine.turning import turning_joints
 from chaosgym.machines.modal_machine.varying import Spring, VaryingMachine, checked_samples
 from chaosgym.machines.parameters import parameter, parameters_of, suggestion
 from chaosgym.machines.stated import range_of, reduced, tolerances_of
 from chaosgym.machines.units import TURNING
-
-FIELDS = {"stiffness": "contact_stiffness", "damping": "contact_damping"}
-"""Fields of the machine by key of [joint], where they have other names."""
 
 SAMPLED = ("drive", "joint", "spring")
 """Tables that take samples of a cycle."""
@@ -225,7 +222,7 @@ def _with_one_joint(
     if base is VaryingMachine:
         fields |= {"samples": samples, "springs": springs, "slides": slides}
     known = parameters_of(base)
-    values = {"speed": speed, **{FIELDS.get(name, name): value for name, value in stated.items()}}
+    values = {"speed": speed, **{OF_JOINT.get(name, name): value for name, value in stated.items()}}
     for field in known:
         about = {**vars(known[field]), **({"provenance": "stated", "source": path} if field in values else {})}
         if turning:
@@ -233,6 +230,7 @@ def _with_one_joint(
         fields[field] = parameter(values.get(field, getattr(base, field)), **about)
     options = {"--speed-hz": ModalMachine.options["--speed-hz"], **clearance_option("clearance", turning)}
     types = {**types, "usual_ranges": usual, "turning": ("joint",) if turning else (), "options": options}
+    types["aliases"] = aliases_of("joint") | aliases_of(joint.get("name", "joint"))
     annotations: dict[str, Any] = dict.fromkeys(fields, Any)
     annotations |= {name: ClassVar[Any] for name in types if not name.startswith("__")}
     namespace = {"__module__": __name__, "__annotations__": annotations, **fields, **types}

@@ -25,7 +25,14 @@ from chaosgym.machines.joint_sets import JointTables, PressedSets
 from chaosgym.machines.machine import Flexible, Machine, Number, Option
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
-from chaosgym.machines.modal_machine.machine import ModalMachine, as_there, clearance_option, rigid_note, turning_note
+from chaosgym.machines.modal_machine.machine import (
+    OF_JOINT,
+    ModalMachine,
+    as_there,
+    clearance_option,
+    rigid_note,
+    turning_note,
+)
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import parameter, parameters_of
 from chaosgym.machines.units import TURNING
@@ -34,18 +41,6 @@ Array = NDArray[np.float64]
 
 LARGEST = "largest"
 """Word for the joint with the largest force."""
-
-FIELDS = {
-    "clearance": "clearance",
-    "offset": "offset",
-    "stops": "stops",
-    "stiffness": "contact_stiffness",
-    "damping": "contact_damping",
-    "lower_stiffness_factor": "lower_stiffness_factor",
-    "lower_damping_factor": "lower_damping_factor",
-    "preload": "preload",
-}
-"""What is known of a joint, and the field of ``ModalMachine`` that is the same of its only joint."""
 
 
 class Joint(NamedTuple):
@@ -392,7 +387,7 @@ def machine_with_joints(
     for name, joint in joints.items():
         if not name.isidentifier() or name.startswith("_"):
             raise ParameterError(f"joint name {name!r} is out of range; allowed: letters, digits and _, as in left_1")
-        for what, same in FIELDS.items():
+        for what, same in OF_JOINT.items():
             unit = known[same].unit
             more = {**about, "unit": TURNING.get(unit, unit) if joint.turns else unit}
             defaults[f"{name}_{what}"] = parameter(getattr(joint, what), **{**vars(known[same]), **more})

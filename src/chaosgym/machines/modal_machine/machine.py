@@ -34,8 +34,25 @@ Array = NDArray[np.float64]
 ROUNDING = 2.0**-52
 """Relative distance of neighbouring numbers."""
 
+OF_JOINT = {
+    "clearance": "clearance",
+    "offset": "offset",
+    "stops": "stops",
+    "stiffness": "contact_stiffness",
+    "damping": "contact_damping",
+    "lower_stiffness_factor": "lower_stiffness_factor",
+    "lower_damping_factor": "lower_damping_factor",
+    "preload": "preload",
+}
+"""What is known of a joint, and the field of a machine with one joint that is the same."""
+
 FEWEST_DIGITS = 1e-9
 """Share of the clearance that rounding may cost unsaid."""
+
+
+def aliases_of(joint: str) -> dict[str, str]:
+    """Fields of a machine by those of its only joint, whose name this is; see ``Machine.aliases``."""
+    return {f"{joint}.{what}": field for what, field in (OF_JOINT | {"friction": "friction"}).items()}
 
 
 def _assumed(default: Any, unit: str, low: float, high: float) -> Any:
@@ -72,6 +89,7 @@ class ModalMachine(ModalImpactMachine):
     name: ClassVar[str] = "modal-machine"
     speed_field: ClassVar[str] = "speed"
     clearance_field: ClassVar[str] = "clearance"
+    aliases: ClassVar[Mapping[str, str]] = aliases_of("joint")
     usual_ranges: ClassVar[Mapping[str, tuple[float, float]]] = {"speed": (4.0, 30.0), "clearance": (2e-5, 2e-4)}
     options: ClassVar[Mapping[str, Option]] = {
         "--speed-hz": Number("speed", "Hz"),

@@ -139,6 +139,7 @@ class VaryingMachine(BinnedMachine):
     name: ClassVar[str] = "varying-machine"
     speed_field: ClassVar[str] = "speed"
     clearance_field: ClassVar[str] = "clearance"
+    aliases: ClassVar[Mapping[str, str]] = ModalMachine.aliases
     usual_ranges: ClassVar[Mapping[str, tuple[float, float]]] = ModalMachine.usual_ranges
     options: ClassVar[Mapping[str, Option]] = ModalMachine.options
     extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = ModalMachine.extremes
