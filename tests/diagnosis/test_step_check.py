@@ -26,13 +26,8 @@ def test_exact_propagation_keeps_its_verdict(frequency, nature):
 
 
 def test_a_coarse_fixed_step_makes_chaos_of_a_periodic_response_and_is_found_out():
-<<<<<<< HEAD
     """With a hard pivot 28.5 Hz is period 1; Runge-Kutta, 2000 steps a cycle, calls it chaotic, a finer step not."""
     beam = replace(HARD_BEAM, excitation_frequency=28.5)
-=======
-    """At 19 Hz five modes have period 2; Runge-Kutta, 2000 steps a cycle, calls that chaotic, a finer step not."""
-    beam = ImpactBeam(excitation_frequency=19.0, n_modes=5, fitted_modes=0)
->>>>>>> etests3
     assert diagnose(beam).status == "certified"
     check = step_check(beam, integrator=RungeKutta4(2000))
     assert check.given.nature == "chaotic"
