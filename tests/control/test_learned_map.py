@@ -45,32 +45,32 @@ def test_it_goes_to_the_nearest_speed_that_is_calm():
 
 def test_where_life_counts_it_goes_to_the_least_load():
     """The same network, with the weights of another objective: the one speed of half the load, within the band."""
-    peaks = np.where(TASK.grid == 25.0, 40.0, 80.0)
+    peaks = np.where(TASK.grid == 23.0, 40.0, 80.0)
     policy = _map_of(np.full(SPEEDS, WILD), peaks)
     envs = native_envs(ENV, 2, objective="life", action="speed")
     envs.reset(seed=0)
     policy.start(envs)
-    np.testing.assert_array_equal(policy(_observed(24.0, 24.0)), 25.0)
-    np.testing.assert_array_equal(policy(_observed(24.0, 22.0)), 22.0)
+    np.testing.assert_array_equal(policy(_observed(22.0, 22.0)), 23.0)
+    np.testing.assert_array_equal(policy(_observed(22.0, 20.0)), 20.0)
 
 
 def test_a_settled_reading_takes_the_place_of_one_on_the_way():
     """The first step at a speed counts until the second; later ones weigh half; another speed is another memory."""
     usual = np.zeros((SPEEDS, len(READINGS))), np.ones((SPEEDS, len(READINGS)))
     felt, place = FeltSpeeds(TASK, 2, *usual), 8
-    assert TASK.grid[place] == 18.0
+    assert TASK.grid[place] == 12.0
 
-    def after(force, speed=18.0):
-        row = felt.add(_observed(speed, 18.0, force))[0]
+    def after(force, speed=12.0):
+        row = felt.add(_observed(speed, 12.0, force))[0]
         return row[:-1].reshape(SPEEDS, CHANNELS)
 
     def reading(force):
-        return readings_of(_observed(18.0, 18.0, force))[0, 0]
+        return readings_of(_observed(12.0, 12.0, force))[0, 0]
 
     assert after(10.0)[place, :3] == pytest.approx([1.0, 0.0, reading(10.0)])
     assert after(20.0)[place, :3] == pytest.approx([1.0, 1.0, reading(20.0)])
     assert after(40.0)[place, 2] == pytest.approx(0.5 * (reading(20.0) + reading(40.0)))
-    elsewhere = after(30.0, 19.0)
+    elsewhere = after(30.0, 13.0)
     assert elsewhere[:, 0].sum() == 2.0
     on_the_way = after(99.0)
     assert on_the_way[place, 2] == elsewhere[place, 2]

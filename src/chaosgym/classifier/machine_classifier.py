@@ -336,7 +336,7 @@ def classifier_for(machine: Machine) -> MachineClassifier:
 
     Examples
     --------
-    >>> beam = chaosgym.ImpactBeam(excitation_frequency=12.0)
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=10.0)
     >>> chaosgym.classifier_for(beam).classify(beam).response_type
     'I'
     """

@@ -161,8 +161,8 @@ def own_type(run: SettledRun, nominal_peak: float) -> Type:
     --------
     >>> from chaosgym.design.combination import own_type
     >>> from chaosgym.design import Criteria, assess
-    >>> found = assess(chaosgym.ImpactBeam(excitation_frequency=12.0), series_size=4)
-    >>> own_type(found.nominal, nominal_peak=40.0)
+    >>> found = assess(chaosgym.ImpactBeam(excitation_frequency=10.0), series_size=4)
+    >>> own_type(found.nominal, nominal_peak=35.0)
     'II'
     """
     if run.nature == "undetermined":
@@ -207,7 +207,7 @@ def combination(
     --------
     >>> from chaosgym.design import assess
     >>> from chaosgym.design.combination import combination
-    >>> found = assess(chaosgym.ImpactBeam(excitation_frequency=12.0), series_size=4)
+    >>> found = assess(chaosgym.ImpactBeam(excitation_frequency=10.0), series_size=4)
     >>> combination(found, base=16).types["I"].share
     1.0
     """
@@ -274,7 +274,7 @@ def influences(
     >>> from chaosgym.design.combination import influences
     >>> from chaosgym.diagnosis import Tolerance
     >>> region = {"clearance": Tolerance(0.05), "length": Tolerance(0.001)}
-    >>> found = influences(chaosgym.ImpactBeam(excitation_frequency=12.0), region, 10.0 / 3.0, base=16)
+    >>> found = influences(chaosgym.ImpactBeam(excitation_frequency=10.0), region, 10.0 / 3.0, base=16)
     >>> [one.parameter for one in found]
     ['clearance', 'length']
     """

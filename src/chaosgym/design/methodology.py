@@ -275,7 +275,7 @@ def assess(
     Examples
     --------
     >>> from chaosgym.design import Criteria, assess
-    >>> beam = chaosgym.ImpactBeam(excitation_frequency=12.0)
+    >>> beam = chaosgym.ImpactBeam(excitation_frequency=10.0)
     >>> assess(beam, criteria=Criteria(load_rating=500.0), series_size=4)
     <impact-beam: Type I, meets>
     """

@@ -164,7 +164,7 @@ def life_against(
     Examples
     --------
     >>> from chaosgym.design.trends import life_against
-    >>> life_against(chaosgym.ImpactBeam(), "excitation_frequency", [10.0, 20.0]).nature
+    >>> life_against(chaosgym.ImpactBeam(), "excitation_frequency", [10.0, 22.0]).nature
     ('periodic', 'chaotic')
     """
     chosen = np.atleast_1d(np.asarray(values, dtype=float))

@@ -221,7 +221,7 @@ def largest_lyapunov_exponent(
     --------
     >>> beam = chaosgym.ImpactBeam(excitation_frequency=12.0)
     >>> round(chaosgym.diagnosis.largest_lyapunov_exponent(beam, cycles=200).per_cycle, 3)
-    -3.437
+    -1.477
     """
     deviation = Deviation(machine, initial_state, integrator)
     if transient:

@@ -63,7 +63,7 @@ class Diagnosis:
 
     Examples
     --------
-    >>> verdict = chaosgym.diagnose(chaosgym.ImpactBeam(excitation_frequency=20.6))
+    >>> verdict = chaosgym.diagnose(chaosgym.ImpactBeam(excitation_frequency=23.25))
     >>> verdict.words, verdict.status
     ('periodic, period 2', 'certified')
     >>> sorted(verdict.votes)

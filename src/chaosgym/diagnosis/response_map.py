@@ -111,7 +111,7 @@ def response_map(
     >>> found = chaosgym.response_map(beam, speeds=[10.0, 19.0], clearances=[1e-4])
     >>> found.type
     array([['I'],
-           ['II']], dtype='<U12')
+           ['III']], dtype='<U12')
     """
     allowed = chosen_tolerances(machine, tolerances, "speed-clearance")
     check_initial_states(initial_states)

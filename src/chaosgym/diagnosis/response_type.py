@@ -168,7 +168,7 @@ def response_type(
 
     Examples
     --------
-    >>> found = chaosgym.response_type(chaosgym.ImpactBeam(excitation_frequency=12.0))
+    >>> found = chaosgym.response_type(chaosgym.ImpactBeam(excitation_frequency=10.0))
     >>> found.type, found.reason
     ('I', 'periodic throughout the tolerances, peak force less than 10 % higher')
     """

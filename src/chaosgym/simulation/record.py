@@ -82,7 +82,7 @@ class CycleRecord:
     >>> record.peak_force.shape
     (20, 2)
     >>> float(record.after(10).peak_force.max().round(1))
-    47.1
+    32.4
     """
 
     machine: Machine

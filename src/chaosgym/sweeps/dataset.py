@@ -221,12 +221,12 @@ def read_sweep(folder: str | Path, columns: list[str] | None = None) -> Labelled
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> speeds = chaosgym.Axis("excitation_frequency", 10.0, 20.0, 3)
+    >>> speeds = chaosgym.Axis("excitation_frequency", 10.0, 22.0, 3)
     >>> with TemporaryDirectory() as folder:
     ...     made = chaosgym.run_sweep(chaosgym.SweepPlan(chaosgym.ImpactBeam(), (speeds,)), folder)
     ...     sweep = chaosgym.read_sweep(folder, ["excitation_frequency", "period"])
     >>> sweep.table.to_pydict()
-    {'excitation_frequency': [10.0, 15.0, 20.0], 'period': [1, 1, None]}
+    {'excitation_frequency': [10.0, 16.0, 22.0], 'period': [1, 1, None]}
     """
     path = Path(folder) / DATA_FILE
     if not path.is_file():

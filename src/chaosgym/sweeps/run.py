@@ -141,7 +141,7 @@ def run_sweep(
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> speeds = chaosgym.Axis("excitation_frequency", 10.0, 20.0, 3)
+    >>> speeds = chaosgym.Axis("excitation_frequency", 10.0, 22.0, 3)
     >>> with TemporaryDirectory() as folder:
     ...     sweep = chaosgym.run_sweep(chaosgym.SweepPlan(chaosgym.ImpactBeam(), (speeds,)), folder)
     >>> sweep.table["nature"].to_pylist()
