@@ -212,7 +212,7 @@ def test_no_trial_beats_one_of_the_front(chaotic):
 def test_a_seed_that_suffices_is_found_where_no_stated_value_does(chaotic):
     """A damping that does nothing, and the seed of a smaller gap: the seed is screened, assessed and named."""
     found = improve(
-        chaotic, {"contact_damping": [22.0], "clearance": []}, seeds=[{"clearance": 0.06e-3}], series_size=8
+        chaotic, {"contact_damping": [22.0], "clearance": []}, seeds=[{"clearance": 0.03e-3}], series_size=8
     )
     assert found.best is not None
     assert "clearance" in found.best.changes
