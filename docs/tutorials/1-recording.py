@@ -44,7 +44,7 @@ right.set(xlabel="peak of a cycle [N]", ylabel="peak of the next [N]")
 plt.show()
 
 # %% [markdown]
-# The dots on the right lie on several branches. The next peak depends on this one, and on more than the sensor sees.
+# The dots on the right fill a cloud: the next peak depends on more than this one.
 #
 # ## Judge it
 #

@@ -53,7 +53,7 @@ for axes, machine in zip(panels, (calm, wild), strict=True):
     run = chaosgym.simulate(machine, cycles=1500, transient=300)
     axes.plot(1e3 * run.displacement, run.velocity, ".", markersize=2)
     axes.set(title=f"{machine.excitation_frequency} Hz", xlabel="displacement [mm]", ylabel="velocity [m/s]")
-    axes.set(xlim=(-0.14, 0.14), ylim=(-0.1, 0.1))
+    axes.set(xlim=(-0.14, -0.1), ylim=(-0.06, 0.06))
 plt.show()
 
 # %% [markdown]

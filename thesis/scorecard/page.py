@@ -60,8 +60,8 @@ def _exclusions(hit: Set[str]) -> str:
     return (
         f"### Exclusions\n\nOf {found.candidates} beams of the search without walls (`python -m thesis exclusions`), "
         "most of them with a soft pivot and judged by quick runs, none hits both statements of a row, though by chance "
-        f"one or more would. {never}Where the shipped beam, of a hard pivot, hits both, the soft pivot excludes them; "
-        "where not, no beam is known that does both.\n\n"
+        f"one or more would. {never}The last column counts which of the two the shipped beam hits, "
+        "judged by thorough runs; 2 would be an exception.\n\n"
         "| statement | hit by | statement | hit by | judged on both | hit by the shipped beam |\n"
         "|---|---|---|---|---|---|\n" + rows
     )
