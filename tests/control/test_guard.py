@@ -8,9 +8,11 @@ from chaosgym.control.comparison_lines import difference
 from chaosgym.control.controllers import BackOff, Follow
 from chaosgym.control.evaluation import policy_of
 from chaosgym.control.guard import GuardedPolicy
-from chaosgym.control.policies import shipped_policy
+from chaosgym.control.policies import TrainedPolicy, shipped_policy
+from chaosgym.control.policies.network import Dense, Network
 from chaosgym.control.rollout import play
 from chaosgym.control.statistics import paired_difference
+from chaosgym.envs.observation import OBSERVATION_NAMES
 from chaosgym.errors import ParameterError
 
 NOISE_FREE = {"sensor_error": 0.0, "bouncing_error": 0.0, "missed_impacts": 0.0}
@@ -69,8 +71,13 @@ def test_who_was_wrong_is_not_asked_again():
     assert guarded.returns.mean() > 0.5 * (follow.returns + backed.returns).mean()
 
 
-def test_the_shipped_policy_is_kept_from_harm():
-    """With structural damping doubled the shipped policy loses to following; guarded it does not."""
+def test_a_harmful_policy_is_kept_from_harm(monkeypatch):
+    """With structural damping doubled a policy that stays 0.5 Hz off loses to following; guarded it does not."""
+    weight, bias = np.zeros((6, 14), np.float32), np.zeros(6, np.float32)
+    bias[0], bias[4] = 0.5, 0.75  # stay, two steps up
+    weight[4, OBSERVATION_NAMES.index("trim")] = -1.0
+    off = TrainedPolicy(ENV, "trim", Network(None, (Dense(weight, bias, "none"),)))
+    monkeypatch.setattr("benchmarks.envs.mismatch.shipped_policy", lambda _: off)
     found = mismatch(32, ["structural damping x2"])[0]
     returns = found["returns"]
     assert returns["shipped"] < returns["follow"] - 5.0
