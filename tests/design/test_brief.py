@@ -1,6 +1,7 @@
 """Design briefs: what is written is what is assessed, and every mistake is named with its cure."""
 
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from chaosgym.diagnosis import Tolerance, default_tolerances
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import MACHINES, ImpactBeam
 from chaosgym.machines.units import parse_quantity
+
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 
 CRITERIA = '[criteria]\nload_rating = "500 N"\nlife = "10 Mcycles"\nreliability = 0.99\n'
 
@@ -194,3 +197,10 @@ def test_a_file_of_a_machine_is_a_brief_of_its_template(tmp_path):
         by_template.criteria,
         by_template.changes,
     )
+
+
+@pytest.mark.parametrize("brief", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.stem)
+def test_the_briefs_of_the_documentation_are_read(brief):
+    """Those with parts of a duty too, whose keys are speeds and no fields of the machine."""
+    stated = tomllib.loads(brief.read_text()).get("duty", {}).get("speeds", {})
+    assert len(read_brief(brief).duty) == len(stated)

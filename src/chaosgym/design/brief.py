@@ -22,6 +22,9 @@ from chaosgym.machines.parameters import by_field, parameters_of, suggestion, wi
 from chaosgym.machines.stated import flat
 from chaosgym.machines.units import parse_quantity, parse_row, units_of
 
+BY_FIELD = ("parameters", "tolerances", "changes", "costs")
+"""Sections whose keys are fields of the machine."""
+
 REQUIRED_CRITERIA = ("load_rating", "life", "reliability")
 """Criteria that a brief must state; the others have defaults, which the report lists."""
 
@@ -208,7 +211,8 @@ def _section(
     section = values.get(name, {})
     if not isinstance(section, Mapping):
         raise DesignError(f"{name} = {shown(section)} is not a table; write [{name}] and one line a value below it")
-    section = by_field(machine, flat(section)) if machine else section
+    if machine and name in BY_FIELD:
+        section = by_field(machine, flat(section))
     _known(f"[{name}]", section, known, _homes(machine))
     return section
 
