@@ -2,8 +2,8 @@
 
 Truth is the nature of the system without noise, at parameters away from bifurcations. A record is in reach if a person
 with the whole truth of the noise would expect an answer: a pattern three times as large as all scatter and seen sixteen
-times; scatter of at most 1.5 % around one level over 128 cycles (chaos of a crank looks like white noise of 3 to 11 %);
-chaos over 256 cycles and five times the error.
+times; scatter of at most 1.5 % around one level over 128 cycles, if it is random; chaos over 256 cycles and five times
+the error.
 """
 
 import numpy as np

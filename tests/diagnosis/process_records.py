@@ -161,12 +161,16 @@ def make(kind, seed, statement=None):
 
 
 def answer(record, verdict):
-    """Judge an answer: "right", "wrong", "undetermined", or "within" the error where the motion hides in it."""
+    """Judge an answer: "right", "wrong", "undetermined", or "within" the error where the motion hides in it.
+
+    "right, if" and "wrong, if" are those under the condition that the scatter is random.
+    """
     found = verdict.diagnosis
+    condition = ", if" if found.condition else ""
     if found.nature == "undetermined":
         return "undetermined"
     if record.nature == "nonchaotic":
-        return "right" if found.nature == "quasiperiodic" else "within" if record.hidden else "wrong"
+        return "right" if found.nature == "quasiperiodic" else "within" if record.hidden else f"wrong{condition}"
     if found.nature == record.nature and (found.period in record.periods or record.nature != "periodic"):
-        return "right"
-    return "within" if record.hidden and found.nature == "periodic" else "wrong"
+        return f"right{condition}"
+    return "within" if record.hidden and found.nature == "periodic" else f"wrong{condition}"

@@ -17,6 +17,9 @@ from tests.diagnosis.maps import circle, henon, logistic, three_frequencies
 from tests.diagnosis.process_records import answer
 from tests.diagnosis.records import make, scatter, strong
 
+ANSWERS = ("right", "right, if", "wrong", "wrong, if", "undetermined")
+"""Answers of the table; "if" are those that rest on the scatter being random, as the verdict says."""
+
 
 def judged(module, kinds, seeds):
     """Answers to records: counts by kind and by what is stated of the sensor, in reach or not; those that are wrong."""
@@ -29,7 +32,7 @@ def judged(module, kinds, seeds):
             for row in (kind, f"stated {STATEMENTS[seed % 4]}", "all"):
                 key = (row, record.clear, found)
                 counts[key] = counts.get(key, 0) + 1
-            if found == "wrong":
+            if found.startswith("wrong"):
                 wrong.append((kind, seed, record.nature, verdict.diagnosis.words, verdict.diagnosis.reason))
     return counts, wrong
 
@@ -42,11 +45,10 @@ def share(counts, row, what, where=(True, False)):
 
 def show(counts):
     """Print the table, as in docs/diagnosis.md."""
-    answers = ("right", "wrong", "undetermined", "within")
-    print("| records | in reach: right | wrong | undetermined | others: right | wrong | undetermined | within |")
+    print("| records | in reach:", " | ".join(ANSWERS), "| others:", " | ".join((*ANSWERS, "within")), "|")
     for row in dict.fromkeys(row for row, _, _ in counts):
-        columns = [counts.get((row, where, what), 0) for where in (True, False) for what in answers]
-        del columns[3]
+        columns = [counts.get((row, where, what), 0) for where in (True, False) for what in (*ANSWERS, "within")]
+        del columns[len(ANSWERS)]
         print("|", " | ".join(map(str, [row, *columns])), "|")
 
 

@@ -193,7 +193,8 @@ def measured_runs(given: Measured, *, several: bool = False, of_force: bool = Fa
         except DiagnosisError as error:
             run = f", run {signal.name!r}" if len(found) > 1 else ""
             raise DiagnosisError(f"{recording.source}{run}: {error}") from error
-        verdict = replace(verdict, diagnosis=replace(verdict.diagnosis, condition=condition))
+        conditions = filter(None, (condition, verdict.diagnosis.condition))
+        verdict = replace(verdict, diagnosis=replace(verdict.diagnosis, condition=" and ".join(conditions)))
         runs.append(
             Run(
                 signal.name,

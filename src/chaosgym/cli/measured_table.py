@@ -1,6 +1,5 @@
 """A table of many recordings: the channels of one file, or the files of a folder or a pattern, a line each."""
 
-from dataclasses import replace
 from glob import glob, has_magic
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -79,11 +78,9 @@ def _together(runs: list[Run]) -> Any:
 
     if len(runs) < 2 or not all(run.aligned for run in runs) or len({len(run.peaks) for run in runs}) > 1:
         return None
-    found = judge_together(
+    return judge_together(
         [run.verdict for run in runs], np.column_stack([run.peaks for run in runs]), [run.name for run in runs]
     )
-    conditions = {run.verdict.diagnosis.condition for run in runs} - {""}
-    return replace(found, diagnosis=replace(found.diagnosis, condition=", ".join(sorted(conditions))))
 
 
 def table_as_dict(found: list[Judged]) -> dict[str, Any]:

@@ -27,7 +27,7 @@ FOLLOWS = {
     "undetermined": "what the response is has to be settled before the life may be relied on",
 }
 
-RANDOM_FOLLOWS = "the pattern repeats and its scatter is random, so that the life follows from their statistics"
+RANDOM_FOLLOWS = "the pattern repeats but for its scatter, so that the life follows from the statistics of all cycles"
 
 
 @dataclass(frozen=True)

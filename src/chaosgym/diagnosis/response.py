@@ -59,7 +59,7 @@ class Diagnosis:
     orbit_record
         The motion on the proven orbit, whole periods of it; None where none was proven.
     condition
-        What the nature rests on that was guessed, such as "if the cycle is 49.4 ms"; empty if nothing was.
+        What the nature rests on that is not known, such as "if the cycle is 49.4 ms"; empty if nothing is.
 
     Examples
     --------

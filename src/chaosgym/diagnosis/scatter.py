@@ -2,8 +2,9 @@ r"""Scatter of the sensor, of the process or of chaos: what readings do about th
 
 Scatter has three causes, and its size tells none of them: the sensor, a process that is random (load, supply, speed),
 deterministic chaos. Chaos is claimed only where ``determinism`` finds a map that makes the irregularity without noise,
-a torus where a few lines of the spectrum are all. A pattern that stands out of noise is periodic with random scatter.
-What is left is undetermined, and the verdict says what would tell.
+a torus where a few lines of the spectrum are all. A pattern that stands out of noise is periodic if its scatter is
+random, which the verdict says: small chaos around a pattern may look the same. What is left is undetermined, and the
+verdict says what would tell.
 """
 
 import math
@@ -79,8 +80,8 @@ def _fitted(values: Array, time: NDArray[Any], frequencies: Array) -> tuple[Arra
 
 SMALL_SCATTER, LARGE_SCATTER = 0.015, 0.08
 """Standard deviations, as shares of the mean force. Scatter around one level above the first is told from chaos only by
-the sensor's error: chaos of a crank looks like white noise of 3 to 11 %. A stated error above the second hides what
-would matter."""
+the sensor's error; below it a periodic response is told if the scatter is random, since three in four surfaces of
+chaotic cranks scatter by more. A stated error above the second hides what would matter."""
 
 PATTERN, LONGEST_PATTERN, SEEN = 2.0, 32, 12
 """Standard deviation of a pattern in those of the scatter around it, its longest period, and how often it is seen."""
@@ -121,7 +122,8 @@ class MeasuredVerdict:
     coefficient_of_variation
         The same as a share of the mean reading.
     random
-        Whether the scatter of a periodic response is that of a random process or sensor.
+        Whether the scatter of a periodic response is taken for that of a random process or sensor. Where it is larger
+        than a stated error, or none is stated, ``diagnosis.condition`` says that the verdict rests on this.
     outliers
         Cycles, from 1, whose single readings were left out.
     gaps
@@ -335,9 +337,16 @@ def _random(found: Scatter, fitted: Determinism, told: SensorError | None) -> Me
     how = f"with {kind} scatter of {newton(found.sigma)} (standard deviation, {100.0 * found.relative:.2g} %)"
     if told is None:
         estimate = SensorError(3.0 * found.sigma, found.sigma, "estimated")
-        return _periodic(found, f"{how}, of the sensor or the process", estimate, random=True)
-    stated = "more than" if found.sigma > told.sigma else "within"
-    return _periodic(found, f"{how}, {stated} the stated error", told, random=True)
+        return _if_random(_periodic(found, f"{how}, of the sensor or the process", estimate, random=True), found)
+    if found.sigma <= told.sigma:
+        return _periodic(found, f"{how}, within the stated error", told, random=True)
+    return _if_random(_periodic(found, f"{how}, more than the stated error", told, random=True), found)
+
+
+def _if_random(verdict: MeasuredVerdict, found: Scatter) -> MeasuredVerdict:
+    """A periodic verdict under the condition that its scatter is no chaos, which a single record can't prove."""
+    condition = f"if its scatter of {100.0 * found.relative:.2g} % is random"
+    return replace(verdict, diagnosis=replace(verdict.diagnosis, condition=condition))
 
 
 def _beyond(found: Scatter, told: SensorError | None) -> str:

@@ -37,7 +37,8 @@ def judge_together(verdicts: Sequence[MeasuredVerdict], peaks: Array, names: Seq
     Notes
     -----
     A sensor without any reading but zero does not count. The others must agree; where none of them decides, all are
-    asked together. Chaos and a torus need one sensor that shows them and none that repeats.
+    asked together. Chaos and a torus need one sensor that shows them and none that repeats. A sensor that repeats only
+    if its scatter is random decides nothing against another.
     """
     live = [place for place in range(len(verdicts)) if np.any(peaks[:, place])]
     if len(live) < 2:
@@ -47,7 +48,8 @@ def judge_together(verdicts: Sequence[MeasuredVerdict], peaks: Array, names: Seq
     natures = {verdict.diagnosis.nature for verdict in alone}
     if natures == {"periodic"}:
         return _periodic(alone, [names[place] for place in live])
-    if len(natures - {"undetermined"}) > 1 or "periodic" in natures:
+    firm = {verdict.diagnosis.nature for verdict in alone if not verdict.diagnosis.condition}
+    if len(firm - {"undetermined"}) > 1 or "periodic" in firm:
         return _open(f"the sensors do not agree: {told}", peaks, alone)
     for nature in ("chaotic", "quasiperiodic"):
         if nature in natures:
