@@ -95,11 +95,16 @@ def test_finer_models_come_nearer_to_the_reference():
     assert errors[3] < errors_of(HARD_BEAM, [{"n_modes": 8, "fitted_modes": 0}])[0]
 
 
-def test_the_reference_does_not_move_with_as_many_modes_as_can_be_kept():
-    """The zero of the beam's ladder: peak forces at periodic points and the path from rest, to a hundred-thousandth."""
+def test_the_reference_does_not_move_with_twice_as_many_modes():
+    """The zero of the beam's ladder, to a ten-thousandth: a hundredth of the error of ``fine``, and of a sensor.
+
+    With damping of the beam alone, as of the hard pivot, high modes matter less: to a hundred-thousandth.
+    """
     for frequency, clearance in ((19.0, 0.127e-3), (10.0, 0.1e-3), (6.0, 0.05e-3)):
-        reference = ImpactBeam(fidelity="reference", excitation_frequency=frequency, clearance=clearance)
-        _agree(reference, replace(reference, n_modes=40), 100, peaks=1e-5, path=1e-5)
+        for beam, least in ((ImpactBeam(), 1e-4), (HARD_BEAM, 1e-5)):
+            at = replace(beam, excitation_frequency=frequency, clearance=clearance)
+            reference = with_settings(at, {"fidelity": "reference"})
+            _agree(reference, replace(reference, n_modes=40), 100, peaks=least, path=least)
 
 
 @pytest.mark.slow

@@ -208,11 +208,10 @@ def _homes(machine: Machine | None = None) -> dict[str, str]:
 def _section(
     values: Mapping[str, Any], name: str, known: Iterable[str], machine: Machine | None = None
 ) -> Mapping[str, Any]:
-    section = values.get(name, {})
-    if not isinstance(section, Mapping):
-        raise DesignError(f"{name} = {shown(section)} is not a table; write [{name}] and one line a value below it")
-    if machine and name in BY_FIELD:
-        section = by_field(machine, flat(section))
+    given = values.get(name, {})
+    if not isinstance(given, Mapping):
+        raise DesignError(f"{name} = {shown(given)} is not a table; write [{name}] and one line a value below it")
+    section: Mapping[str, Any] = by_field(machine, flat(given)) if machine and name in BY_FIELD else given
     _known(f"[{name}]", section, known, _homes(machine))
     return section
 

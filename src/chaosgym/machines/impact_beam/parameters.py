@@ -46,7 +46,7 @@ class BeamParameters(ModalImpactMachine):
         for rung, modes, fitted, accuracy in (
             ("standard", 4, 2, "standard"),
             ("fine", 6, 2, "standard"),
-            ("reference", 30, 2, "tightest"),
+            ("reference", 20, 2, "tightest"),
         )
     }
 
