@@ -2,9 +2,16 @@
 
 import pytest
 
-from chaosgym import demo
+from chaosgym import ImpactBeam, demo, response_type
 from chaosgym.errors import DatasetError
 from tests.small_demo import SMALL
+
+
+@pytest.mark.parametrize(("kind", "point"), demo.POINTS.items())
+def test_a_point_has_the_type_that_its_legend_names(kind, point):
+    """The figure calls three points of the beam Type I, II and III; over their tolerances they are."""
+    frequency, clearance = point
+    assert response_type(ImpactBeam(excitation_frequency=frequency, clearance=clearance), workers=1).type == kind
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from chaosgym.machines import ImpactBeam
 from chaosgym.simulation import CycleRecord, simulate
 from chaosgym.sweeps import Axis, LabelledSweep, SweepPlan, run_sweep
 
-POINTS = {"I": (6.0, 0.127e-3), "II": (18.67, 0.127e-3), "III": (30.0, 0.127e-3)}
+POINTS = {"I": (9.0, 0.127e-3), "II": (12.0, 0.127e-3), "III": (30.0, 0.127e-3)}
 """Excitation frequency [Hz] and clearance [m] of one point of each type."""
 
 AXES = (
