@@ -69,7 +69,6 @@ QUICK = {
     "dataset-info": "map; built",
     "dataset-card": "map",
     "dataset-map": "map --out map2.png",
-    "dataset-noise": "map --points 3 --workers 1",
     "design": f'{PEAKS} --load-rating "500 N"; --template impact-beam',
     "run-agent": f"{BEAM} --machine 13; {BEAM} --plant docs.examples.rig:Rig",
     "info": "",

@@ -1,6 +1,5 @@
-"""The commands around a dataset: what is in it, its card, its label noise, its map."""
+"""The commands around a dataset: what is in it, its card, its map."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -56,12 +55,8 @@ def test_an_unfinished_folder_says_how_far_it_is(folder, tmp_path):
     assert "unfinished" in run("dataset", "info", str(tmp_path))[1]
 
 
-def test_card_holds_the_command_that_makes_the_dataset_again(folder, tmp_path):
-    """The command in the card, run again, finds the folder complete; noise and split are reported."""
-    noise = run_json("dataset", "noise", str(folder), "--points", "4")
-    assert noise["points"] == 4
-    assert set(noise["changes"]) >= {"mirrored initial state", "twice the cycles", "0.1 % in every parameter"}
-    assert all(0.0 <= change["nature"] <= 1.0 for change in noise["changes"].values())
+def test_card_holds_the_command_that_makes_the_dataset_again(folder):
+    """The command in the card, run again, finds the folder complete."""
     assert run("dataset", "card", str(folder))[0] == 0
     card = (folder / "CARD.md").read_text()
     command = next(line for line in card.splitlines() if line.startswith("    chaosgym sweep"))
@@ -69,14 +64,8 @@ def test_card_holds_the_command_that_makes_the_dataset_again(folder, tmp_path):
     assert code == 0
     assert "complete, 50 points" in out
     assert "The Two-Step Test alone (`two_step`) and the exponent's sign agree on chaos at " in card
-    for heading in ("How it was made", "Class balance", "How far to trust", "Label noise", "Split", "Licence"):
+    for heading in ("How it was made", "Class balance", "How far to trust", "Split", "Licence"):
         assert f"## {heading}" in card
-    (tmp_path / "keep").mkdir()
-    (folder / "noise.json").write_text("{")
-    code, _, err = run("dataset", "card", str(folder))
-    assert code == 2
-    assert "noise.json is damaged" in err
-    (folder / "noise.json").write_text(json.dumps(noise))
 
 
 def test_cost_is_measured_against_every_axis(folder):

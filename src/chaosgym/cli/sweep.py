@@ -1,6 +1,5 @@
 """The commands ``sweep`` and ``dataset``: the responses of many machines, and the folder that they are kept in."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -282,35 +281,6 @@ def card(folder: str, as_json: bool) -> None:
 
     path = write_card(folder)
     emit({"wrote": str(path)}, as_json, lambda: [f"wrote {path}"])
-
-
-@dataset.command("noise")
-@FOLDER
-@click.option("--points", type=click.IntRange(1, 10**6), default=300, show_default=True, help="Rows to diagnose again.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
-@click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
-@AS_JSON
-def noise(folder: str, points: int, seed: int, workers: int | None, as_json: bool) -> None:
-    """Measure how often labels change with the initial state, twice the cycles and 0.1 % in the parameters."""
-    from chaosgym.files import write_atomically
-    from chaosgym.sweeps import read_sweep
-    from chaosgym.sweeps.card import NOISE_FILE
-    from chaosgym.sweeps.noise import label_noise
-
-    found = label_noise(read_sweep(folder), points, seed=seed, workers=workers, progress=True)
-    text = json.dumps(found, indent=2) + "\n"
-    write_atomically(Path(folder) / NOISE_FILE, lambda temporary: temporary.write_text(text))
-    emit(
-        found,
-        as_json,
-        lambda: [
-            f"{folder}: {found['points']} rows diagnosed again; nature differs / still periodic, peak moved by 10 %",
-            *(
-                f"  {name:36s}{change['nature']:6.1%} +- {change['half_interval']:.1%}  {change['largest_peak']:6.1%}"
-                for name, change in found["changes"].items()
-            ),
-        ],
-    )
 
 
 @dataset.command("map")

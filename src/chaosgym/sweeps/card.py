@@ -11,10 +11,10 @@ import numpy as np
 
 from chaosgym.diagnosis import TYPES, default_tolerances
 from chaosgym.errors import DatasetError
-from chaosgym.files import contents, first_line, write_atomically
+from chaosgym.files import first_line, write_atomically
 from chaosgym.machines.parameters import changes_of, parameters_of
 from chaosgym.sweeps.dataset import DAMAGE, DATA_FILE, LabelledSweep, read_sweep
-from chaosgym.sweeps.folder import CHUNK_FOLDER, LARGEST_PLAN, PLAN_FILE, read_plan_file
+from chaosgym.sweeps.folder import CHUNK_FOLDER, PLAN_FILE, read_plan_file
 from chaosgym.sweeps.plan import SweepPlan
 
 CLASSES = ("nature", "response_type", "full_response_type", "status", "split")
@@ -132,7 +132,7 @@ def compare_types(sweep: LabelledSweep) -> dict[str, Any] | None:
     }
 
 
-CARD_FILE, NOISE_FILE = "CARD.md", "noise.json"
+CARD_FILE = "CARD.md"
 
 
 def sweep_command(plan: SweepPlan, folder: str) -> str:
@@ -158,7 +158,7 @@ def write_card(folder: str | Path) -> Path:
     Raises
     ------
     DatasetError
-        If the sweep is not finished, or the file of its label noise is damaged.
+        If the sweep is not finished.
     """
     folder = Path(folder)
     text = dataset_card(read_sweep(folder), folder)
@@ -167,7 +167,7 @@ def write_card(folder: str | Path) -> Path:
 
 
 def dataset_card(sweep: LabelledSweep, folder: Path) -> str:
-    """Return the card of a sweep that lies in ``folder``, with its label noise if that was measured there."""
+    """Return the card of a sweep that lies in ``folder``."""
     info = dataset_info(folder)
     plan = sweep.plan
     sections = [
@@ -176,7 +176,6 @@ def dataset_card(sweep: LabelledSweep, folder: Path) -> str:
         _columns(sweep),
         _balance(info["classes"]),
         _trust(plan, info),
-        _noise(folder),
         _split(plan),
         _provenance(info),
         "## Licence\n\nMIT, as chaosgym itself.",
@@ -261,49 +260,6 @@ def _trust(plan: SweepPlan, info: Mapping[str, Any]) -> str:
 
 def _words(pair: str) -> list[str]:
     return [word for word in pair.split(" against ") if word in TYPES]
-
-
-def read_noise(folder: str | Path) -> dict[str, Any] | None:
-    """What ``chaosgym dataset noise`` found for a folder; None if it did not run.
-
-    Raises
-    ------
-    DatasetError
-        If its file is damaged.
-    """
-    file = Path(folder) / NOISE_FILE
-    if not file.is_file():
-        return None
-    try:
-        found: dict[str, Any] = json.loads(contents(file, LARGEST_PLAN))
-    except (RecursionError, ValueError) as error:
-        raise _damaged_noise(folder, error) from error
-    return found
-
-
-def _damaged_noise(folder: str | Path, error: Exception) -> DatasetError:
-    file = Path(folder) / NOISE_FILE
-    return DatasetError(f"{file} is damaged: {error!r}; run `chaosgym dataset noise {folder}` again")
-
-
-def _noise(folder: Path) -> str:
-    noise = read_noise(folder)
-    if noise is None:
-        return ""
-    try:
-        rows = [
-            f"| {name} | {change['nature']:.1%} ± {change['half_interval']:.1%} | {change['largest_peak']:.1%} |"
-            for name, change in noise["changes"].items()
-        ]
-        options = f"--points {noise['points']} --seed {noise['seed']}"
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
-        raise _damaged_noise(folder, error) from error
-    return (
-        f"## Label noise\n\n`chaosgym dataset noise {folder} {options}`. What another initial state changes are "
-        "coexisting attractors.\n\n"
-        "| change | nature differs | still periodic, largest peak more than 10 % away |\n|---|---|---|\n"
-        + "\n".join(rows)
-    )
 
 
 def _split(plan: SweepPlan) -> str:
