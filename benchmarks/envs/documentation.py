@@ -1,4 +1,4 @@
-"""What does the page of each machine's environments say? One text, filled in from the task: spaces, numbers, levels.
+"""The pages of the environments: one of what all tasks share, one for each machine, filled in from the tasks.
 
 python -m benchmarks.envs.documentation docs
 """
@@ -46,22 +46,54 @@ JUDGES = {
     "cycles before. A step is irregular if they differ, at every period up to eight, by more than 2 % of their mean.",
 }
 
-TEXT = (Path(__file__).parent / "page.md").read_text(encoding="utf-8")
-"""The page, with places for what differs."""
+FOLDER = Path(__file__).parent
+COMMON, TEXT = (FOLDER.joinpath(name).read_text(encoding="utf-8") for name in ("task.md", "page.md"))
+"""The page of what all tasks share, and that of one machine, with places for what differs."""
+
+REWARDS = {
+    "deviation": "-w abs(speed - demand)",
+    "type_iii": "-w (share of the step's cycles that are irregular)",
+    "damage": "-w (increase of the damage)",
+    "time": "-w (duration of the step) / (duration of the job at top speed)",
+    "failure": "-w (steps left) on fracture or a failed simulation",
+}
+"""Terms of the reward, by the names of their weights."""
 
 
 def pages() -> Iterator[tuple[str, str]]:
     """Names of the files, and the pages, in the format of Gymnasium's own (Markdown)."""
-    rows = []
+    rows, known = [], {}
     for machine, names in _by_machine().items():
         file = f"environments/{machine}.md"
-        yield file, page(names)
-        rows += [f"| [`{name}`]({file}) | {KINDS[kind_of(name)]} |" for name in names]
-    rows.append(f"| [`chaosgym/AnyMachine-v0`](environments/AnyMachine.md) | {ANY_MACHINE} |")
-    table = "\n".join(["| id | task |", "|---|---|", *rows])
-    yield (
-        "environments.md",
-        f"# Environments\n\n{table}\n\nThese pages are written by `python -m benchmarks.envs.documentation docs`.\n",
+        known[machine] = gym.make(names[0]).unwrapped
+        yield file, page(names, known[machine])
+        rows += [f"[`{name}`]({file}) | {KINDS[kind_of(name)]}" for name in names]
+    rows.append(f"[`chaosgym/AnyMachine-v0`](environments/AnyMachine.md) | {ANY_MACHINE}")
+    yield "environments.md", common(rows, known)
+
+
+def common(rows: list[str], known: dict[str, Any]) -> str:
+    """Text of the page of what all tasks share: a column of a table for each machine."""
+    task = next(iter(known.values())).task
+    weights = [
+        " | ".join([f"`reward_{name}`", value, *(f"{getattr(env.task, f'{name}_weight'):g}" for env in known.values())])
+        for name, value in REWARDS.items()
+    ]
+    columns = " | ".join(known)
+    units = [f"{_unit(env.nominal)} on {machine}" for machine, env in known.items()]
+    return COMMON.format(
+        ids=_table("id | task", rows),
+        shortest=task.shortest_hold,
+        longest=task.longest_hold,
+        units=" and in ".join(units),
+        size=len(MEANINGS),
+        sensor=task.sensor_error,
+        bouncing=task.bouncing_error,
+        missed=task.missed_impacts,
+        life=task.life_share,
+        observations=_table(f"Num | Observation | {columns}", _observations(list(known.values()))),
+        rewards=_table(f"Term | Value | w, {columns.replace('| ', '| w, ')}", weights),
+        arguments=_table(f"Parameter | {columns} | Description", _arguments([env.task for env in known.values()])),
     )
 
 
@@ -78,12 +110,10 @@ def kind_of(name: str) -> str:
     return next((kind for kind in KINDS if kind and f"{kind}-" in name), "")
 
 
-def page(names: list[str]) -> str:
-    """Text of the page of one machine's ids, of which the first is the nominal machine's."""
-    name = names[0]
-    env: Any = gym.make(name).unwrapped
+def page(names: list[str], env: Any) -> str:
+    """Text of the page of one machine's ids; the environment is that of the nominal machine."""
     task, nominal = env.task, env.nominal
-    unit = parameters_of(nominal)[nominal.speed_field].unit
+    unit = _unit(nominal)
     moves = [f"{task.trim_step * move:+g} {unit} of trim" if move else "hold" for move in MOVES]
     noise = []
     if task.speed_ripple:
@@ -91,31 +121,17 @@ def page(names: list[str]) -> str:
     if task.kick:
         noise.append(f"Velocities are kicked by {task.kick:g} of their range (standard deviation) once a cycle.")
     return TEXT.format(
-        name=name,
-        title=name.removeprefix("chaosgym/").split("-")[0],
+        title=names[0].removeprefix("chaosgym/").split("-")[0],
         ids=_table(
             "id | level |", [f"`{one}` | `{gym.spec(one).kwargs['level']}` | {KINDS[kind_of(one)]}" for one in names]
         ),
         machine=MACHINES[nominal.name],
-        short=nominal.name,
         unit=unit,
-        shortest=task.shortest_hold,
-        longest=task.longest_hold,
         actions=_table("Num | Action", [f"{k} | {move}" for k, move in enumerate([*moves, "back to the demand"])]),
         low=task.lowest_speed,
         high=task.highest_speed,
-        slew=task.slew_limit,
         grid=f", on a grid of {task.speed_grid:g} {unit}" if task.speed_grid else "",
-        trim=task.largest_trim,
-        coarse=2 * task.trim_step,
-        size=len(MEANINGS),
-        sensor=task.sensor_error,
-        bouncing=task.bouncing_error,
-        missed=task.missed_impacts,
-        observations=_table("Num | Observation | Min | Max", _observations(env)),
         judge=JUDGES[isinstance(env._job.judge, ExponentJudge)],
-        rating=task.load_rating,
-        life=task.life_share,
         start=task.start_below,
         run_in=task.run_in_cycles,
         steps=task.steps,
@@ -124,12 +140,12 @@ def page(names: list[str]) -> str:
         disturbance=" ".join(noise),
         rung=nominal.rung or "none",
         model=_model(env),
-        arguments="\n".join(_arguments(task)),
-        **{
-            name: getattr(task, name)
-            for name in ("deviation_weight", "type_iii_weight", "damage_weight", "time_weight", "failure_weight")
-        },
     )
+
+
+def _unit(nominal: Any) -> str:
+    """Unit of the machine's speed."""
+    return parameters_of(nominal)[nominal.speed_field].unit
 
 
 def _table(head: str, rows: list[str]) -> str:
@@ -155,16 +171,24 @@ def _model(env: Any) -> str:
     return ", ".join(f"`{name}={value!r}`" for name, value in values.items() if value != getattr(nominal, name))
 
 
-def _observations(env: Any) -> list[str]:
-    bounds = zip(env.observation_space.low, env.observation_space.high, strict=True)
-    named = zip(MEANINGS.items(), bounds, strict=True)
-    return [f"{k} | `{name}`: {meaning} | {low:g} | {high:g}" for k, ((name, meaning), (low, high)) in enumerate(named)]
+def _observations(environments: list[Any]) -> list[str]:
+    spaces = [env.observation_space for env in environments]
+    return [
+        " | ".join([f"{k} | `{name}`: {meaning}", *(f"{space.low[k]:g} to {space.high[k]:g}" for space in spaces)])
+        for k, (name, meaning) in enumerate(MEANINGS.items())
+    ]
 
 
-def _arguments(task: Any) -> Iterator[str]:
-    for name, about in parameters_of(task).items():
-        value = getattr(task, name)
-        yield f"| `{name}` | `{value if isinstance(value, str) else f'{value:g}'}` | {about.unit} | {about.source} |"
+def _arguments(tasks: list[Any]) -> list[str]:
+    """Rows of the keywords; what all tasks have alike stands in the first column alone."""
+    rows = []
+    for name, about in parameters_of(tasks[0]).items():
+        values = [getattr(task, name) for task in tasks]
+        shown = [f"`{value}`" if isinstance(value, str) else f"`{value:g}`" for value in values]
+        unit = f" [{about.unit}]" if about.unit != "-" else ""
+        columns = shown if len(set(shown)) > 1 else [shown[0], *[""] * (len(shown) - 1)]
+        rows.append(" | ".join([f"`{name}`", *columns, about.source + unit]))
+    return rows
 
 
 def write_pages(folder: Path) -> None:

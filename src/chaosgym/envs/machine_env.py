@@ -159,7 +159,7 @@ def refuse_pictures(workplace: Workplace, render_mode: str | None) -> None:
 
 
 class MachineEnv(gym.Env[Observation, Any]):
-    """A machine whose speed an agent trims around a demand; what it does and takes: docs/environments.
+    """A machine whose speed an agent trims around a demand; what it does and takes: docs/environments.md.
 
     Parameters
     ----------
