@@ -20,18 +20,13 @@ def verdict(finding: Finding) -> str:
 
 _OPENING = """# The simulated figures of the thesis, drawn again
 
-P. Gu, *Chaotic Vibration in Machine Systems and Its Implications for Design*, PhD thesis, MIT, 1994. The pixels of its
-figures are not available; axes and ranges follow the text, and everything that the text prints about a figure is drawn
-over it in one colour and compared with the machine here. Written by
-
-    python -m thesis figures all --out FOLDER --gallery docs/development/figures.md
-
-which draws every figure (`python -m thesis figures --list` names them) and keeps what it computed in `FOLDER/results`.
-Numbers
-agree within the tolerances of the [scorecard](scorecard.md): a force within 15 % or 3 N, a range if both its ends do, a
-nature if it is the same word. What the scorecard judges is judged by the same runs here, those of the thesis' machine.
-Forces and natures are those of the plotted dots, one a cycle: of the beam on one side of the bearing, of the crank the
-larger of both sides. Dots within 0.5 N are one, as for the scorecard.
+Written by `python -m thesis figures all --out FOLDER --gallery docs/development/figures.md`; `python -m thesis
+figures --list` names the figures. P. Gu, *Chaotic Vibration in Machine Systems and Its Implications for Design*, PhD
+thesis, MIT, 1994. The pixels are not available: axes and ranges follow the text, and what the text prints of a figure
+is drawn over it in one colour. Numbers agree within the tolerances of the [scorecard](scorecard.md): a force within
+15 % or 3 N, a range if both its ends do, a nature if it is the same word. What the scorecard judges is judged by the
+same runs. Forces and natures are those of the plotted dots, one a cycle: of the beam on one side of the bearing, of
+the crank the larger of both sides. Dots within 0.5 N are one.
 """
 
 
@@ -74,14 +69,12 @@ def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
     if answered:
         lines += [
             "",
-            "## Sensitivities as printed",
+            "## Sensitivities",
             "",
-            "| parameter | printed | here | figure | |",
+            "| parameter | figures | agree | differ | not judged |",
             "|---|---|---|---|---|",
         ]
-    for parameter, entries in answered.items():
-        for number, finding in entries:
-            lines.append(f"| {parameter} | {finding.printed} | {finding.here} | {number} | {verdict(finding)} |")
+    lines += [_sensitivity(parameter, entries) for parameter, entries in answered.items()]
     for one in drawn:
         figure = one.figure
         lines += ["", f"## {figure.label}. {figure.title}", "", figure.shows]
@@ -95,8 +88,16 @@ def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
             lines.append(f"- {finding.printed}. Here {finding.here}: {verdict(finding)}.")
         picture = picture_path(figure, pictures)
         if picture.exists():
-            lines += ["", f"![{figure.label}: {figure.title}]({pictures.name}/{picture.name})"]
+            lines += ["", f"![{figure.label}]({pictures.name}/{picture.name})"]
     return "\n".join(lines) + "\n"
+
+
+def _sensitivity(parameter: str, entries: Sequence[tuple[str, Finding]]) -> str:
+    """Row of a parameter: the figures that vary it, and what became of their statements about it."""
+    figures = ", ".join(dict.fromkeys(number for number, _ in entries))
+    judged = [finding.agrees for _, finding in entries if not contradiction(finding.targets)]
+    agree, differ = judged.count(True), judged.count(False)
+    return f"| {parameter} | {figures} | {agree} | {differ} | {len(entries) - agree - differ} |"
 
 
 def write_gallery(drawn: Sequence[Drawn], path: Path) -> None:
