@@ -33,11 +33,13 @@ def test_scorecard_page_lists_every_statement():
     """Each comparison has its row and each statement left out its reason."""
     page = (DOCS / "development" / "scorecard.md").read_text()
     known = read_comparisons()
+    cells = [line.strip("| ").split(" | ", 1) for line in page.splitlines() if line.startswith("| ")]
+    statements = {cell[-1]: cell[0].split(", ") for cell in cells}
     for one in known.compared:
         assert re.search(rf"^\| {one.id} \|.*$", page, re.MULTILINE) is not None, one.id
-        assert not one.reading or f"| {one.id} | {one.reading} |" in page
+        assert not one.reading or one.id in statements[one.reading]
     for name, reason in known.out.items():
-        assert f"| {name} | {reason} |" in page
+        assert name in statements[reason]
 
 
 def test_scorecard_page_shows_what_the_machines_do():

@@ -1,6 +1,6 @@
 """The page of the scorecard: one table a machine, misses shown like hits."""
 
-from collections.abc import Set
+from collections.abc import Mapping, Set
 
 from chaosgym.machines import ImpactBeam
 from thesis.scorecard.exclusions import known_exclusions
@@ -52,7 +52,7 @@ def _exclusions(hit: Set[str]) -> str:
     """Pairs of statements that no beam of the searches hits together, and which of them the shipped beam hits."""
     found = known_exclusions()
     rows = "\n".join(
-        f"| {_named(pair.one)} | {pair.hits} | {_named(pair.other)} | {pair.hits_of_other} | {pair.judged} "
+        f"| {pair.one} | {pair.hits} | {pair.other} | {pair.hits_of_other} | {pair.judged} "
         f"| {len(hit & {pair.one, pair.other})} |"
         for pair in found.pairs
     )
@@ -65,11 +65,6 @@ def _exclusions(hit: Set[str]) -> str:
         "| statement | hit by | statement | hit by | judged on both | hit by the shipped beam |\n"
         "|---|---|---|---|---|---|\n" + rows
     )
-
-
-def _named(name: str) -> str:
-    known = {one.id: one.statement for one in read_comparisons().compared}
-    return f"{name}, {known[name].figure}: {known[name].quantity}" if name in known else name
 
 
 def _firm(card: Scorecard, machine: str) -> str:
@@ -109,15 +104,23 @@ def _tolerances() -> str:
 
 def _readings() -> str:
     known = read_comparisons()
-    rows = "\n".join(f"| {one.id} | {one.reading} |" for one in known.compared if one.reading)
+    rows = _by_reason({one.id: one.reading for one in known.compared if one.reading})
     open_ones = "\n".join(f"| {name} | {one.value:g} | {one.reason} |" for name, one in known.unprinted.items())
     return (
         "## Readings\n\nDecided from the text, whatever the verdict.\n\n"
-        f"| statement | text and decision |\n|---|---|\n{rows}\n\n"
+        f"| statements | text and decision |\n|---|---|\n{rows}\n\n"
         f"| condition that is not in print | value | why |\n|---|---|---|\n{open_ones}\n"
     )
 
 
 def _left_out() -> str:
-    rows = "\n".join(f"| {name} | {reason} |" for name, reason in read_comparisons().out.items())
-    return f"## Statements that are not compared\n\n| statement | why |\n|---|---|\n{rows}\n"
+    rows = _by_reason(read_comparisons().out)
+    return f"## Statements that are not compared\n\n| statements | why |\n|---|---|\n{rows}\n"
+
+
+def _by_reason(reasons: Mapping[str, str]) -> str:
+    """Rows of a table: the statements that share a reason, and the reason."""
+    names: dict[str, list[str]] = {}
+    for name, reason in reasons.items():
+        names.setdefault(reason, []).append(name)
+    return "\n".join(f"| {', '.join(shared)} | {reason} |" for reason, shared in names.items())
