@@ -1,31 +1,30 @@
-"""The estimator follows scikit-learn, and its plain arrays equal what scikit-learn computed."""
+"""The estimator refuses what it cannot judge, and its plain arrays equal what scikit-learn computed."""
 
 import numpy as np
 import pytest
-from sklearn.base import clone
 from sklearn.ensemble import HistGradientBoostingClassifier
-from sklearn.utils.estimator_checks import check_estimator
 
 from chaosgym.classifier import ResponseClassifier
 from chaosgym.classifier.calibration import softmax
 from chaosgym.classifier.trees import class_scores, forest_of
 
 
-@pytest.mark.filterwarnings("ignore")
-def test_follows_the_conventions_of_scikit_learn():
-    """Every check of scikit-learn passes; some fit warnings of its own making are beside the point."""
-    results = check_estimator(ResponseClassifier(rounds=10), on_skip=None)
-    assert {result["status"] for result in results} <= {"passed", "skipped"}
-
-
-def test_clone_keeps_the_settings():
-    """A clone has the same parameters and no fit; an unknown parameter is named."""
-    original = ResponseClassifier(inputs="records", rounds=7, seed=5)
-    copy = clone(original)
-    assert copy.get_params() == original.get_params()
-    assert not hasattr(copy, "forest_")
-    with pytest.raises(ValueError, match="'colour' is no parameter"):
-        original.set_params(colour=3)
+def test_what_cannot_be_learned_or_judged_is_refused_by_name():
+    """One class, rows without a class, a model without a fit, other columns and NaN are one line each."""
+    points, labels = np.random.default_rng(0).random((60, 2)), np.repeat(["chaotic", "periodic"], 30)
+    model = ResponseClassifier(rounds=2)
+    with pytest.raises(ValueError, match="not fitted"):
+        model.predict(points)
+    with pytest.raises(ValueError, match="at least 2 classes"):
+        model.fit(points, np.full(60, "chaotic"))
+    with pytest.raises(ValueError, match="59 classes for 60 rows"):
+        model.fit(points, labels[1:])
+    with pytest.raises(ValueError, match="NaN"):
+        model.fit(points * np.nan, labels)
+    model.fit(points, labels)
+    for bad, message in ((points[:, :1], "1 columns; allowed: 2"), (points * np.nan, "NaN"), (points[0], "2D")):
+        with pytest.raises(ValueError, match=message):
+            model.predict(bad)
 
 
 @pytest.mark.parametrize("classes", [2, 3])

@@ -1,11 +1,10 @@
-"""A classifier of responses with the interface of scikit-learn: one boosted model, one temperature.
+"""A classifier of responses: one boosted model, one temperature.
 
 It learns one question (a nature, whether an irregularity is resolvable) from the values of a machine's fields, from
 measured peak forces, or from fields and the first cycles of a run together. Training needs scikit-learn; a fitted one
 is a few plain arrays and needs numpy and numba only.
 """
 
-import inspect
 from typing import Any, Literal
 
 import numpy as np
@@ -83,35 +82,8 @@ class ResponseClassifier:
         self.least_rows = least_rows
         self.seed = seed
 
-    def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Return the constructor's parameters."""
-        return {name: getattr(self, name) for name in inspect.signature(type(self)).parameters}
-
-    def set_params(self, **params: Any) -> "ResponseClassifier":
-        """Change the constructor's parameters."""
-        known = self.get_params()
-        for name, value in params.items():
-            if name not in known:
-                raise ValueError(f"{name!r} is no parameter of ResponseClassifier; allowed: {', '.join(known)}")
-            setattr(self, name, value)
-        return self
-
     def __repr__(self) -> str:
         return f"ResponseClassifier(inputs={self.inputs!r}, seed={self.seed})"
-
-    def __sklearn_is_fitted__(self) -> bool:
-        return hasattr(self, "forest_")
-
-    def __sklearn_tags__(self) -> Any:
-        from sklearn.utils import ClassifierTags, InputTags, Tags, TargetTags
-
-        records = self.inputs == "records"
-        return Tags(
-            estimator_type="classifier",
-            target_tags=TargetTags(required=True),
-            classifier_tags=ClassifierTags(),
-            input_tags=InputTags(allow_nan=records, positive_only=records),
-        )
 
     def fit(
         self,
@@ -143,12 +115,9 @@ class ResponseClassifier:
         sensor_error : (n,), optional
             With records: largest error of a peak [N], NaN where it is not known.
         """
-        from sklearn.utils.multiclass import check_classification_targets
-        from sklearn.utils.validation import check_X_y
-
-        finite: Any = "allow-nan" if self.inputs == "records" else True
-        values, labels = check_X_y(X, y, dtype=np.float64, ensure_all_finite=finite, estimator=self)
-        check_classification_targets(labels)
+        values, labels = self._columns(X), np.asarray(y)
+        if len(values) != len(labels):
+            raise ValueError(f"y has {len(labels)} classes for {len(values)} rows of X; allowed: one a row")
         self.n_features_in_ = values.shape[1]
         self.classes_, kinds = np.unique(labels, return_inverse=True)
         if len(self.classes_) < 2:
@@ -200,11 +169,6 @@ class ResponseClassifier:
         """Probabilities (n, n_classes) from features that are computed already."""
         return softmax(class_scores(self.forest_, features) / self.temperature_)
 
-    def score(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None, **more: Any) -> float:
-        """Share of classes that are right."""
-        weights = None if sample_weight is None else np.asarray(sample_weight, dtype=float)
-        return float(np.average(self.predict(X, **more) == np.asarray(y), weights=weights))
-
     def _features(self, values: Array, cycles: ArrayLike | None = None, sensor_error: ArrayLike | None = None) -> Array:
         if self.inputs == "records":
             peaks, _, errors = as_records(values, None, sensor_error)
@@ -215,25 +179,19 @@ class ResponseClassifier:
         return response_features(self.scaling_, values, run[..., 0], run[..., 1:])
 
     def _checked(self, X: ArrayLike) -> Array:
-        """Columns as numbers, or an error that says what is wrong."""
+        """Columns (n, n_columns) for a model that was trained on as many."""
         if not hasattr(self, "forest_"):
-            from sklearn.exceptions import NotFittedError
+            raise ValueError("this ResponseClassifier is not fitted; call fit first, or load a trained one")
+        values = self._columns(X)
+        if self.inputs == "parameters" and values.shape[1] != self.n_features_in_:
+            raise ValueError(f"X has {values.shape[1]} columns; allowed: {self.n_features_in_}, as in fit")
+        return values
 
-            raise NotFittedError("this ResponseClassifier is not fitted; call fit first, or load a trained one")
-        if hasattr(X, "toarray"):
-            raise TypeError("sparse input is not supported; give a dense array")
-        values = np.asarray(X)
-        if np.iscomplexobj(values):
-            raise ValueError("Complex data not supported; give real numbers")
-        values = np.ascontiguousarray(values, dtype=float)
+    def _columns(self, X: ArrayLike) -> Array:
+        """Columns (n, n_columns) as numbers."""
+        values = np.ascontiguousarray(X, dtype=float)
         if values.ndim != 2:
             raise ValueError(f"X has shape {values.shape}; allowed: 2D, (rows, columns). Reshape your data")
-        if self.inputs == "parameters":
-            if values.shape[1] != self.n_features_in_:
-                raise ValueError(
-                    f"X has {values.shape[1]} features, but ResponseClassifier is expecting "
-                    f"{self.n_features_in_} features as input"
-                )
-            if not np.isfinite(values).all():
-                raise ValueError("X holds NaN or infinity; allowed: finite numbers")
+        if self.inputs == "parameters" and not np.isfinite(values).all():
+            raise ValueError("X holds NaN or infinity; allowed: finite numbers")
         return values
