@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from time import thread_time
 from typing import Any
@@ -24,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from chaosgym.classifier.answer import Classification, NatureAnswer, RecordAnswer, neighbours_of, type_probabilities
 from chaosgym.classifier.cascade import CLEAR, MILLION, judge_nature
 from chaosgym.classifier.estimator import ResponseClassifier
+from chaosgym.classifier.features import as_records, response_features
 from chaosgym.classifier.record_answers import judge_records
 from chaosgym.classifier.storage import read_model, write_model
 from chaosgym.errors import DiagnosisError, ModelFileError, ParameterError
@@ -223,6 +225,14 @@ class MachineClassifier:
         """Classify many records (n, cycles), shorter ones ending in NaN: columns of the answer by name."""
         return judge_records(self._model(NATURE), self._model(IRREGULAR), peaks, sensor_error)
 
+    def irregular_probability(self, peaks: ArrayLike, sensor_error: ArrayLike) -> Array:
+        """How likely a sensor of this largest error [N] sees records (n, cycles) as irregular, (n,) from 0 to 1.
+
+        Shorter records end in NaN. It is the ``irregular_probability`` of ``classify_records``, without the rest.
+        """
+        forces, _, errors = as_records(peaks, None, sensor_error)
+        return self._model(IRREGULAR).chances(response_features(None, None, forces, None, errors))[:, 1]
+
     def _model(self, name: str) -> ResponseClassifier:
         if name not in self.records:
             raise ModelFileError(
@@ -321,11 +331,19 @@ def default_classifier(machine_name: str) -> MachineClassifier:
     >>> chaosgym.default_classifier("slider-crank").machine.name
     'slider-crank'
     """
-    path = resources.files("chaosgym") / "weights" / f"{machine_name}.npz"
-    if not path.is_file():
+    if not has_classifier(machine_name):
         raise ModelFileError(f"no classifier is shipped for {machine_name}; train one with `chaosgym train-classifier`")
-    with resources.as_file(path) as file:
+    with resources.as_file(_shipped(machine_name)) as file:
         return MachineClassifier.load(file)
+
+
+def has_classifier(machine_name: str) -> bool:
+    """Whether a classifier is shipped for a machine."""
+    return _shipped(machine_name).is_file()
+
+
+def _shipped(machine_name: str) -> Traversable:
+    return resources.files("chaosgym") / "weights" / f"{machine_name}.npz"
 
 
 def classifier_for(machine: Machine) -> MachineClassifier:

@@ -20,6 +20,7 @@ import pyarrow.compute
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from chaosgym.classifier.machine_classifier import has_classifier
 from chaosgym.control import controllers
 from chaosgym.control.maps import FLEET, FLEET_SEED, Maps, fleet_maps, maps_of, model_keywords
 from chaosgym.control.policies.shipped import shipped_name
@@ -45,6 +46,9 @@ COLUMNS = ("contender", "knows", "seed", "machine", "job_return", "type_iii", "d
 
 SUBJECTS = ("objective", "level", "split", "sealed")
 """Keywords that are part of what a comparison is of."""
+
+CLASSIFIED = "back off, by the classifier"
+"""Contender where a classifier of records is shipped."""
 
 WITHOUT_MODELS = (ZERO, ONE, "own map, demands known", "back off", SAFE, "kriging")
 """Contenders on a pool of machines, of which nobody has a model."""
@@ -78,6 +82,7 @@ class Contenders:
             "best common schedule, demands known": lambda: controllers.CommonSchedule(self.fleet),
             "back off": partial(controllers.BackOff, remembers=False),
             SAFE: controllers.BackOff,
+            CLASSIFIED: partial(controllers.BackOff, classified=True),
             "kriging": lambda: controllers.Kriging(price=None),
             "bandit": lambda: controllers.Bandit(self.fleet),
             "table": lambda: controllers.Table(self._tables()),
@@ -85,8 +90,11 @@ class Contenders:
             "belief, exact model": lambda: controllers.Belief(self._exact_fleet()),
             "receding horizon": controllers.RecedingHorizon,
         }
-        if isinstance(native_envs(self.env, **self.keywords).workplace.variants, Pool):
+        envs = native_envs(self.env, **self.keywords)
+        if isinstance(envs.workplace.variants, Pool):
             return {name: maker for name, maker in known.items() if name in WITHOUT_MODELS}
+        if not has_classifier(envs.nominal.name):
+            del known[CLASSIFIED]
         return known
 
     @property

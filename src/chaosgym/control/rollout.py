@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import trange
 
-from chaosgym.envs.observation import FELT, OBSERVATION_NAMES
+from chaosgym.envs.observation import COMMANDED, FELT, OBSERVATION_NAMES
 from chaosgym.envs.pool import SHARE
 from chaosgym.envs.task import Status
 from chaosgym.envs.vector_env import native_envs
@@ -195,7 +195,7 @@ def play(
         kept["reward"][step, runs] = rewards[runs]
         for name in ("speed", "demand", "type_iii"):
             kept[name][step, runs] = info[name][runs]
-        felt[step, runs] = observations[runs, len(OBSERVATION_NAMES) - len(FELT) :]
+        felt[step, runs] = observations[runs, len(COMMANDED) : len(OBSERVATION_NAMES)]
         damage[runs], status[runs] = info["damage"][runs], info["status"][runs]
         force[runs] = np.maximum(force[runs], info["largest_force"][runs])
         seconds[runs] += task.cycles_per_step * envs.jobs.period[runs]

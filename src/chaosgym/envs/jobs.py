@@ -8,10 +8,11 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from chaosgym.core.compilation import call
+from chaosgym.envs.classified import RecordsAtSpeed
 from chaosgym.envs.drive import DEAD_BAND, MOVES
 from chaosgym.envs.judge import ExponentJudge, Judge, RecurrenceJudge
 from chaosgym.envs.kernels.steps import JOB, REPORT, drive, observe, settle
-from chaosgym.envs.observation import Observation, sensed
+from chaosgym.envs.observation import OBSERVATION_NAMES, Observation, sensed
 from chaosgym.envs.pool import Pool
 from chaosgym.envs.task import Status, Task, demand_of
 from chaosgym.envs.variants import DRAWN, Variants
@@ -71,6 +72,7 @@ class Jobs:
         self.task, self.variants, self.space, self.batch = task, variants, space, batch_of(nominal, count)
         self.judge: Judge = (ExponentJudge if isinstance(self.batch, VariedBatch) else RecurrenceJudge)(count)
         self._monitor = RepeatSums(count) if task.monitor == "on" else None
+        self._records = RecordsAtSpeed(nominal, task.sensor_error, count) if task.classifier == "on" else None
         self.machines: list[Machine] = [nominal] * count
         self.state = np.zeros(count, JOB)
         self.state["speed"], self.state["machine"] = task.lowest_speed, DRAWN
@@ -133,6 +135,8 @@ class Jobs:
         self.judge.start(which)
         if self._monitor is not None:
             self._monitor.forget(which)
+        if self._records is not None:
+            self._records.forget(which)
         for i in which.tolist():
             self.batch.start(i, self.machines[i].at(self._speed_of(i)))
         count = max(task.run_in_cycles, task.cycles_per_step)
@@ -242,5 +246,8 @@ class Jobs:
         if self._monitor is not None:
             for column in measured.T:
                 self._monitor.add(which, column, max(task.sensor_error, LEAST_ERROR))
-            values[:, -1] = self._monitor.level(which)
+            values[:, len(OBSERVATION_NAMES)] = self._monitor.level(which)
+        if self._records is not None:
+            self._records.add(which, self.speed[which], measured)
+            values[:, -1] = self._records.irregular_probability(which)
         return values

@@ -33,8 +33,9 @@ FELT = (
 OBSERVATION_NAMES = (*COMMANDED, *FELT)
 """Entries of an observation, in their order."""
 
-MONITOR = "monitor_level"
-"""One more with ``monitor="on"``: the level of ``chaosgym.monitor``, an alarm above 1."""
+ASKED = {"monitor": ("monitor_level", HIGHEST / LIMIT), "classifier": ("irregular_probability", 1.0)}
+"""Entries that follow where the keyword is "on", and the most that each may be: the level of ``chaosgym.monitor``, an
+alarm above 1; and how likely the machine's trained classifier of records holds the motion at this speed irregular."""
 
 MEANINGS = {
     "speed": "speed of the step",
@@ -57,18 +58,23 @@ MEANINGS = {
 
 def observation_names(task: Task) -> tuple[str, ...]:
     """Return the entries of an observation of a task."""
-    return (*OBSERVATION_NAMES, MONITOR) if task.monitor == "on" else OBSERVATION_NAMES
+    return (*OBSERVATION_NAMES, *(ASKED[keyword][0] for keyword in asked_of(task)))
+
+
+def asked_of(task: Task) -> tuple[str, ...]:
+    """Return the keywords of the entries that a task adds, in their order."""
+    return tuple(keyword for keyword in ASKED if getattr(task, keyword) == "on")
 
 
 def observation_space(task: Task) -> Box:
-    """Return the space of observations, (14,) or (15,), with finite bounds."""
+    """Return the space of observations, (14,) and one more for each keyword of ``ASKED``, with finite bounds."""
     span, force = task.highest_speed - task.lowest_speed, FORCE_RANGE * task.load_rating
     trim = span if task.action == "speed" else task.largest_trim
     low = [task.lowest_speed, task.lowest_demand, -trim, -span, 0.0, 0.0] + [0.0] * len(FELT)
     high = [task.highest_speed, task.highest_demand, trim, span, 1.0, float(task.shortest_hold)]
     high += [force] * (len(FELT) - 2) + [IMPACT_RANGE, 1.0]
-    if task.monitor == "on":
-        low, high = [*low, 0.0], [*high, HIGHEST / LIMIT]
+    most = [ASKED[keyword][1] for keyword in asked_of(task)]
+    low, high = low + [0.0] * len(most), high + most
     return Box(np.array(low, np.float32), np.array(high, np.float32))
 
 

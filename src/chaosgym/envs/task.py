@@ -84,6 +84,12 @@ class Task:
     monitor: str = parameter(
         "off", choices=("off", "on"), provenance="assumed", source="whether the monitor's level is observed too"
     )
+    classifier: str = parameter(
+        "off",
+        choices=("off", "on"),
+        provenance="assumed",
+        source="whether it is observed how likely the trained classifier of records holds the motion irregular",
+    )
     speed_ripple: float = _number(0.0, high=0.1, source="standard deviation of a cycle's speed, as a share of it")
     kick: float = _number(
         0.0, high=0.1, source="standard deviation of the change of each velocity once a cycle, as a share of its range"

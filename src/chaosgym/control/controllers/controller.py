@@ -74,7 +74,17 @@ THRESHOLD = 1.17
 """Felt irregularity, in units of the sensor's error, above which motion is irregular (calibrated on other machines)."""
 
 
+SURE = 0.9
+"""Probability of the trained classifier above which motion is irregular (calibrated on other machines): fluctuations of
+the speed, which it was not trained with, look a little irregular to it."""
+
+
 def irregular(observations: Observations, task: Task, threshold: float, softness: float) -> Array:
-    """Probability (n,) that the motion is irregular, by what is felt in units of the sensor's error."""
+    """Probability (n,) that the motion is irregular, by what is felt in units of the sensor's error.
+
+    Where the task gives the trained classifier's, 1 if that is sure and 0 if not.
+    """
+    if task.classifier == "on":
+        return (observations[:, -1] > SURE).astype(float)
     felt = irregularity(observations) / max(task.sensor_error, 1e-3 * task.load_rating)
     return np.asarray(0.5 + 0.5 * np.tanh(0.5 * (felt - threshold) / softness))

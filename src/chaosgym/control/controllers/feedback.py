@@ -30,13 +30,22 @@ class BackOff(Controller):
         Steps before it moves on.
     spacing
         Of the ladder, in trim steps.
+    classified
+        Whether the trained classifier of records says what is irregular, instead of a threshold.
     """
 
     knows = "measurements"
 
-    def __init__(self, *, remembers: bool = True, patience: int = 2, spacing: int = 2) -> None:
+    def __init__(
+        self, *, remembers: bool = True, patience: int = 2, spacing: int = 2, classified: bool = False
+    ) -> None:
         super().__init__()
-        self.remembers, self.patience, self.spacing = remembers, patience, spacing
+        self.remembers, self.patience, self.spacing, self.classified = remembers, patience, spacing, classified
+
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """Keywords of the environment that it plays in."""
+        return super().keywords | ({"classifier": "on"} if self.classified else {})
 
     def begin(self, envs: Any) -> None:
         """Start at the demand."""

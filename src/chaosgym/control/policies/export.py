@@ -11,6 +11,7 @@ from gymnasium.spaces import Discrete
 
 from chaosgym.control.policies.network import Dense, Lstm, Network
 from chaosgym.control.policies.policy import Normalisation, TrainedPolicy
+from chaosgym.envs.observation import asked_of
 from chaosgym.errors import ModelFileError
 
 
@@ -67,6 +68,7 @@ def exported(model: Any, env: str, envs: Any, *, memory: bool = False) -> Traine
         usual=usual,
         squashed=bool(model.policy.squash_output),
         machine=envs.get_attr("nominal")[0].definition,
+        asked=asked_of(envs.get_attr("task")[0]),
     )
 
 

@@ -19,7 +19,7 @@ from chaosgym.control.policies.network import Dense, Lstm, Network, State
 from chaosgym.envs import environment
 from chaosgym.envs.drive import BACK
 from chaosgym.envs.memory import SpeedMemory, Usual
-from chaosgym.envs.observation import OBSERVATION_NAMES
+from chaosgym.envs.observation import ASKED, OBSERVATION_NAMES, asked_of
 from chaosgym.envs.task import Task
 from chaosgym.errors import ModelFileError, ParameterError
 from chaosgym.files import DAMAGE, contents, unpacked, write_atomically
@@ -69,6 +69,8 @@ class TrainedPolicy:
         For a policy with a ``SpeedMemory``, what is usual at each speed; None for one without a memory.
     squashed
         Whether continuous answers go through tanh; otherwise they are clipped.
+    asked
+        Keywords of the entries that it sees beside the 14 of every observation: of "monitor" and "classifier".
     machine
         ``definition`` of the machine that it was trained on; by default the name in the environment's id.
 
@@ -85,6 +87,7 @@ class TrainedPolicy:
     usual: Usual | None = None
     squashed: bool = False
     machine: str = ""
+    asked: tuple[str, ...] = ()
     knows: str = "measurements"
     _state: State | None = field(default=None, init=False, repr=False)
     _memory: SpeedMemory | None = field(default=None, init=False, repr=False)
@@ -93,7 +96,10 @@ class TrainedPolicy:
         if self.action not in ACTIONS:
             raise ModelFileError(f"the kind of actions is {self.action!r}; known: {', '.join(ACTIONS)}")
         self.machine = self.machine or environment(self.env).kwargs["machine"]
-        size = len(OBSERVATION_NAMES) + (len(SpeedMemory.names()) if self.usual else 0)
+        if self.asked != tuple(keyword for keyword in ASKED if keyword in self.asked):
+            raise ModelFileError(f"it sees {', '.join(self.asked)}; known, in this order: {', '.join(ASKED)}")
+        self._seen = len(OBSERVATION_NAMES) + len(self.asked)
+        size = self._seen + (len(SpeedMemory.names()) if self.usual else 0)
         self.network.check(size, ACTIONS[self.action])
         if self.normalisation:
             for name, values in (("mean", self.normalisation.mean), ("deviation", self.normalisation.deviation)):
@@ -107,7 +113,7 @@ class TrainedPolicy:
     @property
     def keywords(self) -> dict[str, Any]:
         """Keywords of the environment that it plays in."""
-        return {"action": self.action}
+        return {"action": self.action} | dict.fromkeys(self.asked, "on")
 
     def start(self, envs: Any) -> None:
         """Begin the jobs of a vector environment that has been reset.
@@ -118,6 +124,11 @@ class TrainedPolicy:
             If it is of another machine, or has another kind of actions.
         """
         here = envs.nominal.definition
+        if asked_of(envs.task) != self.asked:
+            raise ModelFileError(
+                f"the policy sees {', '.join(self.asked) or 'nothing'} beside the usual entries, the environment gives "
+                f"{', '.join(asked_of(envs.task)) or 'none'}; make it with the keywords {self.keywords}"
+            )
         if here != self.machine or envs.task.action != self.action:
             raise ModelFileError(
                 f"the policy was trained on {self.env} (machine {self.machine}) with action={self.action!r}; "
@@ -142,7 +153,7 @@ class TrainedPolicy:
             self._memory = SpeedMemory(task, count, self.usual, learns=False)
 
     def __call__(self, observations: Array) -> Array:
-        """Return the actions (n,) or (n, 2) for observations (n, 14) of as many jobs as were started.
+        """Return the actions (n,) or (n, 2) for observations (n, 14 and what was asked) of as many jobs as started.
 
         Raises
         ------
@@ -150,10 +161,8 @@ class TrainedPolicy:
             If an observation is not finite or has another length.
         """
         values = np.asarray(observations, np.float32)
-        if values.shape[1:] != (len(OBSERVATION_NAMES),) or not np.isfinite(values).all():
-            raise ParameterError(
-                f"observations have shape {values.shape}; allowed: (n, {len(OBSERVATION_NAMES)}), all finite"
-            )
+        if values.shape[1:] != (self._seen,) or not np.isfinite(values).all():
+            raise ParameterError(f"observations have shape {values.shape}; allowed: (n, {self._seen}), all finite")
         if self._memory:
             values = self._memory.add(values)
         if self.normalisation:
@@ -191,7 +200,7 @@ def save_policy(policy: "TrainedPolicy | LearnedMap", folder: str | Path) -> Non
             "normalisation_limit": policy.normalisation.limit if policy.normalisation else None,
             "memory": policy.usual is not None,
             "squashed": policy.squashed,
-        }
+        } | ({"asked": list(policy.asked)} if policy.asked else {})
     buffer = BytesIO()
     np.savez(buffer, **arrays)  # type: ignore[arg-type]
     description |= {
@@ -261,6 +270,7 @@ def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPol
         usual=usual,
         squashed=bool(description["squashed"]),
         machine=machine,
+        asked=tuple(str(keyword) for keyword in description.get("asked", ())),
     )
 
 
