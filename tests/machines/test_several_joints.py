@@ -2,6 +2,7 @@
 
 import json
 import math
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +22,8 @@ from chaosgym.machines.impact_beam.modes import modal_analysis
 from chaosgym.machines.integrators import TIGHTEST_EVENTS
 from chaosgym.machines.modal_machine import jointed
 from chaosgym.machines.modal_machine.jointed import Joint, machine_with_joints
+from chaosgym.simulation.batch import batch_of
+from chaosgym.simulation.run import simulate_with_deviations
 
 FIELDS = ("section", "peak_force", "impacts", "contact_fraction", "bounce_duration")
 PIPE = Path("docs/machines/pipe-in-two-supports.toml")
@@ -163,20 +166,114 @@ def test_split_repeated_and_sampled_runs_are_equal_bit_for_bit():
         np.testing.assert_array_equal(getattr(again, name), expected)
 
 
-def test_a_batch_moves_each_machine_as_alone():
-    """Machines of a batch, at speeds and clearances of their own, have the peak forces of single runs bit for bit."""
-    from chaosgym.simulation.batch import batch_of
+def variants():
+    """Machines that differ in speed, gaps, offset, drive, springs and in whether their surfaces differ."""
+    return [
+        three_modes(UNEVEN),
+        three_modes(UNEVEN, speed=11.0, loose_clearance=3e-5, off_centre_offset=0.0, drive_level=1.7),
+        three_modes(UNEVEN, speed=17.0, off_centre_lower_stiffness_factor=1.0, off_centre_lower_damping_factor=1.0),
+        three_modes(UNEVEN, speed=23.0, one_sided_stops="two", loose_stiffness=4e5, damping_factor=3.0),
+        three_modes(UNEVEN, speed=14.0, frequency_factor=0.7, one_sided_preload=-5.0),
+    ]
 
-    machine = three_modes(UNEVEN)
-    batch, which = batch_of(machine, 3), np.arange(3)
-    for i in range(3):
+
+def started(machines):
+    """A batch of machines at rest."""
+    batch = batch_of(machines[0], len(machines))
+    for i, machine in enumerate(machines):
         batch.start(i, machine)
-    batch.set_speeds(which, np.array([12.0, 14.0, 17.0]))
-    batch.set_clearances(which, np.array([1e-4, 1.5e-4, 2e-4]))
-    cycles = batch.run(which, 10)
-    assert not cycles.failed.any()
-    for i, (speed, gap) in enumerate(zip((12.0, 14.0, 17.0), (1e-4, 1.5e-4, 2e-4), strict=True)):
-        np.testing.assert_array_equal(cycles.peak_force[i], simulate(machine.at(speed, gap), 10).peak_force)
+    return batch
+
+
+def test_a_batch_moves_each_machine_as_alone():
+    """Forces, impacts, bouncing and final states of a batch are those of single runs bit for bit.
+
+    So they are in two parts, and beside others in another order.
+    """
+    machines, which = variants(), np.arange(5)
+    whole, parts, some = started(machines), started(machines), started(machines)
+    found, first = whole.run(which, 30), parts.run(which, 11)
+    second = parts.run(which, 19)
+    assert not found.failed.any()
+    few = some.run(np.array([3, 1]), 30)
+    for i, machine in enumerate(machines):
+        alone = simulate(machine, 30)
+        expected = alone.peak_force, alone.impacts, alone.bounce_duration
+        for k, values in enumerate(expected, start=1):
+            np.testing.assert_array_equal(found[k][i], values)
+            np.testing.assert_array_equal(np.concatenate([first[k][i], second[k][i]]), values)
+        for values, final in zip(whole.motion(i), alone.final_state, strict=True):
+            np.testing.assert_array_equal(values, final)
+    np.testing.assert_array_equal(few.peak_force, found.peak_force[[3, 1]])
+    np.testing.assert_array_equal(machines[0].sensed(found.peak_force), found.peak_force.max(axis=2))
+
+
+@pytest.mark.parametrize("kind", ["three uneven joints", "a rigid body", "twelve harmonics of an unbalance"])
+def test_speeds_and_gaps_that_change_from_cycle_to_cycle_in_a_batch(kind):
+    """A batch whose speeds vary and whose gap wears moves as single runs do, and so do its deviations, bit for bit.
+
+    Where the highest harmonic turns faster than the fastest mode, intervals depend on the speed.
+    """
+    if kind == "twelve harmonics of an unbalance":
+        wave = 40.0 * np.sin(2.0 * np.pi * np.arange(64) / 64) ** 3
+        drives = (Drive.sampled("force", "c", wave, 12), Drive.sine("unbalance", "drive", 2e-3))
+        machine = machine_with_joints(Structure.of_modes([9.0, 31.0, 60.0], 0.02, SHAPES), PLAIN, drives, speed=14.0)()
+    else:
+        machine = three_modes(UNEVEN, (0.0 if kind == "a rigid body" else 9.0, 61.0, 190.0))
+    speeds = np.random.default_rng(0).choice([0.3, 6.0, 13.0, 14.0, 31.0], (3, 8))
+    worn = np.array([1.2e-4, 1.6e-4, 3e-4])
+    batch, which = started([machine] * 3), np.arange(3)
+    batch.set_clearances(which, worn)
+    cycles, growth = batch.run_varied(which, speeds)
+    batch.set_speeds(which, np.array([9.0, 14.0, 20.0]))
+    later = batch.run(which, 3)
+    for i, clearance in enumerate(worn.tolist()):
+        state, deviation = None, np.cos(1.0 + np.arange(machine.n_states))[None]
+        for k, speed in enumerate(speeds[i].tolist()):
+            each = machine.at(speed, clearance)
+            record, deviation, grown = simulate_with_deviations(each, 1, state, deviations=deviation)
+            state = record.final_state
+            np.testing.assert_array_equal(cycles.peak_force[i, k], record.peak_force[0])
+            assert growth[i, k] == grown[0, 0]
+        last = simulate(machine.at((9.0, 14.0, 20.0)[i], clearance), 3, state)
+        np.testing.assert_array_equal(later.peak_force[i], last.peak_force)
+    assert cycles.impacts.sum() > 20
+
+
+def test_machines_that_fail_are_told_and_the_others_move_on(monkeypatch):
+    """Too little memory for one machine's sets, and a state that is no number: both by their places, at once."""
+    machines = variants()
+    batch, which = started(machines), np.arange(5)
+    monkeypatch.setattr(joint_sets, "MOST_BYTES", 1)
+    batch.start(1, machines[1])
+    monkeypatch.undo()
+    batch.kick(np.array([4]), np.full((1, 3), math.nan))
+    found = batch.run(which, 12)
+    assert found.failed.tolist() == [False, True, False, False, True]
+    for i in (0, 2, 3):
+        np.testing.assert_array_equal(found.peak_force[i], simulate(machines[i], 12).peak_force)
+    assert not found.peak_force[[1, 4]].any()
+    batch.start(1, machines[1])
+    batch.start(4, machines[4])
+    again = batch.run(np.array([1, 4]), 12)
+    np.testing.assert_array_equal(again.peak_force[1], simulate(machines[4], 12).peak_force)
+
+
+def test_environments_of_several_joints_are_judged_by_their_exponent():
+    """Side by side, pickled between, jobs on a pipe in two supports are those of one environment each, bit for bit."""
+    envs = gym.make_vec("chaosgym/MachineWear-v0", num_envs=3, machine=str(PIPE))
+    alone = [gym.make("chaosgym/MachineWear-v0", machine=str(PIPE)) for _ in range(3)]
+    first, _ = envs.reset(seed=4)
+    for i, env in enumerate(alone):
+        np.testing.assert_array_equal(env.reset(seed=4 + i)[0], first[i])
+    for k in range(6):
+        envs = pickle.loads(pickle.dumps(envs)) if k == 3 else envs
+        seen, reward, *_, info = envs.step(np.full(3, k % 3))
+        for i, env in enumerate(alone):
+            mine = env.step(k % 3)
+            np.testing.assert_array_equal(mine[0], seen[i])
+            assert (mine[1], mine[-1]["irregularity"]) == (reward[i], info["irregularity"][i])
+    assert (np.abs(info["irregularity"]) > 0.0).all()
 
 
 def test_twelve_joints_and_forty_modes():
@@ -196,7 +293,7 @@ def test_twelve_joints_and_forty_modes():
 def test_little_memory_changes_no_byte(monkeypatch):
     """Where sets are forgotten and made anew a run is the same; where a cycle needs more than fit, one line says so."""
     expected = simulate(three_modes(UNEVEN), 12)
-    for speed, bytes_ in ((14.0, 600_000), (13.0, 1)):
+    for speed, bytes_ in ((14.0, 800_000), (13.0, 1)):
         monkeypatch.setattr(joint_sets, "MOST_BYTES", bytes_)
         jointed._tables.cache_clear()
         if bytes_ > 1:
@@ -358,8 +455,10 @@ def test_an_environment_senses_the_largest_force_of_all_joints():
     """Mean peak force of an observation, without errors, is the mean over the cycles of the largest on any surface."""
     env = gym.make("chaosgym/Machine-v0", machine=str(PIPE), sensor_error=0.0, speed_ripple=0.0, cycles_per_step=5)
     env.reset(seed=3)
+    env.unwrapped._job.traced = 1
     observation = env.step(env.action_space.sample())[0]
-    record = env.unwrapped._job.batch.records[0]
+    (piece,) = env.unwrapped._job.pieces[0]
+    record = simulate(piece.machine, 5, chaosgym.simulation.MotionState(piece.coordinates, piece.bouncing))
     found = record.peak_force.max(axis=1)[-5:]
     assert observation[6] == pytest.approx(found.mean(), rel=1e-5)
     assert observation[8] == pytest.approx(found.max(), rel=1e-5)

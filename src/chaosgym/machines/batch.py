@@ -59,7 +59,7 @@ class CompiledBatch(ABC):
         self._machine = machine
         self._columns = [(array.shape[1:], array.dtype, len(array)) for array in machine.arrays(1)]
         self._arrays: CycleArrays | None = None
-        self._motions = Motions(np.zeros((count, machine.n_states)), np.zeros((count, 3)))
+        self._motions = Motions(np.zeros((count, machine.n_states)), np.zeros((count, 3 * max(1, len(machine.joints)))))
         self._scale = np.zeros_like(self._motions.coordinates)
 
     def __len__(self) -> int:
@@ -126,32 +126,20 @@ class CompiledBatch(ABC):
         """Run the machines ``which`` (k,) in place; rows of ``arrays`` and ``outcome`` (k,) in that order."""
 
 
-class ModalImpactBatch(CompiledBatch):
-    """Machines of a few modes and one gap."""
+class VaryingBatch(CompiledBatch):
+    """Machines that take along a small deviation each, at a speed that may change from cycle to cycle."""
 
     def __init__(self, machine: "Machine", count: int) -> None:
         super().__init__(machine, count)
-        model = machine.reduce()
-        self._parts = [stacked([getattr(model, name)] * count) for name in _PARTS]
-        self._batch = stacked([_flat(model)] * count)
         self._deviations = np.ones((count, 1, machine.n_states))
-        self._machines: list[Any] = [machine] * count
 
     def start(self, i: int, machine: "Machine") -> None:
         """Put a machine at rest into place i."""
         super().start(i, machine)
         self._deviations[i] = np.cos(1.0 + np.arange(self._deviations.shape[2]))
 
-    def change(self, i: int, machine: "Machine") -> None:
-        """Put another machine into place i, whose motion goes on."""
-        model = machine.reduce()
-        for name, part in zip(_PARTS, self._parts, strict=True):
-            put(part, i, getattr(model, name))
-        put(self._batch, i, _flat(model))
-        self._machines[i] = machine
-
     def run_varied(self, which: Indices, speeds: Array) -> tuple[Cycles, Array]:
-        """Run the machines ``which`` (k,) for a cycle at each of the frequencies ``speeds`` (k, cycles) [Hz].
+        """Run the machines ``which`` (k,) for a cycle at each of the ``speeds`` (k, cycles), in the speed field's unit.
 
         Returns
         -------
@@ -160,9 +148,33 @@ class ModalImpactBatch(CompiledBatch):
         """
         arrays, outcome = self._empty(len(which), speeds.shape[1])
         growth = np.zeros((*speeds.shape, 1))
-        given = (self._batch, *self._parts, which, speeds, self._motions, self._deviations, growth, arrays)
-        call_side_by_side(advance_varied_beams, len(self), *given, self._settings, outcome)
+        self._vary(which, speeds, self._deviations, growth, arrays, outcome)
         return self._cycles(arrays, outcome), growth[:, :, 0]
+
+    @abstractmethod
+    def _vary(
+        self, which: Indices, speeds: Array, vectors: Array, growth: Array, arrays: CycleArrays, outcome: Indices
+    ) -> None:
+        """As ``_advance``, with deviations ``vectors`` (N, 1, n_states) that grow by ``growth`` (k, cycles, 1)."""
+
+
+class ModalImpactBatch(VaryingBatch):
+    """Machines of a few modes and one gap."""
+
+    def __init__(self, machine: "Machine", count: int) -> None:
+        super().__init__(machine, count)
+        model = machine.reduce()
+        self._parts = [stacked([getattr(model, name)] * count) for name in _PARTS]
+        self._batch = stacked([_flat(model)] * count)
+        self._machines: list[Any] = [machine] * count
+
+    def change(self, i: int, machine: "Machine") -> None:
+        """Put another machine into place i, whose motion goes on."""
+        model = machine.reduce()
+        for name, part in zip(_PARTS, self._parts, strict=True):
+            put(part, i, getattr(model, name))
+        put(self._batch, i, _flat(model))
+        self._machines[i] = machine
 
     def set_speeds(self, which: Indices, speeds: Array) -> None:
         """Change the excitation frequencies [Hz]."""
@@ -176,6 +188,12 @@ class ModalImpactBatch(CompiledBatch):
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         given = (self._batch, *self._parts, which, self._motions, arrays, self._settings, outcome)
         call_side_by_side(advance_beams, len(self), *given)
+
+    def _vary(
+        self, which: Indices, speeds: Array, vectors: Array, growth: Array, arrays: CycleArrays, outcome: Indices
+    ) -> None:
+        given = (self._batch, *self._parts, which, speeds, self._motions, vectors, growth, arrays)
+        call_side_by_side(advance_varied_beams, len(self), *given, self._settings, outcome)
 
 
 _PARTS = ("regimes", "tables")

@@ -1,7 +1,7 @@
 """Machines of a few modes and several joints: tables of each set of pressed surfaces, made when it is first visited.
 
 sets = PressedSets(stiffness, damping, shape, springs, dampers)     # of a structure, whatever drives it
-tables = JointTables(sets, frequency, drive, static_force)          # at one speed
+tables = JointTables(sets, frequency, level, drive, static_force, step_phase)     # at one speed
 outcome, done = tables.advance(stops, state, bouncing, arrays, ExactEvents())
 """
 
@@ -15,9 +15,12 @@ from numpy.typing import NDArray
 from chaosgym.core import status
 from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays
+from chaosgym.core.joints.batch import JointModel, displacement_weights
 from chaosgym.core.joints.cycle import advance_joints
 from chaosgym.core.joints.run import JointRun, new_space, work_space
-from chaosgym.core.joints.tables import MOST_LEVELS, ROW, layout, tabulate
+from chaosgym.core.joints.sets import put_sets, set_length
+from chaosgym.core.joints.tables import MOST_LEVELS, layout
+from chaosgym.core.lanes import unset
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents
@@ -153,8 +156,8 @@ class JointTables:
         Of the structure.
     frequency
         Of the cycle [Hz].
-    drive : (H, 2, n)
-        Modal forces that go with cosine and sine of each harmonic of the cycle.
+    level, drive
+        As of ``put_sets``.
     static_force : (n,)
         Constant modal force.
     step_phase
@@ -162,53 +165,33 @@ class JointTables:
     """
 
     def __init__(
-        self, sets: PressedSets, frequency: float, drive: Array, static_force: Array, step_phase: float
+        self, sets: PressedSets, frequency: float, level: float, drive: Array, static_force: Array, step_phase: float
     ) -> None:
-        self._sets, self._drive, self._static, self._step_phase = sets, drive, static_force, step_phase
-        self._omega, self._period = 2.0 * math.pi * frequency, 1.0 / frequency
+        self._sets, self._static, self._step_phase = sets, static_force, step_phase
+        self._level, self._drive, self.frequency = level, np.ascontiguousarray(drive), frequency
         m, n = sets.shape.shape
-        shortest = self._shortest(sets.fastest)
-        levels = min(max(math.ceil(math.log2(self._period / (4.0 * shortest))), 1), MOST_LEVELS)
-        self._layout = call(layout, n, len(drive), m, levels)
-        self._at = call(work_space, self._layout, sets.radix)
-        self._length = int(self._layout[ROW])
+        self._at = call(work_space, call(layout, n, drive.shape[1], m, MOST_LEVELS), sets.radix)
+        self._row, self._length = map(int, call(set_length, self._at))
         self._most = max(1, MOST_BYTES // (8 * self._length))
         self._lock = Lock()
         self._forget()
-        stiffness = sets.stiffness
-        self._weights = np.where(stiffness != 0.0, stiffness, self._omega**2)
 
     def _forget(self) -> None:
         self._tables = np.empty(0)
         self._rows = np.full(self._sets.count, -1, np.int64)
         self._kept = 0
 
-    def _shortest(self, fastest: float) -> float:
-        return self._step_phase / max(fastest, len(self._drive) * self._omega)
-
     def _make(self, code: int) -> None:
         """Make the tables of a set; arrays in which a run may still be are left as they are."""
         found = self._sets.of(code)
-        n = len(self._static)
-        load = found.to_modal[:, n:] @ self._static
+        load = found.to_modal[:, len(self._static) :] @ self._static
         lag = np.divide(found.dampers, found.springs, out=np.zeros(len(found.springs)), where=found.springs > 0.0)
-        row = call(
-            tabulate,
-            self._at[: len(self._layout)],
-            found.generator,
-            found.to_modal,
-            found.from_modal,
-            self._sets.shape,
-            lag,
-            self._shortest(found.fastest),
-            found.rest,
-            found.drift,
-            found.constants,
-            self._omega,
-            self._drive,
-            settled(found.generator, load)[0],
-            load,
-        )
+        of_structure = (found.generator, found.to_modal, found.from_modal, lag, found.rest, found.drift)
+        parts = (np.array(found.fastest), *of_structure, found.constants, settled(found.generator, load)[0], load)
+        row = np.zeros(self._length)
+        row[self._row : self._row + sum(part.size for part in parts)] = np.concatenate([part.ravel() for part in parts])
+        driven = (self._step_phase, self.frequency, self._level, self._drive)
+        call(put_sets, self._at, self._sets.shape, *driven, row)
         with self._lock:
             if self._rows[code] >= 0:
                 return
@@ -216,21 +199,38 @@ class JointTables:
                 self._forget()
             begin = self._kept * self._length
             if begin == len(self._tables):
-                room = min(max(2 * self._kept, 8), self._most)
-                self._tables = np.concatenate([self._tables, np.empty(room * self._length - begin)])
+                tables = unset(min(max(2 * self._kept, 8), self._most) * self._length)
+                tables[:begin] = self._tables
+                self._tables = tables
             self._tables[begin : begin + self._length] = row
             rows = self._rows.copy()
             rows[code] = begin
             self._rows = rows
             self._kept += 1
 
-    def _run(self, stops: Array, event_tolerance: float) -> tuple[JointRun, NDArray[np.int64]]:
-        """All that a run reads, and where the rows of the sets begin."""
-        with self._lock:
-            tables, rows = self._tables, self._rows
+    def provide(self, code: int, made: int) -> bool:
+        """Make the tables of a set; False if so many, ``made`` since a cycle ended, are more than the memory holds."""
+        if made > self._most:
+            return False
+        if self._kept == 0:
+            # at another speed these sets were visited: they likely are at this one
+            for likely in self._sets.visited(min(LIKELY, self._most - 1)):
+                self._make(likely)
+        self._make(code)
+        return True
+
+    def space(self, stops: Array) -> Array:
+        """Work space of a run; ``stops`` (m, 2) are positions [m]."""
         sets = self._sets
-        own = call(new_space, self._at, sets.shape, stops, sets.springs, sets.dampers)
-        return JointRun(tables, own, self._at, self._period, event_tolerance / self._step_phase), rows
+        space: Array = call(new_space, self._at, sets.shape, stops, sets.springs, sets.dampers)
+        return space
+
+    def model(self, own: Array) -> JointModel:
+        """Return the machine that moves in a work space; it holds addresses, so tables and space must be kept."""
+        rows, kept = self._rows, self._kept
+        places = (self._tables.ctypes.data, kept, rows.ctypes.data, len(rows), own.ctypes.data)
+        structure = self._at, self._sets.shape, self._sets.stiffness
+        return JointModel(*places, *structure, self._drive, self._level, self.frequency)
 
     def advance(
         self,
@@ -242,21 +242,17 @@ class JointTables:
         tangents: Tangents,
     ) -> tuple[int, int]:
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``. ``stops`` (m, 2) are positions [m]."""
-        done, cycles, made = 0, len(arrays.section), 0
+        done, cycles, made, own = 0, len(arrays.section), 0, self.space(stops)
+        weights = call(displacement_weights, self._sets.stiffness, self.frequency)
         while True:
             part = CycleArrays(*(values[done:] for values in arrays))
             along = tangents._replace(log_growth=tangents.log_growth[done:])
-            run, rows = self._run(stops, integrator.event_tolerance)
+            with self._lock:
+                tables, rows = self._tables, self._rows
+            run = JointRun(tables, own, self._at, 1.0 / self.frequency, integrator.event_tolerance / self._step_phase)
             motion = (state, bouncing, part, integrator.event_budget, along)
-            outcome, finished, code = call(advance_joints, run, rows, self._weights, *motion)
+            outcome, finished, code = call(advance_joints, run, rows, weights, *motion)
             done += finished
-            if outcome != status.NEEDS_SET:
-                return outcome, min(done, cycles)
             made = 1 if finished else made + 1
-            if made > self._most:
-                return outcome, done
-            if self._kept == 0:
-                # at another speed these sets were visited: they likely are at this one
-                for likely in self._sets.visited(min(LIKELY, self._most - 1)):
-                    self._make(likely)
-            self._make(code)
+            if outcome != status.NEEDS_SET or not self.provide(code, made):
+                return outcome, min(done, cycles)

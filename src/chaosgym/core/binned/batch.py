@@ -5,10 +5,9 @@ it.
 """
 
 import numpy as np
-from numba import carray, prange, types
-from numba.core import cgutils
-from numba.extending import intrinsic
+from numba import carray, prange
 
+from chaosgym.core.addresses import pointer
 from chaosgym.core.batch import rows_of
 from chaosgym.core.binned.cycle import advance as advance_binned
 from chaosgym.core.binned.model import BinnedModel, TaylorModel
@@ -17,16 +16,6 @@ from chaosgym.core.binned.taylor import advance as advance_taylor
 from chaosgym.core.kernel import njit, side_by_side
 from chaosgym.core.tangent import no_tangents
 from chaosgym.core.varied import cycle_of
-
-
-@intrinsic
-def pointer(typing_context, address):
-    """Turn an integer into a pointer."""
-
-    def build(context, builder, signature, arguments):
-        return builder.inttoptr(arguments[0], cgutils.voidptr_t)
-
-    return types.voidptr(types.intp), build
 
 
 @njit(cache=True, inline="always")

@@ -40,8 +40,9 @@ MODES, HARMONICS, JOINTS, BLOCKS, WIDTH, STATES, LEVELS = range(7)
 AHEAD, TURN, FINER, GENERATOR, TAYLOR, NOW_ROWS, BOUNDS, BENDS, SIZES, FROM, TO, CONSTANTS, DRIFTS, ROW = range(7, 21)
 """Where the tables of a set begin in its row of numbers, and how long the row is; see ``layout``."""
 
-SHORTEST, DRIFTING = 0, 1
-"""Numbers at the beginning of a row: the shortest interval [s]; 1 if a coordinate may drift, else 0."""
+SHORTEST, DRIFTING, ALWAYS_DRIFTING = 0, 1, 2
+"""Numbers at the beginning of a row: the shortest interval [s]; 1 if a coordinate may drift, else 0, under the drive
+and whatever the drive."""
 
 PLACES = 21
 
@@ -111,14 +112,14 @@ def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, res
         As in ``layout``, without the column of 1.
     """
     n, m, width, states = at[MODES], at[JOINTS], at[WIDTH], at[STATES]
-    values[SHORTEST], values[DRIFTING] = shortest, 0.0
+    values[SHORTEST], values[ALWAYS_DRIFTING] = shortest, 0.0
     for j in range(m):
         for i in range(2 * n):
             if drift[j, i] != 0.0:
-                values[DRIFTING] = 1.0
+                values[ALWAYS_DRIFTING] = 1.0
     for j in range(n):
         if generator[1, j] != 0.0 and generator[2, j] == 0.0:
-            values[DRIFTING] = 1.0
+            values[ALWAYS_DRIFTING] = 1.0
     _put_blocks(at, generator, shortest, np.int64(0), at[LEVELS], values)
     rows, reading = np.empty((DEGREE + 1, 2 * n)), np.empty((5, 2 * n))
     for j in range(m):
@@ -145,10 +146,11 @@ def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, res
 
 @njit(cache=True, nogil=True)
 def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, rest, load, values):
-    """Add to a row by ``put_structure`` a drive (H, 2, n) at ``omega`` [rad/s] and a constant force.
+    """Write into a row by ``put_structure`` a drive (H, 2, n) at ``omega`` [rad/s] and a constant force.
 
-    ``drive`` are modal forces that go with cosine and sine of each harmonic; ``rest``, ``load`` (2n,) are position of
-    rest and rate at the origin of the modal coordinates under the constant force. Those that are ``SLOW`` drift.
+    They take the place of others. ``drive`` are modal forces that go with cosine and sine of each harmonic; ``rest``,
+    ``load`` (2n,) are position of rest and rate at the origin of the modal coordinates under the constant force. Those
+    that are ``SLOW`` drift.
     """
     n, harmonics, width, states = at[MODES], at[HARMONICS], at[WIDTH], at[STATES]
     shortest, period = values[SHORTEST], 2.0 * math.pi / omega
@@ -170,9 +172,11 @@ def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, res
     back = from_modal @ steady
     rows, reading = np.empty((DEGREE + 1, 2 * harmonics)), np.empty((5, 2 * harmonics))
     resting, settling = np.zeros(2 * n), np.zeros(2 * n)
+    values[DRIFTING] = values[ALWAYS_DRIFTING]
     for i in range(2 * n):
+        lane = at[DRIFTS] + (i // n) * width + i % n
+        values[lane] = 0.0
         if _is_slow(generator, i, period):
-            lane = at[DRIFTS] + (i // n) * width + i % n
             values[lane] = load[i]
             values[DRIFTING] = 1.0 if load[i] != 0.0 else values[DRIFTING]
         else:
@@ -189,6 +193,7 @@ def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, res
             derivative(turning, rows[p], rows[p + 1])
         _read(rows, lag[j], reading)
         _put_joint(at, turning, rows, reading, j, n, levels, values)
+        values[at[CONSTANTS] + j * (1 + at[JOINTS])] = 0.0
         for i in range(n):
             values[at[CONSTANTS] + j * (1 + at[JOINTS])] += shape[j, i] * resting[i]
     for i in range(2 * n):
@@ -201,17 +206,6 @@ def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, res
     for c in range(2 * harmonics):
         lane = (c // harmonics) * width + n + c % harmonics
         values[at[TO] + (2 * n + c) * 2 * width + lane] = 1.0
-
-
-@njit(cache=True, nogil=True)
-def tabulate(
-    at, generator, to_modal, from_modal, shape, lag, shortest, rest, drift, constants, omega, drive, load_rest, load
-):
-    """Row of a set of pressed surfaces under a drive and a constant force; see ``put_structure``, ``put_drive``."""
-    values = np.zeros(at[ROW])
-    put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, rest, drift, constants, values)
-    put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, load_rest, load, values)
-    return values
 
 
 @leaf

@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, ClassVar, NamedTuple, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,9 @@ from chaosgym.machines.modal_machine.machine import (
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import parameter, parameters_of
 from chaosgym.machines.units import TURNING
+
+if TYPE_CHECKING:
+    from chaosgym.machines.joint_batch import JointBatch
 
 Array = NDArray[np.float64]
 
@@ -238,10 +241,24 @@ class JointedMachine(Machine):
 
     def _drive(self) -> tuple[Array, Array]:
         """Modal forces of cosine and sine of each harmonic, (H, 2, n), and constant ones, (n,)."""
-        harmonics, static = modal_drive(self.modes, self.drives)
+        harmonics, static = self._load()
         omega = 2.0 * math.pi * self.speed
-        force = self.drive_level * (harmonics[0] + omega**2 * harmonics[1])
-        return np.ascontiguousarray(force), static + self.of_joints("preload") @ self.joint_shapes
+        return np.ascontiguousarray(self.drive_level * (harmonics[0] + omega**2 * harmonics[1])), static
+
+    def _load(self) -> tuple[Array, Array]:
+        """The drive at level 1, (2, H, 2, n) as of ``put_sets``, and constant modal forces, (n,)."""
+        harmonics, static = modal_drive(self.modes, self.drives)
+        return harmonics, static + self.of_joints("preload") @ self.joint_shapes
+
+    def tables(self, step_phase: float = ExactEvents.step_phase) -> JointTables:
+        """Return tables of its own at its speed and drive, none made yet."""
+        return JointTables(self.sets, self.speed, self.drive_level, *self._load(), step_phase)
+
+    def batch(self, count: int) -> "JointBatch":
+        """Return ``count`` variants that move in one compiled call."""
+        from chaosgym.machines.joint_batch import JointBatch
+
+        return JointBatch(self, count)
 
     def run(
         self,
@@ -320,7 +337,7 @@ def _sets(
 @lru_cache(maxsize=8)
 def _tables(machine: JointedMachine, step_phase: float) -> JointTables:
     """Tables of a machine at its speed and drive; few are kept, since they are large."""
-    return JointTables(machine.sets, machine.speed, *machine._drive(), step_phase)
+    return machine.tables(step_phase)
 
 
 def _refuse_same_place(names: tuple[str, ...], places: Mapping[str, str], shapes: Array) -> None:
