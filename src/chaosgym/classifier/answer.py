@@ -27,7 +27,7 @@ class NatureAnswer:
     proven
         Whether Newton's method proved a periodic orbit that the motion nears.
     stage
-        What spoke: "parameters", "8 cycles" ... "64 cycles" from rest, "certificate", or "nothing" of an abstention.
+        Which stage decided: "parameters", "8 cycles" ... "64 cycles" from rest, "certificate", or "nothing".
     cycles
         Simulated cycles.
     period

@@ -21,7 +21,7 @@ SENSOR = 3.0
 """Largest error of a peak [N] of the sensor whose records are judged (thesis 3.6)."""
 
 NEAR = 1.5
-"""Factor between true amplitude and the sensor's error within which a record says little."""
+"""Factor between true amplitude and the sensor's error within which a record hardly decides."""
 
 LENGTHS = (8, 16, 32, 64)
 """Cycles of the records that are judged."""

@@ -1,1 +1,1 @@
-"""Ways to set the speed of a machine, and who does it better on the same machines."""
+"""Controllers and policies that set the speed of a machine, and their comparison on the same machines."""

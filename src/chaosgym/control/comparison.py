@@ -39,7 +39,7 @@ ZERO, ONE = "follow the demand", "own map"
 """Contenders that are worth 0 and 1."""
 
 SAFE = "back off, with memory"
-"""Contender that needs neither model nor training, against which the others are told too."""
+"""Contender without model and training: differences of return are reported against it."""
 
 COLUMNS = ("contender", "knows", "seed", "machine", "job_return", "type_iii", "deviation", "damage", "largest_force")
 """Columns of a comparison's table, one row a job."""
@@ -51,7 +51,7 @@ CLASSIFIED = "back off, by the classifier"
 """Contender where a classifier of records is shipped."""
 
 WITHOUT_MODELS = (ZERO, ONE, "own map, demands known", "back off", SAFE, "kriging")
-"""Contenders on a pool of machines, of which nobody has a model."""
+"""Contenders that need no model: those of a pool of machines."""
 
 WORN_LEVELS = 5
 """Clearances at which a machine that wears is mapped."""

@@ -1,6 +1,6 @@
 """A guard for any policy: it runs at the demand first, and replaces a policy that was wrong in this job.
 
-Under each demand the guard goes to the demand. Where that is calm it stays. Where the peaks miss themselves for
+Under each demand the guard goes to the demand. Where that is calm it stays. Where the peaks do not repeat for
 ``patience`` steps it lets the policy set the speed, within the band of trims that the task allows. If what the policy
 finds is irregular too for ``strikes`` steps under this demand, backing off takes over, and does so at once under the
 demands to come. So a policy that fits the machine saves the search, and one that does not costs a few steps of a job.

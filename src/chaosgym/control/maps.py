@@ -30,7 +30,7 @@ FLEET_SEED = 77_000_000
 """First seed of their draws."""
 
 SMOOTHING = np.array([0.15, 0.7, 0.15])
-"""Weights of a speed and its neighbours: a plan must not trust a single speed."""
+"""Weights of a speed and its neighbours: a plan must not rest on a single speed."""
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ FEWEST = 5
 """Cycles of a step at least: peaks are compared with those four cycles before."""
 
 BEFORE_THE_FIRST = -1
-"""Steps done before the machine was felt at the speed of the start."""
+"""Steps done before the machine was measured at the speed of the start."""
 
 _FIRST = np.zeros(1, np.int64)
 
@@ -72,7 +72,7 @@ class Operator:
         return float(self._job["speed"][0])
 
     def start(self, *, speed: float, demand: float) -> float:
-        """Begin at a speed, with a demand; what was felt before is forgotten. The first ``next`` tells of this speed.
+        """Begin at a speed, with a demand, and drop earlier measurements; the first ``next`` gives those at this speed.
 
         Raises
         ------

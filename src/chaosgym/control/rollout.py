@@ -104,7 +104,7 @@ class Played:
 
     @property
     def felt_unit(self) -> str:
-        """Unit of the forces that are felt: newtons, or shares of a rated force that each machine has."""
+        """Unit of the measured forces: newtons, or shares of a rated force that each machine has."""
         return "of the rated one" if self.unit == SHARE else "N"
 
     @property

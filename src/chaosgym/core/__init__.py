@@ -1,1 +1,1 @@
-"""Compiled kernels that serve every machine; they know numpy and numba only."""
+"""Compiled kernels that machines share; they import numpy and numba only."""

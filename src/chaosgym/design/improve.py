@@ -1,4 +1,4 @@
-r"""The next change, and the cheapest one that suffices: phase VII of thesis 5.6, closed.
+r"""Search for the cheapest change with which a machine meets its criteria (phase VII of thesis 5.6).
 
 Candidates follow the thesis: less clearance, more damping, another speed, a stiffer member; then preload, stiffness of
 the contact and mass. Every value that is stated is assessed over the tolerances. Values between them, those that the

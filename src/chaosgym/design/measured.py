@@ -1,4 +1,4 @@
-"""The message of measured peak forces: nature, life and reliability, without a machine model."""
+"""Evaluation of measured peak forces without a machine model: nature, life and reliability."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

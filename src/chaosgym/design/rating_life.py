@@ -1,4 +1,4 @@
-r"""The basic rating life: what a cycle costs a bearing surface, the one law behind every life and every damage.
+r"""The basic rating life: damage of a bearing surface by a cycle of given peak force.
 
     L = (C / F)^p                          life in millions of cycles under a constant peak force F (thesis eq. 5.2)
     1 / L = (F / C)^p                      damage: lives used up in a million cycles

@@ -1,4 +1,4 @@
-"""Everything that a design report shows: the assessment, the map around it, life over speed, and what to change."""
+"""The answer to a design brief: assessment, map of types around it, life over speed, and changes."""
 
 from dataclasses import dataclass
 from typing import Any

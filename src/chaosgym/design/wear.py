@@ -1,4 +1,4 @@
-r"""Wear of the joint by Archard's law: the gap grows, the map moves, and a life follows (thesis 5.5.2, wear).
+r"""Wear of the joint by Archard's law: growth of the clearance, and hours until its limit (thesis 5.5.2, wear).
 
     h = K W s / (H A)                      depth h of a surface of area A under the load W along the sliding distance s
 

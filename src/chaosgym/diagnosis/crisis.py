@@ -40,7 +40,7 @@ SMALL, ALIVE = 0.02, 0.5
 """Sizes, as shares of that of the chaotic motion, of one that is not chaotic any more and of one that still is."""
 
 LAST = 256
-"""Cycles by which it is seen what a motion has become."""
+"""Cycles by which the motion after a crisis is classified."""
 
 OUTSIDE = 0.05
 """Share of the chaotic range by which another motion must leave it."""

@@ -311,7 +311,7 @@ class _Step(NamedTuple):
 
 
 def _reach(points: Array, centres: Array, width: float) -> float:
-    """Square of the distance from all centres beyond which the map knows nothing."""
+    """Square of the distance from all centres beyond which the fitted map is not used."""
     nearest = np.sum(points**2, axis=1)[:, None] - 2.0 * points @ centres.T + np.sum(centres**2, axis=1)
     return max(4.0 * float(np.max(nearest.min(axis=1))), (0.5 * width) ** 2, 0.01)
 

@@ -1,4 +1,4 @@
-r"""The nature of a measured record: one answer from peaks and the sensor's error, or an honest "can't tell".
+r"""The nature of a measured record: one answer from peaks and the sensor's error, or "undetermined".
 
 1. Single wrong readings are replaced and missing cycles filled in; both are reported.
 2. A record of two regimes is cut, and each part judged; chaos in one part counts, as in the Two-Step Test.

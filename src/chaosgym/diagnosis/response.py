@@ -20,7 +20,7 @@ Type = Literal["I", "II", "III", "undetermined"]
 """Type of a response over its tolerance neighbourhood."""
 
 Status = Literal["certified", "agreed", "disputed", "transient", "unresolved"]
-"""certified: proven to machine precision; agreed: all tests that speak say the same; disputed: they don't;
+"""certified: proven to machine precision; agreed: all tests that decide agree; disputed: they do not;
 transient: irregular for long before it settled; unresolved: the budget ended first."""
 
 TYPES: tuple[Type, ...] = ("I", "II", "III", "undetermined")
@@ -47,7 +47,7 @@ class Diagnosis:
     transient
         True where the response was irregular for long and then settled: transient chaos.
     status
-        A ``Status``; None where a single test spoke.
+        A ``Status``; None where a single test was run.
     horizon
         Number of cycles, counted from the initial condition, that the verdict rests on.
     settle_cycle
@@ -105,7 +105,7 @@ class Diagnosis:
 
     @property
     def judged(self) -> "CycleRecord":
-        """The settled motion that the verdict speaks of; raises as ``run`` does.
+        """The settled motion that was judged; raises as ``run`` does.
 
         The proven orbit where there is one, since a proof needs no run that has settled; else the last half of the run.
         """

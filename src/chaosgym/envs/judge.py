@@ -38,11 +38,11 @@ MISS = 0.02
 
 
 WINDOW = 20
-"""Cycles of which recurrence hears at least."""
+"""Cycles that recurrence needs at least."""
 
 
 class Judge(Protocol):
-    """What tells irregular motion of N machines."""
+    """Judge of irregular motion of N machines."""
 
     def start(self, which: Indices) -> None:
         """Forget the machines ``which`` (k,)."""

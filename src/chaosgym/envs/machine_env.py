@@ -103,7 +103,7 @@ class Workplace:
         return Jobs(self.task, self.variants, self.space, count)
 
     def _take_any(self, *, split: str | None = None, **keywords: Any) -> None:
-        """A machine of the pool in each job; nobody has a model of it."""
+        """A machine of the pool in each job; there is no model of it for controllers."""
         self.variants = Pool(split)
         self.model = nominal = self.variants.nominal
         self.unit = SHARE

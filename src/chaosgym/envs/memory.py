@@ -1,10 +1,10 @@
-"""A wrapper that adds a memory: what was felt at which speed in this job, and how far that lies from the usual.
+"""A wrapper that adds the measurements of the job by speed, and how far they lie from the mean over machines.
 
 env = VisitedSpeeds(gym.make("chaosgym/ImpactBeamTolerance-v1"))
 
 Adds to the observation, in the order of ``SpeedMemory.names``:
 
-- what the last three observations told of speed and peaks;
+- speed and peaks of the last three observations;
 - for every speed around the demand, how irregular the peaks were there in this job, and whether it was visited;
 - how far mean peak, impacts and bouncing lie from their usual values at this speed, now and on average over the job.
   Usual is the mean over all machines met so far: a table that grows while training runs, and is kept with the policy.
@@ -29,7 +29,7 @@ KEPT = ("speed", "offset", "mean_peak_force", "std_peak_force", "repeat_1", "rep
 """Their entries that are."""
 
 REACH = 12
-"""Trim steps to either side of the demand for which the memory tells what was felt."""
+"""Trim steps to either side of the demand for which the memory gives the measurements."""
 
 COMPARED = ("mean_peak_force", "impacts_per_cycle", "bouncing_share")
 """Entries that are compared with their usual values."""
@@ -144,7 +144,7 @@ class SpeedMemory:
         return np.concatenate(parts, axis=1).astype(np.float32)
 
     def _around(self, every: NDArray[np.int64], demand: Array) -> tuple[Array, Array]:
-        """What was felt, and whether the speed was visited, around demands (k,); -1 beyond the drive's range."""
+        """Measured irregularity, and whether a speed was visited, around demands (k,); -1 beyond the drive's range."""
         near = np.rint((demand - self._lowest) / self._spacing).astype(np.int64)[:, None]
         place = near + np.arange(-REACH, REACH + 1)
         inside = (place >= 0) & (place < self._felt.shape[1])

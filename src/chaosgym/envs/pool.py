@@ -25,7 +25,7 @@ ANY = "any"
 """What ``machine`` is where each job draws one of the pool."""
 
 SHARE = "of the range"
-"""Unit of its speeds; a force that is felt is a share of the rated one."""
+"""Unit of its speeds; a measured force is a share of the rated one."""
 
 SPLITS = ("train", "test", "other_machines")
 

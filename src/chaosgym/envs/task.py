@@ -1,4 +1,4 @@
-r"""The task: length of a job, demanded speeds, sensors, disturbances and costs, every number in one place.
+r"""The task: length of a job, demanded speeds, sensors, disturbances and costs.
 
 A step of a job costs
 

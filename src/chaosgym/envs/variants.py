@@ -77,7 +77,7 @@ class Variants:
         self.count, self.seed = (SEALED, sealed_seed()) if sealed else (HELD_OUT, HELD_OUT_SEED)
 
     def drawn(self, generator: np.random.Generator, number: int | None = None) -> Machine:
-        """Draw a machine; ``number`` says which field lies outside, where one does."""
+        """Draw a machine; ``number`` selects the field that lies outside, where one does."""
         shares = self.shares(generator, number)
         items = zip(self.tolerances.items(), shares.tolist(), strict=True)
         values = {name: getattr(self.nominal, name) * _factor(width, share) for (name, width), share in items}

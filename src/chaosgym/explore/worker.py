@@ -1,4 +1,4 @@
-"""Work of one page beside the event loop: a thread that answers the latest question of each kind."""
+"""Work of one page beside the event loop: a thread that computes the latest request of each kind."""
 
 import threading
 from collections.abc import Callable

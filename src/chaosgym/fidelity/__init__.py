@@ -1,1 +1,1 @@
-"""The fidelity ladder: what accuracy costs, and where a model stops answering."""
+"""The fidelity ladder: cost and accuracy of its rungs, and their outcome at extreme parameters."""

@@ -1,4 +1,4 @@
-"""Ways through time: exactly from one contact event to the next, or in fixed steps."""
+"""Integrators: exact propagation between contact events, or fixed steps."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-r"""An impact on a spring and damper that push and never pull, seen from outside.
+r"""Closed-form impact on a spring and damper that never pull: duration, restitution, largest force.
 
 A mass m meets the surface at speed v. While the force N = k x + d x' pushes, with w = sqrt(k / m) and
 z = d / (2 sqrt(k m)) = cos(a), 0 < a <= pi / 2 below critical damping:
@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 
 class LinearImpact(NamedTuple):
-    """An impact as seen from outside.
+    """Figures of an impact.
 
     ``restitution`` speed after over speed before; ``duration`` [s]; ``force_per_speed`` largest force over the speed
     before [N s/m].

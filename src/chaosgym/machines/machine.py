@@ -1,4 +1,4 @@
-"""The protocol of a machine: all that simulation, diagnosis, sweeps, environments and the command line ask of one."""
+"""The protocol of a machine: what simulation, diagnosis, sweeps, environments and the command line call."""
 
 import math
 from abc import ABC, abstractmethod
@@ -68,7 +68,7 @@ Array = NDArray[np.float64]
 
 
 class Work(NamedTuple):
-    """The machine at work, as the environments know it.
+    """Defaults of a machine in the environments.
 
     Attributes
     ----------
@@ -154,7 +154,7 @@ class Machine(ABC):
 
     @property
     def definition(self) -> str:
-        """What tells kinds of machines apart: the name, or the hash of the file that describes the kind."""
+        """Identifier of the kind of machine: the name, or the hash of the file that describes the kind."""
         return self.name
 
     @property

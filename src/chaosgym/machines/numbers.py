@@ -1,4 +1,4 @@
-"""The gate for a machine's numbers: kind, shape, finite, range; whatever a file, an archive or a program gives."""
+"""Validation of a machine's numbers from files, archives and programs: kind, shape, finiteness, range."""
 
 import reprlib
 from typing import Any

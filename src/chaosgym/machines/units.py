@@ -1,4 +1,4 @@
-"""Quantities as they are written, a number and a unit such as ``0.127 mm``: a bare number invites a wrong guess.
+"""Quantities as texts of a number and a unit, such as ``0.127 mm``. A bare number is refused: its unit is ambiguous.
 
 Each unit of a field has its alternatives and what one of them is in the field's own unit. A frequency of a cycle and a
 rotation differ by 60, never by 2 pi. Units that are not listed are written as the field states them. µ is u, and

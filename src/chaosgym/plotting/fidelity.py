@@ -1,4 +1,4 @@
-"""The price of accuracy and the reach of the models: what ``tradeoff`` and ``stability`` found, as figures."""
+"""Figures of ``tradeoff`` (cost and error of each rung) and ``stability`` (outcome at each extreme)."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Whole operating cycles in, one row of results per cycle out."""
+"""Simulation of whole operating cycles: one row of results per cycle."""
 
 from chaosgym.machines.integrators import ExactEvents, Integrator, RungeKutta4
 from chaosgym.simulation.record import CycleRecord, MotionState

@@ -71,16 +71,16 @@ def place_of(speeds: Array, task: Task) -> NDArray[np.int64]:
 
 
 THRESHOLD = 1.17
-"""Felt irregularity, in units of the sensor's error, above which motion is irregular (calibrated on other machines)."""
+"""Measured irregularity, in units of the sensor's error, above which motion is irregular (set on other machines)."""
 
 
 SURE = 0.9
 """Probability of the trained classifier above which motion is irregular (calibrated on other machines): fluctuations of
-the speed, which it was not trained with, look a little irregular to it."""
+the speed, which it was not trained with, look slightly irregular to it."""
 
 
 def irregular(observations: Observations, task: Task, threshold: float, softness: float) -> Array:
-    """Probability (n,) that the motion is irregular, by what is felt in units of the sensor's error.
+    """Probability (n,) that the motion is irregular, by the measured irregularity in units of the sensor's error.
 
     Where the task gives the trained classifier's, 1 if that is sure and 0 if not.
     """

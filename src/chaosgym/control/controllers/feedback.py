@@ -79,7 +79,7 @@ class BackOff(Controller):
 
 
 class Bandit(Controller):
-    """Counts what was felt at each speed, on top of the mean map of models, and favours doubt a little.
+    """Mean map of models, updated by the irregularity measured at each speed; uncertain speeds get a bonus.
 
     Parameters
     ----------
@@ -88,9 +88,9 @@ class Bandit(Controller):
     weight
         Steps that the mean map counts for.
     optimism
-        Standard deviations of the share by which doubt makes a speed look better.
+        Standard deviations of the share that are subtracted from the expected share at a speed.
     threshold, softness
-        Felt irregularity at which a step counts half, and over which the verdict turns.
+        Measured irregularity at which a step counts half, and the width over which its weight goes from 0 to 1.
     """
 
     knows = "tolerances"

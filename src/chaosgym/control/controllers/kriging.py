@@ -1,4 +1,4 @@
-r"""A memory of load over speed: a Gaussian process of what was felt in this job, and speeds that are worth a try.
+r"""Kriging of the load over speed: a Gaussian process fitted in the job, and the speed of least expected cost.
 
 The logarithm y of the mean peak force is a function of the speed x, this machine's own. Its prior is
 
@@ -9,7 +9,7 @@ e. Mean and deviation at all speeds follow from the steps of the job so far. The
 are those under which these steps are likeliest, with a wide prior of each. Several motions may exist at a speed, so the
 latest step there counts most.
 
-The demand is felt first. Then a step at x costs c(x) = d(x) + L(x), its distance from the demand and the life that it
+The first step goes to the demand. A step at x costs c(x) = d(x) + L(x), its distance from the demand and the life it
 takes, L being log-normal. With b the least expected cost, trying x may save max(b - c(x), 0) in each of the H steps to
 come: the rule goes where
 
@@ -60,7 +60,7 @@ Chosen on machines of the pool's training split and beams of the fleet's, which 
 
 
 LOG_COST = (-30.0, 9.0)
-"""Logarithms of the least and the largest cost of a step that are told apart."""
+"""Logarithms of the least and the largest cost of a step that are distinguished."""
 
 
 class Prior(NamedTuple):
@@ -72,7 +72,7 @@ class Prior(NamedTuple):
 
 
 class Kriging(Controller):
-    """Feels the demand, and leaves it for speeds within reach where life costs less; no model, no training.
+    """Starts at the demand and leaves it for speeds within reach where life costs less; no model, no training.
 
     A step costs its distance from the demand, as a share of the range of speed, and the ``price`` times its load over
     the usual load, that at the demands so far, each to the power of 10/3.
@@ -193,7 +193,7 @@ def _priors(grid: Array) -> list[Prior]:
 
 
 def _whitened(prior: Prior, at: Any, felt: Array, counts: Array) -> tuple[Array, Array]:
-    """Cholesky factor of the covariance of what was felt, and its inverse times that."""
+    """Cholesky factor of the covariance of the measured values, and its inverse times that."""
     covariance = prior.covariance[np.ix_(at, at)] + np.diag(prior.error**2 / counts)
     factor = np.asarray(np.linalg.cholesky(covariance), float)
     return factor, np.asarray(np.linalg.solve(factor, felt))

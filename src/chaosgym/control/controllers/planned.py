@@ -253,7 +253,7 @@ class Belief(Controller):
         self._speed = np.full(self.count, np.nan)
 
     def speeds(self, observations: Observations) -> Array:
-        """The best speed on the expected map, what was felt at a speed counted in."""
+        """The best speed on the expected map, updated by what was measured at the speeds visited."""
         speed, every = seen(observations, "speed"), np.arange(self.count)
         held = np.abs(speed - self._speed) < 0.5 * self.task.trim_step
         self._speed = speed

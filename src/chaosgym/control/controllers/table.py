@@ -1,8 +1,8 @@
-r"""A table of what training machines did: at each speed and clearance, how often it was irregular and what was felt.
+r"""A table of training machines: share of irregular steps and mean measurements at each speed and clearance.
 
-The clearance of the machine at work is inferred from what is felt, by Bayes' rule over classes of clearance, with
+The clearance of the machine at work is inferred from the measurements, by Bayes' rule over classes of clearance, with
 independent normal errors of five readings at each speed. Where the clearance is all that differs between machines this
-is the yardstick of a learned agent; it knows nothing of whatever else differs.
+is what a learned agent is compared with; other differences between machines are not modelled.
 """
 
 from typing import Any, NamedTuple

@@ -1,9 +1,8 @@
-"""A learned map: from what was felt in this job, how irregular and how loaded this machine is at every speed.
+"""A learned map: irregularity and load of a machine at every speed, predicted from the measurements of the job.
 
-A network was trained to tell, for machines of a fleet, what they did at all speeds where they were run, from what had
-been felt at some of them. At work its answer takes the place of the map that nobody has of this machine, and the speed
-of least expected cost within reach is the next one. The weights of the task come in there alone, so one network plays
-every objective.
+A network was trained on machines of a fleet to predict their behaviour at all speeds from measurements at some of
+them. In a job its prediction replaces the machine's own map, and the next speed is that of least expected cost within
+reach. The weights of the task enter in this cost alone, so one network serves every objective.
 """
 
 from dataclasses import dataclass, field
@@ -44,7 +43,7 @@ def readings_of(observations: NDArray[Any]) -> Array:
 
 
 class FeltSpeeds:
-    """What N jobs felt at each speed of a task's grid.
+    """Measurements of N jobs at each speed of a task's grid.
 
     Parameters
     ----------

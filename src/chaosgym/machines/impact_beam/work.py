@@ -1,4 +1,4 @@
-"""The impact beam at work in the environments, where there is something to feel and something to win."""
+"""The impact beam in the environments: force and range of speed, tolerances, and numbers of the task."""
 
 from chaosgym.machines.machine import Work
 
