@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[2]
 EXAMPLES: dict[str, list[dict[str, Any]]] = tomllib.loads(Path(__file__).with_name("examples.toml").read_text("utf-8"))
 """What each page shows, by the name of the command."""
 
-LONGEST = 60
+LONGEST = 40
 """Lines of an output that a page shows."""
 
 PICTURES = (".png", ".gif", ".webp")
