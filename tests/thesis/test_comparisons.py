@@ -8,9 +8,11 @@ from thesis.figures.beam import DAMPING
 from thesis.figures.computations import Runs, Types
 from thesis.figures.crank_maps import SLIDER_MAP
 from thesis.figures.crank_resonances import resonance
+from thesis.figures.figure import Finding
 from thesis.figures.flips import flips
 from thesis.figures.gallery import gallery, sensitivities
 from thesis.figures.printed import comparison
+from thesis.figures.produce import Drawn
 from thesis.scorecard.observation import THOROUGH
 
 
@@ -60,6 +62,17 @@ def test_a_figure_that_fails_leaves_the_others(tmp_path, monkeypatch):
     assert not broken.path.exists()
     assert drawn.path.exists()
     assert "Not computed: diverged" in gallery([broken, drawn], tmp_path)
+
+
+def test_the_gallery_names_rows_of_the_scorecard_and_tells_the_rest(tmp_path):
+    """A statement that the scorecard tells in full stands by its name and verdict, any other one in words."""
+    valley = Finding("19 Hz: 15 N", "24 N", agrees=False, targets=("IBS-025",), sensitivity="speed", scored=True)
+    range_ = Finding("30 Hz: 30 to 85 N", "60 to 78 N", agrees=False, targets=("IBS-029",), scored=True)
+    found = (valley, range_, Finding("a crest", "none", agrees=None))
+    page = gallery([Drawn(FIGURES["3.8"], tmp_path / "none.png", found, 0.0)], tmp_path)
+    assert "- **differs**: IBS-025\n- not judged: IBS-029\n- a crest. Here none: nothing to decide it by.\n" in page
+    assert "24 N" not in page
+    assert "| speed | 3.8 | 0 | 1 | 0 |" in page
 
 
 def test_the_map_of_the_slider_is_calm_at_small_clearance():

@@ -30,6 +30,8 @@ class Finding(NamedTuple):
         Names of the statements in the table of the reference.
     sensitivity
         Parameter to which the response is said to be sensitive, if the statement is about that.
+    scored
+        Whether the scorecard's row of the statement tells all of this.
     """
 
     printed: str
@@ -37,6 +39,7 @@ class Finding(NamedTuple):
     agrees: bool | None
     targets: tuple[str, ...] = ()
     sensitivity: str = ""
+    scored: bool = False
 
 
 def _no_findings(parts: Parts) -> Sequence[Finding]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thesis.figures.figure import Finding
-from thesis.figures.printed import Printed, printed, within
+from thesis.figures.printed import Printed, in_scorecard, printed, within
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,14 @@ def compare_response(
         here = (float(np.min(peaks)), float(np.max(peaks)))
     agrees = within(target, here) and (nature is None or nature == kind)
     text = ("at most " if largest_only else "") + words(wanted) + " N" + (f", {nature}" if nature else "")
-    return Finding(f"{where}: {text}", describe_forces(peaks, kind, period), agrees, (target,), sensitivity)
+    return Finding(
+        f"{where}: {text}",
+        describe_forces(peaks, kind, period),
+        agrees,
+        (target,),
+        sensitivity,
+        scored=in_scorecard(target),
+    )
 
 
 def compare_nature(
@@ -64,7 +71,7 @@ def compare_nature(
     """Compare the nature of a response with the printed one."""
     peaks, kind, period = np.asarray(response[0]), str(response[1]), int(response[2])
     here = describe_forces(peaks, kind, period)
-    return Finding(f"{where}: {nature}", here, kind == nature, (target,), sensitivity)
+    return Finding(f"{where}: {nature}", here, kind == nature, (target,), sensitivity, scored=in_scorecard(target))
 
 
 def words(value: Printed) -> str:

@@ -25,8 +25,9 @@ figures --list` names the figures. P. Gu, *Chaotic Vibration in Machine Systems 
 thesis, MIT, 1994. The pixels are not available: axes and ranges follow the text, and what the text prints of a figure
 is drawn over it in one colour. Numbers agree within the tolerances of the [scorecard](scorecard.md): a force within
 15 % or 3 N, a range if both its ends do, a nature if it is the same word. What the scorecard judges is judged by the
-same runs. Forces and natures are those of the plotted dots, one a cycle: of the beam on one side of the bearing, of
-the crank the larger of both sides. Dots within 0.5 N are one.
+same runs; its rows, found by the names of the statements, tell what is printed and what is found. Forces and natures
+are those of the plotted dots, one a cycle: of the beam on one side of the bearing, of the crank the larger of both
+sides. Dots within 0.5 N are one.
 """
 
 
@@ -83,13 +84,24 @@ def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
         if one.error:
             lines += ["", f"Not computed: {one.error}"]
         if one.findings:
-            lines.append("")
-        for finding in one.findings:
-            lines.append(f"- {finding.printed}. Here {finding.here}: {verdict(finding)}.")
+            lines += ["", *_statements(one.findings)]
         picture = picture_path(figure, pictures)
         if picture.exists():
             lines += ["", f"![{figure.label}]({pictures.name}/{picture.name})"]
     return "\n".join(lines) + "\n"
+
+
+def _statements(findings: Sequence[Finding]) -> list[str]:
+    """Lines on statements: those that a row of the scorecard tells in full by their names, the others in words."""
+    rows: dict[str, list[str]] = {}
+    lines = []
+    for finding in findings:
+        if finding.scored:
+            word = "not judged" if contradiction(finding.targets) else _WORDS[finding.agrees]
+            rows.setdefault(word, []).extend(finding.targets)
+        else:
+            lines.append(f"- {finding.printed}. Here {finding.here}: {verdict(finding)}.")
+    return [*(f"- {word}: {', '.join(dict.fromkeys(names))}" for word, names in rows.items()), *lines]
 
 
 def _sensitivity(parameter: str, entries: Sequence[tuple[str, Finding]]) -> str:

@@ -34,6 +34,11 @@ def _comparisons() -> dict[str, Comparison]:
     return {one.id: one for one in read_comparisons().compared}
 
 
+def in_scorecard(target: str) -> bool:
+    """Whether the scorecard has a row of a statement."""
+    return target in _comparisons()
+
+
 def comparison(target: str) -> Comparison:
     """How the scorecard compares a statement."""
     return _comparisons()[target]

@@ -51,4 +51,4 @@ def scored_finding(parts: Parts, target: str, printed: str, *, more: str = "", s
     """A statement in words beside what the scorecard found, and ``more`` that the figure shows."""
     told = (str(parts[target][name]) for name in ("value", "notes"))
     here = "; ".join(part for part in (*told, more) if part)
-    return Finding(printed, here, agrees(parts, target), (target,), sensitivity)
+    return Finding(printed, here, agrees(parts, target), (target,), sensitivity, scored=not more)
