@@ -13,7 +13,7 @@ from tqdm import trange
 
 from chaosgym.diagnosis import diagnose
 from chaosgym.envs.judge import ExponentJudge, RecurrenceJudge
-from chaosgym.simulation.batch import VariedBatch, batch_of
+from chaosgym.machines.batch import VaryingBatch
 
 Array = NDArray[np.float64]
 
@@ -52,10 +52,10 @@ def judges(env: str, machines: int = 16, speeds: int = 23, seed: int = 0) -> dic
 
 def _verdicts(drawn: list[Any], grid: Array, task: Any, share: float, generator: np.random.Generator) -> dict[str, Any]:
     """Verdicts (machines, speeds) of each judge, machines swept upwards."""
-    batch, every = batch_of(drawn[0], len(drawn)), np.arange(len(drawn))
+    batch, every = drawn[0].batch(len(drawn)), np.arange(len(drawn))
     for i, machine in enumerate(drawn):
         batch.start(i, machine.at(float(grid[0])))
-    carries = isinstance(batch, VariedBatch)
+    carries = isinstance(batch, VaryingBatch)
     exponent, recurrence = ExponentJudge(len(drawn)), RecurrenceJudge(len(drawn))
     result: dict[str, Any] = {"recurrence": np.zeros((len(drawn), len(grid)), np.bool_)}
     if carries:
@@ -74,7 +74,7 @@ def _verdicts(drawn: list[Any], grid: Array, task: Any, share: float, generator:
 def _run(batch: Any, every: Any, speed: float, task: Any, share: float, generator: Any) -> tuple[Array, Array]:
     """Peak forces and growth (machines, cycles) at a speed."""
     count, cycles = len(every), SETTLING + JUDGED
-    if isinstance(batch, VariedBatch):
+    if isinstance(batch, VaryingBatch):
         speeds = speed * (1.0 + share * task.speed_ripple * generator.standard_normal((count, cycles)))
         done, growth = batch.run_varied(every, speeds)
         return done.peak_force[:, :, 0], growth

@@ -18,7 +18,6 @@ from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.envs.pool import REACH, Kept, machine_of, pool_task
 from chaosgym.envs.task import LIFE_PRICE
 from chaosgym.machines.family import Ranged
-from chaosgym.simulation.batch import batch_of
 
 Array = NDArray[np.float64]
 
@@ -40,7 +39,7 @@ CONTACT, LEAST_GAIN = 0.9, 0.05
 def swept(machines: list[Ranged], rng: np.random.Generator) -> tuple[Array, NDArray[np.bool_]]:
     """Mean load (n, s, sides) [N^10/3] of machines at each speed, and whose simulation failed (n,)."""
     grid, n = pool_task().grid, len(machines)
-    batch: Any = batch_of(machines[0].machine, n)
+    batch: Any = machines[0].machine.batch(n)
     every = np.arange(n)
     low, high = (np.array([getattr(one, name) for one in machines]) for name in ("lowest", "highest"))
     for i, one in enumerate(machines):

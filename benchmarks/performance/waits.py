@@ -16,7 +16,6 @@ from benchmarks.performance.timing import processor_seconds
 from chaosgym.classifier import classifier_for
 from chaosgym.machines import ImpactBeam
 from chaosgym.simulation import simulate
-from chaosgym.simulation.batch import batch_of
 from chaosgym.sweeps import SweepPlan, run_sweep
 from chaosgym.sweeps.plan import default_axes
 
@@ -52,7 +51,7 @@ def waits(repeats: int = 5) -> dict[str, float]:
         "classify a random beam, types": _median(lambda: classify(types=True), repeats) / POINTS,
         "point of a sweep": _median(sweep, repeats) / POINTS,
     }
-    batch: Any = batch_of(beam, MACHINES)
+    batch: Any = beam.batch(MACHINES)
     for i in range(MACHINES):
         batch.start(i, beam)
     which, speeds = np.arange(MACHINES), np.random.default_rng(0).uniform(8.0, 30.0, (MACHINES, CYCLES))
@@ -63,7 +62,7 @@ def waits(repeats: int = 5) -> dict[str, float]:
     found["cycle with deviation, a speed of its own"] = _median(own_speeds, repeats) / speeds.size
     found["cycle of ten at one speed"] = _median(lambda: batch.run(which, CYCLES), repeats) / speeds.size
     tracemalloc.start()
-    kept = batch_of(beam, MACHINES)
+    kept = beam.batch(MACHINES)
     for i in range(MACHINES):
         kept.start(i, beam)
     found["memory, bytes a machine of a batch"] = tracemalloc.get_traced_memory()[0] / MACHINES

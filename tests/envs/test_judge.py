@@ -8,7 +8,6 @@ from chaosgym.diagnosis import diagnose
 from chaosgym.diagnosis.lyapunov import largest_lyapunov_exponent
 from chaosgym.envs.judge import MISS, ExponentJudge, RecurrenceJudge, recurrence_miss
 from chaosgym.simulation import simulate
-from chaosgym.simulation.batch import batch_of
 from chaosgym.simulation.run import simulate_with_deviations
 
 
@@ -25,7 +24,7 @@ def _env(machine, speed):
 def test_side_by_side_growth_is_that_of_one_machine():
     """Cycles at speeds of their own, with a deviation, give the bits of ``simulate_with_deviations``."""
     beam = gym.make("chaosgym/ImpactBeam-v1").unwrapped.nominal
-    batch, speeds = batch_of(beam, 3), np.random.default_rng(0).uniform(18.0, 30.0, (3, 6))
+    batch, speeds = beam.batch(3), np.random.default_rng(0).uniform(18.0, 30.0, (3, 6))
     for i in range(3):
         batch.start(i, beam)
     cycles, growth = batch.run_varied(np.arange(3), speeds)

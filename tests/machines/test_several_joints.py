@@ -22,7 +22,6 @@ from chaosgym.machines.impact_beam.modes import modal_analysis
 from chaosgym.machines.integrators import TIGHTEST_EVENTS
 from chaosgym.machines.modal_machine import jointed
 from chaosgym.machines.modal_machine.jointed import Joint, machine_with_joints
-from chaosgym.simulation.batch import batch_of
 from chaosgym.simulation.run import simulate_with_deviations
 
 FIELDS = ("section", "peak_force", "impacts", "contact_fraction", "bounce_duration")
@@ -179,7 +178,7 @@ def variants():
 
 def started(machines):
     """A batch of machines at rest."""
-    batch = batch_of(machines[0], len(machines))
+    batch = machines[0].batch(len(machines))
     for i, machine in enumerate(machines):
         batch.start(i, machine)
     return batch

@@ -14,7 +14,6 @@ from chaosgym.cli import app
 from chaosgym.design.bending import Bending, Section, stress_of_modes
 from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_machine.varying import Spring, VaryingMachine, means
-from chaosgym.simulation.batch import batch_of
 from chaosgym.simulation.run import simulate_with_deviations
 
 MACHINES = Path(__file__).parents[2] / "docs" / "machines"
@@ -235,7 +234,7 @@ def test_a_run_may_be_split_and_batched():
     first = chaosgym.simulate(machine, 2)
     rest = chaosgym.simulate(machine, 4, first.final_state)
     np.testing.assert_array_equal(whole.section[2:], rest.section)
-    batch = batch_of(machine, 3)
+    batch = machine.batch(3)
     for i, speed in enumerate((19.0, 21.0, 19.0)):
         batch.start(i, machine.at(speed))
     found = batch.run(np.arange(3), 6)

@@ -17,10 +17,9 @@ from chaosgym.envs.pool import Pool
 from chaosgym.envs.task import Status, Task, demand_of
 from chaosgym.envs.variants import DRAWN, Variants
 from chaosgym.errors import SimulationError
-from chaosgym.machines.batch import Cycles
+from chaosgym.machines.batch import Cycles, KickedBatch, VaryingBatch
 from chaosgym.machines.machine import Machine
 from chaosgym.monitor import RepeatSums
-from chaosgym.simulation.batch import KickedBatch, VariedBatch, batch_of
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -69,8 +68,8 @@ class Jobs:
 
     def __init__(self, task: Task, variants: Variants | Pool, space: Box, count: int) -> None:
         nominal = variants.nominal
-        self.task, self.variants, self.space, self.batch = task, variants, space, batch_of(nominal, count)
-        self.judge: Judge = (ExponentJudge if isinstance(self.batch, VariedBatch) else RecurrenceJudge)(count)
+        self.task, self.variants, self.space, self.batch = task, variants, space, nominal.batch(count)
+        self.judge: Judge = (ExponentJudge if isinstance(self.batch, VaryingBatch) else RecurrenceJudge)(count)
         self._monitor = RepeatSums(count) if task.monitor == "on" else None
         self._records = RecordsAtSpeed(nominal, task.sensor_error, count) if task.classifier == "on" else None
         self.machines: list[Machine] = [nominal] * count
@@ -193,7 +192,7 @@ class Jobs:
         if self.traced:
             for i in which[which < self.traced].tolist():
                 self.pieces[i] = []
-        if kicks is None and isinstance(self.batch, VariedBatch):
+        if kicks is None and isinstance(self.batch, VaryingBatch):
             self._trace(which, speeds)
             cycles, growth = self.batch.run_varied(which, speeds)
             growth[cycles.failed] = 0.0
@@ -216,7 +215,7 @@ class Jobs:
                 self.batch.kick(which, kicks[:, cycle])
             column = speeds[:, cycle : cycle + 1]
             self._trace(which, column)
-            if isinstance(self.batch, VariedBatch):
+            if isinstance(self.batch, VaryingBatch):
                 done, growth[:, cycle : cycle + 1] = self.batch.run_varied(which, column)
             else:
                 self.batch.set_speeds(which, column[:, 0])

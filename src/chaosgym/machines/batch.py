@@ -1,6 +1,12 @@
 """Batches: variants of one machine that move side by side in one compiled call.
 
-They differ in numbers, not in their joints or in how many modes they have. Each moves as it would alone, bit for bit.
+batch = ImpactBeam().batch(256)
+batch.start(0, machine)                  # from rest; the same for 1, 2, ...
+batch.set_speeds(which, speeds)
+cycles = batch.run(which, 5)             # on all processors
+
+They differ in numbers, not in their joints or in how many modes they have. Each goes on from where it is, and moves as
+``simulate`` moves it, bit for bit.
 """
 
 from abc import ABC, abstractmethod
@@ -124,6 +130,14 @@ class CompiledBatch(ABC):
     @abstractmethod
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
         """Run the machines ``which`` (k,) in place; rows of ``arrays`` and ``outcome`` (k,) in that order."""
+
+
+class KickedBatch(CompiledBatch):
+    """Machines that are kicked and run for many cycles in one call."""
+
+    @abstractmethod
+    def run_kicked(self, which: Indices, kicks: Array) -> Cycles:
+        """``kick`` the machines ``which`` (k,) by each of the shares (k, cycles, n_states / 2) and run them a cycle."""
 
 
 class VaryingBatch(CompiledBatch):

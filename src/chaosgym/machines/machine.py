@@ -444,6 +444,6 @@ class Machine(ABC):
         """Return those fields of ``CycleRecord`` that not every machine has, such as ``sensor_peak``."""
         return {}
 
-    def batch(self, count: int) -> "CompiledBatch | None":
-        """Return ``count`` variants that move in one compiled call; None if there is no such kernel."""
-        return None
+    @abstractmethod
+    def batch(self, count: int) -> "CompiledBatch":
+        """Return ``count`` variants that move in one compiled call."""

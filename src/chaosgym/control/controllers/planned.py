@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from chaosgym.control.controllers.controller import THRESHOLD, Array, Controller, Observations, irregular, seen
 from chaosgym.control.maps import Maps
 from chaosgym.envs.judge import MISS, recurrence_miss
-from chaosgym.simulation.batch import batch_of
 
 
 class Follow(Controller):
@@ -191,7 +190,7 @@ class RecedingHorizon(Controller):
         """Start the copies as the machines were started."""
         task, self._model = self.task, envs.model
         self._trims = np.arange(-task.largest_trim, task.largest_trim + 1e-9, task.trim_step)
-        self._batch = batch_of(self._model, self.count * (1 + len(self._trims)))
+        self._batch = self._model.batch(self.count * (1 + len(self._trims)))
         for place in range(len(self._batch)):
             self._batch.start(place, self._model.at(float(envs.jobs.speed[place % self.count])))
         self._batch.run(np.arange(self.count), task.run_in_cycles)

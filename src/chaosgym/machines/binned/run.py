@@ -14,7 +14,7 @@ from chaosgym.core.binned.taylor import advance as advance_stepped
 from chaosgym.core.compilation import call, call_side_by_side
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.tangent import Tangents, no_tangents
-from chaosgym.machines.batch import CompiledBatch, Cycles, put, stacked
+from chaosgym.machines.batch import CompiledBatch, Cycles, KickedBatch, put, stacked
 from chaosgym.machines.binned.model import STEP_PHASE, ModelsBySpeed, fastest_rate, models_by_speed, stepped_model
 from chaosgym.machines.integrators import ExactEvents, Integrator
 
@@ -68,7 +68,7 @@ SPEED_FIELDS = ("bin_duration", "steps", "order")
 """Fields of a model that change with its speed, apart from the table."""
 
 
-class BinnedBatch(CompiledBatch):
+class BinnedBatch(KickedBatch):
     """Mechanisms that have propagators."""
 
     def __init__(self, machine: Any, count: int) -> None:
