@@ -7,6 +7,7 @@ With --options in place of names no example runs: only options and summaries bec
 
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -19,7 +20,9 @@ from typing import Any
 import click
 
 from chaosgym.cli import COMMANDS, app
+from chaosgym.cli.measured_options import Measured
 from chaosgym.files import write_atomically
+from chaosgym.machines import MACHINES
 
 ROOT = Path(__file__).parents[2]
 
@@ -28,6 +31,12 @@ EXAMPLES: dict[str, list[dict[str, Any]]] = tomllib.loads(Path(__file__).with_na
 
 LONGEST = 40
 """Lines of an output that a page shows."""
+
+SHARED = {
+    "show": ("of the machine", {option for name in MACHINES.entry_points for option in MACHINES[name].options}),
+    "diagnose": ("of what was measured", {f"--{name.replace('_', '-')}" for name in Measured._fields}),
+}
+"""Options that several commands have: the page that lists them, what they are, and their names."""
 
 PICTURES = (".png", ".gif", ".webp")
 
@@ -124,7 +133,14 @@ def _run(line: str, folder: Path) -> str:
 
 
 def _last_part(name: str) -> str:
-    return f"## Options\n\n```text\n{options(name)}\n```\n"
+    text, notes = options(name), []
+    for home, (whose, names) in SHARED.items():
+        listed = rf"^  (?:{'|'.join(sorted(names))}) .*\n(?:  {{9,}}.*\n)*"
+        short = text if name == home else re.sub(listed, "", text, flags=re.MULTILINE)
+        if short != text:
+            notes.append(f"Options {whose} are those of [{home}]({home}.md#options).\n\n")
+        text = short
+    return f"## Options\n\n{''.join(notes)}```text\n{text}\n```\n"
 
 
 def _pictures(example: dict[str, Any]) -> list[str]:
