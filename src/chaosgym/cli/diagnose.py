@@ -16,6 +16,7 @@ from chaosgym.cli.measured_options import (
     run_as_dict,
     run_lines,
 )
+from chaosgym.cli.measured_run_up import judged_run_up, region_lines
 from chaosgym.cli.measured_table import all_runs, judged, judged_files, sources_of, table_as_dict, table_lines
 from chaosgym.cli.output import draw, emit, force_line, patience, picture_path, plot_option, verdict_lines
 from chaosgym.machines import MACHINES
@@ -45,6 +46,10 @@ from chaosgym.machines import MACHINES
 @click.option("--step-check", is_flag=True, help="Repeat with a finer step and say whether the verdict stays.")
 @click.option("--sweep", metavar="FILE", help="Peak forces at many speeds, with a column of speeds: Types I, II, III.")
 @click.option("--speed-column", metavar="NAME", help="Column of the speed of --sweep, where there are several.")
+@click.option("--run-up", is_flag=True, help="The speed of --series changes: orders, and types by bands of speed.")
+@click.option(
+    "--orders", type=click.FloatRange(1.0, 1000.0), metavar="NUMBER", help="Highest order of --run-up; default 20."
+)
 @click.option(
     "--estimate",
     multiple=True,
@@ -64,6 +69,8 @@ def diagnose(
     step_check: bool,
     sweep: str | None,
     speed_column: str | None,
+    run_up: bool,
+    orders: float | None,
     estimate: tuple[str, ...],
     measured: Measured,
     plot: str | None,
@@ -71,19 +78,21 @@ def diagnose(
 ) -> None:
     """Tell periodic from chaotic: a machine by simulation, a measured signal, or one by the other.
 
-    With --sweep, the types of a measured sweep.
+    With --sweep, the types of a measured sweep. With --run-up, orders and types of a recording whose speed changes.
     """
     picture = picture_path(plot, f"diagnose-{machine.name if machine else 'measured'}")
     if kicks and not margins:
         raise click.UsageError("--kicks belongs to --margins")
     if speed_column and not sweep:
         raise click.UsageError("--speed-column belongs to --sweep")
+    if orders and not run_up:
+        raise click.UsageError("--orders belongs to --run-up")
     if estimate and not (machine and measured):
         raise click.UsageError("--estimate needs a machine and what was measured: MACHINE --peaks FILE")
     if sweep:
-        if machine or measured or types or margins or step_check or test != "adaptive":
+        if machine or measured or run_up or types or margins or step_check or test != "adaptive":
             raise click.UsageError(
-                "--sweep goes alone: no machine, no --peaks or --series, nothing that needs a machine"
+                "--sweep goes alone: no machine, no --peaks, --series or --run-up, nothing that needs a machine"
             )
         speeds, peaks, found, told = measured_sweep(sweep, speed_column, measured)
         result = {**told, **found.as_dict(), "warnings": []}
@@ -91,6 +100,11 @@ def diagnose(
         label = f"{told['speed_column']} [{told['speed_unit']}]" if told["speed_unit"] else told["speed_column"]
         title = f"Types of {Path(told['file']).name}"
         draw(picture, lambda plots: plots.sweep_figure(speeds, peaks, found, label, title), result, lines)
+    elif run_up:
+        if machine or types or margins or step_check or test != "adaptive":
+            raise click.UsageError("--run-up goes without a machine, --test, --types, --margins and --step-check")
+        found, title, unit, result, lines = judged_run_up(measured, orders)
+        draw(picture, lambda plots: plots.run_up_figure(found, title, unit), result, lines)
     elif measured:
         if types or margins or step_check or test != "adaptive":
             raise click.UsageError("--peaks and --series go without --test, --types, --margins and --step-check")
@@ -150,18 +164,7 @@ def _compared(
 
 def _sweep_lines(told: dict[str, Any], found: Any) -> list[str]:
     """Regions of types, upwards, then what was read."""
-    unit = f" {told['speed_unit']}" if told["speed_unit"] else ""
-    rows = [f"{told['file']}: {len(found.speeds)} speeds"]
-    for region in found.regions:
-        span = f"{region.first:g}" + (f" to {region.last:g}" if region.speeds > 1 else "") + unit
-        inside = [one for one in found.speeds if region.first <= one.speed <= region.last]
-        wild = sum(one.nature == "irregular" for one in inside)
-        natures = f"irregular at {wild} of {len(inside)} speeds" if wild else "periodic"
-        forces = f"mean peak {region.lowest_mean:.4g} to {region.highest_mean:.4g} N"
-        rows.append(f"  Type {region.type:4s} {span:18s} {natures}, {forces}")
-    for one in found.beginnings:
-        route = "route not told" if one.route == "not told" else one.route
-        rows.append(f"  irregular between {one.periodic:g} and {one.irregular:g}{unit}: {route}; {one.because}")
+    rows = [f"{told['file']}: {len(found.speeds)} speeds", *region_lines(found, told["speed_unit"], "N")]
     return [*rows, *(f"  {note}" for note in told["notes"])]
 
 

@@ -61,7 +61,13 @@ OPTIONS = (
     click.option("--hz", type=Quantity("Hz"), help="Cycles a second of --series; without it, the spectrum's line."),
     click.option("--rpm", type=Quantity("rpm"), help="Cycles a minute instead."),
     click.option("--period-s", type=Quantity("s"), help="Duration of a cycle instead."),
-    click.option("--tachometer", metavar="NAME", help="Column of --series that rises once a cycle instead."),
+    click.option("--tachometer", metavar="NAME", help="Column of --series with a tachometer's pulses instead."),
+    click.option(
+        "--pulses-per-revolution",
+        type=click.IntRange(1, 100_000),
+        metavar="N",
+        help="Pulses of the tachometer in a cycle; default 1.",
+    ),
     click.option(
         "--sensor-error",
         type=Reading("N"),
@@ -88,6 +94,7 @@ class Measured(NamedTuple):
     rpm: float | None
     period_s: float | None
     tachometer: str | None
+    pulses_per_revolution: int | None
     sensor_error: float | None
     sensor_sigma: float | None
 
@@ -139,6 +146,8 @@ def _check(given: Measured, elsewhere: bool) -> None:
             raise click.UsageError(
                 f"the sensor's error is in {size.unit}; allowed without a file of readings: N, kN, lbf"
             )
+    if given.pulses_per_revolution and not given.tachometer:
+        raise click.UsageError("--pulses-per-revolution belongs to --tachometer")
     if given.tachometer and any((given.hz, given.rpm, given.period_s)):
         raise click.UsageError("--tachometer and a stated cycle exclude each other")
 
@@ -171,6 +180,7 @@ def measured_runs(given: Measured, *, several: bool = False, of_force: bool = Fa
                 rate_hz=given.rate_hz,
                 period=period,
                 tachometer=given.tachometer,
+                pulses_per_revolution=given.pulses_per_revolution or 1,
                 scale=given.scale,
             )
             found.append((signal, cut.peaks, cut.resolution, (f"{len(cut.peaks)} cycles", *cut.notes), cut.condition))

@@ -114,7 +114,7 @@ def sweep_types(
         raise DiagnosisError("a sweep needs the sensor's error: --sensor-error or --sensor-sigma (3 N in the thesis)")
     at, force = np.asarray(speeds, dtype=float), np.asarray(peaks, dtype=float)
     runs = _runs(at, force)
-    judged = [_judged(run, error.half_width, sensor_error, sensor_sigma) for _, run in runs]
+    judged = [judged_speed(run, error.half_width, sensor_error, sensor_sigma) for _, run in runs]
     irregular = [wild for wild, _ in judged]
     means = [float(run.mean()) for _, run in runs]
     types = _types(irregular, means, error.half_width)
@@ -150,10 +150,30 @@ def _runs(speeds: Array, peaks: Array) -> list[tuple[float, Array]]:
     return found
 
 
-def _judged(
+def judged_speed(
     run: Array, half_width: float, sensor_error: float | None, sensor_sigma: float | None
 ) -> tuple[bool, int | None]:
-    """Whether peaks vary by more than the sensor errs, at every short period; and after how many cycles they repeat."""
+    """Whether peaks vary by more than the sensor errs, at every short period; and after how many cycles they repeat.
+
+    Parameters
+    ----------
+    run : (cycles,)
+        Peak forces at one speed [N].
+    half_width
+        What the sensor errs by [N], from whichever of the other two is stated.
+    sensor_error, sensor_sigma
+        Largest error of a reading, or its standard deviation.
+
+    Raises
+    ------
+    DiagnosisError
+        If the peaks can't be judged.
+
+    Examples
+    --------
+    >>> judged_speed(np.tile([20.0, 30.0], 12), 1.0, 1.0, None)
+    (False, 2)
+    """
     verdict = judge_peaks(run, sensor_error=sensor_error, sensor_sigma=sensor_sigma).diagnosis
     return verdict.nature != "periodic" and irregularity(run, LONGEST_PERIOD) > half_width, verdict.period
 

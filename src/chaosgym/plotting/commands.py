@@ -21,11 +21,12 @@ from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram
 from chaosgym.diagnosis.bifurcation_map import BifurcationMap
 from chaosgym.diagnosis.measured_sweep import SweepTypes
 from chaosgym.diagnosis.overlay import Overlay
+from chaosgym.diagnosis.run_up import RunUp
 from chaosgym.machines import Machine
 from chaosgym.plotting import response
 from chaosgym.plotting.branches import bifurcation_map, branches
 from chaosgym.plotting.design import axis_label, cost_against_life, peak_record, series_life, type_map_around
-from chaosgym.plotting.style import ACCENT, INK, NATURE_COLOURS, STYLE, TYPE_COLOURS, figure_of
+from chaosgym.plotting.style import ACCENT, INK, NATURE_COLOURS, STYLE, figure_of
 from chaosgym.simulation import CycleRecord, simulate
 
 Array = NDArray[np.float64]
@@ -211,23 +212,38 @@ def _shortened(title: str, most: int = 34) -> str:
 def sweep_figure(speeds: Array, peaks: Array, types: SweepTypes, label: str, title: str) -> Figure:
     """Measured peak forces over the speed, their means, and the regions of types, as in figure 3.16 of the thesis."""
     figure = figure_of(1.45 * WIDTH, 3.0)
-    ax = figure.subplots()
-    at = [one.speed for one in types.speeds]
-    middles = 0.5 * (np.array(at[1:]) + np.array(at[:-1]))
-    ends = [at[0] - (middles[0] - at[0]), *middles, at[-1] + (at[-1] - middles[-1])]
-    for region in types.regions:
-        low, high = ends[at.index(region.first)], ends[at.index(region.last) + 1]
-        ax.axvspan(low, high, color=TYPE_COLOURS[region.type], alpha=0.18, lw=0.0)
-        ax.text(0.5 * (low + high), 1.02, region.type, transform=ax.get_xaxis_transform(), ha="center", fontsize=9)
-    irregular = np.isin(speeds, [one.speed for one in types.speeds if one.nature == "irregular"])
-    for nature, shown, which in (("periodic", "periodic", ~irregular), ("chaotic", "irregular", irregular)):
-        if which.any():
-            ax.plot(speeds[which], peaks[which], ".", ms=3.5, mew=0.0, color=NATURE_COLOURS[nature], label=shown)
-    ax.plot(at, [one.mean_peak for one in types.speeds], color=INK, lw=0.8, label="mean")
-    ax.set(
-        xlabel=label, ylabel="peak force [N]", xlim=(ends[0], ends[-1]), ylim=(0.0, 1.08 * float(peaks.max()) or 1.0)
-    )
-    ax.legend(loc="upper left", fontsize=8)
+    ax = response.types_over_speed(speeds, peaks, types, figure.subplots())
+    ax.set(xlabel=label, ylabel="peak force [N]")
+    figure.suptitle(title, x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    return figure
+
+
+@_styled
+def run_up_figure(found: RunUp, title: str, unit: str) -> Figure:
+    """Speed and orders over time, and over the speed frequencies of the strongest orders and peaks of the turns."""
+    figure = figure_of(2.0 * WIDTH, 5.4)
+    (speed, campbell), (orders, peaks) = figure.subplots(2, 2, height_ratios=(2, 3))
+    rpm, spectra = 60.0 * found.spectra.speeds, found.spectra
+    starts = found.cycles.starts
+    speed.plot(starts, found.speeds, color=INK, lw=0.8)
+    speed.set(ylabel="speed [rpm]", xlim=(starts[0], starts[-1]))
+    largest = float(spectra.amplitude.max()) or 1.0
+    shown = 20.0 * np.log10(np.maximum(spectra.amplitude.T / largest, 1e-3))
+    mesh = orders.pcolormesh(spectra.times, spectra.orders, shown, cmap="magma_r", shading="nearest", rasterized=True)
+    orders.set(xlabel="time [s]", ylabel="order", xlim=(starts[0], starts[-1]))
+    figure.colorbar(mesh, ax=orders, label=f"dB of {largest:.3g} {unit}")
+    for line in found.lines:
+        size = 40.0 * line.amplitude / max(one.largest for one in found.lines)
+        campbell.scatter(rpm, line.order * spectra.speeds, s=size, lw=0.0, color=ACCENT, alpha=0.6)
+        campbell.text(
+            1.01 * rpm.max(), line.order * spectra.speeds.max(), f"{round(line.order, 2):g}", fontsize=7, va="center"
+        )
+    campbell.set(ylabel="frequency [Hz]", title="Size: amplitude of an order")
+    if found.types is None:
+        peaks.plot(found.speeds, found.cycles.peaks, ".", ms=3.0, mew=0.0, color=INK)
+    else:
+        response.types_over_speed(found.judged[0], found.judged[1], found.types, peaks)
+    peaks.set(xlabel="speed [rpm]", ylabel=f"peak of a turn [{unit}]")
     figure.suptitle(title, x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
     return figure
 

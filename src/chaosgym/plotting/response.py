@@ -14,9 +14,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import ArrayLike, NDArray
 
+from chaosgym.diagnosis.measured_sweep import SweepTypes
 from chaosgym.errors import DatasetError
 from chaosgym.plotting.design import axis_label
-from chaosgym.plotting.style import ACCENT, MUTED, NATURE_COLOURS, PALE, STYLE, TYPE_COLOURS, figure_of
+from chaosgym.plotting.style import ACCENT, INK, MUTED, NATURE_COLOURS, PALE, STYLE, TYPE_COLOURS, figure_of
 from chaosgym.sweeps import LabelledSweep, SweepPlan
 
 Array = NDArray[np.float64]
@@ -97,6 +98,25 @@ def force_spans(values: Array, low: Array, high: Array, nature: NDArray[Any], ax
         ncols=2,
     )
     ax.set(ylabel="peak force [N], least to largest", ylim=(0.0, 1.25 * float(np.nanmax(high)) or 1.0))
+    return ax
+
+
+def types_over_speed(speeds: Array, peaks: Array, types: SweepTypes, ax: Axes) -> Axes:
+    """Peaks over the speed, their means, and the regions of types."""
+    at = [one.speed for one in types.speeds]
+    middles = 0.5 * (np.array(at[1:]) + np.array(at[:-1]))
+    ends = [at[0] - (middles[0] - at[0]), *middles, at[-1] + (at[-1] - middles[-1])]
+    for region in types.regions:
+        low, high = ends[at.index(region.first)], ends[at.index(region.last) + 1]
+        ax.axvspan(low, high, color=TYPE_COLOURS[region.type], alpha=0.18, lw=0.0)
+        ax.text(0.5 * (low + high), 1.02, region.type, transform=ax.get_xaxis_transform(), ha="center", fontsize=9)
+    irregular = np.isin(speeds, [one.speed for one in types.speeds if one.nature == "irregular"])
+    for nature, shown, which in (("periodic", "periodic", ~irregular), ("chaotic", "irregular", irregular)):
+        if which.any():
+            ax.plot(speeds[which], peaks[which], ".", ms=3.5, mew=0.0, color=NATURE_COLOURS[nature], label=shown)
+    ax.plot(at, [one.mean_peak for one in types.speeds], color=INK, lw=0.8, label="mean")
+    ax.set(xlim=(ends[0], ends[-1]), ylim=(0.0, 1.08 * float(peaks.max()) or 1.0))
+    ax.legend(loc="upper left", fontsize=8)
     return ax
 
 

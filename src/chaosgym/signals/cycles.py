@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals.columns import Sampling, Signal, choose_force, sampling
 from chaosgym.signals.read import Recording
+from chaosgym.signals.tachometer import Turns, turns_of
 
 Array = NDArray[np.float64]
 
@@ -34,6 +35,8 @@ class CyclePeaks:
     ----------
     peaks : (cycles,)
         Largest modulus of each cycle, in the unit of the series.
+    starts : (cycles,)
+        Instants [s] at which these cycles begin.
     resolution
         Half width of what the sampling leaves open of a peak.
     period
@@ -45,6 +48,7 @@ class CyclePeaks:
     """
 
     peaks: Array
+    starts: Array
     resolution: float
     period: float
     notes: tuple[str, ...]
@@ -110,30 +114,8 @@ def strongest_line_nearby(value: Array, step: float, period: float) -> float | N
     return padded * step / peak if stands_out and abs(peak - place) > 2.0 else None
 
 
-def tachometer_starts(pulses: Array, time: Array) -> Array:
-    """Instants [s] at which a tachometer begins a cycle: it rises through the middle of its range.
-
-    Raises
-    ------
-    DiagnosisError
-        If it rises fewer than 9 times.
-    """
-    low, high = float(pulses.min()), float(pulses.max())
-    middle, slack = 0.5 * (low + high), 0.1 * (high - low)
-    above = np.where(pulses > middle + slack, 1, np.where(pulses < middle - slack, 0, -1))
-    for undecided in np.flatnonzero(above < 0):
-        above[undecided] = above[undecided - 1] if undecided else 0
-    rises = np.flatnonzero(np.diff(above) == 1)
-    if len(rises) < 9:
-        raise DiagnosisError(f"the tachometer rises {len(rises)} times; needed: once a cycle, 9 times or more")
-    share = (middle - pulses[rises]) / np.where(
-        pulses[rises + 1] > pulses[rises], pulses[rises + 1] - pulses[rises], 1.0
-    )
-    return np.asarray(time[rises] + np.clip(share, 0.0, 1.0) * (time[rises + 1] - time[rises]))
-
-
 def cycle_peaks(
-    value: Array, instants: Sampling, period: float | None = None, starts: Array | None = None
+    value: Array, instants: Sampling, period: float | None = None, turns: Turns | None = None
 ) -> CyclePeaks:
     """Largest modulus of each cycle of a series.
 
@@ -144,9 +126,9 @@ def cycle_peaks(
     instants
         Its sampling.
     period
-        Cycle [s]; estimated from the spectrum if neither it nor ``starts`` is given.
-    starts : (cycles + 1,)
-        Instants [s] at which cycles begin, from a tachometer.
+        Cycle [s]; estimated from the spectrum if neither it nor ``turns`` is given.
+    turns
+        Of the shaft, by a tachometer: a turn is a cycle.
 
     Raises
     ------
@@ -155,9 +137,11 @@ def cycle_peaks(
     """
     missing, value = ~np.isfinite(value), _filled(value)
     notes, condition = [f"missing samples: {gap}" for gap in instants.gaps], ""
-    if starts is not None:
+    if turns is not None:
+        starts = turns.starts
         cycle = float(np.mean(np.diff(starts)))
         notes.append(f"cycle from the tachometer: {cycle:.6g} s on average, {len(starts) - 1} cycles")
+        notes += filter(None, [turns.told])
     elif period is None:
         cycle = estimated_period(value, instants.step)
         condition = f"if the cycle is {1e3 * cycle:.4g} ms"
@@ -167,8 +151,8 @@ def cycle_peaks(
         )
     else:
         cycle = period
-    _check_cycle(cycle, instants)
-    if starts is None:
+    _check_cycle(cycle if turns is None else float(np.diff(turns.starts).min()), instants)
+    if turns is None:
         if period is not None:
             other = None if instants.gaps else strongest_line_nearby(value, instants.step, period)
             if other is not None:
@@ -178,12 +162,13 @@ def cycle_peaks(
         first = instants.time[0]
         starts = first + cycle * np.arange(int((instants.time[-1] + instants.step - first) / cycle * (1.0 + 1e-12)) + 1)
     starts = _shifted_to_quiet(value, instants.time, starts)
-    peaks, spread, dropped = _largest(np.where(missing, np.nan, value), instants, starts)
+    peaks, kept, spread = _largest(np.where(missing, np.nan, value), instants, starts)
+    dropped = len(starts) - 1 - len(peaks)
     if dropped:
         notes.append(f"{dropped} cycles left out: samples are missing")
     if len(peaks) == 0:
         raise DiagnosisError(f"the series holds no whole cycle of {cycle:g} s")
-    return CyclePeaks(peaks, spread, cycle, tuple(notes), condition)
+    return CyclePeaks(peaks, kept, spread, cycle, tuple(notes), condition)
 
 
 def _filled(value: Array) -> Array:
@@ -222,17 +207,16 @@ def _shifted_to_quiet(value: Array, time: Array, starts: Array) -> Array:
     return shifted if len(shifted) > 1 else starts
 
 
-def _largest(value: Array, instants: Sampling, starts: Array) -> tuple[Array, float, int]:
-    """(largest modulus of each whole cycle, half width that sampling leaves open, cycles left out)."""
+def _largest(value: Array, instants: Sampling, starts: Array) -> tuple[Array, Array, float]:
+    """(largest modulus of each whole cycle, where these begin, half width that sampling leaves open)."""
     size = np.abs(value)
     edges = np.searchsorted(instants.time, starts - 1e-9 * instants.step)
-    peaks, opens = [], []
-    dropped = 0
+    peaks, kept, opens = [], [], []
     for first, last, begin, end in zip(edges[:-1], edges[1:], starts[:-1], starts[1:], strict=True):
         whole = last - first >= max(1.0, FULL * (end - begin) / instants.step - 1.0)
         if not whole or np.isnan(size[first:last]).any():
-            dropped += 1
             continue
+        kept.append(begin)
         top = int(first + np.argmax(size[first:last]))
         if 0 < top < len(size) - 1 and size[top] >= max(size[top - 1], size[top + 1]):
             curve = size[top - 1] - 2.0 * size[top] + size[top + 1]
@@ -243,7 +227,56 @@ def _largest(value: Array, instants: Sampling, starts: Array) -> tuple[Array, fl
             peaks.append(size[top])
             opens.append(0.0)
     # the parabola through three samples leaves about a tenth of what the largest sample alone would miss
-    return np.array(peaks), 0.1 * float(np.median(opens)) if opens else 0.0, dropped
+    return np.array(peaks), np.array(kept), 0.1 * float(np.median(opens)) if opens else 0.0
+
+
+def series_of(
+    recording: Recording,
+    column: str | None = None,
+    unit: str | None = None,
+    *,
+    rate_hz: float | None = None,
+    tachometer: str | None = None,
+    pulses_per_revolution: int = 1,
+    scale: str | None = None,
+) -> tuple[Signal, Sampling, Turns | None]:
+    """The force column of a series, its sampling, and the turns by its tachometer, if there is one.
+
+    Parameters
+    ----------
+    recording
+        What was read.
+    column, unit, scale
+        Of the force, as for ``choose_force``.
+    rate_hz
+        Sampling rate, if there is no time column.
+    tachometer, pulses_per_revolution
+        Column of a tachometer, and its pulses of a turn.
+
+    Raises
+    ------
+    DiagnosisError
+        If a column is not there, or the tachometer is the signal or tells no turns.
+    """
+    if column is None and tachometer is not None:
+        rest = {name: values for name, values in recording.columns.items() if name != tachometer}
+        signal = choose_force(replace(recording, columns=rest), None, unit, scale)
+    else:
+        signal = choose_force(recording, column, unit, scale)
+    instants = sampling(recording, len(signal.values), rate_hz)
+    size = min(len(signal.values), len(instants.time))
+    instants = instants._replace(time=instants.time[:size])
+    signal = signal._replace(values=signal.values[:size])
+    if tachometer is None:
+        return signal, instants, None
+    if tachometer not in recording.columns:
+        raise DiagnosisError(f"{recording.source} has no column {tachometer!r} for the tachometer")
+    if tachometer == signal.name:
+        raise DiagnosisError(f"{recording.source}: column {tachometer!r} can't be both tachometer and signal")
+    pulses = recording.columns[tachometer][:size]
+    if len(pulses) < size:
+        raise DiagnosisError(f"{recording.source}: {tachometer!r} ends before {signal.name!r}")
+    return signal, instants, turns_of(pulses, instants.time, pulses_per_revolution)
 
 
 def peaks_of_series(
@@ -254,6 +287,7 @@ def peaks_of_series(
     rate_hz: float | None = None,
     period: float | None = None,
     tachometer: str | None = None,
+    pulses_per_revolution: int = 1,
     scale: str | None = None,
 ) -> tuple[Signal, CyclePeaks]:
     """Peaks of the series in a recording: its force column, and the peak of each cycle.
@@ -262,14 +296,10 @@ def peaks_of_series(
     ----------
     recording
         What was read.
-    column, unit, scale
-        Of the force, as for ``choose_force``.
-    rate_hz
-        Sampling rate, if there is no time column.
+    column, unit, scale, rate_hz, tachometer, pulses_per_revolution
+        As for ``series_of``.
     period
         Operating cycle [s].
-    tachometer
-        Column of a tachometer that rises once a cycle.
 
     Examples
     --------
@@ -285,17 +315,13 @@ def peaks_of_series(
     >>> len(cycles.peaks), float(cycles.peaks[5])
     (19, 11.0)
     """
-    if column is None and tachometer is not None:
-        rest = {name: values for name, values in recording.columns.items() if name != tachometer}
-        signal = choose_force(replace(recording, columns=rest), None, unit, scale)
-    else:
-        signal = choose_force(recording, column, unit, scale)
-    instants = sampling(recording, len(signal.values), rate_hz)
-    size = min(len(signal.values), len(instants.time))
-    instants = instants._replace(time=instants.time[:size])
-    starts = None
-    if tachometer is not None:
-        if tachometer not in recording.columns:
-            raise DiagnosisError(f"{recording.source} has no column {tachometer!r} for the tachometer")
-        starts = tachometer_starts(recording.columns[tachometer][:size], instants.time)
-    return signal, cycle_peaks(signal.values[:size], instants, period, starts)
+    signal, instants, turns = series_of(
+        recording,
+        column,
+        unit,
+        rate_hz=rate_hz,
+        tachometer=tachometer,
+        pulses_per_revolution=pulses_per_revolution,
+        scale=scale,
+    )
+    return signal, cycle_peaks(signal.values, instants, period, turns)
