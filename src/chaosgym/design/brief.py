@@ -4,6 +4,7 @@ import os
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -383,142 +384,45 @@ def template(name: str) -> str:
     DesignError
         If there is no such machine.
     """
+    import jinja2
+
     machine = _machine(name)
-    speed, clearance = machine.speed_field, machine.clearance_field
-    criteria, unit = Criteria(), parameters_of(machine)[clearance].unit
-    lines = [
-        "# Design brief for `chaosgym design`. Quantities are texts with a unit; % is a share of the nominal value.",
-        "",
-        f'machine = "{name}"',
-        f"series = {SERIES_SIZE}  # machines built at random within the tolerances",
-        "",
-        "[parameters]  # any field of the machine; those left out keep its own value",
-        f"{speed} = {_quantity(machine, speed)}",
-        f"{clearance} = {_quantity(machine, clearance)}  # half the gap",
-        "",
-        "[tolerances]  # on either side of nominal",
-        *(_tolerance_line(machine, key, tolerance) for key, tolerance in default_tolerances(machine).items()),
-        "",
-        "[region]",
-        "tolerances = 1  # 1, or 2 to look at twice the tolerance",
-        "wear = false    # true: two tolerances for the clearance, which grows in service",
-        "",
-        "[duty]",
-        'hours_a_day = "24 h"  # of operation: a life in years or days is that many',
-        "# [duty.speeds]  # a load collective: share of the operating time at each speed; left out, one speed",
-        f'# {_quoted(machine, 1.0)} = "60 %"',
-        f'# {_quoted(machine, 0.8)} = "40 %"',
-        "",
-        "[criteria]",
-        'load_rating = "500 N"          # force under which the surface lasts a million cycles',
-        'life = "2000 Mcycles"          # or in time: "10 years", "87600 h"',
-        "reliability = 0.999            # probability that the strength exceeds the contact stress",
-        'machines_that_meet = "90 %"    # of those in tolerance, each by its own statistics',
-        f"safety_factor = {criteria.safety_factor:g}              # strength against stress, for Types I and II",
-        "# life_exponent = 3             # point contact; line contact, 10/3, if left out",
-        f'contact_radius = "{1e3 * criteria.contact_radius:g} mm"        # ball on a flat surface',
-        f'contact_modulus = "{1e-9 * criteria.contact_modulus:g} GPa"     # steel on steel',
-        f'strength = "{1e-9 * criteria.strength:g} GPa"            # Hertzian endurance strength, mean',
-        f'strength_deviation = "{1e-9 * criteria.strength_deviation:g} GPa"  # and standard deviation',
-        f"fatigue_factor = {criteria.fatigue_factor:g}             # multiplies the stress",
-        f"confidence = {criteria.confidence:g}              # of the intervals",
-        "",
-        "[changes]  # values that may be tried to meet the criteria",
-        *(_change_line(machine, key, row) for key, row in default_changes(machine).items()),
-        "",
-        "[costs]  # weight of a change: weight * |ln(new / old)|; 1 if left out",
-        f"{speed} = 2",
-        *(_wear_lines(machine) if unit == "m" else ()),
-        *(_impact_lines(machine) if getattr(machine, clearance) else ()),
-        *(_bending_lines(machine) if machine.flexible is not None or machine.bending_links else ()),
-    ]
-    return "\n".join(lines) + "\n"
+    fields = parameters_of(machine)
+    bends = "modes" if machine.flexible is not None else ""
+    if machine.bending_links:
+        bends = machine.bending_links[0]
+    if bends and type(machine).stress_at is not Machine.stress_at:
+        bends = "beam"
 
+    def written(field: str, value: float) -> str:
+        unit = fields[field].unit
+        if unit == "-":
+            return f"{value:.6g}"
+        return f'"{1e3 * value:.6g} mm"' if unit == "m" else f'"{value:.6g} {unit}"'
 
-def _wear_lines(machine: Machine) -> list[str]:
-    """The section on wear, commented out."""
-    limit = 3e3 * getattr(machine, machine.clearance_field)
-    return [
-        "",
-        "# [archard]  # wear by Archard's law; left out if this section is",
-        f'# limit = "{limit:.4g} mm"      # clearance at which the joint is worn out',
-        '# sliding = "2 mm"       # of the parts by each other, in a cycle',
-        '# area = "20 mm^2"       # over which wear spreads',
-        '# hardness = "2 GPa"     # of the softer surface',
-        "# coefficient = 1e-5     # K of lubricated steel",
-        "# uncertainty = 3        # factor to which K is known",
-    ]
+    def share_of_speed(factor: float) -> str:
+        return f'"{factor * getattr(machine, machine.speed_field):.4g} {fields[machine.speed_field].unit}"'
 
-
-def _impact_lines(machine: Machine) -> list[str]:
-    """The section on where impacts fall, commented out."""
-    name = machine.clearance_field
-    nominal, unit = getattr(machine, name), parameters_of(machine)[name].unit
-    return [
-        "",
-        "# [impacts]  # how large peaks are, and how far they spread over the bearing, at some clearances",
-        f"# clearances = [{', '.join(_written(factor * nominal, unit) for factor in (0.5, 1.0, 1.5))}]",
-    ]
-
-
-def _bending_lines(machine: Machine) -> list[str]:
-    """The section on bending, commented out."""
-    where = [
-        '# turn = "turn2 - turn1"   # curvature of the section: turn of one point against another',
-        '# span = "20 mm"          # over the distance between them',
-        '# or the modal curvatures of the section instead of both: curvatures = "0.7, 4.2 kg^-1/2 m^-2"',
-        '# fibre = "5 mm"          # distance of the outer fibre from the neutral one',
-        '# modulus = "210 GPa"',
-    ]
-    for link in machine.bending_links[:1]:
-        where = [
-            f'# link = "{link}"           # that bends',
-            '# at = "50 mm"            # section of it, from its start on',
-            '# fibre = "5 mm"          # distance of the outer fibre from the neutral one',
-        ]
-    if type(machine).stress_at is not Machine.stress_at:
-        where = ['# at = "150 mm"           # section of the beam, from the pivot on']
-    return [
-        "",
-        "# [bending]  # fatigue of the flexible part at a section; left out if this section is",
-        *where,
-        '# amplitude = "250 MPa"   # reversed stress that the part bears',
-        '# cycles = "1 Mcycles"    # for so many stress cycles',
-        "# slope = 5              # of the S-N line",
-        '# ultimate = "600 MPa"    # tensile strength',
-        '# mean_stress = "goodman"  # or "gerber", or "none"',
-        "# notch_factor = 1.5",
-        '# static_stress = "0 MPa"  # without any vibration',
-        "# uncertainty = 3        # factor to which lives are known",
-    ]
-
-
-def _quoted(machine: Machine, factor: float) -> str:
-    """A multiple of the nominal speed, as a key."""
-    name = machine.speed_field
-    return f'"{factor * getattr(machine, name):.4g} {parameters_of(machine)[name].unit}"'
-
-
-_SHOWN_UNITS = {"m": ("mm", 1e-3)}
-
-
-def _written(value: float, unit: str) -> str:
-    if unit == "-":
-        return f"{value:.6g}"
-    shown, size = _SHOWN_UNITS.get(unit, (unit, 1.0))
-    return f'"{value / size:.6g} {shown}"'
-
-
-def _quantity(machine: Machine, name: str) -> str:
-    return _written(getattr(machine, name), parameters_of(machine)[name].unit)
-
-
-def _tolerance_line(machine: Machine, name: str, tolerance: Tolerance) -> str:
-    if tolerance.relative:
-        return f'{name} = "{100 * tolerance.value:g} %"'
-    return f"{name} = {_written(tolerance.value, parameters_of(machine)[name].unit)}"
-
-
-def _change_line(machine: Machine, name: str, row: Iterable[float]) -> str:
-    unit = parameters_of(machine)[name].unit
-    return f"{name} = [{', '.join(_written(value, unit) for value in row)}]"
+    page = jinja2.Template(
+        files("chaosgym.design").joinpath("brief.toml.jinja").read_text(encoding="utf-8"),
+        trim_blocks=True,
+        keep_trailing_newline=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    text: str = page.render(
+        name=name,
+        series=SERIES_SIZE,
+        speed=machine.speed_field,
+        clearance=machine.clearance_field,
+        gap=getattr(machine, machine.clearance_field),
+        slides=fields[machine.clearance_field].unit == "m",
+        bends=bends,
+        criteria=Criteria(),
+        tolerances=default_tolerances(machine),
+        changes=default_changes(machine),
+        nominal=lambda field: written(field, getattr(machine, field)),
+        written=written,
+        row=lambda field, values: f"[{', '.join(written(field, value) for value in values)}]",
+        share_of_speed=share_of_speed,
+    )
+    return text
