@@ -9,7 +9,7 @@ import numpy as np
 
 from chaosgym.core.joints.cycle import advance_joints
 from chaosgym.core.joints.run import JointRun, new_space, work_space
-from chaosgym.core.joints.tables import MOST_LEVELS, ROW, layout, put_drive, put_structure
+from chaosgym.core.joints.tables import MOST_LEVELS, ROW, layout, no_rubs, put_drive, put_structure
 from chaosgym.core.kernel import njit
 from chaosgym.core.lanes import aligned, unset
 from chaosgym.core.modal_model import LOAD, LOWER_STOP, STOP, UPPER_STOP
@@ -43,14 +43,14 @@ def tabulate(model, shortest):
     """``Tables.values`` of a model, for its number of harmonics and ``shortest`` intervals (R,) [s]."""
     regimes, lags, shape = model.regimes, _lags(model), model.tip_shape.reshape((1, model.tip_shape.size))
     count, n = lags.shape[0], model.tip_shape.size
-    at = layout(n, model.drive.shape[1], 1, MOST_LEVELS)
+    at, rubs = layout(n, model.drive.shape[1], 1, 0, MOST_LEVELS), no_rubs(n)
     values, constants = aligned(count * at[ROW]).reshape((count, at[ROW])), np.empty((1, 1))
     for r in range(count):
         constants[0, 0] = model.rest_penetration[r] if r > 0 else 0.0
         generator, to_modal, from_modal = regimes.generator[r], regimes.to_modal[r], regimes.from_modal[r]
         rest, drift = model.rest[r, STOP].reshape((1, 2 * n)), model.drift[r, STOP].reshape((1, 2 * n))
         put_structure(
-            at, generator, to_modal, from_modal, shape, lags[r], shortest[r], rest, drift, constants, values[r]
+            at, generator, to_modal, from_modal, shape, lags[r], shortest[r], rest, drift, constants, rubs, values[r]
         )
     return values
 
@@ -66,7 +66,7 @@ def make_run(model, step_phase, event_tolerance):
     omega = 2.0 * math.pi * model.excitation_frequency
     regimes, known, lags = model.regimes, model.tables.values, _lags(model)
     count, n, harmonics = lags.shape[0], model.tip_shape.size, model.drive.shape[1]
-    at = layout(n, harmonics, 1, MOST_LEVELS)
+    at, rubs = layout(n, harmonics, 1, 0, MOST_LEVELS), no_rubs(n)
     slow = np.max(model.tables.shortest) * harmonics * omega > step_phase
     if slow or model.tables.step_phase != step_phase or known.shape[1] != at[ROW]:
         known = tabulate(model, shortest_intervals(regimes, step_phase, harmonics * omega))
@@ -83,10 +83,10 @@ def make_run(model, step_phase, event_tolerance):
             row[i] = known[r, i]
         generator, to_modal, from_modal = regimes.generator[r], regimes.to_modal[r], regimes.from_modal[r]
         rest, load = model.rest[r, LOAD], model.drift[r, LOAD]
-        put_drive(at, generator, to_modal, from_modal, shape, lags[r], omega, drive, rest, load, row)
-    at = work_space(at, np.full(1, count))
+        put_drive(at, generator, to_modal, from_modal, shape, lags[r], omega, drive, rest, load, rubs, row)
+    at = work_space(at, np.full(1, count), np.empty(0, np.int64))
     stiffness, damping = model.contact_stiffness.reshape((1, 2)), model.contact_damping.reshape((1, 2))
-    own = new_space(at, shape, model.stops.reshape((1, 2)), stiffness, damping)
+    own = new_space(at, shape, model.stops.reshape((1, 2)), stiffness, damping, rubs.shape, np.empty((0, 4)))
     weights = np.empty(n)
     for i in range(n):
         weights[i] = model.stiffness[i] if model.stiffness[i] != 0.0 else omega * omega

@@ -34,8 +34,9 @@ VANISHED = 1e-300
 class Tangents(NamedTuple):
     """Deviations that travel with a motion.
 
-    ``vectors`` (m, 2n) are advanced in place. ``log_growth`` (cycles, m) receives the logarithm of the growth of each
-    in each cycle, after which they are made orthonormal again; with shape (cycles, 0) they are left as they are.
+    ``vectors`` (m, 2n) are advanced in place; with friction of f joints they are (m, 2n + f), its springs behind.
+    ``log_growth`` (cycles, m) receives the logarithm of the growth of each in each cycle, after which they are made
+    orthonormal again; with shape (cycles, 0) they are left as they are.
     """
 
     vectors: np.ndarray
@@ -50,11 +51,13 @@ def no_tangents(states: int, cycles: int) -> Tangents:
 
 @njit(cache=True, inline="always")
 def _product(weights, vectors, a, b):
-    """Scalar product of energy of two deviations: sum w q q + q' q'."""
-    n = weights.shape[0]
+    """Scalar product of energy of two deviations: sum w q q + q' q', and w z z of tangential springs."""
+    n = vectors.shape[1] - weights.shape[0]
     total = 0.0
     for i in range(n):
         total += weights[i] * vectors[a, i] * vectors[b, i] + vectors[a, n + i] * vectors[b, n + i]
+    for i in range(n, weights.shape[0]):
+        total += weights[i] * vectors[a, n + i] * vectors[b, n + i]
     return total
 
 
@@ -62,7 +65,8 @@ def _product(weights, vectors, a, b):
 def orthonormalise(weights, tangents, cycle):
     """Make deviations orthonormal in energy (modified Gram-Schmidt, twice); note in ``log_growth`` how much they grew.
 
-    ``weights`` (n,) [1/s^2] are those of displacements: the stiffness of each mode.
+    ``weights`` (n,) [1/s^2] are those of displacements: the stiffness of each mode. Behind them may be those of
+    tangential springs (f,).
     """
     vectors, growth = tangents.vectors, tangents.log_growth
     n2 = vectors.shape[1]

@@ -1,10 +1,13 @@
 """Machines of a few modes and several joints: tables of each set of pressed surfaces, made when it is first visited.
 
+What friction does at a pressed surface, sticking or sliding to either side, makes a set of its own.
+
 sets = PressedSets(stiffness, damping, shape, springs, dampers)     # of a structure, whatever drives it
 tables = JointTables(sets, frequency, level, drive, static_force, step_phase)     # at one speed
 outcome, done = tables.advance(stops, state, bouncing, arrays, ExactEvents())
 """
 
+import itertools
 import math
 from threading import Lock
 from typing import NamedTuple
@@ -19,7 +22,7 @@ from chaosgym.core.joints.batch import JointModel, displacement_weights
 from chaosgym.core.joints.cycle import advance_joints
 from chaosgym.core.joints.run import JointRun, new_space, work_space
 from chaosgym.core.joints.sets import put_sets, set_length
-from chaosgym.core.joints.tables import MOST_LEVELS, layout
+from chaosgym.core.joints.tables import MOST_LEVELS, Rubs, layout, read_at_rest
 from chaosgym.core.lanes import unset
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
@@ -34,15 +37,51 @@ MOST_SETS = 1_000_000
 MOST_BYTES = 500_000_000
 """Memory for the tables of a machine at one speed; when it is full they are made anew as they are visited."""
 
+FRICTION_MODES = 3
+"""What friction does at a pressed surface: it sticks, slides up or slides down."""
+
 LIKELY = 12
 """Sets that are made at once at another speed or drive, those that were visited first."""
+
+
+class Sliders(NamedTuple):
+    """Joints with friction.
+
+    Attributes
+    ----------
+    joint : (f,) int
+        Which joints these are.
+    shape : (f, n)
+        Tangential displacement [kg^-1/2].
+    friction, speed : (f,)
+        Coefficient of friction; speed of the surfaces [m/s].
+    springs : (f, 2)
+        Tangential springs at the upper and the lower surface [N/m].
+    """
+
+    joint: NDArray[np.int64]
+    shape: Array
+    friction: Array
+    speed: Array
+    springs: Array
+
+    @property
+    def numbers(self) -> Array:
+        """As the kernels take them, (f, 4)."""
+        return np.column_stack([self.friction, self.springs, self.speed])
+
+
+def no_sliders(modes: int) -> Sliders:
+    """No friction, of a structure of some modes."""
+    return Sliders(np.empty(0, np.int64), np.empty((0, modes)), np.empty(0), np.empty(0), np.empty((0, 2)))
 
 
 class PressedSet(NamedTuple):
     """A structure with some surfaces pressed: blocks as in ``Regimes``, and where it rests per position of each.
 
-    ``rest``, ``drift`` (m, 2n) are those of ``settled``; ``constants`` (m, m) what each joint reads then, counted from
-    its surface where it presses; ``springs``, ``dampers`` (m,) those that act.
+    ``rest``, ``drift`` (m, 2n) are those of ``settled``; ``constants`` (m + 2f, m) what each channel reads then,
+    counted from its surface where it presses; ``lag`` (m,) damper over spring [s] of those that act; ``rubs`` is what
+    friction does.
     """
 
     generator: Array
@@ -52,8 +91,8 @@ class PressedSet(NamedTuple):
     rest: Array
     drift: Array
     constants: Array
-    springs: Array
-    dampers: Array
+    lag: Array
+    rubs: Rubs
 
 
 class PressedSets:
@@ -71,6 +110,8 @@ class PressedSets:
         Of the upper and the lower surface [N/m], [N s/m].
     two_sided : (m,) bool
         False for joints with an upper surface only.
+    sliders
+        Joints with friction.
 
     Raises
     ------
@@ -79,12 +120,22 @@ class PressedSets:
     """
 
     def __init__(
-        self, stiffness: Array, damping: Array, shape: Array, springs: Array, dampers: Array, two_sided: Array
+        self,
+        stiffness: Array,
+        damping: Array,
+        shape: Array,
+        springs: Array,
+        dampers: Array,
+        two_sided: Array,
+        sliders: Sliders | None = None,
     ) -> None:
         self.stiffness, self.damping, self.shape = stiffness, damping, np.ascontiguousarray(shape)
         self.springs, self.dampers = springs, dampers
         differs = two_sided & ((springs[:, 0] != springs[:, 1]) | (dampers[:, 0] != dampers[:, 1]))
-        self.radix = np.where(differs, 3, 2).astype(np.int64)
+        self.sliders = no_sliders(len(stiffness)) if sliders is None else sliders
+        self.modes = np.ones(len(shape), np.int64)
+        self.modes[self.sliders.joint] = FRICTION_MODES
+        self.radix = 1 + np.where(differs, 2, 1) * self.modes
         self.count = math.prod(self.radix.tolist())
         if self.count > MOST_SETS:
             raise ParameterError(
@@ -94,7 +145,10 @@ class PressedSets:
         self._made: dict[int, PressedSet] = {}
 
     def digits(self, code: int) -> list[int]:
-        """Digit of each joint in the number of a set: 0 for none; 1 for the upper surface, or for either."""
+        """Digit of each joint in the number of a set: 0 for none; 1 for the upper surface, or for either.
+
+        With friction these are 1 to 3 for the upper surface: it sticks, slides up or slides down.
+        """
         digits = []
         for radix in self.radix.tolist():
             digits.append(code % radix)
@@ -121,30 +175,66 @@ class PressedSets:
         m, n = self.shape.shape
         digits = self.digits(code)
         pressed = [j for j in range(m) if digits[j]]
-        springs, dampers = np.zeros(m), np.zeros(m)
+        springs, dampers, pushes = np.zeros(m), np.zeros(m), self.shape.copy()
         for j in pressed:
-            springs[j], dampers[j] = self.springs[j, digits[j] - 1], self.dampers[j, digits[j] - 1]
-        stiffness = np.diag(self.stiffness) + (self.shape.T * springs) @ self.shape
-        damping = self.damping + (self.shape.T * dampers) @ self.shape
+            surface = (digits[j] - 1) // self.modes[j]
+            springs[j], dampers[j] = self.springs[j, surface], self.dampers[j, surface]
+        held, weight, rate = self._friction(digits, springs, pushes)
+        shapes = self.sliders.shape
+        stiffness = np.diag(self.stiffness) + (pushes.T * springs) @ self.shape + (shapes.T * held) @ shapes
+        damping = self.damping + (pushes.T * dampers) @ self.shape
         rigid = bool(np.any(self.stiffness == 0.0))
-        generator, from_modal = modal_blocks(stiffness, damping, rigid)
+        generator, from_modal = modal_blocks(stiffness, damping, rigid, bool(rate.any()))
         to_modal: Array = np.asarray(np.linalg.inv(from_modal), dtype=np.float64)
         turns = generator[2] != 0.0
         modulus = np.where(turns, np.hypot(generator[0], generator[2]), np.max(np.abs(generator[[0, 3]]), axis=0))
         rest, drift = np.zeros((m, 2 * n)), np.zeros((m, 2 * n))
         for j in pressed:
-            rest[j], drift[j] = settled(generator, to_modal[:, n:] @ (springs[j] * self.shape[j]))
+            rest[j], drift[j] = settled(generator, to_modal[:, n:] @ (springs[j] * pushes[j]))
         constants = (self.shape @ from_modal[:n]) @ rest.T
+        strains = (shapes @ from_modal[:n]) @ rest.T
         if rigid:
             constants[pressed, pressed] -= 1.0
         elif pressed:
             # how far a joint rests beyond its surface is small against how far the surface is away
-            some = self.shape[pressed]
-            compliance = (some / self.stiffness) @ some.T
-            constants[np.ix_(pressed, pressed)] = -np.linalg.inv(np.eye(len(pressed)) + compliance * springs[pressed])
-        return PressedSet(
-            generator, to_modal, from_modal, float(modulus.max()), rest, drift, constants, springs, dampers
-        )
+            sticks = np.flatnonzero(held).tolist()
+            some, pushed = (np.concatenate([a[pressed], shapes[sticks]]) for a in (self.shape, pushes))
+            stiff = np.concatenate([springs[pressed], held[sticks]])
+            compliance = (some / self.stiffness) @ pushed.T
+            deep = -np.linalg.inv(np.eye(len(some)) + compliance * stiff)[:, : len(pressed)]
+            constants[np.ix_(pressed, pressed)] = deep[: len(pressed)]
+            strains[np.ix_(sticks, pressed)] = deep[len(pressed) :]
+        lag = np.divide(dampers, springs, out=np.zeros(m), where=springs > 0.0)
+        follow = np.zeros((2 * n, 2 * len(held)))
+        for c in np.flatnonzero(held):
+            follow[:, c] = settled(generator, to_modal[:, n:] @ (held[c] * shapes[c]))[0]
+            follow[:, len(held) + c] = settled(generator, -follow[:, c])[0]
+        rubs = Rubs(self.sliders.joint.astype(float), shapes, follow, weight, rate)
+        shown = np.zeros((m + 2 * len(held), m))
+        shown[:m] = constants
+        for k, j in itertools.product(range(2 * len(held)), pressed):
+            at_rest = constants[self.sliders.joint[k // 2], j], strains[k // 2, j]
+            shown[m + k, j] = call(read_at_rest, generator, from_modal, self.shape, lag, rubs, k, *at_rest, drift[j])
+        fastest = float(modulus.max())
+        return PressedSet(generator, to_modal, from_modal, fastest, rest, drift, shown, lag, rubs)
+
+    def _friction(self, digits: list[int], springs: Array, pushes: Array) -> tuple[Array, Array, Array]:
+        """Tangential springs that hold (f,), and ``Rubs.weight``, ``Rubs.rate``; adds to what pressure pushes."""
+        f = len(self.sliders.joint)
+        held, weight, rate = np.zeros(f), np.zeros((2 * f, 2)), np.zeros(2 * f)
+        for c, j in enumerate(self.sliders.joint.tolist()):
+            if not digits[j]:
+                continue
+            surface, mode = divmod(digits[j] - 1, FRICTION_MODES)
+            friction, spring = self.sliders.friction[c], self.sliders.springs[c, surface]
+            if mode == 0:
+                held[c] = spring
+                weight[2 * c : 2 * c + 2] = [[friction * springs[j], -spring], [friction * springs[j], spring]]
+            else:
+                sign = 1.0 if mode == 1 else -1.0
+                pushes[j] += sign * friction * self.sliders.shape[c]
+                weight[2 * c], rate[2 * c] = (-friction * springs[j] / spring, sign), 1.0
+        return held, weight, rate
 
 
 class JointTables:
@@ -170,7 +260,9 @@ class JointTables:
         self._sets, self._static, self._step_phase = sets, static_force, step_phase
         self._level, self._drive, self.frequency = level, np.ascontiguousarray(drive), frequency
         m, n = sets.shape.shape
-        self._at = call(work_space, call(layout, n, drive.shape[1], m, MOST_LEVELS), sets.radix)
+        of_row = call(layout, n, drive.shape[1], m, len(sets.sliders.joint), MOST_LEVELS)
+        self._at = call(work_space, of_row, sets.radix, sets.sliders.joint)
+        self._stiffness = np.concatenate([sets.stiffness, sets.sliders.springs[:, 0]])
         self._row, self._length = map(int, call(set_length, self._at))
         self._most = max(1, MOST_BYTES // (8 * self._length))
         self._lock = Lock()
@@ -185,9 +277,15 @@ class JointTables:
         """Make the tables of a set; arrays in which a run may still be are left as they are."""
         found = self._sets.of(code)
         load = found.to_modal[:, len(self._static) :] @ self._static
-        lag = np.divide(found.dampers, found.springs, out=np.zeros(len(found.springs)), where=found.springs > 0.0)
-        of_structure = (found.generator, found.to_modal, found.from_modal, lag, found.rest, found.drift)
-        parts = (np.array(found.fastest), *of_structure, found.constants, settled(found.generator, load)[0], load)
+        of_structure = (found.generator, found.to_modal, found.from_modal, found.lag, found.rest, found.drift)
+        parts = (
+            np.array(found.fastest),
+            *of_structure,
+            found.constants,
+            *found.rubs,
+            settled(found.generator, load)[0],
+            load,
+        )
         row = np.zeros(self._length)
         row[self._row : self._row + sum(part.size for part in parts)] = np.concatenate([part.ravel() for part in parts])
         driven = (self._step_phase, self.frequency, self._level, self._drive)
@@ -222,14 +320,16 @@ class JointTables:
     def space(self, stops: Array) -> Array:
         """Work space of a run; ``stops`` (m, 2) are positions [m]."""
         sets = self._sets
-        space: Array = call(new_space, self._at, sets.shape, stops, sets.springs, sets.dampers)
+        space: Array = call(
+            new_space, self._at, sets.shape, stops, sets.springs, sets.dampers, sets.sliders.shape, sets.sliders.numbers
+        )
         return space
 
     def model(self, own: Array) -> JointModel:
         """Return the machine that moves in a work space; it holds addresses, so tables and space must be kept."""
         rows, kept = self._rows, self._kept
         places = (self._tables.ctypes.data, kept, rows.ctypes.data, len(rows), own.ctypes.data)
-        structure = self._at, self._sets.shape, self._sets.stiffness
+        structure = self._at, self._sets.shape, self._stiffness
         return JointModel(*places, *structure, self._drive, self._level, self.frequency)
 
     def advance(
@@ -243,7 +343,7 @@ class JointTables:
     ) -> tuple[int, int]:
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``. ``stops`` (m, 2) are positions [m]."""
         done, cycles, made, own = 0, len(arrays.section), 0, self.space(stops)
-        weights = call(displacement_weights, self._sets.stiffness, self.frequency)
+        weights = call(displacement_weights, self._stiffness, self.frequency)
         while True:
             part = CycleArrays(*(values[done:] for values in arrays))
             along = tangents._replace(log_growth=tangents.log_growth[done:])

@@ -85,14 +85,14 @@ def with_rigid_bodies(modes: Modes) -> Modes:
     return modes._replace(angular_frequency=np.where(slow, 0.0, modes.angular_frequency), damping=damping)
 
 
-def modal_blocks(stiffness: Array, damping: Array, rigid: bool) -> tuple[Array, Array]:
+def modal_blocks(stiffness: Array, damping: Array, rigid: bool, rubs: bool = False) -> tuple[Array, Array]:
     """Real 2 x 2 blocks of q'' + damping q' + stiffness q = 0: generator (4, n) and from_modal (2n, 2n).
 
     Where the machine can move as a ``rigid`` body, a direction that neither spring nor damper resists drifts, in a
-    block of its own.
+    block of its own. What slides and ``rubs`` makes the matrices unsymmetric, and may let a motion grow.
     """
     scale = math.sqrt(np.linalg.norm(stiffness, 2)) or 1.0
-    held, directions = np.linalg.eigh(stiffness / scale**2 + damping / scale)
+    held, directions = _stretched(stiffness / scale**2 + damping / scale, rubs)
     loose = (held < NEGLIGIBLE * max(1.0, float(held[-1]))) & rigid
     blocks, columns = [], []
     for free in directions[:, loose].T:
@@ -102,9 +102,40 @@ def modal_blocks(stiffness: Array, damping: Array, rigid: bool) -> tuple[Array, 
     basis = directions[:, ~loose] if loose.any() else np.eye(len(stiffness))
     if basis.shape[1]:
         own = (basis.T @ stiffness @ basis, basis.T @ damping @ basis)
-        _add_damped(*own, basis, rigid, blocks, columns)
+        _add_damped(*own, basis, rigid, blocks, columns, rubs)
     first, second = zip(*columns, strict=True)
-    return np.array(blocks).T, np.column_stack([*first, *second])
+    from_modal = np.column_stack([*first, *second])
+    if rubs and loose.any():
+        _push_along(stiffness, damping, directions[:, loose], np.array(blocks).T, from_modal)
+    return np.array(blocks).T, from_modal
+
+
+def _stretched(matrix: Array, rubs: bool) -> tuple[Array, Array]:
+    """By how much a matrix stretches directions, ascending, and these: singular values and vectors where it rubs."""
+    if not rubs:
+        return np.linalg.eigh(matrix)
+    _, sizes, directions = np.linalg.svd(matrix)
+    return sizes[::-1], directions[::-1].T
+
+
+def _push_along(stiffness: Array, damping: Array, loose: Array, generator: Array, from_modal: Array) -> None:
+    """Add to the columns of other coordinates how friction moves directions (n, k) that nothing resists.
+
+    A block B moves others by Y u, and these by X u with X B^2 = -loose' (stiffness Y + damping Y B).
+    """
+    n = len(stiffness)
+    for j in range(loose.shape[1], n):
+        block, pair = generator[:, j].reshape(2, 2), [j, n + j]
+        moved = from_modal[:n, pair]
+        forced = -loose.T @ (stiffness @ moved + damping @ moved @ block)
+        square = block @ block
+        if block[1, 0] != 0.0:
+            along = np.linalg.solve(square.T, forced.T).T
+        else:
+            # nothing pushes where the other one rests
+            along = np.divide(forced, np.diag(square), out=np.zeros_like(forced), where=np.diag(square) > 0.0)
+        from_modal[:n, pair] += loose @ along
+        from_modal[n:, pair] += loose @ along @ block
 
 
 def _add_damped(
@@ -114,6 +145,7 @@ def _add_damped(
     rigid: bool,
     blocks: list[tuple[float, float, float, float]],
     columns: list[tuple[Array, Array]],
+    rubs: bool,
 ) -> None:
     """Add the blocks of coordinates, columns of ``basis``, that all have a spring or a damper.
 
@@ -125,7 +157,7 @@ def _add_damped(
     n = len(stiffness)
     scale = math.sqrt(np.linalg.norm(stiffness, 2)) or 1.0
     # a displacement weighs as much as the velocity that belongs to it, in slow modes as in fast ones
-    rates, directions = np.linalg.eigh(stiffness + damping @ damping)
+    rates, directions = _stretched(stiffness + damping @ damping, rubs)
     weight = directions * np.sqrt(np.maximum(rates, 0.0)) @ directions.T
     found, one, graded = [], np.ones(n), np.arange(1.0, n + 1.0)
     for moved in (0.0 * one, 1e-9 * one, 1e-8 * one, 1e-9 * graded, 1e-8 * graded):
@@ -138,7 +170,7 @@ def _add_damped(
         found.append((condition, values, vectors))
         if condition < MAX_CONDITION:
             break
-        if len(found) == 1 and _add_uncoupled(stiffness, damping, basis, rigid, blocks, columns):
+        if len(found) == 1 and not rubs and _add_uncoupled(stiffness, damping, basis, rigid, blocks, columns):
             return
     condition, values, vectors = min(found, key=lambda each: each[0])
     if not condition < HOPELESS_CONDITION:
@@ -146,18 +178,19 @@ def _add_damped(
             "modes that are equal and critically damped can't be told apart; allowed: damping ratios that differ from "
             "1 by a millionth or more"
         )
-    resting = int(np.sum(np.linalg.eigvalsh(stiffness) < NEGLIGIBLE * scale**2)) if rigid else 0
+    resting = int(np.sum(_stretched(stiffness, rubs)[0] < NEGLIGIBLE * scale**2)) if rigid else 0
     slowest = np.argsort(np.abs(values))[:resting]
     values[slowest[values[slowest].imag == 0.0]] = 0.0
     vectors = np.concatenate([basis @ vectors[:n], basis @ vectors[n:]])
     turning = [i for i in np.argsort(np.abs(values)) if values[i].imag > 0.0]
     decaying = [i for i in np.argsort(np.abs(values)) if values[i].imag == 0.0]
     for i in turning:
-        a, b = min(values[i].real, 0.0), values[i].imag
+        a, b = min(values[i].real, math.inf if rubs else 0.0), values[i].imag
         blocks.append((a, -b, b, a))
         columns.append((vectors[:, i].real, -vectors[:, i].imag))
     for i, k in zip(decaying[::2], decaying[1::2], strict=True):
-        blocks.append((min(values[i].real, 0.0), 0.0, 0.0, min(values[k].real, 0.0)))
+        most = math.inf if rubs else 0.0
+        blocks.append((min(values[i].real, most), 0.0, 0.0, min(values[k].real, most)))
         columns.append((vectors[:, i].real, vectors[:, k].real))
 
 

@@ -32,8 +32,8 @@ class JointModel(NamedTuple):
         As of ``JointRun``.
     shape : (m, n)
         Displacement of each joint per unit modal coordinate.
-    stiffness : (n,)
-        Squared natural angular frequencies [1/s^2].
+    stiffness : (n + f,)
+        Squared natural angular frequencies [1/s^2], and tangential springs of joints with friction [N/m].
     drive, level : (2, H, 2, n), float
         As of ``put_sets``.
     frequency : float
@@ -55,7 +55,7 @@ class JointModel(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def displacement_weights(stiffness, frequency):
-    """Weights (n,) of displacements in ``orthonormalise``; a rigid body counts as if it swung once a cycle."""
+    """Weights (n + f,) of displacements in ``orthonormalise``; a rigid body counts as if it swung once a cycle."""
     omega = 2.0 * np.pi * frequency
     return np.where(stiffness != 0.0, stiffness, omega * omega)
 
@@ -98,9 +98,9 @@ def advance_joint_machines(
 ):
     """Go on with those machines of ``which`` (k,) whose places are ``ahead``, to cycle ``until``, unless they fail.
 
-    ``speeds`` (k, cycles) [Hz]; ``vectors`` (N, 1, 2n) and ``growth`` (k, cycles, 1) are of deviations, as in
-    ``advance_varied_beams``, or none, (N, 0, 2n) and (k, cycles, 0). ``done``, ``outcome`` and ``needed`` (k,) are the
-    cycles that each has finished, its status, and with NEEDS_SET the number of the set.
+    ``speeds`` (k, cycles) [Hz]; ``vectors`` (N, 1, 2n + f) and ``growth`` (k, cycles, 1) are of deviations, as in
+    ``advance_varied_beams``, or none, (N, 0, 2n + f) and (k, cycles, 0). ``done``, ``outcome`` and ``needed`` (k,) are
+    the cycles that each has finished, its status, and with NEEDS_SET the number of the set.
     """
     for place in prange(ahead.shape[0]):
         k = ahead[place]

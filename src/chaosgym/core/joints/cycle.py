@@ -1,8 +1,9 @@
 r"""Exact motion of a few modes whose joints, any number, rattle between two surfaces each.
 
 Between contact events the machine is linear (``joints.tables``). A surface presses with N = k p + d p', p the
-penetration, while p and N are positive; beyond a surface that would pull, a joint is open like one in its gap. Sets of
-pressed surfaces have tables of their own. They are made outside, when a set is first visited: ``advance`` then stops
+penetration, while p and N are positive; beyond a surface that would pull, a joint is open like one in its gap. Friction
+sticks or slides (``joints.friction``). Sets of pressed surfaces, and of what friction does there, have tables of their
+own. They are made outside, when a set is first visited: ``advance`` then stops
 before the cycle with NEEDS_SET and tells which.
 
 From one event to the next the motion goes on by eight intervals, as long as proofs allow (``joints.events``). Where
@@ -26,6 +27,15 @@ from chaosgym.core.joints.events import (
     place_of,
     quiet_intervals,
     read_series,
+)
+from chaosgym.core.joints.friction import (
+    begin_friction,
+    change_friction,
+    note_deflections,
+    read_anchors,
+    touch_friction,
+    write_anchors,
+    write_deflections,
 )
 from chaosgym.core.joints.run import (
     JOINT,
@@ -56,7 +66,19 @@ from chaosgym.core.joints.run import (
     travel,
     write_samples,
 )
-from chaosgym.core.joints.tables import FROM, GENERATOR, HARMONICS, JOINTS, MODES, SHORTEST, STATES, TO, WIDTH
+from chaosgym.core.joints.tables import (
+    BLOCKS,
+    FROM,
+    GENERATOR,
+    HARMONICS,
+    JOINTS,
+    MODES,
+    SHORTEST,
+    SLIDERS,
+    STATES,
+    TO,
+    WIDTH,
+)
 from chaosgym.core.kernel import leaf, njit, part
 from chaosgym.core.lanes import LANES, add_columns
 from chaosgym.core.tangent import MAX_CONTRACTION, orthonormalise
@@ -84,15 +106,16 @@ def begin_cycle(run, state, arrays, cycle):
 
 @leaf
 def begin_state(run, state):
-    """Write a state at phase zero of the drive, and which surfaces press in it."""
-    own, first = run.own, run.at[STATE]
-    for i in range(state.shape[0]):
+    """Write a state at phase zero of the drive, which surfaces press in it, and what friction does there."""
+    own, first, states = run.own, run.at[STATE], 2 * run.at[MODES]
+    for i in range(states):
         own[first + i] = state[i]
     for h in range(run.at[HARMONICS]):
-        own[first + state.shape[0] + h], own[first + state.shape[0] + run.at[HARMONICS] + h] = 1.0, 0.0
+        own[first + states + h], own[first + states + run.at[HARMONICS] + h] = 1.0, 0.0
     for column in range(2 * run.at[JOINTS]):
         own[run.at[PEAKS] + column] = 0.0
     find_sides(run, state)
+    begin_friction(run, state)
 
 
 @part
@@ -106,9 +129,10 @@ def add_contact_time(run, span, contact_time):
 
 @leaf
 def carry(run, weights, row, elapsed, tangents, cycle):
-    """Advance deviations (k, 2n) by ``elapsed`` seconds in a set; see ``tangent.carry``."""
+    """Advance deviations (k, 2n + f) by ``elapsed`` seconds in a set; see ``tangent.carry``."""
     own, at, vectors = run.own, run.at, tangents.vectors
-    n, width, states, spare = at[MODES], at[WIDTH], 2 * at[MODES], at[SPARE]
+    n, width, states, spare, rubs = at[MODES], at[WIDTH], 2 * at[MODES], at[SPARE], at[SLIDERS] > 0
+    columns = 2 * at[BLOCKS] if rubs else states
     several = tangents.log_growth.shape[1] > 1
     pieces, steepest = 1, 0.0
     if several:
@@ -120,18 +144,22 @@ def carry(run, weights, row, elapsed, tangents, cycle):
         for k in range(vectors.shape[0]):
             for i in range(states):
                 own[at[STATE] + i] = vectors[k, i]
-            add_columns(run.tables, row + at[TO], 2 * width, states, own, at[STATE], own, spare, LANES)
+            if rubs:
+                write_anchors(run, vectors, k)
+            add_columns(run.tables, row + at[TO], 2 * width, columns, own, at[STATE], own, spare, LANES)
             travel(run, row, elapsed / pieces, spare, spare)
             add_columns(run.tables, row + at[FROM], at[STATES], 2 * width, own, spare, own, at[STATE], LANES)
             for i in range(states):
                 vectors[k, i] = own[at[STATE] + i]
+            if rubs:
+                read_anchors(run, spare + n + at[HARMONICS], vectors, k)
         if several:
             orthonormalise(weights, tangents, cycle)
 
 
 @leaf
 def touch(run, j, side, vectors):
-    """Saltation of deviations (k, 2n) at the touch of a surface: its damper acts at once, for each at its own time."""
+    """Saltation of deviations at the touch of a surface: its damper acts at once, for each at its own time."""
     own, n = run.own, run.at[MODES]
     shape, damping = run.at[SHAPES] + j * n, known(run, j, UPPER_DAMPER if side > 0.0 else LOWER_DAMPER)
     for k in range(vectors.shape[0]):
@@ -227,7 +255,10 @@ def run_cycle(run, rows, weights, bouncing, arrays, cycle, event_budget, tangent
             carry(run, weights, row, time - carried, tangents, cycle)
             carried = time
         leave(run, row)
-        own[at[JOINT] + changed * NUMBERS + SIDE] = towards
+        if changed < m:
+            own[at[JOINT] + changed * NUMBERS + SIDE] = towards
+        if at[SLIDERS] > 0:
+            change_friction(run, changed)
         code = pressed_set(run)
         row = rows[code]
         if row < 0:
@@ -236,6 +267,8 @@ def run_cycle(run, rows, weights, bouncing, arrays, cycle, event_budget, tangent
             which = UPPER if towards > 0.0 else LOWER
             arrays.impacts[cycle, 2 * changed + which] += 1
             note_touch(bouncing, m, changed, towards, time, bounce_time)
+            if carries and at[SLIDERS] > 0:
+                touch_friction(run, changed, towards, touches, instant, tangents.vectors)
             if carries and touches:
                 touch(run, changed, towards, tangents.vectors)
         enter(run, row)
@@ -244,6 +277,7 @@ def run_cycle(run, rows, weights, bouncing, arrays, cycle, event_budget, tangent
     if sample < history.shape[0]:
         write_samples(run, row, time, run.period, sample, history)
     leave(run, row)
+    note_deflections(run)
     arrays.events[cycle] = events
     for column in range(2 * m):
         arrays.peak_force[cycle, column] = own[at[PEAKS] + column]
@@ -260,7 +294,7 @@ def run_cycle(run, rows, weights, bouncing, arrays, cycle, event_budget, tangent
 
 @leaf
 def keep(vectors, kept):
-    """Copy deviations (k, 2n): an assignment of arrays would compile what it says of shapes that differ."""
+    """Copy deviations (k, 2n + f): an assignment of arrays would compile what it says of shapes that differ."""
     for k in range(vectors.shape[0]):
         for i in range(vectors.shape[1]):
             kept[k, i] = vectors[k, i]
@@ -268,11 +302,12 @@ def keep(vectors, kept):
 
 @njit(cache=True, nogil=True)
 def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, tangents):
-    """Advance ``state`` (2n,) and ``bouncing`` (3m,) in place by whole cycles, one for each row of ``arrays``.
+    """Advance ``state`` (2n + f,) and ``bouncing`` (3m,) in place by whole cycles, one for each row of ``arrays``.
 
     Every cycle starts at phase zero of the drive; ``tangents`` travel with the motion, and there may be none.
-    ``rows`` (radix^m,) tell where in the tables the row of each set of pressed surfaces begins, -1 where there is none
-    yet; ``weights`` (n,) are those of displacements in ``orthonormalise``.
+    ``rows`` (product of the digits of all joints,) tell where in the tables the row of each set of pressed surfaces
+    begins, -1 where there is none yet; ``weights`` (n + f,) are those of displacements and tangential springs in
+    ``orthonormalise``.
 
     Returns
     -------
@@ -290,7 +325,7 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
         begin_state(run, state)
         outcome, code = run_cycle(run, rows, weights, bouncing, arrays, cycle, event_budget, tangents)
         if outcome == status.OK:
-            for i in range(state.shape[0]):
+            for i in range(2 * run.at[MODES]):
                 if not math.isfinite(run.own[run.at[STATE] + i]):
                     outcome = status.DIVERGED
         if outcome != status.OK:
@@ -298,7 +333,8 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
                 bouncing[i] = bounced[i]
             keep(vectors, tangents.vectors)
             return outcome, cycle, code
-        for i in range(state.shape[0]):
+        for i in range(2 * run.at[MODES]):
             state[i] = run.own[run.at[STATE] + i]
+        write_deflections(run, state)
         let_pass(bouncing, run.at[JOINTS], run.period)
     return status.OK, arrays.section.shape[0], 0

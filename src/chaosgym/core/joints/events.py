@@ -43,7 +43,7 @@ from chaosgym.core.joints.run import (
     lag_of,
     spring_of,
 )
-from chaosgym.core.joints.tables import DEGREE, JOINTS, LEVELS, SHORTEST
+from chaosgym.core.joints.tables import CHANNELS, DEGREE, JOINTS, LONGEST, SHORTEST
 from chaosgym.core.kernel import leaf, part
 from chaosgym.core.lanes import LANES, add_tops, exponent, first_above, first_doubt, item, power_of_two
 from chaosgym.core.propagator import safe_time
@@ -64,7 +64,7 @@ NEAR_PEAK = 0.99
 
 @part
 def place_of(run, j):
-    """Where the reading of now of joint j lies."""
+    """Where the reading of now of channel j lies."""
     return run.at[READING] + j * READINGS + NOW
 
 
@@ -72,17 +72,19 @@ def place_of(run, j):
 def choose_level(run, row, most, left):
     """Level up to ``most`` at which intervals are longest, and their length.
 
-    The cubic through the ends of one is near enough to what each joint reads, and four intervals fit into what is
+    The cubic through the ends of one is near enough to what each channel reads, and four intervals fit into what is
     ``left`` of the cycle, unless it is level 0.
     """
     own, at, h, times = run.own, run.at, run.tables[row + SHORTEST], math.inf
     shortest4 = VALUE_DOUBT * h * h * h * h
-    for j in range(at[JOINTS]):
+    for j in range(at[CHANNELS]):
         if known(run, j, AWAKE) == 0.0:
             continue
         reading, side = item(own, place_of(run, j)), known(run, j, SIDE)
         if side == 0.0:
             room = GAP_DOUBT * min(known(run, j, UPPER_GAP) - reading, reading + known(run, j, LOWER_GAP))
+        elif j >= at[JOINTS]:
+            room = GAP_DOUBT * (side * reading - gap_of(run, j, side))
         else:
             largest = item(own, at[PEAKS] + 2 * j + (UPPER if side > 0.0 else LOWER)) / spring_of(run, j, side)
             room = CONTACT_DOUBT * max(largest, side * reading - gap_of(run, j, side))
@@ -90,15 +92,15 @@ def choose_level(run, row, most, left):
     # an interval twice as long has sixteen times the error
     if not (times >= 16.0 and left >= 8.0 * h):
         return np.int64(0), h
-    level = min(min(most, at[LEVELS] - 1), min(exponent(times) // 4, exponent(left / h) - 2))
+    level = min(min(most, int(run.tables[row + LONGEST])), min(exponent(times) // 4, exponent(left / h) - 2))
     return level, h * power_of_two(level)
 
 
 @part
 def quiet_intervals(run, row, h, count):
-    """Number of intervals, up to ``count``, in which surely no contact changes."""
+    """Number of intervals, up to ``count``, in which surely no contact and no friction changes."""
     own, h4 = run.own, VALUE_DOUBT * h * h * h * h
-    for j in range(run.at[JOINTS]):
+    for j in range(run.at[CHANNELS]):
         if known(run, j, AWAKE) == 0.0:
             continue
         side, place = known(run, j, SIDE), place_of(run, j)
@@ -196,8 +198,8 @@ def note_crests(run, row, h, expanded):
 
 @leaf
 def read_series(run, time):
-    """Write what every joint that is awake reads at a time of its series as its reading after one interval."""
-    for j in range(run.at[JOINTS]):
+    """Write what every channel that is awake reads at a time of its series as its reading after one interval."""
+    for j in range(run.at[CHANNELS]):
         if known(run, j, AWAKE) != 0.0:
             side, place = known(run, j, SIDE), place_of(run, j) + 1
             y, v, a, _ = reading_at(run.own, run.at[SERIES] + j * (DEGREE + 1), 1, DEGREE, time)
@@ -207,14 +209,14 @@ def read_series(run, time):
 
 @leaf
 def first_change(run, row, h, expanded, tolerance):
-    """(Joint or -1, its new side, instant, ``expanded``) of the first change of contact within h.
+    """(Channel or -1, its new side, instant, ``expanded``) of the first change of contact or friction within h.
 
     The readings of now and after one interval are those at both ends. Series of the joints are made where they are
     needed, if they are not ``expanded``.
     """
     own, at = run.own, run.at
     first, towards, instant = np.int64(-1), 0.0, h
-    for j in range(at[JOINTS]):
+    for j in range(at[CHANNELS]):
         if known(run, j, AWAKE) == 0.0:
             continue
         place, series, side = place_of(run, j), at[SERIES] + j * (DEGREE + 1), known(run, j, SIDE)

@@ -10,6 +10,7 @@ from chaosgym.core.joints.tables import (
     BENDS,
     BLOCKS,
     BOUNDS,
+    CHANNELS,
     CONSTANTS,
     DEGREE,
     DRIFTING,
@@ -26,6 +27,7 @@ from chaosgym.core.joints.tables import (
     PLACES,
     SHORTEST,
     SIZES,
+    SLIDERS,
     STATES,
     TAYLOR,
     TO,
@@ -52,7 +54,8 @@ from chaosgym.core.lanes import (
 from chaosgym.core.propagator import exponential
 
 UPPER_GAP, LOWER_GAP, UPPER_STIFFNESS, LOWER_STIFFNESS, UPPER_LAG, LOWER_LAG = range(6)
-"""Numbers of a joint: distance [m] of its surfaces from where it rests; spring [N/m]; damper over spring [s]."""
+"""Numbers of a channel: distance [m] of its surfaces from where it rests; spring [N/m]; damper over spring [s]. Those
+of friction read newtons or metres a second and have one surface; their SIDE is 0 while they have nothing to read."""
 
 SIDE, AWAKE, BASE, READING_REST, FOURTH, READING_BEND, READING_FOURTH = range(6, 13)
 """More of them: the surface that presses, +1 or -1, or 0; 1 unless the joint surely reaches no surface in this set;
@@ -69,6 +72,9 @@ RATE, READING_RATE, ROUNDED = 17, 17 + POWERS, 17 + 2 * POWERS
 """And last: what the drift adds to displacement and reading, by powers of time from the first on; how much of the
 displacement [m] is rounding of what it is the sum of."""
 
+MODE = 18 + 2 * POWERS
+"""What friction of a joint does while a surface presses, as a digit: STICKS, SLIDES_UP, SLIDES_DOWN; 1 without it."""
+
 NUMBERS = 32
 
 READINGS = 4 * LANES
@@ -76,12 +82,19 @@ READINGS = 4 * LANES
 
 NOW, RATES = np.int64(LANES - 1), 2 * LANES
 
-U, SPARE, STATE, JOINT, READING, SERIES, TOTALS, PEAKS, SHAPES, DRIFT, OWN, RADIX = range(PLACES, PLACES + 12)
+U, SPARE, STATE, JOINT, READING, SERIES, TOTALS, PEAKS, SHAPES, DRIFT, SLIDER, SLIPS, OWN, RADIX = range(
+    PLACES, PLACES + 14
+)
 """Where coordinates and the constants after them, room for others, the state with what follows it, ``NUMBERS`` and
-``READINGS`` of the joints, their Taylor series, room for eight numbers, the largest forces of the cycle (2m,), the
-displacements of the joints per unit modal coordinate (m, n) and the drift (POWERS, 2L) begin in ``own``; its length.
-RADIX is where in ``at`` the digits of a joint in the number of a set begin: 3 where its surfaces differ in spring or
-damper, else 2."""
+``READINGS`` of the channels, their Taylor series, room for eight numbers, the largest forces of the cycle (2m,), the
+displacements of the joints per unit modal coordinate (m, n), the drift (POWERS, 2L), ``OF_SLIDER`` numbers of each
+friction and its tangential displacement (f, n) begin in ``own``; its length. RADIX is where in ``at`` the digits of a
+joint in the number of a set begin: one for none, and for each surface that differs 1, or as many as friction has modes;
+behind them the joint of each friction (f,), and the friction of each joint, -1 for none, (m,)."""
+
+FRICTION, UPPER_TANGENTIAL, LOWER_TANGENTIAL, SLIDING_SPEED, DEFLECTION, OF_SLIDER = range(6)
+"""Numbers of friction: its coefficient; tangential spring [N/m] of each surface; speed of the surfaces [m/s];
+deflection of the spring at the end of a cycle [m]."""
 
 
 class JointRun(NamedTuple):
@@ -109,34 +122,45 @@ class JointRun(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def work_space(layout, radix):
-    """``JointRun.at``, the ``layout`` (PLACES,) of a row and then that of the work space; ``radix`` (m,)."""
-    at = np.zeros(RADIX + radix.shape[0], np.int64)
+def work_space(layout, radix, rubbed):
+    """``JointRun.at``, the ``layout`` (PLACES,) of a row and then that of the work space.
+
+    ``radix`` (m,) are the digits of each joint, ``rubbed`` (f,) the joints with friction.
+    """
+    sliders = rubbed.shape[0]
+    at = np.zeros(RADIX + 2 * radix.shape[0] + sliders, np.int64)
     for i in range(PLACES):
         at[i] = layout[i]
     for j in range(radix.shape[0]):
         at[RADIX + j] = radix[j]
-    m, width = at[JOINTS], 2 * at[WIDTH]
+        at[RADIX + radix.shape[0] + sliders + j] = -1
+    for c in range(sliders):
+        at[RADIX + radix.shape[0] + c] = rubbed[c]
+        at[RADIX + radix.shape[0] + sliders + rubbed[c]] = c
+    m, channels, width = at[JOINTS], at[CHANNELS], 2 * at[WIDTH]
     at[U] = 0
     at[SPARE] = width + padded(1 + m)
     at[STATE] = 2 * at[SPARE]
-    at[JOINT] = at[STATE] + at[STATES] + padded(2 * at[HARMONICS] + 1 + m)
-    at[READING] = at[JOINT] + NUMBERS * m
-    at[SERIES] = at[READING] + READINGS * m
-    at[TOTALS] = at[SERIES] + (DEGREE + 1) * m
+    at[JOINT] = at[STATE] + at[STATES] + padded(2 * (at[HARMONICS] + sliders) + 1 + m)
+    at[READING] = at[JOINT] + NUMBERS * channels
+    at[SERIES] = at[READING] + READINGS * channels
+    at[TOTALS] = at[SERIES] + (DEGREE + 1) * channels
     at[PEAKS] = at[TOTALS] + LANES
     at[SHAPES] = at[PEAKS] + padded(2 * m)
     at[DRIFT] = at[SHAPES] + padded(m * at[MODES])
-    at[OWN] = at[DRIFT] + POWERS * width
+    at[SLIDER] = at[DRIFT] + POWERS * width
+    at[SLIPS] = at[SLIDER] + padded(OF_SLIDER * sliders)
+    at[OWN] = at[SLIPS] + padded(sliders * at[MODES])
     return at
 
 
 @njit(cache=True, nogil=True)
-def new_space(at, shape, stops, stiffness, damping):
+def new_space(at, shape, stops, stiffness, damping, slip, friction):
     """``JointRun.own``, with what is known of the joints whatever presses.
 
     ``shape`` (m, n) is the displacement of each joint per unit modal coordinate; ``stops``, ``stiffness`` and
-    ``damping`` (m, 2) are position [m], spring and damper of its upper and lower surface.
+    ``damping`` (m, 2) are position [m], spring and damper of its upper and lower surface. ``slip`` (f, n) and
+    ``friction`` (f, 4) are the tangential displacements of joints with friction and the first numbers of ``OF_SLIDER``.
     """
     own = aligned(at[OWN])
     m, n = shape.shape
@@ -149,12 +173,18 @@ def new_space(at, shape, stops, stiffness, damping):
             own[first + UPPER_LAG + which] = damping[j, which] / stiffness[j, which]
         for i in range(n):
             own[at[SHAPES] + j * n + i] = shape[j, i]
+        own[first + MODE] = 1.0
+    for c in range(slip.shape[0]):
+        for k in range(friction.shape[1]):
+            own[at[SLIDER] + c * OF_SLIDER + k] = friction[c, k]
+        for i in range(n):
+            own[at[SLIPS] + c * n + i] = slip[c, i]
     return own
 
 
 @part
 def known(run, j, which):
-    """One of the ``NUMBERS`` of joint j."""
+    """One of the ``NUMBERS`` of channel j."""
     return item(run.own, run.at[JOINT] + j * NUMBERS + which)
 
 
@@ -212,21 +242,24 @@ def pressed_set(run):
     """Number of the set of surfaces that press: a digit for each joint."""
     code, place = 0, 1
     for j in range(run.at[JOINTS]):
-        side = known(run, j, SIDE)
-        if side > 0.0:
-            code += place
-        elif side < 0.0:
-            code += place * (run.at[RADIX + j] - 1)
-        place *= run.at[RADIX + j]
+        side, radix = known(run, j, SIDE), run.at[RADIX + j]
+        if side != 0.0:
+            # digits of the lower surface are the last ones; radix 4 and 7 are those of friction
+            modes = 3 if radix > 3 else 1
+            code += place * (int(known(run, j, MODE)) + (radix - 1 - modes if side < 0.0 else 0))
+        place *= radix
     return code
 
 
 @leaf
 def enter(run, row):
-    """Set u, and what is known of the joints, to the state in a set; the state is followed by cosines and sines."""
+    """Set u, and what is known of the channels, to the state in a set.
+
+    The state is followed by cosines and sines, anchors and their speeds.
+    """
     own, at, tables = run.own, run.at, run.tables
-    n, harmonics, m, width = at[MODES], at[HARMONICS], at[JOINTS], 2 * at[WIDTH]
-    more = at[STATE] + 2 * n + 2 * harmonics
+    m, width = at[JOINTS], 2 * at[WIDTH]
+    more = at[STATE] + 2 * at[BLOCKS]
     own[more] = 1.0
     for j in range(m):
         side = known(run, j, SIDE)
@@ -236,7 +269,7 @@ def enter(run, row):
         own[at[U] + width + c] = own[more + c]
     if tables[row + DRIFTING] != 0.0:
         _begin_drift(run, row)
-    for j in range(m):
+    for j in range(at[CHANNELS]):
         _settle(run, row, j)
 
 
@@ -260,7 +293,7 @@ def _begin_drift(run, row):
 
 @leaf
 def _settle(run, row, j):
-    """Write the numbers of joint j that depend on the set; u and the positions of the pressed surfaces are known."""
+    """Write the numbers of channel j that depend on the set; u and the positions of the pressed surfaces are known."""
     own, at, tables = run.own, run.at, run.tables
     m, width, first = at[JOINTS], 2 * at[WIDTH], at[JOINT] + j * NUMBERS
     more, side, rest = at[U] + width, known(run, j, SIDE), 0.0
@@ -272,8 +305,11 @@ def _settle(run, row, j):
         own[first + BASE] = rest
     else:
         own[first + (UPPER_GAP if side > 0.0 else LOWER_GAP)] = -side * rest
-        own[first + BASE] = own[more + 1 + j] + rest
+        own[first + BASE] = rest if j >= m else own[more + 1 + j] + rest
     own[first + AWAKE] = 1.0
+    if j >= m and side == 0.0:
+        own[first + AWAKE] = 0.0
+        return
     reach = dot_of_sizes(tables, row + at[SIZES] + j * width, own, at[U], width)
     own[first + ROUNDED] = ROUNDING * (reach + abs(own[first + BASE]))
     if tables[row + DRIFTING] != 0.0:
@@ -281,13 +317,14 @@ def _settle(run, row, j):
         return
     own[first + READING_REST] = own[first + READING_BEND] = own[first + READING_FOURTH] = 0.0
     own[first + RATE] = own[first + READING_RATE] = 0.0
-    if side == 0.0 and reach < own[first + UPPER_GAP] and reach < own[first + LOWER_GAP]:
+    # friction may let a motion grow, and moves the anchors
+    if side == 0.0 and at[SLIDERS] == 0 and reach < own[first + UPPER_GAP] and reach < own[first + LOWER_GAP]:
         own[first + AWAKE] = 0.0
 
 
 @leaf
 def _show_drift(run, row, j):
-    """Write what the drift adds to displacement and reading of joint j, and to the reading's bounds for a cycle."""
+    """Write what the drift adds to displacement and reading of channel j, and to the reading's bounds for a cycle."""
     own, at, first = run.own, run.at, run.at[JOINT] + j * NUMBERS
     width, side = 2 * at[WIDTH], known(run, j, SIDE)
     lag = 0.0 if side == 0.0 else lag_of(run, j, side)
@@ -310,22 +347,26 @@ def _show_drift(run, row, j):
 
 @leaf
 def leave(run, row):
-    """Write the state of u in a set, cosines and sines behind it."""
+    """Write the state of u in a set, cosines and sines, anchors and their speeds behind it."""
     own, at = run.own, run.at
-    n, harmonics, width = at[MODES], at[HARMONICS], at[WIDTH]
+    n, harmonics, sliders, width = at[MODES], at[HARMONICS], at[SLIDERS], at[WIDTH]
     count = 2 * width + 1 + at[JOINTS]
     add_columns(run.tables, row + at[FROM], at[STATES], count, own, at[U], own, at[STATE], LANES)
     for h in range(harmonics):
         own[at[STATE] + 2 * n + h] = own[at[U] + n + h]
         own[at[STATE] + 2 * n + harmonics + h] = own[at[U] + width + n + h]
+    anchors = at[STATE] + 2 * (n + harmonics)
+    for c in range(sliders):
+        own[anchors + c] = own[at[U] + n + harmonics + c]
+        own[anchors + sliders + c] = own[at[U] + width + n + harmonics + c]
 
 
 @leaf
 def read_now(run, row):
-    """Write what every joint that is awake reads in u."""
+    """Write what every channel that is awake reads in u."""
     own, at = run.own, run.at
     width = 2 * at[WIDTH]
-    for j in range(at[JOINTS]):
+    for j in range(at[CHANNELS]):
         if known(run, j, AWAKE) == 0.0:
             continue
         rows, place = row + at[NOW_ROWS] + 4 * j * width, at[READING] + j * READINGS + NOW
@@ -335,13 +376,14 @@ def read_now(run, row):
 
 @part
 def look(run, row, level, h):
-    """Write what every joint that is awake reads after 1 to 8 intervals of a level, of length h."""
+    """Write what every channel that is awake reads after 1 to 8 intervals of a level, of length h."""
     own, at = run.own, run.at
-    blocks, m = at[BLOCKS], at[JOINTS]
-    for j in range(m):
+    blocks, channels = at[BLOCKS], at[CHANNELS]
+    for j in range(channels):
         if known(run, j, AWAKE) == 0.0:
             continue
-        ahead, place = row + at[AHEAD] + (level * m + j) * 4 * blocks * LANES, at[READING] + j * READINGS + NOW + 1
+        ahead = row + at[AHEAD] + (level * channels + j) * 4 * blocks * LANES
+        place = at[READING] + j * READINGS + NOW + 1
         sample(run.tables, ahead, own, at[U], blocks, at[WIDTH], place, place + RATES)
         if run.tables[row + DRIFTING] != 0.0:
             _add_drift_ahead(own, at[JOINT] + j * NUMBERS, h, place)
@@ -363,10 +405,10 @@ def _add_drift_ahead(own, first, h, place):
 
 @part
 def bound_fourth(run, row):
-    """Write bounds of the fourth derivatives of what the joints read, from now on."""
+    """Write bounds of the fourth derivatives of what the channels read, from now on."""
     own, at = run.own, run.at
     width = 2 * at[WIDTH]
-    for j in range(at[JOINTS]):
+    for j in range(at[CHANNELS]):
         if known(run, j, AWAKE) != 0.0:
             bound = dot_of_sizes(run.tables, row + at[BOUNDS] + j * width, own, at[U], width)
             put(own, at[JOINT] + j * NUMBERS + FOURTH, bound + known(run, j, READING_FOURTH))
@@ -374,7 +416,7 @@ def bound_fourth(run, row):
 
 @leaf
 def bound_second(tables, own, at, row, j):
-    """Bound of the second derivative of what joint j reads, from now on."""
+    """Bound of the second derivative of what channel j reads, from now on."""
     width = 2 * at[WIDTH]
     bend = own[at[JOINT] + j * NUMBERS + READING_BEND]
     return dot_of_sizes(tables, row + at[BENDS] + j * width, own, at[U], width) + bend
@@ -382,9 +424,9 @@ def bound_second(tables, own, at, row, j):
 
 @part
 def read_after(run, intervals):
-    """Take over what the joints read after some intervals of a look as what they read now."""
+    """Take over what the channels read after some intervals of a look as what they read now."""
     own = run.own
-    for j in range(run.at[JOINTS]):
+    for j in range(run.at[CHANNELS]):
         place = run.at[READING] + j * READINGS + NOW
         put(own, place, item(own, place + intervals))
         put(own, place + RATES, item(own, place + RATES + intervals))
@@ -399,9 +441,9 @@ def add_drift(run, row, time, out):
 
 @part
 def read_next(run, intervals):
-    """Take over what the joints read one interval later as what they read after one."""
+    """Take over what the channels read one interval later as what they read after one."""
     own = run.own
-    for j in range(run.at[JOINTS]):
+    for j in range(run.at[CHANNELS]):
         place = run.at[READING] + j * READINGS + NOW + 1
         put(own, place, item(own, place + intervals))
         put(own, place + RATES, item(own, place + RATES + intervals))
@@ -455,10 +497,10 @@ def travel(run, row, time, u, out):
 
 @leaf
 def expand(run, row):
-    """Write the Taylor series of the displacement of every joint that is awake, from where it rests, of time in s."""
+    """Write the Taylor series of the displacement of every channel that is awake, from where it rests, of time in s."""
     own, at = run.own, run.at
     blocks = at[BLOCKS]
-    for j in range(at[JOINTS]):
+    for j in range(at[CHANNELS]):
         if known(run, j, AWAKE) == 0.0:
             continue
         series, first = at[SERIES] + j * (DEGREE + 1), row + at[TAYLOR] + 4 * j * blocks * LANES

@@ -8,11 +8,20 @@ of which is a block that turns at its own rate. Hence
                    e_j = y_j + lag_j y_j'           its reading; lag = damper / spring of a pressed surface, else 0
 
 and e_j at instants ahead, its Taylor series and a bound of its fourth derivative for all time to come are sums over u.
+
+A joint with friction adds a block, the displacement a of the anchor of its tangential spring, which moves at constant
+speed, and two channels that read what must stay positive while it goes on sticking or sliding (``joints.friction``):
+
+    E = alpha e_j + beta (w_j - a_j)     or E',     w_j the tangential displacement
+
+Friction of a sliding joint may feed energy from one mode to another: bounds then hold for the eight intervals ahead.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 
 from chaosgym.core.kernel import leaf, njit
 from chaosgym.core.lanes import LANES, padded
@@ -34,64 +43,100 @@ DEGREE = 15
 Y, V, E, E_RATE = 0, 1, 2, 3
 """Rows of ``NOW_ROWS``: displacement, velocity, reading and its rate."""
 
-MODES, HARMONICS, JOINTS, BLOCKS, WIDTH, STATES, LEVELS = range(7)
-"""Sizes: n, H, m, N = n + H, L = N padded, 2n padded, lengths of an interval (shortest 2^level)."""
+MODES, HARMONICS, JOINTS, BLOCKS, WIDTH, STATES, LEVELS, SLIDERS, CHANNELS = range(9)
+"""Sizes: n, H, m, N = n + H + f, L = N padded, 2n padded, lengths of an interval (shortest 2^level), f joints with
+friction, m + 2f channels."""
 
-AHEAD, TURN, FINER, GENERATOR, TAYLOR, NOW_ROWS, BOUNDS, BENDS, SIZES, FROM, TO, CONSTANTS, DRIFTS, ROW = range(7, 21)
+AHEAD, TURN, FINER, GENERATOR, TAYLOR, NOW_ROWS, BOUNDS, BENDS, SIZES, FROM, TO, CONSTANTS, DRIFTS, ROW = range(9, 23)
 """Where the tables of a set begin in its row of numbers, and how long the row is; see ``layout``."""
 
-SHORTEST, DRIFTING, ALWAYS_DRIFTING = 0, 1, 2
+SHORTEST, DRIFTING, ALWAYS_DRIFTING, LONGEST = range(4)
 """Numbers at the beginning of a row: the shortest interval [s]; 1 if a coordinate may drift, else 0, under the drive
-and whatever the drive."""
+and whatever the drive; the highest level of an interval."""
 
-PLACES = 21
+MOST_GROWTH = 1.0
+"""Logarithm of the growth of a coordinate over eight intervals of the highest level, unless that is the shortest."""
+
+PLACES = 23
+
+
+class Rubs(NamedTuple):
+    """Friction in a set of pressed surfaces: f joints, and two channels of each; see ``joints.friction``.
+
+    Attributes
+    ----------
+    joint : (f,)
+        Number of the joint that rubs.
+    shape : (f, n)
+        Tangential displacement per unit modal coordinate.
+    follow : (2n, 2f)
+        What the modal coordinates follow per unit displacement of each anchor, and per unit speed.
+    weight : (2f, 2)
+        alpha, beta of each channel; zeros of one that has nothing to read.
+    rate : (2f,)
+        1 where a channel reads E', 0 where it reads E.
+    """
+
+    joint: np.ndarray
+    shape: np.ndarray
+    follow: np.ndarray
+    weight: np.ndarray
+    rate: np.ndarray
+
+
+@register_jitable
+def no_rubs(n):
+    """Return what rubs where no joint of a machine of n modes has friction: nothing."""
+    return Rubs(np.empty(0), np.empty((0, n)), np.empty((2 * n, 0)), np.empty((0, 2)), np.empty(0))
 
 
 @njit(cache=True)
-def layout(n, harmonics, m, levels):
+def layout(n, harmonics, m, sliders, levels):
     """Sizes, and where the tables of a set begin in their row.
 
-    AHEAD (levels, m, 2, 2, N, 8)
-        Reading and its rate after 1 to 8 intervals: [joint, quantity, coordinate of the block, block].
+    AHEAD (levels, c, 2, 2, N, 8)
+        Reading and its rate after 1 to 8 intervals: [channel, quantity, coordinate of the block, block].
     TURN (levels, 8, 4, L), FINER (FINE + 1, 4, L), GENERATOR (4, L)
         Blocks of exp(B t) after 1 to 8 intervals, within the shortest interval, and B.
-    TAYLOR (m, 2, 2, N, 8)
-        Taylor coefficients of the displacement, of time in seconds: [joint, half, coordinate, block].
-    NOW_ROWS (m, 4, 2L), BOUNDS (m, 2L), BENDS (m, 2L), SIZES (m, 2L)
-        What a joint shows; bounds of the reading's fourth and second derivative, and of the displacement.
+    TAYLOR (c, 2, 2, N, 8)
+        Taylor coefficients of the displacement, of time in seconds: [channel, half, coordinate, block].
+    NOW_ROWS (c, 4, 2L), BOUNDS (c, 2L), BENDS (c, 2L), SIZES (c, 2L)
+        What a channel shows; bounds of the reading's fourth and second derivative, and of the displacement. The first m
+        channels are the joints; the displacement of others is what they read.
     FROM (2L + 1 + m, 2n padded)
         State (q, q') by columns of u, of 1 and of the positions of the pressed surfaces.
-    TO (2n + 2H + 1 + m, 2L)
-        u by columns of state, cosines, sines, 1 and positions.
-    CONSTANTS (m, 1 + m)
+    TO (2n + 2H + 2f + 1 + m, 2L)
+        u by columns of state, cosines, sines, anchors, their speeds, 1 and positions.
+    CONSTANTS (c, 1 + m)
         Reading at rest, from the surface where one presses, per 1 and position.
     DRIFTS (1 + m, 2L)
         Rate of the coordinates without a position of rest, likewise.
     """
     at = np.zeros(PLACES, np.int64)
-    blocks = n + harmonics
+    blocks, channels = n + harmonics + sliders, m + 2 * sliders
     width, states, more = padded(blocks), padded(2 * n), 1 + m
     at[MODES], at[HARMONICS], at[JOINTS], at[BLOCKS] = n, harmonics, m, blocks
     at[WIDTH], at[STATES], at[LEVELS] = width, states, levels
+    at[SLIDERS], at[CHANNELS] = sliders, channels
     at[AHEAD] = LANES
-    at[TURN] = at[AHEAD] + levels * m * 4 * blocks * LANES
+    at[TURN] = at[AHEAD] + levels * channels * 4 * blocks * LANES
     at[FINER] = at[TURN] + levels * LANES * 4 * width
     at[GENERATOR] = at[FINER] + (FINE + 1) * 4 * width
     at[TAYLOR] = at[GENERATOR] + 4 * width
-    at[NOW_ROWS] = at[TAYLOR] + m * 4 * blocks * LANES
-    at[BOUNDS] = at[NOW_ROWS] + m * 8 * width
-    at[BENDS] = at[BOUNDS] + m * 2 * width
-    at[SIZES] = at[BENDS] + m * 2 * width
-    at[FROM] = at[SIZES] + m * 2 * width
+    at[NOW_ROWS] = at[TAYLOR] + channels * 4 * blocks * LANES
+    at[BOUNDS] = at[NOW_ROWS] + channels * 8 * width
+    at[BENDS] = at[BOUNDS] + channels * 2 * width
+    at[SIZES] = at[BENDS] + channels * 2 * width
+    at[FROM] = at[SIZES] + channels * 2 * width
     at[TO] = at[FROM] + (2 * width + more) * states
     at[CONSTANTS] = at[TO] + (2 * blocks + more) * 2 * width
-    at[DRIFTS] = at[CONSTANTS] + padded(m * more)
+    at[DRIFTS] = at[CONSTANTS] + padded(channels * more)
     at[ROW] = at[DRIFTS] + more * 2 * width
     return at
 
 
 @njit(cache=True, nogil=True)
-def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, rest, drift, constants, values):
+def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, rest, drift, constants, rubs, values):
     """Fill a row (at[ROW],) of zeros with what depends on neither drive nor constant force.
 
     Parameters
@@ -108,28 +153,46 @@ def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, res
         Shortest interval [s].
     rest, drift : (m, 2n)
         Of the modal coordinates, per unit position of each pressed surface.
-    constants : (m, m)
+    constants : (m + 2f, m)
         As in ``layout``, without the column of 1.
+    rubs
+        What rubs in this set.
     """
     n, m, width, states = at[MODES], at[JOINTS], at[WIDTH], at[STATES]
-    values[SHORTEST], values[ALWAYS_DRIFTING] = shortest, 0.0
+    harmonics, sliders = at[HARMONICS], at[SLIDERS]
+    values[SHORTEST], values[ALWAYS_DRIFTING], values[LONGEST] = shortest, 0.0, at[LEVELS] - 1
     for j in range(m):
         for i in range(2 * n):
             if drift[j, i] != 0.0:
                 values[ALWAYS_DRIFTING] = 1.0
+    growth = 0.0
     for j in range(n):
         if generator[1, j] != 0.0 and generator[2, j] == 0.0:
             values[ALWAYS_DRIFTING] = 1.0
+        growth = max(growth, max(generator[0, j], generator[3, j]))
+    longest = LANES * shortest
+    if growth > 0.0:
+        while values[LONGEST] > 0.0 and growth * math.ldexp(longest, int(values[LONGEST])) > MOST_GROWTH:
+            values[LONGEST] -= 1.0
+        growth *= math.ldexp(longest, int(values[LONGEST]))
     _put_blocks(at, generator, shortest, np.int64(0), at[LEVELS], values)
-    rows, reading = np.empty((DEGREE + 1, 2 * n)), np.empty((5, 2 * n))
+    shown, strain = np.empty((m, 2 * n)), np.empty((sliders, 2 * n))
     for j in range(m):
-        moved = shape[j] @ np.ascontiguousarray(from_modal[:n])
-        for i in range(2 * n):
-            rows[0, i] = moved[i]
-        for p in range(DEGREE):
-            derivative(generator, rows[p], rows[p + 1])
-        _read(rows, lag[j], reading)
-        _put_joint(at, generator, rows, reading, j, np.int64(0), at[LEVELS], values)
+        shown[j] = shape[j] @ np.ascontiguousarray(from_modal[:n])
+    for c in range(sliders):
+        strain[c] = rubs.shape[c] @ np.ascontiguousarray(from_modal[:n])
+    _put_channels(at, generator, shown, lag, strain, rubs, np.int64(0), at[LEVELS], math.exp(growth), values)
+    if sliders > 0:
+        anchors = np.zeros((4, sliders))
+        anchors[1] = 1.0
+        _put_blocks(at, anchors, shortest, n + harmonics, at[LEVELS], values)
+        back = from_modal @ rubs.follow
+        shown, strain = shape @ np.ascontiguousarray(back[:n]), rubs.shape @ np.ascontiguousarray(back[:n])
+        for c in range(sliders):
+            strain[c, c] -= 1.0
+        _put_channels(at, anchors, shown, lag, strain, rubs, n + harmonics, at[LEVELS], 1.0, values)
+        for c in range(2 * sliders):
+            _put_forced(at, back[:, c], rubs.follow[:, c], c, sliders, harmonics, 2 * harmonics, values)
     resting = from_modal @ np.ascontiguousarray(rest.T)
     for i in range(2 * n):
         for c in range(2 * n):
@@ -139,13 +202,13 @@ def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, res
             values[at[FROM] + (2 * width + 1 + j) * states + i] = resting[i, j]
             values[at[TO] + (2 * at[BLOCKS] + 1 + j) * 2 * width + (i // n) * width + i % n] = -rest[j, i]
             values[at[DRIFTS] + (1 + j) * 2 * width + (i // n) * width + i % n] = drift[j, i]
-    for j in range(m):
+    for j in range(at[CHANNELS]):
         for k in range(m):
             values[at[CONSTANTS] + j * (1 + m) + 1 + k] = constants[j, k]
 
 
 @njit(cache=True, nogil=True)
-def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, rest, load, values):
+def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, rest, load, rubs, values):
     """Write into a row by ``put_structure`` a drive (H, 2, n) at ``omega`` [rad/s] and a constant force.
 
     They take the place of others. ``drive`` are modal forces that go with cosine and sine of each harmonic; ``rest``,
@@ -170,42 +233,71 @@ def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, res
             steady[i, h], steady[i, harmonics + h] = response[i, 0], response[i, 1]
     _put_blocks(at, turning, shortest, n, levels, values)
     back = from_modal @ steady
-    rows, reading = np.empty((DEGREE + 1, 2 * harmonics)), np.empty((5, 2 * harmonics))
-    resting, settling = np.zeros(2 * n), np.zeros(2 * n)
+    resting, settling, drifting = np.zeros(2 * n), np.zeros(2 * n), np.zeros(2 * n)
     values[DRIFTING] = values[ALWAYS_DRIFTING]
     for i in range(2 * n):
         lane = at[DRIFTS] + (i // n) * width + i % n
         values[lane] = 0.0
         if _is_slow(generator, i, period):
-            values[lane] = load[i]
+            drifting[i] = values[lane] = load[i]
             values[DRIFTING] = 1.0 if load[i] != 0.0 else values[DRIFTING]
         else:
             settling[i] = rest[i]
     for i in range(2 * n):
         for c in range(2 * n):
             resting[i] += from_modal[i, c] * settling[c]
+    shown, strain = np.empty((at[JOINTS], 2 * harmonics)), np.empty((at[SLIDERS], 2 * harmonics))
     for j in range(at[JOINTS]):
         for c in range(2 * harmonics):
-            rows[0, c] = 0.0
+            shown[j, c] = 0.0
             for i in range(n):
-                rows[0, c] += shape[j, i] * back[i, c]
-        for p in range(DEGREE):
-            derivative(turning, rows[p], rows[p + 1])
-        _read(rows, lag[j], reading)
-        _put_joint(at, turning, rows, reading, j, n, levels, values)
+                shown[j, c] += shape[j, i] * back[i, c]
         values[at[CONSTANTS] + j * (1 + at[JOINTS])] = 0.0
         for i in range(n):
             values[at[CONSTANTS] + j * (1 + at[JOINTS])] += shape[j, i] * resting[i]
+    for s in range(at[SLIDERS]):
+        strain[s] = rubs.shape[s] @ np.ascontiguousarray(back[:n])
+    _put_channels(at, turning, shown, lag, strain, rubs, n, levels, 1.0, values)
+    for k in range(2 * at[SLIDERS]):
+        reading, slid = np.sum(shape[int(rubs.joint[k // 2])] * resting[:n]), np.sum(rubs.shape[k // 2] * resting[:n])
+        constant = read_at_rest(generator, from_modal, shape, lag, rubs, k, reading, slid, drifting)
+        values[at[CONSTANTS] + (at[JOINTS] + k) * (1 + at[JOINTS])] = constant
+    for c in range(2 * harmonics):
+        _put_forced(at, back[:, c], steady[:, c], c, harmonics, np.int64(0), np.int64(0), values)
     for i in range(2 * n):
-        for c in range(2 * harmonics):
-            lane = (c // harmonics) * width + n + c % harmonics
-            values[at[FROM] + lane * states + i] = back[i, c]
-            values[at[TO] + (2 * n + c) * 2 * width + (i // n) * width + i % n] = -steady[i, c]
         values[at[FROM] + 2 * width * states + i] = resting[i]
         values[at[TO] + 2 * at[BLOCKS] * 2 * width + (i // n) * width + i % n] = -settling[i]
-    for c in range(2 * harmonics):
-        lane = (c // harmonics) * width + n + c % harmonics
-        values[at[TO] + (2 * n + c) * 2 * width + lane] = 1.0
+
+
+@leaf
+def _put_forced(at, back, steady, c, group, lanes_before, columns_before, values):
+    """Fill FROM and TO of coordinate c of a ``group`` of blocks that force the machine, after others of their kind.
+
+    ``steady`` (2n,) is what the modal coordinates follow per unit of it, ``back`` (2n,) that in the state.
+    """
+    n, width, states = at[MODES], at[WIDTH], at[STATES]
+    lane = (c // group) * width + n + lanes_before + c % group
+    column = at[TO] + (2 * n + columns_before + c) * 2 * width
+    for i in range(2 * n):
+        values[at[FROM] + lane * states + i] = back[i]
+        values[column + (i // n) * width + i % n] = -steady[i]
+    values[column + lane] = 1.0
+
+
+@njit(cache=True)
+def read_at_rest(generator, from_modal, shape, lag, rubs, k, reading, strain, drift):
+    """What channel k of friction reads where its joint reads ``reading`` and its tangential spring ``strain``, at rest.
+
+    Modal coordinates ``drift`` (2n,) at these rates, which shows as a constant in what has a velocity in it.
+    """
+    n, j, after = shape.shape[1], int(rubs.joint[k // 2]), np.empty(from_modal.shape[0])
+    alpha, beta = rubs.weight[k, 0], rubs.weight[k, 1]
+    moved = shape[j] @ np.ascontiguousarray(from_modal[:n])
+    slid = rubs.shape[k // 2] @ np.ascontiguousarray(from_modal[:n])
+    if rubs.rate[k] == 0.0:
+        return alpha * (reading + lag[j] * np.sum(moved * drift)) + beta * strain
+    derivative(generator, moved, after)
+    return np.sum((alpha * (moved + lag[j] * after) + beta * slid) * drift)
 
 
 @leaf
@@ -251,12 +343,41 @@ def _put_blocks(at, generator, shortest, first, levels, values):
 
 
 @njit(cache=True)
-def _put_joint(at, generator, rows, reading, j, first_block, levels, values):
-    """Fill AHEAD, TAYLOR, NOW_ROWS and bounds of joint j for blocks (4, k) from ``first_block`` on.
+def _put_channels(at, generator, shown, lag, strain, rubs, first_block, levels, growth, values):
+    """Fill what the channels show of blocks (4, k) from ``first_block`` on, whose norm grows by ``growth`` at most.
+
+    ``shown`` (m, 2k) is the displacement of each joint per unit of their coordinates, ``strain`` (f, 2k) that of each
+    tangential spring.
+    """
+    own, m = generator.shape[1], shown.shape[0]
+    rows, reading, read = np.empty((DEGREE + 1, 2 * own)), np.empty((5, 2 * own)), np.empty(2 * own)
+    for k in range(at[CHANNELS]):
+        j, c = np.int64(k), (k - m) // 2
+        if k >= m:
+            j = int(rubs.joint[c])
+        for i in range(2 * own):
+            rows[0, i] = shown[j, i]
+        if k >= m:
+            derivative(generator, rows[0], rows[1])
+            for i in range(2 * own):
+                read[i] = rubs.weight[k - m, 0] * (rows[0, i] + lag[j] * rows[1, i])
+                read[i] += rubs.weight[k - m, 1] * strain[c, i]
+                rows[0, i] = read[i]
+            if rubs.rate[k - m] != 0.0:
+                derivative(generator, read, rows[0])
+        for p in range(DEGREE):
+            derivative(generator, rows[p], rows[p + 1])
+        _read(rows, lag[j] if k < m else 0.0, reading)
+        _put_joint(at, generator, rows, reading, k, first_block, levels, growth, values)
+
+
+@njit(cache=True)
+def _put_joint(at, generator, rows, reading, j, first_block, levels, growth, values):
+    """Fill AHEAD, TAYLOR, NOW_ROWS and bounds of channel j for blocks (4, k) from ``first_block`` on.
 
     ``rows`` (DEGREE + 1, 2k) are the derivatives of its displacement, ``reading`` (5, 2k) those of its reading.
     """
-    m, blocks, width, own = at[JOINTS], at[BLOCKS], at[WIDTH], generator.shape[1]
+    channels, blocks, width, own = at[CHANNELS], at[BLOCKS], at[WIDTH], generator.shape[1]
     size = np.empty(2 * own)
     factorial = 1.0
     for p in range(DEGREE + 1):
@@ -274,9 +395,9 @@ def _put_joint(at, generator, rows, reading, j, first_block, levels, values):
         bound(generator, reading[4] if which == 0 else reading[2] if which == 1 else rows[0], size)
         begin = at[BOUNDS + which] + j * 2 * width + first_block
         for i in range(2 * own):
-            values[begin + (i // own) * width + i % own] = size[i]
+            values[begin + (i // own) * width + i % own] = growth * size[i]
     for level in range(levels):
-        first = at[AHEAD] + (level * m + j) * 4 * blocks * LANES
+        first = at[AHEAD] + (level * channels + j) * 4 * blocks * LANES
         for b in range(own):
             for i in range(LANES):
                 instant = at[TURN] + 4 * (LANES * level + i) * width + first_block + b

@@ -21,7 +21,7 @@ from chaosgym.core.cycle import CycleArrays, cycle_arrays
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
-from chaosgym.machines.joint_sets import JointTables, PressedSets
+from chaosgym.machines.joint_sets import JointTables, PressedSets, Sliders
 from chaosgym.machines.machine import Flexible, Machine, Number, Option
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
@@ -34,7 +34,7 @@ from chaosgym.machines.modal_machine.machine import (
     turning_note,
 )
 from chaosgym.machines.modal_machine.structure import Structure
-from chaosgym.machines.parameters import parameter, parameters_of
+from chaosgym.machines.parameters import Parameter, parameter, parameters_of
 from chaosgym.machines.units import TURNING
 
 if TYPE_CHECKING:
@@ -46,6 +46,21 @@ LARGEST = "largest"
 """Word for the joint with the largest force."""
 
 
+POISSON = 0.3
+"""Poisson's ratio of steel."""
+
+MINDLIN = 2.0 * (1.0 - POISSON) / (2.0 - POISSON)
+"""Tangential over normal stiffness of two like bodies in contact that do not slip (R. D. Mindlin, Compliance of elastic
+bodies in contact, J. Appl. Mech. 16 (1949) 259)."""
+
+OF_FRICTION = {
+    "friction": Parameter("-", 0.0, 100.0, (), "assumed", "default"),
+    "tangential_factor": Parameter("-", 1e-9, 1e9, (), "assumed", "Mindlin 1949, steel"),
+    "sliding_speed": Parameter("m/s", -1e4, 1e4, (), "assumed", "default"),
+}
+"""What is known beside that of a joint with a ``tangent``."""
+
+
 class Joint(NamedTuple):
     """A joint of a structure; see the fields of ``ModalMachine``.
 
@@ -53,6 +68,10 @@ class Joint(NamedTuple):
     gap; ``stiffness`` [N/m] and ``damping`` [N s/m] of the upper stop, and factors of the lower one's; ``offset`` [m]
     of the middle of the gap; ``stops`` "two" or "one"; ``preload`` [N] towards the upper stop. ``turns`` says that m
     is rad and N is N m.
+
+    A joint with a ``tangent``, the point whose motion is along its surfaces, has Coulomb ``friction`` there: a slider
+    in series with a tangential spring, ``tangential_factor`` times that of the stop. The surfaces move at
+    ``sliding_speed`` [m/s], positive where the tangential displacement grows.
 
     Examples
     --------
@@ -70,6 +89,10 @@ class Joint(NamedTuple):
     lower_damping_factor: float = 1.0
     preload: float = 0.0
     turns: bool = False
+    tangent: str = ""
+    friction: float = 0.0
+    tangential_factor: float = MINDLIN
+    sliding_speed: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +120,9 @@ class JointedMachine(Machine):
     places: ClassVar[Mapping[str, str]] = {}
     """Point that moves in the gap of each joint, by the joint's name."""
 
+    tangents: ClassVar[Mapping[str, str]] = {}
+    """Point whose motion is along the surfaces, by the name of each joint that may have friction."""
+
     turning: ClassVar[tuple[str, ...]] = ()
     """Names of joints that turn, as of ``ModalMachine``."""
 
@@ -120,6 +146,9 @@ class JointedMachine(Machine):
             if not row.any():
                 raise ParameterError(f"{name}.at = {self.places[name]!r} never moves: every shape is 0 there")
         _refuse_same_place(self.joints, self.places, self.joint_shapes)
+        for name, point in self.tangents.items():
+            if not self.modes.shape(point).any():
+                raise ParameterError(f"{name}.tangent = {point!r} never moves: every shape is 0 there")
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -157,6 +186,11 @@ class JointedMachine(Machine):
         return np.array([self.modes.shape(self.places[name]) for name in self.joints])
 
     @property
+    def rubbing(self) -> tuple[str, ...]:
+        """Names of the joints with friction."""
+        return tuple(name for name in self.tangents if getattr(self, f"{name}_friction") > 0.0)
+
+    @property
     def stops(self) -> Array:
         """Positions of the upper and the lower stop of each joint [m], infinite where there is none, (m, 2)."""
         gap, middle = self.of_joints("clearance"), self.of_joints("offset")
@@ -179,7 +213,11 @@ class JointedMachine(Machine):
         springs, dampers = self.of_joints("stiffness"), self.of_joints("damping")
         lower = self.of_joints("lower_stiffness_factor"), self.of_joints("lower_damping_factor")
         key = (self.frequency_factor, self.damping_factor, tuple(springs), tuple(dampers), *map(tuple, lower))
-        return _sets(self.modes, tuple(self.places.values()), tuple(self.of_joints("stops") == "two"), *key)
+        rubs = tuple(
+            (self.joints.index(name), self.tangents[name], *(getattr(self, f"{name}_{what}") for what in OF_FRICTION))
+            for name in self.rubbing
+        )
+        return _sets(self.modes, tuple(self.places.values()), tuple(self.of_joints("stops") == "two"), *key, rubs)
 
     def reduce(self) -> PressedSets:
         """Return what the kernels integrate between contact events."""
@@ -192,13 +230,16 @@ class JointedMachine(Machine):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What turns, modes that count as rigid, and what sampled drives leave out."""
-        notes = turning_note(self.turning), rigid_note(self.natural_frequencies), *drive_notes(self.drives)
+        """What turns or rubs, modes that count as rigid, and what sampled drives leave out."""
+        rubs = f"friction sticks and slides in {', '.join(self.rubbing)}" if self.rubbing else ""
+        notes = turning_note(self.turning), rigid_note(self.natural_frequencies), rubs, *drive_notes(self.drives)
         return tuple(filter(None, notes))
 
     @property
-    def flexible(self) -> Flexible:
-        """Its equations between contacts."""
+    def flexible(self) -> Flexible | None:
+        """Its equations between contacts; None with friction, which acts beside the forces of the joints."""
+        if self.rubbing:
+            return None
         return Flexible(self.sets.stiffness, self.sets.damping, self.sets.shape, *self._drive())
 
     def shape_of(self, place: str) -> Array:
@@ -207,8 +248,8 @@ class JointedMachine(Machine):
 
     @property
     def n_states(self) -> int:
-        """Displacement and velocity of every mode."""
-        return 2 * len(self.modes.angular_frequency)
+        """Displacement and velocity of every mode, and the deflection of every tangential spring."""
+        return 2 * len(self.modes.angular_frequency) + len(self.rubbing)
 
     @property
     def fastest_rate(self) -> float:
@@ -228,13 +269,16 @@ class JointedMachine(Machine):
     def state_weights(self, state: Array) -> Array:
         """Weights (n_states,) by which the squared norm of a deviation is its energy."""
         rates = self.frequency_factor * self.modes.angular_frequency
-        return np.concatenate([rates, np.ones(len(rates))])
+        return np.concatenate([rates, np.ones(len(rates)), np.sqrt(self.sets.sliders.springs[:, 0])])
 
     def contraction(self, contact_time: Array, impacts: float) -> float:
         """Sum of all Lyapunov exponents of a cycle with so much contact on each surface [s], (2m,).
 
-        It is -tr(D) T - sum of d |phi|^2 t_contact: damping of the structure, and of each contact while it lasts.
+        It is -tr(D) T - sum of d |phi|^2 t_contact: damping of the structure, and of each contact while it lasts. With
+        friction it is -inf, as what slides forgets where it stuck.
         """
+        if self.rubbing:
+            return -math.inf
         sets = self.sets
         structure = -float(np.trace(sets.damping)) * self.cycle_period
         return structure - float((sets.dampers * np.sum(sets.shape**2, axis=1)[:, None]).ravel() @ contact_time)
@@ -292,9 +336,14 @@ class JointedMachine(Machine):
         return np.asarray(peak_force[..., first : first + 2].max(axis=-1))
 
     def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Share of the bound of passivity: only the drive gives energy, and what preloads or offsets have stored."""
-        sets, n = self.sets, self.n_states // 2
-        energy = np.sum(states[:, n:] ** 2 + sets.stiffness * states[:, :n] ** 2, axis=1)
+        """Share of the bound of passivity: only the drive gives energy, and what preloads or offsets have stored.
+
+        Surfaces that move may give any power: then nothing bounds a run, and the share is 0.
+        """
+        sets, n = self.sets, len(self.modes.angular_frequency)
+        if sets.sliders.speed.any():
+            return 0.0
+        energy = np.sum(states[:, n : 2 * n] ** 2 + sets.stiffness * states[:, :n] ** 2, axis=1)
         force, static = self._drive()
         load = float(np.sum(np.linalg.norm(force, axis=(1, 2)))) + float(np.linalg.norm(static))
         stops = self.stops
@@ -319,19 +368,25 @@ def _sets(
     dampers: tuple[float, ...],
     spring_factors: tuple[float, ...],
     damper_factors: tuple[float, ...],
+    rubs: tuple[tuple[int, str, float, float, float], ...],
 ) -> PressedSets:
     shape = np.array([modes.shape(place) for place in places])
     upper, damper = np.array(springs), np.array(dampers)
     rates, damping = frequency_factor * modes.angular_frequency, damping_factor * modes.damping
     free = with_rigid_bodies(Modes(rates, damping, shape[0], np.zeros_like(shape[0])))
-    return PressedSets(
-        free.angular_frequency**2,
-        free.damping,
-        shape,
-        np.stack([upper, upper * spring_factors], axis=1),
-        np.stack([damper, damper * damper_factors], axis=1),
-        np.array(two_sided),
-    )
+    both = np.stack([upper, upper * spring_factors], axis=1)
+    dampers_of = np.stack([damper, damper * damper_factors], axis=1)
+    sliders = None
+    if rubs:
+        joints, points, friction, factors, speeds = zip(*rubs, strict=True)
+        sliders = Sliders(
+            np.array(joints, np.int64),
+            np.array([modes.shape(point) for point in points]),
+            np.array(friction),
+            np.array(speeds),
+            both[list(joints)] * np.array(factors)[:, None],
+        )
+    return PressedSets(free.angular_frequency**2, free.damping, shape, both, dampers_of, np.array(two_sided), sliders)
 
 
 @lru_cache(maxsize=8)
@@ -408,6 +463,12 @@ def machine_with_joints(
             unit = known[same].unit
             more = {**about, "unit": TURNING.get(unit, unit) if joint.turns else unit}
             defaults[f"{name}_{what}"] = parameter(getattr(joint, what), **{**vars(known[same]), **more})
+        for what, described in OF_FRICTION.items() if joint.tangent else ():
+            more = {**about, "unit": TURNING.get(described.unit, described.unit) if joint.turns else described.unit}
+            value = getattr(joint, what)
+            if what == "tangential_factor" and value == MINDLIN:
+                more |= {"provenance": described.provenance, "source": described.source}
+            defaults[f"{name}_{what}"] = parameter(value, **{**vars(described), **more})
     own = parameters_of(JointedMachine)
     defaults["monitored"] = parameter(
         stated.pop("monitored", LARGEST), **{**vars(own["monitored"]), "choices": (LARGEST, *joints)}
@@ -421,6 +482,7 @@ def machine_with_joints(
     first = next(iter(joints)) if watched == LARGEST else watched
     types: dict[str, Any] = {
         "places": {name: joint.at for name, joint in joints.items()},
+        "tangents": {name: joint.tangent for name, joint in joints.items() if joint.tangent},
         "usual_ranges": {"speed": usual["speed"], f"{first}_clearance": usual["clearance"]},
         "options": {
             "--speed-hz": Number("speed", "Hz"),
