@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
 CALIBRATION = 0.15
-"""Share of the groups that calibrate where they are not named."""
+"""Share of the rows that calibrate where they are not named."""
 
 COVERAGE = 0.90
 """Of the sets of plausible classes, for each class."""
@@ -90,7 +90,6 @@ class ResponseClassifier:
         X: ArrayLike,
         y: ArrayLike,
         *,
-        groups: ArrayLike | None = None,
         calibration: ArrayLike | None = None,
         ranges: tuple[ArrayLike, ArrayLike] | None = None,
         cycles: ArrayLike | None = None,
@@ -104,10 +103,8 @@ class ResponseClassifier:
             Parameters or records, by ``inputs``.
         y : (n,)
             Classes.
-        groups : (n,), optional
-            Machine that a row belongs to; rows of one machine stay together.
         calibration : (n,) of bool, optional
-            Rows that calibrate; those of some groups by default.
+            Rows that calibrate; some drawn ones by default.
         ranges : two of (n_columns,), optional
             Lowest and highest parameters that count as known; those of the rows by default.
         cycles : (n, n_cycles, 3), optional
@@ -122,8 +119,7 @@ class ResponseClassifier:
         self.classes_, kinds = np.unique(labels, return_inverse=True)
         if len(self.classes_) < 2:
             raise ValueError("y holds one class; ResponseClassifier needs at least 2 classes")
-        parts = np.arange(len(kinds)) if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1]
-        held = self._held_back(kinds, parts, calibration)
+        held = self._held_back(kinds, calibration)
         if self.inputs == "parameters":
             self.scaling_ = parameter_scaling(self.machine, self.fields or (), values)
             low, high = (values.min(axis=0), values.max(axis=0)) if ranges is None else ranges
@@ -145,11 +141,10 @@ class ResponseClassifier:
             self.plausible_ = conformal_thresholds(softmax(scores / self.temperature_), kinds[held], COVERAGE)
         return self
 
-    def _held_back(self, kinds: Labels, parts: Labels, calibration: ArrayLike | None) -> NDArray[np.bool_]:
+    def _held_back(self, kinds: Labels, calibration: ArrayLike | None) -> NDArray[np.bool_]:
         """Rows (n,) that calibrate; none if the others would not hold every class."""
         if calibration is None:
-            drawn = np.random.default_rng(self.seed).permutation(parts.max() + 1)
-            held = np.isin(parts, drawn[: round(CALIBRATION * len(drawn))])
+            held = np.random.default_rng(self.seed).permutation(len(kinds)) < CALIBRATION * len(kinds)
         else:
             held = np.asarray(calibration, dtype=bool)
         complete = len(np.unique(kinds[~held])) == kinds.max() + 1

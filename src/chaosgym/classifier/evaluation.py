@@ -35,7 +35,7 @@ class Estimate(NamedTuple):
     high: float
 
 
-def bootstrap_scores(truth: NDArray[Any], guess: NDArray[Any], groups: NDArray[Any], seed: int = 0) -> dict[str, Any]:
+def bootstrap_scores(truth: NDArray[Any], guess: NDArray[Any], groups: NDArray[Any]) -> dict[str, Any]:
     """Accuracy and balanced accuracy (n,) with intervals from drawing whole machines (groups) with replacement."""
     kinds, kind = np.unique(truth, return_inverse=True)
     parts, part = np.unique(groups, return_inverse=True)
@@ -43,7 +43,7 @@ def bootstrap_scores(truth: NDArray[Any], guess: NDArray[Any], groups: NDArray[A
     total = np.zeros_like(right)
     np.add.at(right, (part, kind), guess == truth)
     np.add.at(total, (part, kind), 1.0)
-    weights = np.random.default_rng(seed).multinomial(len(parts), np.full(len(parts), 1.0 / len(parts)), RESAMPLES)
+    weights = np.random.default_rng(0).multinomial(len(parts), np.full(len(parts), 1.0 / len(parts)), RESAMPLES)
     drawn = np.concatenate([np.ones((1, len(parts))), weights])
     rights, totals = drawn @ right, drawn @ total
     accuracy = rights.sum(axis=1) / totals.sum(axis=1)

@@ -140,7 +140,7 @@ def _unrolled(angle: Array) -> Array:
     return np.asarray(middle + np.angle(np.exp(1j * (angle - middle))))
 
 
-def coverage(diagram: PeakImpactDiagram, sections: int = SECTIONS) -> Array:
+def coverage(diagram: PeakImpactDiagram) -> Array:
     """Share of impacts that fall into sections already visited, estimated after each impact, (impacts,).
 
     Examples
@@ -152,8 +152,8 @@ def coverage(diagram: PeakImpactDiagram, sections: int = SECTIONS) -> Array:
     """
     if len(diagram.force) == 0:
         raise DesignError("the Peak Impact Diagram is empty: no cycle has contact")
-    cell = _section(diagram.location, sections) * sections + _section(diagram.force, sections)
-    visits = np.zeros(sections * sections, dtype=np.int64)
+    cell = _section(diagram.location) * SECTIONS + _section(diagram.force)
+    visits = np.zeros(SECTIONS * SECTIONS, dtype=np.int64)
     once = 0
     shares = np.empty(len(cell))
     for n, place in enumerate(cell):
@@ -163,7 +163,7 @@ def coverage(diagram: PeakImpactDiagram, sections: int = SECTIONS) -> Array:
     return shares
 
 
-def filling_cycles(diagram: PeakImpactDiagram, sections: int = SECTIONS, share: float = COVERAGE) -> int | None:
+def filling_cycles(diagram: PeakImpactDiagram) -> int | None:
     """Impacts after which the diagram has taken shape for good; None if it has not.
 
     Examples
@@ -173,13 +173,13 @@ def filling_cycles(diagram: PeakImpactDiagram, sections: int = SECTIONS, share: 
     >>> filling_cycles(peak_impacts(record))
     40
     """
-    low = np.flatnonzero(coverage(diagram, sections) < share)
+    low = np.flatnonzero(coverage(diagram) < COVERAGE)
     first = int(low[-1]) + 2 if len(low) else 1
     return first if first <= len(diagram.force) else None
 
 
-def _section(values: Array, sections: int) -> NDArray[np.int64]:
+def _section(values: Array) -> NDArray[np.int64]:
     low, width = float(np.min(values)), float(np.ptp(values))
     if width <= 1e-9 * max(abs(low), 1e-300):
         return np.zeros(len(values), dtype=np.int64)
-    return np.minimum((values - low) / width * sections, sections - 1).astype(np.int64)
+    return np.minimum((values - low) / width * SECTIONS, SECTIONS - 1).astype(np.int64)

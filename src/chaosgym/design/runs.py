@@ -80,11 +80,10 @@ def settled_run(
     machine: Machine,
     *,
     verdict: Diagnosis | None = None,
-    cycles: int = SERIES_CYCLES,
     until_converged: bool = False,
     budget: int = DIAGNOSIS_BUDGET,
 ) -> SettledRun:
-    """Run a machine from rest until it has settled, and record its peak forces.
+    """Run a machine from rest until it has settled, and record its peak forces: a period, or ``SERIES_CYCLES``.
 
     Parameters
     ----------
@@ -92,8 +91,6 @@ def settled_run(
         What to run.
     verdict
         On the machine from rest, if it is known already.
-    cycles
-        Cycles to record of a response that does not repeat; of one that does, its period.
     until_converged
         Go on, doubling the record, until mean and deviation have converged on the worse surface.
     budget
@@ -109,7 +106,7 @@ def settled_run(
         verdict = diagnose(machine, budget=RETRY * budget)
     state = MotionState(np.asarray(verdict.evidence["final_state"]), rest_state(machine).bouncing)
     repeats = verdict.nature == "periodic" and verdict.period is not None
-    record = simulate(machine, verdict.period if repeats and verdict.period else cycles, state)
+    record = simulate(machine, verdict.period if repeats and verdict.period else SERIES_CYCLES, state)
     run = SettledRun(
         machine,
         verdict.nature,

@@ -132,7 +132,6 @@ def life_against(
     machine: Machine,
     field: str,
     values: ArrayLike,
-    exponent: float = CUBIC_EXPONENT,
     *,
     workers: int | None = None,
     progress: bool = False,
@@ -147,8 +146,6 @@ def life_against(
         Field that varies.
     values : (n,)
         In its unit; the first one with contact is the reference.
-    exponent
-        Of the life law.
     workers
         Number of threads; all processors by default.
     progress
@@ -172,13 +169,13 @@ def life_against(
     runs: list[SettledRun] = parallel_map(
         settled_run, machines, workers=workers, progress=f"life against {field}" if progress else None
     )
-    peaks = [run.worse_side(exponent) for run in runs]
-    forces = [equivalent_force(each, exponent) for each in peaks]
+    peaks = [run.worse_side(CUBIC_EXPONENT) for run in runs]
+    forces = [equivalent_force(each, CUBIC_EXPONENT) for each in peaks]
     touching = np.flatnonzero(forces)
     if not len(touching):
         raise DesignError(f"no life against {field}: no contact from {chosen[0]:g} to {chosen[-1]:g}")
     reference = forces[int(touching[0])]
-    lives = np.array([relative_life(each, reference, exponent) for each in peaks])
+    lives = np.array([relative_life(each, reference, CUBIC_EXPONENT) for each in peaks])
     return LifeTrend(
         field,
         chosen,

@@ -185,7 +185,7 @@ def worn_clearances(machine: Machine, wear: Wear) -> Array:
     return np.linspace(nominal, wear.limit, STEPS + 1)
 
 
-def wear_life(machine: Machine, wear: Wear, *, workers: int | None = None, progress: bool = False) -> WearLife:
+def wear_life(machine: Machine, wear: Wear, *, workers: int | None = None) -> WearLife:
     """Course of a joint's clearance as it wears, each clearance run from rest.
 
     Parameters
@@ -196,8 +196,6 @@ def wear_life(machine: Machine, wear: Wear, *, workers: int | None = None, progr
         Data of Archard's law.
     workers
         Number of threads; all processors by default.
-    progress
-        Show a progress bar on standard error.
 
     Raises
     ------
@@ -221,7 +219,6 @@ def wear_life(machine: Machine, wear: Wear, *, workers: int | None = None, progr
         _loads,
         [machine.at(clearance=float(gap)) for gap in gaps],
         workers=workers,
-        progress="wear" if progress else None,
     )
     depth = np.array([wear_depth(load, wear.sliding, wear.area, wear.hardness, wear.coefficient) for load, *_ in runs])
     hours_a_metre = _inverse(0.5 * depth * 3600.0 / machine.cycle_period)

@@ -345,7 +345,11 @@ def _of_sensors(values: Array) -> Array:
     return values[-MOST_READINGS:].reshape(min(len(values), MOST_READINGS), -1)
 
 
-def surrogate(values: Array, rng: np.random.Generator, rounds: int = 30) -> Array:
+ROUNDS = 30
+"""Rounds in which spectra and distribution of a surrogate are matched in turn."""
+
+
+def surrogate(values: Array, rng: np.random.Generator) -> Array:
     """A random record with the spectra, cross-spectra and distributions of ``values``, (cycles, sensors).
 
     Phases of all sensors at a frequency turn by one angle (Schreiber and Schmitz 2000; Prichard and Theiler 1994). Of
@@ -354,7 +358,7 @@ def surrogate(values: Array, rng: np.random.Generator, rounds: int = 30) -> Arra
     ordered, spectrum = np.sort(values, axis=0), np.fft.rfft(values, axis=0)
     phase = spectrum / np.maximum(np.abs(spectrum), 1e-300)
     made = values[rng.permutation(len(values))]
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         turned = np.fft.rfft(made, axis=0)
         turned *= phase.conj() / np.maximum(np.abs(turned), 1e-300)
         together = np.sum(turned, axis=1, keepdims=True)

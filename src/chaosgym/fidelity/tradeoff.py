@@ -336,13 +336,17 @@ def _with_front(rows: Sequence[TradeoffRow], points: int) -> list[TradeoffRow]:
     return [replace(row, on_front=id(row) in front) for row in rows]
 
 
-def scene_costs(machine: Machine, cycles: int = 40) -> dict[str, float]:
+SCENE_CYCLES = 40
+"""Cycles by which a scene is timed."""
+
+
+def scene_costs(machine: Machine) -> dict[str, float]:
     """Microseconds of processor time per cycle of each scene, at the machine's own rung."""
     costs = {}
     for scene, fields in machine.scenes.items():
         place = with_settings(machine, fields)
         state = simulate(place, 2).final_state
         start = time.thread_time()
-        simulate(place, cycles, state)
-        costs[scene] = 1e6 * (time.thread_time() - start) / cycles
+        simulate(place, SCENE_CYCLES, state)
+        costs[scene] = 1e6 * (time.thread_time() - start) / SCENE_CYCLES
     return costs

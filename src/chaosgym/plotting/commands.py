@@ -203,9 +203,9 @@ def thumbnails(shown: list[tuple[str, Array, Diagnosis]]) -> Figure:
     return figure
 
 
-def _shortened(title: str, most: int = 34) -> str:
+def _shortened(title: str) -> str:
     """The end of a title that is too long."""
-    return title if len(title) <= most else f"...{title[3 - most :]}"
+    return title if len(title) <= 34 else f"...{title[-31:]}"
 
 
 @_styled

@@ -70,13 +70,12 @@ def check_picture(path: Path, formats: tuple[str, ...] = FORMATS) -> Path:
     return path
 
 
-def free_name(stem: str, folder: Path | None = None) -> Path:
+def free_name(stem: str) -> Path:
     """Path of a PNG file that does not exist: stem.png, stem-2.png, stem-3.png ... in the current folder."""
-    folder = folder or Path()
-    path, number = folder / f"{stem}.png", 1
+    path, number = Path(f"{stem}.png"), 1
     while path.exists():
         number += 1
-        path = folder / f"{stem}-{number}.png"
+        path = Path(f"{stem}-{number}.png")
     return path
 
 
