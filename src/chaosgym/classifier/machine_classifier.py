@@ -37,8 +37,8 @@ Array = NDArray[np.float64]
 PEAK_CYCLES = 16
 """Cycles from rest that the largest peak of a neighbourhood's point rests on at least, unless an orbit is proven."""
 
-GENERAL, GENERAL_CYCLES = "impact-beam", 128
-"""Machine whose records teach about machines without a classifier, and cycles from rest after which they are asked."""
+GENERAL_CYCLES = 128
+"""Cycles from rest after which a machine without a classifier is judged by its record."""
 
 NATURE, IRREGULAR = "record-nature", "record-irregular"
 """Names of the classifiers of records."""
@@ -349,8 +349,8 @@ def _shipped(machine_name: str) -> Traversable:
 def classifier_for(machine: Machine) -> MachineClassifier:
     """Return the classifier that is shipped for a machine, or else one for any machine with a gap.
 
-    The general one takes proofs of periodic orbits, and reads peak forces as the beam's classifier of records does. It
-    has no guess from parameters, and takes no measured records.
+    The general one takes proofs of periodic orbits, and reads peak forces as the classifier of ``MACHINES.general``
+    does. It has no guess from parameters, and takes no measured records.
 
     Examples
     --------
@@ -362,5 +362,5 @@ def classifier_for(machine: Machine) -> MachineClassifier:
         return default_classifier(machine.name)
     except ModelFileError:
         pass
-    nature = default_classifier(GENERAL).records[NATURE]
+    nature = default_classifier(MACHINES.general).records[NATURE]
     return MachineClassifier(machine, {GENERAL_CYCLES: nature}, {}, {"fields": ()})

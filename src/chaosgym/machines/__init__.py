@@ -16,11 +16,12 @@ class MachineRegistry(Mapping[str, "type[Machine]"]):
     """Machine classes by name.
 
     ``entry_points`` says where each is: module and class, as in ``"package.module:Class"``. A name that ends in
-    ``.toml`` is the file of a machine, and stands for the class that it describes.
+    ``.toml`` is the file of a machine, and stands for the class that it describes. ``general`` is the name of the
+    machine whose records teach about machines without a classifier of their own.
     """
 
-    def __init__(self, entry_points: Mapping[str, str]) -> None:
-        self.entry_points = dict(entry_points)
+    def __init__(self, entry_points: Mapping[str, str], general: str) -> None:
+        self.entry_points, self.general = dict(entry_points), general
 
     def __getitem__(self, name: str) -> "type[Machine]":
         if str(name).endswith(FILE_ENDING):
@@ -53,7 +54,8 @@ MACHINES = MachineRegistry(
     {
         "impact-beam": "chaosgym.machines.impact_beam:ImpactBeam",
         "slider-crank": "chaosgym.machines.slider_crank:SliderCrank",
-    }
+    },
+    general="impact-beam",
 )
 """A new machine of chaosgym adds one line here; one from outside calls ``register_machine``."""
 

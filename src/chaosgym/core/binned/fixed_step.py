@@ -59,7 +59,7 @@ def note_joint_peaks(model, closed, view, channel_peak):
 
 @njit(cache=True, nogil=True)
 def advance_binned_fixed_step(model, state, bouncing, arrays, steps, fastest):
-    """Advance ``state`` and ``bouncing`` by whole revolutions of ``steps`` equal steps; see ``slider_crank.advance``.
+    """Advance ``state`` and ``bouncing`` by whole revolutions of ``steps`` equal steps; see ``cycle.advance``.
 
     ``fastest`` is the largest angular frequency with all contacts closed. Peaks and samples are taken at the ends of
     steps.

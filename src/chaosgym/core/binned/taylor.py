@@ -605,7 +605,7 @@ def turn(model, closed, series, views, whole, z, peak, bouncing, arrays, cycle, 
 
 @njit(cache=True, nogil=True)
 def advance(model, state, bouncing, arrays, event_tolerance, event_budget):
-    """Advance ``state`` (2n,) and ``bouncing`` in place by whole revolutions; see ``slider_crank.advance``."""
+    """Advance ``state`` (2n,) and ``bouncing`` in place by whole revolutions; see ``cycle.advance``."""
     bins, _, lanes = model.acceleration.shape
     if model.steps * bins > STEP_BUDGET:
         return status.STEP_BUDGET, 0
