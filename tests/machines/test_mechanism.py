@@ -13,7 +13,7 @@ from chaosgym.machines.mechanism.joints import Joint
 from chaosgym.machines.mechanism.mechanism import Mechanism, Spring
 from chaosgym.machines.mechanism.nominal import nominal, revolution_of
 from chaosgym.machines.slider_crank.equations import equations
-from chaosgym.machines.slider_crank.parameters import SliderCrank
+from chaosgym.machines.slider_crank.machine import SliderCrank
 from tests.machines.mechanisms import four_bar, thesis_crank
 
 BINS = 180

@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 from chaosgym import ImpactBeam, SliderCrank
 from chaosgym.cli import app
-from chaosgym.machines.slider_crank.parameters import DIMENSIONS
+from chaosgym.machines.slider_crank.machine import DIMENSIONS
 
 
 @pytest.mark.parametrize("field", DIMENSIONS)

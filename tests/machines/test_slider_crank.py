@@ -13,7 +13,7 @@ from chaosgym.machines.slider_crank.connecting_rod import Bar, EndBody, connecti
 from chaosgym.machines.slider_crank.equations import ELEMENTS, equations, mode_damping, rod_of
 from chaosgym.machines.slider_crank.joints import joints_of
 from chaosgym.machines.slider_crank.kinematics import planar_motion, slider_position
-from chaosgym.machines.slider_crank.parameters import SliderCrank, frequencies_at
+from chaosgym.machines.slider_crank.machine import SliderCrank, frequencies_at
 from tests.plain_modes import PLAIN_CRANK
 from thesis.figures.crank_resonances import SUPERHARMONIC_SLIDER_CRANK
 

@@ -9,7 +9,7 @@ from chaosgym.errors import DatasetError, ParameterError
 from chaosgym.machines import ImpactBeam
 from chaosgym.machines.impact_beam.modes import static_tip_deflection
 from chaosgym.machines.parameters import parameters_of
-from chaosgym.machines.slider_crank.parameters import frequencies_at
+from chaosgym.machines.slider_crank.machine import frequencies_at
 from tests.plain_modes import PLAIN_BEAM
 from thesis.scorecard import search as calibration
 from thesis.scorecard.calibrate import calibrate

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from chaosgym.machines import SliderCrank
-from chaosgym.machines.slider_crank.parameters import frequencies_at
+from chaosgym.machines.slider_crank.machine import frequencies_at
 from thesis import plotting as thesis
 from thesis.figures.computations import Computation, History
 from thesis.figures.crank import MIDDLE, SECTION_4_4_DAMPING, SMALL, TRANSIENT, WIDE, ball, runs, slider

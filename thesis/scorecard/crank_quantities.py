@@ -6,7 +6,7 @@ import numpy as np
 
 from chaosgym.machines import Machine, SliderCrank
 from chaosgym.machines.parameters import with_settings
-from chaosgym.machines.slider_crank.parameters import frequencies_at
+from chaosgym.machines.slider_crank.machine import frequencies_at
 from thesis.scorecard import crank_runs
 from thesis.scorecard.findings import Finding, Quantity, Results, Value, no_jobs
 from thesis.scorecard.jobs import Job

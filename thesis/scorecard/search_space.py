@@ -15,7 +15,7 @@ import scipy.optimize
 from chaosgym.errors import ParameterError
 from chaosgym.machines import THESIS_SLIDER_CRANK, ImpactBeam, Machine, SliderCrank
 from chaosgym.machines.impact_beam.modes import static_tip_deflection
-from chaosgym.machines.slider_crank.parameters import frequencies_at
+from chaosgym.machines.slider_crank.machine import frequencies_at
 from thesis.scorecard.quantities import lateral_mass
 from thesis.statements import read_comparisons
 

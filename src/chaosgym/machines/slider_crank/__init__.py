@@ -1,5 +1,5 @@
 """The Spatial Slider Crank of the thesis."""
 
-from chaosgym.machines.slider_crank.parameters import THESIS_SLIDER_CRANK, SliderCrank
+from chaosgym.machines.slider_crank.machine import THESIS_SLIDER_CRANK, SliderCrank
 
 __all__ = ["THESIS_SLIDER_CRANK", "SliderCrank"]

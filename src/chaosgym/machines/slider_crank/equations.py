@@ -24,7 +24,7 @@ Thesis 2.2 (equations 2.4 to 2.8) and 4.3.
 """
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,9 +41,7 @@ from chaosgym.machines.slider_crank.connecting_rod import (
     connecting_rod,
 )
 from chaosgym.machines.slider_crank.kinematics import PlanarMotion, planar_motion
-
-if TYPE_CHECKING:
-    from chaosgym.machines.slider_crank.parameters import SliderCrank
+from chaosgym.machines.slider_crank.parameters import CrankParameters
 
 Array = NDArray[np.float64]
 
@@ -63,7 +61,7 @@ BALL_DIRECTIONS = (BALL_ALONG, BALL_ACROSS, BALL_LATERAL)
 SLIDER_TURNS = (SLIDER_ROLL, SLIDER_YAW, SLIDER_PITCH)
 
 
-def degrees_of_freedom(machine: "SliderCrank", spatial: bool = False) -> tuple[str, ...]:
+def degrees_of_freedom(machine: CrankParameters, spatial: bool = False) -> tuple[str, ...]:
     """Names of the coordinates that the scene of a machine requires, in their order.
 
     ``spatial`` adds the sideways motion that a motor at an angle excites, also where it stands straight.
@@ -121,12 +119,12 @@ class _Inertia(NamedTuple):
     slider_across: Array
 
 
-def bar_of(machine: "SliderCrank") -> Bar:
+def bar_of(machine: CrankParameters) -> Bar:
     """The rod without its end bodies."""
     return Bar(machine.rod_length, machine.rod_diameter, machine.youngs_modulus, machine.density)
 
 
-def rod_of(machine: "SliderCrank") -> ConnectingRod:
+def rod_of(machine: CrankParameters) -> ConnectingRod:
     """Rod with its end bodies, in the coordinates that the scene requires."""
     housing = EndBody(
         machine.housing_mass, machine.housing_inertia, machine.housing_offset_along, machine.housing_offset_across
@@ -135,14 +133,14 @@ def rod_of(machine: "SliderCrank") -> ConnectingRod:
     return connecting_rod(bar_of(machine), housing, yoke, *modes_of(machine))
 
 
-def modes_of(machine: "SliderCrank") -> tuple[int, int, int]:
+def modes_of(machine: CrankParameters) -> tuple[int, int, int]:
     """Modes of the rod that are kept, its finite elements, and the modes that are fitted."""
     if machine.rod == "rigid":
         return 0, ELEMENTS, 0
     return machine.n_modes, max(ELEMENTS, 2 * machine.n_modes), machine.fitted_modes
 
 
-def mode_damping(machine: "SliderCrank", rod: ConnectingRod) -> tuple[Array, Array]:
+def mode_damping(machine: CrankParameters, rod: ConnectingRod) -> tuple[Array, Array]:
     """Stiffness and structural damping of stretch and modes, (1 + n_modes,) each, by the machine's damping family."""
     stretch = rod.stiffness[ALONG_B, ALONG_B]
     stiffness = np.concatenate([[stretch], rod.mode_frequency**2])
@@ -156,7 +154,7 @@ def mode_damping(machine: "SliderCrank", rod: ConnectingRod) -> tuple[Array, Arr
     return stiffness, np.asarray(2.0 * ratio * np.sqrt(stiffness * inertia))
 
 
-def _structural_damping(machine: "SliderCrank", rod: ConnectingRod) -> Array:
+def _structural_damping(machine: CrankParameters, rod: ConnectingRod) -> Array:
     """C of the rod coordinates; zero for a rigid rod."""
     damping = np.zeros_like(rod.stiffness)
     if machine.rod == "flexible":
@@ -167,7 +165,7 @@ def _structural_damping(machine: "SliderCrank", rod: ConnectingRod) -> Array:
     return damping
 
 
-def _coordinate_map(machine: "SliderCrank", phi: Array, size: int, orders: int = 3) -> Array:
+def _coordinate_map(machine: CrankParameters, phi: Array, size: int, orders: int = 3) -> Array:
     """R and its derivatives by phi: (orders, B, size, n); the last three of ``size`` rows are the slider's."""
     names = degrees_of_freedom(machine)
     sine, cosine = np.sin(phi), np.cos(phi)
@@ -201,7 +199,7 @@ def _guide_reaction(load: Array, phi: Array) -> Array:
 
 
 def _geometric_stiffness(
-    machine: "SliderCrank", rod: ConnectingRod, phi: Array, motion: _Inertia, load: Array
+    machine: CrankParameters, rod: ConnectingRod, phi: Array, motion: _Inertia, load: Array
 ) -> Array:
     """K_geo of the rod coordinates from the nominal tension and the offset end bodies: (2, B, m, m)."""
     line, length = rod.line_mass, machine.rod_length
@@ -221,7 +219,7 @@ def _geometric_stiffness(
     return np.asarray(stiffness + np.einsum("pkb,pij->kbij", np.stack(turning), rod.end_rotation))
 
 
-def _inertia(machine: "SliderCrank", motion: PlanarMotion) -> _Inertia:
+def _inertia(machine: CrankParameters, motion: PlanarMotion) -> _Inertia:
     """Nominal accelerations; gravity enters as an upward acceleration of everything."""
     angle = math.radians(machine.gravity_angle)
     up_x, up_y = -machine.gravity * math.sin(angle), machine.gravity * math.cos(angle)
@@ -237,7 +235,7 @@ def _inertia(machine: "SliderCrank", motion: PlanarMotion) -> _Inertia:
     )
 
 
-def _slider_mass(machine: "SliderCrank") -> Array:
+def _slider_mass(machine: CrankParameters) -> Array:
     """Mass matrix (3, 3) of the slider about its pivot."""
     x, y = machine.slider_offset_along, machine.slider_offset_across
     slider = machine.slider_mass * np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [-y, x, 0.0]])
@@ -257,14 +255,14 @@ def _body_load(rod: ConnectingRod, slider: Array, inertia: _Inertia) -> Array:
     return np.ascontiguousarray(np.moveaxis(np.concatenate([rod_load, slider_load]), 0, -1))
 
 
-def loads(machine: "SliderCrank", crank_angle: Array, rod: ConnectingRod) -> Array:
+def loads(machine: CrankParameters, crank_angle: Array, rod: ConnectingRod) -> Array:
     """``equations(machine, crank_angle, rod).load`` alone: (2, B, n)."""
     motion = planar_motion(crank_angle, machine.crank_radius, machine.rod_length)
     load = _body_load(rod, _slider_mass(machine), _inertia(machine, motion))
     return np.asarray(np.einsum("bij,kbi->kbj", _coordinate_map(machine, motion.phi, load.shape[-1], 1)[0], load))
 
 
-def equations(machine: "SliderCrank", crank_angle: Array, rod: ConnectingRod | None = None) -> Equations:
+def equations(machine: CrankParameters, crank_angle: Array, rod: ConnectingRod | None = None) -> Equations:
     """Assemble the equations of motion at given crank angles.
 
     Parameters

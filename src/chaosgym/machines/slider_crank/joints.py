@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,7 @@ from chaosgym.machines.slider_crank.equations import (
     SLIDER_ROLL,
     SLIDER_YAW,
 )
-
-if TYPE_CHECKING:
-    from chaosgym.machines.slider_crank.parameters import SliderCrank
+from chaosgym.machines.slider_crank.parameters import CrankParameters
 
 Array = NDArray[np.float64]
 
@@ -223,7 +221,7 @@ class InstrumentedBall:
 _ONE = np.ones(1)
 
 
-def slider_joint_of(machine: "SliderCrank") -> JointModel:
+def slider_joint_of(machine: CrankParameters) -> JointModel:
     """Model of the slider joint of a machine."""
     if machine.slider_joint == "clearance":
         return PlainSlider(machine.is_spatial)
@@ -232,7 +230,7 @@ def slider_joint_of(machine: "SliderCrank") -> JointModel:
     return TightJoint()
 
 
-def ball_joint_of(machine: "SliderCrank") -> JointModel:
+def ball_joint_of(machine: CrankParameters) -> JointModel:
     """Model of the ball joint of a machine."""
     if machine.ball_joint == "spherical":
         return SphericalBall(machine.is_spatial)
@@ -241,7 +239,7 @@ def ball_joint_of(machine: "SliderCrank") -> JointModel:
     return TightJoint()
 
 
-def joints_of(machine: "SliderCrank") -> list[binned.Contact]:
+def joints_of(machine: CrankParameters) -> list[binned.Contact]:
     """All contacts of a machine: those of the slider joint, then those of the ball joint."""
     names = machine.degrees_of_freedom
     joints = []
@@ -269,24 +267,24 @@ def _contacts(joint: JointModel) -> tuple[Contact, ...]:
     return joint.contacts()
 
 
-def gaps_of(machine: "SliderCrank") -> Array:
+def gaps_of(machine: CrankParameters) -> Array:
     """Clearances [m] of ``joints_of``."""
     slider, ball = len(_contacts(slider_joint_of(machine))), len(_contacts(ball_joint_of(machine)))
     return np.array([machine.slider_clearance] * slider + [machine.ball_clearance] * ball)
 
 
-def display_of(machine: "SliderCrank") -> Array:
+def display_of(machine: CrankParameters) -> Array:
     """Displacement of the monitored joint: of the slider across the guide, or of the rod's end across the rod."""
     shown = SLIDER_ACROSS if machine.monitored_joint == "slider" else BALL_ACROSS
     return np.array([float(name == shown) for name in machine.degrees_of_freedom])
 
 
-def sensors_of(machine: "SliderCrank") -> tuple[str, ...]:
+def sensors_of(machine: CrankParameters) -> tuple[str, ...]:
     """Names of the force sensors: those of an instrumented slider joint, then those of an instrumented ball joint."""
     return slider_joint_of(machine).sensors + ball_joint_of(machine).sensors
 
 
-def sensor_peaks(machine: "SliderCrank", contact_peak: Array) -> Array:
+def sensor_peaks(machine: CrankParameters, contact_peak: Array) -> Array:
     """Peak force (cycles, sensors) of each sensor from those of the contacts' two sides, (cycles, contacts, 2)."""
     names = sensors_of(machine)
     peaks = np.zeros((len(contact_peak), len(names)))
@@ -298,7 +296,7 @@ def sensor_peaks(machine: "SliderCrank", contact_peak: Array) -> Array:
     return peaks
 
 
-def hertz_constants(machine: "SliderCrank") -> tuple[float, float]:
+def hertz_constants(machine: CrankParameters) -> tuple[float, float]:
     """K [N/m^1.5] and chi [s/m] with the linear law's secant stiffness and restitution at the reference force.
 
     Half a swing of the linear law leaves e = exp(-pi zeta / sqrt(1 - zeta^2)) of the speed v at which slider and yoke

@@ -1,7 +1,6 @@
 """What is held over bins of crank angle of a slider crank: its equations in the plane or in space, and its friction."""
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,15 +8,13 @@ from numpy.typing import NDArray
 from chaosgym.machines.binned.model import Held, held, middles_and_nodes
 from chaosgym.machines.slider_crank.equations import Equations, equations, loads, rod_of
 from chaosgym.machines.slider_crank.kinematics import slider_rate
+from chaosgym.machines.slider_crank.parameters import CrankParameters
 from chaosgym.machines.slider_crank.spatial_equations import spatial_equations, spatial_loads
-
-if TYPE_CHECKING:
-    from chaosgym.machines.slider_crank.parameters import SliderCrank
 
 Array = NDArray[np.float64]
 
 
-def _assembled(machine: "SliderCrank", middles: Array, nodes: Array) -> tuple[Equations, Array]:
+def _assembled(machine: CrankParameters, middles: Array, nodes: Array) -> tuple[Equations, Array]:
     """Equations at the middles of the bins and loads at the nodes of the forcing, in the plane or in space."""
     if machine.is_spatial:
         return spatial_equations(machine, middles), spatial_loads(machine, nodes)
@@ -25,7 +22,7 @@ def _assembled(machine: "SliderCrank", middles: Array, nodes: Array) -> tuple[Eq
     return equations(machine, middles, rod), loads(machine, nodes, rod)
 
 
-def held_of(machine: "SliderCrank") -> Held:
+def held_of(machine: CrankParameters) -> Held:
     """Held accelerations of a crank."""
     middles, nodes = middles_and_nodes(machine.bins)
     found, load = _assembled(machine, middles, nodes)
@@ -33,7 +30,7 @@ def held_of(machine: "SliderCrank") -> Held:
     return held(found.mass, found.damping, found.stiffness, load, friction)
 
 
-def _friction(machine: "SliderCrank", crank_angle: Array) -> Array:
+def _friction(machine: CrankParameters, crank_angle: Array) -> Array:
     """Friction coefficient with the sign of the nominal slider velocity, ramped through zero."""
     if machine.friction_coefficient == 0.0:
         return np.zeros(len(crank_angle))
@@ -42,7 +39,7 @@ def _friction(machine: "SliderCrank", crank_angle: Array) -> Array:
     return np.asarray(machine.friction_coefficient * np.clip(speed, -1.0, 1.0))
 
 
-def force_bound(crank: "SliderCrank") -> float:
+def force_bound(crank: CrankParameters) -> float:
     """Force [N] of an impact of all moving masses at ten times the speed of the crank pin.
 
     The motor may give any power, so that there is no bound of energy. What turns with the rod counts as the mass at its

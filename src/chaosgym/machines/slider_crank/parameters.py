@@ -1,19 +1,14 @@
-r"""The Spatial Slider Crank: a flywheel, a connecting rod and a slider whose joints rattle in their clearance.
+"""Parameters of the Spatial Slider Crank: a flywheel, a connecting rod and a slider with clearance in its joints.
 
 A motor turns the crank at constant speed. A ball joint drives a slender steel rod; at its other end a yoke pivots on a
 slider that runs along a straight guide (thesis 4.2). Clearance in the slider joint lets the slider rattle across the
 guide, clearance in the ball joint lets the ball rattle in its housing.
-
-Nominal kinematics and rod (``kinematics``, ``connecting_rod``) -> equations of small motions (``equations``),
-held over bins of crank angle -> exact propagators (``kernels.propagator``) -> BinnedModel.
 
 Gravity is off by default. With the mechanism's plane upright, the slider's weight keeps it on the guide below about
 360 rpm, so no impact could happen in the slider joint; yet the thesis shows impacts of 35 to 130 N at 190 to 290 rpm
 (4.4.2), which follow the law of a slider without weight. Its ball joint results need gravity (4.4.1). Each scene
 therefore says which gravity it has. What makes impacts of the printed size under gravity is pitch: an instrumented
 slider joint whose slider has its centre of gravity about 30 mm off the guide.
-
-The file is long because half of it is the table of fields, each with its range, its provenance and its source.
 
 References
 ----------
@@ -22,66 +17,31 @@ P. Gu, Chaotic Vibration in Machine Systems and Its Implications for Design, PhD
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from chaosgym.core.binned.model import HERTZ, LINEAR
-from chaosgym.core.cycle import CycleArrays
 from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.machine import BinnedMachine
-from chaosgym.machines.binned.model import MAX_SETS, Contact, Held
 from chaosgym.machines.machine import Option, Work
-from chaosgym.machines.parameters import Parameter, parameter, parameters_of
-from chaosgym.machines.slider_crank.equations import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom, equations
-from chaosgym.machines.slider_crank.joints import display_of, gaps_of, joints_of, sensor_peaks, sensors_of
-from chaosgym.machines.slider_crank.kinematics import slider_position
-from chaosgym.machines.slider_crank.model import force_bound, held_of
+from chaosgym.machines.parameters import parameter
 from chaosgym.machines.slider_crank.scenes import EXTREMES, OPTIONS, SCENES
-from chaosgym.machines.slider_crank.spatial_equations import spatial_equations
 from chaosgym.machines.slider_crank.work import WORK
 
-Array = NDArray[np.float64]
+FITTED = "fitted to the statements, see docs/development/calibration.md"
+"""Source of what was fitted to the thesis' results."""
 
-_FIT = "fitted to the statements, see docs/development/calibration.md"
 _FREQUENCY = "first natural frequency 75.6 Hz, thesis 4.5.5"
 _STEEL = "steel"
 
-DIMENSIONS = (
-    "crank_radius",
-    "rod_length",
-    "rod_diameter",
-    "youngs_modulus",
-    "density",
-    "slider_mass",
-    "yoke_mass",
-    "housing_mass",
-)
-"""Fields that make it another crank than that of the thesis."""
-
-
-def _is_fitted(name: str, about: Parameter) -> bool:
-    """True for a constant that was fitted to the thesis' results, or follows from them: a mass, spring or damping."""
-    numbers = about.provenance == "calibrated" and about.source == _FIT and not about.choices and name != "n_modes"
-    return numbers or (about.provenance == "derived" and about.unit in ("kg", "kg m^2"))
-
 
 @dataclass(frozen=True, kw_only=True)
-class SliderCrank(BinnedMachine):
-    """The Spatial Slider Crank; the defaults are the planar mechanism of the thesis with clearance at the slider.
+class CrankParameters(BinnedMachine):
+    """Parameters of the Spatial Slider Crank, and what follows from them alone.
 
     Raises
     ------
     ParameterError
         On construction, if a field is outside its range; names the field, the value and the range.
-
-    Examples
-    --------
-    >>> crank = chaosgym.SliderCrank(crank_speed=200.0, slider_clearance=3.2e-5)
-    >>> crank.cycle_period
-    0.3
     """
 
     fidelity_ladder: ClassVar[Mapping[str, Mapping[str, Any]]] = {
@@ -129,18 +89,18 @@ class SliderCrank(BinnedMachine):
     """Angle between the motor axis and the normal of the guide [deg]; planar motion at 0."""
     rod: str = parameter("flexible", choices=("flexible", "rigid"), provenance="printed", source="thesis 4.3.1")
     """Whether the rod bends and stretches."""
-    n_modes: int = parameter(3, low=1, high=40, provenance="calibrated", source=_FIT)
+    n_modes: int = parameter(3, low=1, high=40, provenance="calibrated", source=FITTED)
     """Bending modes of the flexible rod, in each plane; the fit to the thesis kept three and ``fitted_modes`` 0."""
     fitted_modes: int = parameter(1, low=0, high=6, provenance="assumed", source="a matter of computing")
     """Modes added that stand for all that are left out: they give the slider the rod's inertia."""
-    damping_ratio: float = parameter(0.01077, low=0.0, high=100.0, provenance="calibrated", source=_FIT)
+    damping_ratio: float = parameter(0.01077, low=0.0, high=100.0, provenance="calibrated", source=FITTED)
     """Structural damping ratio of the rod's first mode."""
     damping_family: str = parameter(
-        "power", choices=("uniform", "stiffness", "power"), provenance="calibrated", source=_FIT
+        "power", choices=("uniform", "stiffness", "power"), provenance="calibrated", source=FITTED
     )
     """"uniform": the same ratio in every mode; "stiffness": proportional to the mode's frequency; "power": to that
     power of it that ``damping_exponent`` names."""
-    damping_exponent: float = parameter(1.3257, low=-2.0, high=4.0, provenance="calibrated", source=_FIT)
+    damping_exponent: float = parameter(1.3257, low=-2.0, high=4.0, provenance="calibrated", source=FITTED)
     """Exponent of the frequency in the structural damping ratio of a mode, with damping_family = "power"."""
     geometric_stiffness: str = parameter(
         "off",
@@ -153,25 +113,25 @@ class SliderCrank(BinnedMachine):
     """Young's modulus of the rod [Pa]."""
     density: float = parameter(7833.0, unit="kg/m^3", low=10.0, high=1e5, provenance="assumed", source=_STEEL)
     """Mass density of the rod [kg/m^3]."""
-    housing_mass: float = parameter(0.3705, unit="kg", low=0.0, high=100.0, provenance="calibrated", source=_FIT)
+    housing_mass: float = parameter(0.3705, unit="kg", low=0.0, high=100.0, provenance="calibrated", source=FITTED)
     """Ball joint housing at the rod's end [kg]."""
     housing_inertia: float = parameter(
         5.57889e-4, unit="kg m^2", low=0.0, high=10.0, provenance="derived", source=_FREQUENCY
     )
     """Moment of inertia of the housing about the ball centre [kg m^2]."""
     housing_offset_along: float = parameter(
-        -5.85e-3, unit="m", low=-0.1, high=0.1, provenance="calibrated", source=_FIT
+        -5.85e-3, unit="m", low=-0.1, high=0.1, provenance="calibrated", source=FITTED
     )
     """Centre of gravity of the housing from the ball centre towards the slider [m]."""
     housing_offset_across: float = parameter(0.0, unit="m", low=-0.1, high=0.1, provenance="assumed", source="symmetry")
     """Centre of gravity of the housing across the rod [m]."""
-    yoke_mass: float = parameter(0.2982, unit="kg", low=0.0, high=100.0, provenance="calibrated", source=_FIT)
+    yoke_mass: float = parameter(0.2982, unit="kg", low=0.0, high=100.0, provenance="calibrated", source=FITTED)
     """Yoke at the rod's other end [kg]."""
     yoke_inertia: float = parameter(
         5.77575e-4, unit="kg m^2", low=0.0, high=10.0, provenance="derived", source=_FREQUENCY
     )
     """Moment of inertia of the yoke about the slider pivot [kg m^2]."""
-    yoke_offset_along: float = parameter(0.01844, unit="m", low=-0.1, high=0.1, provenance="calibrated", source=_FIT)
+    yoke_offset_along: float = parameter(0.01844, unit="m", low=-0.1, high=0.1, provenance="calibrated", source=FITTED)
     """Centre of gravity of the yoke from the slider pivot, positive away from the crank [m]."""
     yoke_offset_across: float = parameter(0.0, unit="m", low=-0.1, high=0.1, provenance="assumed", source="symmetry")
     """Centre of gravity of the yoke across the rod [m]."""
@@ -248,15 +208,17 @@ class SliderCrank(BinnedMachine):
         50.0, unit="N", low=1e-3, high=1e6, provenance="assumed", source="middle of the printed forces"
     )
     """Force [N] at which the Hertzian law has the linear law's secant stiffness and restitution."""
-    contact_stiffness: float = parameter(1.552e7, unit="N/m", low=1e3, high=1e12, provenance="calibrated", source=_FIT)
+    contact_stiffness: float = parameter(
+        1.552e7, unit="N/m", low=1e3, high=1e12, provenance="calibrated", source=FITTED
+    )
     """Linearised Hertzian stiffness of a joint [N/m]; the stations of an instrumented slider joint share it."""
     contact_damping_ratio: float = parameter(
         0.05, low=0.0, high=100.0, provenance="printed", source="thesis 4.5.4: 2.5 % and 5 %"
     )
     """Damping ratio of a joint in contact, related to ``contact_damping_mass``."""
-    contact_damping_mass: float = parameter(6.908, unit="kg", low=0.0, high=1e3, provenance="calibrated", source=_FIT)
+    contact_damping_mass: float = parameter(6.908, unit="kg", low=0.0, high=1e3, provenance="calibrated", source=FITTED)
     """Mass to which the contact damping ratio is related [kg]; 0: that of slider and yoke."""
-    ball_damping_mass: float = parameter(0.48, unit="kg", low=0.0, high=1e3, provenance="calibrated", source=_FIT)
+    ball_damping_mass: float = parameter(0.48, unit="kg", low=0.0, high=1e3, provenance="calibrated", source=FITTED)
     """The same for the ball joint [kg]; 0: that of the slider joint."""
     friction_coefficient: float = parameter(
         0.0, low=0.0, high=0.5, provenance="printed", source="thesis 4.5.3: 0 and 0.1"
@@ -324,174 +286,6 @@ class SliderCrank(BinnedMachine):
         return "slider" if self.slider_joint != "ideal" else "ball"
 
     @property
-    def round_bearing(self) -> bool:
-        """True for the ball joint."""
-        return self.monitored_joint == "ball"
-
-    def bearing_place(self, phase: Array, force: Array) -> tuple[Array, str]:
-        """Where on its bearing the monitored joint carries a force, and the unit of that place.
-
-        Parameters
-        ----------
-        phase : (n,)
-            Phases [rad] of the cycle.
-        force : (n, 3)
-            Components of the force, as in ``CycleRecord.peak_vector``.
-
-        Returns
-        -------
-        (place, unit)
-            The slider's pivot on its guide, counted from the crank's axis, and "m"; or the polar angle on the ball
-            joint's housing, counted in the rod's plane of swing from the rod's axis, and "deg".
-        """
-        if self.monitored_joint == "slider":
-            tilt = math.radians(self.motor_angle)
-            return slider_position(phase, self.crank_radius, self.rod_length, tilt), "m"
-        return np.degrees(np.arctan2(force[:, 1], force[:, 0])), "deg"
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Constants that were fitted to the thesis' crank and that a crank of other dimensions keeps."""
-        default, known = type(self)(), parameters_of(self)
-        usual = {name for name in known if getattr(self, name) == getattr(default, name)}
-        others = [name for name in DIMENSIONS if name not in usual]
-        kept = [name for name, about in known.items() if name in usual and _is_fitted(name, about)]
-        kept = [name for name in kept if name != "ball_damping_mass" or self.ball_joint != "ideal"]
-        if not others or not kept:
-            return ()
-        values = ", ".join(f"{name} {getattr(self, name):g} {known[name].unit.strip('-')}".strip() for name in kept)
-        return (f"{', '.join(others)}: not the thesis' crank, yet these are still fitted to it: {values}",)
-
-    @property
-    def sensors(self) -> tuple[str, ...]:
-        """Names of the force sensors of the instrumented joints; ``CycleRecord.sensor_peak`` has their columns."""
-        return sensors_of(self)
-
-    @property
-    def clearance_field(self) -> str:
-        """Field that holds the clearance of the monitored joint."""
-        return f"{self.monitored_joint}_clearance"
-
-    @property
-    def chaos_thresholds(self) -> Mapping[str, tuple[float, float]]:
-        """Clearance [m] of the slider, and speed [rpm] (thesis 5.3.1).
-
-        The least clearance is printed for contact dampings of 2.5 and 5 %, in proportion; so it is taken beyond them.
-        """
-        least = 0.064e-3 * self.contact_damping_ratio / 0.05
-        return {"clearance": (self.slider_clearance, least), "speed": (self.crank_speed, 100.0)}
-
-    @property
-    def natural_frequencies(self) -> Array:
-        """Natural frequencies [Hz] at rest at crank angle zero, every joint tight, (n_modes + 1,).
-
-        At a motor angle (2 n_modes + 1,): those of bending sideways too.
-        """
-        return frequencies_at(self, 0.0)
-
-    @property
-    def degrees_of_freedom(self) -> tuple[str, ...]:
-        """Names of the coordinates that are integrated: only those that the scene requires."""
-        return degrees_of_freedom(self)
-
-    @property
     def is_spatial(self) -> bool:
         """True if the motor stands at an angle, so that the rod swings in two planes."""
         return self.motor_angle > 0.0
-
-    @property
-    def bins(self) -> int:
-        """Bins of crank angle over which matrices are held."""
-        return round(360.0 / self.matrix_update_interval)
-
-    def held(self) -> Held:
-        """Return the held accelerations, whatever the speed and the clearances."""
-        return held_of(self)
-
-    @property
-    def contacts(self) -> list[Contact]:
-        """All contacts, those of the slider joint first."""
-        return joints_of(self)
-
-    @property
-    def gaps(self) -> Array:
-        """Clearances [m] of the contacts."""
-        return gaps_of(self)
-
-    @property
-    def display(self) -> Array:
-        """Displacement of the monitored joint: of the slider across the guide, or of the rod's end across the rod."""
-        return display_of(self)
-
-    @property
-    def stiffest(self) -> float:
-        """Contact stiffness [N/m]."""
-        return self.contact_stiffness
-
-    @property
-    def law(self) -> int:
-        """Law of all contacts."""
-        return LINEAR if self.contact_law == "linear" else HERTZ
-
-    @property
-    def has_propagators(self) -> bool:
-        """True if contact is linear, no contact force turns with the ball, and the contact sets are few."""
-        if self.contact_law != "linear" or self.ball_joint == "spherical":
-            return False
-        return int(self.radix ** len(self.gaps)) <= MAX_SETS
-
-    @property
-    def radix(self) -> int:
-        """Contact states of a channel that differ in their matrices: friction tells one side from the other."""
-        return 3 if self.friction_coefficient > 0.0 else 2
-
-    @property
-    def sampled_bins(self) -> list[int]:
-        """Bins at which eigenvalues are looked at: the rod in line with the guide, and farthest off it."""
-        return [0, self.bins // 4]
-
-    def further_results(self, arrays: CycleArrays) -> dict[str, Any]:
-        """Phase and components of each peak force, and the peaks of the sensors."""
-        peaks = sensor_peaks(self, arrays.channel_peak) if self.sensors else None
-        return {**super().further_results(arrays), "sensor_peak": peaks}
-
-    @property
-    def room(self) -> tuple[float, float]:
-        """How far [m] the gap lets the displacement go: a ball among tetrahedral sensors, further than half of it."""
-        sensors = self.monitored_joint == "ball" and self.ball_joint == "instrumented"
-        gap = float(getattr(self, self.clearance_field)) * (math.sqrt(3.0) if sensors else 1.0)
-        return -gap, gap
-
-    def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
-        """Draw crank, rod and slider; see ``Machine.draw``."""
-        from chaosgym.machines.slider_crank.picture import draw_crank
-
-        draw_crank(panel, record, colour, moment, force_limit)
-
-    def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Largest force, as a share of that of an impact of all masses at ten times the speed of the crank pin."""
-        return float(peak_force.max()) / force_bound(self)
-
-
-THESIS_SLIDER_CRANK = SliderCrank(fitted_modes=0, matrix_update_interval=5.0)
-"""The default crank in the thesis' own reduction (5.2.2), in which its constants were fitted."""
-
-
-def frequencies_at(machine: SliderCrank, crank_angle: float) -> Array:
-    """Natural frequencies [Hz] of the mechanism at rest at a crank angle [deg], every joint tight.
-
-    Examples
-    --------
-    >>> from chaosgym.machines.slider_crank.parameters import frequencies_at
-    >>> frequencies_at(chaosgym.SliderCrank(), 90.0).round(1)
-    array([  75.6,  136.2,  549.5, 1167.6, 1542.4])
-    """
-    from scipy.linalg import eigh
-
-    bound = replace(machine, slider_joint="clearance", ball_joint="ideal", rod="flexible")
-    assemble = spatial_equations if machine.is_spatial else equations
-    system = assemble(bound, np.array([math.radians(crank_angle)]))
-    free = [i for i, name in enumerate(bound.degrees_of_freedom) if name not in (SLIDER_ACROSS, SLIDER_LATERAL)]
-    at = np.ix_(free, free)
-    squares = eigh(system.stiffness[0, 0][at], system.mass[0][at], eigvals_only=True)
-    return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi))

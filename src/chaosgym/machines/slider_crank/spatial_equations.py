@@ -38,13 +38,13 @@ ball joint that the rod needs, yoke bearing, slider pivot.
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.machines.slider_crank.connecting_rod import ACROSS_A, ACROSS_B, MODES
 from chaosgym.machines.slider_crank.equations import Equations, mode_damping
+from chaosgym.machines.slider_crank.parameters import CrankParameters
 from chaosgym.machines.slider_crank.spatial_kinematics import (
     AXIS,
     Frame,
@@ -58,9 +58,6 @@ from chaosgym.machines.slider_crank.spatial_kinematics import (
     slider_inertia,
     slider_offset,
 )
-
-if TYPE_CHECKING:
-    from chaosgym.machines.slider_crank.parameters import SliderCrank
 
 Array = NDArray[np.float64]
 
@@ -80,7 +77,7 @@ def _dot(one: Array, other: Array) -> Array:
     return np.asarray(np.einsum("qbi,bi->qb", one, other))
 
 
-def _tension(machine: "SliderCrank", rods: Rods, frame: Frame, acceleration: Array, guide: Array) -> Array:
+def _tension(machine: CrankParameters, rods: Rods, frame: Frame, acceleration: Array, guide: Array) -> Array:
     """Coefficients (3, 2, B) of the tension [N] as a polynomial of the place along the rod, as in ``ConnectingRod``."""
     yoke, slider, turning = (acceleration[:, :, k] for k in (-4, -3, -2))
     line, length, first = rods.swing.line_mass, machine.rod_length, rods.swing.position[0]
@@ -108,7 +105,7 @@ def _rod_stiffness(rods: Rods, frame: Frame, shapes: Shapes, tension: Array) -> 
 
 
 def geometric_stiffness(
-    machine: "SliderCrank", rods: Rods, frame: Frame, shapes: Shapes, acceleration: Array, guide: Array
+    machine: CrankParameters, rods: Rods, frame: Frame, shapes: Shapes, acceleration: Array, guide: Array
 ) -> Array:
     """Geometric stiffness of gravity and, per squared crank rate, of the nominal motion: (2, B, n, n).
 
@@ -143,7 +140,7 @@ def geometric_stiffness(
     return total + _slider_stiffness(machine, shapes, slider)
 
 
-def _slider_stiffness(machine: "SliderCrank", shapes: Shapes, acceleration: Array) -> Array:
+def _slider_stiffness(machine: CrankParameters, shapes: Shapes, acceleration: Array) -> Array:
     """Of the slider, whose centre of gravity is off its pivot and turns with it, (2, B, n, n)."""
     turn, offset = shapes.slider_turn, slider_offset(machine)
     pulled = np.einsum("qbi,in->qbn", acceleration, turn)
@@ -153,7 +150,7 @@ def _slider_stiffness(machine: "SliderCrank", shapes: Shapes, acceleration: Arra
     return np.asarray(machine.slider_mass * (0.5 * (product + np.swapaxes(product, -1, -2)) - hanging))
 
 
-def held(machine: "SliderCrank") -> "SliderCrank":
+def held(machine: CrankParameters) -> CrankParameters:
     """The machine with a rigid rod and clearance at the slider alone: its loads are what the guide must carry."""
     return replace(machine, rod="rigid", slider_joint="clearance", ball_joint="ideal", geometric_stiffness="off")
 
@@ -172,7 +169,7 @@ def _shifted(crank_angle: Array) -> list[Array]:
     return [crank_angle + _SHIFT * k for k in range(-4, 5)]
 
 
-def spatial_loads(machine: "SliderCrank", crank_angle: Array) -> Array:
+def spatial_loads(machine: CrankParameters, crank_angle: Array) -> Array:
     """Load of gravity and, per squared crank rate, of the nominal motion: (2, B, n)."""
     rods = rods_of(machine)
     around = [positions_at(machine, angle, rods) for angle in _shifted(crank_angle)]
@@ -180,7 +177,7 @@ def spatial_loads(machine: "SliderCrank", crank_angle: Array) -> Array:
     return _loads(machine, rods, particle, _accelerations(machine, rods, _difference(_SECOND, around)))
 
 
-def _accelerations(machine: "SliderCrank", rods: Rods, motion: Array) -> Array:
+def _accelerations(machine: CrankParameters, rods: Rods, motion: Array) -> Array:
     """Accelerations of the particles: gravity's reaction, and ``motion`` (B, k, 3) per squared crank rate."""
     _, director = masses_of(machine, rods)
     tilt = math.radians(machine.gravity_angle)
@@ -188,14 +185,14 @@ def _accelerations(machine: "SliderCrank", rods: Rods, motion: Array) -> Array:
     return np.stack([np.broadcast_to((1.0 - director)[:, None] * up, motion.shape), motion])
 
 
-def _loads(machine: "SliderCrank", rods: Rods, particle: Array, acceleration: Array) -> Array:
+def _loads(machine: CrankParameters, rods: Rods, particle: Array, acceleration: Array) -> Array:
     mass, _ = masses_of(machine, rods)
     count, _, _, n = particle.shape
     forces = (mass[:, None] * acceleration).reshape(2, count, 1, -1)
     return np.asarray((forces @ particle.reshape(count, -1, n))[:, :, 0])
 
 
-def spatial_equations(machine: "SliderCrank", crank_angle: Array) -> Equations:
+def spatial_equations(machine: CrankParameters, crank_angle: Array) -> Equations:
     """Assemble the equations of motion at given crank angles; see ``equations.Equations``.
 
     Parameters
@@ -244,7 +241,7 @@ def spatial_equations(machine: "SliderCrank", crank_angle: Array) -> Equations:
     )
 
 
-def _elastic(machine: "SliderCrank", rods: Rods) -> tuple[Array, Array]:
+def _elastic(machine: CrankParameters, rods: Rods) -> tuple[Array, Array]:
     """Stiffness and structural damping of stretch and modes, diagonal; zero for a rigid rod."""
     size = 1 + 2 * len(rods.swing.mode_frequency)
     if machine.rod == "rigid":

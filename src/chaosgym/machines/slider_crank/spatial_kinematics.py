@@ -15,7 +15,7 @@ rod, so that with the rod's end turning by beta = (beta_n, beta_b)
 """
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +33,7 @@ from chaosgym.machines.slider_crank.equations import (
     rod_of,
 )
 from chaosgym.machines.slider_crank.kinematics import crank_pin, slider_position
-
-if TYPE_CHECKING:
-    from chaosgym.machines.slider_crank.parameters import SliderCrank
+from chaosgym.machines.slider_crank.parameters import CrankParameters
 
 Array = NDArray[np.float64]
 
@@ -91,7 +89,7 @@ class Shapes(NamedTuple):
     slider_turn: Array
 
 
-def rods_of(machine: "SliderCrank") -> Rods:
+def rods_of(machine: CrankParameters) -> Rods:
     """The rod of a machine in both planes."""
     swing = rod_of(machine)
     still = EndBody(machine.yoke_mass, 0.0, 0.0, 0.0)
@@ -99,7 +97,7 @@ def rods_of(machine: "SliderCrank") -> Rods:
     return Rods(swing, connecting_rod(bar_of(machine), housing, still, *modes_of(machine)))
 
 
-def frame_at(machine: "SliderCrank", angle: Array) -> Frame:
+def frame_at(machine: CrankParameters, angle: Array) -> Frame:
     """Nominal frame at crank angles (B,) [rad]."""
     tilt = math.radians(machine.motor_angle)
     pin = crank_pin(angle, machine.crank_radius, tilt)
@@ -112,7 +110,7 @@ def frame_at(machine: "SliderCrank", angle: Array) -> Frame:
     return Frame(pin, slider, along, across, np.cross(along, across), yoke)
 
 
-def masses_of(machine: "SliderCrank", rods: Rods) -> tuple[Array, Array]:
+def masses_of(machine: CrankParameters, rods: Rods) -> tuple[Array, Array]:
     """Masses (k,) of the particles: the bar's points, housing, yoke, slider, and the unit vectors of housing and yoke.
 
     The second array (k,) is 1 for the two unit vectors, whose mass is a central rotary inertia, and 0 for points.
@@ -130,7 +128,7 @@ def masses_of(machine: "SliderCrank", rods: Rods) -> tuple[Array, Array]:
     return np.concatenate([bar, bodies]), np.concatenate([np.zeros(len(bar) + 3), np.ones(2)])
 
 
-def slider_inertia(machine: "SliderCrank") -> Array:
+def slider_inertia(machine: CrankParameters) -> Array:
     """Central moments of inertia (3,) of the slider about X, Y and Z: a block as wide as it is high."""
     along, across = machine.slider_offset_along, machine.slider_offset_across
     roll = machine.slider_roll_inertia - machine.slider_mass * across**2
@@ -138,12 +136,12 @@ def slider_inertia(machine: "SliderCrank") -> Array:
     return np.array([roll, pitch, pitch])
 
 
-def slider_offset(machine: "SliderCrank") -> Array:
+def slider_offset(machine: CrankParameters) -> Array:
     """Centre of gravity (3,) of the slider from its pivot."""
     return np.array([machine.slider_offset_along, machine.slider_offset_across, 0.0])
 
 
-def positions_at(machine: "SliderCrank", angle: Array, rods: Rods) -> Array:
+def positions_at(machine: CrankParameters, angle: Array, rods: Rods) -> Array:
     """Nominal positions (B, k, 3) of the particles, unit vectors included."""
     frame = frame_at(machine, angle)
     bar = frame.pin[:, None] + rods.swing.position[:, None] * frame.along[:, None]
@@ -153,7 +151,7 @@ def positions_at(machine: "SliderCrank", angle: Array, rods: Rods) -> Array:
     return np.concatenate([bar, np.stack([housing, yoke, slider, frame.along, frame.yoke], axis=1)], axis=1)
 
 
-def _ends(machine: "SliderCrank", frame: Frame) -> tuple[Array, Array]:
+def _ends(machine: CrankParameters, frame: Frame) -> tuple[Array, Array]:
     """Motion (B, 3, n) of the rod's ends A and B per unit coordinate."""
     names = degrees_of_freedom(machine, spatial=True)
     at_a, at_b = np.zeros((2, len(frame.pin), 3, len(names)))
@@ -169,13 +167,13 @@ def _ends(machine: "SliderCrank", frame: Frame) -> tuple[Array, Array]:
     return at_a, at_b
 
 
-def _slider_turn(machine: "SliderCrank") -> Array:
+def _slider_turn(machine: CrankParameters) -> Array:
     """Turn (3, n) of the slider about X, Y and Z per unit coordinate."""
     names = degrees_of_freedom(machine, spatial=True)
     return np.array([[float(name == turn) for name in names] for turn in SLIDER_TURNS])
 
 
-def shapes_at(machine: "SliderCrank", angle: Array, rods: Rods) -> Shapes:
+def shapes_at(machine: CrankParameters, angle: Array, rods: Rods) -> Shapes:
     """Motion per unit coordinate at crank angles (B,) [rad]."""
     frame = frame_at(machine, angle)
     at_a, at_b = _ends(machine, frame)
