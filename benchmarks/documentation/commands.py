@@ -33,7 +33,7 @@ LONGEST = 40
 """Lines of an output that a page shows."""
 
 SHARED = {
-    "show": ("of the machine", {option for name in MACHINES.entry_points for option in MACHINES[name].options}),
+    "show": ("of the machine", {"--set", "--fidelity", *(key for name in MACHINES for key in MACHINES[name].options)}),
     "diagnose": ("of what was measured", {f"--{name.replace('_', '-')}" for name in Measured._fields}),
 }
 """Options that several commands have: the page that lists them, what they are, and their names."""
