@@ -102,7 +102,7 @@ def _run_point(frequency: float, clearance: float) -> CycleRecord:
 
 
 def _point_row(kind: str, record: CycleRecord, sweep: LabelledSweep) -> dict[str, Any]:
-    """What simulation says of a point, and the type of the sweep's nearest point."""
+    """Verdict by simulation of a point, and the type of the sweep's nearest point."""
     verdict = two_step_test(record.after(200))
     peaks = record.peak_force[200:].max(axis=1)
     machine: Any = record.machine

@@ -267,7 +267,7 @@ def parquet_of(source: Any, columns: list[str] | None = None) -> Any:
 
 
 def first_line(error: BaseException) -> str:
-    """First line of what an error says, or its kind; no more than two hundred letters."""
+    """First line of an error's message, or its kind; at most two hundred letters."""
     return (str(error).strip().split("\n")[0] or type(error).__name__)[:200]
 
 

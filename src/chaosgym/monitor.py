@@ -76,7 +76,7 @@ class RepeatSums:
         self._last = np.full((count, lags), np.nan)
 
     def forget(self, which: Indices) -> None:
-        """Forget what the sensors ``which`` (k,) have seen."""
+        """Reset the sensors ``which`` (k,)."""
         self.cycles[which], self._sums[which], self._last[which] = 0, 0.0, np.nan
 
     def add(self, which: Indices, peaks: Array, sensor_error: float) -> Array:
@@ -90,14 +90,14 @@ class RepeatSums:
         return gaps
 
     def level(self, which: Indices) -> Array:
-        """Least sum over its limit, (k,); 0 until every lag could be seen twice."""
+        """Least sum over its limit, (k,); 0 until every lag has been measured twice."""
         known = self.cycles[which] > 2 * self._sums.shape[1]
         return np.asarray(np.where(known, self._sums[which].min(axis=1) / LIMIT, 0.0))
 
 
 @dataclass(frozen=True)
 class Watch:
-    """What the monitor says after a cycle.
+    """State of the monitor after a cycle.
 
     Attributes
     ----------
@@ -181,7 +181,7 @@ class Monitor:
         self.reset()
 
     def reset(self) -> None:
-        """Forget what was seen."""
+        """Start anew, without earlier readings."""
         self.cycle, self.alarm, self.missing, self.dead = 0, False, 0, False
         self.sensor_error = self.stated
         self._sums = RepeatSums(1, self.longest_period)
@@ -191,7 +191,7 @@ class Monitor:
 
     @property
     def state(self) -> dict[str, Any]:
-        """What is known so far, as plain values for JSON."""
+        """State as plain values for JSON."""
         names = ("cycle", "alarm", "sensor_error", "stated", "missing", "dead")
         return {**{name: getattr(self, name) for name in names}, "level": float(self._sums.level(FIRST)[0])}
 

@@ -99,7 +99,7 @@ class Contenders:
 
     @property
     def _training(self) -> dict[str, Any]:
-        """Keywords of the machines that a contender may know: of a split those of training."""
+        """Keywords of the machines from which a contender may learn: of a split those of training."""
         given = {name: value for name, value in self.keywords.items() if name != "sealed"}
         return given | ({"split": "train"} if given.get("split") else {})
 
@@ -273,7 +273,7 @@ def shipped_comparison(env: str, **keywords: Any) -> pa.Table | None:
 
 
 def subject_of(env: str, **keywords: Any) -> str:
-    """What a comparison is of: the environment, and what sets it apart from the id's own.
+    """Subject of a comparison: the environment, and the keywords that differ from the id's own.
 
     Examples
     --------

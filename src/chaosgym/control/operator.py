@@ -142,7 +142,7 @@ class Operator:
         return self.speed
 
     def _count_a_step(self) -> None:
-        """One more step is done; after those of a job the last one goes on."""
+        """Count a step, up to the last one of a job."""
         if self._job["done"][0] < self.task.steps - 1:
             self._job["done"] += 1
         else:

@@ -55,7 +55,7 @@ class Lines:
         print("reset", file=self._told, flush=True)
 
     def run(self, speed: float, cycles: int) -> Any:
-        """Ask for a step, and wait for its line."""
+        """Request a step, and read the line that answers it."""
         print(f"run {speed:.10g} {cycles}", file=self._told, flush=True)
         line = self._heard.readline()
         if not line:
@@ -66,7 +66,7 @@ class Lines:
             raise ParameterError(f"{line.strip()[:60]!r} is no line of forces [N]; allowed: 81.2 80.9 ...") from None
 
     def done(self) -> None:
-        """Tell the plant that no more is asked."""
+        """Tell the plant that the job has ended."""
         print("done", file=self._told, flush=True)
 
 
@@ -105,7 +105,7 @@ def _from_here() -> Any:
 
 @contextmanager
 def _told(name: str) -> Any:
-    """Turn whatever goes wrong in the code of a plant into one line."""
+    """Report any error in the code of a plant in one line."""
     try:
         yield
     except ParameterError:
@@ -179,7 +179,7 @@ def work(plant: Plant, operator: Operator, job: int = 0, name: str = "") -> Work
 
 
 def _readings(plant: Plant, speed: float, cycles: int, name: str) -> Mapping[str, Any]:
-    """What a step told, checked."""
+    """Validated readings of a step."""
     with _told(name):
         found = plant.run(speed, cycles)
         readings: Mapping[str, Any] = found if isinstance(found, Mapping) else {"peaks": found}

@@ -32,7 +32,7 @@ class _ByContent(_Locator):  # type: ignore[misc] # numba has no types
         self._cache_path = cache_folder(Path(py_file))
 
     def get_source_stamp(self) -> str:
-        """Of every kernel the same: the folder's name tells the sources."""
+        """The same stamp for every kernel: the folder is named by the hash of the sources."""
         return ""
 
     @classmethod
@@ -51,7 +51,7 @@ def leaf(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def part(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a piece of other kernels as if it were written out in each: it needs no call and no code of its own."""
+    """Always inline this kernel into its callers."""
     compiled: Callable[..., Any] = njit(cache=True, inline="always")(function)
     return compiled
 

@@ -293,7 +293,7 @@ def dot_of_distances(e, table, at, own, u_at, v_at, width):
 
 @_operation()
 def copy(e, own, at, out_at, count):
-    """Copy some numbers within an array, whose parts must not overlap: numba's own indexing asks for every sign."""
+    """Copy numbers within an array without overlap; unlike numba's indexing it tests no sign of the index."""
     b = e.builder
     with e.vectors(b.add(count, e.index(LANES - 1))) as loop:
         first = e.times(loop.index, LANES)
@@ -588,7 +588,7 @@ def sum_series(e, series, at, stride, last, time, out, out_at, width):
 
 @_operation(types.float64)
 def item(e, own, at):
-    """Number at a place that is not negative: numba's own indexing first asks for that."""
+    """Number at an index that is not negative; unlike numba's indexing it does not test for that."""
     return e.number(own, at)
 
 

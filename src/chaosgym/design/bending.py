@@ -177,7 +177,7 @@ def stress_of_modes(machine: Machine, bending: Bending) -> Array:
 
 
 class Stressed(NamedTuple):
-    """What one machine's section goes through.
+    """Stress history of a section of one machine.
 
     Attributes
     ----------

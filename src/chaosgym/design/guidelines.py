@@ -121,7 +121,7 @@ def guidelines(found: Assessment, further: Sequence[Neighbour] = ()) -> tuple[Gu
 
 
 def _held(case: Case, found: Assessment) -> str:
-    """How often the case of its neighbours told the nature of a point of the dataset."""
+    """How often the case of its neighbours gave the right nature of a point of the dataset."""
     rate = measured_rates().get(found.machine.name, {}).get(f"case {case}")
     if rate is None or rate.precision is None:
         return "; how often the case tells a machine's nature was not measured on this machine"

@@ -75,7 +75,7 @@ REFINEMENTS = 3
 
 @dataclass(frozen=True)
 class Trial:
-    """A changed machine and what the methodology says of it."""
+    """A changed machine and its assessment."""
 
     changes: Mapping[str, float]
     cost: float
@@ -88,7 +88,7 @@ class Trial:
 
     @property
     def life(self) -> float:
-        """Life that the methodology tells, in required lives."""
+        """Life by the assessment, in required lives."""
         return self.assessment.evaluation.life_interval.low / self.assessment.criteria.life
 
     @property
@@ -347,7 +347,7 @@ def improve(
 
 
 def _allowed(machine: Machine, change: Mapping[str, float], force: float) -> bool:
-    """Whether a machine with the change can be built and its cost be told; an unknown field is an error."""
+    """Whether a machine with the change is allowed and has a cost; an unknown field is an error."""
     for name in change:
         if name not in parameters_of(machine):
             with_settings(machine, change)

@@ -65,7 +65,7 @@ class MeasuredPeaks:
 
     @property
     def strength_stated(self) -> bool:
-        """Whether a reliability may be told."""
+        """Whether the criteria state a strength, which a reliability needs."""
         return all(name in self.stated for name in STRENGTH)
 
     @property

@@ -370,7 +370,7 @@ def further_checks(
 
 
 def verdict_of(kind: Type, checks: tuple[Check, ...]) -> Verdict:
-    """Whether all criteria are met, by a response that was told."""
+    """Verdict of the checks: "fails" if one is missed, "undetermined" if the type is, else "meets"."""
     if not all(check.met for check in checks):
         return "fails"
     return "undetermined" if kind == "undetermined" else "meets"

@@ -44,7 +44,7 @@ MODE_SIGNIFICANCE = 3.0
 
 
 def as_forces(forces: ArrayLike, minimum: int = 1) -> Array:
-    """Return forces as (n,), or say what is wrong with them.
+    """Return forces as (n,).
 
     Raises
     ------

@@ -312,7 +312,7 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
 
 
 def contradictions(answer: DesignStudy) -> list[str]:
-    """Statements of a study that its own machines deny; none of a study that ``study`` returns.
+    """Statements of a study that contradict its own machines; none of a study that ``study`` returns.
 
     The type is held against every machine of the series, of the neighbourhood and of the map within the tolerances,
     the largest force against theirs, the verdict against its checks, the change that suffices against its own, criteria

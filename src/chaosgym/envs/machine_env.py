@@ -153,7 +153,7 @@ def first_of(info: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
 
 
 def refuse_pictures(workplace: Workplace, render_mode: str | None) -> None:
-    """Raise ``ParameterError`` where motion is asked for as pictures that have no unit."""
+    """Raise ``ParameterError`` if pictures are requested of a pool of machines, whose motion has no unit."""
     if render_mode is not None and isinstance(workplace.variants, Pool):
         raise ParameterError(f"render_mode = {render_mode!r} is not possible with any machine; allowed: None")
 

@@ -66,7 +66,7 @@ class Usual:
         np.add.at(self.squares, places, values**2)
 
     def deviation(self, places: NDArray[np.int64], values: Array, floor: Array) -> Array:
-        """Distances from the mean (n, 3) in standard deviations, each with a floor; 0 where too little is known."""
+        """Distances from the mean (n, 3) in standard deviations, each with a floor; 0 before enough observations."""
         count = np.maximum(self.count[places], 1.0)[:, None]
         mean = self.total[places] / count
         spread = np.sqrt(np.maximum(self.squares[places] / count - mean**2, 0.0))

@@ -51,7 +51,7 @@ def native_envs(env: str, count: int = 1, **keywords: Any) -> "MachineVectorEnv"
 
 
 class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]]):
-    """Sub-environments of one kind, as ``gymnasium.make_vec`` asks for them.
+    """Vector environment of ``gymnasium.make_vec``: sub-environments of one kind.
 
     Parameters
     ----------

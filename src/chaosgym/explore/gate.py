@@ -20,7 +20,7 @@ CLOSING = (
 
 
 def guard(server: Server) -> None:
-    """Answer this computer's own browser alone: 403 for other names in Host, 400 for a query that is no UTF-8."""
+    """Serve browsers on this computer alone: 403 for other names in Host, 400 for a query that is no UTF-8."""
     app: Any = server._tornado
     found = app.find_handler
     hosts = {f"{name}:{server.port}" for name in NAMES}

@@ -147,7 +147,7 @@ def command_of(machine: Machine) -> str:
 
 
 def view_of(machine: Machine) -> View:
-    """Everything that is shown of a point; a motion that can't be followed is told, not raised."""
+    """Everything that is shown of a point; a failed simulation is shown, not raised."""
     try:
         _check_cost(machine)
         verdict = diagnose(machine, budget=BUDGET)

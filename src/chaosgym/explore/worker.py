@@ -25,7 +25,7 @@ class Worker:
         threading.Thread(target=self._run, daemon=True).start()  # Ctrl-C does not wait for it
 
     def ask(self, kind: str, work: Callable[[], Any], tell: Callable[[Any], None]) -> None:
-        """Let ``tell`` hear what ``work`` returns, unless something else of this kind is asked meanwhile."""
+        """Call ``tell`` with the result of ``work``, unless a newer request of this kind has come."""
         with self._bell:
             self._asked[kind] = work, tell
             self._bell.notify()

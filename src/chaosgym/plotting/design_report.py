@@ -114,7 +114,7 @@ def design_report(study: DesignStudy, command: str = "", *, date: str = "", brie
 
 
 def _of_section(study: DesignStudy) -> dict[str, Parameter]:
-    """What is known of the section that bends, without what its kind leaves out."""
+    """Parameters of the section that bends, without those that its kind leaves out."""
     found = study.assessment.bending
     if found is None:
         return {}
@@ -217,7 +217,7 @@ def _column(study: DesignStudy) -> dict[str, str]:
 
 
 def _measured_column(measured: MeasuredPeaks, study: DesignStudy) -> dict[str, str]:
-    """What a recording tells of the same quantities, at the speed and by the criteria of the first study."""
+    """The same quantities of a recording, at the speed and by the criteria of the first study."""
     value, found = measured.evaluation, study.assessment
     period = found.machine.cycle_period
     told = {

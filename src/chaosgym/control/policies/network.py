@@ -52,7 +52,7 @@ class Lstm(NamedTuple):
         return zeros, zeros
 
     def __call__(self, inputs: Array, state: State) -> State:
-        """Return the next state for (..., inputs); its hidden part is the answer."""
+        """Return the next state for (..., inputs); its hidden part is the output."""
         hidden, memory = state
         gates = inputs @ self.from_input.T + hidden @ self.from_hidden.T + self.bias
         take, keep, cell, give = np.split(gates, 4, axis=-1)
@@ -67,7 +67,7 @@ class Network(NamedTuple):
     layers: tuple[Dense, ...]
 
     def __call__(self, inputs: Array, state: State | None) -> tuple[Array, State | None]:
-        """Return the answer (..., outputs) and the next state, for inputs (..., inputs) and the state before."""
+        """Return the outputs (..., outputs) and the next state, for inputs (..., inputs) and the state before."""
         values = inputs
         if self.lstm:
             state = self.lstm(values, state or self.lstm.rest(values.shape[:-1]))

@@ -1,4 +1,4 @@
-"""What the kernels know of a mechanism whose matrices are held over bins of an angle."""
+"""Arrays that the kernels read: a mechanism whose matrices are held over bins of an angle."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ LINEAR, HERTZ = 0, 1
 
 
 class BinnedModel(NamedTuple):
-    """All that the kernels know of a mechanism with n coordinates and m contact channels.
+    """Arrays of a mechanism with n coordinates and m contact channels.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class BinnedModel(NamedTuple):
 
 
 class TaylorModel(NamedTuple):
-    """All that the kernels know of a mechanism with n coordinates, J joints and R rows.
+    """Arrays of a mechanism with n coordinates, J joints and R rows.
 
     Lanes are what the R rows read, then the n coordinates, rounded up to a multiple of 8.
 

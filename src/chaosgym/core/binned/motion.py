@@ -261,7 +261,7 @@ def bound_fourth(motion, at):
 
 @part
 def read_after(motion, intervals):
-    """Take over what the channels read after some intervals of a look as what they read now."""
+    """Set the current readings of the channels to those after some intervals of a look."""
     own, first = motion.own, places(motion.n, motion.m).readings + NOW
     for j in range(motion.m):
         place = first + j * READINGS

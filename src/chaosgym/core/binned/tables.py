@@ -233,7 +233,7 @@ def _deal_columns(space, matrix, rows, lanes, table, at, length, count):
 
 @leaf
 def _put_channels(space, row, lag, anchor, s, duration, interval, count, table, at, length):
-    """Fill ``ahead``, ``now`` and ``bound``: what the channels read in a look, with contact set s.
+    """Fill ``ahead``, ``now`` and ``bound``: readings of the channels over a look, with contact set s.
 
     With z' = B z and the row e of a reading, its fourth derivative is e B^4 exp(B t) z. The row of that is computed
     at the ends of all intervals, and between them differs from the nearer of them by exp(B t), |t| up to half an

@@ -47,7 +47,7 @@ def limited(value, low, high):
 
 @njit(cache=True)
 def trimmed(task, action, demand, trim, moves, dead_band):
-    """Trim that an action asks for, at the demand and trim before."""
+    """Trim that follows from an action, the demand and the trim before."""
     if task["action"] == BY_SPEED:
         return action[0] - demand
     if task["action"] == BY_TRIM:
@@ -170,7 +170,7 @@ def recurrence_misses(peaks, misses):
 def observe(
     tasks, which, demands, jobs, true_peaks, bounce_duration, period, errors, counted, low, high, measured, values
 ):
-    """Write what agents see of the last cycles: ``values`` (k, 14 or more), ``measured`` peaks (k, last).
+    """Write the observations of the last cycles: ``values`` (k, 14 or more), ``measured`` peaks (k, last).
 
     ``true_peaks`` (k, cycles) where the sensor is, ``bounce_duration`` (k, cycles, sides), ``period`` and ``counted``
     impacts (k,). ``errors`` (k, last + 1) from 0 to 1, of these peaks and of the share of bouncing. ``values`` lie
