@@ -20,7 +20,7 @@ from chaosgym.envs.kernels.steps import INFO
 from chaosgym.envs.observation import Observation, observation_names, observation_space
 from chaosgym.envs.pool import ANY, SHARE, Pool, pool_task
 from chaosgym.envs.setups import task_of, tolerances_of
-from chaosgym.envs.task import Status, UnknownKeywordError, divided
+from chaosgym.envs.task import Status, Task, UnknownKeywordError, divided
 from chaosgym.envs.variants import Variants
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES
@@ -158,7 +158,26 @@ def refuse_pictures(workplace: Workplace, render_mode: str | None) -> None:
         raise ParameterError(f"render_mode = {render_mode!r} is not possible with any machine; allowed: None")
 
 
-class MachineEnv(gym.Env[Observation, Any]):
+class JobSpec:
+    """Specification of an environment whose job ends by itself, as termination, after ``task.steps``."""
+
+    task: Task
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """Specification, with the steps of a job as ``max_episode_steps``."""
+        if self._spec is None:
+            return None
+        own = self._spec.max_episode_steps or self.task.steps
+        return replace(self._spec, max_episode_steps=min(own, self.task.steps))
+
+    @spec.setter
+    def spec(self, given: EnvSpec | None) -> None:
+        self._spec = given
+
+
+class MachineEnv(JobSpec, gym.Env[Observation, Any]):
     """A machine whose speed an agent trims around a demand; what it does and takes: docs/environments.md.
 
     Parameters
@@ -177,7 +196,6 @@ class MachineEnv(gym.Env[Observation, Any]):
     """
 
     metadata = METADATA
-    _spec: EnvSpec | None = None
 
     def __init__(self, machine: str = "", *, render_mode: str | None = None, **keywords: Any) -> None:
         if render_mode is not None and render_mode not in METADATA["render_modes"]:
@@ -194,19 +212,6 @@ class MachineEnv(gym.Env[Observation, Any]):
         self._job.traced = 0 if render_mode is None else 1
         self._runs = False
         self._dashboard: Dashboard | None = None
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """Specification, with the steps of a job as ``max_episode_steps``: a job ends by itself, as termination."""
-        return None if self._spec is None else replace(self._spec, max_episode_steps=self._spec_steps())
-
-    @spec.setter
-    def spec(self, given: EnvSpec | None) -> None:
-        self._spec = given
-
-    def _spec_steps(self) -> int:
-        own = self._spec and self._spec.max_episode_steps
-        return min(own or self.task.steps, self.task.steps)
 
     @property
     def speed(self) -> float:

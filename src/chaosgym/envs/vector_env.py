@@ -6,12 +6,10 @@ Every sub-environment does what a single environment with its seed does, bit for
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.seeding import np_random
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
@@ -21,7 +19,7 @@ from chaosgym.envs import environment
 from chaosgym.envs.drive import checked_actions
 from chaosgym.envs.jobs import Indices
 from chaosgym.envs.kernels.steps import INFO
-from chaosgym.envs.machine_env import METADATA, Workplace, refuse_pictures, start_of
+from chaosgym.envs.machine_env import METADATA, JobSpec, Workplace, refuse_pictures, start_of
 from chaosgym.envs.observation import Observation, observation_names
 from chaosgym.envs.task import Status
 from chaosgym.errors import ParameterError
@@ -50,7 +48,7 @@ def native_envs(env: str, count: int = 1, **keywords: Any) -> "MachineVectorEnv"
     return cast(MachineVectorEnv, gym.make_vec(environment(env), num_envs=count, **keywords).unwrapped)
 
 
-class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]]):
+class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArray[Any]]):
     """Vector environment of ``gymnasium.make_vec``: sub-environments of one kind.
 
     Parameters
@@ -72,8 +70,6 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
     ParameterError
         If a value is out of range; names it and the allowed range.
     """
-
-    _spec: EnvSpec | None = None
 
     def __init__(
         self,
@@ -116,19 +112,6 @@ class MachineVectorEnv(gym.vector.VectorEnv[Observation, Actions, NDArray[Any]])
         self.single_observation_space = self.workplace.space
         self.action_space = batch_space(self.workplace.actions, num_envs)
         self.observation_space = batch_space(self.workplace.space, num_envs)
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """Specification, with the steps of a job as ``max_episode_steps``: a job ends by itself, as termination."""
-        return None if self._spec is None else replace(self._spec, max_episode_steps=self._spec_steps())
-
-    @spec.setter
-    def spec(self, given: EnvSpec | None) -> None:
-        self._spec = given
-
-    def _spec_steps(self) -> int:
-        own = self._spec and self._spec.max_episode_steps
-        return min(own or self.task.steps, self.task.steps)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
