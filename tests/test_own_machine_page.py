@@ -44,7 +44,8 @@ def test_the_page_runs(tmp_path, monkeypatch, capsys):
         if kind == "python":
             exec(compile(text, "own-machine.md", "exec"), names)
         elif kind == "toml":
-            name = "servo" if "arcmin" in text else "arm2" if "[[joint]]" in text else "arm"
+            marks = {"arcmin": "servo", "[[joint]]": "arm2", "tangent": "blade"}
+            name = next((name for mark, name in marks.items() if mark in text), "arm")
             Path(f"{name}.toml").write_text(text)
         else:
             for line in text.strip().splitlines():
@@ -54,7 +55,7 @@ def test_the_page_runs(tmp_path, monkeypatch, capsys):
                 if target:
                     Path(target).write_text(result.stdout)
                 if "diagnose" in command:
-                    assert re.search(r"(arm2?|servo).toml: (periodic|quasi|chaotic|undetermined)", result.stdout)
+                    assert re.search(r"(arm2?|servo|blade).toml: (periodic|quasi|chaotic|undetermined)", result.stdout)
     assert "Type" in Path("report.html").read_text()
     assert Path("overlay.png").stat().st_size > 10_000
     assert 20.0 < names["arm"].natural_frequencies[0] < 25.0

@@ -9,8 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import chaosgym
 from chaosgym import Drive, Joint, Structure, machine_with_joints, simulate
+from chaosgym.diagnosis import find_periodic_orbit
+from chaosgym.diagnosis.lyapunov import lyapunov_spectrum
+from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import TIGHTEST_EVENTS
+from chaosgym.machines.parameters import by_field
 from chaosgym.simulation import MotionState
 from chaosgym.simulation.run import simulate_with_deviations
 
@@ -301,3 +306,116 @@ def test_deviations_are_those_of_two_nearby_runs(damping):
         seen += int(record.impacts.sum())
         state = record.final_state
     assert seen > 10
+
+
+BLADE = """
+[structure]
+frequencies = "9, 61, 190 Hz"
+damping_ratios = "2 %"
+[structure.shapes]
+tip = "2.1, -1.9, 1.7 kg^-1/2"
+side = "1.0, 1.2, -0.7 kg^-1/2"
+drive = "1.2, 0.8, 0.5 kg^-1/2"
+[joint]
+at = "tip"
+clearance = "0.15 mm"
+stiffness = "0.2 N/um"
+damping = "15 N s/m"
+friction = 0.3
+tangent = "side"
+[[drive]]
+at = "drive"
+force = "8 N"
+[operation]
+speed = "14 Hz"
+speed_range = "8 to 20 Hz"
+clearance_range = "0.05 to 0.3 mm"
+"""
+
+
+def read(folder, *changes):
+    """The file of a blade that rubs, with changes (old, new)."""
+    text = BLADE
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    file = folder / "blade.toml"
+    file.write_text(text)
+    return chaosgym.read_machine(file)
+
+
+def test_a_file_states_what_sticks_and_slides(tmp_path):
+    """A tangential spring is Mindlin's share of the stop's if none is stated; fields go by the names of one joint."""
+    blade = read(tmp_path)
+    assert blade.joints == blade.rubbing == ("joint",)
+    assert blade.joint_tangential_factor == pytest.approx(1.4 / 1.7)
+    stated = 'tangent = "-side"\ntangential_stiffness = "50 N/mm"\nsliding_speed = "20 mm/s"'
+    belt = read(tmp_path, ('tangent = "side"', stated))
+    assert (belt.joint_tangential_factor, belt.joint_sliding_speed, belt.tangents["joint"]) == (0.25, 0.02, "-side")
+    assert any("sticks and slides along '-side'" in note for note in belt.notes)
+    named = {"clearance": 1e-4, "joint.friction": 0.1}
+    assert by_field(blade, named) == {"joint_clearance": 1e-4, "joint_friction": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("friction = 0.3", "friction = -0.3", "joint_friction = -0.3 is out of range; allowed: 0 to 100"),
+        ('tangent = "side"', "", "joint.friction needs joint.tangent"),
+        ("friction = 0.3", "", "joint.tangent has no meaning without joint.friction"),
+        ('tangent = "side"', 'slides = "side"\nsliding_speed = "1 m/s"', "joint.sliding_speed has no meaning without"),
+        ("friction = 0.3", 'friction = 0.3\nslides = "side"', "joint.slides does not go with joint.tangent"),
+        ('"side"', '"sid"', "no point 'sid'; did you mean side"),
+        ('tangent = "side"', 'tangent = "side"\ntangential_stiffness = "0 N/m"', "allowed: above 0"),
+        ('tangent = "side"', 'tangent = "side"\ntangential_stiffness = "1 N"', "unknown unit 'N'"),
+        ('"0.2 N/um"', '"0.2, 0.3, 0.1 N/um"', "over the cycle does not go with joint.tangent"),
+        ("1.0, 1.2, -0.7", "0, 0, 0", "joint.tangent = 'side' never moves"),
+        ('tangent = "side"', 'tangent = "side"\nmu = 0.1', "tangent the point that sticks and slides"),
+    ],
+)
+def test_bad_friction_is_told_in_a_line(tmp_path, old, new, told):
+    """What has no meaning, or contradicts itself, is refused in one line."""
+    with pytest.raises(ParameterError) as error:
+        read(tmp_path, (old, new))
+    assert told in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_fast_belt_is_what_slides_all_the_time(tmp_path):
+    """Surfaces that move at 10 m/s never stick: the motion is that of ``slides`` by another kernel, to 1e-6 of the gap.
+
+    A point that slides to where it grows is one whose surfaces move to where it falls.
+    """
+    one_way = read(tmp_path, ('tangent = "side"', 'slides = "side"'))
+    stated = 'tangent = "side"\nsliding_speed = "-10 m/s"\ntangential_stiffness = "10 N/um"'
+    belt = read(tmp_path, ('tangent = "side"', stated))
+    runs = [simulate(machine, 1, samples_per_cycle=60).history[0, :, 0] for machine in (one_way, belt)]
+    assert np.abs(runs[0] - runs[1]).max() < 1e-6 * 0.15e-3
+
+
+def test_a_batch_moves_each_machine_as_alone(tmp_path):
+    """Machines side by side, at speeds and clearances of their own, have the peaks of single runs bit for bit."""
+    blade = read(tmp_path)
+    batch, which = blade.batch(3), np.arange(3)
+    for i in range(3):
+        batch.start(i, blade)
+    places = [(12.0, 1e-4), (14.0, 1.5e-4), (17.0, 2e-4)]
+    batch.set_speeds(which, np.array([speed for speed, _ in places]))
+    batch.set_clearances(which, np.array([gap for _, gap in places]))
+    cycles = batch.run(which, 10)
+    for i, place in enumerate(places):
+        np.testing.assert_array_equal(cycles.peak_force[i], simulate(blade.at(*place), 10).peak_force)
+    batch.kick(which, np.ones((3, blade.n_velocities)))
+    with pytest.raises(ParameterError, match="allowed: the same ones"):
+        batch.change(0, replace(blade, joint_friction=0.0))
+
+
+def test_the_exponent_is_that_of_the_second_trajectory(tmp_path):
+    """The multipliers of a proven orbit that sticks and slides tell how fast a nearby run comes back."""
+    blade = read(tmp_path)
+    orbit = find_periodic_orbit(blade, simulate(blade, 1, transient=200).final_state.coordinates, 1)
+    largest = float(np.abs(orbit.multipliers).max())
+    assert 0.0 < largest < 1.0
+    exponents, demanded = lyapunov_spectrum(blade, 100)
+    assert exponents[0] == pytest.approx(math.log(largest), abs=0.01)
+    assert demanded == -math.inf

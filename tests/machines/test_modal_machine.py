@@ -404,7 +404,7 @@ def test_a_base_that_is_moved_for_good_changes_nothing(machine_file):
 
 
 WORDS = {
-    "friction": ([("preload = ", "mu = ")], "slides is the point that it pulls"),
+    "friction": ([("preload = ", "mu = ")], "tangent the point that sticks and slides"),
     "torque": ([("force = ", "torque = ")], "forces in N m, springs in N m/rad"),
     "a random drive": ([("force = ", "psd = ")], "repeats with every cycle"),
     "backlash": ([('clearance = "0.15', 'backlash = "0.15')], "clearance is half the gap"),

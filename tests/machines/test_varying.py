@@ -316,7 +316,7 @@ def test_a_file_states_friction_and_samples(tmp_path):
             'friction = -0.1\nslides = "side"\ndamping = ',
             "friction = -0.1 is out of range; allowed: 0 to",
         ),
-        ("damping = ", "friction = 0.1\ndamping = ", "friction needs slides"),
+        ("damping = ", "friction = 0.1\ndamping = ", "joint.friction needs joint.tangent"),
         ("damping = ", 'slides = "side"\ndamping = ', "joint.slides has no meaning without joint.friction"),
         ("damping = ", 'friction = 0.1\nslides = "sid"\ndamping = ', "no point 'sid'; did you mean side"),
         (
@@ -352,7 +352,7 @@ def test_what_goes_with_one_joint_only_is_told(tmp_path):
     """Several joints refuse friction, samples and springs; a variation that turns the stiffness over is refused."""
     two = '[[joint]]\nname = "b"\nat = "side"\nclearance = "1 mm"\nstiffness = "1 N/um"\ndamping = "1 N s/m"\n'
     for change, told in (
-        (("clearance = ", 'friction = 0.1\nslides = "side"\nclearance = '), "joint.friction does not go with several"),
+        (("clearance = ", 'friction = 0.1\nslides = "side"\nclearance = '), "joint.slides does not go with several"),
         (
             ('stiffness = "1 N/um"\ndamping = "20', 'stiffness = "1, 2, 3 N/um"\ndamping = "20'),
             "stiffness over the cycle",

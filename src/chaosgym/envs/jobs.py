@@ -79,7 +79,7 @@ class Jobs:
         self.damage = np.zeros((count, len(nominal.sides)))
         self._lowest, self._span, self.force = np.zeros(count), np.ones(count), np.ones(count)
         self._job_time, self.period = np.ones((2, count))
-        self._velocities = nominal.n_states // 2
+        self._velocities = nominal.n_velocities
         self.traced = 0
         self.pieces: list[list[Piece]] = [[] for _ in range(count)]
 

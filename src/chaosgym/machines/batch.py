@@ -83,10 +83,10 @@ class CompiledBatch(ABC):
         return self._motions.coordinates[i].copy(), self._motions.bouncing[i].copy()
 
     def kick(self, which: Indices, shares: Array) -> None:
-        """Change the velocities of the machines ``which`` (k,) by ``shares`` (k, n_states / 2) of their largest."""
-        half = self._scale.shape[1] // 2
+        """Change the velocities of the machines ``which`` (k,) by ``shares`` (k, n_velocities) of their largest."""
+        half = self._machine.n_velocities
         np.maximum(self._scale, np.abs(self._motions.coordinates), out=self._scale)
-        self._motions.coordinates[which, half:] += shares * self._scale[which, half:]
+        self._motions.coordinates[which, half : 2 * half] += shares * self._scale[which, half : 2 * half]
 
     def run(self, which: Indices, cycles: int) -> Cycles:
         """Run the machines ``which`` (k,) for some cycles."""
@@ -137,7 +137,7 @@ class KickedBatch(CompiledBatch):
 
     @abstractmethod
     def run_kicked(self, which: Indices, kicks: Array) -> Cycles:
-        """``kick`` the machines ``which`` (k,) by each of the shares (k, cycles, n_states / 2) and run them a cycle."""
+        """``kick`` the machines ``which`` (k,) by each of the shares (k, cycles, n_velocities) and run them a cycle."""
 
 
 class VaryingBatch(CompiledBatch):

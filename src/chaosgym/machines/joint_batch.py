@@ -10,6 +10,7 @@ from chaosgym.core import status
 from chaosgym.core.compilation import call_side_by_side
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.joints.batch import advance_joint_machines
+from chaosgym.errors import ParameterError
 from chaosgym.machines.batch import VaryingBatch, put, stacked
 
 Array = NDArray[np.float64]
@@ -44,7 +45,15 @@ class JointBatch(VaryingBatch):
         self._load()
 
     def change(self, i: int, machine: Any) -> None:
-        """Put another machine into place i, whose motion goes on."""
+        """Put another machine into place i, whose motion goes on.
+
+        Raises
+        ------
+        ParameterError
+            If friction is 0 in it where it is not in the others, or the other way round: their states differ.
+        """
+        if machine.rubbing != self._machines[i].rubbing:
+            raise ParameterError("machines of a batch differ in which joints have friction; allowed: the same ones")
         self._machines[i], self._speeds[i] = machine, machine.speed
         self._tables[i] = machine.tables(self._settings.step_phase)
         self._own[i] = self._tables[i].space(machine.stops)

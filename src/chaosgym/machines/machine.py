@@ -178,6 +178,11 @@ class Machine(ABC):
         """Number of states of the equations of motion."""
 
     @property
+    def n_velocities(self) -> int:
+        """Velocities in the state, which stand behind as many displacements."""
+        return self.n_states // 2
+
+    @property
     @abstractmethod
     def fastest_rate(self) -> float:
         """Largest modulus [1/s] of an eigenvalue, contacts closed."""

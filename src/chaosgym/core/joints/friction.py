@@ -16,7 +16,7 @@ Where w stays in one place, T dissipates what it takes; z is a part of the state
 
 References
 ----------
-G. M. Jenkin, Analysis of the stress-strain relationships in reactor grade graphite, Brit. J. Appl. Phys. 13 (1962) 30.
+G. M. Jenkins, Analysis of the stress-strain relationships in reactor grade graphite, Brit. J. Appl. Phys. 13 (1962) 30.
 J. H. Griffin, Friction damping of resonant stresses in gas turbine engine airfoils, J. Eng. Power 102 (1980) 329.
 """
 

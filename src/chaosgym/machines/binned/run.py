@@ -125,7 +125,7 @@ class BinnedBatch(KickedBatch):
             self._batch.gap[i] = self._machines[i].gaps
 
     def run_kicked(self, which: Indices, kicks: Array) -> Cycles:
-        """``kick`` the machines ``which`` (k,) by each of the shares (k, cycles, n_states / 2) and run them a cycle."""
+        """``kick`` the machines ``which`` (k,) by each of the shares (k, cycles, n_velocities) and run them a cycle."""
         arrays, outcome = self._empty(*kicks.shape[:2])
         given = (self._batch, which, kicks, self._motions, self._scale, arrays, self._settings, outcome)
         call_side_by_side(advance_kicked_machines, len(self), *given)

@@ -15,7 +15,7 @@ from chaosgym.machines.machine import Machine, Work
 from chaosgym.machines.modal_machine import cycle_file
 from chaosgym.machines.modal_machine.archives import read_archive, read_matrix
 from chaosgym.machines.modal_machine.drive import KINDS, Drive
-from chaosgym.machines.modal_machine.jointed import Joint, machine_with_joints
+from chaosgym.machines.modal_machine.jointed import OF_FRICTION, Joint, machine_with_joints
 from chaosgym.machines.modal_machine.keys import KEYS
 from chaosgym.machines.modal_machine.machine import OF_JOINT, ModalMachine, aliases_of, clearance_option
 from chaosgym.machines.modal_machine.structure import BASE, Structure
@@ -106,13 +106,15 @@ def built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type
     drives, title = tuple(_drive(row) for row in data["drive"]), data[""].get("title", path)
     types: dict[str, Any] = {"name": path, "__doc__": title, "__reduce__": reduced}
     made: Any
-    if len(data["joint"]) > 1:
+    if len(data["joint"]) > 1 or "tangent" in data["joint"][0]:
         _refuse_varying(data)
         about = {"provenance": "stated", "source": path}
         watched = {"monitored": operation["monitored"]} if "monitored" in operation else {}
+        joints = _several_joints(data["joint"], structure)
+        types["aliases"] = _aliases_of_one(next(iter(joints))) if len(joints) == 1 else {}
         made = machine_with_joints(
             structure,
-            _several_joints(data["joint"], structure),
+            joints,
             drives,
             about=about,
             usual_ranges=usual,
@@ -133,13 +135,47 @@ def built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type
 
 
 def _refuse_varying(data: Mapping[str, Any]) -> None:
-    """Refuse what goes with one joint only."""
+    """Refuse what goes neither with several joints nor with friction that sticks."""
+    beside = "several [[joint]]" if len(data["joint"]) > 1 else "joint.tangent"
     for row in data["joint"]:
-        for key, name in (("friction", "friction"), ("slides", "slides"), ("samples", "stiffness over the cycle")):
-            if key in row:
-                raise ParameterError(f"joint.{name} does not go with several [[joint]]; allowed: with one")
+        if "slides" in row:
+            allowed = "tangent, with sliding_speed" if len(data["joint"]) > 1 else "one of them"
+            raise ParameterError(f"joint.slides does not go with {beside}; allowed: {allowed}")
+        if "samples" in row:
+            raise ParameterError(f"joint.stiffness over the cycle does not go with {beside}; allowed: one number")
     if data["spring"]:
-        raise ParameterError("[[spring]] does not go with several [[joint]]; allowed: with one")
+        raise ParameterError(f"[[spring]] does not go with {beside}; allowed: with one [joint] without tangent")
+
+
+def _aliases_of_one(name: str) -> dict[str, str]:
+    """Fields of the only joint, by those of a machine with one joint and by ``joint`` and a dot."""
+    plain = {**OF_JOINT, **{what: what for what in OF_FRICTION}}
+    return {known: f"{name}_{what}" for what, same in plain.items() for known in (same, f"joint.{what}")}
+
+
+def _with_friction(joint: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """A joint with the factor of its tangential spring; refuses what has no meaning without friction."""
+    for key, needs in (
+        ("slides", "friction"),
+        ("tangent", "friction"),
+        ("tangential_stiffness", "tangent"),
+        ("sliding_speed", "tangent"),
+    ):
+        if key in joint and needs not in joint:
+            raise ParameterError(f"{name}.{key} has no meaning without {name}.{needs}; leave it out")
+    if "friction" in joint and not {"slides", "tangent"} & set(joint):
+        raise ParameterError(
+            f"{name}.friction needs {name}.tangent, the point that moves along the surfaces (or {name}.slides, where "
+            "they slide past one way all the time)"
+        )
+    found = dict(joint)
+    if "tangential_stiffness" in found:
+        spring = found.pop("tangential_stiffness")
+        if not spring > 0.0:
+            raise ParameterError(f"{name}.tangential_stiffness = {spring:g} is out of range; allowed: above 0")
+        (stiffness,) = needed(name, joint, "stiffness")
+        found["tangential_factor"] = spring / stiffness if stiffness > 0.0 else math.inf
+    return found
 
 
 def _spring(row: Mapping[str, Any]) -> Spring:
@@ -149,6 +185,7 @@ def _spring(row: Mapping[str, Any]) -> Spring:
 
 def _stated_of(joint: Mapping[str, Any], name: str, structure: Structure) -> dict[str, Any]:
     """What a file states of a joint, with factors of the lower stop, and the damper that a restitution stands for."""
+    joint = _with_friction(joint, name)
     if "restitution" in joint:
         joint = _with_damper(joint, name, structure)
     _, clearance, *upper = needed(name, joint, "at", "clearance", "stiffness", "damping")
@@ -190,7 +227,7 @@ def _several_joints(tables: list[dict[str, Any]], structure: Structure) -> dict[
     """Joints by their names: the stated ones, or joint_1, joint_2 ..."""
     joints: dict[str, Joint] = {}
     for number, table in enumerate(tables, 1):
-        name = table.get("name", f"joint_{number}")
+        name = table.get("name", f"joint_{number}" if len(tables) > 1 else "joint")
         if name in joints:
             raise ParameterError(f"two [[joint]] have the name {name!r}; allowed: a name of its own for each")
         joints[name] = Joint(**_stated_of(table, name if "name" in table else "joint", structure))
@@ -210,8 +247,6 @@ def _with_one_joint(
 ) -> Any:
     stated = _stated_of(joint, "joint", structure)
     turning, samples, slides = stated.pop("turns"), stated.pop("samples", ()), stated.pop("slides", "")
-    if slides and "friction" not in stated:
-        raise ParameterError("joint.slides has no meaning without joint.friction; leave it out")
     base: Any = VaryingMachine if samples or springs or "friction" in stated else ModalMachine
     fields: dict[str, Any] = {
         "modes": structure,

@@ -231,7 +231,8 @@ class JointedMachine(Machine):
     @property
     def notes(self) -> tuple[str, ...]:
         """What turns or rubs, modes that count as rigid, and what sampled drives leave out."""
-        rubs = f"friction sticks and slides in {', '.join(self.rubbing)}" if self.rubbing else ""
+        along = ", ".join(f"{self.tangents[name]!r} ({name})" for name in self.rubbing)
+        rubs = along and f"friction sticks and slides along {along}"
         notes = turning_note(self.turning), rigid_note(self.natural_frequencies), rubs, *drive_notes(self.drives)
         return tuple(filter(None, notes))
 
@@ -249,7 +250,12 @@ class JointedMachine(Machine):
     @property
     def n_states(self) -> int:
         """Displacement and velocity of every mode, and the deflection of every tangential spring."""
-        return 2 * len(self.modes.angular_frequency) + len(self.rubbing)
+        return 2 * self.n_velocities + len(self.rubbing)
+
+    @property
+    def n_velocities(self) -> int:
+        """One of every mode."""
+        return len(self.modes.angular_frequency)
 
     @property
     def fastest_rate(self) -> float:
@@ -340,7 +346,7 @@ class JointedMachine(Machine):
 
         Surfaces that move may give any power: then nothing bounds a run, and the share is 0.
         """
-        sets, n = self.sets, len(self.modes.angular_frequency)
+        sets, n = self.sets, self.n_velocities
         if sets.sliders.speed.any():
             return 0.0
         energy = np.sum(states[:, n : 2 * n] ** 2 + sets.stiffness * states[:, :n] ** 2, axis=1)

@@ -8,7 +8,7 @@ TURNS = "what turns has a gap in rad or arcmin, forces in N m, springs in N m/ra
 
 LIMITS = {
     "torque moment inertia rad arcmin": TURNS,
-    "coulomb stribeck mu": "friction of [joint] is Coulomb's, and slides is the point that it pulls",
+    "coulomb stribeck mu tangential": "friction of [joint] is Coulomb's, and tangent the point that sticks and slides",
     "random psd noise seed white": "a random drive does not fit: what drives repeats with every cycle",
     "flow fluid velocity wind": "forces that depend on the motion, as of a flow, do not fit",
     "time_varying mesh parametric stiffness_samples": "stiffness of [joint] or [[spring]] takes samples of one cycle",

@@ -44,8 +44,9 @@ def turning_joints(values: Mapping[str, Any]) -> list[bool]:
             raise ParameterError(f"joint.lower {MOTION[below]} and its joint {MOTION[not below]}; allowed: the same")
         _agree("joint", moves, str(row.get("at", "")), points)
         found.append(bool(moves))
-        if "slides" in row:
-            _agree("joint.slides", bool(moves), str(row["slides"]), points)
+        for along in ("slides", "tangent"):
+            if along in row:
+                _agree(f"joint.{along}", bool(moves), str(row[along]), points)
     for row in values.get("spring", ()):
         _agree("spring", _motion("spring", row), str(row.get("at", "")), points)
     operation = values["operation"]

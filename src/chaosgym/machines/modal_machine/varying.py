@@ -5,7 +5,7 @@ r"""A structure of a few modes with one joint whose surfaces rub, or with stiffn
 
 Stiffness is held over bins of the cycle, at its mean in each, and between two changes of contact the motion is exact
 (``core.binned``). Friction is Coulomb's, mu N, on surfaces that slide past each other in one direction all the time,
-as a belt or a rotor that turns: it pulls the point ``slides`` to where that grows.
+as a belt or a rotor that turns: the point ``slides`` slides to where it grows, and friction pulls it back.
 
 structure = Structure.of_modes([0.0], [[600.0]], {"mesh": [3.2]})
 machine = VaryingMachine(modes=structure, joint="mesh", samples=(1.2, 1.2, 0.8, 0.8), preload=40.0, speed=700.0)
@@ -117,7 +117,7 @@ class VaryingMachine(BinnedMachine):
     springs
         Springs of the structure beside its modes.
     slides
-        Point that friction pulls to where it grows, such as "shaft" or "-shaft"; "" without friction.
+        Point that slides to where it grows, such as "shaft" or "-shaft", and is pulled back; "" without friction.
 
     Raises
     ------
