@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 import chaosgym
 from chaosgym import Drive, Joint, Structure, machine_with_joints, simulate
@@ -419,3 +420,31 @@ def test_the_exponent_is_that_of_the_second_trajectory(tmp_path):
     exponents, demanded = lyapunov_spectrum(blade, 100)
     assert exponents[0] == pytest.approx(math.log(largest), abs=0.01)
     assert demanded == -math.inf
+
+
+def harmonic_balance(load, stiffness, limit, mass, spring, damping, rate):
+    """Amplitude of a mass under a sine on the element of Jenkins, by its first harmonic (Griffin 1980)."""
+
+    def missing(amplitude):
+        held, lost, slip = stiffness, 0.0, limit / stiffness
+        if amplitude > slip:
+            angle = math.acos(1.0 - 2.0 * slip / amplitude)
+            held = stiffness / math.pi * (angle - 0.5 * math.sin(2.0 * angle))
+            lost = 4.0 * limit / (math.pi * amplitude) * (1.0 - slip / amplitude)
+        reaction = complex(spring + held - mass * rate**2, mass * damping * rate + lost)
+        return amplitude * abs(reaction) - load
+
+    return brentq(missing, 1e-9, 1.0)
+
+
+@pytest.mark.parametrize("speed", [190.0, 200.0, 207.0, 215.0, 230.0])
+@pytest.mark.parametrize("preload", [5.0, 40.0, 400.0])
+def test_the_blade_of_the_example_swings_as_griffin_says(speed, preload):
+    """Amplitudes of the first harmonic agree within 1 %, where the damper sticks, slides, or does both."""
+    blade = chaosgym.read_machine("docs/machines/friction-damper.toml")
+    blade = replace(blade, speed=speed, joint_preload=preload)
+    q, v = simulate(blade, 1, transient=1500).final_state.coordinates[[0, 2]] / math.sqrt(0.1)
+    rate = 2.0 * math.pi * speed
+    spring = 0.1 * (400.0 * math.pi) ** 2
+    expected = harmonic_balance(20.0, 5e4, 0.3 * preload, 0.1, spring, 5.0, rate)
+    assert math.hypot(q, v / rate) == pytest.approx(expected, rel=0.01)

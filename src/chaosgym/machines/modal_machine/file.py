@@ -15,7 +15,8 @@ from chaosgym.machines.machine import Machine, Work
 from chaosgym.machines.modal_machine import cycle_file
 from chaosgym.machines.modal_machine.archives import read_archive, read_matrix
 from chaosgym.machines.modal_machine.drive import KINDS, Drive
-from chaosgym.machines.modal_machine.jointed import OF_FRICTION, Joint, machine_with_joints
+from chaosgym.machines.modal_machine.friction import OF_FRICTION, with_friction
+from chaosgym.machines.modal_machine.jointed import Joint, machine_with_joints
 from chaosgym.machines.modal_machine.keys import KEYS
 from chaosgym.machines.modal_machine.machine import OF_JOINT, ModalMachine, aliases_of, clearance_option
 from chaosgym.machines.modal_machine.structure import BASE, Structure
@@ -153,31 +154,6 @@ def _aliases_of_one(name: str) -> dict[str, str]:
     return {known: f"{name}_{what}" for what, same in plain.items() for known in (same, f"joint.{what}")}
 
 
-def _with_friction(joint: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """A joint with the factor of its tangential spring; refuses what has no meaning without friction."""
-    for key, needs in (
-        ("slides", "friction"),
-        ("tangent", "friction"),
-        ("tangential_stiffness", "tangent"),
-        ("sliding_speed", "tangent"),
-    ):
-        if key in joint and needs not in joint:
-            raise ParameterError(f"{name}.{key} has no meaning without {name}.{needs}; leave it out")
-    if "friction" in joint and not {"slides", "tangent"} & set(joint):
-        raise ParameterError(
-            f"{name}.friction needs {name}.tangent, the point that moves along the surfaces (or {name}.slides, where "
-            "they slide past one way all the time)"
-        )
-    found = dict(joint)
-    if "tangential_stiffness" in found:
-        spring = found.pop("tangential_stiffness")
-        if not spring > 0.0:
-            raise ParameterError(f"{name}.tangential_stiffness = {spring:g} is out of range; allowed: above 0")
-        (stiffness,) = needed(name, joint, "stiffness")
-        found["tangential_factor"] = spring / stiffness if stiffness > 0.0 else math.inf
-    return found
-
-
 def _spring(row: Mapping[str, Any]) -> Spring:
     at, values = needed("spring", row, "at", "stiffness")
     return Spring(at, tuple(checked_samples("spring.stiffness", values, 0.0).tolist()))
@@ -185,7 +161,7 @@ def _spring(row: Mapping[str, Any]) -> Spring:
 
 def _stated_of(joint: Mapping[str, Any], name: str, structure: Structure) -> dict[str, Any]:
     """What a file states of a joint, with factors of the lower stop, and the damper that a restitution stands for."""
-    joint = _with_friction(joint, name)
+    joint = with_friction(joint, name)
     if "restitution" in joint:
         joint = _with_damper(joint, name, structure)
     _, clearance, *upper = needed(name, joint, "at", "clearance", "stiffness", "damping")

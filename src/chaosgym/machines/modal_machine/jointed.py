@@ -25,6 +25,7 @@ from chaosgym.machines.joint_sets import JointTables, PressedSets, Sliders
 from chaosgym.machines.machine import Flexible, Machine, Number, Option
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
+from chaosgym.machines.modal_machine.friction import MINDLIN, OF_FRICTION
 from chaosgym.machines.modal_machine.machine import (
     OF_JOINT,
     ModalMachine,
@@ -34,7 +35,7 @@ from chaosgym.machines.modal_machine.machine import (
     turning_note,
 )
 from chaosgym.machines.modal_machine.structure import Structure
-from chaosgym.machines.parameters import Parameter, parameter, parameters_of
+from chaosgym.machines.parameters import parameter, parameters_of
 from chaosgym.machines.units import TURNING
 
 if TYPE_CHECKING:
@@ -44,21 +45,6 @@ Array = NDArray[np.float64]
 
 LARGEST = "largest"
 """Word for the joint with the largest force."""
-
-
-POISSON = 0.3
-"""Poisson's ratio of steel."""
-
-MINDLIN = 2.0 * (1.0 - POISSON) / (2.0 - POISSON)
-"""Tangential over normal stiffness of two like bodies in contact that do not slip (R. D. Mindlin, Compliance of elastic
-bodies in contact, J. Appl. Mech. 16 (1949) 259)."""
-
-OF_FRICTION = {
-    "friction": Parameter("-", 0.0, 100.0, (), "assumed", "default"),
-    "tangential_factor": Parameter("-", 1e-9, 1e9, (), "assumed", "Mindlin 1949, steel"),
-    "sliding_speed": Parameter("m/s", -1e4, 1e4, (), "assumed", "default"),
-}
-"""What is known beside that of a joint with a ``tangent``."""
 
 
 class Joint(NamedTuple):
