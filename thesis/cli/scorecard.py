@@ -1,5 +1,6 @@
 """The command ``scorecard``: how many printed results of the thesis are hit."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import click
@@ -10,16 +11,21 @@ from chaosgym.cli.output import emit
 @click.command()
 @click.option("--machine", type=click.Choice(["impact-beam", "slider-crank"]), multiple=True, help="Default: both.")
 @click.option(
-    "--beam",
+    "--candidate",
     metavar="NAME|FILE",
-    help="Judge this beam instead: a candidate of thesis/scorecard/candidates.json, or result.json of a search.",
+    help="Judge this machine instead: a candidate of thesis/scorecard/candidates.json, or result.json of a search.",
 )
 @click.option("--basin", metavar="NAME", help="Judge where this structure of the search begins instead; one --machine.")
 @click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
 @click.option("--markdown", is_flag=True, help="Print the page of the documentation.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def scorecard(
-    machine: tuple[str, ...], beam: str | None, basin: str | None, workers: int | None, markdown: bool, as_json: bool
+    machine: tuple[str, ...],
+    candidate: str | None,
+    basin: str | None,
+    workers: int | None,
+    markdown: bool,
+    as_json: bool,
 ) -> None:
     """Compare every simulated statement of the thesis with the machines here; misses are shown."""
     from thesis.cache import default_folder
@@ -27,20 +33,23 @@ def scorecard(
     from thesis.scorecard.scorecard import scorecard as judge
 
     bases: dict[str, Any] | None = None
+    unprinted: Mapping[str, float] = {}
     if basin is not None:
         from thesis.scorecard.search_space import SEARCH_SPACES
 
-        if len(machine) != 1 or beam is not None:
-            raise click.UsageError("--basin goes with one --machine, and without --beam")
+        if len(machine) != 1 or candidate is not None:
+            raise click.UsageError("--basin goes with one --machine, and without --candidate")
         space = SEARCH_SPACES[machine[0]].only(basin)
         bases = {machine[0]: space.machine(space.basins[0], space.basins[0].shares())}
-    if beam is not None:
+    if candidate is not None:
         from thesis.scorecard.candidates import read_candidate
 
-        if machine and machine != ("impact-beam",):
-            raise click.UsageError("--beam goes with --machine impact-beam alone")
-        machine, bases = ("impact-beam",), {"impact-beam": read_candidate(beam)}
-    card = judge(machine or None, bases=bases, folder=default_folder(), workers=workers, progress=True)
+        found, unprinted = read_candidate(candidate)
+        if machine and machine != (found.name,):
+            raise click.UsageError(f"{candidate} is of --machine {found.name} alone")
+        machine, bases = (found.name,), {found.name: found}
+    given = {"bases": bases, "unprinted": unprinted, "folder": default_folder()}
+    card = judge(machine or None, **given, workers=workers, progress=True)
     if markdown:
         return click.echo(page(card), nl=False)
     result = card.as_dict()

@@ -53,7 +53,7 @@ def figure() -> Figure:
     drawn = Figure(figsize=(8.0, 4.5), layout="constrained")
     panel = drawn.subplots()
     beam = ImpactBeam()
-    for one, colour, label in ((read_candidate("former"), "0.65", "hard pivot"), (beam, "C0", "ImpactBeam()")):
+    for one, colour, label in ((read_candidate("former").machine, "0.65", "hard pivot"), (beam, "C0", "ImpactBeam()")):
         low, high = force_curve(one, speeds)
         panel.fill_between(speeds, low, high, color=colour, alpha=0.4, lw=0)
         panel.plot(speeds, 0.5 * (low + high), color=colour, label=label)

@@ -99,6 +99,8 @@ def known_exclusions(journals: Iterable[Path] = ()) -> Exclusions:
     """
     found = [one for path in (JOURNAL, *journals) for one in _read(path)]
     for one in candidates().values():
+        if "machine" in one:  # not a beam
+            continue
         told = {name: verdict for name, (verdict, _) in one["found_here"].items()}
         found.append({name: verdict == "hit" for name, verdict in told.items() if name in _fitted()})
     return exclusions(found)
