@@ -94,7 +94,7 @@ BEAM = "ImpactBeamTolerance-v1"
 START = f"python agents/ppo.py --env chaosgym/{BEAM} --seed 0 --steps 900000 {LARGE} --out {RUNS}/{BEAM}"
 FLEET = """--keywords '{"level": "fleet", "split": "train"}'"""
 POLICIES = {
-    "ImpactBeamTolerance-v1": [f"python agents/ppo.py --seed 0 --steps 900000 {LARGE}"],
+    "ImpactBeamTolerance-v1": ["python agents/learn_map.py --seed 0 --steps 600000"],
     "ImpactBeamWear-v1": [
         START,
         f"python agents/ppo.py --start {RUNS}/{BEAM} --seed 0 --steps 300000 {LARGE} --learning-rate 5e-4",
