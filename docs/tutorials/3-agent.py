@@ -11,7 +11,7 @@
 # the tolerances, so the agent must feel which speeds are calm.
 #
 # This tutorial trains for half a minute only. That is enough to see how the pieces fit, and far too little to learn
-# the task. The shipped policy took 900,000 steps.
+# the task. The shipped agent took 600,000 steps.
 #
 # ## The environment
 
