@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 import chaosgym
 from chaosgym import Drive, Joint, Structure, machine_with_joints, simulate
 from chaosgym.diagnosis import find_periodic_orbit
-from chaosgym.diagnosis.lyapunov import lyapunov_spectrum
+from chaosgym.diagnosis.lyapunov import largest_lyapunov_exponent, lyapunov_spectrum
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import TIGHTEST_EVENTS
 from chaosgym.machines.parameters import by_field
@@ -411,7 +411,7 @@ def test_a_batch_moves_each_machine_as_alone(tmp_path):
         batch.change(0, replace(blade, joint_friction=0.0))
 
 
-def test_the_exponent_is_that_of_the_second_trajectory(tmp_path):
+def test_the_exponent_of_a_proven_orbit_is_that_of_its_multipliers(tmp_path):
     """The multipliers of a proven orbit that sticks and slides tell how fast a nearby run comes back."""
     blade = read(tmp_path)
     orbit = find_periodic_orbit(blade, simulate(blade, 1, transient=200).final_state.coordinates, 1)
@@ -420,6 +420,25 @@ def test_the_exponent_is_that_of_the_second_trajectory(tmp_path):
     exponents, demanded = lyapunov_spectrum(blade, 100)
     assert exponents[0] == pytest.approx(math.log(largest), abs=0.01)
     assert demanded == -math.inf
+
+
+@pytest.mark.parametrize(("friction", "speed", "chaotic"), [(0.1, 16.0, True), (0.2, 12.0, False)])
+def test_the_exponent_is_that_of_two_nearby_runs(tmp_path, friction, speed, chaotic):
+    """Two runs that are drawn together again after each cycle part as the deviation grows, in chaos and out of it."""
+    blade = replace(read(tmp_path), joint_friction=friction, speed=speed)
+    state = simulate(blade, 1, transient=300).final_state
+    weights = blade.state_weights(state.coordinates)
+    direction, growth, apart = np.cos(1.0 + np.arange(len(weights))) / weights, 0.0, 1e-9
+    for _ in range(500):
+        near = MotionState(state.coordinates + apart * direction, state.bouncing)
+        state, other = simulate(blade, 1, state).final_state, simulate(blade, 1, near).final_state
+        moved = other.coordinates - state.coordinates
+        size = float(np.linalg.norm(moved * weights))
+        growth += math.log(size / apart) / 500
+        direction = moved / size
+    found = largest_lyapunov_exponent(blade, 1500, transient=300)
+    assert found.per_cycle == pytest.approx(growth, abs=0.06)
+    assert (growth > 0.5) == chaotic
 
 
 def harmonic_balance(load, stiffness, limit, mass, spring, damping, rate):
