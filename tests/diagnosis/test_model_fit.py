@@ -5,21 +5,25 @@
 
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chaosgym import ImpactBeam, SliderCrank, simulate
+from chaosgym import ImpactBeam, SliderCrank, read_machine, simulate
 from chaosgym.diagnosis.diagnose import diagnose_alone
 from chaosgym.diagnosis.measured import judge_peaks
 from chaosgym.diagnosis.model_fit import ModelFit, model_fit, with_record
 from chaosgym.diagnosis.record_figures import figures, names_of
 from chaosgym.diagnosis.response_type import default_tolerances
 from chaosgym.errors import DiagnosisError
+from chaosgym.machines.machine_file import template
 from chaosgym.machines.parameters import with_settings
 from tests.plain_modes import HARD_BEAM
 from tests.third_machine import ImpactOscillator
+
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 def another(nominal, rng):
@@ -87,6 +91,28 @@ def test_the_same_seed_gives_the_same_answer(beam):
     nominal, _, peaks = beam
     first, second = (model_fit(nominal, peaks[:40], seed=3) for _ in range(2))
     assert first == second
+
+
+@pytest.mark.parametrize("name", ["cam-follower", "kahraman-singh-1990"])
+def test_a_record_without_noise_is_that_of_its_machine_file(name):
+    """Peaks that ``simulate`` wrote, all alike, fit the file that they are of, which is periodic."""
+    machine = read_machine(DOCS / "machines" / f"{name}.toml")
+    found = model_fit(machine, machine.sensed(simulate(machine, 64, transient=200).peak_force))
+    assert (found.fits, found.nature, found.period) == (True, "periodic", 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["modes", "slider-crank", "four-bar", "compressor"])
+def test_machine_files_of_all_kinds_are_compared_with_their_records(kind, tmp_path):
+    """Each template of new-machine, off its numbers, with noise: its nature, and the gap, or that it is not told."""
+    path = tmp_path / f"{kind}.toml"
+    path.write_text(template(kind))
+    nominal, rng = read_machine(path), np.random.default_rng(1)
+    true = another(nominal, rng)
+    found = model_fit(nominal, true.sensed(noisy(true, 128, rng, 1e-3, 3e-3)), estimate=["clearance"])
+    assert found.nature in (diagnose_alone(true, budget=800).nature, "undetermined")
+    (one,) = found.estimates.values() or (None,)
+    assert one is None or not one.told or one.low < getattr(true, true.clearance_field) < one.high
 
 
 @pytest.mark.slow

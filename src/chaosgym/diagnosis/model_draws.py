@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.diagnosis.record_figures import figures
+from chaosgym.diagnosis.record_figures import LEAST_SCATTER, figures
 from chaosgym.diagnosis.response_type import Tolerance, default_tolerances
 from chaosgym.errors import DiagnosisError, ParameterError, SimulationError
 from chaosgym.machines.machine import Machine
@@ -168,7 +168,8 @@ def compared(
     """A draw with its difference; unknown noise on the readings makes up for the scatter that is missing."""
     mean = record.mean(axis=0)
     if share is None:
-        missing = math.exp(2.0 * wanted[1]) - float((record[:, 0].std() / max(mean[0], 1e-300)) ** 2)
+        scatter = math.exp(wanted[1]) if wanted[1] > math.log(LEAST_SCATTER) else 0.0
+        missing = scatter**2 - float((record[:, 0].std() / max(mean[0], 1e-300)) ** 2)
         share = float(np.clip(math.sqrt(max(missing, 0.0)), *SENSOR_NOISE))
     parts = (figures(record + share * mean * rng.normal(size=record.shape)) - wanted) / scale
     difference = float(np.sqrt(np.mean(parts**2)))

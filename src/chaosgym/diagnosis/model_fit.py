@@ -52,8 +52,8 @@ BATCHES = 6
 """Parts of a record whose figures tell how much sampling moves them."""
 
 FIRST, LATER, ROUNDS = 120, 60, 6
-"""Draws of the first round, from the prior, and of each later one, around the best; rounds at the most. Each parameter
-that is estimated doubles the first."""
+"""Draws of the first round, from the prior, and of each later one, around the best; rounds at the most, and twice as
+many while some draws agree with the record, but too few. Each parameter that is estimated doubles the first."""
 
 BEST = 24
 """Draws around which the next round draws."""
@@ -220,10 +220,13 @@ def model_fit(
     share = None if told is None else told.sigma / float(measured.mean())
     draws: list[Draw] = []
     proposals: list[tuple[int, Array, Array]] = []
-    for number in range(ROUNDS):
+    for number in range(2 * ROUNDS):
         count = LATER if number else FIRST * 2 ** len(prior.wide)
         draws.sort(key=lambda draw: draw.difference)
         if number > 2 and len(draws) >= MOST and draws[MOST - 1].difference < ENOUGH:
+            break
+        agree = sum(draw.difference < FITS for draw in draws)
+        if number >= ROUNDS and not 0 < agree < FEWEST:
             break
         best = draws[:BEST] if number else []
         centres = np.array([draw.place for draw in best])
@@ -290,7 +293,8 @@ def _concluded(
     ordered = sorted(draws, key=lambda draw: draw.difference)
     nearest, accepted = ordered[0], [draw for draw in ordered[:MOST] if draw.difference < FITS]
     if len(accepted) < FEWEST:
-        reason = f"the model does not fit: of {len(draws)} simulated records {_worst(nearest, names)}"
+        agree = f"{len(accepted)} agree, and {FEWEST} are needed; " if accepted else ""
+        reason = f"the model does not fit: of {len(draws)} simulated records {agree}{_worst(nearest, names)}"
         return ModelFit("undetermined", None, reason, False, {}, len(draws), len(accepted), nearest.difference, {}, {})
     weights = weights_of(accepted, proposals)
     natures: dict[str, float] = {}

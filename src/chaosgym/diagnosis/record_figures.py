@@ -11,8 +11,8 @@ from chaosgym.signals.noise import class_residual
 
 Array = NDArray[np.float64]
 
-LEAST_SCATTER = 1e-4
-"""Standard deviation, as a share of the mean, below which scatter counts as none."""
+LEAST_SCATTER = 1e-3
+"""Standard deviation, as a share of the mean, below which scatter counts as none: few draws have so little noise."""
 
 SHARES = (0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98)
 """Shares of the readings below the quantiles that describe their distribution."""
@@ -63,11 +63,12 @@ def _of_sensor(readings: Array) -> list[float]:
     if mean <= 0.0:
         return [np.nan] * len(OF_SENSOR)
     scaled = _scaled(readings)
-    power = max(float(np.mean(scaled**2)), 1e-12)
+    power = float(np.mean(scaled**2))
     told = [np.log(mean), np.log(max(sigma / mean, LEAST_SCATTER)), *np.quantile(scaled, SHARES)]
-    told += [float(np.mean(scaled[lag:] * scaled[:-lag])) / power for lag in LAGS]
-    told += [1.0 - float(np.mean(class_residual(scaled, period) ** 2)) / power for period in PATTERNS]
-    return told + [_forecast_rest(scaled, past) / power for past in PASTS]
+    # the power is 1, and less where there is hardly any scatter, whose order then says nothing
+    told += [float(np.mean(scaled[lag:] * scaled[:-lag])) for lag in LAGS]
+    told += [power - float(np.mean(class_residual(scaled, period) ** 2)) for period in PATTERNS]
+    return told + [_forecast_rest(scaled, past) for past in PASTS]
 
 
 def _forecast_rest(scaled: Array, past: int) -> float:
