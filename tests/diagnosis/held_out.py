@@ -273,3 +273,23 @@ def make(kind, seed, statement=None):
     share = float(rng.choice([0.01, 0.03, 0.06, 0.15]))
     series = 50.0 * (np.tile(pattern, cycles // period + 1)[:cycles] + share * (noise - noise.mean()) / noise.std())
     return finished(kind, rng, series, "periodic", period, statement, process=50.0 * share)
+
+
+def found_chaos(kind, cycles, noise, records=24, seed=777):
+    """(how many of so many records of a chaotic system, with this noise as a share of the mean, are told chaotic)."""
+    from chaosgym.diagnosis.measured import judge_peaks
+
+    rng, told = np.random.default_rng(seed), []
+    for k in range(records):
+        series = force(CHAOS[kind](rng, cycles, 1000 * seed + k, 0.0), rng, rng.uniform(0.1, 0.3))
+        sigma = noise * series.mean()
+        peaks = series + sigma * rng.normal(size=cycles)
+        if scatter(series[cycles // 2 :]) >= 3.0 * sigma:
+            told.append(judge_peaks(peaks).diagnosis.nature == "chaotic")
+    return sum(told), len(told)
+
+
+if __name__ == "__main__":
+    for cycles, noise in ((500, 0.01), (1000, 0.01), (500, 0.003), (500, 0.001)):
+        found, of = found_chaos("Ikeda chaos", cycles, noise)
+        print(f"Ikeda, {cycles} cycles, noise {100.0 * noise:g} %: {found} of {of} chaotic", flush=True)
