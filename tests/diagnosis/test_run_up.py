@@ -132,6 +132,13 @@ def test_peaks_that_change_too_fast_for_a_band_are_left_out():
     assert {one.nature for one in found.types.speeds} == {"periodic"}
 
 
+def test_a_machine_that_never_touches_has_no_orders():
+    """No force at all: no order, no ringing, and Type I throughout."""
+    found = run_up(np.zeros_like(TIME), INSTANTS, turns(ANGLES["run-up"]), sensor_error=0.1)
+    assert (found.lines, found.envelope) == ((), ())
+    assert [region.type for region in found.types.regions] == ["I"]
+
+
 @pytest.mark.parametrize(
     ("highest", "why"),
     [(300.0, r"order 300 at 192. rpm needs .* samples a second, and there are 1.6e\+04; allowed: up to order 195")],

@@ -36,6 +36,9 @@ CHANGES = 0.05
 LOST = 0.01
 """Share of the amplitude of the highest order whose loss is told."""
 
+ONE_WAY = 0.95
+"""Share of the turns in one direction below which the others are told to be left out."""
+
 NARROW = 0.0075
 """Share of the peaks that their sampling may leave open: samples beside the largest then lie 30 % below it."""
 
@@ -193,7 +196,7 @@ def _bands(speeds: Array, peaks: Array, half_width: float) -> tuple[list[Array],
     """Bands (2, turns) of the longest run in one direction: their speed, and peaks without their trend; and notes."""
     first, last = _one_way(speeds)
     notes = []
-    if last - first < len(speeds):
+    if last - first < ONE_WAY * len(speeds):
         ends = f"{speeds[first]:.4g} to {speeds[last - 1]:.4g} rpm"
         notes.append(f"types are those of the longest run in one direction: turns {first + 1} to {last}, {ends}")
     least = float(np.ptp(speeds[first:last])) / BANDS

@@ -117,7 +117,7 @@ class AngleSignal:
 
     def amplitude(self, orders: Array) -> Array:
         """Amplitudes (frames, k) at given orders; multiples of the first are the quickest."""
-        multiples = np.allclose(orders, orders[:1] * np.arange(1, len(orders) + 1))
+        multiples = len(orders) > 0 and np.allclose(orders, orders[0] * np.arange(1, len(orders) + 1))
         found = np.zeros((len(self.begins), len(orders)))
         for number, begin in enumerate(self.begins):
             part = slice(*np.searchsorted(self.angle, (begin, begin + FRAME)))
