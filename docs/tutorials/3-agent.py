@@ -100,4 +100,5 @@ print(f"shipped:      {shipped.score:.2f} ({shipped.interval[0]:.2f} to {shipped
 # Sixteen machines leave wide intervals; use all 256 for a result that you report, and several seeds. An interval that
 # holds zero can't be told from following the demand. After so few steps nothing better is to be expected.
 #
-# The shipped agent is a learned map: it learns what each machine did at every speed, not one reward a step (page *Training*).
+# The shipped agent is a learned map: it learns what each machine did at every speed, not one reward a step
+# (page *Training*).
