@@ -20,7 +20,7 @@ CLEARANCE, CYCLES, TRANSIENT, ERROR = 0.127e-3, 30, 200, 3.0
 
 def swept_peaks() -> str:
     """Frequency [Hz] and peak force [N], one line a cycle, from 4 to 30 Hz."""
-    beam, generator = read_candidate("C"), np.random.default_rng(0)
+    beam, generator = read_candidate("C").machine, np.random.default_rng(0)
     lines = ["frequency [Hz],peak [N]"]
     for frequency in range(4, 31):
         record = simulate(beam.at(float(frequency), CLEARANCE), CYCLES, transient=TRANSIENT)

@@ -48,7 +48,7 @@ def scorecard(
         if machine and machine != (found.name,):
             raise click.UsageError(f"{candidate} is of --machine {found.name} alone")
         machine, bases = (found.name,), {found.name: found}
-    given = {"bases": bases, "unprinted": unprinted, "folder": default_folder()}
+    given: dict[str, Any] = {"bases": bases, "unprinted": unprinted, "folder": default_folder()}
     card = judge(machine or None, **given, workers=workers, progress=True)
     if markdown:
         return click.echo(page(card), nl=False)
