@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 import chaosgym
 from chaosgym import Drive, Joint, Structure, machine_with_joints, simulate
+from chaosgym.core.events import opening
 from chaosgym.diagnosis import find_periodic_orbit
 from chaosgym.diagnosis.lyapunov import largest_lyapunov_exponent, lyapunov_spectrum
 from chaosgym.errors import ParameterError
@@ -439,6 +440,14 @@ def test_the_exponent_is_that_of_two_nearby_runs(tmp_path, friction, speed, chao
     found = largest_lyapunov_exponent(blade, 1500, transient=300)
     assert found.per_cycle == pytest.approx(growth, abs=0.06)
     assert (growth > 0.5) == chaotic
+
+
+@pytest.mark.parametrize("tolerance", [1e-9, 1e-13, 1e-15])
+def test_the_end_of_a_short_stick_is_found_however_closely_events_are_placed(tolerance):
+    """A margin that begins at its limit without a slope, t^2 - 1.5 t^3 in rounding of 4.4, ends at t = 2 / 3."""
+    series = np.array([4.4, 0.0, 1.0, -1.5, 0.0, 0.0])
+    found = opening(series, 0, 1, 5, 1.0, 4.4, 0.0, 0.0, 1.0, tolerance, 2.0)
+    assert found == pytest.approx(2.0 / 3.0, abs=1e-8)
 
 
 def harmonic_balance(load, stiffness, limit, mass, spring, damping, rate):

@@ -139,18 +139,19 @@ def settled(side, gap, two_sided, e0, d0, e1, d1, h, fourth):
 
 
 @leaf
-def opening(own, series, lanes, last, side, gap, lag, least, h, tolerance):
+def opening(own, series, lanes, last, side, gap, lag, least, h, tolerance, growth):
     """First instant in [0, h] at which a closed channel opens, or inf.
 
     A force that is zero by rounding and grows does not open it; likewise in ``closing``. Else two channels that open at
     one instant open and close each other without end. ``least`` is what is rounding at least: sums of large terms know
-    of more.
+    of more. Pieces that nothing can be told of become longer by ``growth``: a reading that begins at zero without a
+    slope stays rounding for a time that has nothing to do with the ``tolerance``.
     """
     if h <= 0.0:
         return math.inf
     fourth = fourth_of(own, series, lanes, last, lag, h)
     y, v, a, _ = reading_at(own, series, lanes, last, 0.0)
-    low, length = 0.0, h
+    low, length, finest = 0.0, h, tolerance
     e0, d0 = side * (y + lag * v) - gap, side * (v + lag * a)
     for _ in range(MOST_PIECES):
         if low >= h:
@@ -162,12 +163,15 @@ def opening(own, series, lanes, last, side, gap, lag, least, h, tolerance):
         if verdict == CROSSES:
             return crossing(own, series, lanes, last, side, gap, lag, low, high, e0, d0, e1, d1, tolerance)
         if verdict == UNSURE:
-            if length > tolerance:
+            if length > finest:
                 length *= 0.5
                 continue
             slack = least + ROUNDING * (abs(gap) + abs(y) + lag * abs(v))
             if e1 <= 0.0 and (d1 <= 0.0 or e1 < -slack):
                 return high
+            finest *= growth
+        else:
+            finest = tolerance
         length *= 2.0
         low, e0, d0 = high, e1, d1
     return math.inf

@@ -110,7 +110,7 @@ def first_change(motion, last, h, tolerance):
             if found <= instant:
                 first, towards, instant = j, to, found
         elif side != 0.0:
-            found = opening(own, series, lanes, last, side, gap, lag, 0.0, instant, tolerance)
+            found = opening(own, series, lanes, last, side, gap, lag, 0.0, instant, tolerance, 1.0)
             if found <= instant:
                 first, towards, instant = j, 0.0, found
         else:

@@ -234,7 +234,10 @@ def first_change(run, row, h, expanded, tolerance):
             if verdict == CROSSES:
                 found = crossing(own, series, 1, DEGREE, side, gap, lag, 0.0, h, e0, d0, e1, d1, tolerance)
             else:
-                found = opening(own, series, 1, DEGREE, side, gap, lag, known(run, j, ROUNDED), instant, tolerance)
+                # what begins to stick is at its limit, to which its force does not grow yet
+                longer = 2.0 if j >= at[JOINTS] else 1.0
+                least = known(run, j, ROUNDED)
+                found = opening(own, series, 1, DEGREE, side, gap, lag, least, instant, tolerance, longer)
             if found <= instant:
                 first, towards, instant = j, 0.0, found
             continue
