@@ -8,9 +8,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 
-STALE: dict[str, str] = {
-    "sample:sweep": "from 14 Hz on the command gives other peaks of this beam; docs/commands/diagnose.md shows these"
-}
+STALE: dict[str, str] = {}
 """Artefacts known to be stale, and why they still are. An entry goes with the commit that makes the artefact anew."""
 
 
