@@ -310,7 +310,7 @@ def test_a_measured_sweep_is_told_by_types(tmp_path):
     assert (tmp_path / "s.png").stat().st_size > 10_000
     code, out, _ = run("diagnose", "--sweep", SWEEP, "--sensor-sigma", "1.73 N")
     assert code == 0
-    assert "Type III  22 to 30 Hz" in out
+    assert "Type III  29 to 30 Hz" in out
 
 
 @pytest.mark.parametrize(
