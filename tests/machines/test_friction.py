@@ -367,6 +367,8 @@ def test_a_file_states_what_sticks_and_slides(tmp_path):
         ("friction = 0.3", "", "joint.tangent has no meaning without joint.friction"),
         ('tangent = "side"', 'slides = "side"\nsliding_speed = "1 m/s"', "joint.sliding_speed has no meaning without"),
         ("friction = 0.3", 'friction = 0.3\nslides = "side"', "joint.slides does not go with joint.tangent"),
+        ('"side"', '""', "joint.tangent = '' is no point that moves along the surfaces"),
+        ('"side"', '"-tip"', "joint.tangent = '-tip' is no point that moves along the surfaces; allowed: another one"),
         ('"side"', '"sid"', "no point 'sid'; did you mean side"),
         ('tangent = "side"', 'tangent = "side"\ntangential_stiffness = "0 N/m"', "allowed: above 0"),
         ('tangent = "side"', 'tangent = "side"\ntangential_stiffness = "1 N"', "unknown unit 'N'"),

@@ -29,7 +29,8 @@ def with_friction(joint: Mapping[str, Any], name: str) -> dict[str, Any]:
     Raises
     ------
     ParameterError
-        If something has no meaning without friction, friction has no direction, or the spring is not above 0.
+        If something has no meaning without friction, friction has no direction or the stop's, or the spring is not
+        above 0.
 
     Examples
     --------
@@ -50,6 +51,12 @@ def with_friction(joint: Mapping[str, Any], name: str) -> dict[str, Any]:
         raise ParameterError(
             f"{name}.friction needs {name}.tangent, the point that moves along the surfaces (or {name}.slides, where "
             "they slide past one way all the time)"
+        )
+    across = ("", str(joint.get("at", "")).strip("+- "))
+    if "tangent" in joint and joint["tangent"].strip("+- ") in across:
+        raise ParameterError(
+            f"{name}.tangent = {joint['tangent']!r} is no point that moves along the surfaces; allowed: another one "
+            f"than {name}.at, which moves across them"
         )
     found = dict(joint)
     if "tangential_stiffness" in found:
