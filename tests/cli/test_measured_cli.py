@@ -398,7 +398,7 @@ def test_columns_are_named_by_patterns_lists_and_numbers(recordings):
     assert (code, json.loads(out)["column"]) == (0, "rear")
     code, _, err = run("diagnose", "--peaks", recordings / "a.csv", "--column", "front,side*")
     assert (code, err.count("\n")) == (2, 1)
-    assert "has no column 'side*'; its columns: 'front', 'rear'" in err
+    assert "has no column 'side*'; its columns of numbers: 'front', 'rear'" in err
     code, _, err = run("design", "--peaks", recordings / "a.csv", "--column", "*", "--load-rating", "500 N")
     assert (code, err.count("\n")) == (2, 1)
     assert "--column '*' means 'front', 'rear'; allowed here: one column" in err

@@ -54,12 +54,26 @@ def test_a_tachometer_of_several_pulses_cuts_the_cycles_of_other_commands(record
     assert any("448 cycles" in note or "449 cycles" in note for note in json.loads(out)["warnings"])
 
 
+def test_a_tachometer_may_be_named_by_its_number(recording):
+    """As any other column."""
+    by_name, by_number = (
+        run("diagnose", "--series", recording, "--run-up", *OF_FILE, "--tachometer", name, "--json")[1]
+        for name in ("tacho", "3")
+    )
+    assert by_name
+    assert by_number == by_name
+
+
 @pytest.mark.parametrize(
     ("options", "why"),
     [
         (("--run-up",), "--run-up needs --series FILE --tachometer NAME"),
         (("--run-up", "--tachometer", "bearing", "--column", "bearing"), "can't be both tachometer and signal"),
-        (("--run-up", "--column", "bearing", "--tachometer", "speed"), "has no column 'speed' for the tachometer"),
+        (
+            ("--run-up", "--column", "bearing", "--tachometer", "speed"),
+            "'speed'; its columns of numbers: ",
+        ),
+        (("--run-up", *OF_FILE, "--orders", "nan"), "Invalid value for '--orders': 'nan' is no number"),
         (("--run-up", *OF_FILE[:-1], "400"), "turns, 400 pulses each; needed: 12 turns or more"),
         (("--run-up", *OF_FILE, "--orders", "300"), "order 300 at .* allowed: up to order"),
         (("--pulses-per-revolution", "4"), "--pulses-per-revolution belongs to --tachometer"),

@@ -84,6 +84,15 @@ def test_impacts_are_counted_by_the_envelope():
     assert found.envelope[0].order == pytest.approx(3.25, abs=0.01)
 
 
+def test_a_pure_order_has_no_ringing():
+    """What the digits of a file and the ends of the filter leave of a sine has no orders of its own."""
+    angle = ANGLES["run-up"]
+    found = run_up(np.round(20.0 + 10.0 * np.sin(4.0 * np.pi * angle), 5), INSTANTS, turns(angle))
+    assert [round(line.order, 2) for line in found.lines] == [2.0]
+    assert found.envelope == ()
+    assert "no envelope: nothing rings above the highest order" in found.notes
+
+
 @pytest.mark.parametrize("way", ["up", "down"])
 def test_types_of_peaks_that_rise_and_scatter_above_a_speed(way):
     """Peaks follow the speed, and alternate by 8 N above 1000 rpm, and scatter above 1400: Types I and III as made."""

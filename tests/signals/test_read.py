@@ -115,7 +115,7 @@ def test_a_column_is_taken_by_name_number_and_unit(tmp_path):
     path.write_text("left,right\n1,2\n3,1\n2,2\n")
     assert choose_force(read_recording(path), "RIGHT").values.tolist() == [2.0, 1.0, 2.0]
     assert choose_force(read_recording(path), "1", "kN").values.tolist() == [1000.0, 3000.0, 2000.0]
-    with pytest.raises(DiagnosisError, match="no column 'middle'; its columns: 'left', 'right'"):
+    with pytest.raises(DiagnosisError, match="no column 'middle'; its columns of numbers: 'left', 'right'"):
         choose_force(read_recording(path), "middle")
     assert choose_force(read_recording(path), "left", "V").unit == "V"
     with pytest.raises(DiagnosisError, match="'left' is in furlong, no unit that is known; allowed: N"):

@@ -82,6 +82,9 @@ def test_noise_on_the_pulses_and_missing_samples_make_none():
 
 STEADY = SPEEDS["constant"][0]
 
+BACK = 0.9 * (TIME - 0.5 * TIME[-1]) ** 2
+"""A coast-down through zero: the shaft goes on backwards, and a tachometer can't tell."""
+
 
 @pytest.mark.parametrize(
     ("signal", "per_turn", "why"),
@@ -98,6 +101,8 @@ STEADY = SPEEDS["constant"][0]
         ),
         (np.random.default_rng(3).normal(size=len(TIME)), 1, "is the column that of a tachometer|come every"),
         (pulses(STEADY, 1, 0.05) + pulses(STEADY - 0.1, 1, 0.05), 1, "are doubled"),
+        (pulses(BACK, 1), 1, "silent from 9.* s; cut the recording there, as the shaft may have stopped"),
+        (pulses(BACK, 60), 60, "silent from 9.* s; cut the recording there, as the shaft may have stopped"),
         (pulses(STEADY, 1), 0, "0 pulses per revolution; allowed: 1 or more"),
     ],
 )

@@ -7,7 +7,7 @@ from typing import Any
 import click
 import numpy as np
 
-from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.machine_options import FloatRange, machine_command
 from chaosgym.cli.output import draw, emit, picture_path, plot_option
 
 SHOWN = 30
@@ -35,7 +35,7 @@ SHOWN = 30
 )
 @click.option(
     "--most-unstable",
-    type=click.FloatRange(1.0, 1e6),
+    type=FloatRange(1.0, 1e6),
     default=1000.0,
     show_default=True,
     help="Largest multiplier up to which unstable orbits are followed.",

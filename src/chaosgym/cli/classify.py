@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from chaosgym.cli.machine_options import Quantity, machine_command
+from chaosgym.cli.machine_options import FloatRange, Quantity, machine_command
 from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, run_lines
 from chaosgym.cli.output import draw, emit, patience, picture_path, plot_option
 from chaosgym.machines import MACHINES
@@ -30,7 +30,7 @@ def _quick_start(arguments: list[str]) -> None:
 @machine_command(required=False, before=_quick_start)
 @click.option(
     "--budget-us",
-    type=click.FloatRange(0.0),
+    type=FloatRange(0.0),
     help="Processor time [us] for the answer; 0: from parameters alone. Default: what it takes to be sure.",
 )
 @click.option("--nature-only", is_flag=True, help="Don't judge the type, which needs the four neighbours.")

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.machine_options import FloatRange, machine_command
 from chaosgym.cli.measured_model import compared
 from chaosgym.cli.measured_options import (
     Measured,
@@ -35,7 +35,7 @@ from chaosgym.machines import MACHINES
 @click.option("--margins", is_flag=True, help="Also tell how far each tolerance is from a loss of stability.")
 @click.option(
     "--reach",
-    type=click.FloatRange(0.0, 10.0, min_open=True),
+    type=FloatRange(0.0, 10.0, min_open=True),
     default=1.0,
     show_default=True,
     help="Tolerances up to which margins are looked for.",
@@ -47,9 +47,7 @@ from chaosgym.machines import MACHINES
 @click.option("--sweep", metavar="FILE", help="Peak forces at many speeds, with a column of speeds: Types I, II, III.")
 @click.option("--speed-column", metavar="NAME", help="Column of the speed of --sweep, where there are several.")
 @click.option("--run-up", is_flag=True, help="The speed of --series changes: orders, and types by bands of speed.")
-@click.option(
-    "--orders", type=click.FloatRange(1.0, 1000.0), metavar="NUMBER", help="Highest order of --run-up; default 20."
-)
+@click.option("--orders", type=FloatRange(1.0, 1000.0), metavar="NUMBER", help="Highest order of --run-up; default 20.")
 @click.option(
     "--estimate",
     multiple=True,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from chaosgym.cli.machine_options import machine_command
+from chaosgym.cli.machine_options import FloatRange, machine_command
 from chaosgym.cli.output import emit
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
 @click.option("--transient", type=click.IntRange(0, 10**5), default=100, show_default=True, help="Cycles before them.")
 @click.option(
     "--budget",
-    type=click.FloatRange(0.0, min_open=True),
+    type=FloatRange(0.0, min_open=True),
     default=10.0,
     show_default=True,
     help="Processor time of each fixed step [s].",

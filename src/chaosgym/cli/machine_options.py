@@ -47,6 +47,17 @@ class Quantity(click.ParamType):  # type: ignore[type-arg]
         return found / units_of(base).get(self.bare, 1.0)
 
 
+class FloatRange(click.FloatRange):
+    """A number in a range; click takes nan into any."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number."""
+        found = float(super().convert(value, param, ctx))
+        if found != found:
+            self.fail(f"{value!r} is no number.", param, ctx)
+        return found
+
+
 def millimetres_meant(field: str, written: str, value: float, usual: float) -> str:
     """Doubt about a bare number in metres that looks like millimetres; empty if there is none."""
     from chaosgym.machines.units import looks_like_millimetres

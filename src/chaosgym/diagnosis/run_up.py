@@ -36,6 +36,9 @@ CHANGES = 0.05
 LOST = 0.01
 """Share of the amplitude of the highest order whose loss is told."""
 
+QUIET = 1e-4
+"""Share of the standard deviation of a signal below which ringing is that of its digits and of the filter."""
+
 ONE_WAY = 0.95
 """Share of the turns in one direction below which the others are told to be left out."""
 
@@ -62,7 +65,8 @@ class RunUp:
     spectra, lines
         Orders of the signal over the speed, and the strongest of them.
     envelope
-        Strongest orders of the ringing above the highest order; empty where the signal is sampled too slowly for it.
+        Strongest orders of the ringing above the highest order; empty where the signal is sampled too slowly for it, or
+        nothing rings.
     types
         Regions of Types I, II and III over the speed [rpm]; None where they are not told.
     judged : (2, n)
@@ -156,7 +160,9 @@ def run_up(
         notes.append("no envelope: the signal is sampled too slowly for what lies above the highest order")
     else:
         rings = AngleSignal(above, instants.time, instants.step, turns, highest)
-        envelope = rings.lines(rings.spectra())
+        least = QUIET * float(np.nanstd(value))
+        envelope = [line for line in rings.lines(rings.spectra()) if line.typical > least]
+        notes += [] if envelope else ["no envelope: nothing rings above the highest order"]
     judged, types = np.empty((2, 0)), None
     if error is None:
         notes.append("types by speed are not told without the sensor's error: --sensor-error or --sensor-sigma")

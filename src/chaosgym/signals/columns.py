@@ -139,19 +139,25 @@ def choose_force(
             raise DiagnosisError(f"{recording.source} has no column that could be a force ({why}); use --column NAME")
         name = names[0]
     else:
-        name = _named(recording, column)
+        name = named_column(recording, column)
     return _force(recording, name, unit, scale)
 
 
-def _named(recording: Recording, column: str) -> str:
-    """Name of the column that is meant by a name or a number."""
+def named_column(recording: Recording, column: str) -> str:
+    """Name of the column that is meant by a name or a number.
+
+    Raises
+    ------
+    DiagnosisError
+        If there is none.
+    """
     matching = [name for name in recording.columns if name.casefold() == column.strip().casefold()]
     place = re.fullmatch(r"\d{1,9}", column.strip(), re.ASCII)
     if not matching and place and 1 <= int(column) <= len(recording.columns):
         matching = [list(recording.columns)[int(column) - 1]]
     if not matching:
         listed = _first(list(map(repr, dict.fromkeys([*recording.columns, *recording.problems]))), ", ")
-        raise DiagnosisError(f"{recording.source} has no column {column!r}; its columns: {listed}")
+        raise DiagnosisError(f"{recording.source} has no column {column!r}; its columns of numbers: {listed}")
     return matching[0]
 
 
@@ -175,7 +181,7 @@ def choose_speed(recording: Recording, column: str | None = None) -> Signal:
             raise DiagnosisError(f"{recording.source} has {told}; use --speed-column NAME")
         name = names[0]
     else:
-        name = _named(recording, column)
+        name = named_column(recording, column)
     if name in recording.problems:
         raise DiagnosisError(f"{recording.source}, {recording.problems[name]}")
     unit = recording.units.get(name, "")
@@ -207,7 +213,7 @@ def named_columns(recording: Recording, column: str) -> list[str]:
     found = list(whole)
     for part in [] if whole else column.split(","):
         matching = [name for name in recording.columns if fnmatchcase(name.casefold(), part.strip().casefold())]
-        found += matching or [_named(recording, part)]
+        found += matching or [named_column(recording, part)]
     return list(dict.fromkeys(found))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.errors import DiagnosisError
-from chaosgym.signals.columns import Sampling, Signal, choose_force, sampling
+from chaosgym.signals.columns import Sampling, Signal, choose_force, named_column, sampling
 from chaosgym.signals.read import Recording
 from chaosgym.signals.tachometer import Turns, turns_of
 
@@ -258,6 +258,7 @@ def series_of(
     DiagnosisError
         If a column is not there, or the tachometer is the signal or tells no turns.
     """
+    tachometer = None if tachometer is None else named_column(recording, tachometer)
     if column is None and tachometer is not None:
         rest = {name: values for name, values in recording.columns.items() if name != tachometer}
         signal = choose_force(replace(recording, columns=rest), None, unit, scale)
@@ -269,8 +270,6 @@ def series_of(
     signal = signal._replace(values=signal.values[:size])
     if tachometer is None:
         return signal, instants, None
-    if tachometer not in recording.columns:
-        raise DiagnosisError(f"{recording.source} has no column {tachometer!r} for the tachometer")
     if tachometer == signal.name:
         raise DiagnosisError(f"{recording.source}: column {tachometer!r} can't be both tachometer and signal")
     pulses = recording.columns[tachometer][:size]

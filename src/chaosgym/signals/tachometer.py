@@ -33,8 +33,9 @@ SHORT, UNEVEN = 0.6, 0.3
 MOST_MENDED, MOST_UNEVEN = 0.2, 0.05
 """Shares of the pulses that may be missed or doubled, and of the intervals that may be uneven."""
 
-SLOWEST = 0.1
-"""Share of the largest speed below which the ends of a recording are left out."""
+SLOWEST, STOPPED = 0.1, 1.5
+"""Share of the largest speed below which the ends of a recording are left out; and by what factor an interval between
+these may exceed that of this speed, or the shaft may have stopped there and turned back."""
 
 APART = 50
 """Samples between the pulses that carry the angle: a pulse is known to half a sample only."""
@@ -103,7 +104,7 @@ def turns_of(signal: Array, time: Array, pulses_per_revolution: int = 1) -> Turn
     Raises
     ------
     DiagnosisError
-        If there are no 12 turns, fewer than 4 samples a pulse, a silence of six pulses, or pulses come irregularly.
+        If there are no 12 turns, fewer than 4 samples a pulse, a silence of six pulses, a stop, or uneven pulses.
 
     Examples
     --------
@@ -174,10 +175,19 @@ def _rises(signal: Array, time: Array) -> tuple[Array, float]:
 
 
 def _fast_enough(rises: Array) -> Array:
-    """Pulses but for slow ones at both ends, where the shaft starts or stops."""
+    """Pulses but for slow ones at both ends, where the shaft starts or stops; nowhere else may it."""
     gaps = np.diff(rises)
-    fast = np.flatnonzero(gaps <= float(np.quantile(gaps, 0.1)) / SLOWEST)
-    return rises[fast[0] : fast[-1] + 2]
+    longest = float(np.quantile(gaps, 0.1)) / SLOWEST
+    fast = np.flatnonzero(gaps <= longest)
+    first, last = fast[0], fast[-1] + 1
+    stops = first + np.flatnonzero(gaps[first:last] > STOPPED * longest)
+    if len(stops):
+        place = int(stops[0])
+        raise DiagnosisError(
+            f"the tachometer is silent from {rises[place]:.6g} to {rises[place + 1]:.6g} s; cut the recording there, "
+            "as the shaft may have stopped and turned back"
+        )
+    return rises[first : last + 1]
 
 
 def _usual(gaps: Array) -> Array:
