@@ -81,8 +81,8 @@ RUNS = "runs/" + hashlib.sha256(Path(GOLDEN).read_bytes()).hexdigest()[:8]
 
 SHIPPED = Path("src/chaosgym/control/policies/shipped")
 
-TASKS = ["src/chaosgym/envs/setups.py", "src/chaosgym/envs/judge.py"]
-TASKS += sorted(map(str, Path("src/chaosgym/machines").glob("*/work.py")))
+TASKS = ["src/chaosgym/envs/levels.py", "src/chaosgym/envs/judge.py"]
+TASKS += sorted(map(str, Path("src/chaosgym/machines").glob("*/task_defaults.py")))
 """What says how machines are used in the environments, and when they cost."""
 
 RECIPES = "src/chaosgym/sweeps/datasets.toml"

@@ -13,8 +13,8 @@ import gymnasium as gym
 from chaosgym.envs import ENVIRONMENTS
 from chaosgym.envs.drive import MOVES
 from chaosgym.envs.judge import ExponentJudge
+from chaosgym.envs.levels import LEVELS, task_of, tolerances_of
 from chaosgym.envs.observation import MEANINGS
-from chaosgym.envs.setups import LEVELS, task_of, tolerances_of
 from chaosgym.machines.parameters import parameters_of
 
 KINDS = {

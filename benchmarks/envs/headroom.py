@@ -27,7 +27,7 @@ def headroom(env: str, machines: int = 40, keywords: Mapping[str, Any] | None = 
     given = dict(keywords or {})
     known: Any = gym.make_vec(env, num_envs=1, **given).unwrapped
     seeds = [FLEET_SEED + k for k in range(machines)]
-    drawn = [known.workplace.variants.drawn(np_random(seed)[0]) for seed in seeds]
+    drawn = [known.settings.variants.drawn(np_random(seed)[0]) for seed in seeds]
     gaps = np.array([getattr(machine, machine.clearance_field) for machine in drawn])
     maps = maps_of(env, seeds=seeds, progress="maps", **given)
     return costs(known.task, maps, gaps)

@@ -31,7 +31,7 @@ def judges(env: str, machines: int = 16, speeds: int = 23, seed: int = 0) -> dic
     grid = np.linspace(task.lowest_demand, task.highest_demand, speeds)
     if task.speed_grid:
         grid = task.speed_grid * np.rint(grid / task.speed_grid)
-    drawn = [made.workplace.variants.held_out(k) for k in range(machines)]
+    drawn = [made.settings.variants.held_out(k) for k in range(machines)]
     wild = np.array(
         [
             [diagnose(drawn[i].at(float(speed)), budget=BUDGET).nature != "periodic" for speed in grid]

@@ -21,7 +21,7 @@ def test_the_clearance_is_found(tables):
     """The likeliest class lies within a tenth of the range of the true clearance on most machines, unlike a guess."""
     rule, machines = Table(tables), range(32)
     play(rule, BEAM, machines, steps=40)
-    variants = native_envs(BEAM).workplace.variants
+    variants = native_envs(BEAM).settings.variants
     clearance = np.array([variants.held_out(k).clearance for k in machines])
     share = (clearance / 0.127e-3 - 0.8) / 0.4
     found = (rule._fit.argmax(axis=1) + 0.5) / CLASSES

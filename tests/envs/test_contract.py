@@ -232,7 +232,7 @@ def test_machines_are_drawn_afresh_and_kept_ones_stay(name: str) -> None:
     kept = [env.reset(seed=seed, options={"machine": 7})[1]["clearance"] for seed in (1, 2)]
     assert kept[0] == kept[1]
     nominal = getattr(env.nominal, env.nominal.clearance_field)
-    width = env.workplace.variants.tolerances.get(env.nominal.clearance_field, 0.0)
+    width = env.settings.variants.tolerances.get(env.nominal.clearance_field, 0.0)
     assert len(set(drawn)) == (5 if width else 1)
     assert all(abs(value / nominal - 1.0) <= width for value in [*drawn, *kept])
 

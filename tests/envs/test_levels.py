@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 import chaosgym
 from chaosgym.control.controllers import Follow
 from chaosgym.control.rollout import play
-from chaosgym.envs import setups
-from chaosgym.envs.setups import tolerances_of
+from chaosgym.envs import levels as known
+from chaosgym.envs.levels import tolerances_of
 from chaosgym.envs.variants import HELD_OUT_SEED, SPLITS, Variants, sealed_seed
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ParameterError
@@ -25,9 +25,9 @@ def test_the_ids_are_levels():
     by_id = {level: native_envs(f"chaosgym/ImpactBeam{task}-v1") for level, task in LEVELS.items()}
     for level, envs in by_id.items():
         same = native_envs("chaosgym/ImpactBeam-v1", level=level)
-        assert (envs.task, envs.workplace.variants.tolerances) == (same.task, same.workplace.variants.tolerances)
+        assert (envs.task, envs.settings.variants.tolerances) == (same.task, same.settings.variants.tolerances)
     shares = np.random.default_rng([HELD_OUT_SEED, 13]).uniform(-1.0, 1.0, 1)
-    thirteen = by_id["clearance"].workplace.variants.held_out(13)
+    thirteen = by_id["clearance"].settings.variants.held_out(13)
     assert thirteen.clearance == pytest.approx(0.127e-3 * (1.0 + 0.2 * shares[0]), rel=1e-15)
 
 
@@ -41,7 +41,7 @@ def test_a_fleet_varies_what_no_sensor_tells(env):
     fleet.reset(seed=1)
     one = fleet.machine
     fleet.reset(seed=2)
-    widths = fleet.workplace.variants.tolerances
+    widths = fleet.settings.variants.tolerances
     assert len(widths) >= 5
     assert all(getattr(one, field) != getattr(fleet.machine, field) for field in widths)
     before = getattr(fleet.machine, fleet.nominal.clearance_field)
@@ -118,5 +118,5 @@ def test_what_is_refused_says_what_to_do(keywords, message):
 def test_every_machine_has_every_level():
     """A machine that names nothing hidden has a fleet too: its tolerances and growing clearance."""
     for name in MACHINES:
-        levels = {level: tolerances_of(MACHINES[name](), level) for level in setups.LEVELS}
+        levels = {level: tolerances_of(MACHINES[name](), level) for level in known.LEVELS}
         assert levels["clearance"].items() <= levels["fleet"].items()

@@ -173,7 +173,7 @@ def test_sub_environments_can_be_asked() -> None:
     assert envs.get_attr("speed") == (20.0, 20.0)
     machines = envs.get_attr("machine")
     assert [machine.excitation_frequency for machine in machines] == [20.0, 20.0]
-    kept = [envs.workplace.variants.held_out(k).clearance for k in (4, 9)]
+    kept = [envs.settings.variants.held_out(k).clearance for k in (4, 9)]
     assert [machine.clearance for machine in machines] == kept
     assert envs.get_attr("task")[1].highest_speed == 24.0
     with pytest.raises(AttributeError, match="no attribute 'sped'; known: speed"):

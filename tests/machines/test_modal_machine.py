@@ -342,7 +342,7 @@ def test_commands_and_environments_take_the_file(machine_file, tmp_path):
     env = gym.make("chaosgym/MachineTolerance-v0", machine=str(path))
     envs = gym.make_vec("chaosgym/MachineTolerance-v0", num_envs=2, machine=str(path))
     np.testing.assert_array_equal(envs.reset(seed=3)[0][0], env.reset(seed=3)[0])
-    assert set(env.unwrapped.workplace.variants.tolerances) == {"clearance", "damping_factor"}
+    assert set(env.unwrapped.settings.variants.tolerances) == {"clearance", "damping_factor"}
     brief = tmp_path / "brief.toml"
     brief.write_text(run("design", "--template", path)[0].stdout.replace(str(path), path.name))
     from chaosgym.design.brief import read_brief

@@ -456,7 +456,7 @@ def test_an_environment_senses_the_largest_force_of_all_joints():
     env.reset(seed=3)
     env.unwrapped._job.traced = 1
     observation = env.step(env.action_space.sample())[0]
-    (piece,) = env.unwrapped._job.pieces[0]
+    (piece,) = env.unwrapped._job.segments[0]
     record = simulate(piece.machine, 5, chaosgym.simulation.MotionState(piece.coordinates, piece.bouncing))
     found = record.peak_force.max(axis=1)[-5:]
     assert observation[6] == pytest.approx(found.mean(), rel=1e-5)

@@ -91,7 +91,7 @@ class Contenders:
             "receding horizon": controllers.RecedingHorizon,
         }
         envs = native_envs(self.env, **self.keywords)
-        if isinstance(envs.workplace.variants, Pool):
+        if isinstance(envs.settings.variants, Pool):
             return {name: maker for name, maker in known.items() if name in WITHOUT_MODELS}
         if not has_classifier(envs.nominal.name):
             del known[CLASSIFIED]
@@ -192,7 +192,7 @@ def compare(
     known = native_envs(env, **keywords)
     kind = known.nominal
     subject = subject_of(env if kind.definition == kind.name else f"{env} ({kind.definition})", **keywords)
-    kept = known.workplace.variants.count
+    kept = known.settings.variants.count
     count = kept if machines is None else machines
     if count > kept:
         raise ParameterError(f"machines = {count} is out of range; allowed: up to {kept}, of those kept for evaluation")

@@ -163,7 +163,7 @@ class Operator:
 
     def _observed(self, peaks: Array, impacts: float, bouncing: float) -> NDArray[np.float32]:
         """Observation (1, 14) of readings, which have their errors already."""
-        space, cycles = self._envs.workplace.space, len(peaks)
+        space, cycles = self._envs.settings.space, len(peaks)
         period = np.array([float(self._envs.nominal.period_at(self.speed))])
         duration = np.full((1, cycles, 1), 0.5 * bouncing * period[0])
         values = np.empty((1, *space.shape), np.float32)

@@ -180,7 +180,7 @@ def play(
     numbers = None if machines is None else np.asarray(machines, np.int64)
     chosen = np.asarray(machines if seeds is None else seeds, np.int64)
     envs = native_envs(env, len(chosen), **(keywords | policy.keywords))
-    given = chosen + (envs.workplace.variants.seed if seeds is None else 0)
+    given = chosen + (envs.settings.variants.seed if seeds is None else 0)
     options = {} if numbers is None else {"machine": numbers}
     observations, info = envs.reset(seed=given.tolist(), options=options)
     policy.start(envs)
@@ -205,7 +205,7 @@ def play(
             break
     return Played(
         env=env,
-        unit=envs.workplace.unit,
+        unit=envs.settings.unit,
         machines=np.full(count, -1) if numbers is None else numbers,
         seeds=given,
         felt=felt,

@@ -17,7 +17,7 @@ TASKS: dict[str, dict[str, Any]] = {
     "Tolerance": {"level": "clearance"},
     "Wear": {"level": "wear"},
 }
-"""Keywords of each task; ``chaosgym.envs.setups`` says what the levels are, "fleet" among them."""
+"""Keywords of each task; ``chaosgym.envs.levels`` says what the levels are, "fleet" among them."""
 
 ENVIRONMENTS = tuple(f"chaosgym/{MACHINES.class_name(name)}{task}-v1" for name in MACHINES for task in TASKS)
 """Ids of chaosgym's own machines."""

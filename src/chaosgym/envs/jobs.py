@@ -38,7 +38,7 @@ class StepResult(NamedTuple):
     report: NDArray[np.void]
 
 
-class Piece(NamedTuple):
+class Segment(NamedTuple):
     """Part of a step: a ``machine`` at ``speeds`` (cycles,), from a state as in a ``MotionState``."""
 
     machine: Machine
@@ -63,7 +63,7 @@ class Jobs:
     force, period : (N,)
         What a force of the task is a share of [N], and duration of a cycle of the last step [s].
     traced
-        Number of the first jobs of which ``pieces`` keeps where the last step began, for pictures; a list each.
+        Number of the first jobs of which ``segments`` keeps where the last step began, for pictures; a list each.
     """
 
     def __init__(self, task: Task, variants: Variants | Pool, space: Box, count: int) -> None:
@@ -81,7 +81,7 @@ class Jobs:
         self._job_time, self.period = np.ones((2, count))
         self._velocities = nominal.n_velocities
         self.traced = 0
-        self.pieces: list[list[Piece]] = [[] for _ in range(count)]
+        self.segments: list[list[Segment]] = [[] for _ in range(count)]
 
     @property
     def speed(self) -> Array:
@@ -191,7 +191,7 @@ class Jobs:
             kicks = task.kick * np.array([g.standard_normal((count, self._velocities)) for g in generators])
         if self.traced:
             for i in which[which < self.traced].tolist():
-                self.pieces[i] = []
+                self.segments[i] = []
         if kicks is None and isinstance(self.batch, VaryingBatch):
             self._trace(which, speeds)
             cycles, growth = self.batch.run_varied(which, speeds)
@@ -232,7 +232,7 @@ class Jobs:
             return
         for k in np.flatnonzero(which < self.traced).tolist():
             i = int(which[k])
-            self.pieces[i].append(Piece(self.machine_at(i), speeds[k], *self.batch.motion(i)))
+            self.segments[i].append(Segment(self.machine_at(i), speeds[k], *self.batch.motion(i)))
 
     def _observe(self, which: Indices, cycles: Cycles, period: Array, generators: Generators) -> Observation:
         space, task = self.space, self.task

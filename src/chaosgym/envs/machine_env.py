@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from chaosgym.envs.drive import action_space, checked_actions
 from chaosgym.envs.jobs import Indices, Jobs
 from chaosgym.envs.kernels.steps import INFO
+from chaosgym.envs.levels import task_of, tolerances_of
 from chaosgym.envs.observation import Observation, observation_names, observation_space
 from chaosgym.envs.pool import ANY, SHARE, Pool, pool_task
-from chaosgym.envs.setups import task_of, tolerances_of
 from chaosgym.envs.task import Status, Task, UnknownKeywordError, divided
 from chaosgym.envs.variants import Variants
 from chaosgym.errors import ParameterError
@@ -37,7 +37,7 @@ FIRST = np.zeros(1, np.int64)
 METADATA: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}
 
 
-def start_of(workplace: "Workplace", options: Mapping[str, Any], count: int) -> tuple[float | None, Indices | None]:
+def start_of(settings: "EnvSettings", options: Mapping[str, Any], count: int) -> tuple[float | None, Indices | None]:
     """Return how ``count`` jobs start, by the options of a reset: speed, and numbers (count,) of kept machines.
 
     Either is None where the reset leaves it to the task.
@@ -50,16 +50,16 @@ def start_of(workplace: "Workplace", options: Mapping[str, Any], count: int) -> 
     for name in options:
         if name not in ("machine", "speed"):
             raise ParameterError(f"options has no entry {name!r}; allowed: machine, speed")
-    task = workplace.task
+    task = settings.task
     speed, low, high = options.get("speed"), task.lowest_speed, task.highest_speed
     if speed is not None and (not isinstance(speed, int | float | np.number) or not low <= speed <= high):
         raise ParameterError(f"options['speed'] = {speed!r} is out of range; allowed: {low:g} to {high:g}")
     machine = options.get("machine")
-    numbers = None if machine is None else workplace.variants.checked_numbers(machine, count)
+    numbers = None if machine is None else settings.variants.checked_numbers(machine, count)
     return None if speed is None else float(speed), numbers
 
 
-class Workplace:
+class EnvSettings:
     """Task, machines, spaces and model of an environment, from its keywords.
 
     Parameters
@@ -132,10 +132,10 @@ class Workplace:
             raise ParameterError(f"machine = {machine!r} does not exist; {MACHINES.listed(machine)}")
         kind = MACHINES[machine]
         usual: Machine = kind()
-        work = usual.work
+        defaults = usual.task_defaults
         widths = tolerances_of(usual, level)
         self.task, fields = divided(task_of(usual, level), usual, keywords)
-        base = {name: value for name, value in work.fields.items() if name not in fields}
+        base = {name: value for name, value in defaults.fields.items() if name not in fields}
         if fidelity is not None:
             base = {name: value for name, value in base.items() if name not in kind.fidelity_ladder.get(fidelity, {})}
             fields["fidelity"] = fidelity
@@ -143,7 +143,7 @@ class Workplace:
         for speed in (self.task.lowest_speed, self.task.highest_speed):
             nominal.at(speed)
         self.variants = Variants(nominal, widths if tolerances is None else tolerances, split, sealed=sealed)
-        self.model = with_settings(nominal, work.model if model_fidelity is None else {"fidelity": model_fidelity})
+        self.model = with_settings(nominal, defaults.model if model_fidelity is None else {"fidelity": model_fidelity})
         self.unit = parameters_of(nominal)[nominal.speed_field].unit
 
 
@@ -152,9 +152,9 @@ def first_of(info: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
     return {name: values.item() for name, values in info.items()}
 
 
-def refuse_pictures(workplace: Workplace, render_mode: str | None) -> None:
+def refuse_pictures(settings: EnvSettings, render_mode: str | None) -> None:
     """Raise ``ParameterError`` if pictures are requested of a pool of machines, whose motion has no unit."""
-    if render_mode is not None and isinstance(workplace.variants, Pool):
+    if render_mode is not None and isinstance(settings.variants, Pool):
         raise ParameterError(f"render_mode = {render_mode!r} is not possible with any machine; allowed: None")
 
 
@@ -187,12 +187,12 @@ class MachineEnv(JobSpec, gym.Env[Observation, Any]):
     render_mode
         None, "rgb_array" or "human".
     keywords
-        Those of ``Workplace``.
+        Those of ``EnvSettings``.
 
     Raises
     ------
     ParameterError, UnknownKeywordError
-        As ``Workplace``.
+        As ``EnvSettings``.
     """
 
     metadata = METADATA
@@ -201,14 +201,14 @@ class MachineEnv(JobSpec, gym.Env[Observation, Any]):
         if render_mode is not None and render_mode not in METADATA["render_modes"]:
             raise ParameterError(f"render_mode = {render_mode!r} is not one of None, human, rgb_array")
         self.render_mode = render_mode
-        self.workplace = Workplace(machine, **keywords)
-        refuse_pictures(self.workplace, render_mode)
-        self.task, self.model = self.workplace.task, self.workplace.model
-        self.nominal = self.workplace.variants.nominal
+        self.settings = EnvSettings(machine, **keywords)
+        refuse_pictures(self.settings, render_mode)
+        self.task, self.model = self.settings.task, self.settings.model
+        self.nominal = self.settings.variants.nominal
         self.observation_names = observation_names(self.task)
-        self.observation_space = cast(Space[Observation], self.workplace.space)
-        self.action_space = cast(Space[Any], self.workplace.actions)
-        self._job = self.workplace.jobs(1)
+        self.observation_space = cast(Space[Observation], self.settings.space)
+        self.action_space = cast(Space[Any], self.settings.actions)
+        self._job = self.settings.jobs(1)
         self._job.traced = 0 if render_mode is None else 1
         self._runs = False
         self._dashboard: Dashboard | None = None
@@ -244,7 +244,7 @@ class MachineEnv(JobSpec, gym.Env[Observation, Any]):
             If the machine can't be simulated at its starting speed.
         """
         super().reset(seed=seed)
-        speed, numbers = start_of(self.workplace, options or {}, 1)
+        speed, numbers = start_of(self.settings, options or {}, 1)
         self._runs = False
         observation, info = self._job.start(FIRST, [self.np_random], numbers, speed)
         self._runs = True
@@ -280,7 +280,7 @@ class MachineEnv(JobSpec, gym.Env[Observation, Any]):
         """Last step with a time history."""
         from chaosgym.envs.rendering import record_of
 
-        return record_of(self._job.pieces[0], self.task.cycles_per_step)
+        return record_of(self._job.segments[0], self.task.cycles_per_step)
 
     def _show(self) -> "Dashboard":
         if self._dashboard is None:

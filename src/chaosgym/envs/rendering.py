@@ -15,7 +15,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from chaosgym.envs.jobs import Piece
+from chaosgym.envs.jobs import Segment
 from chaosgym.envs.observation import OBSERVATION_NAMES
 from chaosgym.envs.task import Task
 from chaosgym.machines.machine import Machine
@@ -50,10 +50,10 @@ def blank() -> Frame:
     return np.full((round(SIZE[1] * DOTS_PER_INCH), round(SIZE[0] * DOTS_PER_INCH), 3), 255, np.uint8)
 
 
-def record_of(pieces: Iterable[Piece], cycles: int) -> CycleRecord:
+def record_of(segments: Iterable[Segment], cycles: int) -> CycleRecord:
     """The last cycles of a step with a time history, run once more from its start: no bit of the step changes."""
     records: list[CycleRecord] = []
-    for piece in pieces:
+    for piece in segments:
         state: MotionState | None = MotionState(piece.coordinates, piece.bouncing)
         for speed in piece.speeds.tolist():
             record = simulate(piece.machine.at(speed), 1, state, samples_per_cycle=RENDER_SAMPLES // cycles)

@@ -19,7 +19,7 @@ from chaosgym.envs import environment
 from chaosgym.envs.drive import checked_actions
 from chaosgym.envs.jobs import Indices
 from chaosgym.envs.kernels.steps import INFO
-from chaosgym.envs.machine_env import METADATA, JobSpec, Workplace, refuse_pictures, start_of
+from chaosgym.envs.machine_env import METADATA, EnvSettings, JobSpec, refuse_pictures, start_of
 from chaosgym.envs.observation import Observation, observation_names
 from chaosgym.envs.task import Status
 from chaosgym.errors import ParameterError
@@ -33,7 +33,7 @@ DRAWN = 4
 Actions = NDArray[Any]
 Flags = NDArray[np.bool_]
 
-SHARED = ("model", "nominal", "observation_names", "render_mode", "task", "workplace")
+SHARED = ("model", "nominal", "observation_names", "render_mode", "task", "settings")
 """Attributes that all sub-environments have in common."""
 
 
@@ -91,12 +91,12 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
         modes = [mode.value for mode in AutoresetMode]
         if autoreset_mode not in (*AutoresetMode, *modes):
             raise ParameterError(f"autoreset_mode = {autoreset_mode!r} is not one of {', '.join(modes)}")
-        self.workplace = Workplace(machine, **keywords)
-        refuse_pictures(self.workplace, render_mode)
-        self.task, self.model = self.workplace.task, self.workplace.model
-        self.nominal = self.workplace.variants.nominal
+        self.settings = EnvSettings(machine, **keywords)
+        refuse_pictures(self.settings, render_mode)
+        self.task, self.model = self.settings.task, self.settings.model
+        self.nominal = self.settings.variants.nominal
         self.observation_names = observation_names(self.task)
-        self.jobs = self.workplace.jobs(num_envs)
+        self.jobs = self.settings.jobs(num_envs)
         self.render_mode = render_mode
         self.jobs.traced = 0 if render_mode is None else min(num_envs, DRAWN)
         self._dashboards: list[Dashboard] = []
@@ -108,10 +108,10 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
         self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**METADATA, "render_modes": ["rgb_array"], "autoreset_mode": self.autoreset_mode}
-        self.single_action_space = self.workplace.actions
-        self.single_observation_space = self.workplace.space
-        self.action_space = batch_space(self.workplace.actions, num_envs)
-        self.observation_space = batch_space(self.workplace.space, num_envs)
+        self.single_action_space = self.settings.actions
+        self.single_observation_space = self.settings.space
+        self.action_space = batch_space(self.settings.actions, num_envs)
+        self.observation_space = batch_space(self.settings.space, num_envs)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -134,7 +134,7 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
         options = dict(options or {})
         which = self._masked(options.pop("reset_mask", None))
         seeds = self._seeds(seed)
-        start = start_of(self.workplace, options, self.num_envs)
+        start = start_of(self.settings, options, self.num_envs)
         observation, info = self._start(which, [seeds[i] for i in which.tolist()], *start)
         if not self._has_begun:
             self._last = np.zeros(cast(tuple[int, ...], self.observation_space.shape), np.float32)
@@ -244,8 +244,8 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
         from chaosgym.envs.rendering import blank, record_of
 
         cycles = self.task.cycles_per_step
-        pairs = zip(self._dashboards, self.jobs.pieces, strict=False)
-        drawn = [dashboard.draw(record_of(pieces, cycles)) for dashboard, pieces in pairs]
+        pairs = zip(self._dashboards, self.jobs.segments, strict=False)
+        drawn = [dashboard.draw(record_of(segments, cycles)) for dashboard, segments in pairs]
         return (*drawn, *(self.num_envs - len(drawn)) * [blank()])
 
     def _generators_of(self, which: Indices) -> list[np.random.Generator]:

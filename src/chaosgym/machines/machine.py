@@ -67,7 +67,7 @@ Option = Number | Choice
 Array = NDArray[np.float64]
 
 
-class Work(NamedTuple):
+class TaskDefaults(NamedTuple):
     """Defaults of a machine in the environments.
 
     Attributes
@@ -129,7 +129,7 @@ class Machine(ABC):
 
     tolerances: ClassVar[Mapping[str, tuple[float, bool]]] = {}
     """Half width of each field within which machines are built, and whether it is a share; usual ones if empty."""
-    work: ClassVar[Work] = Work()
+    task_defaults: ClassVar[TaskDefaults] = TaskDefaults()
     """What environments start from, where the usual does not serve."""
 
     fidelity: InitVar[str | None] = None

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.impact_beam.work import WORK
-from chaosgym.machines.machine import Number, Option, Work
+from chaosgym.machines.impact_beam.task_defaults import TASK_DEFAULTS
+from chaosgym.machines.machine import Number, Option, TaskDefaults
 from chaosgym.machines.modal_impact import ModalImpactMachine
 from chaosgym.machines.parameters import parameter
 
@@ -85,7 +85,7 @@ class BeamParameters(ModalImpactMachine):
         "force 1e6 N": {"force_amplitude": 1e6},
     }
 
-    work: ClassVar[Work] = WORK
+    task_defaults: ClassVar[TaskDefaults] = TASK_DEFAULTS
 
     excitation_frequency: float = parameter(
         30.0, unit="Hz", low=1e-3, high=1e4, provenance="printed", source="thesis figure 3.7"

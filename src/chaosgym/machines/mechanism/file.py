@@ -9,7 +9,7 @@ import numpy as np
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.file_keys import needed
-from chaosgym.machines.machine import Work
+from chaosgym.machines.machine import TaskDefaults
 from chaosgym.machines.mechanism.beam import END, START, Beam, beam_link
 from chaosgym.machines.mechanism.forces import STROKE_ANGLES, Gas, Sampled
 from chaosgym.machines.mechanism.joints import Joint
@@ -283,7 +283,7 @@ def built(path: str, digest: str, data: Mapping[str, Any], _folder: Path) -> typ
     named = zip(("speed_range", "clearance_range"), fields, ends, strict=True)
     made.usual_ranges = {field: range_of(made, f"operation.{key}", field, given) for key, field, given in named}
     made.tolerances = tolerances_of(data["tolerances"], machine)
-    made.work = Work(task=data["job"])
+    made.task_defaults = TaskDefaults(task=data["job"])
     machine.reduce()  # what can't move is refused here, by name, and the rest is kept for the first run
     kind: type[MechanismMachine] = made
     return kind

@@ -11,7 +11,7 @@ import numpy as np
 from chaosgym.errors import ParameterError
 from chaosgym.machines.file_keys import needed
 from chaosgym.machines.linear_impact import damping_for
-from chaosgym.machines.machine import Machine, Work
+from chaosgym.machines.machine import Machine, TaskDefaults
 from chaosgym.machines.modal_machine import cycle_file
 from chaosgym.machines.modal_machine.archives import read_archive, read_matrix
 from chaosgym.machines.modal_machine.drive import KINDS, Drive
@@ -130,7 +130,7 @@ def built(path: str, digest: str, data: Mapping[str, Any], folder: Path) -> type
             raise ParameterError("operation.monitored needs several [[joint]]; allowed with one: leave it out")
         made = _with_one_joint(structure, data["joint"][0], drives, springs, speed, usual, types, definition, path)
     made.tolerances = tolerances_of(data["tolerances"], made())
-    made.work = Work(task={**made.work.task, **data["job"]})
+    made.task_defaults = TaskDefaults(task={**made.task_defaults.task, **data["job"]})
     kind: type[Machine] = made
     return kind
 

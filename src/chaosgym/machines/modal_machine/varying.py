@@ -24,7 +24,7 @@ from chaosgym.core.cycle import CycleArrays
 from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.machines.binned.model import KEPT_BYTES, Contact, Held, held, middles_and_nodes
-from chaosgym.machines.machine import Option, Work
+from chaosgym.machines.machine import Option, TaskDefaults
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.machine import ModalMachine, as_there, rigid_note, turning_note
@@ -150,7 +150,7 @@ class VaryingMachine(BinnedMachine):
     turning: ClassVar[tuple[str, ...]] = ()
     """Names of joints that turn, as of ``ModalMachine``."""
     beside_matrices: ClassVar[tuple[str, ...]] = ("speed", "clearance", "offset")
-    work: ClassVar[Work] = Work(task={"speed_ripple": 0.0, "kick": 3e-4})
+    task_defaults: ClassVar[TaskDefaults] = TaskDefaults(task={"speed_ripple": 0.0, "kick": 3e-4})
     """A table is made at each speed, so that jobs are kicked and their speed has no ripple."""
 
     modes: Structure

@@ -22,10 +22,10 @@ from typing import Any, ClassVar
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.machine import BinnedMachine
-from chaosgym.machines.machine import Option, Work
+from chaosgym.machines.machine import Option, TaskDefaults
 from chaosgym.machines.parameters import parameter
 from chaosgym.machines.slider_crank.scenes import EXTREMES, OPTIONS, SCENES
-from chaosgym.machines.slider_crank.work import WORK
+from chaosgym.machines.slider_crank.task_defaults import TASK_DEFAULTS
 
 FITTED = "fitted to the statements, see docs/development/calibration.md"
 """Source of what was fitted to the thesis' results."""
@@ -64,7 +64,7 @@ class CrankParameters(BinnedMachine):
     options: ClassVar[Mapping[str, Option]] = OPTIONS
     scenes: ClassVar[Mapping[str, Mapping[str, Any]]] = SCENES
     extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = EXTREMES
-    work: ClassVar[Work] = WORK
+    task_defaults: ClassVar[TaskDefaults] = TASK_DEFAULTS
     beside_matrices: ClassVar[tuple[str, ...]] = ("crank_speed", "slider_clearance", "ball_clearance")
     sides: ClassVar[tuple[str, ...]] = ("upper", "lower")
     """Surfaces whose force points up and down: on the slider, or on the housing if the ball joint is monitored."""

@@ -1,8 +1,8 @@
 """The slider crank at work in the environments."""
 
-from chaosgym.machines.machine import Work
+from chaosgym.machines.machine import TaskDefaults
 
-WORK = Work(
+TASK_DEFAULTS = TaskDefaults(
     # figure 4.14b, with an assumed contact damping of 6.5 %: with the printed 5 % hardly a speed is calm, with 8 %
     # backing off finds a calm one at once (docs/development/tasks.md)
     fields={"slider_clearance": 0.254e-3, "contact_damping_ratio": 0.065},

@@ -36,23 +36,23 @@ def tolerances_of(machine: Machine, level: str) -> Mapping[str, float]:
         raise ParameterError(f"level = {level!r} is not one of {', '.join(LEVELS)}")
     if level == "nominal":
         return {}
-    usual = _shares(machine) if machine.work.tolerances is None else machine.work.tolerances
-    return {**usual, **machine.work.fleet} if level == "fleet" else usual
+    usual = _shares(machine) if machine.task_defaults.tolerances is None else machine.task_defaults.tolerances
+    return {**usual, **machine.task_defaults.fleet} if level == "fleet" else usual
 
 
 def task_of(machine: Machine, level: str) -> Task:
-    """Task of a level of a machine by its ``work``; what that leaves open follows from its usual ranges.
+    """Task of a level of a machine by its ``task_defaults``; what that leaves open follows from its usual ranges.
 
     Raises
     ------
     ParameterError
-        If the machine's ``work`` has a number that no task has, or one out of its range.
+        If the machine's ``task_defaults`` has a number that no task has, or one out of its range.
     """
     known = parameters_of(Task)
-    for name in machine.work.task:
+    for name in machine.task_defaults.task:
         if name not in known:
             raise ParameterError(f"the job of {machine.name} has no number {name!r}{suggestion(name, known)}")
-    numbers: dict[str, Any] = {**machine.work.task, **({"wear": WEAR} if level in WEARING else {})}
+    numbers: dict[str, Any] = {**machine.task_defaults.task, **({"wear": WEAR} if level in WEARING else {})}
     return replace(_usual_task(machine), **numbers)
 
 

@@ -1,8 +1,8 @@
 """The impact beam in the environments: force and range of speed, tolerances, and numbers of the task."""
 
-from chaosgym.machines.machine import Work
+from chaosgym.machines.machine import TaskDefaults
 
-WORK = Work(
+TASK_DEFAULTS = TaskDefaults(
     # twice the thesis' force, and speeds about the onset of chaos (assumed): with less force, or at higher speeds,
     # chaos fills whole ranges that no trim leaves (docs/development/tasks.md)
     fields={"force_amplitude": 17.8, "clearance": 0.127e-3},
