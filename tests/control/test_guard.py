@@ -104,3 +104,12 @@ def test_what_it_can_not_guard_is_refused():
         play(GuardedPolicy(policy_of(lambda observation: 0)), ENV, [0], steps=2)
     with pytest.raises(ParameterError, match="a guard goes by irregular motion"):
         play(GuardedPolicy(shipped_policy(ENV)), ENV, [0], objective="life", steps=2)
+
+
+def test_a_guard_asks_for_what_its_policy_observes():
+    """A policy that looks at the classifier is given it behind a guard too, in jobs and by an operator."""
+    inner = BackOff(classified=True)
+    guarded = GuardedPolicy(inner)
+    assert guarded.keywords == inner.keywords == {"action": "speed", "classifier": "on"}
+    assert play(guarded, ENV, [3], steps=4).speed.shape == (4, 1)
+    assert GuardedPolicy(shipped_policy(ENV)).keywords["action"] == "speed"

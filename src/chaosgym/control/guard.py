@@ -48,6 +48,11 @@ class GuardedPolicy(Controller):
         self.policy, self.patience, self.strikes = policy, patience, strikes
         self._back_off = BackOff(patience=patience)
 
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """Of the environment: that of a controller, and what the policy observes."""
+        return getattr(self.policy, "keywords", {}) | super().keywords
+
     def begin(self, envs: Any) -> None:
         """Trust the policy.
 
