@@ -100,3 +100,16 @@ def test_keywords_that_are_none_end_in_one_line(script, text, tmp_path):
     assert done.returncode == 2
     assert "keyword" in done.stderr.splitlines()[-1]
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("option", ["--out", "--start"])
+def test_a_run_with_other_observations_is_refused_in_one_line(option, tmp_path):
+    """What was trained with the classifier neither goes on nor begins a training without it."""
+    _train("ppo", tmp_path / "on", 40, "--keywords", '{"classifier": "on"}', *SMALL["ppo"])
+    where = [option, tmp_path / "on"] + ([] if option == "--out" else ["--out", tmp_path / "off"])
+    command = [sys.executable, AGENTS / "ppo.py", *where, "--steps", 80, *SMALL["ppo"]]
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "other observations or actions; allowed: the same machine and --keywords" in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr

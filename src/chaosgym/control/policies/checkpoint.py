@@ -97,7 +97,7 @@ def load_checkpoint(folder: Path, kind: Any, envs: Any) -> tuple[Any, Any] | Non
     Raises
     ------
     ModelFileError
-        If the file is damaged, or was written by another user or on another computer.
+        If the file is damaged, was written by another user or on another computer, or the environments differ.
     """
     import torch
 
@@ -114,7 +114,13 @@ def load_checkpoint(folder: Path, kind: Any, envs: Any) -> tuple[Any, Any] | Non
             "anything, so it is not read: choose another folder to start anew"
         )
     state = pickle.loads(signed[SIZE:])
-    model = kind.load(io.BytesIO(state["model"]), envs, device="cpu", force_reset=False)
+    try:
+        model = kind.load(io.BytesIO(state["model"]), envs, device="cpu", force_reset=False)
+    except ValueError:  # of stable-baselines3, where spaces differ
+        raise ModelFileError(
+            f"{folder} was trained in an environment with other observations or actions; allowed: the same machine "
+            "and --keywords"
+        ) from None
     for env, values in zip(_layers(model.env), state["envs"], strict=True):
         vars(env).update(values)
     vars(model).update(state["unsaved"])
