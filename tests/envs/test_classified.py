@@ -70,6 +70,6 @@ def test_backing_off_by_the_classifier_leaves_chaos():
 
 
 def test_a_machine_without_a_classifier_of_records_says_so():
-    """The keyword is refused where no classifier is shipped, with what trains one."""
-    with pytest.raises(ParameterError, match="train-classifier"):
+    """The keyword is refused where no classifier is shipped, with what is allowed in its place."""
+    with pytest.raises(ParameterError, match="for modal-machine it ships none; allowed: 'off', or monitor"):
         gym.make("chaosgym/AnyMachine-v0", classifier="on")

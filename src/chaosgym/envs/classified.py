@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.classifier.features import MAX_CYCLES, MIN_CYCLES
-from chaosgym.classifier.machine_classifier import default_classifier
-from chaosgym.errors import ModelFileError, ParameterError
+from chaosgym.classifier.machine_classifier import default_classifier, has_classifier
+from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
 
 Array = NDArray[np.float64]
@@ -34,10 +34,12 @@ class RecordsAtSpeed:
     """
 
     def __init__(self, machine: Machine, sensor_error: float, count: int) -> None:
-        try:
-            self._classifier = default_classifier(machine.name)
-        except ModelFileError as error:
-            raise ParameterError(f"classifier = 'on' is out of range; allowed: 'off', since {error}") from None
+        if not has_classifier(machine.name):
+            raise ParameterError(
+                f"classifier = 'on' needs a classifier that chaosgym ships, and for {machine.name} it ships none; "
+                "allowed: 'off', or monitor = 'on'"
+            )
+        self._classifier = default_classifier(machine.name)
         self._error = sensor_error
         self._peaks, self._length = np.full((count, MAX_CYCLES), np.nan), np.zeros(count, np.int64)
         self._speed = np.full(count, np.nan)
