@@ -116,10 +116,16 @@ def _scores(following, own, mine):
     return Scores(pa.table(table))
 
 
+def test_where_the_own_map_loses_nobody_has_a_score():
+    """The scale would be turned over: who loses most would score best."""
+    with pytest.raises(ParameterError, match=r"there is no score.*earns -4.50, not more than"):
+        _scores([-4.0, -4.0], [-4.0, -5.0], [-9.0, -9.0]).row("mine")
+
+
 def test_calm_machines_have_no_score_and_do_not_spoil_that_of_others():
     """Where the own map gains nothing there is no scale; draws of calm machines alone are left out of the interval."""
     calm = np.array([-3.0, -4.0, -5.0])
-    with pytest.raises(ParameterError, match=r"there is no score.*earns what 'follow the demand' does, -4.00"):
+    with pytest.raises(ParameterError, match=r"there is no score.*not more than 'follow the demand' with -4.00"):
         _scores(calm, calm, calm + 1.0).row("mine")
     following = np.array([-3.0, -3.0, -9.0])
     row = _scores(following, np.array([-3.0, -3.0, -5.0]), np.array([-3.0, -3.0, -7.0])).row("mine")

@@ -320,7 +320,7 @@ class Scores:
         Raises
         ------
         ParameterError
-            If following the demand or the own map has not been played, or both earn the same everywhere.
+            If following the demand or the own map has not been played, or that map earns no more than following.
         """
         names = list(dict.fromkeys(self.table["contender"].to_pylist()))
         rows = {name: self.row(name) for name in names}
@@ -335,10 +335,10 @@ class Scores:
         where that has not played.
         """
         mine, zero, one = self.paired(name, ZERO, ONE)
-        if np.array_equal(zero, one):
+        if not one.mean() > zero.mean():
             raise ParameterError(
-                f"there is no score: on these machines {ONE!r} earns what {ZERO!r} does, {zero.mean():.2f}, since calm "
-                "speeds are all it finds; let more machines play, or widen the range of speed"
+                f"there is no score: on these machines {ONE!r} earns {one.mean():.2f}, not more than {ZERO!r} with "
+                f"{zero.mean():.2f}; let more machines play, or widen the range of speed"
             )
 
         def score(drawn: NDArray[np.int64]) -> Array:
