@@ -90,17 +90,12 @@ DATASETS = tuple(tomllib.loads(Path(RECIPES).read_text()))
 """Machines whose datasets are made; the options stand in ``RECIPES``."""
 
 LARGE = "--units 128 --batch 1920 --rollout 120"
-BEAM = "ImpactBeamTolerance-v1"
-START = f"python agents/ppo.py --env chaosgym/{BEAM} --seed 0 --steps 900000 {LARGE} --out {RUNS}/{BEAM}"
 FLEET = """--keywords '{"level": "fleet", "split": "train"}'"""
 POLICIES = {
     "ImpactBeamTolerance-v1": ["python agents/learn_map.py --seed 0 --steps 600000"],
-    "ImpactBeamWear-v1": [
-        START,
-        f"python agents/ppo.py --start {RUNS}/{BEAM} --seed 0 --steps 300000 {LARGE} --learning-rate 5e-4",
-    ],
+    "ImpactBeamWear-v1": ["python agents/learn_map.py --seed 0 --steps 600000"],
     "SliderCrankTolerance-v1": [f"python agents/ppo.py --fidelity draft --seed 0 --steps 240000 {LARGE}"],
-    "ImpactBeamTolerance-v1-fleet": [f"python agents/learn_map.py {FLEET} --seed 0 --steps 300000"],
+    "ImpactBeamTolerance-v1-fleet": [f"python agents/learn_map.py {FLEET} --seed 0 --steps 1200000"],
     "SliderCrankTolerance-v1-fleet": [
         f"python agents/ppo.py {FLEET} --fidelity draft --seed 0 --steps 240000 {LARGE}",
     ],
