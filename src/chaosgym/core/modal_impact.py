@@ -46,7 +46,7 @@ def tabulate(model, shortest):
     at, rubs = layout(n, model.drive.shape[1], 1, 0, MOST_LEVELS), no_rubs(n)
     values, constants = aligned(count * at[ROW]).reshape((count, at[ROW])), np.empty((1, 1))
     for r in range(count):
-        constants[0, 0] = model.rest_penetration[r]
+        constants[0, 0] = model.rest_penetration[r] if r > 0 else 0.0
         generator, to_modal, from_modal = regimes.generator[r], regimes.to_modal[r], regimes.from_modal[r]
         rest, drift = model.rest[r, STOP].reshape((1, 2 * n)), model.drift[r, STOP].reshape((1, 2 * n))
         put_structure(

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.core.cycle import CycleArrays
-from chaosgym.core.modal_model import ModalImpactModel, Regimes, Tables, with_drive_from
+from chaosgym.core.modal_model import LOAD, STOP, ModalImpactModel, Regimes, Tables, with_drive_from
+from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.machine import Flexible, Machine
-from chaosgym.machines.modal_blocks import settled
 from chaosgym.machines.parameters import check_parameter, refuse_not_finite
 
 if TYPE_CHECKING:
@@ -27,12 +27,24 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+MAX_CONDITION = 1e6
+"""Condition number of a set of eigenvectors below which no better one is looked for."""
+
+HOPELESS_CONDITION = 1e12
+"""Condition number beyond which a motion would keep less than four digits."""
+
 RIGID_SHARE = 1e-6
 """Natural frequency, as a share of the fastest one, below which a mode is the motion of a rigid body.
 
 Programs of finite elements print rigid bodies so, at the rounding of their stiffness. A static force would push such a
 mode so far away that the gap drowns in the rounding of that distance.
 """
+
+UNCOUPLED = 1e-8
+"""Damping between two modes, as a share of their own, that counts as none where modes are nearly critical."""
+
+NEGLIGIBLE = 1e-13
+"""Stiffness and damping, against the largest, of a direction that neither springs nor dampers resist."""
 
 
 class Modes(NamedTuple):
@@ -73,6 +85,183 @@ def with_rigid_bodies(modes: Modes) -> Modes:
     return modes._replace(angular_frequency=np.where(slow, 0.0, modes.angular_frequency), damping=damping)
 
 
+def modal_blocks(stiffness: Array, damping: Array, rigid: bool, rubs: bool = False) -> tuple[Array, Array]:
+    """Real 2 x 2 blocks of q'' + damping q' + stiffness q = 0: generator (4, n) and from_modal (2n, 2n).
+
+    Where the machine can move as a ``rigid`` body, a direction that neither spring nor damper resists drifts, in a
+    block of its own. What slides and ``rubs`` makes the matrices unsymmetric, and may let a motion grow.
+    """
+    scale = math.sqrt(np.linalg.norm(stiffness, 2)) or 1.0
+    held, directions = _stretched(stiffness / scale**2 + damping / scale, rubs)
+    loose = (held < NEGLIGIBLE * max(1.0, float(held[-1]))) & rigid
+    blocks, columns = [], []
+    for free in directions[:, loose].T:
+        blocks.append((0.0, 1.0, 0.0, 0.0))
+        columns.append((np.concatenate([free, 0.0 * free]), np.concatenate([0.0 * free, free])))
+    # without such directions, the modes stay as they are, to the last digit
+    basis = directions[:, ~loose] if loose.any() else np.eye(len(stiffness))
+    if basis.shape[1]:
+        own = (basis.T @ stiffness @ basis, basis.T @ damping @ basis)
+        _add_damped(*own, basis, rigid, blocks, columns, rubs)
+    first, second = zip(*columns, strict=True)
+    from_modal = np.column_stack([*first, *second])
+    if rubs and loose.any():
+        _push_along(stiffness, damping, directions[:, loose], np.array(blocks).T, from_modal)
+    return np.array(blocks).T, from_modal
+
+
+def _stretched(matrix: Array, rubs: bool) -> tuple[Array, Array]:
+    """By how much a matrix stretches directions, ascending, and these: singular values and vectors where it rubs."""
+    if not rubs:
+        return np.linalg.eigh(matrix)
+    _, sizes, directions = np.linalg.svd(matrix)
+    return sizes[::-1], directions[::-1].T
+
+
+def _push_along(stiffness: Array, damping: Array, loose: Array, generator: Array, from_modal: Array) -> None:
+    """Add to the columns of other coordinates how friction moves directions (n, k) that nothing resists.
+
+    A block B moves others by Y u, and these by X u with X B^2 = -loose' (stiffness Y + damping Y B).
+    """
+    n = len(stiffness)
+    for j in range(loose.shape[1], n):
+        block, pair = generator[:, j].reshape(2, 2), [j, n + j]
+        moved = from_modal[:n, pair]
+        forced = -loose.T @ (stiffness @ moved + damping @ moved @ block)
+        square = block @ block
+        if block[1, 0] != 0.0:
+            along = np.linalg.solve(square.T, forced.T).T
+        else:
+            # nothing pushes where the other one rests
+            along = np.divide(forced, np.diag(square), out=np.zeros_like(forced), where=np.diag(square) > 0.0)
+        from_modal[:n, pair] += loose @ along
+        from_modal[n:, pair] += loose @ along @ block
+
+
+def _add_damped(
+    stiffness: Array,
+    damping: Array,
+    basis: Array,
+    rigid: bool,
+    blocks: list[tuple[float, float, float, float]],
+    columns: list[tuple[Array, Array]],
+    rubs: bool,
+) -> None:
+    """Add the blocks of coordinates, columns of ``basis``, that all have a spring or a damper.
+
+    A mode that is critically damped to the last digit has one eigenvector instead of two. If damping couples no modes,
+    displacement and velocity of each serve as its coordinates. Else its damping is moved by a billionth, which
+    separates the pair; where that leaves equal modes entangled, that of each by another amount. The best set of
+    eigenvectors that was found serves, unless it would leave no digits.
+    """
+    n = len(stiffness)
+    scale = math.sqrt(np.linalg.norm(stiffness, 2)) or 1.0
+    # a displacement weighs as much as the velocity that belongs to it, in slow modes as in fast ones
+    rates, directions = _stretched(stiffness + damping @ damping, rubs)
+    weight = directions * np.sqrt(np.maximum(rates, 0.0)) @ directions.T
+    found, one, graded = [], np.ones(n), np.arange(1.0, n + 1.0)
+    for moved in (0.0 * one, 1e-9 * one, 1e-8 * one, 1e-9 * graded, 1e-8 * graded):
+        roots = np.sqrt(1.0 + moved)
+        system = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -(np.outer(roots, roots) * damping)]])
+        values, vectors = np.linalg.eig(system)
+        balanced = np.concatenate([weight @ vectors[:n], vectors[n:]])
+        lengths = np.linalg.norm(balanced, axis=0)
+        condition = float(np.linalg.cond(balanced / lengths)) if lengths.all() else math.inf
+        found.append((condition, values, vectors))
+        if condition < MAX_CONDITION:
+            break
+        if len(found) == 1 and not rubs and _add_uncoupled(stiffness, damping, basis, rigid, blocks, columns):
+            return
+    condition, values, vectors = min(found, key=lambda each: each[0])
+    if not condition < HOPELESS_CONDITION:
+        raise ParameterError(
+            "modes that are equal and critically damped can't be told apart; allowed: damping ratios that differ from "
+            "1 by a millionth or more"
+        )
+    resting = int(np.sum(_stretched(stiffness, rubs)[0] < NEGLIGIBLE * scale**2)) if rigid else 0
+    slowest = np.argsort(np.abs(values))[:resting]
+    values[slowest[values[slowest].imag == 0.0]] = 0.0
+    vectors = np.concatenate([basis @ vectors[:n], basis @ vectors[n:]])
+    turning = [i for i in np.argsort(np.abs(values)) if values[i].imag > 0.0]
+    decaying = [i for i in np.argsort(np.abs(values)) if values[i].imag == 0.0]
+    for i in turning:
+        a, b = min(values[i].real, math.inf if rubs else 0.0), values[i].imag
+        blocks.append((a, -b, b, a))
+        columns.append((vectors[:, i].real, -vectors[:, i].imag))
+    for i, k in zip(decaying[::2], decaying[1::2], strict=True):
+        most = math.inf if rubs else 0.0
+        blocks.append((min(values[i].real, most), 0.0, 0.0, min(values[k].real, most)))
+        columns.append((vectors[:, i].real, vectors[:, k].real))
+
+
+def _add_uncoupled(
+    stiffness: Array,
+    damping: Array,
+    basis: Array,
+    rigid: bool,
+    blocks: list[tuple[float, float, float, float]],
+    columns: list[tuple[Array, Array]],
+) -> bool:
+    """Add the blocks of the modes that damping does not couple, in coordinates (w q, q'); False if it does couple them.
+
+    A mode of a ``rigid`` body without a spring creeps to rest, as two real eigenvalues.
+    """
+    if np.any(stiffness != np.diag(np.diag(stiffness))):
+        rates, shapes = np.linalg.eigh(stiffness)
+    else:
+        rates, shapes = np.diag(stiffness), np.eye(len(stiffness))
+    between = shapes.T @ damping @ shapes
+    own = np.diag(between)
+    held = rates > NEGLIGIBLE * np.max(rates)
+    if not (rigid or held.all()) or not np.all(own[held] >= 0.0) or not np.all(own[~held] > NEGLIGIBLE * np.max(own)):
+        return False
+    if np.any(np.abs(between - np.diag(own)) > UNCOUPLED * np.sqrt(np.outer(own, own))):
+        return False
+    for rate, resistance, has_spring, shape in zip(rates, own, held, (basis @ shapes).T, strict=True):
+        w = math.sqrt(rate) if has_spring else 0.0
+        blocks.append((0.0, w, -w, -resistance))
+        first, second = (shape / w, 0.0 * shape) if has_spring else (shape, -shape / resistance)
+        columns.append((np.concatenate([first, 0.0 * shape]), np.concatenate([second, shape])))
+    return True
+
+
+def _regimes(modes: Modes, *systems: tuple[Array, Array]) -> Regimes:
+    """Regimes of several (stiffness, damping) of the same modes."""
+    n, rigid = len(modes.tip_shape), bool(np.any(modes.angular_frequency == 0.0))
+    parts = []
+    for matrices in systems:
+        generator, from_modal = modal_blocks(*matrices, rigid)
+        # the modulus of a pair is the root of its determinant, of two real eigenvalues the larger one
+        turns = generator[2] != 0.0
+        modulus = np.where(turns, np.hypot(generator[0], generator[2]), np.max(np.abs(generator[[0, 3]]), axis=0))
+        output = modes.tip_shape @ from_modal[:n]
+        parts.append((generator, np.linalg.inv(from_modal), from_modal, output, modulus.max()))
+    return Regimes(*(np.ascontiguousarray(np.stack(part)) for part in zip(*parts, strict=True)))
+
+
+def settled(generator: Array, force: Array) -> tuple[Array, Array]:
+    """Position of rest (2n,) of modal coordinates under a constant force (2n,), and the rate of those without one."""
+    n = generator.shape[1]
+    rest, drift = np.zeros(2 * n), np.zeros(2 * n)
+    for j, (p, q, r, s) in enumerate(generator.T):
+        pair = [j, n + j]
+        if r != 0.0:
+            determinant = p * s - q * r
+            rest[pair] = (
+                (q * force[n + j] - s * force[j]) / determinant,
+                (r * force[j] - p * force[n + j]) / determinant,
+            )
+        elif q != 0.0:
+            drift[pair] = force[pair]
+        else:
+            for i, rate in zip(pair, (p, s), strict=True):
+                if rate == 0.0:
+                    drift[i] = force[i]
+                else:
+                    rest[i] = -force[i] / rate
+    return rest, drift
+
+
 def flexible_model(
     modes: Modes,
     contact_stiffness: float,
@@ -98,16 +287,31 @@ def flexible_model(
     step_phase
         For which the tables are made; see ``ExactEvents``.
     """
-    from chaosgym.machines.pressed_sets import PressedSets
-
     refuse_not_finite("a model of modes", *modes, 0.0 if static_force is None else static_force)
     modes = with_rigid_bodies(modes)
     n, tip, stiffness = len(modes.tip_shape), modes.tip_shape, modes.angular_frequency**2
-    both = np.array([(contact_stiffness, contact_damping), lower or (contact_stiffness, contact_damping)])
-    sets = PressedSets(stiffness, modes.damping, tip[None], both[None, :, 0], both[None, :, 1], np.array([True]))
-    found = [sets.of(code) for code in range(sets.count)]
+    upper = Stop(contact_stiffness, contact_damping)
+    stops = [upper] if lower in (None, upper) else [upper, lower]
+    systems = [(np.diag(stiffness), modes.damping)]
+    for stop in stops:
+        push = np.outer(tip, tip)
+        systems.append((np.diag(stiffness) + stop.stiffness * push, modes.damping + stop.damping * push))
+    regimes = _regimes(modes, *systems)
     static = np.zeros(n) if static_force is None else np.array(static_force, dtype=float)
-    loads = [each.to_modal @ np.concatenate([np.zeros(n), static]) for each in found]
+    with np.errstate(divide="ignore"):
+        compliance = float(np.sum(np.divide(tip**2, stiffness, where=tip != 0.0, out=np.zeros(n))))
+    rest, drift, penetration = [], [], []
+    for r, stop in enumerate([Stop(0.0, 0.0), *stops]):
+        parts = []
+        for force in (stop.stiffness * tip, static):
+            load = regimes.to_modal[r] @ np.concatenate([np.zeros(n), force])
+            parts.append((*settled(regimes.generator[r], load), load))
+        rest.append([part[0] for part in parts])
+        # whether a coordinate rests under the static force or drifts is a question of the speed
+        drift.append([parts[STOP][1], parts[LOAD][2]])
+        # (K + k p p') q = k c p at rest, so the tip rests at x with x - c = -c / (1 + k p' K^-1 p)
+        penetration.append(-1.0 / (1.0 + stop.stiffness * compliance))
+    both = [stops[0], stops[-1]]
     if drive is None:
         drive = np.zeros((2, 1, 2, n))
         drive[0, 0, 1] = modes.force_shape
@@ -116,25 +320,16 @@ def flexible_model(
         drive=drive,
         static_force=static,
         stops=np.full(2, math.nan),
-        contact_stiffness=both[:, 0].copy(),
-        contact_damping=both[:, 1].copy(),
+        contact_stiffness=np.array([stop.stiffness for stop in both]),
+        contact_damping=np.array([stop.damping for stop in both]),
         stiffness=stiffness,
         damping=modes.damping,
         tip_shape=tip,
-        pressed=np.array([0, 1, sets.count - 1]),
-        regimes=Regimes(
-            generator=np.stack([each.generator for each in found]),
-            to_modal=np.stack([each.to_modal for each in found]),
-            from_modal=np.stack([each.from_modal for each in found]),
-            output=np.stack([tip @ each.from_modal[:n] for each in found]),
-            fastest=np.array([each.fastest for each in found]),
-        ),
-        rest=np.array(
-            [(each.rest[0], settled(each.generator, load)[0]) for each, load in zip(found, loads, strict=True)]
-        ),
-        # whether a coordinate rests under the static force or drifts is a question of the speed
-        drift=np.array([(each.drift[0], load) for each, load in zip(found, loads, strict=True)]),
-        rest_penetration=np.array([each.constants[0, 0] for each in found]),
+        pressed=np.array([0, 1, len(stops)]),
+        regimes=regimes,
+        rest=np.array(rest),
+        drift=np.array(drift),
+        rest_penetration=np.array(penetration),
         tables=Tables(step_phase, np.empty(0), np.empty((0, 0))),
     )
     return with_tables(model)
@@ -297,6 +492,7 @@ class ModalImpactMachine(Machine):
     ) -> tuple[int, int]:
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
         from chaosgym.core.compilation import call
+        from chaosgym.core.fixed_step import advance_fixed_step
         from chaosgym.core.modal_impact import advance_model
         from chaosgym.core.tangent import no_tangents
 
@@ -309,8 +505,6 @@ class ModalImpactMachine(Machine):
             motion = coordinates, bouncing, arrays, budget, along
             outcome = call(advance_model, model, share, step, tolerance, *motion)
         else:
-            from chaosgym.core.fixed_step import advance_fixed_step
-
             outcome = call(advance_fixed_step, model, coordinates, bouncing, arrays, integrator.steps_per_cycle)
         status, done = outcome
         return status, done

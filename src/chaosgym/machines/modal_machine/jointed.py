@@ -21,7 +21,7 @@ from chaosgym.core.cycle import CycleArrays, cycle_arrays
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
-from chaosgym.machines.joint_sets import JointTables
+from chaosgym.machines.joint_sets import JointTables, PressedSets, Sliders
 from chaosgym.machines.machine import Flexible, Machine, Number, Option
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
@@ -36,7 +36,6 @@ from chaosgym.machines.modal_machine.machine import (
 )
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import parameter, parameters_of
-from chaosgym.machines.pressed_sets import PressedSets, Sliders
 from chaosgym.machines.units import TURNING
 
 if TYPE_CHECKING:
