@@ -257,6 +257,19 @@ def series_of(
     ------
     DiagnosisError
         If a column is not there, or the tachometer is the signal or tells no turns.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from chaosgym.signals.cycles import series_of
+    >>> from chaosgym.signals.read import read_recording
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "run.csv"
+    ...     _ = file.write_text("time [s],force [N]\\n0.0,1.5\\n0.1,5.0\\n0.2,1.0\\n")
+    ...     signal, instants, turns = series_of(read_recording(file))
+    >>> signal.values.max().item(), instants.time[-1].item(), turns
+    (5.0, 0.2, None)
     """
     tachometer = None if tachometer is None else named_column(recording, tachometer)
     if column is None and tachometer is not None:
