@@ -84,6 +84,16 @@ def test_impacts_are_counted_by_the_envelope():
     assert found.envelope[0].order == pytest.approx(3.25, abs=0.01)
 
 
+def test_noise_has_no_orders():
+    """White noise about a mean, and under an order of its size: no order but that one, and no ringing is named."""
+    angle = ANGLES["run-up"]
+    for seed, loud in ((0, 0.0), (1, 1.0), (2, 1.0)):
+        noise = np.random.default_rng(seed).normal(size=len(TIME))
+        found = run_up(5.0 + loud * np.cos(2.0 * np.pi * angle) + noise, INSTANTS, turns(angle))
+        assert [round(line.order, 2) for line in found.lines] == [1.0][: int(loud)]
+        assert found.envelope == ()
+
+
 def test_a_pure_order_has_no_ringing():
     """What the digits of a file and the ends of the filter leave of a sine has no orders of its own."""
     angle = ANGLES["run-up"]

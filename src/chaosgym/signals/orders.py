@@ -35,6 +35,9 @@ OVERSAMPLED = 4
 MOST_LINES, FAINT = 8, 0.01
 """Lines that are named, and the share of the largest below which none is."""
 
+BY_CHANCE = 1e-3
+"""Probability that a spectrum of noise alone names a line (assumed)."""
+
 
 class OrderSpectra(NamedTuple):
     """Amplitudes over speed and order.
@@ -145,11 +148,13 @@ class AngleSignal:
         return OrderSpectra(ends.mean(axis=0), FRAME / np.diff(ends, axis=0)[0], orders, self.amplitude(orders))
 
     def lines(self, spectra: OrderSpectra) -> list[OrderLine]:
-        """The strongest orders, the strongest first: maxima of the root mean square over all frames."""
+        """The strongest orders above noise, the strongest first: maxima of the root mean square over all frames."""
         typical = np.sqrt(np.mean(spectra.amplitude**2, axis=0))
         padded = np.pad(typical, 2)
         around = np.max([np.roll(padded, k) for k in (-2, -1, 1, 2)], axis=0)[2:-2]
-        places = np.flatnonzero((typical > around) & (typical > FAINT * typical.max()))
+        least = np.maximum(FAINT * typical.max(), _by_chance(typical, len(self.begins)))
+        # the first two lines of a Hann window are those of a drift
+        places = 2 + np.flatnonzero((typical > around)[2:] & (typical > least)[2:])
         places = places[np.argsort(-typical[places], kind="stable")][:MOST_LINES]
         orders = np.array([_between(spectra.orders, typical, int(place)) for place in places])
         tracks = self.amplitude(orders).T
@@ -159,6 +164,19 @@ class AngleSignal:
             rms = float(np.sqrt(np.mean(track**2)))
             found.append(OrderLine(order, float(track[top]), float(spectra.speeds[top]), rms, track))
         return found
+
+
+def _by_chance(typical: Array, frames: int) -> Array:
+    """Root mean square that noise reaches by chance at each order, by the quieter lines within half an order of it.
+
+    Powers of noise are exponential in a frame, and their means over all frames gamma distributed.
+    """
+    from scipy.ndimage import percentile_filter
+    from scipy.stats import gamma
+
+    quiet = percentile_filter(typical**2, 25, size=FRAME + 1, mode="mirror")
+    reach = gamma.isf(BY_CHANCE / len(typical), frames) / gamma.ppf(0.25, frames)
+    return np.asarray(np.sqrt(reach * quiet))
 
 
 def _between(orders: Array, typical: Array, place: int) -> float:
