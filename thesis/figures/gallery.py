@@ -20,14 +20,11 @@ def verdict(finding: Finding) -> str:
 
 _OPENING = """# The simulated figures of the thesis, drawn again
 
-Written by `python -m thesis figures all --out FOLDER --gallery docs/development/figures.md`; `python -m thesis
-figures --list` names the figures. P. Gu, *Chaotic Vibration in Machine Systems and Its Implications for Design*, PhD
-thesis, MIT, 1994. The pixels are not available: axes and ranges follow the text, and what the text prints of a figure
-is drawn over it in one colour. Numbers agree within the tolerances of the [scorecard](scorecard.md): a force within
-15 % or 3 N, a range if both its ends do, a nature if it is the same word. What the scorecard judges is judged by the
-same runs; its rows, found by the names of the statements, tell what is printed and what is found. Forces and natures
-are those of the plotted dots, one a cycle: of the beam on one side of the bearing, of the crank the larger of both
-sides. Dots within 0.5 N are one.
+Written by `python -m thesis figures all --out FOLDER --gallery docs/development/figures.md`; `--list` tells what
+each figure shows. P. Gu, *Chaotic Vibration in Machine Systems and Its Implications for Design*, PhD thesis, MIT,
+1994. Axes and ranges follow the text, and what the text prints of a figure is drawn over it in one colour. Names of
+statements are rows of the [scorecard](scorecard.md), judged by the same runs within the same tolerances. Forces and
+natures are those of the plotted dots, one a cycle; dots within 0.5 N are one.
 """
 
 
@@ -78,7 +75,7 @@ def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
     lines += [_sensitivity(parameter, entries) for parameter, entries in answered.items()]
     for one in drawn:
         figure = one.figure
-        lines += ["", f"## {figure.label}. {figure.title}", "", figure.shows]
+        lines += ["", f"## {figure.label}. {figure.title}"]
         if figure.remark:
             lines += ["", f"Not as in the thesis: {figure.remark}."]
         if one.error:
