@@ -31,4 +31,4 @@ def test_the_page_runs(tmp_path, monkeypatch):
     assert Path("crank.png").stat().st_size > 10_000
     assert names["crank"].degrees_of_freedom == ("guide across", "guide turn")
     assert len(names["observation"]) == 14
-    assert 0.1 < abs(names["torque"]).max() < 100.0
+    assert 0.1 < abs(names["drive"].torque).max() < 100.0

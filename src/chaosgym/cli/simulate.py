@@ -72,6 +72,9 @@ def simulate(
     sensors = dict(zip(machine.sensors, _largest(record.sensor_peak), strict=True))
     if sensors:
         result["largest_sensor_force_N"] = sensors
+    drive = machine.drive_torque
+    if drive is not None:
+        result["drive"] = drive.as_dict()
     lines = [
         f"{machine.name}: {cycles} cycles after {transient}",
         *(
@@ -82,6 +85,7 @@ def simulate(
         f"impacts per cycle         {record.impacts.sum(axis=1).mean():.1f}",
         f"share in contact          {contact.mean():.2f}",
         *(f"largest force, {name:16s} {force:.2f} N" for name, force in sensors.items()),
+        *(() if drive is None else drive.told),
         *result["warnings"],
         *(f"written to {path}" for path in result["files"]),
         f"computing time            {1e6 * seconds_per_cycle:.0f} us per cycle",
@@ -122,6 +126,10 @@ def show(machine: Any, markdown: bool, plot: str | None, as_json: bool) -> None:
         **{name: getattr(machine, name) for name in ("degrees_of_freedom", "sensors") if machine.degrees_of_freedom},
     }
 
+    drive = machine.drive_torque
+    if drive is not None:
+        result["drive"] = drive.as_dict()
+
     def lines() -> list[str]:
         rows = []
         for name, about in described.items():
@@ -135,7 +143,7 @@ def show(machine: Any, markdown: bool, plot: str | None, as_json: bool) -> None:
         for name in ("degrees_of_freedom", "sensors"):
             if names := getattr(machine, name):
                 rows.append(f"{len(names)} {name.replace('_', ' ')}: {', '.join(names)}")
-        return rows
+        return rows if drive is None else [*rows, *drive.told]
 
     drawn: list[str] = []
     draw(picture, lambda plots: plots.machine_figure(machine), result, drawn)

@@ -111,6 +111,7 @@ class DesignStudy:
         ]
         lines += [f"  {line}" for line in self.bending_told]
         lines += [f"  {line}" for line in ([] if found.wear is None else found.wear.told)]
+        lines += [f"  {line}" for line in self.drive_told]
         lines += [f"  {one.told(found.machine)}" for one in self.impacts]
         lines.append(f"  {self.margin_told}")
         lines += [f"  {one.sentence} ({one.section})" for one in self.guidelines]
@@ -145,6 +146,12 @@ class DesignStudy:
         return [] if found is None else found.told(self.assessment.cycle_period)
 
     @property
+    def drive_told(self) -> tuple[str, ...]:
+        """Torque and power of the drive at the nominal speed, for people; none for a machine that tells no torque."""
+        drive = self.assessment.machine.drive_torque
+        return () if drive is None else drive.told
+
+    @property
     def dearer(self) -> tuple[Trial, ...]:
         """Changes on the front that meet all criteria and cost more than the cheapest one, for life or robustness."""
         if self.improvement is None or self.improvement.best is None:
@@ -167,6 +174,7 @@ class DesignStudy:
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         found, lives = self.improvement, self.assessment.evaluation.life_interval
+        drive = self.assessment.machine.drive_torque
         return {
             "chaosgym": __version__,
             "seed": self.seed,
@@ -186,6 +194,7 @@ class DesignStudy:
                     self.assessment.collective, damage_shares(self.assessment.collective), strict=True
                 )
             ],
+            "drive": None if drive is None else drive.as_dict(),
             "combination": self.combination.as_dict(),
             "guidelines": [one._asdict() for one in self.guidelines],
             "margins": None if self.margins is None else self.margins.as_dict(),

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
 from chaosgym.errors import ParameterError
+from chaosgym.machines.drive_torque import DriveTorque
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.parameters import check_parameter, expand_fidelity, validate, with_settings
 
@@ -349,6 +350,11 @@ class Machine(ABC):
     def sensed(self, peak_force: Array) -> Array:
         """Peak forces [N] that the sensor of the monitored joint shows, (..., cycles), of those of all ``sides``."""
         return np.asarray(peak_force[..., 0])
+
+    @property
+    def drive_torque(self) -> DriveTorque | None:
+        """Torque of its drive over a revolution while every gap stays in its middle; None if it has none to tell."""
+        return None
 
     def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
         """Draw the machine in motion.

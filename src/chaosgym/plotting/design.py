@@ -21,6 +21,7 @@ from chaosgym.design.statistics import histogram, running_statistics
 from chaosgym.design.trends import LifeTrend
 from chaosgym.diagnosis import ResponseMap
 from chaosgym.machines import Machine
+from chaosgym.machines.drive_torque import DriveTorque
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.plotting.style import ACCENT, BAD, INK, MUTED, NATURE_COLOURS, TYPE_COLOURS
 
@@ -150,6 +151,17 @@ def life_over_speed(trend: LifeTrend, machine: Machine, ax: Axes) -> Axes:
     ax.axvline(factor * getattr(machine, trend.field), color=MUTED, lw=1.0, ls=":")
     ax.set(yscale="log", xlabel=label, ylabel="relative life (cubic law)", title="What speed costs")
     ax.legend(loc="lower left", ncols=2)
+    return ax
+
+
+def drive_torque(drive: DriveTorque, ax: Axes) -> Axes:
+    """Torque of the drive [N m] over the crank angle, and its mean."""
+    angle = np.linspace(0.0, 360.0, len(drive.torque), endpoint=False)
+    ax.plot(angle, drive.torque, color=ACCENT, lw=1.4)
+    ax.axhline(drive.mean, color=INK, lw=1.0, ls="--", label=f"mean {drive.mean:.3g} N m")
+    ax.set(xlabel="crank angle [deg]", ylabel="torque of the drive [N m]", title="What the motor gives", xlim=(0, 360))
+    ax.set_xticks(range(0, 361, 90))
+    ax.legend()
     return ax
 
 

@@ -386,6 +386,9 @@ def _pictures(study: DesignStudy) -> list[Picture]:
         shape = f"It has its shape from cycle {filled} on." if filled else "It has not yet its final shape."
         caption = f"Where the peak of each of {len(study.diagram.force)} cycles acts. {shape}"
         pictures.append(_picture(_drawn(lambda ax: figures.impact_diagram(study.diagram, ax)), caption))
+    if (drive := machine.drive_torque) is not None:
+        caption = "The nominal machine at constant speed, every gap in its middle."
+        pictures.append(_picture(_drawn(lambda ax: figures.drive_torque(drive, ax)), caption))
     if found.nominal.period is None:
         pictures.append(_picture(_figure_of_convergence(peaks, found.convergence.cycles), CONVERGENCE))
     return pictures

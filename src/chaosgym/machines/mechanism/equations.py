@@ -122,7 +122,7 @@ def small_motion(mechanism: Mechanism, revolution: Revolution, first: float, cou
         damping=sums.damping[:, ::times],
         stiffness=sums.stiffness[:, ::times],
         load=sums.load[:, ::times],
-        torque=np.einsum("bz,kbz->kb", sums.found.inverse[:, :, 0], sums.pull)[:, ::times],
+        torque=sums.torque[:, ::times],
     )
 
 
@@ -139,6 +139,21 @@ def loads(mechanism: Mechanism, revolution: Revolution, first: float, count: int
     """
     sums, times = _summed(mechanism, revolution, first, count, False)
     return sums.load[:, ::times]
+
+
+def drive_torque(mechanism: Mechanism, revolution: Revolution, first: float, count: int) -> Array:
+    """``small_motion(mechanism, revolution, first, count).torque`` alone, in a fraction of its time.
+
+    Examples
+    --------
+    >>> from chaosgym.machines.mechanism.equations import drive_torque
+    >>> from chaosgym.machines.mechanism.nominal import revolution_of
+    >>> crank = chaosgym.read_machine("docs/machines/slider-crank-flores-guide.toml").mechanism
+    >>> drive_torque(crank, revolution_of(crank), first=0.0, count=36).shape
+    (3, 36)
+    """
+    sums, times = _summed(mechanism, revolution, first, count, False)
+    return sums.torque[:, ::times]
 
 
 def _summed(
@@ -182,6 +197,11 @@ class _Sums:
     def load(self) -> Array:
         """What the gaps feel of all pulls, (3, B, n)."""
         return np.asarray((self.pull[:, :, None] @ self.compatible)[:, :, 0])
+
+    @property
+    def torque(self) -> Array:
+        """What the drive feels of all pulls, (3, B)."""
+        return np.asarray(np.einsum("bz,kbz->kb", self.found.inverse[:, :, 0], self.pull))
 
     def add_masses(self, link: Link) -> None:
         """Add the particles of a link and what turns with them, in axes of the link."""

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS, Contact, Held, held, middles_and_nodes
+from chaosgym.machines.drive_torque import DriveTorque
 from chaosgym.machines.machine import Number, Option
 from chaosgym.machines.mechanism.beam import fibre_stress
-from chaosgym.machines.mechanism.equations import SmallMotion, loads, small_motion
+from chaosgym.machines.mechanism.equations import SmallMotion, drive_torque, loads, small_motion
 from chaosgym.machines.mechanism.joints import ACROSS, ALONG, TURN, Joint
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism
 from chaosgym.machines.mechanism.nominal import Revolution, places, revolution_of
@@ -25,6 +26,8 @@ Array = NDArray[np.float64]
 SMALL = 0.02
 """Clearance as a share of a link's length beyond which motions in the gap are not small."""
 
+TORQUE_ANGLES = 720
+"""Crank angles at which the torque of the drive is told."""
 
 LEAST_MASS = 1e-10
 """Least eigenvalue of a mass matrix whose diagonal is one."""
@@ -148,6 +151,12 @@ class MechanismMachine(BinnedMachine):
     def equations(self, first: float, count: int) -> SmallMotion:
         """Equations of small motions on a uniform grid of crank angles; see ``small_motion``."""
         return small_motion(self._scaled(), self.revolution, first, count)
+
+    @property
+    def drive_torque(self) -> DriveTorque:
+        """Torque of the drive over a revolution at the machine's speed; see ``Machine.drive_torque``."""
+        powers = drive_torque(self._scaled(), self.revolution, 0.0, TORQUE_ANGLES)
+        return DriveTorque(self.crank_rate ** np.arange(3) @ powers, self.crank_rate)
 
     def _scaled(self) -> Mechanism:
         """The mechanism with the factors of this machine."""
