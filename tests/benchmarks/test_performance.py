@@ -171,8 +171,8 @@ def test_a_contest_reports_speed_beside_verdict() -> None:
 
 
 def test_what_people_wait_for_is_measured() -> None:
-    """A type takes no less than a nature, and a batch keeps more than the states of its machines."""
+    """A type takes no less than a nature; a batch keeps more than the states of its machines, and shares tables."""
     found = waits(1)
     assert all(value > 0.0 for value in found.values())
     assert found["classify a random beam, types"] > 0.5 * found["classify a random beam, nature"]
-    assert found["memory, bytes a machine of a batch"] > 8 * PLAIN_BEAM.n_states
+    assert 8 * PLAIN_BEAM.n_states < found["memory, bytes a machine of a batch"] < 10_000

@@ -1,5 +1,7 @@
 """The exact propagation of the impact beam against an independent integrator, closed forms and conservation laws."""
 
+import gc
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +11,7 @@ from hypothesis import strategies as st
 
 from chaosgym.errors import SimulationError
 from chaosgym.machines.impact_beam import ImpactBeam
+from chaosgym.machines.impact_beam.machine import _structure
 from chaosgym.simulation import ExactEvents, RungeKutta4, simulate
 from tests.core.twin import twin_trajectory
 from tests.plain_modes import PLAIN_BEAM
@@ -144,6 +147,29 @@ def test_runs_are_reproducible_and_can_be_continued():
         parts = np.concatenate([getattr(first, field), getattr(second, field)])
         np.testing.assert_array_equal(getattr(whole, field), parts)
         np.testing.assert_array_equal(getattr(whole, field), getattr(simulate(PLAIN_BEAM, 60), field))
+
+
+def test_a_batch_shares_tables_and_moves_each_beam_as_alone():
+    """Beams of one structure and another, changed and pickled on the way, move as alone; tables are kept only once."""
+    other = replace(PLAIN_BEAM, contact_stiffness=2e6)
+    beams = [PLAIN_BEAM.at(21.0, 1e-4), PLAIN_BEAM.at(18.0, 2e-4), other.at(25.0, 1e-4), PLAIN_BEAM.at(11.0, 1e-4)]
+    batch, which = beams[0].batch(4), np.arange(4)
+    for i, beam in enumerate([*beams[:3], other]):
+        batch.start(i, beam)
+    batch.change(3, beams[3])
+    _structure.cache_clear()
+    gc.collect()
+    first = batch.run(which, 4)
+    again = pickle.loads(pickle.dumps(batch))
+    _structure.cache_clear()
+    del batch
+    gc.collect()
+    second = again.run(which, 4)
+    for i, beam in enumerate(beams):
+        peaks = np.concatenate([first.peak_force[i], second.peak_force[i]])
+        np.testing.assert_array_equal(peaks, simulate(beam, 8).peak_force)
+    tables = 2 * PLAIN_BEAM.structure.tables.values.nbytes
+    assert tables < len(pickle.dumps(again)) < 1.5 * tables
 
 
 def test_an_exhausted_event_budget_is_an_error_that_names_the_machine():

@@ -1,13 +1,15 @@
 """Many machines with modal impacts at once: each by its own ``advance``, side by side on all threads.
 
-A batch of models is a model whose fields have one more axis, the machines, in front.
+A batch of models is a model whose fields have one more axis, the machines, in front. Tables, which are large, stay
+where they are, and the batch holds their addresses: machines of one structure share them.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
+from numba import carray, prange
 
+from chaosgym.core.addresses import pointer
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.kernel import njit, side_by_side
 from chaosgym.core.modal_impact import advance_model
@@ -20,6 +22,18 @@ class Motions(NamedTuple):
 
     coordinates: np.ndarray
     bouncing: np.ndarray
+
+
+class TablesOfMany(NamedTuple):
+    """``Tables`` of N machines with R regimes each.
+
+    ``step_phase`` (N,) and ``shortest`` (N, R) are as there; the values, of ``shape`` (N, 2), lie at ``address`` (N,).
+    """
+
+    step_phase: np.ndarray
+    shortest: np.ndarray
+    address: np.ndarray
+    shape: np.ndarray
 
 
 class Settings(NamedTuple):
@@ -59,7 +73,8 @@ def regimes_of(regimes, i):
 @njit(cache=True, inline="always")
 def tables_of(tables, i):
     """Tables of machine i."""
-    return Tables(tables.step_phase[i], tables.shortest[i], tables.values[i])
+    shape = tables.shape[i, 0], tables.shape[i, 1]
+    return Tables(tables.step_phase[i], tables.shortest[i], carray(pointer(tables.address[i]), shape, np.float64))
 
 
 @njit(cache=True, inline="always")

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.core import status
-from chaosgym.core.batch import Motions, Settings, advance_beams
+from chaosgym.core.batch import Motions, Settings, TablesOfMany, advance_beams
 from chaosgym.core.compilation import call_side_by_side
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.varied import advance_varied_beams
@@ -173,22 +173,31 @@ class VaryingBatch(CompiledBatch):
 
 
 class ModalImpactBatch(VaryingBatch):
-    """Machines of a few modes and one gap."""
+    """Machines of a few modes and one gap; those that share a structure share its tables."""
 
     def __init__(self, machine: "Machine", count: int) -> None:
         super().__init__(machine, count)
         model = machine.reduce()
-        self._parts = [stacked([getattr(model, name)] * count) for name in _PARTS]
-        self._batch = stacked([_flat(model)] * count)
+        self._batch, self._regimes, self._tables = (stacked([part] * count) for part in _parts(model))
         self._machines: list[Any] = [machine] * count
+        # tables live as long as the batch holds their address
+        self._values: list[Array] = [model.tables.values] * count
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State without addresses, which mean nothing in another process."""
+        return vars(self) | {"_tables": self._tables._replace(address=None)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take over a state, wherever its tables lie."""
+        vars(self).update(state)
+        self._tables = self._tables._replace(address=np.array([values.ctypes.data for values in self._values]))
 
     def change(self, i: int, machine: "Machine") -> None:
         """Put another machine into place i, whose motion goes on."""
         model = machine.reduce()
-        for name, part in zip(_PARTS, self._parts, strict=True):
-            put(part, i, getattr(model, name))
-        put(self._batch, i, _flat(model))
-        self._machines[i] = machine
+        for batch, part in zip((self._batch, self._regimes, self._tables), _parts(model), strict=True):
+            put(batch, i, part)
+        self._machines[i], self._values[i] = machine, model.tables.values
 
     def set_speeds(self, which: Indices, speeds: Array) -> None:
         """Change the excitation frequencies [Hz]."""
@@ -200,19 +209,18 @@ class ModalImpactBatch(VaryingBatch):
             self._batch.stops[i] = self._machines[i].stops_at(clearance)
 
     def _advance(self, which: Indices, arrays: CycleArrays, outcome: Indices) -> None:
-        given = (self._batch, *self._parts, which, self._motions, arrays, self._settings, outcome)
+        given = (self._batch, self._regimes, self._tables, which, self._motions, arrays, self._settings, outcome)
         call_side_by_side(advance_beams, len(self), *given)
 
     def _vary(
         self, which: Indices, speeds: Array, vectors: Array, growth: Array, arrays: CycleArrays, outcome: Indices
     ) -> None:
-        given = (self._batch, *self._parts, which, speeds, self._motions, vectors, growth, arrays)
+        given = (self._batch, self._regimes, self._tables, which, speeds, self._motions, vectors, growth, arrays)
         call_side_by_side(advance_varied_beams, len(self), *given, self._settings, outcome)
 
 
-_PARTS = ("regimes", "tables")
-"""Parts of the model that are models themselves."""
-
-
-def _flat(model: Any) -> Any:
-    return model._replace(**dict.fromkeys(_PARTS, 0.0))
+def _parts(model: Any) -> tuple[Any, Any, TablesOfMany]:
+    """A model without the parts that are models themselves, and these: regimes and where its tables lie."""
+    values = model.tables.values
+    tables = TablesOfMany(model.tables.step_phase, model.tables.shortest, values.ctypes.data, np.array(values.shape))
+    return model._replace(regimes=0.0, tables=0.0), model.regimes, tables
