@@ -10,13 +10,15 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 
-def pressed(apart, rate, gap, stiffness, damping):
-    """Force of a pin in its hole on the pin, which lies ``apart`` from the hole's middle."""
+def pressed(apart, rate, gap, stiffness, damping, hertz=False):
+    """Force of a pin in its hole on the pin, which lies ``apart`` from the hole's middle: linear, or Hertzian."""
     distance = math.hypot(*apart)
     if distance <= gap:
         return np.zeros(2)
-    unit = apart / distance
-    return -max(0.0, stiffness * (distance - gap) + damping * float(unit @ rate)) * unit
+    unit, depth = apart / distance, distance - gap
+    approach = damping * float(unit @ rate)
+    push = stiffness * depth**1.5 * (1.0 + approach) if hertz else stiffness * depth + approach
+    return -max(0.0, push) * unit
 
 
 def _axes(angle):
@@ -39,7 +41,9 @@ def _solved(slope, start, rate, cycles, samples, steps):
     return instants, found.y.T
 
 
-def wrist_pin(rate, gap, stiffness, damping, cycles, samples, crank, rod, rod_mass, rod_inertia, slider, gravity=9.81):
+def wrist_pin(
+    rate, gap, stiffness, damping, cycles, samples, crank, rod, rod_mass, rod_inertia, slider, gravity=9.81, hertz=False
+):
     """Slider crank whose wrist pin has clearance: angle of the rod and place of the slider."""
 
     def gap_of(time, state):
@@ -49,7 +53,7 @@ def wrist_pin(rate, gap, stiffness, damping, cycles, samples, crank, rod, rod_ma
 
     def slope(time, state):
         apart, change, across = gap_of(time, state)
-        force = pressed(apart, change, gap, stiffness, damping)
+        force = pressed(apart, change, gap, stiffness, damping, hertz)
         lifted = _pin(time, crank, rate)[2] + np.array([0.0, gravity])
         turn = -rod_mass * 0.5 * rod * float(across @ lifted) - rod * float(across @ force)
         return [state[2], state[3], turn / (rod_inertia + rod_mass * rod**2 / 4.0), force[0] / slider]
@@ -57,7 +61,7 @@ def wrist_pin(rate, gap, stiffness, damping, cycles, samples, crank, rod, rod_ma
     start = [0.0, crank + rod, -crank / rod * rate, 0.0]
     instants, states = _solved(slope, start, rate, cycles, samples, 1000)
     both = zip(instants, states, strict=True)
-    return np.array([math.hypot(*pressed(*gap_of(t, y)[:2], gap, stiffness, damping)) for t, y in both]), states
+    return np.array([math.hypot(*pressed(*gap_of(t, y)[:2], gap, stiffness, damping, hertz)) for t, y in both]), states
 
 
 def knee(rate, gap, stiffness, damping, cycles, samples, ground, crank, coupler, rocker, gravity=9.81):
@@ -89,9 +93,29 @@ def knee(rate, gap, stiffness, damping, cycles, samples, ground, crank, coupler,
 
 
 def guide(
-    rate, gap, stiffness, damping, cycles, samples, crank, rod, half, rod_mass, rod_inertia, slider, pitch_inertia
+    rate,
+    gap,
+    stiffness,
+    damping,
+    cycles,
+    samples,
+    crank,
+    rod,
+    half,
+    rod_mass,
+    rod_inertia,
+    slider,
+    pitch_inertia,
+    friction=0.0,
 ):
-    """Slider crank whose slider, 2 ``half`` long, has clearance in its guide: angles of rod and slider."""
+    """Slider crank whose slider, 2 ``half`` long, has clearance in its guide: angles of rod and slider.
+
+    Friction acts on its axis; it fades below 2 % of the largest speed at which the tight slider moves.
+    """
+    every = np.linspace(0.0, 2.0 * math.pi, 100_001)
+    fades = (
+        0.02 * np.abs(np.gradient(crank * np.cos(every) + np.sqrt(rod**2 - (crank * np.sin(every)) ** 2), every)).max()
+    )
 
     def touches(time, state):
         phi, pitch, turn, tilt = state
@@ -112,8 +136,11 @@ def guide(
         across = _axes(state[0])[1]
         lifted = _pin(time, crank, rate)[2] + np.array([0.0, 9.81])
         push, moment = sum(f for f, _ in found), sum(f * arm for f, arm in found)
+        slid = -(crank * rate * math.sin(rate * time) + rod * state[2] * math.sin(state[0]))
+        rub = -friction * min(1.0, max(-1.0, slid / (fades * rate))) * sum(abs(f) for f, _ in found)
         # slider at the rod's end: its own pull along the rod cancels in the rod's turn
         turn = -(0.5 * rod_mass + slider) * rod * float(across @ lifted) + rod * across[1] * push
+        turn += rod * across[0] * rub
         inertia = rod_inertia + (rod_mass / 4.0 + slider) * rod**2
         return [state[2], state[3], turn / inertia, moment / pitch_inertia]
 

@@ -17,6 +17,7 @@ from chaosgym.cli import app
 from chaosgym.design.peak_impacts import peak_impacts, worn_side
 from chaosgym.errors import ChaosgymError, ParameterError
 from chaosgym.machines.machine_file import TEMPLATES, schema_text, template
+from chaosgym.machines.mechanism.machine import Clearance, machine_of
 
 KINDS = [kind for kind in TEMPLATES if kind != "modes"]
 
@@ -117,6 +118,13 @@ def test_forces_are_placed_on_their_bearing(file_of):
     assert 0.18 < diagram.location.min() < diagram.location.max() < 0.29
 
 
+def test_two_joints_do_not_rub(file_of):
+    """Friction of a second joint is refused by name: the kernels know one sliding motion."""
+    rubbing = Clearance(1e-4, 1e7, 100.0, friction=0.1)
+    with pytest.raises(ParameterError, match=r"2 joints have friction \(guide, slot\); allowed: one"):
+        machine_of(chaosgym.read_machine(file_of()).mechanism, {"guide": rubbing, "slot": rubbing})
+
+
 def test_a_wide_gap_is_told(file_of):
     """Beyond 2 % of a link the motion in the gap is not small, and every result says so."""
     machine = chaosgym.read_machine(file_of("four-bar"))
@@ -198,6 +206,9 @@ inertia = "2e-4 kg m^2"
 """
 FREE = 'kind = "slot"\nbetween = ["crank.pin"'
 
+LOOSE = 'clearance = "0.1 mm"\nstiffness = "8 N/um"\ndamping = "500 N s/m"'
+HERTZIAN = 'clearance = "0.1 mm"\nhertz_stiffness = "1e10 N/m^1.5"\nhertz_damping = "0.1 s/m"'
+
 REFUSED = [
     (('wrist = "235, 0 mm"', 'wrist = "35, 0 mm"'), r"crank can't turn beyond \d+\.\d deg|does not close"),
     (('pin = "50, 0 mm"', 'pin = "0, 0 mm"'), "only the crank turns and no other link moves"),
@@ -220,7 +231,13 @@ REFUSED = [
     (('speed_range = "100 to 800 rpm"', 'speed_range = "800 to 100 rpm"'), "is no range"),
     (('# monitored = "guide"', 'monitored = "wrist"'), "monitored = 'wrist' is not one of guide"),
     (('guide_damping = "30 %"', 'rod_damping = "30 %"'), r"\[tolerances\] has no key 'rod_damping'"),
-    (('axis = "0 deg"', "friction = 0.1"), "friction in the joints of a file is not modelled"),
+    (('axis = "0 deg"', "friction = 0.9"), "guide_friction = 0.9 is out of range; allowed: 0 to 0.5"),
+    (('axis = "0 deg"', "mu = 0.1"), "friction is Coulomb's, of a guide or slot with clearance"),
+    (('name = "wrist"', 'name = "wrist"\nfriction = 0.1'), "joint wrist has friction and no clearance"),
+    (('axis = "0 deg"', 'hertz_stiffness = "1e10 N/m^1.5"'), "joint guide has stiffness and is Hertzian"),
+    (('stiffness = "8 N/um"', 'hertz_stiffness = "1e10 N/m"'), "unknown unit 'N/m'"),
+    (('name = "wrist"', f'name = "wrist"\nfriction = 0.1\n{LOOSE}'), "friction of a pin in its hole is not modelled"),
+    (('name = "wrist"', f'name = "wrist"\n{HERTZIAN}'), "joint wrist is Hertzian and others are not"),
     (('gravity = "9.81 m/s^2"', "gravity = 9.81"), "has no unit"),
     (('kind = "prismatic"', 'kind = "cam"'), "is not one of revolute, prismatic, slot, weld"),
     (('name = "guide"', 'name = "the guide"'), "name 'the guide' is out of range"),

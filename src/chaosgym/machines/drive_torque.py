@@ -11,6 +11,9 @@ Array = NDArray[np.float64]
 SWING = 0.01
 """Swing of the speed, as a share of it, for which a flywheel is told."""
 
+ROUNDING = 1e-12
+"""Share of the largest torque below which a mean is rounding."""
+
 
 class DriveTorque(NamedTuple):
     """Torque of a drive that turns at constant speed, while every gap stays in its middle.
@@ -37,8 +40,9 @@ class DriveTorque(NamedTuple):
 
     @property
     def mean(self) -> float:
-        """Mean torque [N m]."""
-        return float(self.torque.mean())
+        """Mean torque [N m]; zero where it is rounding."""
+        mean = float(self.torque.mean())
+        return mean if abs(mean) > ROUNDING * float(np.abs(self.torque).max()) else 0.0
 
     @property
     def mean_power(self) -> float:

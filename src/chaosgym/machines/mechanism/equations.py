@@ -141,6 +141,15 @@ def loads(mechanism: Mechanism, revolution: Revolution, first: float, count: int
     return sums.load[:, ::times]
 
 
+def sliding(mechanism: Mechanism, revolution: Revolution, theta: Array, joint: str) -> tuple[Array, Array]:
+    """Sliding of a joint along its axis: per radian of the crank, (B,), and per unit of each coordinate, (B, n)."""
+    found = nominal(mechanism, revolution, theta)
+    which = next(k for k, each in enumerate(mechanism.joints) if each.name == joint)
+    along = mechanism.motions(found.z)[1][:, which, 0]
+    every = np.einsum("bz,bzc->bc", along, found.inverse)
+    return every[:, 0], every[:, mechanism.size - len(mechanism.coordinates) :]
+
+
 def drive_torque(mechanism: Mechanism, revolution: Revolution, first: float, count: int) -> Array:
     """``small_motion(mechanism, revolution, first, count).torque`` alone, in a fraction of its time.
 

@@ -15,7 +15,7 @@ from chaosgym.machines.mechanism.forces import STROKE_ANGLES, Gas, Sampled
 from chaosgym.machines.mechanism.joints import Joint
 from chaosgym.machines.mechanism.keys import KEYS
 from chaosgym.machines.mechanism.links import Body, Link, rigid_link
-from chaosgym.machines.mechanism.machine import CLEARANCE_FIELDS, Clearance, MechanismMachine, machine_of, opened_by
+from chaosgym.machines.mechanism.machine import Clearance, MechanismMachine, machine_of, opened_by, surface_fields
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism, Spring
 from chaosgym.machines.mechanism.nominal import places, revolution_of
 from chaosgym.machines.numbers import number
@@ -158,21 +158,23 @@ def _clearance(name: str, kind: str, row: Mapping[str, Any]) -> Clearance | None
     """Clearance of a joint, if it has one."""
     where = f"joint {name}"
     if "clearance" not in row:
-        for key in ("stiffness", "damping", "stations"):
+        for key in ("stiffness", "damping", "hertz_stiffness", "hertz_damping", "friction", "stations"):
             if key in row:
                 raise ParameterError(f"{where} has {key} and no clearance; allowed: both, or none")
         return None
-    values = needed(where, row, "clearance", "stiffness", "damping")
-    for (what, about), value in zip(CLEARANCE_FIELDS.items(), values, strict=True):
-        low, high, unit = about["low"], about["high"], about["unit"]
-        number(f"{name}_{what}", value, low, high, unit)
+    hertz = "hertz_stiffness" in row or "hertz_damping" in row
+    for key in ("stiffness", "damping"):
+        if hertz and key in row:
+            raise ParameterError(f"{where} has {key} and is Hertzian; allowed: hertz_{key} in place of {key}")
+    gap, stiffness, damping = map(float, needed(where, row, *surface_fields(hertz)))
     stations = tuple(float(place) for place in row.get("stations", ()))
     if stations and len(set(stations)) < 2:
         raise ParameterError(
             f"{where}.stations are at one place; allowed: two or more, or none for a guide without tilt"
         )
-    gap, stiffness, damping = (float(value) for value in values)
-    found = Clearance(gap, stiffness, damping, stations)
+    found = Clearance(gap, stiffness, damping, stations, row.get("friction"), hertz)
+    for what, (value, about) in found.fields.items():
+        number(f"{name}_{what}", value, about["low"], about["high"], about["unit"].strip("-"))
     try:
         opened_by(kind, found)
     except ParameterError as error:

@@ -5,8 +5,9 @@ from chaosgym.machines.mechanism.beam import END, START
 from chaosgym.machines.mechanism.joints import KINDS
 
 LIMITS = {
-    "friction coulomb mu": "friction in the joints of a file is not modelled",
-    "hertz exponent restitution": "a surface is a linear spring and damper: stiffness and damping",
+    "coulomb mu tangential_stiffness": "friction is Coulomb's, of a guide or slot with clearance: friction",
+    "hertz exponent restitution law": "a surface is a linear spring and damper, or Hertzian: hertz_stiffness and "
+    "hertz_damping in place of stiffness and damping",
     "gap backlash play radius": "clearance is how far the pin may leave the middle of its hole, or half a guide's gap",
     "motor torque": "the crank turns at constant speed; the torque that this takes is a result",
     "length": "a link's length is the distance of its points",
@@ -66,6 +67,9 @@ KEYS = Keys(
             "clearance": Key("how far the pin may leave the middle of its hole, or half the gap of a guide", "m"),
             "stiffness": Key("spring of a surface", "N/m"),
             "damping": Key("damper of a surface", "N s/m"),
+            "hertz_stiffness": Key("K of a Hertzian surface, N = K x^1.5 (1 + chi x')", "N/m^1.5"),
+            "hertz_damping": Key("chi of it: 3/2 (1 - e) / v for restitution e near 1 at impact speed v", "s/m"),
+            "friction": Key("Coulomb coefficient along a guide or slot, where it touches; none by default"),
             "stations": Key("where a guide can touch, along it from the point; else it can't tilt", "m", "row"),
         },
         "force": {

@@ -9,13 +9,14 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.core.binned.model import HERTZ, LINEAR
 from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS, Contact, Held, held, middles_and_nodes
 from chaosgym.machines.drive_torque import DriveTorque
 from chaosgym.machines.machine import Number, Option
 from chaosgym.machines.mechanism.beam import fibre_stress
-from chaosgym.machines.mechanism.equations import SmallMotion, drive_torque, loads, small_motion
+from chaosgym.machines.mechanism.equations import SmallMotion, drive_torque, loads, sliding, small_motion
 from chaosgym.machines.mechanism.joints import ACROSS, ALONG, TURN, Joint
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism
 from chaosgym.machines.mechanism.nominal import Revolution, places, revolution_of
@@ -28,6 +29,9 @@ SMALL = 0.02
 
 TORQUE_ANGLES = 720
 """Crank angles at which the torque of the drive is told."""
+
+RAMP = 0.02
+"""Sliding speed below which friction fades, as a share of the largest in a revolution."""
 
 LEAST_MASS = 1e-10
 """Least eigenvalue of a mass matrix whose diagonal is one."""
@@ -44,12 +48,26 @@ class Clearance(NamedTuple):
         Spring [N/m] and damper [N s/m] of a surface; of each station.
     stations
         Places [m] along a guide from the joint's point at which it can touch; none where it can't tilt.
+    friction
+        Coulomb coefficient along the guide or slot; None for one without.
+    hertz
+        True for Hertzian surfaces, whose stiffness is K [N/m^1.5] and whose damping is chi [s/m]; see ``Contact``.
     """
 
     gap: float
     stiffness: float
     damping: float
     stations: tuple[float, ...] = ()
+    friction: float | None = None
+    hertz: bool = False
+
+    @property
+    def fields(self) -> Mapping[str, tuple[float, dict[str, Any]]]:
+        """Value and description of the machine's fields, without the joint's name."""
+        named = dict(zip(surface_fields(self.hertz), (self.gap, self.stiffness, self.damping), strict=True))
+        if self.friction is not None:
+            named["friction"] = self.friction
+        return {name: (value, CLEARANCE_FIELDS[name]) for name, value in named.items()}
 
 
 def opened_by(kind: str, clearance: Clearance) -> tuple[str, ...]:
@@ -62,6 +80,8 @@ def opened_by(kind: str, clearance: Clearance) -> tuple[str, ...]:
     """
     if kind == "weld":
         raise ParameterError("a weld has no clearance; allowed: revolute, prismatic or slot")
+    if clearance.friction is not None and kind == "revolute":
+        raise ParameterError("friction of a pin in its hole is not modelled; allowed: in a prismatic joint or a slot")
     if clearance.stations and kind != "prismatic":
         raise ParameterError(f"stations have no meaning in a {kind} joint; leave them out")
     if kind == "revolute":
@@ -99,6 +119,10 @@ class MechanismMachine(BinnedMachine):
     }
     stations: ClassVar[Mapping[str, tuple[float, ...]]] = {}
     """Places [m] along a guide at which each joint with clearance can touch."""
+    rubs: ClassVar[str] = ""
+    """Joint with friction, if there is one."""
+    hertz: ClassVar[bool] = False
+    """Whether all contacts are Hertzian."""
     extremes: ClassVar[Mapping[str, Mapping[str, Any]]] = {"no gravity": {"gravity_factor": 0.0}}
 
     mechanism: Mechanism
@@ -178,7 +202,31 @@ class MechanismMachine(BinnedMachine):
         middles, nodes = middles_and_nodes(self.bins)
         found = self.equations(float(middles[0]), len(middles))
         self._refuse_massless(found.mass)
-        return held(found.mass, found.damping, found.stiffness, loads(self._scaled(), self.revolution, 0.0, len(nodes)))
+        load = loads(self._scaled(), self.revolution, 0.0, len(nodes))
+        return held(found.mass, found.damping, found.stiffness, load, self._friction(middles))
+
+    def _friction(self, theta: Array) -> Array | None:
+        """What one newton of contact force drives along the joint with friction, (B, n); it fades where that halts."""
+        if not self._rub:
+            return None
+        rate, row = sliding(self.mechanism, self.revolution, theta, self.rubs)
+        signed = np.clip(rate / max(RAMP * float(np.abs(rate).max()), 1e-300), -1.0, 1.0)
+        return np.asarray(self._rub * signed[:, None] * row)
+
+    @property
+    def _rub(self) -> float:
+        """Coefficient of friction, or 0."""
+        return float(getattr(self, f"{self.rubs}_friction")) if self.rubs else 0.0
+
+    @property
+    def radix(self) -> int:
+        """Contact states of a channel that differ in their matrices: friction tells one side from the other."""
+        return 3 if self._rub else 2
+
+    @property
+    def law(self) -> int:
+        """Law of all contacts."""
+        return HERTZ if self.hertz else LINEAR
 
     def _refuse_massless(self, mass: Array) -> None:
         """Refuse mass matrices (bins, n, n) in which some motion moves no mass."""
@@ -205,9 +253,8 @@ class MechanismMachine(BinnedMachine):
         for joint in self.mechanism.joints:
             if not joint.opened:
                 continue
-            gap, spring, damper = (
-                getattr(self, f"{joint.name}_{what}") for what in ("clearance", "stiffness", "damping")
-            )
+            gap, spring, damper = (getattr(self, f"{joint.name}_{what}") for what in surface_fields(self.hertz))
+            slides = joint.name == self.rubs and self._rub > 0.0
             seen = float(joint.name == self.monitored)
             across = self.row_of(joint.name, ACROSS)
             if joint.kind == "revolute":
@@ -217,15 +264,20 @@ class MechanismMachine(BinnedMachine):
                 continue
             for place in self.stations[joint.name] or (0.0,):
                 row = across + place * self.row_of(joint.name, TURN)
-                found.append(Contact(row[None], gap, spring, damper, True, seen * np.eye(3)[1:2]))
+                found.append(Contact(row[None], gap, spring, damper, True, seen * np.eye(3)[1:2], slides))
         return found
 
     @property
     def has_propagators(self) -> bool:
-        """True if every contact is a channel, and the sets of closed ones are few and fit into memory."""
+        """True if every contact is a linear channel, and the sets of closed ones are few and fit into memory."""
         rows = [len(contact.row) for contact in self.contacts]
-        n, sets = len(self.degrees_of_freedom), 2 ** len(rows)
-        return max(rows) == 1 and sets <= MAX_SETS and sets * self.bins * 16 * (2 * n + 5) ** 2 < KEPT_BYTES
+        n, sets = len(self.degrees_of_freedom), self.radix ** len(rows)
+        return (
+            not self.hertz
+            and max(rows) == 1
+            and sets <= MAX_SETS
+            and sets * self.bins * 16 * (2 * n + 5) ** 2 < KEPT_BYTES
+        )
 
     @property
     def display(self) -> Array:
@@ -290,8 +342,9 @@ class MechanismMachine(BinnedMachine):
 
     @property
     def stiffest(self) -> float:
-        """Stiffness [N/m] of the stiffest contact."""
-        return max(contact.stiffness for contact in self.contacts)
+        """Stiffness [N/m] of the stiffest contact; of a Hertzian one, at ten times the largest nominal load."""
+        stiffest = max(contact.stiffness for contact in self.contacts)
+        return 1.5 * stiffest ** (2.0 / 3.0) * _heavy(self) ** (1.0 / 3.0) if self.hertz else stiffest
 
     @property
     def natural_frequencies(self) -> Array:
@@ -343,7 +396,11 @@ class MechanismMachine(BinnedMachine):
         speed = 10.0 * (fastest * self.crank_rate + math.sqrt(gravity * self.revolution.length))
         speed += 10.0 * load * self.cycle_period / mass
         damper = max(contact.damping for contact in self.contacts)
-        return float(peak_force.max()) / ((math.sqrt(self.stiffest * mass) + damper) * speed)
+        largest = (math.sqrt(self.stiffest * mass) + damper) * speed
+        if self.hertz:
+            stiffness = max(contact.stiffness for contact in self.contacts)
+            largest = (1.25 * mass * speed**2) ** 0.6 * stiffness**0.4 * (1.0 + damper * speed)
+        return float(peak_force.max()) / largest
 
     def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
         """Draw the links at a moment; see ``Machine.draw``."""
@@ -374,6 +431,18 @@ def _revolution(mechanism: Mechanism) -> Revolution:
     return revolution_of(mechanism)
 
 
+@lru_cache(maxsize=256)
+def _heavy(machine: MechanismMachine) -> float:
+    """Ten times the largest load [N] of a gap in the nominal motion."""
+    powers = loads(machine._scaled(), machine.revolution, 0.0, 72)
+    across = [
+        machine.degrees_of_freedom.index(f"{joint.name} {ACROSS}") for joint in machine.mechanism.joints if joint.opened
+    ]
+    return 10.0 * max(
+        1.0, float(np.abs(np.einsum("k,kbn->bn", machine.crank_rate ** np.arange(3), powers)[:, across]).max())
+    )
+
+
 @lru_cache(maxsize=1024)
 def _reach(mechanism: Mechanism, joint: str) -> float:
     """Shortest distance [m] between two points of the moving links that a joint joins; infinite if they have one."""
@@ -391,7 +460,16 @@ CLEARANCE_FIELDS: Mapping[str, dict[str, Any]] = {
     "clearance": {"unit": "m", "low": 0.0, "high": 1.0},
     "stiffness": {"unit": "N/m", "low": 1.0, "high": 1e13},
     "damping": {"unit": "N s/m", "low": 0.0, "high": 1e9},
+    "hertz_stiffness": {"unit": "N/m^1.5", "low": 1.0, "high": 1e16},
+    "hertz_damping": {"unit": "s/m", "low": 0.0, "high": 1e3},
+    "friction": {"unit": "-", "low": 0.0, "high": 0.5},
 }
+
+
+def surface_fields(hertz: bool) -> tuple[str, str, str]:
+    """Fields of clearance, stiffness and damping of a joint, without its name."""
+    law = "hertz_" if hertz else ""
+    return "clearance", f"{law}stiffness", f"{law}damping"
 
 
 def machine_of(
@@ -465,9 +543,14 @@ def machine_of(
         if not name.isidentifier() or name.startswith("_"):
             raise ParameterError(f"name {name!r} is out of range; allowed: letters, digits and _, as in big_end")
     fields: dict[str, Any] = {"mechanism": mechanism}
+    rubs = [name for name, given in clearances.items() if given.friction is not None]
+    if len(rubs) > 1:
+        raise ParameterError(f"{len(rubs)} joints have friction ({', '.join(rubs)}); allowed: one")
+    if len({given.hertz for given in clearances.values()}) > 1:
+        hertz = ", ".join(name for name, given in clearances.items() if given.hertz)
+        raise ParameterError(f"joint {hertz} is Hertzian and others are not; allowed: one law for all joints")
     for name, given in clearances.items():
-        values = (given.gap, given.stiffness, given.damping)
-        for (what, described), value in zip(CLEARANCE_FIELDS.items(), values, strict=True):
+        for what, (value, described) in given.fields.items():
             fields[f"{name}_{what}"] = parameter(value, **described, **about)
     for link in mechanism.links:
         if link.mass.any() or link.inertia.any():
@@ -481,6 +564,8 @@ def machine_of(
     usual = {"speed": (100.0, 1000.0), "clearance": (1e-5, 2e-4), **(usual_ranges or {})}
     types: dict[str, Any] = {
         "stations": {name: given.stations for name, given in clearances.items()},
+        "rubs": "".join(rubs),
+        "hertz": any(given.hertz for given in clearances.values()),
         "beside_matrices": ("speed", *(f"{name}_clearance" for name in clearances)),
         "usual_ranges": {"speed": usual["speed"], f"{watched}_clearance": usual["clearance"]},
         "options": _options(watched),
