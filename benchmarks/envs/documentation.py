@@ -30,9 +30,9 @@ ANY_MACHINE = "A machine of a broad family for each job, in shares of its own ra
 MACHINES = {
     "impact-beam": "A steel beam on a flexure pivot is shaken between pivot and tip, and its tip rattles between two "
     "force sensors. It is the Impact Beam System of P. Gu's thesis (MIT, 1994, chapter 3), shaken twice as hard as "
-    "there. With the thesis' force, chaos fills 2 to 6 Hz in a row, which a trim of 2 Hz does not leave. Here it comes "
-    "in bands of 1 to 2 Hz with calm speeds between. Where they lie depends on the clearance, which the mean peak "
-    "force tells.",
+    "there: following the demand is irregular in 21 % of the steps, with the thesis' force in 53 % "
+    "([tasks](../development/tasks.md)). Which speeds are calm depends on the clearance, which the mean peak force "
+    "tells.",
     "slider-crank": "A motor turns a crank, and a slender steel rod drives a slider along a straight guide. The slider "
     "rattles in its clearance across the guide. It is the Spatial Slider Crank of P. Gu's thesis (MIT, 1994, chapter "
     "4) with the clearance of its figure 4.14b and an assumed damping ratio of the contact.",
