@@ -4,7 +4,8 @@
 
 Machines run at random speeds around their demand. A network learns to tell what a machine did at every speed where it
 was run, before or after, from what had been felt up to some step. No reward is used. The same command goes on with a
-run that was interrupted, and ends as if it had not been. The folder holds checkpoint.bin (the jobs so far),
+run that was interrupted, and ends as if it had not been. Runs of several seeds may play at once; ``--steps 0 --jobs
+runs/map-0 runs/map-1`` then fits one map to all their jobs. The folder holds checkpoint.bin (the jobs so far),
 progress.csv (a row an epoch, on an eighth of the machines that nothing is fitted to), policy.json and weights.npz.
 """
 
@@ -62,6 +63,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--env", default="chaosgym/ImpactBeamTolerance-v1", help="Id, or file of a machine.")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--steps", type=int, default=300_000, help="Rounded up to whole jobs of all machines.")
+    parser.add_argument("--jobs", type=Path, nargs="+", default=[], help="Runs whose jobs are fitted too.")
     parser.add_argument("--out", type=Path, default=Path("runs/map"))
     parser.add_argument("--fidelity", default=None, help="Rung of the machines in training; default: the task's.")
     parser.add_argument("--keywords", type=keywords, default={}, help="Of the environment in training, as JSON.")
@@ -104,9 +106,9 @@ def play(envs: MachineVectorEnv, seed: int, moves: float) -> Jobs:
 
 
 def gathered(asked: argparse.Namespace, envs: MachineVectorEnv) -> Jobs:
-    """All jobs; those that the folder holds are not run again."""
-    path, rounds = asked.out / CHECKPOINT, -(-asked.steps // (envs.num_envs * envs.task.steps))
-    known: dict[str, Array] = unpacked(contents(path, LARGEST), LARGEST) if path.exists() else {}
+    """All jobs, those of other runs too; none that a folder holds is run again."""
+    rounds = -(-asked.steps // (envs.num_envs * envs.task.steps))
+    known = _kept(asked.out)
     for k in trange(rounds, desc=asked.out.name, unit="round"):
         if f"seen{k}" in known:
             continue
@@ -114,9 +116,33 @@ def gathered(asked: argparse.Namespace, envs: MachineVectorEnv) -> Jobs:
         known |= {f"{name}{k}": values for name, values in jobs._asdict().items()}
         buffer = io.BytesIO()
         np.savez(buffer, **known)  # type: ignore[arg-type]
-        _write(path, buffer.getvalue())
-    parts = [[known[f"{name}{k}"] for k in range(rounds)] for name in Jobs._fields]
-    return Jobs(*(np.concatenate(part, axis=1) for part in parts))
+        _write(asked.out / CHECKPOINT, buffer.getvalue())
+    parts = _parts(known, rounds)
+    for folder in asked.jobs:
+        other = _kept(folder)
+        parts += _parts(other, len(other) // len(Jobs._fields))
+        if not other or parts[-1].seen.shape[::2] != parts[0].seen.shape[::2]:
+            raise ModelFileError(f"{folder} holds no jobs of this task; give folders that this script wrote for it")
+    if not parts:
+        raise ModelFileError("there are no jobs: give --steps, or --jobs with the folders of other runs")
+    return Jobs(*(np.concatenate(part, axis=1) for part in zip(*parts, strict=True)))
+
+
+def _kept(folder: Path) -> dict[str, Array]:
+    """Arrays of the jobs that a folder holds."""
+    path = folder / CHECKPOINT
+    try:
+        return dict(unpacked(contents(path, LARGEST), LARGEST)) if path.exists() else {}
+    except ValueError as error:
+        raise ModelFileError(f"{path} {error}") from None
+
+
+def _parts(known: dict[str, Array], rounds: int) -> list[Jobs]:
+    """Jobs of each round."""
+    try:
+        return [Jobs(known[f"seen{k}"], known[f"irregular{k}"]) for k in range(rounds)]
+    except KeyError as error:
+        raise ModelFileError(f"a run's {CHECKPOINT} has no array {error}; it was not written by this script") from None
 
 
 def _write(path: Path, content: bytes) -> None:

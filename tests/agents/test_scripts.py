@@ -1,6 +1,7 @@
 """Every script trains, goes on where it stopped, and leaves a policy that numpy plays."""
 
 import csv
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -75,6 +76,27 @@ def test_a_map_is_learned_from_jobs_that_are_not_run_again(tmp_path):
     for objective in ("irregular", "life"):
         job = play(load_policy(tmp_path / "whole"), BEAM, range(2), level="fleet", objective=objective, steps=20)
         assert job.deviation.max() < 3.0
+
+
+@pytest.mark.slow
+def test_a_map_is_learned_from_the_jobs_of_several_runs(tmp_path):
+    """What is usual there is what is usual in a run that played both; a folder without jobs is refused in one line."""
+    small = ("--envs", "4", "--epochs", "2", "--units", "16")
+    for name, seed in (("one", 3), ("other", 4)):
+        _train("learn_map", tmp_path / name, 480, "--seed", seed, *small)
+    both = (tmp_path / "one", tmp_path / "other")
+    _train("learn_map", tmp_path / "both", 0, "--jobs", *both, *small)
+    shutil.copytree(both[0], tmp_path / "again")
+    _train("learn_map", tmp_path / "again", 480, "--seed", 3, "--jobs", both[1], *small)
+    policies = [load_policy(tmp_path / name) for name in ("both", "again")]
+    assert (policies[0].mean == policies[1].mean).all(), "what is usual is told by the same jobs"
+    for jobs, told in (((tmp_path,), "holds no jobs"), ((), "give --steps")):
+        command = [sys.executable, AGENTS / "learn_map.py", "--steps", 0, "--out", tmp_path / "none", "--jobs", *jobs]
+        done = subprocess.run(
+            [str(part) for part in command if jobs or part != "--jobs"], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 2
+        assert told in done.stderr.splitlines()[-1]
 
 
 @pytest.mark.slow
