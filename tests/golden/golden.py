@@ -5,7 +5,8 @@
     labels    natures and periods at 200 points of each dataset's axes
 
 Numbers hold to a millionth, which rounding does not reach in so few cycles, whatever the processor. A label that a
-billionth of the clearance changes hangs on rounding: it is null and not compared.
+billionth of the clearance changes hangs on rounding: it is null and not compared, and one that such a change gives
+back is no other label.
 
 `python -m tests.golden.golden` computes the set, says what is new in it, and writes the file where something is.
 """
@@ -91,18 +92,28 @@ def _label(machine: Machine) -> str:
     return f"{verdict.nature} {verdict.period}" if verdict.period else verdict.nature
 
 
-def labels() -> Entries:
-    """Nature and period of every point."""
-    return {name: _label(machine) for name, machine in _points()}
+def _labels_near(machine: Machine) -> Iterator[str]:
+    """Labels where the clearance differs by as little as rounding."""
+    clearance = getattr(machine, machine.clearance_field)
+    return (_label(machine.at(clearance=factor * clearance)) for factor in ROUNDING)
+
+
+def labels(kept: Entries) -> Entries:
+    """Nature and period of every point; those of ``kept`` where a machine as near as rounding has these."""
+    result: Entries = {}
+    for name, machine in _points():
+        label, other = _label(machine), kept.get(name)
+        hangs = other not in (None, label) and other in _labels_near(machine)
+        result[name] = other if hangs else label
+    return result
 
 
 def firm_labels() -> Entries:
-    """As ``labels``; None where a change of the clearance as small as rounding changes one."""
+    """Nature and period of every point; None where a change of the clearance as small as rounding changes one."""
     result: Entries = {}
     for name, machine in _points():
-        clearance, label = getattr(machine, machine.clearance_field), _label(machine)
-        firm = all(_label(machine.at(clearance=factor * clearance)) == label for factor in ROUNDING)
-        result[name] = label if firm else None
+        label = _label(machine)
+        result[name] = label if all(near == label for near in _labels_near(machine)) else None
     return result
 
 
@@ -125,7 +136,7 @@ def differences(found: Entries, kept: Entries) -> dict[str, str]:
 def main() -> None:
     """Write the set anew where its meaning is new."""
     kept = json.loads(STORED.read_text()) if STORED.exists() else {}
-    found = {"cycles": cycles(), "steps": steps(), "labels": labels()}
+    found = {"cycles": cycles(), "steps": steps(), "labels": labels(kept.get("labels", {}))}
     new = {part: differences(entries, kept.get(part, {})) for part, entries in found.items()}
     for part, lines in new.items():
         print(f"{part}: {len(lines)} of {len(found[part])} entries are new")
