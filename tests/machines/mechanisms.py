@@ -8,7 +8,7 @@ from chaosgym.machines.mechanism.beam import Beam, beam_link
 from chaosgym.machines.mechanism.joints import Joint
 from chaosgym.machines.mechanism.links import Body, rigid_link
 from chaosgym.machines.mechanism.mechanism import Mechanism
-from chaosgym.machines.slider_crank.equations import mode_damping, rod_of
+from chaosgym.machines.slider_crank.connecting_rod import elastic_constants, rods_of
 
 
 def thesis_crank(machine, ball_frame="rod"):
@@ -32,7 +32,7 @@ def thesis_crank(machine, ball_frame="rod"):
         steel = machine.youngs_modulus, machine.density
         beam = Beam(length, area, second, *steel, machine.n_modes, fitted=machine.fitted_modes)
         rod = beam_link("rod", beam, {"start": (end(0.0, "housing"),), "end": (end(0.0, "yoke"),)})
-        rod = rod._replace(damping=np.diag(mode_damping(machine, rod_of(machine))[1]))
+        rod = rod._replace(damping=np.diag(elastic_constants(machine, rods_of(machine)[0])[1]))
     opened = {"ideal": (), "clearance": ("across",), "instrumented": ("across", "turn")}[machine.slider_joint]
     ball = () if machine.ball_joint == "ideal" else ("along", "across")
     turned = math.radians(machine.gravity_angle)

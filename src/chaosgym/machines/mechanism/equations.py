@@ -24,6 +24,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.links import Link, inertia_of, rotation
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism, Spring
 from chaosgym.machines.mechanism.nominal import Nominal, Revolution, nominal
+from chaosgym.machines.periodic import derivatives
 
 Array = NDArray[np.float64]
 
@@ -53,17 +54,6 @@ class SmallMotion(NamedTuple):
     stiffness: Array
     load: Array
     torque: Array
-
-
-def derivatives(values: Array) -> tuple[Array, Array]:
-    """First and second derivative by the crank angle of values (B, ...) on a uniform grid of a revolution."""
-    count = len(values)
-    k = np.arange(count // 2 + 1).reshape(-1, *[1] * (values.ndim - 1))
-    series = np.fft.rfft(values, axis=0)
-    first = 1j * k * series
-    if count % 2 == 0:
-        first[-1] = 0.0
-    return np.fft.irfft(first, count, axis=0), np.fft.irfft(-(k**2) * series, count, axis=0)
 
 
 def _tail(values: Array) -> float:

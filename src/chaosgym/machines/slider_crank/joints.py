@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.machines.binned import model as binned
-from chaosgym.machines.slider_crank.equations import (
+from chaosgym.machines.slider_crank.coordinates import (
     BALL_ACROSS,
     BALL_DIRECTIONS,
     SLIDER_ACROSS,

@@ -5,64 +5,15 @@ at zero motor angle; the crank angle is zero at the outer dead point. With crank
 
     P = r (cos th cos b, sin th, -cos th sin b),   s = P_x + sqrt(l^2 - P_y^2 - P_z^2)
 
-where b is the motor angle: the crank plane turns about Y through its own centre. In the plane (b = 0) the rod makes
-the angle phi with the guide, sin phi = (r / l) sin th.
+where b is the motor angle: the crank plane turns about Y through its own centre.
 
 The crank turns at a constant rate w, so d/dt = w d/dth: everything here is given per unit crank rate.
 """
-
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-
-
-class PlanarMotion(NamedTuple):
-    """Nominal motion of the planar mechanism at given crank angles, all arrays of their shape (B,).
-
-    ``phi`` [rad] with its first and second derivative by the crank angle; slider position ``slider`` [m] and its
-    derivatives; ``pin_along`` and ``pin_across`` [m]: acceleration of the crank pin per squared crank rate along the
-    rod and across it.
-    """
-
-    phi: Array
-    phi_rate: Array
-    phi_acceleration: Array
-    slider: Array
-    slider_rate: Array
-    slider_acceleration: Array
-    pin_along: Array
-    pin_across: Array
-
-
-def planar_motion(crank_angle: Array, radius: float, length: float) -> PlanarMotion:
-    """Nominal motion of the planar mechanism.
-
-    Parameters
-    ----------
-    crank_angle : (B,)
-        Crank angles [rad].
-    radius, length
-        Of the crank and the rod [m].
-    """
-    sine, cosine = np.sin(crank_angle), np.cos(crank_angle)
-    ratio = radius / length
-    phi = np.arcsin(ratio * sine)
-    tilt, lean = np.sin(phi), np.cos(phi)
-    rate = ratio * cosine / lean
-    acceleration = (-ratio * sine + rate**2 * tilt) / lean
-    return PlanarMotion(
-        phi=phi,
-        phi_rate=rate,
-        phi_acceleration=acceleration,
-        slider=radius * cosine + length * lean,
-        slider_rate=-radius * sine - length * tilt * rate,
-        slider_acceleration=-radius * cosine - length * (lean * rate**2 + tilt * acceleration),
-        pin_along=-radius * np.cos(crank_angle + phi),
-        pin_across=-radius * np.sin(crank_angle + phi),
-    )
 
 
 def crank_pin(crank_angle: Array, radius: float, motor_angle: float) -> Array:

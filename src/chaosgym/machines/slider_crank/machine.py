@@ -16,12 +16,12 @@ from chaosgym.core.binned.model import HERTZ, LINEAR
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.machines.binned.model import MAX_SETS, Contact, Held
 from chaosgym.machines.parameters import Parameter, parameters_of
-from chaosgym.machines.slider_crank.equations import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom, equations
+from chaosgym.machines.slider_crank.coordinates import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom
+from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.joints import display_of, gaps_of, joints_of, sensor_peaks, sensors_of
 from chaosgym.machines.slider_crank.kinematics import slider_position
 from chaosgym.machines.slider_crank.model import force_bound, held_of
 from chaosgym.machines.slider_crank.parameters import FITTED, CrankParameters
-from chaosgym.machines.slider_crank.spatial_equations import spatial_equations
 
 Array = NDArray[np.float64]
 
@@ -221,8 +221,7 @@ def frequencies_at(machine: SliderCrank, crank_angle: float) -> Array:
     from scipy.linalg import eigh
 
     bound = replace(machine, slider_joint="clearance", ball_joint="ideal", rod="flexible")
-    assemble = spatial_equations if machine.is_spatial else equations
-    system = assemble(bound, np.array([math.radians(crank_angle)]))
+    system = equations(bound, np.array([math.radians(crank_angle)]))
     free = [i for i, name in enumerate(bound.degrees_of_freedom) if name not in (SLIDER_ACROSS, SLIDER_LATERAL)]
     at = np.ix_(free, free)
     squares = eigh(system.stiffness[0, 0][at], system.mass[0][at], eigvals_only=True)

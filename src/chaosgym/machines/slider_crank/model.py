@@ -1,4 +1,4 @@
-"""What is held over bins of crank angle of a slider crank: its equations in the plane or in space, and its friction."""
+"""What is held over bins of crank angle of a slider crank: its equations and its friction."""
 
 import math
 
@@ -6,28 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.machines.binned.model import Held, held, middles_and_nodes
-from chaosgym.machines.slider_crank.equations import Equations, equations, loads, rod_of
+from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.kinematics import slider_rate
 from chaosgym.machines.slider_crank.parameters import CrankParameters
-from chaosgym.machines.slider_crank.spatial_equations import spatial_equations, spatial_loads
 
 Array = NDArray[np.float64]
-
-
-def _assembled(machine: CrankParameters, middles: Array, nodes: Array) -> tuple[Equations, Array]:
-    """Equations at the middles of the bins and loads at the nodes of the forcing, in the plane or in space."""
-    if machine.is_spatial:
-        return spatial_equations(machine, middles), spatial_loads(machine, nodes)
-    rod = rod_of(machine)
-    return equations(machine, middles, rod), loads(machine, nodes, rod)
 
 
 def held_of(machine: CrankParameters) -> Held:
     """Held accelerations of a crank."""
     middles, nodes = middles_and_nodes(machine.bins)
-    found, load = _assembled(machine, middles, nodes)
+    found = equations(machine, middles, nodes)
     friction = _friction(machine, middles)[:, None] * found.slider_along
-    return held(found.mass, found.damping, found.stiffness, load, friction)
+    return held(found.mass, found.damping, found.stiffness, found.load, friction)
 
 
 def _friction(machine: CrankParameters, crank_angle: Array) -> Array:

@@ -241,10 +241,11 @@ class CrankParameters(BinnedMachine):
 
     def __post_init__(self, fidelity: str | None) -> None:
         super().__post_init__(fidelity)
-        if self.rod_length <= self.crank_radius:
+        # a rod that can stand across the guide leaves open which way the slider goes on from there
+        if self.rod_length < 1.001 * self.crank_radius:
             raise ParameterError(
                 f"rod_length = {self.rod_length:g} m is out of range; "
-                f"allowed: above the crank radius of {self.crank_radius:g} m"
+                f"allowed: above the crank radius of {self.crank_radius:g} m by 0.1 % or more"
             )
         if abs(360.0 / self.matrix_update_interval - round(360.0 / self.matrix_update_interval)) > 1e-9:
             raise ParameterError(
