@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from chaosgym.control.evaluation import evaluate
     from chaosgym.control.operator import Operator
     from chaosgym.diagnosis import Diagnosis, diagnose, response_map, response_type, two_step_test
-    from chaosgym.diagnosis.bifurcation_diagram import follow
+    from chaosgym.diagnosis.diagram_search import follow
     from chaosgym.diagnosis.measured import judge_peaks
     from chaosgym.diagnosis.step_check import step_check
     from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
@@ -34,7 +34,7 @@ _HOME = {
     "chaosgym.control.evaluation": ("evaluate",),
     "chaosgym.control.operator": ("Operator",),
     "chaosgym.diagnosis": ("Diagnosis", "diagnose", "response_map", "response_type", "two_step_test"),
-    "chaosgym.diagnosis.bifurcation_diagram": ("follow",),
+    "chaosgym.diagnosis.diagram_search": ("follow",),
     "chaosgym.diagnosis.measured": ("judge_peaks",),
     "chaosgym.diagnosis.step_check": ("step_check",),
     "chaosgym.errors": ("ChaosgymError", "ParameterError", "SimulationError"),

@@ -10,8 +10,9 @@ import pytest
 from chaosgym import read_machine
 from chaosgym.design import Criteria, assess, improve, variation_region
 from chaosgym.design.bearing import evaluate
+from chaosgym.design.changes import change_cost, default_changes
 from chaosgym.design.fatigue import equivalent_force, rating_life
-from chaosgym.design.improve import Trial, _rank, change_cost, default_changes
+from chaosgym.design.improve import Trial, _rank
 from chaosgym.design.methodology import Check, fit_trend
 from chaosgym.design.reliability import hertz_pressure, normal_reliability
 from chaosgym.design.runs import build_series, settled_run

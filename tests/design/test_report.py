@@ -16,15 +16,16 @@ from chaosgym.cli import main
 from chaosgym.design import Criteria, assess
 from chaosgym.design.bending import Bending, BendingLife, Section, stressed
 from chaosgym.design.brief import brief_from, template
+from chaosgym.design.contradictions import contradictions
 from chaosgym.design.measured import evaluate_peaks
-from chaosgym.design.study import _map, contradictions, study
+from chaosgym.design.study import study
+from chaosgym.design.surroundings import map_around
 from chaosgym.design.told import life_told
 from chaosgym.diagnosis import Tolerance
 from chaosgym.errors import DesignError
+from chaosgym.plotting.comparison_report import comparison_report, comparison_rows
 from chaosgym.plotting.design_report import (
     HEADLINES,
-    comparison_report,
-    comparison_rows,
     design_report,
     measured_report,
     write_report,
@@ -234,7 +235,7 @@ def test_motions_that_coexist_are_told_in_the_headline():
 def test_a_share_of_no_clearance_is_no_map():
     """A cam without a gap has no second axis: an empty map would be drawn."""
     brief = brief_from(tomllib.loads(template("docs/machines/cam-follower.toml")))
-    assert _map(brief, 1, False) is None
+    assert map_around(brief, 1, False) is None
 
 
 def test_a_load_collective_and_wear_are_told():

@@ -10,8 +10,8 @@ from scipy.optimize import brentq
 
 from chaosgym.diagnosis import diagnose
 from chaosgym.diagnosis.bifurcation_curve import follow_bifurcation
-from chaosgym.diagnosis.bifurcation_diagram import follow
 from chaosgym.diagnosis.branch import _repeats, stretch
+from chaosgym.diagnosis.diagram_search import follow
 from chaosgym.diagnosis.orbit_family import OrbitPoint, family_of, with_noise
 from chaosgym.diagnosis.periodic_orbit import PRECISE, find_periodic_orbit, run_period
 from chaosgym.diagnosis.section import better_section

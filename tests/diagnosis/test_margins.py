@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 from chaosgym.cli import app
 from chaosgym.diagnosis import Tolerance, diagnose, find_periodic_orbit
-from chaosgym.diagnosis.bifurcation_diagram import follow
+from chaosgym.diagnosis.diagram_search import follow
 from chaosgym.diagnosis.margins import margins
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines.parameters import with_settings

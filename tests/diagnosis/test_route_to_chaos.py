@@ -5,7 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from chaosgym.diagnosis.bifurcation_diagram import SweepPoint, follow
+from chaosgym.diagnosis.bifurcation_diagram import SweepPoint
+from chaosgym.diagnosis.diagram_search import follow
 from chaosgym.diagnosis.route_to_chaos import (
     _intermittent,
     feigenbaum_ratios,

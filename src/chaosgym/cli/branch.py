@@ -71,7 +71,7 @@ def branch(
     }
     found: Any
     if against is None:
-        from chaosgym.diagnosis.bifurcation_diagram import SWEEP, follow
+        from chaosgym.diagnosis.diagram_search import SWEEP, follow
 
         found = follow(machine, first.field, (first.low, first.high), sweep=first.count or SWEEP, **limits)
     else:

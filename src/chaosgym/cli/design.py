@@ -128,29 +128,30 @@ def _compared(
     """Answer several briefs, and put them side by side, and beside what was measured."""
     from chaosgym.design.brief import read_brief
     from chaosgym.design.study import study
-    from chaosgym.plotting import design_report as report
+    from chaosgym.plotting.comparison_report import MEASURED, agreement, comparison_report, comparison_rows
+    from chaosgym.plotting.design_report import report_paths, write_report
 
     if len(set(briefs_given)) < len(briefs_given):
         raise click.UsageError("a brief is given twice; give each once")
     if out is not None:
-        report.report_paths(out, overwrite)
+        report_paths(out, overwrite)
     asked = {path: read_brief(path) for path in briefs_given}
     first = next(iter(asked.values()))
     run, found = _evaluated(measured, first.criteria, first.stated) if measured else (None, None)
     studies = {path: study(one, seed=seed, workers=workers, progress=True) for path, one in asked.items()}
-    rows = report.comparison_rows(studies, found)
+    rows = comparison_rows(studies, found)
     width = max(len(name) for name in rows)
-    lines = [f"{'':{width}s}  {', '.join([*studies, *([report.MEASURED] if found else [])])}"]
+    lines = [f"{'':{width}s}  {', '.join([*studies, *([MEASURED] if found else [])])}"]
     lines += [f"{name:{width}s}  {' | '.join(cells)}" for name, cells in rows.items()]
     result: dict[str, Any] = {"briefs": {path: one.as_dict() for path, one in studies.items()}}
     if found is not None and run is not None:
         result["measured"] = found.as_dict()
-        lines += [f"measured: {found.headline}", report.agreement(studies, found), *run.notes]
+        lines += [f"measured: {found.headline}", agreement(studies, found), *run.notes]
     if out is not None:
         command = f"chaosgym design {' '.join(briefs_given)} --seed {seed}"
         if measured:
             command += f" --beside --{'peaks' if measured.peaks else 'series'} {measured.peaks or measured.series}"
-        page = report.comparison_report(studies, command, date=datetime.date.today().isoformat(), measured=found)
-        report.write_report(page, result, out, overwrite)
+        page = comparison_report(studies, command, date=datetime.date.today().isoformat(), measured=found)
+        write_report(page, result, out, overwrite)
         lines.append(f"report: {out}")
     emit(result, as_json, lambda: lines)

@@ -10,7 +10,7 @@ from typing import Any
 
 from chaosgym.design.bearing import Criteria, variation_region
 from chaosgym.design.bending import Bending, fibres, read_bending
-from chaosgym.design.improve import default_changes
+from chaosgym.design.changes import default_changes
 from chaosgym.design.methodology import SERIES_SIZE
 from chaosgym.design.runs import deviating
 from chaosgym.design.wear import Wear, read_wear, worn_clearances

@@ -6,14 +6,10 @@ map, the life against speed and the sensitivities suggest, and pairs of fields a
 tolerances run for some cycles. Those that lie on the front of cost against life and robustness as screened are then
 assessed like any other, so that no suggestion rests on a screening or an extrapolation: responses of Type II and III
 have no derivative to trust.
-
-The cost of changing a field from a to b is its weight times |ln(b / a)|, so that halving costs as much as doubling;
-changes of several fields add up. From zero to b it is ln(1 + |b| / s), where s is the equivalent force for a force, and
-the clearance for a length.
 """
 
 import math
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -23,39 +19,20 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from chaosgym.design.bearing import Evaluation, evaluate
+from chaosgym.design.changes import allowed, between, change_cost, default_changes, differing, distinct, part_of
 from chaosgym.design.collective import assess_duty
 from chaosgym.design.methodology import SERIES_SIZE, Assessment, Check
 from chaosgym.design.runs import deviating, sobol_shares, worse_side
 from chaosgym.design.told import listed
-from chaosgym.diagnosis import default_tolerances
 from chaosgym.errors import DesignError, ParameterError, SimulationError
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import parameters_of, quantity_of, with_settings
+from chaosgym.machines.parameters import quantity_of, with_settings
 from chaosgym.simulation import parallel_map, simulate
 
 Array = NDArray[np.float64]
 
-CLEARANCE_FACTORS = (0.75, 0.5, 0.25)
-DAMPING_FACTORS = (2.0, 4.0)
-SPEED_FACTORS = (0.8, 0.9, 1.1)
-SECTION_FACTORS = (1.1, 1.25)
-
-STIFFNESS_FACTORS = (0.5,)
-MASS_FACTORS = (0.8,)
-PRELOAD_FACTORS = (1.5, 2.0)
-"""Factors that are tried by default."""
-
-SECTION_FIELDS = ("height", "rod_diameter", "frequency_factor")
-"""Fields that make a member stiffer."""
-
-MASS_FIELDS = ("slider_mass", "yoke_mass")
-"""Fields that make a moving part lighter."""
-
 SCREENED_MACHINES, SCREENED_CYCLES = 8, 60
 """Machines of the tolerances, and cycles before and while peaks are taken, that screen a candidate."""
-
-STEPS = 3
-"""Values between the nominal one and the outermost one of a field that are screened."""
 
 MOST_PAIRS = 60
 """Pairs of fields that are screened at the most, by cost."""
@@ -65,9 +42,6 @@ MOST_VERIFIED = 8
 
 SPARE = 3
 """Of these, candidates beside the front of cost against life and robustness."""
-
-SAME = 6e-4
-"""Share of a value by which a candidate, rounded to four digits, may miss the nominal one that it stands for."""
 
 REFINEMENTS = 3
 """Bisections between the change that suffices and the nominal value."""
@@ -174,75 +148,6 @@ def not_dominated(rows: Sequence[Sequence[float]]) -> list[bool]:
     return [not beaten(k) for k in range(len(rows))]
 
 
-def default_changes(machine: Machine) -> dict[str, tuple[float, ...]]:
-    """Values worth trying, by field: less clearance, more damping, other speed, stiffer member, softer contact, less
-    mass, more preload. Without values, as for a preload of zero, the search finds its own.
-    """
-    known = parameters_of(machine)
-    factors: dict[str, tuple[float, ...]] = {machine.clearance_field: CLEARANCE_FACTORS}
-    factors |= {name: DAMPING_FACTORS for name in default_tolerances(machine) if "damping" in name}
-    factors[machine.speed_field] = SPEED_FACTORS
-    factors |= {name: SECTION_FACTORS for name in SECTION_FIELDS if name in known}
-    factors |= {name: STIFFNESS_FACTORS for name in known if _of_contact(name, known) and getattr(machine, name) > 0.0}
-    factors |= {name: MASS_FACTORS for name in MASS_FIELDS if name in known}
-    factors |= {name: PRELOAD_FACTORS for name in known if name.endswith("preload")}
-    return {
-        name: tuple(_rounded(getattr(machine, name) * factor, 4) for factor in row if getattr(machine, name))
-        for name, row in factors.items()
-    }
-
-
-def _of_contact(name: str, known: Container[str]) -> bool:
-    """Whether a field is the stiffness of a contact."""
-    return name == "contact_stiffness" or (name.endswith("_stiffness") and f"{name[:-10]}_clearance" in known)
-
-
-def change_cost(
-    machine: Machine,
-    changes: Mapping[str, float],
-    weights: Mapping[str, float] | None = None,
-    force: float = 0.0,
-) -> float:
-    """Cost of a set of changes: the sum of weight times |ln(new / old)|; a weight is 1 unless given.
-
-    Parameters
-    ----------
-    machine
-        The nominal machine.
-    changes
-        New values by field.
-    weights
-        By field.
-    force
-        Equivalent force [N], beside which a force is weighed that is zero in one of the machines.
-
-    Raises
-    ------
-    ParameterError
-        If a change to or from zero, or below it, is of a field that is neither a force nor a length.
-
-    Examples
-    --------
-    >>> from chaosgym.machines import ImpactBeam
-    >>> round(change_cost(ImpactBeam(clearance=2e-4), {"clearance": 1e-4}), 4)
-    0.6931
-    """
-    weights = weights or {}
-    total = 0.0
-    for name, value in changes.items():
-        nominal = getattr(machine, name)
-        if nominal > 0.0 and value > 0.0:
-            size = abs(math.log(value / nominal))
-        else:
-            scales = {"N": force, "m": float(getattr(machine, machine.clearance_field))}
-            scale = scales.get(parameters_of(machine)[name].unit, 0.0)
-            if not scale > 0.0:
-                raise ParameterError(f"{name}: the cost of a change from {nominal:g} to {value:g} needs values above 0")
-            size = math.log1p(abs(value - nominal) / scale)
-        total += weights.get(name, 1.0) * size
-    return total
-
-
 def improve(
     assessment: Assessment,
     changes: Mapping[str, Iterable[float]] | None = None,
@@ -320,10 +225,10 @@ def improve(
     stated = [
         {name: float(value)} for name, row in values.items() for value in row if value != getattr(machine, name, None)
     ]
-    singles: list[Mapping[str, float]] = [one for one in stated if _allowed(machine, one, force)]
-    proposed = [_changed(machine, one) for one in (*seeds, *_between(machine, values, force))]
-    further = _distinct([one for one in proposed if one and _allowed(machine, one, force)], singles)
-    pairs = _distinct([{**a, **b} for a, b in combinations([*singles, *further], 2) if a.keys().isdisjoint(b)], [])
+    singles: list[Mapping[str, float]] = [one for one in stated if allowed(machine, one, force)]
+    proposed = [differing(machine, one) for one in (*seeds, *between(machine, values, force))]
+    further = distinct([one for one in proposed if one and allowed(machine, one, force)], singles)
+    pairs = distinct([{**a, **b} for a, b in combinations([*singles, *further], 2) if a.keys().isdisjoint(b)], [])
     pairs = sorted(pairs, key=lambda one: change_cost(machine, one, weights, force))[:MOST_PAIRS]
     candidates = [*further, *pairs]
     with tqdm(total=len(singles), desc="changes", disable=not progress, unit="machine") as bar:
@@ -344,49 +249,6 @@ def improve(
     if best is not None and all(trial is not best for trial in done):
         done.append(best)
     return Improvement(tuple(sorted(done, key=_rank)), best, len(candidates))
-
-
-def _allowed(machine: Machine, change: Mapping[str, float], force: float) -> bool:
-    """Whether a machine with the change is allowed and has a cost; an unknown field is an error."""
-    for name in change:
-        if name not in parameters_of(machine):
-            with_settings(machine, change)
-    try:
-        with_settings(machine, change)
-        change_cost(machine, change, None, force)
-    except ParameterError:
-        return False
-    return True
-
-
-def _changed(machine: Machine, change: Mapping[str, float]) -> dict[str, float]:
-    """The fields of a candidate that differ from the nominal ones by more than their rounding."""
-    return {
-        name: value
-        for name, value in change.items()
-        if not math.isclose(value, getattr(machine, name, math.nan), rel_tol=SAME)
-    }
-
-
-def _between(machine: Machine, values: Mapping[str, tuple[float, ...]], force: float) -> Iterable[dict[str, float]]:
-    """Values between the nominal one and the outermost ones stated; without any, a range of its own."""
-    for name, row in values.items():
-        nominal = getattr(machine, name)
-        ends = [value for value in (min(row, default=nominal), max(row, default=nominal)) if value != nominal]
-        if not ends:
-            ends = [0.5 * nominal, 2.0 * nominal] if nominal else [-2.0 * force, 2.0 * force]
-        for end in ends:
-            for k in range(1, STEPS + 1):
-                yield {name: _part(nominal, end, k / (STEPS + bool(row)))}
-
-
-def _distinct(
-    changes: Iterable[Mapping[str, float]], known: Iterable[Mapping[str, float]]
-) -> list[Mapping[str, float]]:
-    """Changes without repetition, and without those that are known."""
-    seen = {tuple(sorted(one.items())) for one in known}
-    kept = {tuple(sorted(one.items())): one for one in changes}
-    return [one for key, one in kept.items() if key not in seen]
 
 
 def _front_of_screened(
@@ -455,24 +317,12 @@ def _taken_back(machine: Machine, best: Trial, attempt: Any) -> Trial:
     low, high, full = 0.0, 1.0, dict(best.changes)
     for _ in range(REFINEMENTS):
         share = 0.5 * (low + high)
-        trial = attempt({name: _part(getattr(machine, name), value, share) for name, value in full.items()})
+        trial = attempt({name: part_of(getattr(machine, name), value, share) for name, value in full.items()})
         if trial is not None and trial.meets:
             best, high = trial, share
         else:
             low = share
     return best
-
-
-def _part(nominal: float, value: float, share: float) -> float:
-    """A share of the way to a changed value: in the logarithm where both are above zero."""
-    if nominal > 0.0 and value > 0.0:
-        return _rounded(nominal * (value / nominal) ** share)
-    return _rounded(nominal + share * (value - nominal))
-
-
-def _rounded(value: float, digits: int = 3) -> float:
-    """A change is an engineering figure."""
-    return float(f"{value:.{digits}g}")
 
 
 def _rank(trial: Trial) -> tuple[bool, tuple[float, ...]]:

@@ -9,12 +9,13 @@ from chaosgym.design.bearing import hours_of, plain
 from chaosgym.design.brief import DesignBrief
 from chaosgym.design.collective import assess_duty, damage_shares
 from chaosgym.design.combination import Combination, combination
+from chaosgym.design.contradictions import contradictions
 from chaosgym.design.fatigue import equivalent_force_of_history
 from chaosgym.design.guidelines import Guideline, guidelines
 from chaosgym.design.improve import Improvement, Trial, improve
 from chaosgym.design.methodology import Assessment, Check
 from chaosgym.design.peak_impacts import PeakImpactDiagram, filling_cycles, peak_impacts, worn_side
-from chaosgym.design.runs import DIAGNOSIS_BUDGET
+from chaosgym.design.surroundings import MIDDLE, in_tolerance, map_around
 from chaosgym.design.told import hours_told
 from chaosgym.design.trends import (
     DIAGRAM_CYCLES,
@@ -24,20 +25,13 @@ from chaosgym.design.trends import (
     impacts_against,
     life_against,
 )
-from chaosgym.diagnosis import Neighbour, ResponseMap, find_periodic_orbit, response_map
+from chaosgym.diagnosis import ResponseMap, find_periodic_orbit
 from chaosgym.diagnosis.margins import Margins, margins
-from chaosgym.diagnosis.type_rule import FORCE_CHANGE
-from chaosgym.errors import DesignError, ParameterError
+from chaosgym.errors import DesignError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import quantity_of, with_settings
 from chaosgym.simulation import CycleRecord, simulate
 from chaosgym.version import __version__
-
-MAP_SHARES = np.arange(-4, 5) / 2.0
-"""Points of the map along speed and clearance, in tolerances."""
-
-MIDDLE = len(MAP_SHARES) // 2
-"""Place of the nominal machine along each axis of the map."""
 
 TREND_POINTS = 53
 """Speeds of the life trend."""
@@ -272,14 +266,14 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
         If the study contradicts itself, see ``contradictions``.
     """
     machine = brief.machine
-    around = _map(brief, workers, progress)
+    around = map_around(brief, workers, progress)
     assessment = assess_duty(
         machine,
         brief.region,
         brief.criteria,
         brief.duty,
         series_size=brief.series_size,
-        further=_in_tolerance(around),
+        further=in_tolerance(around),
         bending=brief.bending,
         wear=brief.wear,
         seed=seed,
@@ -309,8 +303,8 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
         trend,
         peak_impacts(record, worn_side(record, brief.criteria.life_exponent)),
         impacts_against(machine, brief.impacts, brief.criteria.life_exponent, workers=workers),
-        combination(assessment, _in_tolerance(around), seed=seed, workers=workers, progress=progress),
-        guidelines(assessment, _in_tolerance(around)),
+        combination(assessment, in_tolerance(around), seed=seed, workers=workers, progress=progress),
+        guidelines(assessment, in_tolerance(around)),
         _margins(assessment),
         _every_impact(record, side, brief),
         seed,
@@ -318,81 +312,6 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
     if found := contradictions(answer):
         raise DesignError(f"the report contradicts itself, which is a fault of this program: {'; '.join(found)}")
     return answer
-
-
-def contradictions(answer: DesignStudy) -> list[str]:
-    """Statements of a study that contradict its own machines; none of a study that ``study`` returns.
-
-    The type is held against every machine of the series, of the neighbourhood and of the map within the tolerances,
-    the largest force against theirs, the verdict against its checks, the change that suffices against its own, criteria
-    of bending and wear against what was found of these, the case of 5.5.1 against the natures found, and map and life
-    over speed against the nominal machine.
-    """
-    found, trend = answer.assessment, answer.life_over_speed
-    region = [(one.nature, one.largest_peak) for one in (*found.series.built, *_in_tolerance(answer.map))]
-    region += [(point.nature, point.largest_peak) for point in found.response.neighbours]
-    said = []
-    if found.type == "I" and any(nature != "periodic" for nature, _ in region):
-        said.append("Type I, with machines in the tolerances that are not periodic")
-    largest = max([found.nominal.largest_peak, *(peak for _, peak in region)])
-    if found.type == "I" and largest > (1.0 + FORCE_CHANGE) * found.response.largest_peak:
-        said.append(f"Type I, with {largest:.4g} N in the tolerances and {found.response.largest_peak:.4g} N nominally")
-    if found.type in ("I", "II") and found.evaluation.largest_force < largest * (1.0 - 1e-9):
-        said.append(f"largest peak {found.evaluation.largest_force:.4g} N, with {largest:.4g} N in the tolerances")
-    if (found.verdict == "meets") != ("undetermined" not in found.types and all(check.met for check in found.checks)):
-        said.append(f"the verdict {found.verdict!r} does not follow from type and checks")
-    said += _of_parts(found)
-    best = None if answer.improvement is None else answer.improvement.best
-    if best is not None and not (best.meets and all(check.met for check in best.assessment.checks)):
-        said.append(f"the change {best.told} is called sufficient, and misses a criterion")
-    natures = {nature for nature, _ in region} | {found.nominal.nature}
-    for one in answer.guidelines:
-        denied = {"Case I:": natures != {"periodic"}, "Case II throughout:": "periodic" in natures}
-        said += [f"{case} {natures} in the tolerances" for case, no in denied.items() if no and case in one.sentence]
-    elsewhere: dict[str, str] = {"the response type": found.response.centre.nature}
-    if answer.map is not None:
-        elsewhere["the map"] = str(answer.map.nature[MIDDLE, MIDDLE])
-    if trend is not None:
-        at = np.flatnonzero(trend.values == getattr(found.machine, trend.field))
-        elsewhere["life over speed"] = trend.nature[int(at[0])] if len(at) else "undetermined"
-    for where, nature in elsewhere.items():
-        if nature != found.nominal.nature and "undetermined" not in (nature, found.nominal.nature):
-            said.append(f"the nominal machine is {found.nominal.nature}, and {nature} in {where}")
-    return said
-
-
-def _of_parts(found: Assessment) -> list[str]:
-    """Criteria of the flexible part and of wear that are not what was found of these."""
-    lives = dict[str, float]()
-    if found.bending is not None:
-        lives["bending life"] = min(found.bending.lives) / found.bending.bending.uncertainty
-    if found.wear is not None:
-        hours = found.wear.course[-1].hours / found.wear.wear.uncertainty
-        lives["wear life"] = hours / hours_of(1.0, found.cycle_period)
-    reached = {check.name: check.reached for check in found.checks}
-    return [
-        f"the {name} is {life:.4g} million cycles, and its criterion is of {reached.get(name, 0.0):.4g}"
-        for name, life in lives.items()
-        if not np.isclose(life, reached.get(name, -1.0), rtol=1e-9)
-    ]
-
-
-def _in_tolerance(around: ResponseMap | None) -> tuple[Neighbour, ...]:
-    """Machines of the map within the tolerances of speed and clearance, but for the nominal one."""
-    if around is None:
-        return ()
-    inside = np.flatnonzero(np.abs(MAP_SHARES) <= 1.0)
-    fields = (around.machine.speed_field, around.machine.clearance_field)
-    return tuple(
-        Neighbour(
-            dict(zip(fields, (float(MAP_SHARES[i]), float(MAP_SHARES[j])), strict=True)),
-            str(around.nature[i, j]),
-            float(np.nan_to_num(around.largest_peak[i, j])),
-        )
-        for i in inside
-        for j in inside
-        if MAP_SHARES[i] or MAP_SHARES[j]
-    )
 
 
 def _margins(found: Assessment) -> Margins | None:
@@ -440,23 +359,6 @@ def _seeds(
 def _every_impact(record: CycleRecord, side: int, brief: DesignBrief) -> float:
     force = np.maximum(record.surface_force[:, :, side].ravel(), 0.0)
     return equivalent_force_of_history(force, len(record), brief.criteria.life_exponent)
-
-
-def _map(brief: DesignBrief, workers: int | None, progress: bool) -> ResponseMap | None:
-    machine, region = brief.machine, brief.region
-    for name in (machine.speed_field, machine.clearance_field):
-        if name not in region or not (getattr(machine, name) or not region[name].relative):  # a share of zero is zero
-            return None
-    speeds, clearances = (
-        [region[name].at(getattr(machine, name), share) for share in MAP_SHARES]
-        for name in (machine.speed_field, machine.clearance_field)
-    )
-    try:
-        return response_map(
-            machine, speeds, clearances, region, budget=DIAGNOSIS_BUDGET, workers=workers, progress=progress
-        )
-    except ParameterError:
-        return None
 
 
 def _life_over_speed(machine: Machine, workers: int | None, progress: bool) -> LifeTrend | None:

@@ -14,9 +14,10 @@ from tqdm import tqdm
 
 from chaosgym.diagnosis.bifurcation import Bifurcation
 from chaosgym.diagnosis.bifurcation_curve import BifurcationCurve, follow_bifurcation
-from chaosgym.diagnosis.bifurcation_diagram import PATIENCE, SWEEP_BUDGET, BifurcationDiagram, follow
+from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram
 from chaosgym.diagnosis.branch import MOST_UNSTABLE
 from chaosgym.diagnosis.diagnose import diagnose
+from chaosgym.diagnosis.diagram_search import PATIENCE, SWEEP_BUDGET, follow
 from chaosgym.diagnosis.orbit_family import continuous_field
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine

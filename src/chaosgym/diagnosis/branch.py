@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.diagnosis.bifurcation import Bifurcation, Found, between, bifurcations_between, grazing, interpolated
+from chaosgym.diagnosis.bifurcation import Bifurcation, Found, bifurcations_between, grazing
+from chaosgym.diagnosis.chord import between, interpolated
 from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily, OrbitPoint
 from chaosgym.diagnosis.section import better_section
 

@@ -23,16 +23,10 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from chaosgym.diagnosis.bifurcation import Bifurcation
-from chaosgym.diagnosis.bifurcation_diagram import (
-    PATIENCE,
-    SAME_PLACE,
-    BifurcationDiagram,
-    Branch,
-    SweepPoint,
-    follow,
-)
+from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram, Branch, SweepPoint
 from chaosgym.diagnosis.crisis import Crisis, boundary_crisis, carried, interior_crisis
 from chaosgym.diagnosis.diagnose import diagnose
+from chaosgym.diagnosis.diagram_search import PATIENCE, SAME_PLACE, follow
 from chaosgym.errors import DiagnosisError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings

@@ -13,12 +13,11 @@ from typing import NamedTuple
 
 import jinja2
 import matplotlib
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chaosgym.design.bearing import hours_of
-from chaosgym.design.fatigue import equivalent_force, rating_life
+from chaosgym.design.fatigue import rating_life
 from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.design.methodology import Assessment
 from chaosgym.design.study import DesignStudy
@@ -47,7 +46,6 @@ WHAT_TYPES_MEAN = {
     "III": "unpredictable in detail, so that only statistics hold",
     "undetermined": "the nature of the nominal response could not be told",
 }
-
 
 COEXISTING = "repeats, but how it was started decides which of several motions it is"
 """What Type III means where motions of different force coexist."""
@@ -86,7 +84,7 @@ def design_report(study: DesignStudy, command: str = "", *, date: str = "", brie
     tone, headline = HEADLINES[found.verdict]
     best = study.improvement.best if study.improvement else None
     tried = list(study.improvement.suggestions) if study.improvement else []
-    return _rendered(
+    return rendered(
         "design.html",
         command,
         study=study,
@@ -123,149 +121,20 @@ def _of_section(study: DesignStudy) -> dict[str, Parameter]:
     return {name: about for name, about in parameters_of(found.bending).items() if name not in own}
 
 
-def comparison_report(
-    studies: Mapping[str, DesignStudy], command: str = "", *, date: str = "", measured: MeasuredPeaks | None = None
-) -> str:
-    """HTML report of several studies side by side, by name of their brief, and beside what was measured."""
-    pictures = []
-    if measured is not None:
-        caption = (
-            "Share of cycles whose peak force is no larger. Measured, and of each brief's nominal machine on its worse "
-            "surface; band: the machines built to its tolerances."
-        )
-        nominal = {name: study.assessment for name, study in studies.items()}
-        drawn = _drawn(partial(figures.peaks_beside, measured.peaks, nominal))
-        pictures.append(_picture(drawn, caption))
-    for name, study in studies.items():
-        drawn = _drawn(partial(figures.series_life, study.assessment))
-        pictures.append(_picture(drawn, f"{name}: life of each machine built to the tolerances."))
-    return _rendered(
-        "comparison.html",
-        command,
-        studies=studies,
-        measured=measured,
-        names=[*studies, *([MEASURED] if measured is not None else [])],
-        rows=comparison_rows(studies, measured),
-        agreement=None if measured is None else agreement(studies, measured),
-        differing=_differing(studies),
-        pictures=pictures,
-        date=date,
-    )
-
-
-MEASURED = "measured"
-"""Name of the column of a recording."""
-
-NOTHING = "–"
-"""What stands where there is nothing to tell."""
-
-
-def comparison_rows(studies: Mapping[str, DesignStudy], measured: MeasuredPeaks | None = None) -> dict[str, list[str]]:
-    """What each study found, by quantity, as texts for people; what was measured comes last."""
-    columns = [_column(study) for study in studies.values()]
-    if measured is not None:
-        columns.append(_measured_column(measured, next(iter(studies.values()))))
-    return {name: [column.get(name, NOTHING) for column in columns] for name in columns[0]}
-
-
-def agreement(studies: Mapping[str, DesignStudy], measured: MeasuredPeaks) -> str:
-    """Which briefs' machines in the tolerances have equivalent forces on both sides of the measured one, for people."""
-    force, around = measured.evaluation.force, []
-    for name, study in studies.items():
-        forces = _forces(study.assessment)
-        if min(forces) <= force <= max(forces):
-            around.append(name)
-    return (
-        f"The equivalent force measured, {force:.1f} N, lies within what machines in the tolerances of "
-        f"{listed(around) or 'no brief'} have"
-    )
-
-
-def _forces(found: Assessment) -> list[float]:
-    """Equivalent force [N] of the nominal machine and of each one of the series."""
-    exponent = found.criteria.life_exponent
-    return [equivalent_force(run.worse_side(exponent), exponent) for run in (found.nominal, *found.series.runs)]
-
-
-def _column(study: DesignStudy) -> dict[str, str]:
-    found = study.assessment
-    value, machine, period = found.evaluation, found.machine, found.cycle_period
-    exponent = found.criteria.life_exponent
-    best = study.improvement.best if study.improvement else None
-    meeting = study.combination.meeting
-    forces = _forces(found)
-    return {
-        "verdict": HEADLINES[found.verdict][1],
-        "machine": machine.name,
-        "speed": quantity_of(machine, machine.speed_field),
-        "clearance": quantity_of(machine, machine.clearance_field),
-        "nominal response": found.nominal.nature,
-        "type over the tolerances": found.type,
-        "machines in the tolerances": found.series.told.partition(" of ")[0],
-        "life in operation": hours_told(hours_of(value.life_interval.low, period)),
-        "life required": hours_told(hours_of(found.criteria.life, period)),
-        "reliability": share_told(value.reliability_interval.low),
-        "mean peak force, nominal": f"{np.mean(found.nominal.worse_side(exponent)):.1f} N",
-        "largest peak force": f"{value.largest_force:.1f} N",
-        "equivalent force": f"{value.force:.1f} N",
-        "equivalent force of each machine": f"{min(forces):.1f} to {max(forces):.1f} N",
-        "load rating needed": f"{value.required_load_rating:.0f} N",
-        "probability of meeting life and reliability": f"{percent_told(meeting.share)} "
-        f"({percent_told(meeting.low)} to {percent_told(meeting.high)})",
-        "cheapest change that suffices": "none needed" if study.improvement is None else best.told if best else "none",
-    }
-
-
-def _measured_column(measured: MeasuredPeaks, study: DesignStudy) -> dict[str, str]:
-    """The same quantities of a recording, at the speed and by the criteria of the first study."""
-    value, found = measured.evaluation, study.assessment
-    period = found.machine.cycle_period
-    told = {
-        "machine": measured.source.get("file", MEASURED),
-        "nominal response": measured.verdict.diagnosis.nature,
-        "life in operation": hours_told(hours_of(value.life_interval.low, period)),
-        "life required": hours_told(hours_of(found.criteria.life, period)),
-        "mean peak force, nominal": f"{np.mean(measured.peaks):.1f} N",
-        "largest peak force": f"{value.largest_force:.1f} N",
-        "equivalent force": f"{value.force:.1f} N",
-        "load rating needed": f"{value.required_load_rating:.0f} N",
-    }
-    if measured.strength_stated:
-        told["reliability"] = share_told(value.reliability_interval.low)
-    return told
-
-
-def _differing(studies: Mapping[str, DesignStudy]) -> dict[str, list[str]]:
-    """Parameters with their tolerances, and criteria, that are not the same in all studies."""
-    columns = []
-    for study in studies.values():
-        found = study.assessment
-        column = {
-            name: f"{quantity_of(found.machine, name)} {_tolerance(found, name)}".strip()
-            for name in parameters_of(found.machine)
-        }
-        columns.append(
-            column
-            | {name: quantity_of(found.criteria, name) for name in parameters_of(found.criteria) if name != "life"}
-        )
-    names = dict.fromkeys(name for column in columns for name in column)
-    table = {name: [column.get(name, NOTHING) for column in columns] for name in names}
-    return {name: cells for name, cells in table.items() if len(set(cells)) > 1}
-
-
 def measured_report(measured: MeasuredPeaks, command: str = "") -> str:
     """HTML report on measured peak forces."""
     record = _figure_of_peaks(measured.peaks, measured.criteria.life_exponent)
     pictures = [
-        _picture(record, "Peak force of every cycle, and how often each force occurs.", wide=True),
-        _picture(_figure_of_convergence(measured.peaks, measured.convergence.cycles), CONVERGENCE),
+        picture_of(record, "Peak force of every cycle, and how often each force occurs.", wide=True),
+        picture_of(_figure_of_convergence(measured.peaks, measured.convergence.cycles), CONVERGENCE),
     ]
-    return _rendered(
+    return rendered(
         "measured.html", command, measured=measured, asked=parameters_of(measured.criteria), pictures=pictures
     )
 
 
-def _rendered(template: str, command: str, **names: object) -> str:
+def rendered(template: str, command: str, **names: object) -> str:
+    """HTML page of a template; ``command`` is printed as the way to make it again."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("chaosgym.plotting"),
         autoescape=True,
@@ -279,7 +148,7 @@ def _rendered(template: str, command: str, **names: object) -> str:
         "command": command,
         "type_colours": TYPE_COLOURS,
         "value_of": quantity_of,
-        "tolerance_of": _tolerance,
+        "tolerance_of": tolerance_told,
         "newton": lambda value: f"{value:.2f} N",
         "life": life_told,
         "hours": hours_told,
@@ -337,7 +206,7 @@ def _pictures(study: DesignStudy) -> list[Picture]:
     exponent = found.criteria.life_exponent
     peaks = found.nominal.worse_side(exponent)
     pictures = [
-        _picture(
+        picture_of(
             _figure_of_peaks(peaks, exponent),
             "The nominal machine, the surface that fatigues faster: peak force of every cycle, and how often each "
             "force occurs.",
@@ -350,51 +219,54 @@ def _pictures(study: DesignStudy) -> list[Picture]:
             "Every change that was assessed over the tolerances. Filled: meets all criteria. No change off the line is "
             "better than one on it in cost, life and share of machines that meet."
         )
-        pictures.append(_picture(_drawn(lambda ax: figures.cost_against_life(improvement, ax)), caption))
+        pictures.append(picture_of(drawn_by(lambda ax: figures.cost_against_life(improvement, ax)), caption))
     if study.map is not None:
         caption = "Each square is a machine with its own tolerances around it. Box: the tolerances; circle: the design."
         region, result = study.assessment.region, study.map
-        pictures.append(_picture(_drawn(lambda ax: figures.type_map_around(result, region, ax)), caption))
+        pictures.append(picture_of(drawn_by(lambda ax: figures.type_map_around(result, region, ax)), caption))
     if study.life_over_speed is not None:
         trend = study.life_over_speed
         caption = (
             "Life relative to the lowest speed with contact. Dots: statistical mean life; bars: what the largest and "
             "the smallest peak alone would suggest. Dotted: the design."
         )
-        pictures.append(_picture(_drawn(lambda ax: figures.life_over_speed(trend, machine, ax)), caption))
+        pictures.append(picture_of(drawn_by(lambda ax: figures.life_over_speed(trend, machine, ax)), caption))
     caption = "Machines with deviations spread over all tolerances at once, each from rest, by its own statistics."
-    pictures.append(_picture(_drawn(lambda ax: figures.series_life(found, ax)), caption))
+    pictures.append(picture_of(drawn_by(lambda ax: figures.series_life(found, ax)), caption))
     caption = "Contact stress at the peak of every cycle, beside the scatter of the strength."
-    pictures.append(_picture(_drawn(lambda ax: figures.stress_against_strength(found, ax)), caption))
+    pictures.append(picture_of(drawn_by(lambda ax: figures.stress_against_strength(found, ax)), caption))
     if found.trend.parameters:
         caption = (
             f"Least squares over the machines in tolerance; the trend leaves {100 * found.trend.unexplained:.1f} % "
             "unexplained. Red raises the force."
         )
-        pictures.append(_picture(_drawn(lambda ax: figures.sensitivities(found, ax)), caption))
+        pictures.append(picture_of(drawn_by(lambda ax: figures.sensitivities(found, ax)), caption))
     if study.combination.influences:
         caption = (
             "Share of the variance in which each parameter takes part, alone or with others (total index). Of "
             f"{study.combination.sampled} machines in the tolerances; lines: {100 * found.criteria.confidence:g} % "
             "intervals."
         )
-        pictures.append(_picture(_drawn(lambda ax: figures.total_indices(study.combination, ax)), caption))
+        pictures.append(picture_of(drawn_by(lambda ax: figures.total_indices(study.combination, ax)), caption))
         caption = "Machines built to the tolerances, over the parameter that matters most for the largest peak force."
-        pictures.append(_picture(_drawn(lambda ax: figures.scatter_of_series(found, study.combination, ax)), caption))
+        pictures.append(
+            picture_of(drawn_by(lambda ax: figures.scatter_of_series(found, study.combination, ax)), caption)
+        )
     if len(study.diagram.force):
         filled = study.cycles_to_fill
         shape = f"It has its shape from cycle {filled} on." if filled else "It has not yet its final shape."
         caption = f"Where the peak of each of {len(study.diagram.force)} cycles acts. {shape}"
-        pictures.append(_picture(_drawn(lambda ax: figures.impact_diagram(study.diagram, ax)), caption))
+        pictures.append(picture_of(drawn_by(lambda ax: figures.impact_diagram(study.diagram, ax)), caption))
     if (drive := machine.drive_torque) is not None:
         caption = "The nominal machine at constant speed, every gap in its middle."
-        pictures.append(_picture(_drawn(lambda ax: figures.drive_torque(drive, ax)), caption))
+        pictures.append(picture_of(drawn_by(lambda ax: figures.drive_torque(drive, ax)), caption))
     if found.nominal.period is None:
-        pictures.append(_picture(_figure_of_convergence(peaks, found.convergence.cycles), CONVERGENCE))
+        pictures.append(picture_of(_figure_of_convergence(peaks, found.convergence.cycles), CONVERGENCE))
     return pictures
 
 
-def _drawn(draw: Callable[[Axes], object]) -> Figure:
+def drawn_by(draw: Callable[[Axes], object]) -> Figure:
+    """A figure of one pair of axes."""
     with matplotlib.rc_context(STYLE):
         figure = figure_of()
         draw(figure.add_subplot())
@@ -416,14 +288,16 @@ def _figure_of_convergence(peaks: figures.Array, cycles: int) -> Figure:
     return figure
 
 
-def _picture(figure: Figure, caption: str, wide: bool = False) -> Picture:
+def picture_of(figure: Figure, caption: str, wide: bool = False) -> Picture:
+    """A figure for the page."""
     buffer = io.BytesIO()
     with matplotlib.rc_context(STYLE):
         figure.savefig(buffer, format="svg", metadata={"Date": None})
     return Picture(base64.b64encode(buffer.getvalue()).decode("ascii"), caption, wide)
 
 
-def _tolerance(found: Assessment, name: str) -> str:
+def tolerance_told(found: Assessment, name: str) -> str:
+    """Tolerance of a parameter, for people; empty without one."""
     if name not in found.region:
         return ""
     tolerance = found.region[name]

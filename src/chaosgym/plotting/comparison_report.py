@@ -1,0 +1,146 @@
+"""The comparison report: studies of several briefs side by side, and beside what was measured."""
+
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+
+from chaosgym.design.bearing import hours_of
+from chaosgym.design.fatigue import equivalent_force
+from chaosgym.design.measured import MeasuredPeaks
+from chaosgym.design.methodology import Assessment
+from chaosgym.design.study import DesignStudy
+from chaosgym.design.told import hours_told, listed, percent_told, share_told
+from chaosgym.machines.parameters import parameters_of, quantity_of
+from chaosgym.plotting import design as figures
+from chaosgym.plotting.design_report import HEADLINES, drawn_by, picture_of, rendered, tolerance_told
+
+
+def comparison_report(
+    studies: Mapping[str, DesignStudy], command: str = "", *, date: str = "", measured: MeasuredPeaks | None = None
+) -> str:
+    """HTML report of several studies side by side, by name of their brief, and beside what was measured."""
+    pictures = []
+    if measured is not None:
+        caption = (
+            "Share of cycles whose peak force is no larger. Measured, and of each brief's nominal machine on its worse "
+            "surface; band: the machines built to its tolerances."
+        )
+        nominal = {name: study.assessment for name, study in studies.items()}
+        drawn = drawn_by(partial(figures.peaks_beside, measured.peaks, nominal))
+        pictures.append(picture_of(drawn, caption))
+    for name, study in studies.items():
+        drawn = drawn_by(partial(figures.series_life, study.assessment))
+        pictures.append(picture_of(drawn, f"{name}: life of each machine built to the tolerances."))
+    return rendered(
+        "comparison.html",
+        command,
+        studies=studies,
+        measured=measured,
+        names=[*studies, *([MEASURED] if measured is not None else [])],
+        rows=comparison_rows(studies, measured),
+        agreement=None if measured is None else agreement(studies, measured),
+        differing=_differing(studies),
+        pictures=pictures,
+        date=date,
+    )
+
+
+MEASURED = "measured"
+"""Name of the column of a recording."""
+
+NOTHING = "–"
+"""What stands where there is nothing to tell."""
+
+
+def comparison_rows(studies: Mapping[str, DesignStudy], measured: MeasuredPeaks | None = None) -> dict[str, list[str]]:
+    """What each study found, by quantity, as texts for people; what was measured comes last."""
+    columns = [_column(study) for study in studies.values()]
+    if measured is not None:
+        columns.append(_measured_column(measured, next(iter(studies.values()))))
+    return {name: [column.get(name, NOTHING) for column in columns] for name in columns[0]}
+
+
+def agreement(studies: Mapping[str, DesignStudy], measured: MeasuredPeaks) -> str:
+    """Which briefs' machines in the tolerances have equivalent forces on both sides of the measured one, for people."""
+    force, around = measured.evaluation.force, []
+    for name, study in studies.items():
+        forces = _forces(study.assessment)
+        if min(forces) <= force <= max(forces):
+            around.append(name)
+    return (
+        f"The equivalent force measured, {force:.1f} N, lies within what machines in the tolerances of "
+        f"{listed(around) or 'no brief'} have"
+    )
+
+
+def _forces(found: Assessment) -> list[float]:
+    """Equivalent force [N] of the nominal machine and of each one of the series."""
+    exponent = found.criteria.life_exponent
+    return [equivalent_force(run.worse_side(exponent), exponent) for run in (found.nominal, *found.series.runs)]
+
+
+def _column(study: DesignStudy) -> dict[str, str]:
+    found = study.assessment
+    value, machine, period = found.evaluation, found.machine, found.cycle_period
+    exponent = found.criteria.life_exponent
+    best = study.improvement.best if study.improvement else None
+    meeting = study.combination.meeting
+    forces = _forces(found)
+    return {
+        "verdict": HEADLINES[found.verdict][1],
+        "machine": machine.name,
+        "speed": quantity_of(machine, machine.speed_field),
+        "clearance": quantity_of(machine, machine.clearance_field),
+        "nominal response": found.nominal.nature,
+        "type over the tolerances": found.type,
+        "machines in the tolerances": found.series.told.partition(" of ")[0],
+        "life in operation": hours_told(hours_of(value.life_interval.low, period)),
+        "life required": hours_told(hours_of(found.criteria.life, period)),
+        "reliability": share_told(value.reliability_interval.low),
+        "mean peak force, nominal": f"{np.mean(found.nominal.worse_side(exponent)):.1f} N",
+        "largest peak force": f"{value.largest_force:.1f} N",
+        "equivalent force": f"{value.force:.1f} N",
+        "equivalent force of each machine": f"{min(forces):.1f} to {max(forces):.1f} N",
+        "load rating needed": f"{value.required_load_rating:.0f} N",
+        "probability of meeting life and reliability": f"{percent_told(meeting.share)} "
+        f"({percent_told(meeting.low)} to {percent_told(meeting.high)})",
+        "cheapest change that suffices": "none needed" if study.improvement is None else best.told if best else "none",
+    }
+
+
+def _measured_column(measured: MeasuredPeaks, study: DesignStudy) -> dict[str, str]:
+    """The same quantities of a recording, at the speed and by the criteria of the first study."""
+    value, found = measured.evaluation, study.assessment
+    period = found.machine.cycle_period
+    told = {
+        "machine": measured.source.get("file", MEASURED),
+        "nominal response": measured.verdict.diagnosis.nature,
+        "life in operation": hours_told(hours_of(value.life_interval.low, period)),
+        "life required": hours_told(hours_of(found.criteria.life, period)),
+        "mean peak force, nominal": f"{np.mean(measured.peaks):.1f} N",
+        "largest peak force": f"{value.largest_force:.1f} N",
+        "equivalent force": f"{value.force:.1f} N",
+        "load rating needed": f"{value.required_load_rating:.0f} N",
+    }
+    if measured.strength_stated:
+        told["reliability"] = share_told(value.reliability_interval.low)
+    return told
+
+
+def _differing(studies: Mapping[str, DesignStudy]) -> dict[str, list[str]]:
+    """Parameters with their tolerances, and criteria, that are not the same in all studies."""
+    columns = []
+    for study in studies.values():
+        found = study.assessment
+        column = {
+            name: f"{quantity_of(found.machine, name)} {tolerance_told(found, name)}".strip()
+            for name in parameters_of(found.machine)
+        }
+        columns.append(
+            column
+            | {name: quantity_of(found.criteria, name) for name in parameters_of(found.criteria) if name != "life"}
+        )
+    names = dict.fromkeys(name for column in columns for name in column)
+    table = {name: [column.get(name, NOTHING) for column in columns] for name in names}
+    return {name: cells for name, cells in table.items() if len(set(cells)) > 1}
