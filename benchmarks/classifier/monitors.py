@@ -1,4 +1,4 @@
-"""How soon monitors see a change, and how often they cry wolf: false alarms, delays, harmless changes.
+"""Delays, false alarms and alarms at harmless changes of monitors of peak forces.
 
 The shipped monitor, the same cumulative sum of one lag, the repeat rule and permutation entropy on sliding windows, and
 the learned probability of an irregular window.

@@ -1,4 +1,4 @@
-"""The race against Exudyn: how much faster this package is, and whether both reach the same verdicts.
+"""Comparison with Exudyn: cycles a second of both programs, and whether both reach the same verdicts.
 
 Cycles per second of processor time, on one thread, without recording; beside them how often the response is judged
 right: periodic with the right period, or not. Both start from rest and are judged by the same rule after as many

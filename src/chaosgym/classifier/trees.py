@@ -84,7 +84,7 @@ def forest_of(model: Any) -> Forest:
 
 
 def _side_by_side(nodes: Any, start: int) -> tuple[Any, ...]:
-    """Columns of one tree's nodes, numbered from ``start`` and so that a right child follows its left sister."""
+    """Columns of one tree's nodes, numbered from ``start`` and so that a right child follows its left sibling."""
     order, places = [0], [0]
     while places:
         node = nodes[places.pop(0)]

@@ -159,7 +159,7 @@ def compare(
     progress: bool = False,
     **keywords: Any,
 ) -> pa.Table:
-    """Let everybody play, and keep a row a job in one Parquet file; jobs that it holds already are not run again.
+    """Run all contenders, and keep a row a job in one Parquet file; jobs that it holds already are not run again.
 
     Parameters
     ----------

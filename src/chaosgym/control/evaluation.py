@@ -161,7 +161,7 @@ def evaluate(
     progress: bool = False,
     **keywords: Any,
 ) -> Evaluation:
-    """Let a policy play machines that are kept for evaluation, and score it.
+    """Run a policy on machines that are kept for evaluation, and score it.
 
     Parameters
     ----------

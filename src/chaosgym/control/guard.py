@@ -54,7 +54,7 @@ class GuardedPolicy(Controller):
         return getattr(self.policy, "keywords", {}) | super().keywords
 
     def begin(self, envs: Any) -> None:
-        """Trust the policy.
+        """Begin with the policy.
 
         Raises
         ------

@@ -21,7 +21,7 @@ CONFIDENCE = 0.95
 
 
 def bootstrap_interval(count: int, statistic: Callable[[NDArray[np.int64]], Array], seed: int = 0) -> Array:
-    """Percentile interval (2,) of a statistic of ``count`` things, drawn again and again with replacement.
+    """Percentile bootstrap interval (2,) of a statistic of ``count`` items.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ def __getattr__(name: str) -> Any:
 
 
 def register_environments() -> None:
-    """Make the environments of every registered machine known to ``gymnasium.make``; again does nothing new."""
+    """Make the environments of every registered machine known to ``gymnasium.make``; a second call changes nothing."""
     for machine in MACHINES:
         for task, keywords in TASKS.items():
             _register(f"chaosgym/{MACHINES.class_name(machine)}{task}-v1", {"machine": machine, **keywords})

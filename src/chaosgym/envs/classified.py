@@ -12,11 +12,11 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 UNKNOWN = 0.5
-"""Probability where fewer cycles were felt at a speed than the classifier reads."""
+"""Probability where fewer cycles were measured at a speed than the classifier reads."""
 
 
 class RecordsAtSpeed:
-    """The peaks that N jobs felt since they last changed their speed, at most the 64 latest, and what they mean.
+    """The peaks of N jobs since they last changed their speed, at most the 64 latest, and what they mean.
 
     Parameters
     ----------

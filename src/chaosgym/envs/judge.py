@@ -45,7 +45,7 @@ class Judge(Protocol):
     """Judge of irregular motion of N machines."""
 
     def start(self, which: Indices) -> None:
-        """Forget the machines ``which`` (k,)."""
+        """Begin anew for the machines ``which`` (k,)."""
         ...
 
     def verdict(self, which: Indices, growth: Array, peaks: Array) -> tuple[Array, Array]:
@@ -66,7 +66,7 @@ class ExponentJudge:
         self._exponent = np.zeros(count)
 
     def start(self, which: Indices) -> None:
-        """Forget the machines ``which`` (k,)."""
+        """Begin anew for the machines ``which`` (k,)."""
         self._exponent[which] = 0.0
 
     def verdict(self, which: Indices, growth: Array, peaks: Array) -> tuple[Array, Array]:
@@ -83,7 +83,7 @@ class RecurrenceJudge:
         self._recent = np.full((count, WINDOW), np.nan)
 
     def start(self, which: Indices) -> None:
-        """Forget the machines ``which`` (k,)."""
+        """Begin anew for the machines ``which`` (k,)."""
         self._recent[which] = np.nan
 
     def verdict(self, which: Indices, growth: Array, peaks: Array) -> tuple[Array, Array]:

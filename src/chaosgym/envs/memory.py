@@ -44,7 +44,7 @@ _REPEATS = [_PLACE[name] for name in ("repeat_1", "repeat_2", "repeat_4")]
 
 
 def irregularity(observations: NDArray[Any]) -> Array:
-    """How much measured peaks miss themselves, (...) [N], at the best of periods 1, 2 and 4; (..., 14) in.
+    """Mean difference of peaks a period apart, (...) [N], least over periods 1, 2, 4, of observations (..., 14).
 
     Sensor errors of half width e alone make it 2 e / 3, whatever the period.
     """

@@ -202,7 +202,7 @@ class Dashboard:
             artist.set_animated(True)
 
     def _make_room(self, samples: Array, room: Array) -> None:
-        """Let the axes grow where something has left them; the ground is then drawn anew."""
+        """Widen the axes that something has left; the background is then drawn anew."""
         reached = {
             "displacement": max(
                 1.1 * float(np.abs(room[np.isfinite(room)]).max()), 1e3 * float(np.abs(samples[:, 0]).max())

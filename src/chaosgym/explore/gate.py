@@ -45,7 +45,7 @@ def _is_text(query: str) -> bool:
 
 
 def _is_news(record: logging.LogRecord) -> bool:
-    """False for what is said of a tab that was closed."""
+    """False for messages about a tab that was closed."""
     error = record.exc_info[1] if record.exc_info else None
     gone = isinstance(error, WebSocketClosedError | StreamClosedError) or _asks_for_its_session(error)
     return not (gone or "connection was closed" in record.getMessage() or record.name == "tornado.access")

@@ -199,7 +199,7 @@ class Page:
             box.update(**{field: 1e3 * place if math.isfinite(place) else None}, visible=math.isfinite(place))
 
     def _start_diagram(self) -> None:
-        """Begin the orbit diagram anew; it fills while the page stays alive to the sliders."""
+        """Begin the orbit diagram anew; it fills speed by speed, and the sliders work meanwhile."""
         self._orbit = orbit_diagram(self.machine, self._sliders[0])
         self._sources["orbit"].data = {"speed": [], "peak": []}
         self._speed_axis.axis_label = self._sliders[0].label

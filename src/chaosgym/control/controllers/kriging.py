@@ -100,7 +100,7 @@ class Kriging(Controller):
         self.price = price
 
     def begin(self, envs: Any) -> None:
-        """Know nothing."""
+        """Begin without measurements."""
         grid = self.task.grid
         self._priors = _priors(grid)
         self._chosen = [self._priors[0]] * self.count

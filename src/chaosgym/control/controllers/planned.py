@@ -11,7 +11,7 @@ from chaosgym.envs.judge import MISS, recurrence_miss
 
 
 class Follow(Controller):
-    """Does what is demanded."""
+    """Runs at the demand."""
 
     def speeds(self, observations: Observations) -> Array:
         """The demand."""

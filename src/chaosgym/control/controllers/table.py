@@ -111,7 +111,7 @@ class Table(Controller):
         self.tables = tables
 
     def begin(self, envs: Any) -> None:
-        """Hold all classes for equally likely."""
+        """Start from a uniform prior over the classes of clearance."""
         self._fit, self._last = np.zeros((self.count, CLASSES)), np.full(self.count, np.nan)
 
     def speeds(self, observations: Observations) -> Array:

@@ -27,7 +27,7 @@ BASE = "base"
 """Point whose shape is the participation of each mode in a motion of the base [kg^1/2]."""
 
 HIGHEST = 1e5
-"""Highest natural frequency [Hz] that a machine with clearance is believed to have."""
+"""Highest natural frequency [Hz] that is accepted; a higher one is taken for a wrong unit."""
 
 MOST_MODES = 1000
 MASSES, COMPLIANCES = (1e-12, 1e12), (1e-18, 1e3)
