@@ -134,6 +134,8 @@ def _run(line: str, folder: Path) -> str:
 
 def _last_part(name: str) -> str:
     text, notes = options(name), []
+    text = re.sub(r"^(Usage: .*\n(?: {9,}.*\n)*)\n(?:  \S.*\n)+", r"\1", text, count=1)  # the summary heads the page
+    text = re.sub(r"\n  --help  +Show this message and exit\.", "", text).replace("Options:\n\n", "")
     for home, (whose, names) in SHARED.items():
         listed = rf"^  (?:{'|'.join(sorted(names))}) .*\n(?:  {{9,}}.*\n)*"
         short = text if name == home else re.sub(listed, "", text, flags=re.MULTILINE)
