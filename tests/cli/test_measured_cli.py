@@ -212,8 +212,8 @@ def test_millimetres_taken_for_metres_and_no_contact_are_said():
 def test_commands_of_the_documentation_run(tmp_path, monkeypatch):
     """Three commands from the sample to a report, one that makes such a file, both sensors, and the model beside it."""
     root = Path(__file__).parent.parent.parent
-    section = (root / "docs" / "diagnosis.md").read_text().split("## Measured data")[1]
-    commands = [shlex.split(line)[1:] for line in re.findall(r"^    (chaosgym .*)$", section, re.MULTILINE)]
+    page = (root / "docs" / "recordings.md").read_text()
+    commands = [shlex.split(line)[1:] for line in re.findall(r"^    (chaosgym .*)$", page, re.MULTILINE)]
     assert [command[0] for command in commands] == [
         "diagnose",
         "classify",

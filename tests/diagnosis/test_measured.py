@@ -44,7 +44,7 @@ def share(counts, row, what, where=(True, False)):
 
 
 def show(counts):
-    """Print the table, as in docs/diagnosis.md."""
+    """Print the table, as in docs/recordings.md."""
     print("| records | in reach:", " | ".join(ANSWERS), "| others:", " | ".join((*ANSWERS, "within")), "|")
     for row in dict.fromkeys(row for row, _, _ in counts):
         columns = [counts.get((row, where, what), 0) for where in (True, False) for what in (*ANSWERS, "within")]
