@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import wasserstein_distance
 
+from chaosgym.design.improve import not_dominated
 from chaosgym.diagnosis.response_type import SHARES, default_tolerances
 from chaosgym.diagnosis.two_step import two_step_test
 from chaosgym.diagnosis.type_rule import Neighbour, judge_type
@@ -326,13 +327,9 @@ def _peak_errors(peaks: Array, truth: Array) -> tuple[float, float, float, float
 
 def _with_front(rows: Sequence[TradeoffRow], points: int) -> list[TradeoffRow]:
     """The rows, those that no other row beats in both cost and Wasserstein distance marked."""
-    full = [row for row in rows if row.points == points and row.wasserstein is not None]
-    costs = np.array([[row.microseconds_per_cycle, row.wasserstein] for row in full])
-    front = {
-        id(row)
-        for row, own in zip(full, costs, strict=True)
-        if not np.any(np.all(costs <= own, axis=1) & np.any(costs < own, axis=1))
-    }
+    full = [(row, row.wasserstein) for row in rows if row.points == points and row.wasserstein is not None]
+    kept = not_dominated([(-row.microseconds_per_cycle, -distance) for row, distance in full])
+    front = {id(row) for (row, _), keep in zip(full, kept, strict=True) if keep}
     return [replace(row, on_front=id(row) in front) for row in rows]
 
 
