@@ -10,7 +10,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import chaosgym
-from chaosgym.design.bending import Bending, Section, bending_life, stress_of_modes, stressed
+from chaosgym.design.bending import bending_life, stressed
+from chaosgym.design.bent_section import Bending, Section, stress_of_modes
 from chaosgym.design.brief import brief_from, template
 from chaosgym.design.collective import assess_duty
 from chaosgym.design.fatigue import rainflow_means

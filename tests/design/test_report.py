@@ -14,7 +14,8 @@ import pytest
 import chaosgym
 from chaosgym.cli import main
 from chaosgym.design import Criteria, assess
-from chaosgym.design.bending import Bending, BendingLife, Section, stressed
+from chaosgym.design.bending import BendingLife, stressed
+from chaosgym.design.bent_section import Bending, Section
 from chaosgym.design.brief import brief_from, template
 from chaosgym.design.contradictions import contradictions
 from chaosgym.design.measured import evaluate_peaks

@@ -6,7 +6,7 @@ import pytest
 from chaosgym import ImpactBeam, simulate
 from chaosgym.diagnosis.run_up import run_up
 from chaosgym.errors import DiagnosisError
-from chaosgym.signals.columns import Sampling
+from chaosgym.signals.sampling import Sampling
 from chaosgym.signals.tachometer import turns_of
 
 RATE = 16_000.0

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 import chaosgym
 from chaosgym.cli import app
-from chaosgym.design.bending import Bending, Section, stress_of_modes
+from chaosgym.design.bent_section import Bending, Section, stress_of_modes
 from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_machine.varying import Spring, VaryingMachine, means
 from chaosgym.simulation.run import simulate_with_deviations

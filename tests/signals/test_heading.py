@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from chaosgym.errors import DiagnosisError
-from chaosgym.signals.columns import choose_force, choose_time, sampling
+from chaosgym.signals.columns import choose_force, choose_time
 from chaosgym.signals.cycles import peaks_of_series
 from chaosgym.signals.heading import split_unit
 from chaosgym.signals.read import read_recording
+from chaosgym.signals.sampling import sampling
 
 COUNT, STEP = 60, 5e-4
 TIME = np.arange(COUNT) * STEP

@@ -11,8 +11,9 @@ import pytest
 from scipy.io import savemat, wavfile
 
 from chaosgym.errors import DiagnosisError
-from chaosgym.signals.columns import choose_force, sampling
+from chaosgym.signals.columns import choose_force
 from chaosgym.signals.read import read_recording
+from chaosgym.signals.sampling import sampling
 
 RATE = 2000.0
 FORCE = 20.0 + 15.0 * np.sin(0.7 * np.arange(60))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from chaosgym.design.bearing import Criteria, variation_region
-from chaosgym.design.bending import Bending, fibres, read_bending
+from chaosgym.design.bent_section import Bending, fibres, read_bending
 from chaosgym.design.changes import default_changes
 from chaosgym.design.methodology import SERIES_SIZE
 from chaosgym.design.runs import deviating

@@ -28,7 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.design.bearing import Criteria, Evaluation, evaluate, hours_of, plain
-from chaosgym.design.bending import Bending, BendingLife, bending_life
+from chaosgym.design.bending import BendingLife, bending_life
+from chaosgym.design.bent_section import Bending
 from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.reliability import time_blocks
 from chaosgym.design.runs import DIAGNOSIS_BUDGET, NOMINAL_BUDGET, Series, SettledRun, build_series, settled_run

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.diagnosis.measured_sweep import FEWEST_SPEEDS, SweepTypes, judged_speed, sweep_types
-from chaosgym.signals.columns import Sampling
 from chaosgym.signals.cycles import CyclePeaks, cycle_peaks
 from chaosgym.signals.noise import stated_error
 from chaosgym.signals.orders import AngleSignal, OrderLine, OrderSpectra, ringing
+from chaosgym.signals.sampling import Sampling
 from chaosgym.signals.tachometer import Turns
 
 Array = NDArray[np.float64]
@@ -136,7 +136,7 @@ def run_up(
 
     Examples
     --------
-    >>> from chaosgym.signals.columns import Sampling
+    >>> from chaosgym.signals.sampling import Sampling
     >>> from chaosgym.signals.tachometer import turns_of
     >>> time = np.arange(20_000) / 1000.0
     >>> angle = 5.0 * time + 0.5 * time**2

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.errors import DiagnosisError
-from chaosgym.signals.columns import Sampling, Signal, choose_force, named_column, sampling
+from chaosgym.signals.columns import Signal, choose_force, named_column
 from chaosgym.signals.read import Recording
+from chaosgym.signals.sampling import Sampling, sampling
 from chaosgym.signals.tachometer import Turns, turns_of
 
 Array = NDArray[np.float64]
