@@ -49,6 +49,9 @@ KEPT = 128
 KEPT_STRUCTURES = 1024
 """Machines whose models are looked up by speed alone."""
 
+KEPT_STEPPED = 16
+"""Models for Taylor series that are kept: some hundred kB each."""
+
 KEPT_BYTES = 256_000_000
 """Memory for the propagators of machines at one speed; those used longest ago go first."""
 
@@ -232,8 +235,9 @@ def _even_powers(forcing: Array, rate: float) -> Array:
     return forcing if len(forcing) == 2 else np.stack([forcing[0] + rate * forcing[1], forcing[2]])
 
 
+@lru_cache(maxsize=KEPT_STEPPED)
 def stepped_model(machine: "BinnedMachine", step_phase: float) -> TaylorModel:
-    """Model of any machine for Taylor series.
+    """Model of any machine for Taylor series; kept for the last machines, which a search asks for again and again.
 
     A closed contact turns by ``step_phase`` / 4 in a piece of a series; half of it leaves a sixteenth of the error.
     """

@@ -145,7 +145,7 @@ class Mechanism:
         every = [Row(joint, motion) for joint in self.joints for motion in joint.rows]
         return [row for row in every if not row.opened] + [row for row in every if row.opened]
 
-    @property
+    @cached_property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the coordinates p of the small motion: gaps, then what bends."""
         gaps = [str(row) for row in self.rows() if row.opened]
