@@ -121,7 +121,7 @@ def test_commands_print_what_their_pages_show(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["1-recording", "2-map", "3-agent", "4-trust"])
+@pytest.mark.parametrize("name", ["1-recording", "2-map", "3-agent", "4-trust", "5-compressor"])
 def test_tutorials_run(name):
     """A tutorial runs from its first cell to its last, and prints what its page shows, word for word."""
     import nbformat
