@@ -120,6 +120,18 @@ def test_commands_print_what_their_pages_show(tmp_path):
     assert differing == []
 
 
+def test_tutorials_have_pictures():
+    """Each notebook shows what its script draws."""
+    import nbformat
+
+    for script in (ROOT / "docs" / "tutorials").glob("*.py"):
+        outputs = [
+            each for cell in nbformat.read(script.with_suffix(".ipynb"), 4).cells for each in cell.get("outputs", ())
+        ]
+        drawn = sum("image/png" in each.get("data", ()) for each in outputs)
+        assert drawn >= script.read_text("utf-8").count("plt.show()") > 0, script
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["1-recording", "2-map", "3-agent", "4-trust", "5-compressor"])
 def test_tutorials_run(name):

@@ -3,6 +3,7 @@
 python -m benchmarks.documentation.tutorials docs/tutorials [NAME ...]
 """
 
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,9 @@ from chaosgym.files import write_atomically
 
 SECONDS = 600
 """Longest time of a cell; the first one may have to compile kernels."""
+
+INLINE = "module://matplotlib_inline.backend_inline"
+"""What draws pictures into a notebook, whatever draws elsewhere."""
 
 
 def executed(script: Path) -> Any:
@@ -28,7 +32,7 @@ def executed(script: Path) -> Any:
         coalesce_streams=True,
         resources={"metadata": {"path": script.parent}},
     )
-    client.execute()
+    client.execute(env={**os.environ, "MPLBACKEND": INLINE})
     return notebook
 
 

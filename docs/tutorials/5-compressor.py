@@ -28,7 +28,6 @@ import chaosgym
 from chaosgym.design.brief import read_brief
 from chaosgym.design.methodology import assess
 from chaosgym.machines.machine_file import template
-from chaosgym.plotting.commands import machine_figure
 
 os.chdir(tempfile.mkdtemp())
 text = template("compressor")
@@ -58,7 +57,8 @@ with open("compressor.toml", "w", encoding="utf-8") as file:
 
 # %%
 compressor = chaosgym.read_machine("compressor.toml")
-machine_figure(compressor)
+figure, panels = plt.subplots(2, 4, figsize=(9, 4.5), layout="constrained")
+compressor.draw_poses(panels.ravel())
 plt.show()
 
 # %% [markdown]
