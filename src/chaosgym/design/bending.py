@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chaosgym.design.bearing import hours_of
 from chaosgym.design.bent_section import Bending, fibres, stress_of_modes
@@ -25,8 +25,6 @@ from chaosgym.design.told import hours_told
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.simulation import parallel_map, simulate
 from chaosgym.simulation.modal_history import modal_history
-
-Array = NDArray[np.float64]
 
 CYCLES = 32
 """Operating cycles of a settled response over which stresses are counted."""

@@ -8,30 +8,10 @@ the clearance for a length.
 import math
 from collections.abc import Container, Iterable, Mapping
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chaosgym.diagnosis import default_tolerances
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
-
-Array = NDArray[np.float64]
-
-CLEARANCE_FACTORS = (0.75, 0.5, 0.25)
-
-DAMPING_FACTORS = (2.0, 4.0)
-
-SPEED_FACTORS = (0.8, 0.9, 1.1)
-
-SECTION_FACTORS = (1.1, 1.25)
-
-STIFFNESS_FACTORS = (0.5,)
-
-MASS_FACTORS = (0.8,)
-
-PRELOAD_FACTORS = (1.5, 2.0)
-"""Factors that are tried by default."""
 
 SECTION_FIELDS = ("height", "rod_diameter", "frequency_factor")
 """Fields that make a member stiffer."""
@@ -51,13 +31,13 @@ def default_changes(machine: Machine) -> dict[str, tuple[float, ...]]:
     mass, more preload. Without values, as for a preload of zero, the search finds its own.
     """
     known = parameters_of(machine)
-    factors: dict[str, tuple[float, ...]] = {machine.clearance_field: CLEARANCE_FACTORS}
-    factors |= {name: DAMPING_FACTORS for name in default_tolerances(machine) if "damping" in name}
-    factors[machine.speed_field] = SPEED_FACTORS
-    factors |= {name: SECTION_FACTORS for name in SECTION_FIELDS if name in known}
-    factors |= {name: STIFFNESS_FACTORS for name in known if _of_contact(name, known) and getattr(machine, name) > 0.0}
-    factors |= {name: MASS_FACTORS for name in MASS_FIELDS if name in known}
-    factors |= {name: PRELOAD_FACTORS for name in known if name.endswith("preload")}
+    factors: dict[str, tuple[float, ...]] = {machine.clearance_field: (0.75, 0.5, 0.25)}
+    factors |= {name: (2.0, 4.0) for name in default_tolerances(machine) if "damping" in name}
+    factors[machine.speed_field] = (0.8, 0.9, 1.1)
+    factors |= {name: (1.1, 1.25) for name in SECTION_FIELDS if name in known}
+    factors |= {name: (0.5,) for name in known if _of_contact(name, known) and getattr(machine, name) > 0.0}
+    factors |= {name: (0.8,) for name in MASS_FIELDS if name in known}
+    factors |= {name: (1.5, 2.0) for name in known if name.endswith("preload")}
     return {
         name: tuple(_rounded(getattr(machine, name) * factor, 4) for factor in row if getattr(machine, name))
         for name, row in factors.items()

@@ -6,14 +6,11 @@ each other, and steps along it are short. The section then moves to the middle o
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chaosgym.core import status
 from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily, OrbitPoint
 from chaosgym.diagnosis.periodic_orbit import PRECISE
 from chaosgym.errors import ParameterError, SimulationError
-
-Array = NDArray[np.float64]
 
 SAMPLES = 256
 """Instants of a cycle at which it is seen whether a surface presses."""

@@ -12,9 +12,7 @@ V. Robins, J. D. Meiss, E. Bradley, Computing connectedness: disconnectedness an
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-Array = NDArray[np.float64]
+from numpy.typing import ArrayLike
 
 Shape = Literal["closed curve", "set with structure", "too few points"]
 
