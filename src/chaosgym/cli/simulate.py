@@ -129,6 +129,9 @@ def show(machine: Any, markdown: bool, plot: str | None, as_json: bool) -> None:
     drive = machine.drive_torque
     if drive is not None:
         result["drive"] = drive.as_dict()
+    motor = machine.under_motor() if machine.has_motor else None
+    if motor is not None:
+        result["motor"] = motor.as_dict()
 
     def lines() -> list[str]:
         rows = []
@@ -143,7 +146,7 @@ def show(machine: Any, markdown: bool, plot: str | None, as_json: bool) -> None:
         for name in ("degrees_of_freedom", "sensors"):
             if names := getattr(machine, name):
                 rows.append(f"{len(names)} {name.replace('_', ' ')}: {', '.join(names)}")
-        return rows if drive is None else [*rows, *drive.told]
+        return [*rows, *(() if drive is None else drive.told), *(() if motor is None else (motor.told,))]
 
     drawn: list[str] = []
     draw(picture, lambda plots: plots.machine_figure(machine), result, drawn)

@@ -142,8 +142,10 @@ class DesignStudy:
     @property
     def drive_told(self) -> tuple[str, ...]:
         """Torque and power of the drive at the nominal speed, for people; none for a machine that tells no torque."""
-        drive = self.assessment.machine.drive_torque
-        return () if drive is None else drive.told
+        machine: Any = self.assessment.machine
+        drive = machine.drive_torque
+        motor = (machine.under_motor().told,) if machine.has_motor else ()
+        return () if drive is None else (*drive.told, *motor)
 
     @property
     def dearer(self) -> tuple[Trial, ...]:
@@ -168,7 +170,8 @@ class DesignStudy:
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         found, lives = self.improvement, self.assessment.evaluation.life_interval
-        drive = self.assessment.machine.drive_torque
+        machine: Any = self.assessment.machine
+        drive = machine.drive_torque
         return {
             "chaosgym": __version__,
             "seed": self.seed,
@@ -189,6 +192,7 @@ class DesignStudy:
                 )
             ],
             "drive": None if drive is None else drive.as_dict(),
+            "motor": machine.under_motor().as_dict() if machine.has_motor else None,
             "combination": self.combination.as_dict(),
             "guidelines": [one._asdict() for one in self.guidelines],
             "margins": None if self.margins is None else self.margins.as_dict(),

@@ -130,6 +130,8 @@ class Machine(ABC):
 
     tolerances: ClassVar[Mapping[str, tuple[float, bool]]] = {}
     """Half width of each field within which machines are built, and whether it is a share; usual ones if empty."""
+    has_motor: ClassVar[bool] = False
+    """Whether a motor turns it, so that ``under_motor`` of a mechanism tells its speed."""
     task_defaults: ClassVar[TaskDefaults] = TaskDefaults()
     """What environments start from, where the usual does not serve."""
 

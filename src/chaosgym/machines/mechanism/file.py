@@ -41,7 +41,7 @@ def tables_of(values: Mapping[str, Any], _folder: Path) -> dict[str, Any]:
         if name not in values:
             raise ParameterError(f"[{name}] is missing" if name != "joint" else "[[joint]] is missing")
     data: dict[str, Any] = {"": KEYS.checked("", values)}
-    for path in ("ground", "operation", "tolerances", "job"):
+    for path in ("ground", "motor", "operation", "tolerances", "job"):
         data[path] = KEYS.checked(path, values.get(path, {}))
     data["ground.points"] = _points("ground", values["ground"])
     if not isinstance(values["link"], dict) or not values["link"]:
@@ -271,10 +271,16 @@ def built(path: str, digest: str, data: Mapping[str, Any], _folder: Path) -> typ
     operation = data["operation"]
     speed, *ends = needed("operation", operation, "speed", "speed_range", "clearance_range")
     mechanism, clearances = mechanism_of(data)
+    motor = (
+        (*needed("motor", data["motor"], "stall_torque", "no_load_speed"), data["motor"].get("inertia", 0.0))
+        if data["motor"]
+        else None
+    )
     made = machine_of(
         mechanism,
         clearances,
         monitored=operation.get("monitored", ""),
+        motor=motor,
         about={"provenance": "stated", "source": path},
         namespace={"name": path, "__doc__": data[""].get("title", path), "__reduce__": reduced},
         definition=parameter(digest, choices=(digest,), provenance="stated", source=path),

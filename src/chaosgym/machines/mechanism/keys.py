@@ -9,7 +9,7 @@ LIMITS = {
     "hertz exponent restitution law": "a surface is a linear spring and damper, or Hertzian: hertz_stiffness and "
     "hertz_damping in place of stiffness and damping",
     "gap backlash play radius": "clearance is how far the pin may leave the middle of its hole, or half a guide's gap",
-    "motor torque": "the crank turns at constant speed; the torque that this takes is a result",
+    "torque": "the torque that the crank takes is a result; that of a motor is [motor] stall_torque",
     "length": "a link's length is the distance of its points",
     "speed": "the speed of the crank stands in [operation]",
     "spherical universal cylindrical": "the mechanism is planar",
@@ -92,6 +92,11 @@ KEYS = Keys(
             "stiffness": Key("of the spring", "N/m"),
             "free_length": Key("without force", "m"),
             "damping": Key("of a damper beside it; none by default", "N s/m"),
+        },
+        "motor": {
+            "stall_torque": Key("at rest; falls in a straight line to none at no_load_speed", "N m"),
+            "no_load_speed": Key("at which it gives no torque", "rpm"),
+            "inertia": Key("of rotor and flywheel, at the crank; 0 by default", "kg m^2"),
         },
         "operation": {
             "speed": Key("of the crank, constant", "rpm"),

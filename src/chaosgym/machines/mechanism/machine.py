@@ -16,9 +16,10 @@ from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS, Contact, Held, 
 from chaosgym.machines.drive_torque import DriveTorque
 from chaosgym.machines.machine import Number, Option
 from chaosgym.machines.mechanism.beam import fibre_stress
-from chaosgym.machines.mechanism.equations import SmallMotion, drive_torque, loads, sliding, small_motion
+from chaosgym.machines.mechanism.equations import SmallMotion, crank_inertia, drive_torque, loads, sliding, small_motion
 from chaosgym.machines.mechanism.joints import ACROSS, ALONG, TURN, Joint
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism
+from chaosgym.machines.mechanism.motor import Load, Motor, MotorRun, turn
 from chaosgym.machines.mechanism.nominal import Revolution, places, revolution_of
 from chaosgym.machines.parameters import parameter
 
@@ -26,6 +27,9 @@ Array = NDArray[np.float64]
 
 SMALL = 0.02
 """Clearance as a share of a link's length beyond which motions in the gap are not small."""
+
+MOTOR_ANGLES = 90
+"""Steps of a revolution under the motor."""
 
 TORQUE_ANGLES = 720
 """Crank angles at which the torque of the drive is told."""
@@ -181,6 +185,37 @@ class MechanismMachine(BinnedMachine):
         """Torque of the drive over a revolution at the machine's speed; see ``Machine.drive_torque``."""
         powers = drive_torque(self._scaled(), self.revolution, 0.0, TORQUE_ANGLES)
         return DriveTorque(self.crank_rate ** np.arange(3) @ powers, self.crank_rate)
+
+    @property
+    def motor(self) -> Motor | None:
+        """The motor of the file; None where the speed is held constant."""
+        if not self.has_motor:
+            return None
+        stall, speed, inertia = (float(getattr(self, name)) for name in MOTOR_FIELDS)
+        return Motor(stall, self.rate_at(speed), inertia)
+
+    def under_motor(self, cycles: int | None = None, speed: float = 0.0) -> MotorRun:
+        """Run the crank under its motor, every gap in its middle; see ``motor.turn``.
+
+        Parameters
+        ----------
+        cycles
+            How many, or until the mean speed has settled.
+        speed
+            At the beginning [rpm].
+
+        Raises
+        ------
+        ParameterError
+            If the machine has no motor.
+        """
+        motor = self.motor
+        if motor is None:
+            raise ParameterError(f"{self.name} has no motor; allowed: a file with [motor]")
+        scaled, angles = self._scaled(), np.linspace(0.0, 2.0 * math.pi, MOTOR_ANGLES, endpoint=False)
+        still, viscous, _ = drive_torque(scaled, self.revolution, 0.0, MOTOR_ANGLES)
+        load = Load(crank_inertia(scaled, self.revolution, angles), still, viscous)
+        return turn(motor, load, self.rate_at(speed), cycles)
 
     def _scaled(self) -> Mechanism:
         """The mechanism with the factors of this machine."""
@@ -466,6 +501,14 @@ CLEARANCE_FIELDS: Mapping[str, dict[str, Any]] = {
 }
 
 
+MOTOR_FIELDS: Mapping[str, dict[str, Any]] = {
+    "motor_stall_torque": {"unit": "N m", "low": 1e-9, "high": 1e9},
+    "motor_no_load_speed": {"unit": "rpm", "low": 0.1, "high": 1e5},
+    "motor_inertia": {"unit": "kg m^2", "low": 0.0, "high": 1e9},
+}
+"""Fields of the motor: its torque at rest, its speed without load, rotor and flywheel at the crank."""
+
+
 def surface_fields(hertz: bool) -> tuple[str, str, str]:
     """Fields of clearance, stiffness and damping of a joint, without its name."""
     law = "hertz_" if hertz else ""
@@ -477,6 +520,7 @@ def machine_of(
     clearances: Mapping[str, Clearance],
     *,
     monitored: str = "",
+    motor: tuple[float, float, float] | None = None,
     about: Mapping[str, Any] | None = None,
     usual_ranges: Mapping[str, tuple[float, float]] | None = None,
     namespace: Mapping[str, Any] | None = None,
@@ -493,6 +537,8 @@ def machine_of(
         Of these joints, by their names.
     monitored
         Joint whose motion and force are recorded; the first with clearance if empty.
+    motor
+        Values of the ``MOTOR_FIELDS``; none for a speed that is held.
     about
         Provenance and source of what is given.
     usual_ranges
@@ -552,6 +598,8 @@ def machine_of(
     for name, given in clearances.items():
         for what, (value, described) in given.fields.items():
             fields[f"{name}_{what}"] = parameter(value, **described, **about)
+    for (what, described), value in zip(MOTOR_FIELDS.items(), motor or (), strict=motor is not None):
+        fields[what] = parameter(value, **described, **about)
     for link in mechanism.links:
         if link.mass.any() or link.inertia.any():
             fields[f"{link.name}_mass_factor"] = _assumed(1.0, "-", 1e-3, 1e3)
@@ -565,8 +613,9 @@ def machine_of(
     types: dict[str, Any] = {
         "stations": {name: given.stations for name, given in clearances.items()},
         "rubs": "".join(rubs),
+        "has_motor": motor is not None,
         "hertz": any(given.hertz for given in clearances.values()),
-        "beside_matrices": ("speed", *(f"{name}_clearance" for name in clearances)),
+        "beside_matrices": ("speed", *(f"{name}_clearance" for name in clearances), *(MOTOR_FIELDS if motor else ())),
         "usual_ranges": {"speed": usual["speed"], f"{watched}_clearance": usual["clearance"]},
         "options": _options(watched),
         **(namespace or {}),

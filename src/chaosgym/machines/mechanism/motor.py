@@ -1,0 +1,196 @@
+r"""Crank of a mechanism under a motor: run-up, mean speed and its swing, stall.
+
+Every gap stays in its middle, so that the crank alone moves, by
+
+    d/dtheta (J + I) w^2 / 2 = T_m (1 - w / w_0) - T_0 - T_1 w
+
+with the rotor and flywheel J, the inertia I(theta) of all links as the crank feels it, the motor's line from its stall
+torque T_m to its speed without load w_0, and what weight, gas and springs (T_0) and dampers (T_1) take at each angle.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chaosgym.errors import ParameterError
+
+Array = NDArray[np.float64]
+
+GRID = 1e-3
+"""Spacing of the speeds at which cycles are run, as a share: models of a machine are kept for each."""
+
+MOST_CYCLES = 20_000
+"""Cycles after which a speed that still changes is taken as it is."""
+
+SETTLED = 1e-5
+"""Share of the mean speed by which it may still change, as its last changes go on in a geometric series."""
+
+NEARLY = 0.99
+"""Share of the settled speed that ends a run-up."""
+
+LEAST = 1e-9
+"""Least inertia in a revolution, as a share of the largest."""
+
+
+class Motor(NamedTuple):
+    """A motor with a straight line of torque over speed, and what turns with it.
+
+    ``stall_torque`` [N m] at rest, ``no_load_rate`` [rad/s] at which it gives none, ``inertia`` [kg m^2] of rotor and
+    flywheel at the crank.
+    """
+
+    stall_torque: float
+    no_load_rate: float
+    inertia: float
+
+
+class Load(NamedTuple):
+    """What a motor turns at B equal steps of a revolution, from crank angle 0 on.
+
+    ``inertia`` (B,) [kg m^2] of the links at the crank; torque that resists: ``still`` (B,) [N m] whatever the speed,
+    ``viscous`` (B,) [N m s] in proportion to it.
+    """
+
+    inertia: Array
+    still: Array
+    viscous: Array
+
+
+class MotorRun(NamedTuple):
+    """Cycles of a crank under its motor.
+
+    Attributes
+    ----------
+    speed, lowest, highest : (cycles,)
+        Mean speed of each whole cycle, and its ends [rpm].
+    power : (cycles,)
+        Mean power of the motor [W].
+    stalled
+        Crank angle [deg] at which the crank stopped in the cycle after the last one; None if it went on.
+    """
+
+    speed: Array
+    lowest: Array
+    highest: Array
+    power: Array
+    stalled: float | None
+
+    @property
+    def operation(self) -> dict[str, Array]:
+        """Speeds for ``simulate``, to 0.1 %: a cycle that has a speed of before has its model."""
+        return {"speed": np.exp(np.rint(np.log(self.speed) / GRID) * GRID)}
+
+    @property
+    def swing(self) -> float:
+        """Highest less lowest speed of the last cycle, as a share of its mean."""
+        return float((self.highest[-1] - self.lowest[-1]) / self.speed[-1])
+
+    @property
+    def run_up_time(self) -> float:
+        """Time [s] until a cycle has 99 % of the last one's mean speed."""
+        turns = int(np.argmax(self.speed >= NEARLY * self.speed[-1])) + 1
+        return 60.0 * float(np.sum(1.0 / self.speed[:turns]))
+
+    def as_dict(self) -> dict[str, float | None]:
+        """Plain values for JSON, with their units; None of a crank that stalls, but for where."""
+        if self.stalled is not None:
+            return {
+                **dict.fromkeys(("speed_rpm", "swing", "power_W", "run_up_s")),
+                "stalled_deg": self.stalled,
+                "turns": len(self.speed),
+            }
+        return {
+            "speed_rpm": float(self.speed[-1]),
+            "swing": self.swing,
+            "power_W": float(self.power[-1]),
+            "run_up_s": self.run_up_time,
+            "stalled_deg": None,
+            "turns": len(self.speed),
+        }
+
+    @property
+    def told(self) -> str:
+        """A line for people, of a run from rest until it is settled."""
+        if self.stalled is not None:
+            return f"motor: from rest the crank stops at {self.stalled:.0f} deg after {len(self.speed)} whole turns"
+        return (
+            f"motor: settles at {self.speed[-1]:.4g} rpm, which swings by {100.0 * self.swing:.2g} % in a cycle; gives "
+            f"{self.power[-1]:.4g} W; from rest to {NEARLY:.0%} of that speed in {self.run_up_time:.2g} s"
+        )
+
+
+def turn(motor: Motor, load: Load, rate: float = 0.0, cycles: int | None = None) -> MotorRun:
+    """Turn a crank from angle 0 on.
+
+    Each step takes the trapezium of the torques; the speed at its end is the root of a quadratic.
+
+    Parameters
+    ----------
+    motor, load
+        What turns, and what is turned.
+    rate
+        Of the crank at the beginning [rad/s].
+    cycles
+        How many, or until the mean speed has settled.
+
+    Raises
+    ------
+    ParameterError
+        If nothing that turns has inertia.
+
+    Examples
+    --------
+    >>> from chaosgym.machines.mechanism.motor import Load, Motor, turn
+    >>> free = Load(np.zeros(90), np.zeros(90), np.zeros(90))
+    >>> round(float(turn(Motor(10.0, 100.0, 0.1), free).speed[-1] * np.pi / 30.0), 2)
+    100.0
+    """
+    steps = len(load.still)
+    width = 2.0 * math.pi / steps
+    slope = motor.stall_torque / motor.no_load_rate
+    nodes = [*range(steps), 0]
+    inertia = (motor.inertia + load.inertia)[nodes].tolist()
+    if min(inertia) <= LEAST * max(inertia):
+        where = math.degrees(inertia.index(min(inertia)) * width)
+        raise ParameterError(
+            f"nothing that turns has inertia at crank angle {where:.0f} deg; allowed: [motor] inertia above 0"
+        )
+    given = (motor.stall_torque - load.still)[nodes].tolist()
+    taken = (slope + load.viscous)[nodes].tolist()
+    speeds: list[tuple[float, float, float, float]] = []
+    while len(speeds) < (MOST_CYCLES if cycles is None else cycles):
+        time, work, low, high = 0.0, 0.0, rate, rate
+        for k in range(steps):
+            energy = 0.5 * inertia[k] * rate**2
+            half = 0.5 * width * taken[k + 1]
+            left = energy + 0.5 * width * (given[k] + given[k + 1] - taken[k] * rate)
+            square = half**2 + 2.0 * inertia[k + 1] * left
+            # a crank that does not gain from rest stands still
+            if left <= 0.0 or square <= 0.0:
+                return _run(speeds, math.degrees(k * width))
+            after = (math.sqrt(square) - half) / inertia[k + 1]
+            time += 2.0 * width / (rate + after)
+            work += 0.5 * width * (2.0 * motor.stall_torque - slope * (rate + after))
+            rate = after
+            low, high = min(low, rate), max(high, rate)
+        speeds.append((2.0 * math.pi / time, low, high, work / time))
+        if cycles is None and _settled([each[0] for each in speeds[-3:]]):
+            break
+    return _run(speeds, None)
+
+
+def _settled(last: list[float]) -> bool:
+    """Whether the last three mean speeds say that they hardly go on changing."""
+    if len(last) < 3:
+        return False
+    before, after = abs(last[1] - last[0]), abs(last[2] - last[1])
+    bound = SETTLED * last[2]
+    return after <= 1e-9 * last[2] or (after < before and after**2 / (before - after) < bound)
+
+
+def _run(cycles: list[tuple[float, float, float, float]], stalled: float | None) -> MotorRun:
+    mean, low, high, power = np.array(cycles).reshape(-1, 4).T
+    rpm = 30.0 / math.pi
+    return MotorRun(rpm * mean, rpm * low, rpm * high, power, stalled)
