@@ -181,6 +181,25 @@ def test_a_run_up_can_be_simulated(motored):
     np.testing.assert_allclose(tail.peak_force, record.peak_force[40:], rtol=1e-9)
 
 
+def test_what_a_motor_can_not_tell_is_not_told(motored):
+    """A flywheel that takes hours is not called settled; a swing beyond 5 % is told, with what it means for runs."""
+    slow = with_settings(motored(), {"motor_inertia": 1e9}).under_motor()
+    assert not slow.settled
+    assert slow.as_dict()["speed_rpm"] is None
+    assert "not settled after 20,000 turns" in slow.told
+    light = with_settings(motored(), {"motor_inertia": 0.01}).under_motor()
+    assert light.swing > 0.05
+    assert "so that runs at a constant speed are far from it" in light.told
+    assert "far from it" not in with_settings(motored(), {"motor_inertia": 0.5}).under_motor().told
+
+
+@pytest.mark.parametrize(("cycles", "speed"), [(0, 0.0), (-1, 0.0), (3, -50.0), (3, math.nan), (3, math.inf)])
+def test_a_run_out_of_range_is_refused(cycles, speed, motored):
+    """Whole cycles from 1 on, and a speed at the beginning from 0 on."""
+    with pytest.raises(ParameterError, match="is out of range; allowed"):
+        motored().under_motor(cycles, speed)
+
+
 def test_what_is_wrong_with_a_motor_is_told(motored, tmp_path):
     """Without a motor there is none to run; without inertia of the links and a flywheel nothing can be told."""
     with pytest.raises(ParameterError, match=r"has no motor; allowed: a file with \[motor\]"):
@@ -189,6 +208,8 @@ def test_what_is_wrong_with_a_motor_is_told(motored, tmp_path):
         motored(('no_load_speed = "1500 rpm"\n', ""))
     with pytest.raises(ParameterError, match="motor_inertia = -1 kg m\\^2 is out of range"):
         motored(("0.02 kg m^2", "-1 kg m^2"))
+    with pytest.raises(ParameterError, match=r"line is so steep .*; allowed: \[motor\] inertia from"):
+        with_settings(motored(), {"motor_stall_torque": 1e6}).under_motor()
     yoke = (FOLDER / "scotch-yoke.toml").read_text(encoding="utf-8")
     still = re.sub(r"\n\[operation\]", "\n" + MOTOR.replace("0.02 kg", "0 kg"), yoke)
     (tmp_path / "yoke.toml").write_text(still, encoding="utf-8")

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.errors import ParameterError
+from chaosgym.machines.numbers import number
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,12 @@ MOST_CYCLES = 20_000
 
 SETTLED = 1e-5
 """Share of the mean speed by which it may still change, as its last changes go on in a geometric series."""
+
+WIDE = 0.05
+"""Swing of the speed beyond which forces at a constant speed are off by more than 10 %."""
+
+LONGEST, FASTEST = 10**6, 1e5
+"""Most cycles, and highest speed [rpm] at the beginning."""
 
 NEARLY = 0.99
 """Share of the settled speed that ends a run-up."""
@@ -69,6 +76,8 @@ class MotorRun(NamedTuple):
         Mean power of the motor [W].
     stalled
         Crank angle [deg] at which the crank stopped in the cycle after the last one; None if it went on.
+    settled
+        Whether the mean speed of the last cycle is that of all to come, to 0.001 %.
     """
 
     speed: Array
@@ -76,6 +85,7 @@ class MotorRun(NamedTuple):
     highest: Array
     power: Array
     stalled: float | None
+    settled: bool
 
     @property
     def operation(self) -> dict[str, Array]:
@@ -94,30 +104,30 @@ class MotorRun(NamedTuple):
         return 60.0 * float(np.sum(1.0 / self.speed[:turns]))
 
     def as_dict(self) -> dict[str, float | None]:
-        """Plain values for JSON, with their units; None of a crank that stalls, but for where."""
-        if self.stalled is not None:
-            return {
-                **dict.fromkeys(("speed_rpm", "swing", "power_W", "run_up_s")),
-                "stalled_deg": self.stalled,
-                "turns": len(self.speed),
+        """Plain values for JSON, with their units; None for what a crank that stalls or does not settle has not."""
+        found = (
+            {
+                "speed_rpm": float(self.speed[-1]),
+                "swing": self.swing,
+                "power_W": float(self.power[-1]),
+                "run_up_s": self.run_up_time,
             }
-        return {
-            "speed_rpm": float(self.speed[-1]),
-            "swing": self.swing,
-            "power_W": float(self.power[-1]),
-            "run_up_s": self.run_up_time,
-            "stalled_deg": None,
-            "turns": len(self.speed),
-        }
+            if self.settled
+            else dict.fromkeys(("speed_rpm", "swing", "power_W", "run_up_s"))
+        )
+        return {**found, "stalled_deg": self.stalled, "turns": len(self.speed)}
 
     @property
     def told(self) -> str:
         """A line for people, of a run from rest until it is settled."""
         if self.stalled is not None:
             return f"motor: from rest the crank stops at {self.stalled:.0f} deg after {len(self.speed)} whole turns"
+        if not self.settled:
+            return f"motor: not settled after {len(self.speed):,} turns from rest, then at {self.speed[-1]:.4g} rpm"
+        wide = f"; beyond {WIDE:.0%}, so that runs at a constant speed are far from it" if self.swing > WIDE else ""
         return (
             f"motor: settles at {self.speed[-1]:.4g} rpm, which swings by {100.0 * self.swing:.2g} % in a cycle; gives "
-            f"{self.power[-1]:.4g} W; from rest to {NEARLY:.0%} of that speed in {self.run_up_time:.2g} s"
+            f"{self.power[-1]:.4g} W; from rest to {NEARLY:.0%} of that speed in {self.run_up_time:.2g} s{wide}"
         )
 
 
@@ -138,7 +148,8 @@ def turn(motor: Motor, load: Load, rate: float = 0.0, cycles: int | None = None)
     Raises
     ------
     ParameterError
-        If nothing that turns has inertia.
+        If cycles or rate are out of range, nothing that turns has inertia, or the motor's line is so steep that the
+        speed follows it within a step.
 
     Examples
     --------
@@ -147,6 +158,9 @@ def turn(motor: Motor, load: Load, rate: float = 0.0, cycles: int | None = None)
     >>> round(float(turn(Motor(10.0, 100.0, 0.1), free).speed[-1] * np.pi / 30.0), 2)
     100.0
     """
+    if cycles is not None:
+        number("cycles", cycles, 1, LONGEST)
+    rate = number("speed", rate * 30.0 / math.pi, 0.0, FASTEST, "rpm") * math.pi / 30.0
     steps = len(load.still)
     width = 2.0 * math.pi / steps
     slope = motor.stall_torque / motor.no_load_rate
@@ -156,6 +170,12 @@ def turn(motor: Motor, load: Load, rate: float = 0.0, cycles: int | None = None)
         where = math.degrees(inertia.index(min(inertia)) * width)
         raise ParameterError(
             f"nothing that turns has inertia at crank angle {where:.0f} deg; allowed: [motor] inertia above 0"
+        )
+    if 0.5 * width * slope > min(inertia) * motor.no_load_rate:
+        least = 0.5 * width * slope / motor.no_load_rate - min(load.inertia)
+        raise ParameterError(
+            f"the motor's line is so steep that the speed follows it within {math.degrees(width):g} deg; "
+            f"allowed: [motor] inertia from {least:.2g} kg m^2 on"
         )
     given = (motor.stall_torque - load.still)[nodes].tolist()
     taken = (slope + load.viscous)[nodes].tolist()
@@ -169,7 +189,7 @@ def turn(motor: Motor, load: Load, rate: float = 0.0, cycles: int | None = None)
             square = half**2 + 2.0 * inertia[k + 1] * left
             # a crank that does not gain from rest stands still
             if left <= 0.0 or square <= 0.0:
-                return _run(speeds, math.degrees(k * width))
+                return _run(speeds, math.degrees(k * width), False)
             after = (math.sqrt(square) - half) / inertia[k + 1]
             time += 2.0 * width / (rate + after)
             work += 0.5 * width * (2.0 * motor.stall_torque - slope * (rate + after))
@@ -178,7 +198,7 @@ def turn(motor: Motor, load: Load, rate: float = 0.0, cycles: int | None = None)
         speeds.append((2.0 * math.pi / time, low, high, work / time))
         if cycles is None and _settled([each[0] for each in speeds[-3:]]):
             break
-    return _run(speeds, None)
+    return _run(speeds, None, _settled([each[0] for each in speeds[-3:]]))
 
 
 def _settled(last: list[float]) -> bool:
@@ -190,7 +210,7 @@ def _settled(last: list[float]) -> bool:
     return after <= 1e-9 * last[2] or (after < before and after**2 / (before - after) < bound)
 
 
-def _run(cycles: list[tuple[float, float, float, float]], stalled: float | None) -> MotorRun:
+def _run(cycles: list[tuple[float, float, float, float]], stalled: float | None, settled: bool) -> MotorRun:
     mean, low, high, power = np.array(cycles).reshape(-1, 4).T
     rpm = 30.0 / math.pi
-    return MotorRun(rpm * mean, rpm * low, rpm * high, power, stalled)
+    return MotorRun(rpm * mean, rpm * low, rpm * high, power, stalled, settled)
