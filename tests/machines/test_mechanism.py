@@ -175,6 +175,16 @@ def test_nominal_motion_of_a_slider_crank_is_its_closed_form():
     np.testing.assert_allclose(z[:, mechanism.at["slider"].start], place, atol=1e-14)
 
 
+def test_a_revolution_may_begin_at_any_crank_angle():
+    """Equations at 40 angles from 460 deg on are those from 10 deg on, ten angles later."""
+    mechanism = four_bar()
+    revolution = revolution_of(mechanism)
+    here, there = (small_motion(mechanism, revolution, math.radians(first), 40) for first in (10.0, 100.0 + 360.0))
+    for one, other in zip(here, there, strict=True):
+        axis = 0 if one is here.mass else 1
+        assert_equal(np.roll(one, -10, axis), other, 1e-9)
+
+
 def test_a_published_four_bar_stands_where_it_is_said_to():
     """Coupler and rocker of siconos' FourBarClearance (Akhadkar, Acary, Brogliato 2016), to the gap of their joints."""
     mechanism = four_bar()

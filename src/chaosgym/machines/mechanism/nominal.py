@@ -231,13 +231,19 @@ def nominal(mechanism: Mechanism, revolution: Revolution, theta: Array) -> Nomin
         raise ParameterError(
             f"the loop is singular at crank angle {_degrees(worst)}: the mechanism is at a dead centre"
         )
-    return Nominal(z, np.asarray(inverse), np.asarray(condition))
+    return Nominal(_unwound(z, theta, where, revolution), np.asarray(inverse), np.asarray(condition))
+
+
+def _unwound(z: Array, theta: Array, where: Array, revolution: Revolution) -> Array:
+    """Coordinates of the first revolution, with the turns that links have made up to crank angles beyond it."""
+    return z + (theta - where)[:, None] * revolution.winding
 
 
 def places(mechanism: Mechanism, revolution: Revolution, theta: Array) -> Array:
     """``nominal(mechanism, revolution, theta).z`` alone, in half the time."""
-    z, last = _closed(_Loops(mechanism), revolution, np.mod(theta, 2.0 * np.pi))
-    return z if last <= LAST else nominal(mechanism, revolution, theta).z
+    where = np.mod(theta, 2.0 * np.pi)
+    z, last = _closed(_Loops(mechanism), revolution, where)
+    return _unwound(z, theta, where, revolution) if last <= LAST else nominal(mechanism, revolution, theta).z
 
 
 def _closed(loops: _Loops, revolution: Revolution, where: Array) -> tuple[Array, float]:
