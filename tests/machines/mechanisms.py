@@ -1,4 +1,4 @@
-"""Mechanisms by hand for tests: the thesis' crank with a rigid rod, and a four-bar."""
+"""Mechanisms by hand for tests: the thesis' crank, in the plane and in space, and a four-bar."""
 
 import math
 
@@ -8,6 +8,8 @@ from chaosgym.machines.mechanism.beam import Beam, beam_link
 from chaosgym.machines.mechanism.joints import Joint
 from chaosgym.machines.mechanism.links import Body, rigid_link
 from chaosgym.machines.mechanism.mechanism import Mechanism
+from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
+from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.slider_crank.connecting_rod import elastic_constants, rods_of
 
 
@@ -75,4 +77,77 @@ def four_bar(ground=3.0, crank=1.0, coupler=4.0, rocker=2.5, gravity=9.81, opene
         {"shaft": (0.0, 0.0), "pivot": (ground, 0.0)},
         (0.0, -gravity),
         **other,
+    )
+
+
+def thesis_crank_in_space(machine):
+    """Links and joints of a ``SliderCrank`` with a rigid rod, its motor at an angle."""
+    length, tilt, turned = machine.rod_length, math.radians(machine.motor_angle), math.radians(machine.gravity_angle)
+    line = machine.density * math.pi * machine.rod_diameter**2 / 4.0 * length
+    slender = line * length**2 / 12.0
+
+    def end(name):
+        """A body that turns like a unit vector along the rod."""
+        mass, inertia, x, y = (
+            getattr(machine, f"{name}_{what}") for what in ("mass", "inertia", "offset_along", "offset_across")
+        )
+        central = inertia - mass * (x**2 + y**2)
+        return SpatialBody(mass, (0.0, central, central), (x, y, 0.0))
+
+    x, y = machine.slider_offset_along, machine.slider_offset_across
+    roll = machine.slider_roll_inertia - machine.slider_mass * y**2
+    pitch = machine.slider_pitch_inertia - machine.slider_mass * (x**2 + y**2)
+    opened = {"ideal": (), "clearance": ("across", "sideways")}
+    opened["instrumented"] = (*opened["clearance"], "roll", "yaw", "pitch")
+    ball = () if machine.ball_joint == "ideal" else ("along", "across", "sideways")
+    x_axis, y_axis, z_axis = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    none = (0.0, 0.0, 0.0)
+    return SpatialMechanism(
+        (
+            spatial_link(
+                "crank", {"shaft": none, "pin": (machine.crank_radius, 0.0, 0.0)}, orientation=(0.0, tilt, 0.0)
+            ),
+            spatial_link(
+                "rod",
+                {"ball": none, "end": (length, 0.0, 0.0)},
+                (SpatialBody(line, (0.0, slender, slender), (length / 2.0, 0.0, 0.0)), end("housing")),
+            ),
+            spatial_link("yoke", {"pivot": none}, (end("yoke"),)),
+            spatial_link(
+                "slider", {"pivot": none}, (SpatialBody(machine.slider_mass, (roll, pitch, pitch), (x, y, 0.0)),)
+            ),
+        ),
+        (
+            Joint(
+                "motor",
+                "revolute",
+                ("ground", "shaft"),
+                ("crank", "shaft"),
+                driven=True,
+                first_axis=(math.sin(tilt), 0.0, math.cos(tilt)),
+                second_axis=z_axis,
+            ),
+            Joint(
+                "ball",
+                "spherical",
+                ("crank", "pin"),
+                ("rod", "ball"),
+                opened=ball,
+                first_axis=x_axis,
+                second_axis=x_axis,
+            ),
+            Joint("bearing", "revolute", ("rod", "end"), ("yoke", "pivot"), first_axis=y_axis, second_axis=y_axis),
+            Joint("yoke", "revolute", ("yoke", "pivot"), ("slider", "pivot"), first_axis=z_axis, second_axis=z_axis),
+            Joint(
+                "slider",
+                "prismatic",
+                ("ground", "shaft"),
+                ("slider", "pivot"),
+                opened=opened[machine.slider_joint],
+                first_axis=x_axis,
+                second_axis=x_axis,
+            ),
+        ),
+        {"shaft": none},
+        (machine.gravity * math.sin(turned), -machine.gravity * math.cos(turned), 0.0),
     )

@@ -15,7 +15,7 @@ and joints, the geometric stiffness is
 Derivatives by the angle are those of the Fourier series through a uniform grid. Where that is too coarse it is refined.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.links import Link, inertia_of, rotation
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism, Spring
 from chaosgym.machines.mechanism.nominal import Nominal, Revolution, nominal
+from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.periodic import derivatives
 
 Array = NDArray[np.float64]
@@ -69,8 +70,8 @@ def _angles(first: float, count: int) -> Array:
 def _smooth(mechanism: Mechanism, revolution: Revolution, first: float, count: int) -> tuple[Nominal, int]:
     """Nominal motion on a uniform grid from ``first`` on that is a multiple of ``count`` angles, and that multiple."""
     scale = np.ones(mechanism.size)
-    for own in mechanism.at.values():
-        scale[own.start + 2 : own.stop] = revolution.length
+    for name, own in mechanism.at.items():
+        scale[mechanism.spin(name) : own.stop] = revolution.length
     gaps = mechanism.size - len(mechanism.coordinates)
     for times in (1, 2, 4, 8, 16, 32, 64):
         if times > 1 and times * count > MOST_ANGLES:
@@ -134,8 +135,7 @@ def loads(mechanism: Mechanism, revolution: Revolution, first: float, count: int
 def sliding(mechanism: Mechanism, revolution: Revolution, theta: Array, joint: str) -> tuple[Array, Array]:
     """Sliding of a joint along its axis: per radian of the crank, (B,), and per unit of each coordinate, (B, n)."""
     found = nominal(mechanism, revolution, theta)
-    which = next(k for k, each in enumerate(mechanism.joints) if each.name == joint)
-    along = mechanism.motions(found.z)[1][:, which, 0]
+    along = mechanism.along(found.z, next(each for each in mechanism.joints if each.name == joint))[1]
     every = np.einsum("bz,bzc->bc", along, found.inverse)
     return every[:, 0], every[:, mechanism.size - len(mechanism.coordinates) :]
 
@@ -144,8 +144,14 @@ def crank_inertia(mechanism: Mechanism, revolution: Revolution, theta: Array) ->
     """Inertia (B,) [kg m^2] of all links as the crank feels it in the nominal motion: twice their energy at 1 rad/s."""
     found, total = nominal(mechanism, revolution, theta), np.zeros(len(theta))
     for link in mechanism.links:
-        if len(link.mass):
-            own, inertia = mechanism.at[link.name], inertia_of(link)
+        own = mechanism.at[link.name]
+        if len(link.mass) and isinstance(mechanism, SpatialMechanism):
+            gradient = mechanism.particles(found.z, link)[1]
+            total += np.einsum(
+                "k,bki->b", link.mass, np.einsum("bkiz,bz->bki", gradient, found.inverse[:, own, 0]) ** 2
+            )
+        elif len(link.mass):
+            inertia = inertia_of(link)
             motion = found.inverse[:, own, 0].copy()
             motion[:, :2] = np.einsum("bji,bj->bi", rotation(found.z[:, own.start + 2]), motion[:, :2])
             total += np.einsum("bi,ij,bj->b", motion, inertia.translating + inertia.turning, motion)
@@ -175,8 +181,8 @@ def _summed(
     sums = _Sums(mechanism, revolution, found, _angles(first, times * count), matrices)
     for link in mechanism.links:
         if len(link.mass):
-            sums.add_masses(link)
-        if matrices:
+            (sums.add_particles if isinstance(mechanism, SpatialMechanism) else sums.add_masses)(link)
+        if matrices and link.elastic:
             sums.add_elastic(link)
     for force in mechanism.forces:
         sums.add_force(force)
@@ -243,6 +249,26 @@ class _Sums:
         self.damping[1] += 2.0 * transposed @ (mass @ once + rate * turned)
         curved = mass @ twice + 2.0 * rate * (inertia.gyroscopic @ once)
         self.stiffness[2] += transposed @ (curved + spin * turned - rate**2 * centrifugal)
+
+    def add_particles(self, link: Link) -> None:
+        """Add the particles of a link in space."""
+        mechanism: Any = self.mechanism
+        own = self.mechanism.at[link.name]
+        places, gradient = mechanism.particles(self.found.z, link)
+        acceleration = np.stack([np.broadcast_to(-np.asarray(mechanism.gravity), places.shape), derivatives(places)[1]])
+        pushed = link.mass[:, None] * acceleration
+        powers = [0, 2]
+        self.pull[powers, ..., own] += np.einsum("pbki,bkiz->pbz", pushed, gradient)
+        if not self.matrices:
+            return
+        for power, forces in zip(powers, pushed, strict=True):
+            mechanism.add_particles(self.found.z, link, forces, self.bent[power])
+        motion = gradient.reshape(len(places), -1, 6) @ self.compatible[:, own]
+        once, twice = derivatives(motion)
+        weighted = np.swapaxes(np.repeat(link.mass, 3)[:, None] * motion, -1, -2)
+        self.mass += weighted @ motion
+        self.damping[1] += 2.0 * weighted @ once
+        self.stiffness[2] += weighted @ twice
 
     def add_elastic(self, link: Link) -> None:
         """Add stiffness and damping of the elastic coordinates of a link, which are the last of p."""

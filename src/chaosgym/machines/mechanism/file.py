@@ -2,31 +2,42 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.file_keys import needed
 from chaosgym.machines.machine import TaskDefaults
 from chaosgym.machines.mechanism.beam import END, START, Beam, beam_link
+from chaosgym.machines.mechanism.file_parts import (
+    LONGEST,
+    axes_of_joint,
+    body_of,
+    check_kind,
+    in_space,
+    place_of,
+    spatial_links,
+)
 from chaosgym.machines.mechanism.forces import STROKE_ANGLES, Gas, Sampled
 from chaosgym.machines.mechanism.joints import Joint
 from chaosgym.machines.mechanism.keys import KEYS
-from chaosgym.machines.mechanism.links import Body, Link, rigid_link
+from chaosgym.machines.mechanism.links import Link, rigid_link
 from chaosgym.machines.mechanism.machine import Clearance, MechanismMachine, machine_of, opened_by, surface_fields
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism, Spring
 from chaosgym.machines.mechanism.nominal import places, revolution_of
+from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.numbers import number
 from chaosgym.machines.parameters import parameter
 from chaosgym.machines.stated import range_of, reduced, tolerances_of
 
+Array = NDArray[np.float64]
+
 MOST_MODES = 12
 """Modes that a beam may keep."""
-
-HEAVIEST, LONGEST = 1e9, 1e6
-"""Most mass [kg] and distance [m] that a file may state."""
 
 
 def tables_of(values: Mapping[str, Any], _folder: Path) -> dict[str, Any]:
@@ -49,6 +60,8 @@ def tables_of(values: Mapping[str, Any], _folder: Path) -> dict[str, Any]:
     data["link"] = {name: _link_table(name, table) for name, table in values["link"].items()}
     for path in ("joint", "force", "gas", "spring"):
         data[path] = [KEYS.checked(path, row) for row in _list(path, values.get(path, []))]
+    points = [data["ground.points"], *(link["points"] for link in data["link"].values())]
+    data["spatial"] = any(len(place) == 3 for some in points for place in some.values())
     return data
 
 
@@ -63,19 +76,12 @@ def _list(path: str, given: Any) -> list[Any]:
     return given
 
 
-def _points(where: str, table: Any) -> dict[str, tuple[float, float]]:
+def _points(where: str, table: Any) -> dict[str, tuple[float, ...]]:
     found = {}
     path = f"{where.partition('.')[0]}.points"
     for name, values in KEYS.checked(path, table.get("points", {}), f"{where}.points").items():
-        found[name] = _pair(f"{where}.points.{name}", values)
+        found[name] = place_of(f"{where}.points.{name}", values)
     return found
-
-
-def _pair(where: str, values: Any) -> tuple[float, float]:
-    if len(values) != 2:
-        raise ParameterError(f"{where} has {len(values)} numbers; allowed: two, x and y, as in '50, 0 mm'")
-    x, y = (number(where, value, -LONGEST, LONGEST, "m") for value in values)
-    return x, y
 
 
 def _link_table(name: str, table: Any) -> dict[str, Any]:
@@ -89,15 +95,6 @@ def _link_table(name: str, table: Any) -> dict[str, Any]:
         if values["points"]:
             raise ParameterError(f"{where} has a beam, whose points are 'start' and 'end'; leave [{where}.points] out")
     return values
-
-
-def _body(where: str, row: Mapping[str, Any]) -> Body:
-    (mass,) = needed(where, row, "mass")
-    if not mass > 0.0:
-        raise ParameterError(f"{where}.mass = {mass:g} kg is out of range; allowed: above 0")
-    inertia = number(f"{where}.inertia", row.get("inertia", 0.0), 0.0, HEAVIEST, "kg m^2")
-    centre = _pair(f"{where}.centre", row.get("centre", np.zeros(2)))
-    return Body(number(f"{where}.mass", mass, 0.0, HEAVIEST, "kg"), inertia, centre)
 
 
 def _section(where: str, row: Mapping[str, Any]) -> tuple[float, float]:
@@ -128,8 +125,11 @@ def _beam(where: str, row: Mapping[str, Any]) -> Beam:
 
 
 def _link(name: str, table: Mapping[str, Any]) -> Link:
+    for key in ("orientation", "axis"):
+        if key in table:
+            raise ParameterError(f"link.{name}.{key} has a meaning in space only; allowed: angle, or points with a z")
     where, angle = f"link.{name}.body", math.radians(table.get("angle", 0.0))
-    bodies = [(row.get("at"), _body(where, row)) for row in table["body"]]
+    bodies = [(row.get("at"), body_of(where, row)) for row in table["body"]]
     if "beam" not in table:
         if any(at for at, _ in bodies):
             raise ParameterError(f"{where}.at has a meaning at the ends of a beam only; leave it out")
@@ -154,7 +154,7 @@ def _end(where: str, text: str) -> tuple[str, str]:
     return link, point
 
 
-def _clearance(name: str, kind: str, row: Mapping[str, Any]) -> Clearance | None:
+def _clearance(name: str, kind: str, row: Mapping[str, Any], spatial: bool) -> Clearance | None:
     """Clearance of a joint, if it has one."""
     where = f"joint {name}"
     if "clearance" not in row:
@@ -176,13 +176,13 @@ def _clearance(name: str, kind: str, row: Mapping[str, Any]) -> Clearance | None
     for what, (value, about) in found.fields.items():
         number(f"{name}_{what}", value, about["low"], about["high"], about["unit"].strip("-"))
     try:
-        opened_by(kind, found)
+        opened_by(kind, found, spatial)
     except ParameterError as error:
         raise ParameterError(f"{where}: {error}") from None
     return found
 
 
-def _joints(rows: list[dict[str, Any]]) -> tuple[list[Joint], dict[str, Clearance]]:
+def _joints(rows: list[dict[str, Any]], spatial: bool) -> tuple[list[Joint], dict[str, Clearance]]:
     joints: list[Joint] = []
     clearances: dict[str, Clearance] = {}
     for row in rows:
@@ -192,10 +192,8 @@ def _joints(rows: list[dict[str, Any]]) -> tuple[list[Joint], dict[str, Clearanc
         where = f"joint {name}"
         (kind,) = needed(where, row, "kind")
         first, second = _ends(where, row)
-        clearance = _clearance(name, kind, row)
-        for key, kinds in (("axis", ("prismatic", "slot")), ("turn", ("prismatic", "weld"))):
-            if key in row and kind not in kinds:
-                raise ParameterError(f"{where}.{key} has no meaning in a {kind} joint; leave it out")
+        check_kind(where, kind, row, spatial)
+        clearance = _clearance(name, kind, row, spatial)
         driven = row.get("driven", False)
         if driven and clearance:
             raise ParameterError(f"{where} is driven and has clearance; allowed: one of them")
@@ -203,18 +201,22 @@ def _joints(rows: list[dict[str, Any]]) -> tuple[list[Joint], dict[str, Clearanc
             clearances[name] = clearance
         angles = (math.radians(row.get(key, 0.0)) for key in ("axis", "turn"))
         axis, turn = angles
-        opened = opened_by(kind, clearance) if clearance else ()
-        joints.append(Joint(name, kind, first, second, axis, "", opened, driven, turn))
+        opened = opened_by(kind, clearance, spatial) if clearance else ()
+        axes = axes_of_joint(where, kind, row) if spatial else ((), ())
+        joints.append(Joint(name, kind, first, second, axis, "", opened, driven, turn, *axes))
     return joints, clearances
 
 
-def _direction(angle: float) -> tuple[float, float]:
-    return math.cos(math.radians(angle)), math.sin(math.radians(angle))
+def _direction(angle: float, mechanism: Mechanism) -> Array:
+    """Unit vector at an angle [deg] from the x axis on, in the plane of x and y."""
+    vector = np.zeros(mechanism.dimensions)
+    vector[:2] = math.cos(math.radians(angle)), math.sin(math.radians(angle))
+    return vector
 
 
-def _force(row: Mapping[str, Any]) -> Force:
+def _force(row: Mapping[str, Any], mechanism: Mechanism) -> Force:
     at, values = needed("force", row, "at", "force")
-    return Force(_end("force.at", at), Sampled(np.asarray(values), np.array(_direction(row.get("direction", 0.0)))).at)
+    return Force(_end("force.at", at), Sampled(np.asarray(values), _direction(row.get("direction", 0.0), mechanism)).at)
 
 
 def _gas(row: Mapping[str, Any], mechanism: Mechanism) -> Force:
@@ -227,7 +229,7 @@ def _gas(row: Mapping[str, Any], mechanism: Mechanism) -> Force:
     exponent = number("gas.exponent", row.get("exponent", 1.3), 0.5, 3.0)
     behind = number("gas.behind", row.get("behind", low), 0.0, 1e9, "Pa")
     gas = Gas(math.pi / 4.0 * bore**2, dead, low, high, behind, exponent)
-    direction, point = np.array(_direction(row.get("direction", 0.0))), _end("gas.at", at)
+    direction, point = _direction(row.get("direction", 0.0), mechanism), _end("gas.at", at)
     theta: Any = np.arange(STROKE_ANGLES) * (2.0 * math.pi / STROKE_ANGLES)
     place = mechanism.point(places(mechanism, revolution_of(mechanism), theta), point)[0] @ direction
     return Force(point, Sampled(gas.force(place), direction).at)
@@ -245,19 +247,24 @@ def _spring(row: Mapping[str, Any]) -> Spring:
 
 def mechanism_of(data: Mapping[str, Any]) -> tuple[Mechanism, dict[str, Clearance]]:
     """Mechanism of the tables of a file, and the clearances of its joints by their names."""
-    joints, clearances = _joints(data["joint"])
-    links = tuple(_link(name, table) for name, table in data["link"].items())
-    ground = data["ground"]
-    gravity = number("ground.gravity", ground.get("gravity", 0.0), 0.0, 1e6, "m/s^2")
-    x, y = _direction(ground.get("gravity_direction", -90.0))
+    spatial, ground = data["spatial"], data["ground"]
+    joints, clearances = _joints(data["joint"], spatial)
+    points, kind = data["ground.points"], SpatialMechanism if spatial else Mechanism
+    if spatial:
+        points = {name: in_space(place) for name, place in points.items()}
+        links = spatial_links(data["link"], joints)
+    else:
+        links = tuple(_link(name, table) for name, table in data["link"].items())
     springs = tuple(map(_spring, data["spring"]))
-    still = Mechanism(links, tuple(joints), data["ground.points"], (gravity * x, gravity * y), springs=springs)
+    still = kind(links, tuple(joints), points, springs=springs)
+    gravity = number("ground.gravity", ground.get("gravity", 0.0), 0.0, 1e6, "m/s^2")
+    pull = tuple((gravity * _direction(ground.get("gravity_direction", -90.0), still)).tolist())
     for spring in springs:
         still.places(spring.first), still.places(spring.second)
-    forces = tuple(map(_force, data["force"])) + tuple(_gas(row, still) for row in data["gas"])
+    forces = tuple(_force(row, still) for row in data["force"]) + tuple(_gas(row, still) for row in data["gas"])
     for force in forces:
         still.places(force.point)
-    return Mechanism(links, still.joints, still.ground, still.gravity, forces, springs), clearances
+    return replace(still, gravity=pull, forces=forces), clearances
 
 
 def built(path: str, digest: str, data: Mapping[str, Any], _folder: Path) -> type[MechanismMachine]:

@@ -1,4 +1,4 @@
-"""Joints of a planar mechanism: which relative motions of two links they hold, or leave as a gap."""
+"""Joints of a mechanism: which relative motions of two links they hold, or leave as a gap."""
 
 from typing import NamedTuple
 
@@ -12,6 +12,23 @@ KINDS = {
     "weld": (ALONG, ACROSS, TURN),
 }
 """Motions that a joint of each kind holds."""
+
+SIDEWAYS, ROLL, YAW, PITCH, SKEW = "sideways", "roll", "yaw", "pitch", "skew"
+"""Motions in space: across along and across; turns about along, across and sideways; how far two axes are from
+crossing at a right angle."""
+
+PLACES = {ALONG: 0, ACROSS: 1, SIDEWAYS: 2}
+"""Motions of the point, and the axis of the joint along which each goes."""
+
+SPATIAL_KINDS = {
+    "revolute": (ALONG, ACROSS, SIDEWAYS, YAW, PITCH),
+    "prismatic": (ACROSS, SIDEWAYS, ROLL, YAW, PITCH),
+    "cylindrical": (ACROSS, SIDEWAYS, YAW, PITCH),
+    "universal": (ALONG, ACROSS, SIDEWAYS, SKEW),
+    "spherical": (ALONG, ACROSS, SIDEWAYS),
+    "weld": (ALONG, ACROSS, SIDEWAYS, ROLL, YAW, PITCH),
+}
+"""Motions that a joint of each kind holds in space."""
 
 GROUND = "ground"
 """Link that stands still."""
@@ -38,6 +55,8 @@ class Joint(NamedTuple):
         True for the one revolute joint whose turn is the crank angle.
     turn
         Angle [rad] of the second link from the first one, where the joint holds it.
+    first_axis, second_axis
+        The joint's axis in axes of the first and of the second link, of a joint in space; empty in the plane.
     """
 
     name: str
@@ -49,13 +68,15 @@ class Joint(NamedTuple):
     opened: tuple[str, ...] = ()
     driven: bool = False
     turn: float = 0.0
+    first_axis: tuple[float, ...] = ()
+    second_axis: tuple[float, ...] = ()
 
     @property
     def rows(self) -> tuple[str, ...]:
         """Motions that it holds or opens."""
-        return KINDS[self.kind]
+        return (SPATIAL_KINDS if self.first_axis else KINDS)[self.kind]
 
     @property
     def measured_in(self) -> str:
         """Link in whose axes along and across are measured."""
-        return self.frame or (self.second[0] if self.kind == "revolute" else self.first[0])
+        return self.frame or (self.second[0] if self.kind in ("revolute", "spherical") else self.first[0])

@@ -2,7 +2,7 @@
 
 from chaosgym.machines.file_keys import OPERATION, TEXT, Key, Keys
 from chaosgym.machines.mechanism.beam import END, START
-from chaosgym.machines.mechanism.joints import KINDS
+from chaosgym.machines.mechanism.joints import KINDS, SPATIAL_KINDS
 
 LIMITS = {
     "coulomb mu tangential_stiffness": "friction is Coulomb's, of a guide or slot with clearance: friction",
@@ -12,7 +12,6 @@ LIMITS = {
     "torque": "the torque that the crank takes is a result; that of a motor is [motor] stall_torque",
     "length": "a link's length is the distance of its points",
     "speed": "the speed of the crank stands in [operation]",
-    "spherical universal cylindrical": "the mechanism is planar",
 }
 """What people look for and does not fit, or has another name: words, and what to say."""
 
@@ -26,7 +25,7 @@ def _unknown(word: str, known: list[str]) -> str:
     return suggestion(word, known)
 
 
-POINT = Key("x and y in the axes of the link", "m", "row")
+POINT = Key("x and y in the axes of the link; with z the mechanism is one in space", "m", "row")
 
 KEYS = Keys(
     {
@@ -35,8 +34,14 @@ KEYS = Keys(
             "gravity": Key("acceleration; none by default", "m/s^2"),
             "gravity_direction": Key("in which it pulls, from the x axis on; -90 by default, downward", "deg"),
         },
-        "ground.points": {"*": Key("x and y on the ground", "m", "row")},
-        "link": {"angle": Key("roughly, at crank angle 0: tells which way a loop is closed; 0 by default", "deg")},
+        "ground.points": {"*": Key("x and y on the ground; with z the mechanism is one in space", "m", "row")},
+        "link": {
+            "angle": Key("roughly, at crank angle 0: tells which way a loop is closed; 0 by default", "deg"),
+            "orientation": Key("the same in space: turns about x, then y, then z of the ground", "deg", "row"),
+            "axis": Key(
+                "in space: own axis about which it may turn right round; of its pin on the ground, or z", kind="row"
+            ),
+        },
         "link.points": {"*": POINT},
         "link.beam": {
             "length": Key("along x from the link's origin; its points are 'start' and 'end'", "m"),
@@ -52,16 +57,22 @@ KEYS = Keys(
         "link.body": {
             "at": Key("end of a beam with which the body turns, 'start' or 'end'", kind=TEXT, choices=(START, END)),
             "mass": Key("of a rigid body of the link", "kg"),
-            "inertia": Key("about its own centre; 0 by default", "kg m^2"),
-            "centre": Key("x and y in the axes of the link, from the end of a beam on; 0, 0 by default", "m", "row"),
+            "inertia": Key(
+                "about its own centre, in space about x, y and z of the link; 0 by default", "kg m^2", "row"
+            ),
+            "centre": Key("x and y (z) in the axes of the link, from the end of a beam on; 0 by default", "m", "row"),
         },
         "joint": {
             "name": Key("begins the names of its fields, as in wrist_clearance", kind=TEXT),
-            "kind": Key("what it holds", kind=TEXT, choices=tuple(KINDS)),
+            "kind": Key("what it holds", kind=TEXT, choices=tuple(dict.fromkeys([*KINDS, *SPATIAL_KINDS]))),
             "between": Key(
                 "two points, such as ['crank.pin', 'rod.start']; a guide or slot is of the first", kind="texts"
             ),
             "axis": Key("of a guide or slot, in the axes of the first link; 0 by default", "deg"),
+            "first_axis": Key(
+                "in space: of a pin, guide or cross in axes of the first link; x of a guide, else z", kind="row"
+            ),
+            "second_axis": Key("in space: the same in axes of the second link; first_axis by default", kind="row"),
             "turn": Key("of the second link from the first, where the joint holds it; 0 by default", "deg"),
             "driven": Key("true for the one revolute joint whose turn is the crank angle", kind="flag"),
             "clearance": Key("how far the pin may leave the middle of its hole, or half the gap of a guide", "m"),

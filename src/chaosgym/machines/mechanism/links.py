@@ -9,7 +9,7 @@ with its place rho, shape N and curve C in the axes of the link. In the nominal 
 """
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple, Optional
+from typing import TYPE_CHECKING, Any, NamedTuple, Optional
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,9 +112,9 @@ class Link(NamedTuple):
     name
         How joints name it.
     points
-        One point each, by name.
+        One point each, by name: ``Places``, or ``SpatialPlaces``.
     masses
-        Where its particles are.
+        Where its particles are, likewise.
     mass, inertia : (k,)
         Of each particle [kg], and what turns with it [kg m^2].
     angle
@@ -125,11 +125,13 @@ class Link(NamedTuple):
         Of the elastic coordinates.
     beam
         What bends, if it is a uniform beam.
+    rigid
+        Coordinates of the link apart from elastic ones: in the plane or in space.
     """
 
     name: str
-    points: Mapping[str, Places]
-    masses: Places
+    points: Mapping[str, Any]
+    masses: Any
     mass: Array
     inertia: Array
     angle: float = 0.0
@@ -137,11 +139,12 @@ class Link(NamedTuple):
     stiffness: Array = np.zeros((0, 0))
     damping: Array = np.zeros((0, 0))
     beam: Optional["Beam"] = None
+    rigid: int = RIGID
 
     @property
     def size(self) -> int:
         """Number of coordinates."""
-        return RIGID + len(self.elastic)
+        return self.rigid + len(self.elastic)
 
 
 class Inertia(NamedTuple):

@@ -17,7 +17,7 @@ from chaosgym.machines.drive_torque import DriveTorque
 from chaosgym.machines.machine import Number, Option
 from chaosgym.machines.mechanism.beam import fibre_stress
 from chaosgym.machines.mechanism.equations import SmallMotion, crank_inertia, drive_torque, loads, sliding, small_motion
-from chaosgym.machines.mechanism.joints import ACROSS, ALONG, TURN, Joint
+from chaosgym.machines.mechanism.joints import ACROSS, ALONG, PITCH, PLACES, SIDEWAYS, TURN, YAW, Joint
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism
 from chaosgym.machines.mechanism.motor import Load, Motor, MotorRun, turn
 from chaosgym.machines.mechanism.nominal import Revolution, places, revolution_of
@@ -36,6 +36,12 @@ TORQUE_ANGLES = 720
 
 RAMP = 0.02
 """Sliding speed below which friction fades, as a share of the largest in a revolution."""
+
+ROUND = ("revolute", "cylindrical", "spherical")
+"""Joints whose gap is a circle or a ball."""
+
+GUIDED = {ACROSS: {TURN: 1.0, PITCH: 1.0}, SIDEWAYS: {YAW: -1.0}}
+"""Turns in a guide, in the plane or in space, that move its stations in either direction per metre of their place."""
 
 LEAST_MASS = 1e-10
 """Least eigenvalue of a mass matrix whose diagonal is one."""
@@ -74,20 +80,25 @@ class Clearance(NamedTuple):
         return {name: (value, CLEARANCE_FIELDS[name]) for name, value in named.items()}
 
 
-def opened_by(kind: str, clearance: Clearance) -> tuple[str, ...]:
-    """Motions that the clearance of a joint of some kind leaves open.
+def opened_by(kind: str, clearance: Clearance, spatial: bool = False) -> tuple[str, ...]:
+    """Motions that the clearance of a joint of some kind leaves open, in the plane or in space.
 
     Raises
     ------
     ParameterError
         If such a joint has no gap, or its clearance no stations.
     """
-    if kind == "weld":
-        raise ParameterError("a weld has no clearance; allowed: revolute, prismatic or slot")
-    if clearance.friction is not None and kind == "revolute":
+    if kind in ("weld", "universal"):
+        allowed = "revolute, cylindrical, spherical or prismatic" if spatial else "revolute, prismatic or slot"
+        raise ParameterError(f"a {kind} joint has no clearance; allowed: {allowed}")
+    if clearance.friction is not None and kind in ROUND:
         raise ParameterError("friction of a pin in its hole is not modelled; allowed: in a prismatic joint or a slot")
     if clearance.stations and kind != "prismatic":
         raise ParameterError(f"stations have no meaning in a {kind} joint; leave them out")
+    if kind == "spherical":
+        return (ALONG, ACROSS, SIDEWAYS)
+    if spatial:
+        return (ACROSS, SIDEWAYS, YAW, PITCH) if clearance.stations else (ACROSS, SIDEWAYS)
     if kind == "revolute":
         return (ALONG, ACROSS)
     return (ACROSS, TURN) if clearance.stations else (ACROSS,)
@@ -99,7 +110,7 @@ def _assumed(default: Any, unit: str, low: float, high: float) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class MechanismMachine(BinnedMachine):
-    """A planar mechanism whose crank turns at constant speed, with clearance in some joints; made by ``machine_of``.
+    """A mechanism whose crank turns at constant speed, with clearance in some joints; made by ``machine_of``.
 
     Every joint with clearance has fields that begin with its name: ``wrist_clearance``, ``wrist_stiffness`` and
     ``wrist_damping`` of the joint "wrist"; every link with mass has a ``rod_mass_factor``.
@@ -223,7 +234,7 @@ class MechanismMachine(BinnedMachine):
         for link in self.mechanism.links:
             factor = getattr(self, f"{link.name}_mass_factor", 1.0)
             links.append(link._replace(mass=factor * link.mass, inertia=factor * link.inertia))
-        gravity = (self.gravity_factor * self.mechanism.gravity[0], self.gravity_factor * self.mechanism.gravity[1])
+        gravity = tuple(self.gravity_factor * part for part in self.mechanism.gravity)
         forces = tuple(_Loaded(force, self.load_factor).force for force in self.mechanism.forces)
         return replace(
             self.mechanism,
@@ -291,15 +302,18 @@ class MechanismMachine(BinnedMachine):
             gap, spring, damper = (getattr(self, f"{joint.name}_{what}") for what in surface_fields(self.hertz))
             slides = joint.name == self.rubs and self._rub > 0.0
             seen = float(joint.name == self.monitored)
-            across = self.row_of(joint.name, ACROSS)
-            if joint.kind == "revolute":
-                rows = np.stack([self.row_of(joint.name, ALONG), across])
-                reading = seen * np.eye(3)[:2]
+            if joint.kind in ROUND:
+                ways = [way for way in PLACES if way in joint.opened]
+                rows = np.stack([self.row_of(joint.name, way) for way in ways])
+                reading = seen * np.eye(3)[[PLACES[way] for way in ways]]
                 found.append(Contact(rows, gap, spring, damper, True, reading))
                 continue
             for place in self.stations[joint.name] or (0.0,):
-                row = across + place * self.row_of(joint.name, TURN)
-                found.append(Contact(row[None], gap, spring, damper, True, seen * np.eye(3)[1:2], slides))
+                for way in (way for way in GUIDED if way in joint.opened):
+                    row = self.row_of(joint.name, way)
+                    row = row + sum(place * sign * self.row_of(joint.name, turn) for turn, sign in GUIDED[way].items())
+                    reading = seen * np.eye(3)[[PLACES[way]]]
+                    found.append(Contact(row[None], gap, spring, damper, True, reading, slides))
         return found
 
     @property
@@ -350,8 +364,8 @@ class MechanismMachine(BinnedMachine):
 
     @property
     def round_bearing(self) -> bool:
-        """True for a pin in its hole."""
-        return self._watched.kind == "revolute"
+        """True for a pin in its hole, and a ball in its socket."""
+        return self._watched.kind in ROUND
 
     def bearing_place(self, phase: Array, force: Array) -> tuple[Array, str]:
         """Where on its bearing the monitored joint carries a force, and the unit of that place.
@@ -371,9 +385,9 @@ class MechanismMachine(BinnedMachine):
         """
         joint = self._watched
         if self.round_bearing:
-            return np.degrees(np.arctan2(force[:, 1], force[:, 0])), "deg"
-        which = self.mechanism.joints.index(joint)
-        return self.mechanism.motions(self.nominal_places(phase))[0][:, which, 0], "m"
+            first = 1 if ALONG not in joint.opened else 0
+            return np.degrees(np.arctan2(force[:, first + 1], force[:, first])), "deg"
+        return self.mechanism.along(self.nominal_places(phase), joint)[0], "m"
 
     @property
     def stiffest(self) -> float:

@@ -12,7 +12,7 @@ are the compatibility matrix of the thesis (2.3): dz = B dp.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,10 +79,12 @@ class Mechanism:
 
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
-    ground: Mapping[str, tuple[float, float]]
-    gravity: tuple[float, float] = (0.0, 0.0)
+    ground: Mapping[str, tuple[float, ...]]
+    gravity: tuple[float, ...] = (0.0, 0.0)
     forces: tuple[Force, ...] = ()
     springs: tuple[Spring, ...] = ()
+    dimensions: ClassVar[int] = 2
+    motions_of_a_link: ClassVar[int] = 3
     at: Mapping[str, slice] = field(init=False, repr=False)
     """Coordinates of each link among all."""
 
@@ -118,12 +120,12 @@ class Mechanism:
     def _count(self) -> None:
         """Refuse what does not have mobility one."""
         held = {joint.name: len(joint.rows) for joint in self.joints}
-        mobility = 3 * len(self.links) - sum(held.values())
+        mobility = self.motions_of_a_link * len(self.links) - sum(held.values())
         if mobility != 1:
             listed = ", ".join(f"{name} {rows}" for name, rows in held.items())
             raise ParameterError(
-                f"the mechanism has mobility {mobility}: {len(self.links)} links with 3 motions each, less what the "
-                f"joints hold ({listed}); allowed: 1"
+                f"the mechanism has mobility {mobility}: {len(self.links)} links with {self.motions_of_a_link} "
+                f"motions each, less what the joints hold ({listed}); allowed: 1"
             )
 
     @property
@@ -135,6 +137,21 @@ class Mechanism:
     def driver(self) -> Joint:
         """The driven joint."""
         return next(joint for joint in self.joints if joint.driven)
+
+    def spin(self, name: str) -> int:
+        """The coordinate of a link in which it may turn right round."""
+        return int(self.at[name].start + self.dimensions)
+
+    def moved(self, z: Array, step: Array) -> Array:
+        """Coordinates after a small step of them all, (B, z)."""
+        return z + step
+
+    def rates(self, z: Array, rate: Array) -> Array:
+        """Rates of the coordinates at z, from those of small steps, (B, z)."""
+        return rate
+
+    def refuse_turned_over(self, z: Array) -> None:
+        """Refuse coordinates (1, z) in which a link has turned by half a turn about an axis that allows no more."""
 
     def link(self, name: str) -> Link:
         """Link of a name."""
@@ -167,7 +184,11 @@ class Mechanism:
             raise ParameterError(f"no link is named {name!r}; known: {self._names()}")
         if point not in known:
             raise ParameterError(f"{name} has no point {point!r}; known: {', '.join(known) or 'none'}")
-        return fixed(np.array(self.ground[point])) if name == GROUND else self.link(name).points[point]
+        return self._still(point) if name == GROUND else self.link(name).points[point]
+
+    def _still(self, point: str) -> Places:
+        """A point of the ground."""
+        return fixed(np.array(self.ground[point]))
 
     def point(self, z: Array, end: tuple[str, str]) -> tuple[Array, Array]:
         """Place (B, 2) of a point and its derivatives by all coordinates, (B, 2, z)."""
@@ -198,6 +219,16 @@ class Mechanism:
     @cached_property
     def _ends(self) -> "_Ends":
         return _ends_of(self)
+
+    def along(self, z: Array, joint: Joint) -> tuple[Array, Array]:
+        """How far [m] the second point lies along a joint's axis, (B,), and its derivatives (B, z)."""
+        which = self.joints.index(joint)
+        value, slope = self.motions(z)
+        return value[:, which, 0], slope[:, which, 0]
+
+    def axes(self, z: Array, joint: Joint) -> Array:
+        """Axes (B, 2, 2) along which the point of a joint is measured, in columns."""
+        return self._turn_of(joint, z)
 
     def motions(self, z: Array) -> tuple[Array, Array]:
         """Value (B, J, 3) and derivatives (B, J, 3, z) of every joint: along, across and turn, held or not."""

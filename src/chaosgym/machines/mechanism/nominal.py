@@ -53,8 +53,8 @@ class _Loops:
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, self.length = mechanism, _length_of(mechanism)
         lengths = np.ones(mechanism.size)
-        for own in mechanism.at.values():
-            lengths[own.start : own.start + 2] = self.length
+        for name, own in mechanism.at.items():
+            lengths[own.start : mechanism.spin(name)] = self.length
         self.scale = lengths
 
     def solve(self, z: Array, theta: Array, tries: int = TRIES, enough: float = ROUNDING) -> tuple[Array, float, Array]:
@@ -71,22 +71,23 @@ class _Loops:
             last = float(np.max(np.abs(step)))
             if not np.isfinite(last):
                 return z, np.inf, slope
-            z = z - self.scale * step / max(1.0, last)
+            z = self.mechanism.moved(z, -self.scale * step / max(1.0, last))
             if last < enough or (last < CLOSED and last >= before):
                 break
         return z, last, slope
 
-    def tangent(self, slope: Array) -> Array:
-        """Derivatives (B, z) of the coordinates by the crank angle, of A in own lengths."""
+    def tangent(self, z: Array, slope: Array) -> Array:
+        """Derivatives (B, z) of the coordinates z by the crank angle, of A in own lengths."""
         drive = np.zeros((len(slope), self.mechanism.size, 1))
         drive[:, 0] = 1.0
-        return np.asarray(self.scale * np.linalg.solve(slope, drive)[..., 0])
+        return self.mechanism.rates(z, np.asarray(self.scale * np.linalg.solve(slope, drive)[..., 0]))
 
 
 def _length_of(mechanism: Mechanism) -> float:
     """Largest distance [m] of two points of a link, or of the ground."""
-    sets = [np.array(list(mechanism.ground.values()), dtype=float).reshape(-1, 2)]
-    sets += [np.array([p.place[0] for p in link.points.values()]).reshape(-1, 2) for link in mechanism.links]
+    sets = [np.array(list(mechanism.ground.values()), dtype=float)]
+    sets += [np.array([p.place[0] for p in link.points.values()]) for link in mechanism.links]
+    sets = [some.reshape(-1, mechanism.dimensions) for some in sets]
     lengths = [float(np.max(np.linalg.norm(some[:, None] - some, axis=-1), initial=0.0)) for some in sets]
     return max(lengths) or 1.0
 
@@ -111,11 +112,10 @@ def _start(loops: _Loops) -> Array:
     """Coordinates (1, z) at crank angle 0 near the rough angles of the links."""
     mechanism, theta = loops.mechanism, np.zeros(1)
     z = np.zeros((1, mechanism.size))
-    places = []
+    places: list[int] = []
     for link in mechanism.links:
-        own = mechanism.at[link.name].start
-        z[0, own + 2] = link.angle
-        places += [own, own + 1]
+        z[0, mechanism.spin(link.name)] = link.angle
+        places += range(mechanism.at[link.name].start, mechanism.spin(link.name))
     value, slope = mechanism.functions(z, theta)
     z[0, places] -= np.linalg.lstsq(slope[0][:, places], value[0], rcond=None)[0]
     found, last, _ = loops.solve(z, theta)
@@ -158,7 +158,7 @@ def revolution_of(mechanism: Mechanism) -> Revolution:
     """
     loops = _Loops(mechanism)
     angles, places = [0.0], [_start(loops)]
-    tangents = [loops.tangent(loops.solve(places[0], np.zeros(1), 1)[2])]
+    tangents = [loops.tangent(places[0], loops.solve(places[0], np.zeros(1), 1)[2])]
     step = STEP
     while angles[-1] < 2.0 * np.pi:
         end = min(angles[-1] + step, 2.0 * np.pi)
@@ -168,6 +168,7 @@ def revolution_of(mechanism: Mechanism) -> Revolution:
         if last > NEARLY or np.max(np.abs(z - guess) / loops.scale) > FAR * min(1.0, 4.0 * step / STEP):
             step *= 0.5
             if step < SHORTEST:
+                loops.mechanism.refuse_turned_over(places[-1])
                 raise ParameterError(
                     f"the crank can't turn beyond {_degrees(angles[-1])}: the loop does not close there; allowed: "
                     "lengths with which it turns right round"
@@ -175,12 +176,12 @@ def revolution_of(mechanism: Mechanism) -> Revolution:
             continue
         angles.append(float(theta[0]))
         places.append(z)
-        tangents.append(loops.tangent(slope))
+        tangents.append(loops.tangent(z, slope))
         step = min(2.0 * step, STEP)
     drift = places[-1][0] - places[0][0]
     turns = np.zeros(mechanism.size)
-    for own in mechanism.at.values():
-        turns[own.start + 2] = np.round(drift[own.start + 2] / (2.0 * np.pi))
+    for turn in map(mechanism.spin, mechanism.at):
+        turns[turn] = np.round(drift[turn] / (2.0 * np.pi))
     if np.max(np.abs(drift - 2.0 * np.pi * turns) / loops.scale) > 1e-6:
         raise ParameterError(
             "the mechanism does not come back after a revolution of the crank: its links pass a dead centre; allowed: "

@@ -20,27 +20,30 @@ GAP = 0.04
 
 
 def link_lines(machine: "MechanismMachine", theta: Array) -> dict[str, Array]:
-    """Places (B, k, 2) [m] of the points of each link at crank angles (B,), joined to one line through them."""
+    """Places (B, k, 2) [m] of the points of each link at crank angles (B,), joined to one line through them.
+
+    A mechanism in space is drawn as seen along z.
+    """
     z = machine.nominal_places(theta)
     lines = {}
     for link in machine.mechanism.links:
         points = [place.moved(z[:, machine.mechanism.at[link.name]])[:, 0] for place in link.points.values()]
-        lines[link.name] = np.stack(points, axis=1)
+        lines[link.name] = np.stack(points, axis=1)[..., :2]
     return lines
 
 
 def _joint_places(machine: "MechanismMachine", theta: Array) -> list[tuple[Any, Array]]:
     """Each joint and where its second point is, (B, 2)."""
     z = machine.nominal_places(theta)
-    return [(joint, machine.mechanism.point(z, joint.second)[0]) for joint in machine.mechanism.joints]
+    return [(joint, machine.mechanism.point(z, joint.second)[0][:, :2]) for joint in machine.mechanism.joints]
 
 
 def _limits(machine: "MechanismMachine") -> tuple[Array, Array, float]:
     """Lowest and highest place of all points through a revolution, and the size of it all [m]."""
     theta = np.arange(72, dtype=np.float64) * (2.0 * math.pi / 72)
     lines = [line.reshape(-1, 2) for line in link_lines(machine, theta).values()]
-    ground = np.array(list(machine.mechanism.ground.values())).reshape(-1, 2)
-    places = np.concatenate([*lines, ground])
+    ground = np.array(list(machine.mechanism.ground.values()), dtype=float)
+    places = np.concatenate([*lines, ground.reshape(-1, machine.mechanism.dimensions)[:, :2]])
     low, high = places.min(axis=0), places.max(axis=0)
     return low, high, float(np.max(high - low)) or 1.0
 
@@ -66,9 +69,12 @@ def _ring(size: float) -> Array:
 def _draw_guides(panel: Any, machine: "MechanismMachine", theta: Array, size: float) -> None:
     """Draw the guide of each prismatic joint on the ground: two lines, apart by the gap as it is drawn."""
     for joint, places in _joint_places(machine, theta):
-        if joint.kind == "revolute" or joint.first[0] != GROUND:
+        if joint.kind not in ("prismatic", "slot", "cylindrical") or joint.first[0] != GROUND:
             continue
-        along = np.array([math.cos(joint.axis), math.sin(joint.axis)])
+        along = machine.mechanism.axes(machine.nominal_places(theta[:1]), joint)[0, :2, 0]
+        if np.linalg.norm(along) < 0.1:
+            continue
+        along = along / np.linalg.norm(along)
         across = np.array([-along[1], along[0]])
         reach = places @ along
         middle = float(np.mean(places @ across))
@@ -101,14 +107,12 @@ def draw_mechanism(panel: Any, record: Any, colour: str, moment: float, force_li
     joint = next(each for each in machine.mechanism.joints if each.name == machine.monitored)
     gap = getattr(machine, machine.clearance_field)
     z = machine.nominal_places(angle)
-    frame = joint.measured_in
-    turn = joint.axis + (0.0 if frame == GROUND else float(z[0, machine.mechanism.at[frame].start + 2]))
-    across = np.array([-math.sin(turn), math.cos(turn)])
+    across = machine.mechanism.axes(z, joint)[0, :2, 1]
     times = GAP * size / gap if gap > 0.0 else 1.0
     shift = samples[now, 0] * times * across
     lines = link_lines(machine, angle)
     _draw_links(panel, machine, lines)
-    place = machine.mechanism.point(z, joint.second)[0][0]
+    place = machine.mechanism.point(z, joint.second)[0][0, :2]
     around = np.linspace(0.0, 2.0 * math.pi, 60)
     panel.plot(
         place[0] + GAP * size * np.cos(around),
@@ -151,5 +155,5 @@ def draw_poses(panels: Any, machine: "MechanismMachine") -> None:
             if joint.opened:
                 panel.plot(*(places[k][:, None] + _ring(size)), color=WILD, linewidth=1.2, zorder=5)
         for place in machine.mechanism.ground.values():
-            panel.plot(*place, "^", color=INK, markersize=6)
+            panel.plot(*place[:2], "^", color=INK, markersize=6)
         panel.set_title(f"{math.degrees(theta[k]):.0f}°", fontsize=8.5)

@@ -1,0 +1,132 @@
+"""Parts of a mechanism's file that differ in the plane and in space: points, bodies, links, axes of joints."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.file_keys import needed
+from chaosgym.machines.mechanism.joints import GROUND, KINDS, SPATIAL_KINDS, Joint
+from chaosgym.machines.mechanism.links import Body, Link
+from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
+from chaosgym.machines.numbers import number
+
+HEAVIEST, LONGEST = 1e9, 1e6
+"""Most mass [kg] and distance [m] that a file may state."""
+
+
+def place_of(where: str, values: Any) -> tuple[float, ...]:
+    """A point in the plane or in space."""
+    if len(values) not in (2, 3):
+        raise ParameterError(
+            f"{where} has {len(values)} numbers; allowed: two, x and y, as in '50, 0 mm', or three in space"
+        )
+    return tuple(number(where, value, -LONGEST, LONGEST, "m") for value in values)
+
+
+def body_of(where: str, row: Mapping[str, Any]) -> Body:
+    """A body of a link in the plane."""
+    mass = _mass(where, row)
+    (inertia,) = _inertia(where, row, 1)
+    centre = place_of(f"{where}.centre", row.get("centre", np.zeros(2)))
+    if len(centre) == 3:
+        raise ParameterError(f"{where}.centre has a z; allowed: x and y, as all points of this file have")
+    x, y = centre
+    return Body(mass, inertia, (x, y))
+
+
+def _inertia(where: str, row: Mapping[str, Any], count: int) -> tuple[float, ...]:
+    given = row.get("inertia", np.zeros(count))
+    if len(given) != count:
+        what = "one, about the body's centre" if count == 1 else "three, about x, y and z of the link"
+        raise ParameterError(f"{where}.inertia has {len(given)} numbers; allowed: {what}")
+    return tuple(number(f"{where}.inertia", value, 0.0, HEAVIEST, "kg m^2") for value in given)
+
+
+def _mass(where: str, row: Mapping[str, Any]) -> float:
+    (mass,) = needed(where, row, "mass")
+    if not mass > 0.0:
+        raise ParameterError(f"{where}.mass = {mass:g} kg is out of range; allowed: above 0")
+    return number(f"{where}.mass", mass, 0.0, HEAVIEST, "kg")
+
+
+def in_space(place: tuple[float, ...]) -> tuple[float, float, float]:
+    """A point whose z is 0 if it has none."""
+    x, y, *z = place
+    return x, y, z[0] if z else 0.0
+
+
+def _spatial_body(where: str, row: Mapping[str, Any]) -> SpatialBody:
+    if "at" in row:
+        raise ParameterError(f"{where}.at has a meaning at the ends of a beam only; leave it out")
+    along, across, sideways = _inertia(where, row, 3)
+    centre = in_space(place_of(f"{where}.centre", row.get("centre", np.zeros(3))))
+    body = SpatialBody(_mass(where, row), (along, across, sideways), centre)
+    try:
+        body.particles()
+    except ParameterError as error:
+        raise ParameterError(f"{where}: {error}") from None
+    return body
+
+
+def spatial_links(tables: Mapping[str, Any], joints: list[Joint]) -> tuple[Link, ...]:
+    """Links in space; each may turn right round about its axis, by default that of its pin on the ground, else z."""
+    pins = [joint for joint in joints if joint.kind in ("revolute", "cylindrical")]
+    axes = {joint.first[0]: joint.first_axis for joint in pins if joint.second[0] == GROUND}
+    axes |= {joint.second[0]: joint.second_axis for joint in pins if joint.first[0] == GROUND}
+    found = []
+    for name, table in tables.items():
+        where = f"link.{name}"
+        if "beam" in table:
+            raise ParameterError(f"{where} has a beam, which bends in the plane only; allowed in space: rigid links")
+        if "angle" in table:
+            raise ParameterError(f"{where}.angle has a meaning in the plane only; allowed in space: orientation")
+        turns = _three(f"{where}.orientation", table.get("orientation", np.zeros(3)))
+        bodies = tuple(_spatial_body(f"{where}.body", row) for row in table["body"])
+        points = {point: in_space(place) for point, place in table["points"].items()}
+        x, y, z = (math.radians(turn) for turn in turns)
+        axis = _axis(f"{where}.axis", table.get("axis", axes.get(name, (0.0, 0.0, 1.0))))
+        found.append(spatial_link(name, points, bodies, (x, y, z), axis))
+    return tuple(found)
+
+
+def _three(where: str, values: Any) -> tuple[float, float, float]:
+    if len(values) != 3:
+        raise ParameterError(f"{where} has {len(values)} numbers; allowed: three, for x, y and z")
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
+def axes_of_joint(where: str, kind: str, row: Mapping[str, Any]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Axis of a joint in space in axes of its first and of its second link."""
+    if kind == "universal":
+        needed(where, row, "first_axis", "second_axis")
+    usual = np.array([1.0, 0.0, 0.0] if kind == "prismatic" else [0.0, 0.0, 1.0])
+    first = _axis(f"{where}.first_axis", row.get("first_axis", usual))
+    return first, _axis(f"{where}.second_axis", row.get("second_axis", first))
+
+
+def _axis(where: str, values: Any) -> tuple[float, float, float]:
+    axis = _three(where, values)
+    if not math.hypot(*axis) > 1e-9:
+        raise ParameterError(f"{where} has no direction; allowed: three numbers that are not all zero")
+    return axis
+
+
+def check_kind(where: str, kind: str, row: Mapping[str, Any], spatial: bool) -> None:
+    """Refuse a kind, or a key of a joint, that belongs to the other sort of mechanism, or to another kind."""
+    known = SPATIAL_KINDS if spatial else KINDS
+    if kind not in known:
+        raise ParameterError(
+            f"{where} is {kind}, which a mechanism {'in space' if spatial else 'in the plane'} has not; allowed: "
+            f"{', '.join(known)}" + ("" if spatial else ", or a point with a z, which makes it one in space")
+        )
+    for key, kinds in (("axis", ("prismatic", "slot")), ("turn", ("prismatic", "weld"))):
+        if key in row and (spatial or kind not in kinds):
+            what = "in space; write first_axis" if spatial else f"in a {kind} joint; leave it out"
+            raise ParameterError(f"{where}.{key} has no meaning {what}")
+    for key in ("first_axis", "second_axis"):
+        if key in row and not spatial:
+            raise ParameterError(f"{where}.{key} has a meaning in space only; allowed: axis, or points with a z")

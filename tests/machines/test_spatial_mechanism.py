@@ -1,0 +1,173 @@
+"""Mechanisms in space: against the thesis' crank at an angle, an exact twin, the plane, and universal joints."""
+
+import math
+
+import numpy as np
+import pytest
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.mechanism.equations import crank_inertia, small_motion
+from chaosgym.machines.mechanism.joints import Joint
+from chaosgym.machines.mechanism.nominal import nominal, revolution_of
+from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
+from chaosgym.machines.mechanism.spatial import SpatialMechanism
+from chaosgym.machines.slider_crank.equations import equations
+from chaosgym.machines.slider_crank.machine import SliderCrank
+from tests.machines.mechanisms import thesis_crank, thesis_crank_in_space
+from tests.machines.spatial_twin import RigidMechanism
+
+BINS = 180
+WIDTH = 2.0 * math.pi / BINS
+ANGLES = (np.arange(BINS) + 0.5) * WIDTH
+LOPSIDED = {
+    "rod": "rigid",
+    "geometric_stiffness": "on",
+    "gravity": 9.81,
+    "gravity_angle": 20.0,
+    "housing_offset_across": 0.004,
+    "yoke_offset_across": -0.003,
+    "slider_offset_along": 0.01,
+    "slider_offset_across": 0.03,
+    "slider_pitch_inertia": 1e-3,
+    "slider_roll_inertia": 5e-4,
+}
+SETS = {
+    "guide": {},
+    "guide that turns": {"slider_joint": "instrumented"},
+    "ball": {"slider_joint": "ideal", "ball_joint": "spherical"},
+    "both": {"slider_joint": "instrumented", "ball_joint": "spherical"},
+}
+
+
+def assembled(mechanism):
+    """Equations at the middles of the bins."""
+    return small_motion(mechanism, revolution_of(mechanism), 0.5 * WIDTH, BINS)
+
+
+def assert_equal(found, expected, tolerance):
+    """Entries agree to a share of the largest one."""
+    assert np.abs(found - expected).max() <= tolerance * np.abs(expected).max()
+
+
+def order_of(mechanism, names):
+    """Coordinates of a mechanism in the order of a crank's names."""
+    known = {"slider across the guide": "slider across", "ball along the rod": "ball along"}
+    known |= {"ball across the rod": "ball across"}
+    return [mechanism.coordinates.index(known.get(name, name)) for name in names]
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_matrices_are_those_of_the_crank_at_an_angle(name):
+    """M, D and f at 15 deg, all bodies off their axes, equal those of the crank to 2e-11; K too where both have it.
+
+    The crank leaves out products of the slider's turns with the rod's, and measures the ball's gap along the nominal
+    rod: stiffness that belongs to a turn of the slider or to the ball differs.
+    """
+    machine = SliderCrank(motor_angle=15.0, **LOPSIDED | SETS[name])
+    mechanism = thesis_crank_in_space(machine)
+    found, expected = assembled(mechanism), equations(machine, ANGLES)
+    order = order_of(mechanism, machine.degrees_of_freedom)
+    assert sorted(order) == list(range(len(mechanism.coordinates)))
+    pick = np.ix_(order, order)
+    assert_equal(found.mass[:, pick[0], pick[1]], expected.mass, 2e-11)
+    assert_equal(found.damping[1][:, pick[0], pick[1]], expected.damping[1], 2e-11)
+    for power, load in zip((0, 2), expected.load, strict=True):
+        assert_equal(found.load[power][:, order], load, 2e-11)
+    if machine.ball_joint == "ideal":
+        for power in (0, 2):
+            mine = found.stiffness[power][:, pick[0], pick[1]][:, :2, :2]
+            assert_equal(mine, expected.stiffness[power][:, :2, :2], 2e-11)
+    assert not found.damping[0].any()
+    assert not found.stiffness[1].any()
+
+
+@pytest.mark.parametrize("degrees", [37.0, 100.0, 301.0])
+def test_what_the_crank_leaves_out_is_that_of_the_exact_mechanism(degrees):
+    """Stiffness between the slider's translations and its turns is that of the nonlinear mechanism, to 1e-7."""
+    machine = SliderCrank(motor_angle=25.0, slider_joint="instrumented", **LOPSIDED)
+    mechanism = thesis_crank_in_space(machine)
+    theta = math.radians(degrees)
+    found = small_motion(mechanism, revolution_of(mechanism), theta, BINS)
+    exact = RigidMechanism(machine, 5).linearised(theta)
+    order = order_of(mechanism, machine.degrees_of_freedom)
+    for power, expected in ((0, exact.stiffness[0]), (2, exact.stiffness[1])):
+        mine = found.stiffness[power][0][np.ix_(order, order)]
+        assert_equal(mine[:2], expected[:2], 1e-7)
+        assert_equal(mine[:, :2], expected[:, :2], 1e-7)
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_in_the_plane_it_is_the_planar_mechanism(name):
+    """With the motor upright M, D, K, f, the drive's torque and what it turns agree to 2e-11, at the ball too."""
+    machine = SliderCrank(**LOPSIDED | SETS[name])
+    flat, spatial = thesis_crank(machine), thesis_crank_in_space(machine)
+    one, other = assembled(flat), assembled(spatial)
+    there = {"slider turn": "slider pitch"}
+    own = [spatial.coordinates.index(there.get(each, each)) for each in flat.coordinates]
+    pick = np.ix_(own, own)
+    assert_equal(other.mass[:, pick[0], pick[1]], one.mass, 2e-11)
+    assert_equal(other.damping[1][:, pick[0], pick[1]], one.damping[1], 2e-11)
+    for power in (0, 2):
+        assert_equal(other.stiffness[power][:, pick[0], pick[1]], one.stiffness[power], 2e-11)
+        assert_equal(other.load[power][:, own], one.load[power], 2e-11)
+        assert_equal(other.torque[power], one.torque[power], 2e-11)
+    inertia = [crank_inertia(each, revolution_of(each), ANGLES) for each in (flat, spatial)]
+    assert_equal(inertia[1], inertia[0], 2e-11)
+
+
+def cardan(angle):
+    """A shaft, a second one at an angle [rad], and a third along the first, joined by two universal joints."""
+    axis = (math.cos(angle), math.sin(angle), 0.0)
+    x_axis, y_axis, z_axis = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    none, end = (0.0, 0.0, 0.0), (0.2, 0.0, 0.0)
+    body = (SpatialBody(1.0, (1e-3, 1e-3, 1e-3)),)
+    return SpatialMechanism(
+        (
+            spatial_link("input", {"end": none}, axis=x_axis),
+            spatial_link("middle", {"start": none, "end": end}, body, orientation=(0.0, 0.0, angle), axis=x_axis),
+            spatial_link("output", {"start": none}, body, axis=x_axis),
+        ),
+        (
+            Joint("motor", "revolute", ("ground", "hub"), ("input", "end"), "", "", (), True, 0.0, x_axis, x_axis),
+            Joint("first", "universal", ("input", "end"), ("middle", "start"), first_axis=y_axis, second_axis=z_axis),
+            Joint("second", "universal", ("middle", "end"), ("output", "start"), first_axis=z_axis, second_axis=y_axis),
+            Joint(
+                "bearing",
+                "cylindrical",
+                ("ground", "far"),
+                ("output", "start"),
+                opened=("across", "sideways"),
+                first_axis=x_axis,
+                second_axis=x_axis,
+            ),
+        ),
+        {"hub": none, "far": tuple(0.2 * part for part in axis)},
+    )
+
+
+def test_universal_joints_turn_unevenly_and_two_make_up_for_it():
+    """Cardan's error in closed form: the middle shaft turns by atan(tan(th) / cos(angle)) as seen from its cross.
+
+    The third shaft, parallel to the first, turns by th again, right round.
+    """
+    angle = math.radians(30.0)
+    mechanism = cardan(angle)
+    revolution = revolution_of(mechanism)
+    theta = np.array([0.3, 1.2, 2.5, 4.0, 6.0])
+    z = nominal(mechanism, revolution, theta).z
+    turns = {name: z[:, mechanism.spin(name)] for name in ("input", "middle", "output")}
+    np.testing.assert_allclose(np.mod(turns["output"], 2.0 * math.pi), theta, atol=1e-10)
+    expected = np.unwrap(np.arctan2(np.sin(theta) * math.cos(angle), np.cos(theta)))
+    other = np.unwrap(np.arctan2(np.sin(theta), np.cos(theta) * math.cos(angle)))
+    middle = np.mod(turns["middle"], 2.0 * math.pi)
+    error = min(np.abs(middle - np.mod(one, 2.0 * math.pi)).max() for one in (expected, other))
+    assert error < 1e-10
+    assert np.ptp(middle - theta) > 0.1
+
+
+def test_a_link_that_turns_over_about_another_axis_is_named():
+    """The third shaft goes right round about x; with another axis of its own it is refused by name."""
+    given = cardan(math.radians(30.0))
+    links = (*given.links[:2], spatial_link("output", {"start": (0.0, 0.0, 0.0)}))
+    with pytest.raises(ParameterError, match="link output turns by half a turn about another axis"):
+        revolution_of(SpatialMechanism(links, given.joints, given.ground))
