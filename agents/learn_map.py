@@ -43,6 +43,9 @@ EVERY = 3
 MOST = 3.0
 """Settled steps at a speed beyond which its outcome counts no more."""
 
+SMALLEST = 0.1
+"""Least load that is told apart from none, in errors of the sensor."""
+
 LOAD_WEIGHT = 0.3
 """Weight of the squared error of the load, in standard deviations, beside the cross-entropy of irregular motion."""
 
@@ -152,7 +155,7 @@ def _write(path: Path, content: bytes) -> None:
 def usual(envs: MachineVectorEnv, seen_: Array) -> tuple[Array, Array]:
     """Mean and deviation of the readings at each speed (speeds, 5)."""
     rows = seen_.reshape(-1, seen_.shape[-1])
-    place, values = place_of(seen(rows, "speed"), envs.task), readings_of(rows)
+    place, values = place_of(seen(rows, "speed"), envs.task), readings_of(rows, envs.task)
     total = np.zeros((3, len(envs.task.grid), values.shape[1]))
     for k in range(3):
         np.add.at(total[k], place, values**k)
@@ -184,7 +187,8 @@ def rows_of(envs: MachineVectorEnv, jobs: Jobs, mean: Array, deviation: Array) -
             inputs.append(row.astype(np.float16))
         held = felt.settled & np.isfinite(jobs.irregular[step])
         place = place_of(seen(jobs.seen[step], "speed"), envs.task)
-        values = np.ones(count), jobs.irregular[step], np.log(seen(jobs.seen[step], "mean_peak_force") + 1e-9)
+        load = np.maximum(seen(jobs.seen[step], "mean_peak_force"), SMALLEST * envs.task.sensor_error)
+        values = np.ones(count), jobs.irregular[step], np.log(load)
         for total, value in zip(sums, values, strict=True):
             np.add.at(total, (every[held], place[held]), value[held])
     known = np.maximum(sums[0], 1.0)
@@ -272,7 +276,8 @@ class Fit:
 
 def train(asked: argparse.Namespace) -> None:
     """Play, fit and write the policy."""
-    given = {"fidelity": asked.fidelity} | asked.keywords | {"action": "speed"}
+    rung = {} if asked.fidelity is None else {"fidelity": asked.fidelity}
+    given = rung | asked.keywords | {"action": "speed"}
     envs = native_envs(asked.env, asked.envs, **given)
     jobs = gathered(asked, envs)
     mean, deviation = usual(envs, jobs.seen)

@@ -65,7 +65,7 @@ def test_a_settled_reading_takes_the_place_of_one_on_the_way():
         return row[:-1].reshape(SPEEDS, CHANNELS)
 
     def reading(force):
-        return readings_of(_observed(12.0, 12.0, force))[0, 0]
+        return readings_of(_observed(12.0, 12.0, force), TASK)[0, 0]
 
     assert after(10.0)[place, :3] == pytest.approx([1.0, 0.0, reading(10.0)])
     assert after(20.0)[place, :3] == pytest.approx([1.0, 1.0, reading(20.0)])

@@ -22,8 +22,8 @@ from chaosgym.errors import ModelFileError
 READINGS = ("mean peak", "scatter", "irregularity", "impacts", "bouncing")
 """What is remembered of a speed; the first three as logarithms [log N]."""
 
-NOISE = (1.0, 0.3, 0.3)
-"""Forces [N] that are added before the logarithm of the first three (assumed)."""
+NOISE = np.array([1.0, 0.3, 0.3])
+"""Added before the logarithm of the first three, in errors of the sensor (assumed)."""
 
 LARGEST = 5.0
 """Readings are cut off here, in standard deviations from what is usual at a speed."""
@@ -35,11 +35,11 @@ AFRESH = 0.5
 """Weight of the last settled step at a speed against those before it there."""
 
 
-def readings_of(observations: NDArray[Any]) -> Array:
+def readings_of(observations: NDArray[Any], task: Task) -> Array:
     """Readings (n, 5) of observations (n, 14)."""
     forces = [seen(observations, "mean_peak_force"), seen(observations, "std_peak_force"), irregularity(observations)]
     others = [seen(observations, "impacts_per_cycle"), seen(observations, "bouncing_share")]
-    return np.column_stack([*np.log(np.column_stack(forces) + NOISE).T, *others])
+    return np.column_stack([*np.log(np.column_stack(forces) + task.sensor_error * NOISE).T, *others])
 
 
 class FeltSpeeds:
@@ -70,7 +70,7 @@ class FeltSpeeds:
         """Take in a step (N, 14); return all that is remembered and the share of the job to do, (N, 7 speeds + 1)."""
         speed = seen(observations, "speed")
         place = place_of(speed, self.task)
-        readings = (readings_of(observations) - self.mean[place]) / self.deviation[place]
+        readings = (readings_of(observations, self.task) - self.mean[place]) / self.deviation[place]
         self.settled = np.abs(speed - self._last) < 0.3 * self.task.trim_step
         self._last = speed
         before = self._felt[self._jobs, place]
