@@ -12,7 +12,7 @@ from chaosgym.design.bearing import Criteria, Evaluation, evaluate, plain
 from chaosgym.design.reliability import time_blocks
 from chaosgym.design.statistics import Convergence, Histogram, as_forces, convergence, histogram, require_enough
 from chaosgym.diagnosis.measured import judge_peaks
-from chaosgym.diagnosis.scatter import MeasuredVerdict
+from chaosgym.diagnosis.response import MeasuredVerdict
 from chaosgym.errors import DesignError
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from chaosgym.design.guidelines import Guideline, guidelines
 from chaosgym.design.improve import Improvement, Trial, improve
 from chaosgym.design.methodology import Assessment, Check
 from chaosgym.design.peak_impacts import PeakImpactDiagram, filling_cycles, peak_impacts, worn_side
-from chaosgym.design.surroundings import MIDDLE, in_tolerance, map_around
+from chaosgym.design.surroundings import in_tolerance, map_around, suggested
 from chaosgym.design.told import hours_told
 from chaosgym.design.trends import (
     DIAGRAM_CYCLES,
@@ -25,8 +25,8 @@ from chaosgym.design.trends import (
     impacts_against,
     life_against,
 )
-from chaosgym.diagnosis import ResponseMap, find_periodic_orbit
-from chaosgym.diagnosis.margins import Margins, margins
+from chaosgym.diagnosis import ResponseMap
+from chaosgym.diagnosis.margins import Margins, margins_of
 from chaosgym.errors import DesignError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import quantity_of, with_settings
@@ -291,7 +291,7 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
             assessment,
             brief.changes,
             brief.costs,
-            seeds=_seeds(brief, assessment, trend, around),
+            seeds=suggested(brief, assessment, trend, around),
             series_size=brief.series_size,
             seed=seed,
             workers=workers,
@@ -309,55 +309,13 @@ def study(brief: DesignBrief, *, seed: int = 0, workers: int | None = None, prog
         impacts_against(machine, brief.impacts, brief.criteria.life_exponent, workers=workers),
         combination(assessment, in_tolerance(around), seed=seed, workers=workers, progress=progress),
         guidelines(assessment, in_tolerance(around)),
-        _margins(assessment),
+        margins_of(assessment.machine, assessment.response.centre, assessment.region),
         _every_impact(record, side, brief),
         seed,
     )
     if found := contradictions(answer):
         raise DesignError(f"the report contradicts itself, which is a fault of this program: {'; '.join(found)}")
     return answer
-
-
-def _margins(found: Assessment) -> Margins | None:
-    centre = found.response.centre
-    if centre.status != "certified" or centre.period is None:
-        return None
-    orbit = find_periodic_orbit(found.machine, centre.evidence["final_state"], centre.period)
-    return margins(found.machine, orbit, found.region) if orbit is not None and orbit.certified else None
-
-
-MOST_OF_MAP = 6
-"""Places of the map that seed the search."""
-
-
-def _seeds(
-    brief: DesignBrief, found: Assessment, trend: LifeTrend | None, around: ResponseMap | None
-) -> list[dict[str, float]]:
-    """Candidates for the search, of fields that may change.
-
-    Speeds at which the trend shows no contact or enough life; places of the map without contact or of Type I, nearest
-    first; and values at which the trend of the force over each tolerance reaches the required life.
-    """
-    machine, criteria = found.machine, found.criteria
-    fields = (machine.speed_field, machine.clearance_field)
-    lacking = criteria.life / max(found.evaluation.life_interval.low, 1e-300)
-    seeds = list[dict[str, float]]()
-    if trend is not None and fields[0] in brief.changes:
-        speeds = trend.longer_lived(getattr(machine, fields[0]), max(lacking, 1.0))
-        seeds += [{fields[0]: speed} for speed in speeds]
-    if around is not None and set(fields) & brief.changes.keys():
-        calm = np.argwhere((around.type == "I") | (around.largest_peak == 0.0))
-        calm = calm[np.argsort(np.abs(calm - MIDDLE).sum(axis=1), kind="stable")]
-        places = [(float(around.speed[i]), float(around.clearance[j])) for i, j in calm]
-        both = [dict(zip(fields, place, strict=True)) for place in places]
-        seeds += [{name: value for name, value in one.items() if name in brief.changes} for one in both][:MOST_OF_MAP]
-    needed = np.log(max(lacking, 1.0)) / criteria.life_exponent
-    for name, slope in zip(found.trend.parameters, found.trend.slopes.tolist(), strict=True):
-        row, nominal = brief.changes.get(name, ()), getattr(machine, name)
-        if row and slope and nominal > 0.0 and abs(needed / slope) < 1e3:
-            value = brief.region[name].at(nominal, -1.2 * needed / slope)
-            seeds.append({name: float(np.clip(value, min(*row, nominal), max(*row, nominal)))})
-    return [{name: float(f"{value:.4g}") for name, value in one.items()} for one in seeds]
 
 
 def _every_impact(record: CycleRecord, side: int, brief: DesignBrief) -> float:

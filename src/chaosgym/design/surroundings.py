@@ -1,9 +1,11 @@
-"""Types of machines around the nominal speed and clearance."""
+"""Types of machines around the nominal speed and clearance, and the changes that a study suggests to try."""
 
 import numpy as np
 
 from chaosgym.design.brief import DesignBrief
+from chaosgym.design.methodology import Assessment
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
+from chaosgym.design.trends import LifeTrend
 from chaosgym.diagnosis import Neighbour, ResponseMap, response_map
 from chaosgym.errors import ParameterError
 
@@ -48,3 +50,37 @@ def map_around(brief: DesignBrief, workers: int | None, progress: bool) -> Respo
         )
     except ParameterError:
         return None
+
+
+MOST_OF_MAP = 6
+"""Places of the map that seed the search."""
+
+
+def suggested(
+    brief: DesignBrief, found: Assessment, trend: LifeTrend | None, around: ResponseMap | None
+) -> list[dict[str, float]]:
+    """Candidates for the search, of fields that may change.
+
+    Speeds at which the trend shows no contact or enough life; places of the map without contact or of Type I, nearest
+    first; and values at which the trend of the force over each tolerance reaches the required life.
+    """
+    machine, criteria = found.machine, found.criteria
+    fields = (machine.speed_field, machine.clearance_field)
+    lacking = criteria.life / max(found.evaluation.life_interval.low, 1e-300)
+    seeds = list[dict[str, float]]()
+    if trend is not None and fields[0] in brief.changes:
+        speeds = trend.longer_lived(getattr(machine, fields[0]), max(lacking, 1.0))
+        seeds += [{fields[0]: speed} for speed in speeds]
+    if around is not None and set(fields) & brief.changes.keys():
+        calm = np.argwhere((around.type == "I") | (around.largest_peak == 0.0))
+        calm = calm[np.argsort(np.abs(calm - MIDDLE).sum(axis=1), kind="stable")]
+        places = [(float(around.speed[i]), float(around.clearance[j])) for i, j in calm]
+        both = [dict(zip(fields, place, strict=True)) for place in places]
+        seeds += [{name: value for name, value in one.items() if name in brief.changes} for one in both][:MOST_OF_MAP]
+    needed = np.log(max(lacking, 1.0)) / criteria.life_exponent
+    for name, slope in zip(found.trend.parameters, found.trend.slopes.tolist(), strict=True):
+        row, nominal = brief.changes.get(name, ()), getattr(machine, name)
+        if row and slope and nominal > 0.0 and abs(needed / slope) < 1e3:
+            value = brief.region[name].at(nominal, -1.2 * needed / slope)
+            seeds.append({name: float(np.clip(value, min(*row, nominal), max(*row, nominal)))})
+    return [{name: float(f"{value:.4g}") for name, value in one.items()} for one in seeds]

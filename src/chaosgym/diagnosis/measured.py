@@ -14,8 +14,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chaosgym.diagnosis.response import Diagnosis
-from chaosgym.diagnosis.scatter import MeasuredVerdict, judge_scatter, newton, scatter_of, undetermined
+from chaosgym.diagnosis.response import Diagnosis, MeasuredVerdict, undetermined
+from chaosgym.diagnosis.scatter import judge_scatter, newton, scatter_of
 from chaosgym.diagnosis.sensors import judge_together
 from chaosgym.diagnosis.two_step import INITIAL_TRANSIENT, two_step_test
 from chaosgym.errors import DiagnosisError

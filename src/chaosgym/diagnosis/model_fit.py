@@ -37,8 +37,7 @@ from chaosgym.diagnosis.model_draws import (
     weights_of,
 )
 from chaosgym.diagnosis.record_figures import figures, names_of
-from chaosgym.diagnosis.response import Nature
-from chaosgym.diagnosis.scatter import MeasuredVerdict
+from chaosgym.diagnosis.response import MeasuredVerdict, Nature
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines.machine import Machine
 from chaosgym.signals.noise import repair, stated_error

@@ -3,12 +3,13 @@
 The words are those of the thesis: periodic, quasiperiodic, chaotic (2.3, 5.2) and Types I, II, III (5.5).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sized
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
 from chaosgym.errors import DiagnosisError
+from chaosgym.signals.noise import SensorError
 
 if TYPE_CHECKING:
     from chaosgym.simulation.record import CycleRecord
@@ -124,3 +125,63 @@ class Diagnosis:
         left_out = ("record", "orbit_record", "condition")
         plain = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in left_out}
         return {**plain, "evidence": dict(self.evidence), "votes": dict(self.votes)}
+
+
+@dataclass(frozen=True)
+class MeasuredVerdict:
+    """The verdict on a measured record.
+
+    Attributes
+    ----------
+    diagnosis
+        Nature, period and reason; the reason says within or beyond how many newton.
+    error
+        Error of the sensor, stated or estimated from the record; None where it can't be estimated.
+    scatter
+        Standard deviation of the readings around their pattern [N]; None where they repeat, or were not asked.
+    coefficient_of_variation
+        The same as a share of the mean reading.
+    random
+        Whether the scatter of a periodic response is taken for that of a random process or sensor. Where it is larger
+        than a stated error, or none is stated, ``diagnosis.condition`` says that the verdict rests on this.
+    outliers
+        Cycles, from 1, whose single readings were left out.
+    gaps
+        Cycles, from 1, before which some are missing.
+    changes
+        First cycles, from 1, of a later regime.
+    notes
+        Sentences for people on what was left out, and on drift.
+    unit
+        Unit of the readings.
+    """
+
+    diagnosis: Diagnosis
+    error: SensorError | None
+    scatter: float | None = None
+    coefficient_of_variation: float | None = None
+    random: bool = False
+    outliers: tuple[int, ...] = ()
+    gaps: tuple[int, ...] = ()
+    changes: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
+    unit: str = "N"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON: those of the diagnosis, and what is known of the readings."""
+        error = None if self.error is None else self.error._asdict()
+        own: dict[str, Any] = {n: list(getattr(self, n)) for n in ("outliers", "gaps", "changes", "notes")}
+        own |= {name: getattr(self, name) for name in ("scatter", "coefficient_of_variation", "random", "unit")}
+        own["condition"] = self.diagnosis.condition
+        return {**self.diagnosis.as_dict(), "sensor_error": error, **own}
+
+
+def undetermined(reason: str, readings: Sized, **evidence: Any) -> Diagnosis:
+    """Diagnosis of a record that can't be judged, and why."""
+    return Diagnosis(
+        nature="undetermined",
+        margin=0.0,
+        reason=reason,
+        horizon=len(readings),
+        evidence={"cycles": len(readings), **evidence},
+    )

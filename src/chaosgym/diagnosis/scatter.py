@@ -11,13 +11,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import repeat
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.diagnosis.determinism import DRIVEN, LEAST_GAIN, Determinism, beats_surrogates, determinism, drive
-from chaosgym.diagnosis.response import Diagnosis
+from chaosgym.diagnosis.response import Diagnosis, MeasuredVerdict, undetermined
+from chaosgym.diagnosis.spectrum import without_lines
 from chaosgym.diagnosis.two_step import CHAOTIC_CYCLES, MAX_LINES, QUASIPERIODIC_CYCLES
 from chaosgym.signals.noise import (
     RANDOM,
@@ -31,52 +31,6 @@ from chaosgym.signals.noise import (
 )
 
 Array = NDArray[np.float64]
-
-PADDED = 16
-"""Length of the transform, in lengths of the record."""
-
-STEPS = 4
-"""Gauss-Newton steps on the frequencies after each line."""
-
-
-def without_lines(values: Array, most: int, enough: float) -> tuple[Array, int]:
-    """Readings less a sum of sinusoids, and how many.
-
-    Parameters
-    ----------
-    values : (cycles,)
-        Readings.
-    most
-        Largest number of sinusoids.
-    enough
-        Standard deviation of the rest at which no further one is looked for.
-    """
-    size = len(values)
-    time = np.arange(size) - 0.5 * (size - 1)
-    window = np.hanning(size)
-    rest: Array = values - values.mean()
-    frequencies: Array = np.empty(0)
-    while len(frequencies) < most and np.std(rest) > enough:
-        power = np.abs(np.fft.rfft(rest * window, PADDED * size))
-        power[: 2 * PADDED] = 0.0
-        frequencies = np.asarray([*frequencies, float(np.argmax(power)) / (PADDED * size)])
-        for _ in range(STEPS):
-            frequencies, rest = _fitted(values, time, frequencies)
-    return rest, len(frequencies)
-
-
-def _fitted(values: Array, time: NDArray[Any], frequencies: Array) -> tuple[Array, Array]:
-    """One Gauss-Newton step on the frequencies [1/cycle], and the rest before it."""
-    angle = 2.0 * np.pi * np.outer(time, frequencies)
-    cosine, sine = np.cos(angle), np.sin(angle)
-    design = np.column_stack([np.ones(len(time)), cosine, sine])
-    weights = np.linalg.lstsq(design, values, rcond=None)[0]
-    count = len(frequencies)
-    slope = 2.0 * np.pi * time[:, None] * (weights[1 + count :] * cosine - weights[1 : 1 + count] * sine)
-    rest = values - design @ weights
-    change = np.linalg.lstsq(np.column_stack([design, slope]), rest, rcond=None)[0][1 + 2 * count :]
-    return frequencies + np.clip(change, -0.5 / len(time), 0.5 / len(time)), rest
-
 
 SMALL_SCATTER, LARGE_SCATTER = 0.015, 0.08
 """Standard deviations, as shares of the mean force. Scatter around one level above the first is told from chaos only by
@@ -105,66 +59,6 @@ ENOUGH_CYCLES = 100
 
 MORE_CYCLES = 1000
 """Cycles below which more of them would tell more."""
-
-
-@dataclass(frozen=True)
-class MeasuredVerdict:
-    """The verdict on a measured record.
-
-    Attributes
-    ----------
-    diagnosis
-        Nature, period and reason; the reason says within or beyond how many newton.
-    error
-        Error of the sensor, stated or estimated from the record; None where it can't be estimated.
-    scatter
-        Standard deviation of the readings around their pattern [N]; None where they repeat, or were not asked.
-    coefficient_of_variation
-        The same as a share of the mean reading.
-    random
-        Whether the scatter of a periodic response is taken for that of a random process or sensor. Where it is larger
-        than a stated error, or none is stated, ``diagnosis.condition`` says that the verdict rests on this.
-    outliers
-        Cycles, from 1, whose single readings were left out.
-    gaps
-        Cycles, from 1, before which some are missing.
-    changes
-        First cycles, from 1, of a later regime.
-    notes
-        Sentences for people on what was left out, and on drift.
-    unit
-        Unit of the readings.
-    """
-
-    diagnosis: Diagnosis
-    error: SensorError | None
-    scatter: float | None = None
-    coefficient_of_variation: float | None = None
-    random: bool = False
-    outliers: tuple[int, ...] = ()
-    gaps: tuple[int, ...] = ()
-    changes: tuple[int, ...] = ()
-    notes: tuple[str, ...] = ()
-    unit: str = "N"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON: those of the diagnosis, and what is known of the readings."""
-        error = None if self.error is None else self.error._asdict()
-        own: dict[str, Any] = {n: list(getattr(self, n)) for n in ("outliers", "gaps", "changes", "notes")}
-        own |= {name: getattr(self, name) for name in ("scatter", "coefficient_of_variation", "random", "unit")}
-        own["condition"] = self.diagnosis.condition
-        return {**self.diagnosis.as_dict(), "sensor_error": error, **own}
-
-
-def undetermined(reason: str, readings: Array, **evidence: Any) -> Diagnosis:
-    """Diagnosis of a record that can't be judged, and why."""
-    return Diagnosis(
-        nature="undetermined",
-        margin=0.0,
-        reason=reason,
-        horizon=len(readings),
-        evidence={"cycles": len(readings), **evidence},
-    )
 
 
 @dataclass(frozen=True)

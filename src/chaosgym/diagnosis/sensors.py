@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.diagnosis.determinism import determinism
-from chaosgym.diagnosis.scatter import MeasuredVerdict, Scatter, chaotic, is_chaotic, scatter_of, undetermined
+from chaosgym.diagnosis.response import MeasuredVerdict, undetermined
+from chaosgym.diagnosis.scatter import Scatter, chaotic, is_chaotic, scatter_of
 from chaosgym.diagnosis.two_step import CHAOTIC_CYCLES
 from chaosgym.signals.noise import quantum, repair
 
