@@ -115,11 +115,11 @@ def test_no_floor_above_the_machines_reaches_into_the_folder_of_one():
 
 def test_compiled_kernels_are_cached_by_their_sources():
     """An edit in any kernel source changes the cache folder, so that stale machine code is never served."""
+    from chaosgym.core.joints.cycle import advance_joints
     from chaosgym.core.kernel_cache import KERNEL_CACHE, kernel_digest
-    from chaosgym.core.modal_impact import advance_model
 
     assert Path(KERNEL_CACHE).name == kernel_digest()
-    assert Path(advance_model.stats.cache_path) == Path(KERNEL_CACHE, "core")
+    assert Path(advance_joints.stats.cache_path) == Path(KERNEL_CACHE, "joints")
 
 
 def test_every_kernel_takes_its_decorator_from_one_place():

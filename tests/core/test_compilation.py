@@ -14,7 +14,7 @@ import chaosgym
 from chaosgym.core import compilation
 from chaosgym.core.compilation import is_cached
 from chaosgym.core.fixed_step import advance_fixed_step
-from chaosgym.core.modal_impact import advance_model
+from chaosgym.core.joints.cycle import advance_joints
 from chaosgym.machines import ImpactBeam, SliderCrank
 from chaosgym.simulation import RungeKutta4, simulate, simulate_with_deviations
 
@@ -34,16 +34,16 @@ def test_a_call_adds_no_version_of_a_kernel():
     simulate(ImpactBeam(), 1)
     simulate_with_deviations(ImpactBeam(), 1, deviations=[[1.0] * 12])
     simulate(ImpactBeam(), 1, integrator=RungeKutta4(4000))
-    assert len(advance_model.signatures) == 1
+    assert len(advance_joints.signatures) == 1
     assert len(advance_fixed_step.signatures) == 1
-    assert is_cached(advance_model)
+    assert is_cached(advance_joints)
 
 
 def test_the_functions_that_are_counted_are_those_that_are_compiled():
     """A bar over the functions that a kernel calls ends full: each of them has machine code then."""
     simulate(ImpactBeam(), 1)
-    functions = compilation._functions_of(advance_model)
-    assert advance_model in functions
+    functions = compilation._functions_of(advance_joints)
+    assert advance_joints in functions
     assert len(functions) > 10
     assert all(map(is_cached, functions))
 
@@ -55,7 +55,7 @@ def test_no_kernel_gives_python_a_named_tuple():
     simulate(ImpactBeam(n_modes=1, fitted_modes=0), 1, integrator=RungeKutta4(4000))
     called = [kernel for kernel, _ in compilation._ready]
     given = {kernel: {signature.return_type for signature in kernel.nopython_signatures} for kernel in called}
-    assert advance_model in given
+    assert advance_joints in given
     assert not any(isinstance(kind, types.BaseNamedTuple) for kinds in given.values() for kind in kinds)
 
 

@@ -19,7 +19,7 @@ from chaosgym.core import status
 from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.joints.batch import JointModel, displacement_weights
-from chaosgym.core.joints.cycle import advance_joints
+from chaosgym.core.joints.cycle import advance_joints, room_for
 from chaosgym.core.joints.run import JointRun, new_space, work_space
 from chaosgym.core.joints.sets import put_sets, set_length
 from chaosgym.core.joints.tables import MOST_LEVELS, Rubs, layout, read_at_rest
@@ -343,7 +343,7 @@ class JointTables:
     ) -> tuple[int, int]:
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``. ``stops`` (m, 2) are positions [m]."""
         done, cycles, made, own = 0, len(arrays.section), 0, self.space(stops)
-        weights = call(displacement_weights, self._stiffness, self.frequency)
+        weights, kept = call(displacement_weights, self._stiffness, self.frequency), room_for(bouncing, tangents)
         while True:
             part = CycleArrays(*(values[done:] for values in arrays))
             along = tangents._replace(log_growth=tangents.log_growth[done:])
@@ -351,7 +351,7 @@ class JointTables:
                 tables, rows = self._tables, self._rows
             run = JointRun(tables, own, self._at, 1.0 / self.frequency, integrator.event_tolerance / self._step_phase)
             motion = (state, bouncing, part, integrator.event_budget, along)
-            outcome, finished, code = call(advance_joints, run, rows, weights, *motion)
+            outcome, finished, code = call(advance_joints, run, rows, weights, *motion, kept)
             done += finished
             made = 1 if finished else made + 1
             if outcome != status.NEEDS_SET or not self.provide(code, made):

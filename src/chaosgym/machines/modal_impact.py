@@ -335,14 +335,13 @@ def flexible_model(
     return with_tables(model)
 
 
-def with_tables(model: ModalImpactModel) -> ModalImpactModel:
-    """Return the model with tables of its own, for the ``step_phase`` of those that it has."""
+def with_tables(model: ModalImpactModel, step_phase: float | None = None, rate: float = 0.0) -> ModalImpactModel:
+    """Give the model tables of its own, for a drive at ``rate`` [rad/s]; by default of the ``step_phase`` it has."""
     from chaosgym.core.compilation import call
-    from chaosgym.core.modal_impact import shortest_intervals, tabulate
+    from chaosgym.core.modal_impact import tabulate
 
-    phase = model.tables.step_phase
-    shortest = call(shortest_intervals, model.regimes, phase, 0.0)
-    return model._replace(tables=Tables(phase, shortest, call(tabulate, model, shortest)))
+    phase = model.tables.step_phase if step_phase is None else step_phase
+    return model._replace(tables=Tables(phase, *call(tabulate, model, phase, rate)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -493,20 +492,28 @@ class ModalImpactMachine(Machine):
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``."""
         from chaosgym.core.compilation import call
         from chaosgym.core.fixed_step import advance_fixed_step
-        from chaosgym.core.modal_impact import advance_model
+        from chaosgym.core.joints.cycle import advance_joints, room_for
+        from chaosgym.core.joints.run import JointRun
+        from chaosgym.core.modal_impact import make_run
         from chaosgym.core.tangent import no_tangents
 
         model = self.reduce()
         phase, share = self.__dict__.get("_section", (0.0, 1.0))
         model = with_drive_from(model, phase) if phase else model
         along = tangents or no_tangents(len(coordinates), len(arrays.section))
-        if isinstance(integrator, ExactEvents):
-            step, tolerance, budget = integrator.step_phase, integrator.event_tolerance, integrator.event_budget
-            motion = coordinates, bouncing, arrays, budget, along
-            outcome = call(advance_model, model, share, step, tolerance, *motion)
-        else:
-            outcome = call(advance_fixed_step, model, coordinates, bouncing, arrays, integrator.steps_per_cycle)
-        status, done = outcome
+        if not isinstance(integrator, ExactEvents):
+            status, done = call(advance_fixed_step, model, coordinates, bouncing, arrays, integrator.steps_per_cycle)
+            return status, done
+        step = integrator.step_phase
+        made = call(make_run, model, model.tables, step)
+        if not len(made[0]):
+            rate = 2.0 * math.pi * model.excitation_frequency * model.drive.shape[1]
+            made = call(make_run, model, with_tables(model, step, rate).tables, step)
+        tables, own, at, rows, weights = made
+        period = share * (1.0 / model.excitation_frequency)
+        run = JointRun(tables, own, at, period, integrator.event_tolerance / step)
+        motion = coordinates, bouncing, arrays, integrator.event_budget, along, room_for(bouncing, along)
+        status, done, _ = call(advance_joints, run, rows, weights, *motion)
         return status, done
 
     def share_of_bound(self, states: Array, peak_force: Array) -> float:

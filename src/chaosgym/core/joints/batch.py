@@ -70,6 +70,7 @@ def _advance(batch, i, speeds, motions, vectors, growth, arrays, settings, until
     rows = carray(pointer(batch.rows[i]), (batch.sets[i],), np.int64)
     own = carray(pointer(batch.own[i]), (at[OWN],), np.float64)
     weights = displacement_weights(batch.stiffness[i], speeds[k, done[k]])
+    kept = np.empty(motions.bouncing.shape[1] + vectors.shape[1] * vectors.shape[2])
     while done[k] < until:
         frequency = speeds[k, done[k]]
         if batch.frequency[i] != frequency:
@@ -85,6 +86,7 @@ def _advance(batch, i, speeds, motions, vectors, growth, arrays, settings, until
             cycle_of(arrays, k, done[k]),
             settings.event_budget,
             Tangents(vectors[i], growth[k, done[k] : done[k] + 1]),
+            kept,
         )
         if outcome != 0:
             return outcome, code

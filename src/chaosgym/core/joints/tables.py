@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
-from chaosgym.core.kernel import leaf, njit
+from chaosgym.core.kernel import leaf, njit, part
 from chaosgym.core.lanes import LANES, padded
 from chaosgym.core.propagator import block, bound, derivative, steady_response
 
@@ -135,7 +135,18 @@ def layout(n, harmonics, m, sliders, levels):
     return at
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
+def _shown(shape, from_modal):
+    """Displacement of what has a ``shape`` (k, n), a row of it after the other, per unit modal coordinate (k, 2n)."""
+    shown = np.empty((shape.shape[0], from_modal.shape[1]))
+    for j in range(shape.shape[0]):
+        row = shape[j] @ from_modal[: shape.shape[1]]
+        for i in range(row.size):
+            shown[j, i] = row[i]
+    return shown
+
+
+@part
 def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, rest, drift, constants, rubs, values):
     """Fill a row (at[ROW],) of zeros with what depends on neither drive nor constant force.
 
@@ -176,18 +187,15 @@ def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, res
             values[LONGEST] -= 1.0
         growth *= math.ldexp(longest, int(values[LONGEST]))
     _put_blocks(at, generator, shortest, np.int64(0), at[LEVELS], values)
-    shown, strain = np.empty((m, 2 * n)), np.empty((sliders, 2 * n))
-    for j in range(m):
-        shown[j] = shape[j] @ np.ascontiguousarray(from_modal[:n])
-    for c in range(sliders):
-        strain[c] = rubs.shape[c] @ np.ascontiguousarray(from_modal[:n])
+    shown, strain = _shown(shape, from_modal), _shown(rubs.shape, from_modal)
     _put_channels(at, generator, shown, lag, strain, rubs, np.int64(0), at[LEVELS], math.exp(growth), values)
     if sliders > 0:
         anchors = np.zeros((4, sliders))
-        anchors[1] = 1.0
+        for c in range(sliders):
+            anchors[1, c] = 1.0
         _put_blocks(at, anchors, shortest, n + harmonics, at[LEVELS], values)
         back = from_modal @ rubs.follow
-        shown, strain = shape @ np.ascontiguousarray(back[:n]), rubs.shape @ np.ascontiguousarray(back[:n])
+        shown, strain = shape @ back[:n], rubs.shape @ back[:n]
         for c in range(sliders):
             strain[c, c] -= 1.0
         _put_channels(at, anchors, shown, lag, strain, rubs, n + harmonics, at[LEVELS], 1.0, values)
@@ -207,7 +215,7 @@ def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, res
             values[at[CONSTANTS] + j * (1 + m) + 1 + k] = constants[j, k]
 
 
-@njit(cache=True, nogil=True)
+@part
 def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, rest, load, rubs, values):
     """Write into a row by ``put_structure`` a drive (H, 2, n) at ``omega`` [rad/s] and a constant force.
 
@@ -256,7 +264,9 @@ def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, res
         for i in range(n):
             values[at[CONSTANTS] + j * (1 + at[JOINTS])] += shape[j, i] * resting[i]
     for s in range(at[SLIDERS]):
-        strain[s] = rubs.shape[s] @ np.ascontiguousarray(back[:n])
+        row = rubs.shape[s] @ back[:n]
+        for c in range(2 * harmonics):
+            strain[s, c] = row[c]
     _put_channels(at, turning, shown, lag, strain, rubs, n, levels, 1.0, values)
     for k in range(2 * at[SLIDERS]):
         reading, slid = np.sum(shape[int(rubs.joint[k // 2])] * resting[:n]), np.sum(rubs.shape[k // 2] * resting[:n])
@@ -292,8 +302,7 @@ def read_at_rest(generator, from_modal, shape, lag, rubs, k, reading, strain, dr
     """
     n, j, after = shape.shape[1], int(rubs.joint[k // 2]), np.empty(from_modal.shape[0])
     alpha, beta = rubs.weight[k, 0], rubs.weight[k, 1]
-    moved = shape[j] @ np.ascontiguousarray(from_modal[:n])
-    slid = rubs.shape[k // 2] @ np.ascontiguousarray(from_modal[:n])
+    moved, slid = shape[j] @ from_modal[:n], rubs.shape[k // 2] @ from_modal[:n]
     if rubs.rate[k] == 0.0:
         return alpha * (reading + lag[j] * np.sum(moved * drift)) + beta * strain
     derivative(generator, moved, after)
