@@ -210,8 +210,8 @@ class Mechanism:
         (a, da), (b, db) = self.point(z, first), self.point(z, second)
         return b - a, db - da
 
-    def _turn_of(self, joint: Joint, z: Array) -> Array:
-        """Turn (B, 2, 2) of the joint's axes."""
+    def axes(self, z: Array, joint: Joint) -> Array:
+        """Axes (B, 2, 2) along which the point of a joint is measured, in columns."""
         frame = joint.measured_in
         angle = np.zeros(len(z)) if frame == GROUND else z[:, self.at[frame].start + 2]
         return rotation(angle + joint.axis)
@@ -225,10 +225,6 @@ class Mechanism:
         which = self.joints.index(joint)
         value, slope = self.motions(z)
         return value[:, which, 0], slope[:, which, 0]
-
-    def axes(self, z: Array, joint: Joint) -> Array:
-        """Axes (B, 2, 2) along which the point of a joint is measured, in columns."""
-        return self._turn_of(joint, z)
 
     def motions(self, z: Array) -> tuple[Array, Array]:
         """Value (B, J, 3) and derivatives (B, J, 3, z) of every joint: along, across and turn, held or not."""
@@ -275,7 +271,7 @@ class Mechanism:
             for k, row in enumerate(rows, 1):
                 if row.joint is joint and row.motion != TURN:
                     pulled[..., (ALONG, ACROSS).index(row.motion)] += forces[..., k]
-            turn, frame = self._turn_of(joint, z), joint.measured_in
+            turn, frame = self.axes(z, joint), joint.measured_in
             ground = np.einsum("bij,...bj->...bi", turn, pulled)
             self.add_bent(z, joint.second, ground, total)
             self.add_bent(z, joint.first, -ground, total)
