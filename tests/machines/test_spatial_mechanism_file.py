@@ -14,6 +14,7 @@ from chaosgym import SliderCrank, simulate
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine_file import schema_text
 from chaosgym.machines.mechanism.nominal import nominal
+from chaosgym.machines.slider_crank.joints import hertz_constants
 from tests.machines.test_mechanism_file import answer, run
 
 FILE = Path(__file__).parents[2] / "docs" / "machines" / "slider-crank-thesis-15deg.toml"
@@ -46,6 +47,32 @@ def test_the_file_rattles_like_the_crank_at_an_angle(speed):
     """
     found, expected = (simulate(given.at(speed), 4).peak_force for given in (chaosgym.read_machine(FILE), CRANK))
     np.testing.assert_allclose(found, expected[:, ::-1], rtol=2e-6)
+
+
+def test_orientations_are_rough(file_of):
+    """The crank a tenth of a turn off in every direction, the rod by 30 deg: the loops close all the same."""
+    off = ('orientation = "0, 15, 0 deg"', 'orientation = "30, -20, 36 deg"')
+    leaning = ("[link.rod]\n", '[link.rod]\norientation = "0, 30, -30 deg"\n')
+    found, expected = (simulate(chaosgym.read_machine(path), 2).peak_force for path in (file_of(off, leaning), FILE))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("surface", "crank"),
+    [
+        (GUIDE + "friction = 0.1\n", {"friction_coefficient": 0.1}),
+        (
+            'clearance = "0.254 mm"\nhertz_stiffness = "{} N/m^1.5"\nhertz_damping = "{} s/m"\n',
+            {"contact_law": "hertz"},
+        ),
+    ],
+)
+def test_friction_and_hertzian_guides_are_those_of_the_crank(surface, crank, file_of):
+    """The first revolution from rest, with friction of 0.1 and with Hertz's law, equals ``SliderCrank``'s to 5e-5."""
+    machine = SliderCrank(motor_angle=15.0, rod="rigid", geometric_stiffness="on", **crank)
+    surface = surface.format(*hertz_constants(machine))
+    found = simulate(chaosgym.read_machine(file_of((GUIDE, surface))), 1).peak_force
+    np.testing.assert_allclose(found, simulate(machine, 1).peak_force[:, ::-1], rtol=5e-5)
 
 
 def test_a_ball_in_the_file_strikes_like_that_of_the_crank(file_of):
