@@ -8,9 +8,11 @@ import pytest
 from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.equations import crank_inertia, small_motion
 from chaosgym.machines.mechanism.joints import Joint
+from chaosgym.machines.mechanism.mechanism import Spring
 from chaosgym.machines.mechanism.nominal import nominal, revolution_of
 from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
 from chaosgym.machines.mechanism.spatial import SpatialMechanism
+from chaosgym.machines.periodic import derivatives
 from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.machine import SliderCrank
 from tests.machines.mechanisms import thesis_crank, thesis_crank_in_space
@@ -163,6 +165,60 @@ def test_universal_joints_turn_unevenly_and_two_make_up_for_it():
     error = min(np.abs(middle - np.mod(one, 2.0 * math.pi)).max() for one in (expected, other))
     assert error < 1e-10
     assert np.ptp(middle - theta) > 0.1
+
+
+def skew_four_bar():
+    """A crank about z and a rocker about x, a coupler between them with a universal joint and a ball; all have mass."""
+    x_axis, y_axis, z_axis, none = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+    body = (SpatialBody(2.0, (3e-3, 5e-3, 4e-3), (0.1, 0.02, 0.03)),)
+    return SpatialMechanism(
+        (
+            spatial_link("crank", {"shaft": none, "pin": (0.05, 0.0, 0.0)}, body),
+            spatial_link("coupler", {"pin": none, "ball": (0.45, 0.0, 0.0)}, body, (0.0, -0.27, 0.98)),
+            spatial_link("rocker", {"pivot": none, "ball": (0.0, 0.0, -0.3)}, body, axis=x_axis),
+        ),
+        (
+            Joint("motor", "revolute", ("ground", "hub"), ("crank", "shaft"), "", "", (), True, 0.0, z_axis, z_axis),
+            Joint("pin", "universal", ("crank", "pin"), ("coupler", "pin"), first_axis=z_axis, second_axis=y_axis),
+            Joint("ball", "spherical", ("coupler", "ball"), ("rocker", "ball"), first_axis=x_axis, second_axis=x_axis),
+            Joint(
+                "pivot",
+                "revolute",
+                ("ground", "pivot"),
+                ("rocker", "pivot"),
+                opened=("across", "sideways"),
+                first_axis=x_axis,
+                second_axis=x_axis,
+            ),
+        ),
+        {"hub": none, "pivot": (0.3, 0.3, 0.4), "wall": (0.7, 0.4, 0.5)},
+        (0.3, -9.0, 2.0),
+        springs=(Spring(("ground", "wall"), ("rocker", "ball"), 300.0, 0.2, 7.0),),
+    )
+
+
+def test_torque_of_the_drive_is_the_power_that_links_in_space_take():
+    """Torque times speed is the rate of kinetic and potential energy of all particles of a skew four-bar with a spring.
+
+    The energies come from where the particles are, without derivatives of joints or points.
+    """
+    mechanism, w = skew_four_bar(), 3.0
+    revolution = revolution_of(mechanism)
+    z = nominal(mechanism, revolution, np.arange(360) * 2.0 * np.pi / 360).z
+    kinetic, potential = np.zeros(360), np.zeros(360)
+    for link in mechanism.links:
+        places = mechanism.particles(z, link)[0]
+        kinetic += 0.5 * np.sum(link.mass * np.sum(derivatives(places)[0] ** 2, axis=-1), axis=-1)
+        potential -= places @ mechanism.gravity @ link.mass
+    coupler, rocker = (mechanism.point(z, (link, "ball"))[0] for link in ("coupler", "rocker"))
+    np.testing.assert_allclose(coupler, rocker, atol=1e-12)
+    stretch = np.linalg.norm(rocker - mechanism.ground["wall"], axis=1)
+    potential += 150.0 * (stretch - 0.2) ** 2
+    power = derivatives(w**2 * kinetic + potential)[0] + 7.0 * w * derivatives(stretch)[0] ** 2
+    found = small_motion(mechanism, revolution, 0.0, 360)
+    np.testing.assert_allclose([1.0, w, w**2] @ found.torque, power, atol=1e-9 * np.abs(power).max())
+    felt = crank_inertia(mechanism, revolution, np.arange(360) * 2.0 * np.pi / 360)
+    np.testing.assert_allclose(0.5 * felt, kinetic, rtol=1e-9)
 
 
 def test_a_link_that_turns_over_about_another_axis_is_named():
