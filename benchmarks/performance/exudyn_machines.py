@@ -2,7 +2,8 @@
 
 The impact beam is a body with mass, stiffness and damping matrices (``ObjectGenericODE2``): those of our modes, turned
 into coordinates of which the first is the tip and the second the point of the force. So both simulators integrate
-the same equations. The slider crank is what an Exudyn user would build of the same parts: geometrically exact
+the same equations. A mechanism of rigid links has the same bodies, joints and contact law, and turns by any angle: its
+equations are Exudyn's own. The slider crank is what an Exudyn user would build of the same parts: geometrically exact
 beam elements whose end nodes carry housing and yoke, a flywheel so heavy that it turns at constant speed, a slider.
 
 Sources: exudyn.readthedocs.io, reference manual of the items used; Exudyn is written by J. Gerstmayr.
@@ -25,6 +26,8 @@ from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines.impact_beam import ImpactBeam
 from chaosgym.machines.machine import Machine
+from chaosgym.machines.mechanism.joints import GROUND
+from chaosgym.machines.mechanism.machine import MechanismMachine
 from chaosgym.machines.slider_crank import SliderCrank
 
 Array = NDArray[np.float64]
@@ -91,7 +94,7 @@ def run_in_exudyn(machine: Machine, cycles: int, setting: ExudynSetting, *, forc
     Parameters
     ----------
     machine
-        An impact beam, or a slider crank with clearance at the slider.
+        An impact beam, a slider crank with clearance at the slider, or a mechanism of rigid links and pins.
     cycles
         Operating cycles.
     setting
@@ -102,8 +105,10 @@ def run_in_exudyn(machine: Machine, cycles: int, setting: ExudynSetting, *, forc
     Returns
     -------
     (seconds, peak_force)
-        Processor time of the run; peak force of each cycle on the first surface, (cycles,), or None.
+        Processor time of the run; peak force of each cycle on the first surface, or on a pin, (cycles,), or None.
     """
+    if isinstance(machine, MechanismMachine):
+        return _run_mechanism(machine, cycles, setting, forces)
     exudyn = load_exudyn()
     container = exudyn.SystemContainer()
     system = container.AddSystem()
@@ -130,6 +135,25 @@ def run_in_exudyn(machine: Machine, cycles: int, setting: ExudynSetting, *, forc
         return seconds, None
     x, v = (first * system.GetSensorStoredData(sensor)[-cycles * steps :, 1 + coordinate] for sensor in sensors)
     force = np.where(x > gap, np.maximum(stiffness * (x - gap) + damping * v, 0.0), 0.0)
+    return seconds, force.reshape(cycles, steps).max(axis=1)
+
+
+def _run_mechanism(
+    machine: MechanismMachine, cycles: int, setting: ExudynSetting, forces: bool
+) -> tuple[float, Array | None]:
+    """``run_in_exudyn`` of a mechanism whose only gap is a pin in its hole."""
+    exudyn = load_exudyn()
+    container = exudyn.SystemContainer()
+    system = container.AddSystem()
+    sensor = _add_mechanism(exudyn, system, machine, forces)
+    system.Assemble()
+    steps = math.ceil(machine.cycle_period / setting.step)
+    settings = _settings(exudyn, machine.cycle_period, cycles, steps, setting)
+    solver = getattr(exudyn.DynamicSolverType, setting.solver)
+    seconds = processor_seconds(lambda: system.SolveDynamic(settings, solverType=solver))
+    if sensor is None:
+        return seconds, None
+    force = np.linalg.norm(system.GetSensorStoredData(sensor)[-cycles * steps :, 1:3], axis=1)
     return seconds, force.reshape(cycles, steps).max(axis=1)
 
 
@@ -223,6 +247,75 @@ def _add_beam(exudyn: Any, system: Any, beam: ImpactBeam, setting: ExudynSetting
     return node, 0
 
 
+def _add_mechanism(exudyn: Any, system: Any, machine: MechanismMachine, forces: bool) -> Any:
+    """Add rigid links on their nominal motion at crank angle zero; the sensor of the pin's force, if asked for."""
+    items, mechanism = exudyn.itemInterface, machine.mechanism
+    step = 1e-4
+    now, next_, after = machine.nominal_places(np.array([0.0, step, 2.0 * step]))
+    rates = machine.crank_rate * (4.0 * next_ - 3.0 * now - after) / (2.0 * step)
+    bodies = {GROUND: system.AddObject(items.ObjectGround())}
+    for link in mechanism.links:
+        own, mass = mechanism.at[link.name], float(link.mass.sum())
+        places = link.masses.place
+        centre = link.mass @ places / mass if mass else np.zeros(2)
+        inertia = float(link.inertia.sum() + link.mass @ np.sum(places**2, axis=1))
+        driven = link.name == mechanism.driver.second[0]
+        node = system.AddNode(
+            items.NodeRigidBody2D(referenceCoordinates=now[own].tolist(), initialVelocities=rates[own].tolist())
+        )
+        bodies[link.name] = system.AddObject(
+            items.ObjectRigidBody2D(
+                nodeNumber=node,
+                mass=mass or 1.0,
+                inertia=FLYWHEEL_INERTIA if driven else inertia,
+                centerOfMass=centre.tolist(),
+            )
+        )
+        weighed = system.AddMarker(items.MarkerBodyMass(bodyNumber=bodies[link.name]))
+        system.AddLoad(items.LoadMassProportional(markerNumber=weighed, loadVector=[*mechanism.gravity, 0.0]))
+
+    def marker(end: tuple[str, str]) -> Any:
+        place = mechanism.ground[end[1]] if end[0] == GROUND else mechanism.link(end[0]).points[end[1]].place[0]
+        return system.AddMarker(
+            items.MarkerBodyPosition(bodyNumber=bodies[end[0]], localPosition=[*map(float, place), 0.0])
+        )
+
+    pin: Any = None
+    for joint in mechanism.joints:
+        ends = [marker(joint.first), marker(joint.second)]
+        if joint.opened:
+            pin = _add_pin(exudyn, system, ends, machine, joint.name)
+        else:
+            system.AddObject(items.ObjectJointRevolute2D(markerNumbers=ends))
+    if not forces:
+        return None
+    kind = exudyn.OutputVariableType.Force
+    return system.AddSensor(items.SensorObject(objectNumber=pin, storeInternal=True, outputVariableType=kind))
+
+
+def _add_pin(exudyn: Any, system: Any, ends: list[Any], machine: MechanismMachine, joint: str) -> Any:
+    """Put a pin into its hole; without a stiffness of its own, from which Exudyn would take a wrong Jacobian."""
+    symbolic = exudyn.symbolic
+    gap, stiffness, damping = (getattr(machine, f"{joint}_{name}") for name in ("clearance", "stiffness", "damping"))
+    spring = system.AddObject(
+        exudyn.itemInterface.ObjectConnectorCartesianSpringDamper(
+            markerNumbers=ends, stiffness=[0.0] * 3, damping=[0.0] * 3
+        )
+    )
+
+    def force(mbs: Any, t: Any, item: Any, x: Any, v: Any, k: Any, d: Any, c: Any) -> Any:
+        size = symbolic.sqrt(x[0] * x[0] + x[1] * x[1] + 1e-30)
+        depth = size - gap
+        push = symbolic.max(0.0, stiffness * depth + damping * (x[0] * v[0] + x[1] * v[1]) / size)
+        push = push * (0.5 * symbolic.sign(depth) + 0.5)
+        return symbolic.Vector([push * x[0] / size, push * x[1] / size, 0.0 * x[0]])
+
+    name = "springForceUserFunction"
+    compiled = exudyn.utilities.CreateSymbolicUserFunction(system, force, name, spring)
+    system.SetObjectParameter(spring, name, compiled)
+    return spring
+
+
 def _add_crank(exudyn: Any, system: Any, crank: SliderCrank, setting: ExudynSetting) -> tuple[int, int]:
     """Add a planar slider crank at crank angle zero on its nominal motion; the slider's node and its y coordinate."""
     items = exudyn.itemInterface
@@ -268,9 +361,7 @@ def _add_crank(exudyn: Any, system: Any, crank: SliderCrank, setting: ExudynSett
         (nodes[-1], crank.yoke_mass, crank.yoke_inertia, crank.yoke_offset_along),
     ):
         body = system.AddObject(
-            items.ObjectRigidBody2D(
-                nodeNumber=node, mass=mass, inertia=moment - mass * offset**2, centerOfMass=[offset, 0.0]
-            )
+            items.ObjectRigidBody2D(nodeNumber=node, mass=mass, inertia=moment, centerOfMass=[offset, 0.0])
         )
         ends.append(system.AddMarker(items.MarkerBodyPosition(bodyNumber=body)))
     slider = system.AddNode(items.NodePoint2D(referenceCoordinates=[radius + length, 0.0]))
