@@ -11,9 +11,10 @@ from click.testing import CliRunner
 import chaosgym
 from chaosgym.cli import app
 from chaosgym.machines.drive_torque import DriveTorque
+from chaosgym.machines.machine_file import template
 from chaosgym.machines.parameters import with_settings
 from tests.machines import linkage_twins
-from tests.machines.test_linkages import WRIST
+from tests.machines.test_linkages import GUIDE, WRIST
 
 FOLDER = Path(__file__).parents[2] / "docs" / "machines"
 CRANK, ROD, AHEAD = 0.025, 0.11, 0.038
@@ -138,6 +139,40 @@ def test_what_knocks_add_to_the_torque():
     assert 0.0 < second.mean() < 1e-3 * largest
     (first,) = torque_of_the_loose_linkage(file, 1, 3600)
     assert first.max() > 2.0 * file.drive_torque.torque.max()
+
+
+def test_friction_takes_its_torque(tmp_path):
+    """A slider of 0.45 kg on a massless rod: m x'' = F (c - mu s |sin|), the torque F times its arm, at each angle."""
+    text = template("slider-crank").replace('stations = "-40, 40 mm"', "friction = 0.3")
+    for gone in ("[[link.rod.body]]", 'mass = "0.30 kg"', 'centre = "118, 0 mm"', 'inertia = "1.4e-3 kg m^2"'):
+        text = text.replace(gone, "#", 1)
+    (tmp_path / "own.toml").write_text(text.replace('gravity = "9.81 m/s^2"', 'gravity = "0 m/s^2"'))
+    given = chaosgym.read_machine(tmp_path / "own.toml")
+    theta, crank, rod = np.arange(720) * math.pi / 360.0, 0.05, 0.235
+    low = np.sqrt(rod**2 - (crank * np.sin(theta)) ** 2)
+    rate = -crank * np.sin(theta) - crank**2 * np.sin(theta) * np.cos(theta) / low
+    second = np.fft.irfft(-(np.arange(361) ** 2) * np.fft.rfft(crank * np.cos(theta) + low), 720)
+    along, across = low / rod, -crank * np.sin(theta) / rod
+    rubbed = 0.3 * np.clip(rate / (0.02 * np.abs(rate).max()), -1.0, 1.0)
+    inertia = 0.45 * given.crank_rate**2 * second
+    force = inertia / (along - rubbed * np.abs(across) * np.sign(inertia))
+    expected = force * crank * (np.cos(theta) * across - np.sin(theta) * along)
+    np.testing.assert_allclose(given.drive_torque.torque, expected, atol=1e-6 * np.abs(expected).max())
+    assert given.drive_torque.mean > 0.01 * np.abs(expected).max()
+
+
+def test_friction_of_a_tilting_slider_takes_what_the_nonlinear_linkage_loses(tmp_path):
+    """Mean torque with friction of 0.1 is what the surfaces of the twin take by friction in a cycle, to 3 %."""
+    text = (FOLDER / "slider-crank-flores-guide.toml").read_text(encoding="utf-8")
+    (tmp_path / "own.toml").write_text(text.replace("stations", "friction = 0.1\nstations"))
+    given = with_settings(chaosgym.read_machine(tmp_path / "own.toml"), {"guide_clearance": 2e-5})
+    surfaces = given.guide_clearance, given.guide_stiffness, 400.0
+    force, states = linkage_twins.guide(given.crank_rate, *surfaces, 2, 1800, **GUIDE, friction=0.1)
+    time = np.arange(3600) * given.cycle_period / 1800
+    slid = GUIDE["crank"] * given.crank_rate * np.sin(given.crank_rate * time)
+    slid = np.abs(slid + GUIDE["rod"] * states[:, 2] * np.sin(states[:, 0]))
+    power = 0.1 * (force * slid)[1800:].mean()
+    assert given.drive_torque.mean_power == pytest.approx(power, rel=0.03)
 
 
 def test_a_constant_torque_needs_no_flywheel():

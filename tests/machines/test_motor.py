@@ -14,6 +14,7 @@ import chaosgym
 from chaosgym import simulate
 from chaosgym.cli import app
 from chaosgym.errors import ParameterError
+from chaosgym.machines.machine_file import template
 from chaosgym.machines.parameters import with_settings
 from tests.machines.test_drive_torque import AHEAD, CRANK, PISTON, ROD, ROD_INERTIA, ROD_MASS
 
@@ -191,6 +192,15 @@ def test_what_a_motor_can_not_tell_is_not_told(motored):
     assert light.swing > 0.05
     assert "so that runs at a constant speed are far from it" in light.told
     assert "far from it" not in with_settings(motored(), {"motor_inertia": 0.5}).under_motor().told
+
+
+def test_friction_that_the_motor_does_not_feel_is_told(tmp_path):
+    """A guide with friction under a motor is noted, so that nobody takes the settled speed for its own."""
+    text = template("slider-crank").replace("axis =", "friction = 0.1 #").replace("[operation]", MOTOR)
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+    given = chaosgym.read_machine(tmp_path / "own.toml")
+    assert given.notes == ("the run-up under the motor leaves friction of guide out",)
+    assert with_settings(given, {"guide_friction": 0.0}).notes == ()
 
 
 @pytest.mark.parametrize(("cycles", "speed"), [(0, 0.0), (-1, 0.0), (3, -50.0), (3, math.nan), (3, math.inf)])

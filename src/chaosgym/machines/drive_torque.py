@@ -16,7 +16,7 @@ ROUNDING = 1e-12
 
 
 class DriveTorque(NamedTuple):
-    """Torque of a drive that turns at constant speed, while every gap stays in its middle.
+    """Torque of a drive that turns at constant speed, while every gap stays in its middle; friction is included.
 
     Knocks in the gaps add to it within a cycle, and what they dissipate adds to its mean.
 

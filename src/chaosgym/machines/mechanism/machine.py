@@ -43,6 +43,9 @@ ROUND = ("revolute", "cylindrical", "spherical")
 GUIDED = {ACROSS: {TURN: 1.0, PITCH: 1.0}, SIDEWAYS: {YAW: -1.0}}
 """Turns in a guide, in the plane or in space, that move its stations in either direction per metre of their place."""
 
+FRICTION_ROUNDS = 30
+"""Rounds in which friction and the force that presses find each other; each gains a factor of some tenths."""
+
 LEAST_MASS = 1e-10
 """Least eigenvalue of a mass matrix whose diagonal is one."""
 
@@ -195,7 +198,24 @@ class MechanismMachine(BinnedMachine):
     def drive_torque(self) -> DriveTorque:
         """Torque of the drive over a revolution at the machine's speed; see ``Machine.drive_torque``."""
         powers = drive_torque(self._scaled(), self.revolution, 0.0, TORQUE_ANGLES)
-        return DriveTorque(self.crank_rate ** np.arange(3) @ powers, self.crank_rate)
+        torque = self.crank_rate ** np.arange(3) @ powers
+        return DriveTorque(torque + self._friction_torque(TORQUE_ANGLES), self.crank_rate)
+
+    def _friction_torque(self, count: int) -> Array:
+        """Torque (B,) that friction takes while the joint's surfaces carry what holds its gap in the middle."""
+        if not self._rub:
+            return np.zeros(count)
+        angles = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)
+        rate, signed, driven = self._rubbing(angles)
+        own = [k for k, name in enumerate(self.degrees_of_freedom) if name.startswith(f"{self.rubs} ")]
+        powers = loads(self._scaled(), self.revolution, 0.0, count)[:, :, own]
+        held_by = np.linalg.pinv(np.concatenate([contact.row for contact in self.contacts if contact.slides])[:, own].T)
+        push = -np.tensordot(self.crank_rate ** np.arange(3), powers, 1)
+        total = np.zeros(count)
+        # friction itself presses the surfaces, or relieves them
+        for _ in range(FRICTION_ROUNDS):
+            total = np.abs((push - total[:, None] * driven[:, own]) @ held_by.T).sum(axis=1)
+        return np.asarray(total * self._rub * signed * rate)
 
     @property
     def motor(self) -> Motor | None:
@@ -253,11 +273,13 @@ class MechanismMachine(BinnedMachine):
 
     def _friction(self, theta: Array) -> Array | None:
         """What one newton of contact force drives along the joint with friction, (B, n); it fades where that halts."""
-        if not self._rub:
-            return None
+        return self._rubbing(theta)[2] if self._rub else None
+
+    def _rubbing(self, theta: Array) -> tuple[Array, Array, Array]:
+        """Sliding per radian (B,) of the joint with friction, its ramped sign (B,), and what a newton drives (B, n)."""
         rate, row = sliding(self.mechanism, self.revolution, theta, self.rubs)
         signed = np.clip(rate / max(RAMP * float(np.abs(rate).max()), 1e-300), -1.0, 1.0)
-        return np.asarray(self._rub * signed[:, None] * row)
+        return rate, signed, self._rub * signed[:, None] * row
 
     @property
     def _rub(self) -> float:
@@ -414,8 +436,10 @@ class MechanismMachine(BinnedMachine):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Gaps that are not small against the links that they join."""
-        told = []
+        """Gaps that are not small against the links that they join, and friction that a motor does not feel."""
+        told = (
+            [f"the run-up under the motor leaves friction of {self.rubs} out"] if self.has_motor and self._rub else []
+        )
         for joint in self.mechanism.joints:
             if joint.opened:
                 gap, reach = getattr(self, f"{joint.name}_clearance"), _reach(self.mechanism, joint.name)
