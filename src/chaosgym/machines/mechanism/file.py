@@ -299,6 +299,8 @@ def built(path: str, digest: str, data: Mapping[str, Any], _folder: Path) -> typ
     made.usual_ranges = {field: range_of(made, f"operation.{key}", field, given) for key, field, given in named}
     made.tolerances = tolerances_of(data["tolerances"], machine)
     made.task_defaults = TaskDefaults(task=data["job"])
+    if motor is not None:
+        machine.under_motor(1)
     machine.reduce()  # what can't move is refused here, by name, and the rest is kept for the first run
     kind: type[MechanismMachine] = made
     return kind
