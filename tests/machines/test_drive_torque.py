@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 import chaosgym
 from chaosgym.cli import app
+from chaosgym.errors import ParameterError
 from chaosgym.machines.drive_torque import DriveTorque
 from chaosgym.machines.machine_file import template
 from chaosgym.machines.parameters import with_settings
@@ -159,6 +160,20 @@ def test_friction_takes_its_torque(tmp_path):
     expected = force * crank * (np.cos(theta) * across - np.sin(theta) * along)
     np.testing.assert_allclose(given.drive_torque.torque, expected, atol=1e-6 * np.abs(expected).max())
     assert given.drive_torque.mean > 0.01 * np.abs(expected).max()
+
+
+def test_friction_that_locks_is_told(tmp_path):
+    """With a rod hardly longer than the crank, friction times the slope of the rod passes 1: no torque turns it."""
+    text = template("slider-crank").replace('stations = "-40, 40 mm"', "friction = 0.5")
+    for length, locks in ((60, False), (54, True)):
+        (tmp_path / "own.toml").write_text(text.replace("235, 0 mm", f"{length}, 0 mm"))
+        given = chaosgym.read_machine(tmp_path / "own.toml")
+        assert (0.5 * 0.05 / math.sqrt((1e-3 * length) ** 2 - 0.05**2) > 1.0) == locks
+        if not locks:
+            assert given.drive_torque.mean > 0.0
+            continue
+        with pytest.raises(ParameterError, match=r"guide_friction = 0.5 locks the mechanism at crank angle \d+ deg"):
+            _ = given.drive_torque
 
 
 def test_friction_of_a_tilting_slider_takes_what_the_nonlinear_linkage_loses(tmp_path):

@@ -43,8 +43,8 @@ ROUND = ("revolute", "cylindrical", "spherical")
 GUIDED = {ACROSS: {TURN: 1.0, PITCH: 1.0}, SIDEWAYS: {YAW: -1.0}}
 """Turns in a guide, in the plane or in space, that move its stations in either direction per metre of their place."""
 
-FRICTION_ROUNDS = 30
-"""Rounds in which friction and the force that presses find each other; each gains a factor of some tenths."""
+FRICTION_ROUNDS = 1000
+"""Most rounds in which friction and the force that presses find each other."""
 
 LEAST_MASS = 1e-10
 """Least eigenvalue of a mass matrix whose diagonal is one."""
@@ -211,11 +211,19 @@ class MechanismMachine(BinnedMachine):
         powers = loads(self._scaled(), self.revolution, 0.0, count)[:, :, own]
         held_by = np.linalg.pinv(np.concatenate([contact.row for contact in self.contacts if contact.slides])[:, own].T)
         push = -np.tensordot(self.crank_rate ** np.arange(3), powers, 1)
-        total = np.zeros(count)
+        total, change = np.zeros(count), np.full(count, np.inf)
         # friction itself presses the surfaces, or relieves them
         for _ in range(FRICTION_ROUNDS):
-            total = np.abs((push - total[:, None] * driven[:, own]) @ held_by.T).sum(axis=1)
-        return np.asarray(total * self._rub * signed * rate)
+            before, total = total, np.abs((push - total[:, None] * driven[:, own]) @ held_by.T).sum(axis=1)
+            change = np.abs(total - before)
+            if change.max() <= 1e-9 * total.max():
+                return np.asarray(total * self._rub * signed * rate)
+            if not total.max() < 1e15 * np.abs(push).max():
+                break
+        where = math.degrees(angles[change.argmax()])
+        raise ParameterError(
+            f"{self.rubs}_friction = {self._rub:g} locks the mechanism at crank angle {where:.0f} deg; allowed: less"
+        )
 
     @property
     def motor(self) -> Motor | None:
