@@ -8,6 +8,7 @@ import pytest
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.numbers import number, numbers, shown
+from chaosgym.machines.units import parse_row
 
 
 def refused(call, *arguments, **keywords):
@@ -105,3 +106,19 @@ def test_the_first_entry_out_of_range_is_named(bad):
     assert line == f"x = {bad:g} mm is out of range; allowed: 0 to 1 mm"
     assert refused(numbers, "x", [0.0, 1.0, bad], 0.0, 1.0, "mm") == line, "the ends of the range are in it"
     assert re.fullmatch(r"x = \S+ is out of range; allowed: 0 to 1", refused(numbers, "x", [bad], 0.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "stray"),
+    [
+        ("50, 0, nan mm", "m", ", nan"),
+        ("9.1 Hz, 61 Hz", "Hz", "Hz, 61"),
+        ("0, 1O0, 300 N", "N", "O0, 300"),
+        ("5 N m", "m", "N"),
+        ("1 - 2 N", "N", "- 2"),
+    ],
+)
+def test_a_row_is_read_to_its_end(text, unit, stray):
+    """No number is dropped because what stands before it is none, and no unit because a known one ends the text."""
+    assert f"has {stray!r} after its first numbers" in refused(parse_row, "x", text, unit)
+    assert parse_row("x", "1, -2.5e1; 3 4 mm", "m") == [0.001, -0.025, 0.003, 0.004]

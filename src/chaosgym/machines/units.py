@@ -150,7 +150,7 @@ def parse_row(name: str, given: Any, unit: str) -> list[float]:
     Raises
     ------
     ParameterError
-        As ``parse_quantity``.
+        As ``parse_quantity``, and if anything but numbers stands before the unit.
     """
     if isinstance(given, list):
         if not given or any(isinstance(one, list) for one in given):
@@ -164,6 +164,11 @@ def parse_row(name: str, given: Any, unit: str) -> list[float]:
     found = _ROW.fullmatch(text.removesuffix(written))
     if found is None:
         return [parse_quantity(name, given, unit)]
+    if written and found[2]:
+        raise ParameterError(
+            f"{name} = {shown(given)} has {shown(found[2].strip())} after its first numbers; allowed: numbers, then "
+            f"one unit, such as '1, 2 {written}'"
+        )
     return [parse_quantity(name, f"{number} {written or found[2]}", unit) for number in re.findall(_NUMBER, found[1])]
 
 
