@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.core.binned.model import FORCING_TERMS, BinnedModel, TaylorModel
+from chaosgym.errors import ParameterError
 from chaosgym.machines.parameters import refuse_not_finite
 
 if TYPE_CHECKING:
@@ -51,6 +52,9 @@ KEPT_STRUCTURES = 1024
 
 KEPT_STEPPED = 16
 """Models for Taylor series that are kept: some hundred kB each."""
+
+MOST_STEPS = 1e9
+"""Steps of a bin; a cycle's budget ends by default long before."""
 
 KEPT_BYTES = 256_000_000
 """Memory for the propagators of machines at one speed; those used longest ago go first."""
@@ -259,7 +263,7 @@ def stepped_model(machine: "BinnedMachine", step_phase: float) -> TaylorModel:
     spectrum = float(np.max(np.abs(np.linalg.eigvals(system[machine.sampled_bins]))))
     return TaylorModel(
         bin_duration=duration,
-        steps=max(1, math.ceil(duration * max(4.0 * contact / step_phase, spectrum / PIECE_PHASE))),
+        steps=_whole_steps(duration * max(4.0 * contact / step_phase, spectrum / PIECE_PHASE)),
         longest=duration / max(1.0, duration * spectrum / SPAN_PHASE),
         tolerance=SPAN_ERROR * step_phase**4,
         contact_rate=contact,
@@ -276,6 +280,16 @@ def stepped_model(machine: "BinnedMachine", step_phase: float) -> TaylorModel:
         monitored=np.array([bool(np.any(contact.reading)) for contact in contacts]),
         display=machine.display,
     )
+
+
+def _whole_steps(wanted: float) -> int:
+    """Steps of a bin, whole and at least one; refused where no kernel would ever end."""
+    if not wanted < MOST_STEPS:
+        raise ParameterError(
+            f"the fastest motion takes {wanted:.1e} steps in a bin; allowed: up to {MOST_STEPS:g}, with more mass and "
+            "inertia, less stiffness and damping, or a higher speed"
+        )
+    return max(1, math.ceil(wanted))
 
 
 def _with_readings(accelerations: Array, row: Array) -> Array:
@@ -447,7 +461,7 @@ def _at_rate(rate: float, step_phase: float, parts: _Structure) -> BinnedModel:
 
     bins = parts.bins
     duration = 2.0 * math.pi / (bins * rate)
-    steps = max(1, math.ceil(duration * parts.spectrum / (2.0 * LANES * step_phase)))
+    steps = _whole_steps(duration * parts.spectrum / (2.0 * LANES * step_phase))
     order = series_order(parts.spectrum * duration / (LANES * steps))
     accelerations = (parts.free, _even_powers(parts.forcing, rate), parts.push, bins, rate)
     return BinnedModel(

@@ -167,7 +167,7 @@ def _clearance(name: str, kind: str, row: Mapping[str, Any], spatial: bool) -> C
         if hertz and key in row:
             raise ParameterError(f"{where} has {key} and is Hertzian; allowed: hertz_{key} in place of {key}")
     gap, stiffness, damping = map(float, needed(where, row, *surface_fields(hertz)))
-    stations = tuple(float(place) for place in row.get("stations", ()))
+    stations = tuple(number(f"{where}.stations", at, -LONGEST, LONGEST, "m") for at in row.get("stations", ()))
     if stations and len(set(stations)) < 2:
         raise ParameterError(
             f"{where}.stations are at one place; allowed: two or more, or none for a guide without tilt"
