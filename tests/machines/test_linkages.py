@@ -9,6 +9,8 @@ import pytest
 import chaosgym
 from chaosgym import simulate
 from chaosgym.core.binned.model import BinnedModel, TaylorModel
+from chaosgym.errors import ParameterError
+from chaosgym.machines.mechanism.forces import Gas
 from chaosgym.machines.parameters import with_settings
 from tests.machines import linkage_twins
 
@@ -196,6 +198,24 @@ def test_a_compressor_takes_the_work_of_its_indicator_diagram():
     taken = swept * (1.0 + dead - dead * (high / low) ** (1.0 / n))
     work = n / (n - 1.0) * low * taken * ((high / low) ** ((n - 1.0) / n) - 1.0)
     assert torque.mean() * 2.0 * math.pi == pytest.approx(work, rel=1e-3)
+
+
+def test_gas_that_never_opens_the_outlet_takes_no_work():
+    """With a dead volume as large as the swept one, suction gas reaches p1 2^n, below p2, and expands again."""
+    place = 0.025 * np.cos(np.arange(360) * np.pi / 180.0)
+    pressure = Gas(0.003, 1.0, 1e5, 5e5, 1e5, 1.3).pressure(place)
+    assert (pressure.min(), pressure.max()) == pytest.approx((1e5, 1e5 * 2.0**1.3))
+    assert pressure == pytest.approx(1e5 * (2.0 / (1.0 + (0.025 - place) / 0.05)) ** 1.3)
+
+
+@pytest.mark.parametrize(("at", "direction"), [("crank.shaft", "0 deg"), ("piston.pin", "90 deg")])
+def test_gas_on_what_has_no_stroke_is_refused(at, direction, tmp_path):
+    """On the shaft, or across the cylinder, where a piston moves by rounding alone."""
+    text = (FOLDER / "compressor.toml").read_text(encoding="utf-8").replace('at = "piston.pin"', f'at = "{at}"')
+    path = tmp_path / "own.toml"
+    path.write_text(text.replace('direction = "0 deg"', f'direction = "{direction}"'), encoding="utf-8")
+    with pytest.raises(ParameterError, match=f"gas.* at {at} has no stroke in its direction"):
+        chaosgym.read_machine(path)
 
 
 EXAMPLES = sorted(path.stem for path in FOLDER.glob("*.toml") if "[link." in path.read_text(encoding="utf-8"))

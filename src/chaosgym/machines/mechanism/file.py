@@ -36,6 +36,9 @@ from chaosgym.machines.stated import range_of, reduced, tolerances_of
 
 Array = NDArray[np.float64]
 
+STILL = 1e-6
+"""Stroke of a piston, as a share of the mechanism's length, below which it stands still."""
+
 MOST_MODES = 12
 """Modes that a beam may keep."""
 
@@ -231,7 +234,12 @@ def _gas(row: Mapping[str, Any], mechanism: Mechanism) -> Force:
     gas = Gas(math.pi / 4.0 * bore**2, dead, low, high, behind, exponent)
     direction, point = _direction(row.get("direction", 0.0), mechanism), _end("gas.at", at)
     theta: Any = np.arange(STROKE_ANGLES) * (2.0 * math.pi / STROKE_ANGLES)
-    place = mechanism.point(places(mechanism, revolution_of(mechanism), theta), point)[0] @ direction
+    revolution = revolution_of(mechanism)
+    place = mechanism.point(places(mechanism, revolution, theta), point)[0] @ direction
+    if not np.ptp(place) > STILL * revolution.length:
+        raise ParameterError(
+            f"[[gas]] at {at} has no stroke in its direction; allowed: a point that moves as the gas is compressed"
+        )
     return Force(point, Sampled(gas.force(place), direction).at)
 
 

@@ -5,8 +5,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.errors import ParameterError
-
 Array = NDArray[np.float64]
 
 STROKE_ANGLES = 1440
@@ -54,22 +52,15 @@ class Gas(NamedTuple):
     def pressure(self, place: Array) -> Array:
         """Pressure [Pa] over a revolution (s,) of a piston that compresses as its place (s,) [m] grows.
 
-        It stays between suction and discharge, and follows p V^n = const while both valves are closed.
-
-        Raises
-        ------
-        ParameterError
-            If the piston does not move.
+        It stays between suction and discharge, and follows p V^n = const while both valves are closed. A dead volume
+        so large that the outlet never opens leaves what suction has filled at the lowest place.
         """
-        stroke = float(np.ptp(place))
-        if not stroke > 0.0:
-            raise ParameterError("[[gas]] acts on a piston that does not move; allowed: a point that has a stroke")
-        volume = (place.max() - place) / stroke + self.dead_volume
-        top, pressure = int(np.argmin(volume)), np.empty(len(place))
-        now = self.discharge
+        volume = (place.max() - place) / np.ptp(place) + self.dead_volume
+        lowest, pressure = int(np.argmax(volume)), np.empty(len(place))
+        now = self.suction
         # the second revolution has forgotten where the first began
         for k in range(1, 2 * len(place) + 1):
-            i, before = (top + k) % len(place), (top + k - 1) % len(place)
+            i, before = (lowest + k) % len(place), (lowest + k - 1) % len(place)
             now = now * (volume[before] / volume[i]) ** self.exponent
             now = pressure[i] = min(max(now, self.suction), self.discharge)
         return pressure
