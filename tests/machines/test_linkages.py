@@ -103,6 +103,23 @@ def test_the_first_peak_of_a_loose_wrist_pin():
     assert math.degrees(phase) == pytest.approx(13.9, abs=0.1)
 
 
+@pytest.mark.slow
+def test_small_motions_may_split_an_orbit():
+    """A limit that is known: at 180 rpm and weak damping the four-bar has period 2 here, split by 0.2 % of the force.
+
+    The nonlinear linkage settles on period 1, at a force that lies within 0.3 % of both peaks.
+    """
+    given = machine("four-bar-akhadkar", fidelity="standard", speed=180.0, knee_damping=60.0)
+    peaks = simulate(given, 8, transient=200).peak_force.max(axis=1)
+    np.testing.assert_allclose(peaks[2:], peaks[:-2], rtol=1e-5)
+    assert 1e-3 < np.ptp(peaks) / peaks.mean() < 3e-3
+    surfaces = given.knee_clearance, given.knee_stiffness, given.knee_damping
+    force, _ = linkage_twins.knee(given.crank_rate, *surfaces, 60, SAMPLES, **KNEE)
+    settled = force.reshape(60, SAMPLES).max(axis=1)[-12:]
+    assert np.ptp(settled) < 1e-4 * settled.mean()
+    np.testing.assert_allclose(peaks, settled.mean(), rtol=3e-3)
+
+
 def rewritten(tmp_path, name, *replaced):
     """Machine of a file with some texts replaced, at its finest rung but one."""
     text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
