@@ -1,6 +1,8 @@
 """The command ``bench``: how fast this computer is."""
 
 from dataclasses import asdict
+from os import cpu_count
+from pathlib import Path
 from typing import Any
 
 import click
@@ -10,14 +12,21 @@ from chaosgym.cli.output import emit
 SHOWN_FUNCTIONS = 15
 """Functions of a cold start that are shown; ``--json`` has all."""
 
+MOST_WORKERS = 4
+"""Dask workers on this computer."""
+
 
 @click.command()
 @click.option("--repeats", type=click.IntRange(1, 100), default=5, show_default=True, help="Timed runs per figure.")
-@click.option("--against", type=click.Choice(["exudyn"]), help="Run the same machines there; needs chaosgym[peers].")
+@click.option(
+    "--against", type=click.Choice(["exudyn", "peers"]), help="The same machines in other programs (chaosgym[peers])."
+)
 @click.option("--scenes", is_flag=True, help="The scenes of the slider crank instead: degrees of freedom and cost.")
 @click.option("--set-up", "set_up", is_flag=True, help="The times to make a slider crank ready instead.")
 @click.option("--mechanisms", is_flag=True, help="Mechanisms from files against the crank of the thesis instead.")
-@click.option("--scaling", is_flag=True, help="What threads and wrapping make of the vector environments instead.")
+@click.option("--scaling", is_flag=True, help="What grows with modes, gaps, cycles, machines, threads, instead.")
+@click.option("--points", type=click.IntRange(0), default=0, help="With --scaling: of a sweep on 1, 2, 4 Dask workers.")
+@click.option("--figure", type=click.Path(dir_okay=False, path_type=Path), help="With --scaling: picture of it, PNG.")
 @click.option("--first-use", "first_use", is_flag=True, help="What commands take at first, and to compile, instead.")
 @click.option("--waits", is_flag=True, help="Short questions, training and memory of a batch instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
@@ -28,6 +37,8 @@ def bench(
     set_up: bool,
     mechanisms: bool,
     scaling: bool,
+    points: int,
+    figure: Path | None,
     first_use: bool,
     waits: bool,
     as_json: bool,
@@ -37,6 +48,12 @@ def bench(
         raise click.UsageError(
             "--against, --scenes, --set-up, --mechanisms, --scaling, --first-use and --waits exclude each other"
         )
+    if against == "peers":
+        from benchmarks.performance.peers import peers
+
+        programs = peers()
+        told = {"peers": [program._asdict() for program in programs]}
+        return emit(told, as_json, lambda: _peer_table(programs))
     if against is not None:
         from benchmarks.performance.against_exudyn import against_exudyn
 
@@ -58,7 +75,6 @@ def bench(
         cycle_costs,
         scene_costs,
         set_up_times,
-        vector_scaling,
     )
 
     if scenes:
@@ -76,8 +92,7 @@ def bench(
         found = {"cycles": [cost._asdict() for cost in cycles], "assembly_milliseconds": times}
         return emit(found, as_json, lambda: _mechanism_table(cycles, times))
     if scaling:
-        measured = vector_scaling(repeats)
-        return emit({"scaling": [asdict(each) for each in measured]}, as_json, lambda: _scaling_table(measured))
+        return _scaling(repeats, points, figure, as_json)
     result = benchmark(repeats, progress=True)
     return emit(result, as_json, lambda: _rates(result))
 
@@ -109,6 +124,13 @@ def _rates(result: dict[str, Any]) -> list[str]:
 
 def _shown(figure: float) -> str:
     return f"{figure:.1f}" if figure < 100.0 else f"{figure:,.0f}"
+
+
+def _peer_table(programs: list[Any]) -> list[str]:
+    head = f"{'cycles per CPU second, error of the first peak':56s}{'Hz':>4s}"
+    return [head] + [
+        f"{each.name:56s}{each.frequency:4.0f}{each.cycles_per_second:12,.1f}{each.error:12.1e}" for each in programs
+    ]
 
 
 def _comparison(rows: list[dict[str, Any]]) -> list[str]:
@@ -151,6 +173,43 @@ def _mechanism_table(rows: list[Any], times: dict[str, float]) -> list[str]:
     ]
     made = [f"{f'assemble, {name}':69s}{value:8.1f} ms{ASSEMBLY[name]:5.0f}" for name, value in times.items()]
     return [f"{head}{'target':>8s}", *lines, *made]
+
+
+def _scaling(repeats: int, points: int, figure: Path | None, as_json: bool) -> None:
+    from benchmarks.performance import vector_scaling
+    from benchmarks.performance.processors import powers_of_two, thread_shares, worker_shares
+    from benchmarks.performance.scaling_figure import scaling_figure
+    from benchmarks.performance.sizes import sizes
+
+    grown, shares, measured = sizes(repeats), thread_shares(repeats), vector_scaling(repeats)
+    if points:
+        shares += worker_shares(points, [count for count in powers_of_two(cpu_count() or 1) if count <= MOST_WORKERS])
+    if figure is not None:
+        scaling_figure(grown, shares, figure)
+    found = {
+        "scaling": [asdict(each) for each in measured],
+        "sizes": [each._asdict() for each in grown],
+        "processors": [each._asdict() for each in shares],
+    }
+    emit(found, as_json, lambda: [*_size_table(grown), *_share_table(shares), *_scaling_table(measured)])
+
+
+def _size_table(grown: list[Any]) -> list[str]:
+    head = f"{'what grows':18s}{'to':>10s}{'us a cycle':>12s}{'us an impact':>14s}{'kB kept':>12s}"
+    rows = []
+    for each in grown:
+        impact = f"{each.microseconds / each.impacts:14.2f}" if each.impacts else f"{'':14s}"
+        rows.append(f"{each.grows:18s}{each.value:10g}{each.microseconds:12.1f}{impact}{1e-3 * each.kept:12.2f}")
+    return [head, *rows]
+
+
+def _share_table(shares: list[Any]) -> list[str]:
+    head = f"{'us of a cycle (threads) or a point (workers)':46s}{'wall':>12s}{'processor':>12s}"
+    return [f"{head}  memory [MB]"] + [
+        f"{f'{each.number} {each.of}':46s}{1e6 * each.wall:12.1f}{1e6 * each.processor:12.1f}  "
+        + ", ".join(f"{1e-6 * size:.0f}" for size in each.memory)
+        for each in shares
+    ]
 
 
 def _scaling_table(measured: list[Any]) -> list[str]:

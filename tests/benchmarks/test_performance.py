@@ -5,6 +5,7 @@ import math
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -13,9 +14,10 @@ import pytest
 from click.testing import CliRunner
 
 from benchmarks.cli import app
-from benchmarks.performance import mechanisms, rates, scaling
+from benchmarks.performance import mechanisms, rates, scaling, sizes
 from benchmarks.performance.against_exudyn import FOUR_BAR, Contest, against_exudyn, period_of
 from benchmarks.performance.exudyn_machines import ExudynSetting, load_exudyn, run_in_exudyn
+from benchmarks.performance.peers import peers
 from benchmarks.performance.reports import report_seconds
 from benchmarks.performance.timing import processor_seconds, rate
 from benchmarks.performance.waits import waits
@@ -74,14 +76,21 @@ def test_every_rate_comes_out_positive(monkeypatch: pytest.MonkeyPatch) -> None:
     assert all(math.isfinite(figure) and figure > 0.0 for figure in figures)
 
 
-def test_threads_and_wrapping_of_vector_environments(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Time inside and outside the kernels makes up a step on one thread, and the ideal is one thread's over theirs."""
+def test_what_grows_is_measured_and_drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Time inside and outside the kernels makes up a step on one thread, and the ideal is one thread's over theirs.
+
+    Of two gaps there are more tables than of one, and every size has a cost and a memory.
+    """
     monkeypatch.setattr(scaling, "SUB_ENVIRONMENTS", 3)
     monkeypatch.setattr(scaling, "WARM_UP_STEPS", 1)
     monkeypatch.setattr(scaling, "TIMED_STEPS", 2)
     threads = numba.get_num_threads()
-    run = CliRunner().invoke(app, ["bench", "--scaling", "--repeats", "1", "--json"])
+    for name, fewer in (("MODES", (2,)), ("STIFFNESS", (1e6,)), ("GAPS", (1, 2)), ("CYCLES", (9,)), ("MACHINES", (2,))):
+        monkeypatch.setattr(sizes, name, fewer)
+    picture = tmp_path / "scaling.png"
+    run = CliRunner().invoke(app, ["bench", "--scaling", "--repeats", "1", "--json", "--figure", str(picture)])
     assert run.exit_code == 0, run.output
+    assert picture.read_bytes().startswith(b"\x89PNG")
     assert numba.get_num_threads() == threads
     measured = json.loads(run.stdout)["scaling"]
     assert [each["environment"] for each in measured] == ["chaosgym/ImpactBeam-v1", "chaosgym/SliderCrank-v1"]
@@ -89,6 +98,11 @@ def test_threads_and_wrapping_of_vector_environments(monkeypatch: pytest.MonkeyP
         assert each["wrapper"] > 0.0
         assert each["physics"] + each["wrapper"] <= 1.01 * each["one_thread"]
         assert each["efficiency"] == pytest.approx(each["one_thread"] / each["all_threads"] / each["threads"])
+    grown = json.loads(run.stdout)["sizes"]
+    assert all(size["microseconds"] > 0.0 and size["kept"] > 0.0 for size in grown)
+    one, two = (size["kept"] for size in grown if size["grows"] == "gaps")
+    assert two > one
+    assert json.loads(run.stdout)["processors"][0]["number"] == 1
 
 
 def test_mechanisms_are_timed_against_the_crank(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -177,6 +191,20 @@ def test_a_contest_reports_speed_beside_verdict() -> None:
     for side in ("chaosgym", "exudyn"):
         assert (row["right_class"][side], row["right_period"][side], row["wrong_at"][side]) == (1, 1, [])
     assert row["mean_peak_force"]["exudyn"] == pytest.approx(row["mean_peak_force"]["chaosgym"], rel=0.02)
+
+
+def test_other_programs_move_the_same_beam() -> None:
+    """Every program's first peak is that of exact events to its accuracy; equal methods of equal step agree beyond it.
+
+    Those that are not installed are named.
+    """
+    found = {each.name: each for each in peers((30.0,), beams=2)}
+    errors = {name: each.error for name, each in found.items() if "not installed" not in name}
+    assert errors.pop("chaosgym, exact events") < 1e-9
+    assert 1e-6 < min(errors.values()) <= max(errors.values()) < 0.01
+    same = [error for name, error in errors.items() if "10 us" in name]
+    assert np.ptp(same) < 1e-2 * same[0]
+    assert all(math.isnan(each.error) for name, each in found.items() if "not installed" in name)
 
 
 def test_what_people_wait_for_is_measured() -> None:
