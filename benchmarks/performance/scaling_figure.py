@@ -24,13 +24,13 @@ COST, MEMORY = "C0", "C1"
 
 def scaling_figure(sizes: Sequence[Size], shares: Sequence[Share], path: Path) -> None:
     """Draw sizes, and the speed-up of threads and workers, to a PNG."""
-    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
+    figure = Figure(figsize=(11.0, 6.0), layout="constrained")
     axes = figure.subplots(2, 3).ravel()
     for ax, (grows, kept) in zip(axes, KEPT.items(), strict=False):
         own = [size for size in sizes if size.grows == grows]
         values = [size.value for size in own]
         ax.plot(values, [size.microseconds for size in own], "o-", color=COST)
-        ax.set(xlabel=grows, ylabel="processor time of a cycle [us]", ylim=(0.0, None))
+        ax.set(xlabel=grows, ylabel="a cycle [us]", ylim=(0.0, None))
         if grows not in ("modes", "gaps"):
             ax.set_xscale("log")
         if kept:
@@ -40,7 +40,7 @@ def scaling_figure(sizes: Sequence[Size], shares: Sequence[Share], path: Path) -
             beside.yaxis.label.set_color(MEMORY)
         else:
             ax.plot(values, [size.microseconds / size.impacts for size in own], "^:", color="C2")
-            ax.text(0.03, 0.12, "of an impact [us]", color="C2", transform=ax.transAxes)
+            ax.text(0.4, 0.12, "of an impact [us]", color="C2", transform=ax.transAxes)
     _speed_up(axes[-1], shares)
     write_atomically(path, lambda file: figure.savefig(file, format="png", dpi=120, metadata={"Software": None}))
 

@@ -27,6 +27,9 @@ MACHINES = (1, 4, 16, 64, 256, 1_024)
 TIMED = 300
 """Cycles of a timed run where their number does not grow."""
 
+AT_ONCE = 10
+"""Cycles of a call of a batch."""
+
 SETTLING = 50
 """Cycles from rest before; they visit the sets of pressed surfaces."""
 
@@ -88,12 +91,12 @@ def _of_batch(count: int, repeats: int) -> Size:
     tracemalloc.start()
     batch = BEAM.batch(count)
     for i in range(count):
-        batch.start(i, BEAM.at(8.0 + 22.0 * i / count))
+        batch.start(i, BEAM)
     kept = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
-    cycles, which = max(1, TIMED // count), np.arange(count)
-    seconds, _ = _median(lambda: batch.run(which, cycles), repeats)
-    return Size("machines", count, 1e6 * seconds / (cycles * count), 0.0, kept / count)
+    which = np.arange(count)
+    seconds, _ = _median(lambda: batch.run(which, AT_ONCE), repeats)
+    return Size("machines", count, 1e6 * seconds / (AT_ONCE * count), 0.0, kept / count)
 
 
 def _median(work: Callable[[], Any], repeats: int) -> tuple[float, float]:
