@@ -38,6 +38,14 @@ def test_template_of_every_machine_describes_the_machine_of_the_thesis(name, tmp
     assert found.costs == {found.machine.speed_field: 2.0}
 
 
+@pytest.mark.parametrize("name", sorted(MACHINES))
+def test_the_changes_of_a_template_may_be_emptied(name):
+    """As docs/design.md advises for a first look: the weights of what is not searched stay where they are."""
+    values = {**tomllib.loads(template(name)), "changes": {}}
+    found = brief_from(values)
+    assert (found.changes, len(found.costs)) == ({}, 1)
+
+
 def test_units_do_not_matter():
     """0.127 mm and 30 Hz are 0.005 in and 1800 rpm; half a kilonewton is 500 N."""
     metric = brief('[parameters]\nclearance = "0.127 mm"\nexcitation_frequency = "30 Hz"')

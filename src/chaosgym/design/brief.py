@@ -361,7 +361,8 @@ def _changes(values: Mapping[str, Any], machine: Machine) -> dict[str, tuple[flo
 
 
 def _costs(values: Mapping[str, Any], machine: Machine) -> dict[str, float]:
-    section = _section(values, "costs", _changes(values, machine), machine)
+    # an empty [changes] searches nothing, and leaves the weights for later
+    section = _section(values, "costs", _changes(values, machine) or parameters_of(machine), machine)
     costs = {key: parse_quantity(f"costs.{key}", given, "-") for key, given in section.items()}
     for key, cost in costs.items():
         if not cost >= 0.0:
