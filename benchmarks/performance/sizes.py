@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 
 from benchmarks.performance.rates import BEAM
@@ -57,7 +58,12 @@ def sizes(repeats: int = 3) -> list[Size]:
     for cycles in CYCLES:
         seconds, kept = _median(partial(simulate, BEAM, cycles), repeats)
         found.append(Size("cycles", cycles, 1e6 * seconds / cycles, 0.0, kept / cycles))
-    return found + [_of_batch(count, repeats) for count in MACHINES]
+    threads = numba.get_num_threads()
+    try:
+        numba.set_num_threads(1)  # threads that wait count as well
+        return found + [_of_batch(count, repeats) for count in MACHINES]
+    finally:
+        numba.set_num_threads(threads)
 
 
 def _grid(gaps: int) -> Any:
