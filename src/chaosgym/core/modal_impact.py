@@ -9,7 +9,7 @@ import numpy as np
 
 from chaosgym.core.joints.cycle import advance_joints, room_for
 from chaosgym.core.joints.run import JointRun, new_space, work_space
-from chaosgym.core.joints.tables import MOST_LEVELS, ROW, layout, no_rubs, put_drive, put_structure
+from chaosgym.core.joints.tables import MOST_LEVELS, ROW, layout, put_drive, put_structure
 from chaosgym.core.kernel import njit
 from chaosgym.core.lanes import aligned, unset
 from chaosgym.core.modal_model import LOAD, LOWER_STOP, STOP, UPPER_STOP, Tables
@@ -33,7 +33,7 @@ def tabulate(model, step_phase, drive_rate):
     """
     regimes, lags, shape = model.regimes, _lags(model), model.tip_shape.reshape((1, model.tip_shape.size))
     count, n, fastest = lags.shape[0], model.tip_shape.size, 0.0
-    at, rubs, shortest = layout(n, model.drive.shape[1], 1, 0, MOST_LEVELS), no_rubs(n), np.empty(count)
+    at, rubs, shortest = layout(n, model.drive.shape[1], 1, 0, MOST_LEVELS), None, np.empty(count)
     values, constants = aligned(count * at[ROW]).reshape((count, at[ROW])), np.empty((1, 1))
     for r in range(count):
         fastest = max(fastest, regimes.fastest[r])
@@ -59,7 +59,7 @@ def make_run(model, tables, step_phase):
     omega = 2.0 * math.pi * model.excitation_frequency
     regimes, known, lags = model.regimes, tables.values, _lags(model)
     count, n, harmonics = lags.shape[0], model.tip_shape.size, model.drive.shape[1]
-    at, rubs, longest = layout(n, harmonics, 1, 0, MOST_LEVELS), no_rubs(n), 0.0
+    at, rubs, longest = layout(n, harmonics, 1, 0, MOST_LEVELS), None, 0.0
     for r in range(count):
         longest = max(longest, tables.shortest[r])
     suit = longest * harmonics * omega <= step_phase and tables.step_phase == step_phase and known.shape[1] == at[ROW]
@@ -81,7 +81,7 @@ def make_run(model, tables, step_phase):
     radix[0] = count
     at = work_space(at, radix, np.empty(0, np.int64))
     stiffness, damping = model.contact_stiffness.reshape((1, 2)), model.contact_damping.reshape((1, 2))
-    own = new_space(at, shape, model.stops.reshape((1, 2)), stiffness, damping, rubs.shape, np.empty((0, 4)))
+    own = new_space(at, shape, model.stops.reshape((1, 2)), stiffness, damping, np.empty((0, n)), np.empty((0, 4)))
     weights = np.empty(n)
     for i in range(n):
         weights[i] = model.stiffness[i] if model.stiffness[i] != 0.0 else omega * omega

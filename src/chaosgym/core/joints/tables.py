@@ -21,7 +21,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 
 from chaosgym.core.kernel import leaf, njit, part
 from chaosgym.core.lanes import LANES, padded
@@ -82,12 +81,6 @@ class Rubs(NamedTuple):
     follow: np.ndarray
     weight: np.ndarray
     rate: np.ndarray
-
-
-@register_jitable
-def no_rubs(n):
-    """Return what rubs where no joint of a machine of n modes has friction: nothing."""
-    return Rubs(np.empty(0), np.empty((0, n)), np.empty((2 * n, 0)), np.empty((0, 2)), np.empty(0))
 
 
 @njit(cache=True)
@@ -167,7 +160,7 @@ def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, res
     constants : (m + 2f, m)
         As in ``layout``, without the column of 1.
     rubs
-        What rubs in this set.
+        What rubs in this set; None of machines without friction, for which numba compiles none of it.
     """
     n, m, width, states = at[MODES], at[JOINTS], at[WIDTH], at[STATES]
     harmonics, sliders = at[HARMONICS], at[SLIDERS]
@@ -187,9 +180,11 @@ def put_structure(at, generator, to_modal, from_modal, shape, lag, shortest, res
             values[LONGEST] -= 1.0
         growth *= math.ldexp(longest, int(values[LONGEST]))
     _put_blocks(at, generator, shortest, np.int64(0), at[LEVELS], values)
-    shown, strain = _shown(shape, from_modal), _shown(rubs.shape, from_modal)
+    shown = strain = _shown(shape, from_modal)
+    if rubs is not None:
+        strain = _shown(rubs.shape, from_modal)
     _put_channels(at, generator, shown, lag, strain, rubs, np.int64(0), at[LEVELS], math.exp(growth), values)
-    if sliders > 0:
+    if rubs is not None and sliders > 0:
         anchors = np.zeros((4, sliders))
         for c in range(sliders):
             anchors[1, c] = 1.0
@@ -263,15 +258,20 @@ def put_drive(at, generator, to_modal, from_modal, shape, lag, omega, drive, res
         values[at[CONSTANTS] + j * (1 + at[JOINTS])] = 0.0
         for i in range(n):
             values[at[CONSTANTS] + j * (1 + at[JOINTS])] += shape[j, i] * resting[i]
-    for s in range(at[SLIDERS]):
-        row = rubs.shape[s] @ back[:n]
-        for c in range(2 * harmonics):
-            strain[s, c] = row[c]
+    if rubs is not None:
+        for s in range(at[SLIDERS]):
+            row = rubs.shape[s] @ back[:n]
+            for c in range(2 * harmonics):
+                strain[s, c] = row[c]
     _put_channels(at, turning, shown, lag, strain, rubs, n, levels, 1.0, values)
-    for k in range(2 * at[SLIDERS]):
-        reading, slid = np.sum(shape[int(rubs.joint[k // 2])] * resting[:n]), np.sum(rubs.shape[k // 2] * resting[:n])
-        constant = read_at_rest(generator, from_modal, shape, lag, rubs, k, reading, slid, drifting)
-        values[at[CONSTANTS] + (at[JOINTS] + k) * (1 + at[JOINTS])] = constant
+    if rubs is not None:
+        for k in range(2 * at[SLIDERS]):
+            reading, slid = (
+                np.sum(shape[int(rubs.joint[k // 2])] * resting[:n]),
+                np.sum(rubs.shape[k // 2] * resting[:n]),
+            )
+            constant = read_at_rest(generator, from_modal, shape, lag, rubs, k, reading, slid, drifting)
+            values[at[CONSTANTS] + (at[JOINTS] + k) * (1 + at[JOINTS])] = constant
     for c in range(2 * harmonics):
         _put_forced(at, back[:, c], steady[:, c], c, harmonics, np.int64(0), np.int64(0), values)
     for i in range(2 * n):
@@ -362,11 +362,11 @@ def _put_channels(at, generator, shown, lag, strain, rubs, first_block, levels, 
     rows, reading, read = np.empty((DEGREE + 1, 2 * own)), np.empty((5, 2 * own)), np.empty(2 * own)
     for k in range(at[CHANNELS]):
         j, c = np.int64(k), (k - m) // 2
-        if k >= m:
+        if rubs is not None and k >= m:
             j = int(rubs.joint[c])
         for i in range(2 * own):
             rows[0, i] = shown[j, i]
-        if k >= m:
+        if rubs is not None and k >= m:
             derivative(generator, rows[0], rows[1])
             for i in range(2 * own):
                 read[i] = rubs.weight[k - m, 0] * (rows[0, i] + lag[j] * rows[1, i])
