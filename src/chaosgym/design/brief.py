@@ -361,13 +361,14 @@ def _changes(values: Mapping[str, Any], machine: Machine) -> dict[str, tuple[flo
 
 
 def _costs(values: Mapping[str, Any], machine: Machine) -> dict[str, float]:
-    # an empty [changes] searches nothing, and leaves the weights for later
-    section = _section(values, "costs", _changes(values, machine) or parameters_of(machine), machine)
+    changes = _changes(values, machine)
+    section = _section(values, "costs", changes or parameters_of(machine), machine)
     costs = {key: parse_quantity(f"costs.{key}", given, "-") for key, given in section.items()}
     for key, cost in costs.items():
         if not cost >= 0.0:
             raise DesignError(f"costs.{key} = {cost:g} is out of range; allowed: 0 or more")
-    return costs
+    # an empty [changes] searches nothing: weights wait there for later
+    return costs if changes else {}
 
 
 def _series_size(values: Mapping[str, Any]) -> int:
