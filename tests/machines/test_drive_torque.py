@@ -190,6 +190,13 @@ def test_friction_of_a_tilting_slider_takes_what_the_nonlinear_linkage_loses(tmp
     assert given.drive_torque.mean_power == pytest.approx(power, rel=0.03)
 
 
+@pytest.mark.parametrize("swing", [0.0, -0.01, math.nan, math.inf, "1 %"])
+def test_a_flywheel_needs_a_swing(swing):
+    """None holds the speed still, and a swing is a share of it above zero."""
+    with pytest.raises(ParameterError, match=r"swing = .* is out of range"):
+        DriveTorque(np.sin(np.arange(12) * np.pi / 6.0), 10.0).flywheel(swing)
+
+
 def test_a_constant_torque_needs_no_flywheel():
     """Nothing is taken up and given back."""
     assert DriveTorque(np.full(360, 3.0), 50.0).energy_swing == pytest.approx(0.0, abs=1e-12)

@@ -259,6 +259,14 @@ def test_what_is_wrong_is_told_in_one_line(file_of, replaced, message):
     assert "own.toml" in str(error.value)
 
 
+@pytest.mark.parametrize(("first", "count"), [(0.0, 0), (0.0, -3), (0.0, 10**7), (np.nan, 36), (np.inf, 36)])
+def test_equations_at_no_angles_are_refused(file_of, first, count):
+    """None at all, more than a computer holds, or from an angle on that is none."""
+    given = chaosgym.read_machine(file_of("slider-crank"))
+    with pytest.raises(ParameterError, match=r"count = .* is out of range|first = .* rad is out of range"):
+        given.equations(first, count)
+
+
 def test_missing_tables_and_a_mechanism_without_clearance(file_of):
     """Tables that are missing are named; so is a mechanism in which nothing rattles."""
     path = file_of(

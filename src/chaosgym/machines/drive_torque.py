@@ -6,10 +6,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.machines.numbers import number
+
 Array = NDArray[np.float64]
 
 SWING = 0.01
 """Swing of the speed, as a share of it, for which a flywheel is told."""
+
+LEAST_SWING = 1e-9
+"""Least swing for which a flywheel can be asked."""
 
 ROUNDING = 1e-12
 """Share of the largest torque below which a mean is rounding."""
@@ -64,7 +69,13 @@ class DriveTorque(NamedTuple):
         """Inertia [kg m^2] with which highest and lowest speed differ by a share ``swing`` of the mean one.
 
         It is that of a small swing, (work taken up) / (swing rate^2), as in any textbook on machine dynamics.
+
+        Raises
+        ------
+        ParameterError
+            If the swing is not a share above 0.
         """
+        number("swing", swing, LEAST_SWING, 2.0)
         return self.energy_swing / (swing * self.rate**2)
 
     def as_dict(self) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from chaosgym.machines.mechanism.joints import ACROSS, ALONG, PITCH, PLACES, SID
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism
 from chaosgym.machines.mechanism.motor import Load, Motor, MotorRun, turn
 from chaosgym.machines.mechanism.nominal import Revolution, places, revolution_of
+from chaosgym.machines.numbers import number
 from chaosgym.machines.parameters import parameter
 
 Array = NDArray[np.float64]
@@ -33,6 +34,9 @@ MOTOR_ANGLES = 90
 
 TORQUE_ANGLES = 720
 """Crank angles at which the torque of the drive is told."""
+
+MOST_ANGLES, MOST_TURNED = 20_000, 1e6
+"""Crank angles at which equations are given at once, and where they may begin [rad]."""
 
 RAMP = 0.02
 """Sliding speed below which friction fades, as a share of the largest in a revolution."""
@@ -191,7 +195,15 @@ class MechanismMachine(BinnedMachine):
         return places(self.mechanism, self.revolution, theta)
 
     def equations(self, first: float, count: int) -> SmallMotion:
-        """Equations of small motions on a uniform grid of crank angles; see ``small_motion``."""
+        """Equations of small motions at ``count`` crank angles from ``first`` [rad] on; see ``small_motion``.
+
+        Raises
+        ------
+        ParameterError
+            If the angles are out of range.
+        """
+        number("count", count, 1, MOST_ANGLES)
+        number("first", first, -MOST_TURNED, MOST_TURNED, "rad")
         return small_motion(self._scaled(), self.revolution, first, count)
 
     @property
