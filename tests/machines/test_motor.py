@@ -152,7 +152,11 @@ def test_a_weak_motor_stalls_where_the_equation_of_motion_stops(motored):
     turns, found = by_hand(2.0, 1500.0 * math.pi / 30.0, 0.02, 50, 300.0 * math.pi / 30.0)
     assert len(run.speed) == len(turns)
     assert run.stalled == pytest.approx(math.degrees(found.y[0, -1]) % 360.0, abs=4.0)
-    assert "the crank stops at" in given.under_motor().told
+    from_rest = given.under_motor()
+    assert "the crank stops at" in from_rest.told
+    assert not len(from_rest.speed)
+    assert math.isnan(from_rest.swing), "there is no whole cycle"
+    assert math.isnan(from_rest.run_up_time)
 
 
 def test_show_tells_it(motored, tmp_path):

@@ -94,12 +94,16 @@ class MotorRun(NamedTuple):
 
     @property
     def swing(self) -> float:
-        """Highest less lowest speed of the last cycle, as a share of its mean."""
+        """Highest less lowest speed of the last cycle, as a share of its mean; nan without a whole cycle."""
+        if not len(self.speed):
+            return float("nan")
         return float((self.highest[-1] - self.lowest[-1]) / self.speed[-1])
 
     @property
     def run_up_time(self) -> float:
-        """Time [s] until a cycle has 99 % of the last one's mean speed."""
+        """Time [s] until a cycle has 99 % of the last one's mean speed; nan without a whole cycle."""
+        if not len(self.speed):
+            return float("nan")
         turns = int(np.argmax(self.speed >= NEARLY * self.speed[-1])) + 1
         return 60.0 * float(np.sum(1.0 / self.speed[:turns]))
 
