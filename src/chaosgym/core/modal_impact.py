@@ -14,6 +14,9 @@ from chaosgym.core.kernel import njit
 from chaosgym.core.lanes import aligned, unset
 from chaosgym.core.modal_model import LOAD, LOWER_STOP, STOP, UPPER_STOP, Tables
 
+ROUNDED = 1.0 + 1e-12
+"""An interval that was made for a drive suits it, whatever rounding made of the quotient."""
+
 
 @njit(cache=True)
 def _lags(model):
@@ -62,7 +65,8 @@ def make_run(model, tables, step_phase):
     at, rubs, longest = layout(n, harmonics, 1, 0, MOST_LEVELS), None, 0.0
     for r in range(count):
         longest = max(longest, tables.shortest[r])
-    suit = longest * harmonics * omega <= step_phase and tables.step_phase == step_phase and known.shape[1] == at[ROW]
+    quick = longest * harmonics * omega <= step_phase * ROUNDED
+    suit = quick and tables.step_phase == step_phase and known.shape[1] == at[ROW]
     values, rows = unset(count * at[ROW] if suit else 0), np.empty(count, np.int64)
     shape, drive = model.tip_shape.reshape((1, n)), np.empty((harmonics, 2, n))
     for h in range(harmonics):
