@@ -6,8 +6,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.machines.numbers import number
-
 Array = NDArray[np.float64]
 
 SWING = 0.01
@@ -75,6 +73,8 @@ class DriveTorque(NamedTuple):
         ParameterError
             If the swing is not a share above 0.
         """
+        from chaosgym.machines.numbers import number
+
         number("swing", swing, LEAST_SWING, 2.0)
         return self.energy_swing / (swing * self.rate**2)
 
