@@ -7,6 +7,7 @@ import gymnasium as gym
 import numpy as np
 
 import chaosgym
+import chaosgym.core.batch
 import chaosgym.core.binned.batch
 import chaosgym.core.compilation
 import chaosgym.core.lanes
@@ -28,7 +29,8 @@ def install():
         for name, value in list(vars(module).items()):
             if id(value) in plain:
                 setattr(module, name, plain[id(value)])
-    chaosgym.core.binned.batch.pointer = lambda address: ctypes.c_void_p(int(address))
+    for module in (chaosgym.core.batch, chaosgym.core.binned.batch):
+        module.pointer = lambda address: ctypes.c_void_p(int(address))
     chaosgym.core.compilation.prepare = lambda *_: None
 
 
