@@ -46,24 +46,24 @@ def first_doubt(own, values_at, slopes_at, h, low, high, doubt, start):
     return int(np.argmax(doubtful)) if doubtful.any() else LANES
 
 
-def _turned(entries, at, u, lanes):
+def _propagated(entries, at, u, lanes):
     blocks = _taken(entries, at, 2, 2, lanes)
     return np.einsum("ijb,jb->ib", blocks, u)
 
 
 @operation
-def turn(entries, at, own, u_at, out_at, lanes):
+def propagate(entries, at, own, u_at, out_at, lanes):
     """Each block times its coordinates."""
-    own[out_at : out_at + 2 * lanes] = _turned(entries, at, _taken(own, u_at, 2, lanes), lanes).ravel()
+    own[out_at : out_at + 2 * lanes] = _propagated(entries, at, _taken(own, u_at, 2, lanes), lanes).ravel()
 
 
 @operation
-def turn_and_expand(entries, at, generator_at, own, u_at, time, out_at, lanes):
-    """As ``turn``, and on from there by the series of the exponential."""
-    start = _turned(entries, at, _taken(own, u_at, 2, lanes), lanes)
+def propagate_and_expand(entries, at, generator_at, own, u_at, time, out_at, lanes):
+    """As ``propagate``, and on from there by the series of the exponential."""
+    start = _propagated(entries, at, _taken(own, u_at, 2, lanes), lanes)
     moved = start
     for term in range(TAYLOR_TERMS, 0, -1):
-        moved = start + time / term * _turned(entries, generator_at, moved, lanes)
+        moved = start + time / term * _propagated(entries, generator_at, moved, lanes)
     own[out_at : out_at + 2 * lanes] = moved.ravel()
 
 

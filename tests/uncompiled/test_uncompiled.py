@@ -15,8 +15,8 @@ from tests.uncompiled.run import results
 CALLS = {
     "sample": lambda call, table, own: call(table, 0, own, 512, 5, 8, 600, 610),
     "first_doubt": lambda call, table, own: call(own, 0, 20, 0.1, -3.0, 3.0, 0.01, 2),
-    "turn": lambda call, table, own: call(table, 0, own, 512, 600, 16),
-    "turn_and_expand": lambda call, table, own: call(table, 0, 64, own, 512, 0.02, 600, 16),
+    "propagate": lambda call, table, own: call(table, 0, own, 512, 600, 16),
+    "propagate_and_expand": lambda call, table, own: call(table, 0, 64, own, 512, 0.02, 600, 16),
     "dot": lambda call, table, own: call(table, 0, own, 100, 24),
     "dot_of_sizes": lambda call, table, own: call(table, 0, own, 100, 24),
     "add_columns": lambda call, table, own: call(table, 0, 16, 5, own, 700, own, 900, 24),

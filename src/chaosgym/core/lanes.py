@@ -7,8 +7,6 @@ are shorter, and calls a function for ``fma`` where the processor has none.
 Operations take arrays of one dimension, contiguous, each followed by the place at which something begins in it: an
 array of more dimensions costs a kernel's compilation three numbers a dimension wherever it is handed on. Coordinates u
 are (2 lanes,), the first and then the second coordinate of each block; ``lanes`` is a multiple of 8.
-
-The file is long because it is a list: an operation for every shape of operands that a kernel has.
 """
 
 from collections.abc import Callable
@@ -218,7 +216,7 @@ def first_doubt(e, own, values_at, slopes_at, h, low, high, doubt, start):
     return b.cttz(b.or_(bits, e.index(1 << LANES)), ir.Constant(ir.IntType(1), 1))
 
 
-def _turned(e, entries, at, own, u_at, lanes, offset):
+def _propagated(e, entries, at, own, u_at, lanes, offset):
     """First and second coordinates of the blocks at ``offset`` times ``entries`` (4, lanes), and where they lie."""
     b = e.builder
     places = [b.add(offset, e.times(lanes, k)) for k in range(4)]
@@ -228,25 +226,25 @@ def _turned(e, entries, at, own, u_at, lanes, offset):
 
 
 @_operation()
-def turn(e, entries, at, own, u_at, out_at, lanes):
+def propagate(e, entries, at, own, u_at, out_at, lanes):
     """Blocks ``entries`` (4, lanes) times u, into ``own`` from ``out_at`` on, which may be where u is."""
     with e.vectors(lanes) as loop:
-        x, y, places = _turned(e, entries, at, own, u_at, lanes, e.times(loop.index, LANES))
+        x, y, places = _propagated(e, entries, at, own, u_at, lanes, e.times(loop.index, LANES))
         e.store(x, own, e.builder.add(out_at, places[0]))
         e.store(y, own, e.builder.add(out_at, places[1]))
 
 
 TAYLOR_TERMS = 6
-"""Terms by which ``turn_and_expand`` goes on from the instant of a table."""
+"""Terms by which ``propagate_and_expand`` goes on from the instant of a table."""
 
 
 @_operation()
-def turn_and_expand(e, entries, at, generator_at, own, u_at, time, out_at, lanes):
-    """As ``turn``, then times exp(B time) by a Taylor series in time; B (4, lanes) is in ``entries`` too."""
+def propagate_and_expand(e, entries, at, generator_at, own, u_at, time, out_at, lanes):
+    """As ``propagate``, then times exp(B time) by a Taylor series in time; B (4, lanes) is in ``entries`` too."""
     b = e.builder
     times = e.spread(time)
     with e.vectors(lanes) as loop:
-        first, second, places = _turned(e, entries, at, own, u_at, lanes, e.times(loop.index, LANES))
+        first, second, places = _propagated(e, entries, at, own, u_at, lanes, e.times(loop.index, LANES))
         b11, b12, b21, b22 = (b.fmul(e.load(entries, b.add(generator_at, place)), times) for place in places)
         x, y = first, second
         for term in range(TAYLOR_TERMS, 0, -1):

@@ -18,7 +18,7 @@ from chaosgym.core.kernel import leaf, njit
 
 
 @njit(cache=True, inline="always")
-def turns(generator, j):
+def oscillates(generator, j):
     """True if block j holds a complex pair, or a nearly critical mode: in both the square of its norm never grows."""
     return generator[2, j] != 0.0
 
@@ -90,8 +90,8 @@ def bound(generator, row, result):
     n = generator.shape[1]
     for j in range(n):
         size = math.hypot(row[j], row[n + j])
-        result[j] = size if turns(generator, j) else abs(row[j])
-        result[n + j] = size if turns(generator, j) else abs(row[n + j])
+        result[j] = size if oscillates(generator, j) else abs(row[j])
+        result[n + j] = size if oscillates(generator, j) else abs(row[n + j])
 
 
 @njit(cache=True)

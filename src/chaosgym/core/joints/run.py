@@ -46,10 +46,10 @@ from chaosgym.core.lanes import (
     dot_of_sizes,
     item,
     padded,
+    propagate,
+    propagate_and_expand,
     put,
     sample,
-    turn,
-    turn_and_expand,
 )
 from chaosgym.core.propagator import exponential
 
@@ -465,7 +465,7 @@ def jump(run, row, level, intervals, h):
     """Move u by 1 to 8 intervals of a level, of length h."""
     at = run.at
     entries = row + at[TURN] + (LANES * level + intervals - 1) * 4 * at[WIDTH]
-    turn(run.tables, entries, run.own, at[U], at[U], at[WIDTH])
+    propagate(run.tables, entries, run.own, at[U], at[U], at[WIDTH])
     add_drift(run, row, intervals * h, at[U])
 
 
@@ -477,7 +477,7 @@ def place(run, row, time):
     instant = min(max(0, int(time / piece + 0.5)), FINE)
     entries = row + at[FINER] + instant * 4 * at[WIDTH]
     rest = time - instant * piece
-    turn_and_expand(run.tables, entries, row + at[GENERATOR], run.own, at[U], rest, at[U], at[WIDTH])
+    propagate_and_expand(run.tables, entries, row + at[GENERATOR], run.own, at[U], rest, at[U], at[WIDTH])
     add_drift(run, row, time, at[U])
 
 

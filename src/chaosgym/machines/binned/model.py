@@ -4,8 +4,6 @@ Matrices are held at the middle of each bin of crank angle, loads follow as cubi
 of closed contacts adds its stiffness and damping. Mass matrices, loads and contacts of all bins depend neither on the
 speed nor on the clearance; at a given speed they are summed and turned into propagators. Both results are kept for
 machines that differ only in speed or clearance.
-
-The file is long because what is assembled, at which level it is kept, and for whom, is one decision.
 """
 
 import math
