@@ -5,12 +5,30 @@ import math
 import numpy as np
 
 from chaosgym.machines.mechanism.beam import Beam, beam_link
+from chaosgym.machines.mechanism.equations import small_motion
 from chaosgym.machines.mechanism.joints import Joint
 from chaosgym.machines.mechanism.links import Body, rigid_link
 from chaosgym.machines.mechanism.mechanism import Mechanism
+from chaosgym.machines.mechanism.nominal import revolution_of
 from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
 from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.slider_crank.connecting_rod import elastic_constants, rods_of
+
+BINS = 180
+ANGLES = (np.arange(BINS) + 0.5) * (2.0 * math.pi / BINS)
+"""Middles of bins of 2 deg."""
+OFFSET = {
+    "rod": "rigid",
+    "geometric_stiffness": "on",
+    "gravity": 9.81,
+    "gravity_angle": 20.0,
+    "housing_offset_across": 0.004,
+    "yoke_offset_across": -0.003,
+    "slider_offset_along": 0.01,
+    "slider_offset_across": 0.03,
+    "slider_pitch_inertia": 1e-3,
+}
+"""Keywords of a ``SliderCrank`` whose centres of mass lie off the axes."""
 
 
 def thesis_crank(machine, ball_frame="rod"):
@@ -151,3 +169,13 @@ def thesis_crank_in_space(machine):
         {"shaft": none},
         (machine.gravity * math.sin(turned), -machine.gravity * math.cos(turned), 0.0),
     )
+
+
+def assembled(mechanism):
+    """Equations at the middles of the bins."""
+    return small_motion(mechanism, revolution_of(mechanism), ANGLES[0], BINS)
+
+
+def assert_equal(found, expected, tolerance):
+    """Entries agree to a share of the largest one."""
+    assert np.abs(found - expected).max() <= tolerance * np.abs(expected).max()

@@ -14,22 +14,8 @@ from chaosgym.machines.mechanism.mechanism import Mechanism, Spring
 from chaosgym.machines.mechanism.nominal import nominal, revolution_of
 from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.machine import SliderCrank
-from tests.machines.mechanisms import four_bar, thesis_crank
+from tests.machines.mechanisms import ANGLES, BINS, OFFSET, assembled, assert_equal, four_bar, thesis_crank
 
-BINS = 180
-WIDTH = 2.0 * math.pi / BINS
-ANGLES = (np.arange(BINS) + 0.5) * WIDTH
-OFFSET = {
-    "rod": "rigid",
-    "geometric_stiffness": "on",
-    "gravity": 9.81,
-    "gravity_angle": 20.0,
-    "housing_offset_across": 0.004,
-    "yoke_offset_across": -0.003,
-    "slider_offset_along": 0.01,
-    "slider_offset_across": 0.03,
-    "slider_pitch_inertia": 1e-3,
-}
 NAMES = {
     "ball along": "ball along the rod",
     "ball across": "ball across the rod",
@@ -37,16 +23,6 @@ NAMES = {
     "slider turn": "slider pitch",
 }
 COORDINATES = {there: here for here, there in NAMES.items()}
-
-
-def assembled(mechanism):
-    """Equations at the middles of the bins."""
-    return small_motion(mechanism, revolution_of(mechanism), 0.5 * WIDTH, BINS)
-
-
-def assert_equal(found, expected, tolerance):
-    """Entries agree to a share of the largest one."""
-    assert np.abs(found - expected).max() <= tolerance * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("joint", ["clearance", "instrumented"])

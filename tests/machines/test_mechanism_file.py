@@ -17,7 +17,8 @@ from chaosgym.cli import app
 from chaosgym.design.peak_impacts import peak_impacts, worn_side
 from chaosgym.errors import ChaosgymError, ParameterError
 from chaosgym.machines.machine_file import TEMPLATES, schema_text, template
-from chaosgym.machines.mechanism.machine import Clearance, machine_of
+from chaosgym.machines.mechanism.clearance import Clearance
+from chaosgym.machines.mechanism.machine_class import machine_of
 
 KINDS = [kind for kind in TEMPLATES if kind != "modes"]
 

@@ -15,40 +15,16 @@ from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.periodic import derivatives
 from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.machine import SliderCrank
-from tests.machines.mechanisms import thesis_crank, thesis_crank_in_space
+from tests.machines.mechanisms import ANGLES, BINS, OFFSET, assembled, assert_equal, thesis_crank, thesis_crank_in_space
 from tests.machines.spatial_twin import RigidMechanism
 
-BINS = 180
-WIDTH = 2.0 * math.pi / BINS
-ANGLES = (np.arange(BINS) + 0.5) * WIDTH
-LOPSIDED = {
-    "rod": "rigid",
-    "geometric_stiffness": "on",
-    "gravity": 9.81,
-    "gravity_angle": 20.0,
-    "housing_offset_across": 0.004,
-    "yoke_offset_across": -0.003,
-    "slider_offset_along": 0.01,
-    "slider_offset_across": 0.03,
-    "slider_pitch_inertia": 1e-3,
-    "slider_roll_inertia": 5e-4,
-}
+LOPSIDED = OFFSET | {"slider_roll_inertia": 5e-4}
 SETS = {
     "guide": {},
     "guide that turns": {"slider_joint": "instrumented"},
     "ball": {"slider_joint": "ideal", "ball_joint": "spherical"},
     "both": {"slider_joint": "instrumented", "ball_joint": "spherical"},
 }
-
-
-def assembled(mechanism):
-    """Equations at the middles of the bins."""
-    return small_motion(mechanism, revolution_of(mechanism), 0.5 * WIDTH, BINS)
-
-
-def assert_equal(found, expected, tolerance):
-    """Entries agree to a share of the largest one."""
-    assert np.abs(found - expected).max() <= tolerance * np.abs(expected).max()
 
 
 def order_of(mechanism, names):
@@ -113,7 +89,7 @@ def test_in_the_plane_it_is_the_planar_mechanism(name):
         assert_equal(other.stiffness[power][:, pick[0], pick[1]], one.stiffness[power], 2e-11)
         assert_equal(other.load[power][:, own], one.load[power], 2e-11)
         assert_equal(other.torque[power], one.torque[power], 2e-11)
-    inertia = [crank_inertia(each, revolution_of(each), ANGLES) for each in (flat, spatial)]
+    inertia = [crank_inertia(each, revolution_of(each), ANGLES[0], BINS) for each in (flat, spatial)]
     assert_equal(inertia[1], inertia[0], 2e-11)
 
 
@@ -217,7 +193,7 @@ def test_torque_of_the_drive_is_the_power_that_links_in_space_take():
     power = derivatives(w**2 * kinetic + potential)[0] + 7.0 * w * derivatives(stretch)[0] ** 2
     found = small_motion(mechanism, revolution, 0.0, 360)
     np.testing.assert_allclose([1.0, w, w**2] @ found.torque, power, atol=1e-9 * np.abs(power).max())
-    felt = crank_inertia(mechanism, revolution, np.arange(360) * 2.0 * np.pi / 360)
+    felt = crank_inertia(mechanism, revolution, 0.0, 360)
     np.testing.assert_allclose(0.5 * felt, kinetic, rtol=1e-9)
 
 

@@ -50,6 +50,11 @@ def parameter(
     return field(default=default, metadata={"parameter": described})
 
 
+def assumed(default: Any, unit: str, low: float, high: float) -> Any:
+    """Make a field of a machine of one's own, of which its file may say otherwise."""
+    return parameter(default, unit=unit, low=low, high=high, provenance="assumed", source="default")
+
+
 def parameters_of(machine: Any) -> Mapping[str, Parameter]:
     """Describe every parameter of a machine or machine class, by field name."""
     return _parameters_of(_class_of(machine))

@@ -140,22 +140,13 @@ def sliding(mechanism: Mechanism, revolution: Revolution, theta: Array, joint: s
     return every[:, 0], every[:, mechanism.size - len(mechanism.coordinates) :]
 
 
-def crank_inertia(mechanism: Mechanism, revolution: Revolution, theta: Array) -> Array:
+def crank_inertia(mechanism: Mechanism, revolution: Revolution, first: float, count: int) -> Array:
     """Inertia (B,) [kg m^2] of all links as the crank feels it in the nominal motion: twice their energy at 1 rad/s."""
-    found, total = nominal(mechanism, revolution, theta), np.zeros(len(theta))
+    found, times = _smooth(mechanism, revolution, first, count)
+    sums = _Sums(mechanism, revolution, found, _angles(first, times * count), True, found.inverse[:, :, :1])
     for link in mechanism.links:
-        own = mechanism.at[link.name]
-        if len(link.mass) and isinstance(mechanism, SpatialMechanism):
-            gradient = mechanism.particles(found.z, link)[1]
-            total += np.einsum(
-                "k,bki->b", link.mass, np.einsum("bkiz,bz->bki", gradient, found.inverse[:, own, 0]) ** 2
-            )
-        elif len(link.mass):
-            inertia = inertia_of(link)
-            motion = found.inverse[:, own, 0].copy()
-            motion[:, :2] = np.einsum("bji,bj->bi", rotation(found.z[:, own.start + 2]), motion[:, :2])
-            total += np.einsum("bi,ij,bj->b", motion, inertia.translating + inertia.turning, motion)
-    return total
+        sums.add_link(link)
+    return sums.mass[::times, 0, 0]
 
 
 def drive_torque(mechanism: Mechanism, revolution: Revolution, first: float, count: int) -> Array:
@@ -178,10 +169,10 @@ def _summed(
 ) -> tuple["_Sums", int]:
     """What all links, forces and springs add at a multiple of ``count`` angles, and that multiple."""
     found, times = _smooth(mechanism, revolution, first, count)
-    sums = _Sums(mechanism, revolution, found, _angles(first, times * count), matrices)
+    gaps = found.inverse[:, :, mechanism.size - len(mechanism.coordinates) :]
+    sums = _Sums(mechanism, revolution, found, _angles(first, times * count), matrices, gaps)
     for link in mechanism.links:
-        if len(link.mass):
-            (sums.add_particles if isinstance(mechanism, SpatialMechanism) else sums.add_masses)(link)
+        sums.add_link(link)
         if matrices and link.elastic:
             sums.add_elastic(link)
     for force in mechanism.forces:
@@ -192,19 +183,25 @@ def _summed(
 
 
 class _Sums:
-    """What masses, springs and forces add, at B crank angles.
+    """What masses, springs and forces add, at B crank angles, to the motions ``compatible`` (B, z, n).
 
     ``mass`` (B, n, n), ``damping`` (2, B, n, n), ``stiffness`` (3, B, n, n), ``pull`` (3, B, z) what the links resist
     with in their own coordinates, ``bent`` (3, B, z, z) its derivative by the second derivatives of the points.
     """
 
     def __init__(
-        self, mechanism: Mechanism, revolution: Revolution, found: Nominal, theta: Array, matrices: bool
+        self,
+        mechanism: Mechanism,
+        revolution: Revolution,
+        found: Nominal,
+        theta: Array,
+        matrices: bool,
+        compatible: Array,
     ) -> None:
         self.mechanism, self.found, self.theta, self.matrices = mechanism, found, theta, matrices
         self.winding = revolution.winding
-        n, size, count = len(mechanism.coordinates), mechanism.size, len(theta)
-        self.compatible = found.inverse[:, :, size - n :]
+        self.compatible = compatible
+        count, size, n = compatible.shape
         self.pull = np.zeros((3, count, size))
         if matrices:
             self.mass, self.damping = np.zeros((count, n, n)), np.zeros((2, count, n, n))
@@ -219,6 +216,11 @@ class _Sums:
     def torque(self) -> Array:
         """What the drive feels of all pulls, (3, B)."""
         return np.asarray(np.einsum("bz,kbz->kb", self.found.inverse[:, :, 0], self.pull))
+
+    def add_link(self, link: Link) -> None:
+        """Add the mass of a link, in the plane or in space."""
+        if len(link.mass):
+            (self.add_particles if isinstance(self.mechanism, SpatialMechanism) else self.add_masses)(link)
 
     def add_masses(self, link: Link) -> None:
         """Add the particles of a link and what turns with them, in axes of the link."""

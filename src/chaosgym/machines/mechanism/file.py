@@ -13,6 +13,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.file_keys import needed
 from chaosgym.machines.machine import TaskDefaults
 from chaosgym.machines.mechanism.beam import END, START, Beam, beam_link
+from chaosgym.machines.mechanism.clearance import Clearance, opened_by, surface_fields
 from chaosgym.machines.mechanism.file_parts import (
     LONGEST,
     axes_of_joint,
@@ -26,7 +27,8 @@ from chaosgym.machines.mechanism.forces import STROKE_ANGLES, Gas, Sampled
 from chaosgym.machines.mechanism.joints import Joint
 from chaosgym.machines.mechanism.keys import KEYS
 from chaosgym.machines.mechanism.links import Link, rigid_link
-from chaosgym.machines.mechanism.machine import Clearance, MechanismMachine, machine_of, opened_by, surface_fields
+from chaosgym.machines.mechanism.machine import MechanismMachine
+from chaosgym.machines.mechanism.machine_class import machine_of
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism, Spring
 from chaosgym.machines.mechanism.nominal import places, revolution_of
 from chaosgym.machines.mechanism.spatial import SpatialMechanism

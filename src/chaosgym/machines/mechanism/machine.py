@@ -1,4 +1,4 @@
-"""A mechanism with clearance in some of its joints, as a machine; ``machine_of`` makes its class."""
+"""A mechanism with clearance in some of its joints, as a machine; ``machine_class`` makes its class."""
 
 import math
 from collections.abc import Mapping
@@ -14,15 +14,15 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS, Contact, Held, held, middles_and_nodes
 from chaosgym.machines.drive_torque import DriveTorque
-from chaosgym.machines.machine import Number, Option
 from chaosgym.machines.mechanism.beam import fibre_stress
+from chaosgym.machines.mechanism.clearance import ROUND, surface_fields
 from chaosgym.machines.mechanism.equations import SmallMotion, crank_inertia, drive_torque, loads, sliding, small_motion
 from chaosgym.machines.mechanism.joints import ACROSS, ALONG, PITCH, PLACES, SIDEWAYS, TURN, YAW, Joint
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism
-from chaosgym.machines.mechanism.motor import Load, Motor, MotorRun, turn
+from chaosgym.machines.mechanism.motor import MOTOR_FIELDS, Load, Motor, MotorRun, turn
 from chaosgym.machines.mechanism.nominal import Revolution, places, revolution_of
 from chaosgym.machines.numbers import number
-from chaosgym.machines.parameters import parameter
+from chaosgym.machines.parameters import assumed, parameter
 
 Array = NDArray[np.float64]
 
@@ -41,9 +41,6 @@ MOST_ANGLES, MOST_TURNED = 20_000, 1e6
 RAMP = 0.02
 """Sliding speed below which friction fades, as a share of the largest in a revolution."""
 
-ROUND = ("revolute", "cylindrical", "spherical")
-"""Joints whose gap is a circle or a ball."""
-
 GUIDED = {ACROSS: {TURN: 1.0, PITCH: 1.0}, SIDEWAYS: {YAW: -1.0}}
 """Turns in a guide, in the plane or in space, that move its stations in either direction per metre of their place."""
 
@@ -52,67 +49,6 @@ FRICTION_ROUNDS = 1000
 
 LEAST_MASS = 1e-10
 """Least eigenvalue of a mass matrix whose diagonal is one."""
-
-
-class Clearance(NamedTuple):
-    """The gap of a joint.
-
-    Attributes
-    ----------
-    gap
-        Half of it, or how far a pin may leave the middle of its hole [m].
-    stiffness, damping
-        Spring [N/m] and damper [N s/m] of a surface; of each station.
-    stations
-        Places [m] along a guide from the joint's point at which it can touch; none where it can't tilt.
-    friction
-        Coulomb coefficient along the guide or slot; None for one without.
-    hertz
-        True for Hertzian surfaces, whose stiffness is K [N/m^1.5] and whose damping is chi [s/m]; see ``Contact``.
-    """
-
-    gap: float
-    stiffness: float
-    damping: float
-    stations: tuple[float, ...] = ()
-    friction: float | None = None
-    hertz: bool = False
-
-    @property
-    def fields(self) -> Mapping[str, tuple[float, dict[str, Any]]]:
-        """Value and description of the machine's fields, without the joint's name."""
-        named = dict(zip(surface_fields(self.hertz), (self.gap, self.stiffness, self.damping), strict=True))
-        if self.friction is not None:
-            named["friction"] = self.friction
-        return {name: (value, CLEARANCE_FIELDS[name]) for name, value in named.items()}
-
-
-def opened_by(kind: str, clearance: Clearance, spatial: bool = False) -> tuple[str, ...]:
-    """Motions that the clearance of a joint of some kind leaves open, in the plane or in space.
-
-    Raises
-    ------
-    ParameterError
-        If such a joint has no gap, or its clearance no stations.
-    """
-    if kind in ("weld", "universal"):
-        allowed = "revolute, cylindrical, spherical or prismatic" if spatial else "revolute, prismatic or slot"
-        raise ParameterError(f"a {kind} joint has no clearance; allowed: {allowed}")
-    if clearance.friction is not None and kind in ROUND:
-        raise ParameterError("friction of a pin in its hole is not modelled; allowed: in a prismatic joint or a slot")
-    if clearance.stations and kind != "prismatic":
-        raise ParameterError(f"stations have no meaning in a {kind} joint; leave them out")
-    if kind == "spherical":
-        return (ALONG, ACROSS, SIDEWAYS)
-    if spatial:
-        return (ACROSS, SIDEWAYS, YAW, PITCH) if clearance.stations else (ACROSS, SIDEWAYS)
-    if kind == "revolute":
-        return (ALONG, ACROSS)
-    return (ACROSS, TURN) if clearance.stations else (ACROSS,)
-
-
-def _assumed(default: Any, unit: str, low: float, high: float) -> Any:
-    return parameter(default, unit=unit, low=low, high=high, provenance="assumed", source="default")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,13 +86,13 @@ class MechanismMachine(BinnedMachine):
     mechanism: Mechanism
     displayed: tuple[float, ...] = field(default=(), repr=False)
     """What histories show in place of the displacement of the monitored joint, for each coordinate; none for that."""
-    speed: float = _assumed(600.0, "rpm", 0.1, 1e5)
+    speed: float = assumed(600.0, "rpm", 0.1, 1e5)
     """Constant speed of the crank [rpm]."""
-    gravity_factor: float = _assumed(1.0, "-", 0.0, 100.0)
+    gravity_factor: float = assumed(1.0, "-", 0.0, 100.0)
     """Factor of gravity."""
-    load_factor: float = _assumed(1.0, "-", 0.0, 1e3)
+    load_factor: float = assumed(1.0, "-", 0.0, 1e3)
     """Factor of the forces over the crank angle, those of a gas among them."""
-    matrix_update_interval: float = _assumed(2.0, "deg", 0.25, 30.0)
+    matrix_update_interval: float = assumed(2.0, "deg", 0.25, 30.0)
     """Crank angle over which mass, damping and stiffness matrices are held [deg]; divides 360."""
     monitored: str = parameter("", choices=("",), provenance="assumed", source="default")
     """Joint whose motion and force are recorded."""
@@ -263,9 +199,9 @@ class MechanismMachine(BinnedMachine):
         motor = self.motor
         if motor is None:
             raise ParameterError(f"{self.name} has no motor; allowed: a file with [motor]")
-        scaled, angles = self._scaled(), np.linspace(0.0, 2.0 * math.pi, MOTOR_ANGLES, endpoint=False)
+        scaled = self._scaled()
         still, viscous, _ = drive_torque(scaled, self.revolution, 0.0, MOTOR_ANGLES)
-        load = Load(crank_inertia(scaled, self.revolution, angles), still, viscous)
+        load = Load(crank_inertia(scaled, self.revolution, 0.0, MOTOR_ANGLES), still, viscous)
         return turn(motor, load, self.rate_at(speed), cycles)
 
     def _scaled(self) -> Mechanism:
@@ -547,148 +483,3 @@ def _reach(mechanism: Mechanism, joint: str) -> float:
             apart = np.linalg.norm(places[:, None] - places, axis=-1)
             shortest = min(shortest, float(np.min(apart[apart > 0.0], initial=math.inf)))
     return shortest
-
-
-CLEARANCE_FIELDS: Mapping[str, dict[str, Any]] = {
-    "clearance": {"unit": "m", "low": 0.0, "high": 1.0},
-    "stiffness": {"unit": "N/m", "low": 1.0, "high": 1e13},
-    "damping": {"unit": "N s/m", "low": 0.0, "high": 1e9},
-    "hertz_stiffness": {"unit": "N/m^1.5", "low": 1.0, "high": 1e16},
-    "hertz_damping": {"unit": "s/m", "low": 0.0, "high": 1e3},
-    "friction": {"unit": "-", "low": 0.0, "high": 0.5},
-}
-
-
-MOTOR_FIELDS: Mapping[str, dict[str, Any]] = {
-    "motor_stall_torque": {"unit": "N m", "low": 1e-9, "high": 1e9},
-    "motor_no_load_speed": {"unit": "rpm", "low": 0.1, "high": 1e5},
-    "motor_inertia": {"unit": "kg m^2", "low": 0.0, "high": 1e9},
-}
-"""Fields of the motor: its torque at rest, its speed without load, rotor and flywheel at the crank."""
-
-
-def surface_fields(hertz: bool) -> tuple[str, str, str]:
-    """Fields of clearance, stiffness and damping of a joint, without its name."""
-    law = "hertz_" if hertz else ""
-    return "clearance", f"{law}stiffness", f"{law}damping"
-
-
-def machine_of(
-    mechanism: Mechanism,
-    clearances: Mapping[str, Clearance],
-    *,
-    monitored: str = "",
-    motor: tuple[float, float, float] | None = None,
-    about: Mapping[str, Any] | None = None,
-    usual_ranges: Mapping[str, tuple[float, float]] | None = None,
-    namespace: Mapping[str, Any] | None = None,
-    definition: Any = None,
-    **stated: Any,
-) -> Any:
-    """Class of machines that are one mechanism, whose fields default to what is given.
-
-    Parameters
-    ----------
-    mechanism
-        Its links and joints; those with clearance are opened as ``opened_by`` says.
-    clearances
-        Of these joints, by their names.
-    monitored
-        Joint whose motion and force are recorded; the first with clearance if empty.
-    motor
-        Values of the ``MOTOR_FIELDS``; none for a speed that is held.
-    about
-        Provenance and source of what is given.
-    usual_ranges
-        Of the speed, as "speed", and of the clearance of the monitored joint, as "clearance".
-    namespace
-        More attributes of the class.
-    definition
-        Field that tells the class from others.
-    stated
-        Other fields of ``MechanismMachine``, such as ``speed``.
-
-    Raises
-    ------
-    ParameterError
-        If no joint has clearance, a name can't begin that of a field, or a value is out of range.
-
-    Examples
-    --------
-    >>> from chaosgym.machines.mechanism.machine import Clearance, machine_of
-    >>> from chaosgym.machines.mechanism.joints import Joint
-    >>> from chaosgym.machines.mechanism.links import Body, rigid_link
-    >>> from chaosgym.machines.mechanism.mechanism import Mechanism
-    >>> crank = rigid_link("crank", {"shaft": (0.0, 0.0), "pin": (0.05, 0.0)})
-    >>> rod = rigid_link("rod", {"big": (0.0, 0.0), "small": (0.2, 0.0)}, (Body(0.5, 1e-3, (0.1, 0.0)),))
-    >>> slider = rigid_link("slider", {"pivot": (0.0, 0.0)}, (Body(1.0, 1e-3, (0.0, 0.0)),))
-    >>> joints = (
-    ...     Joint("motor", "revolute", ("ground", "shaft"), ("crank", "shaft"), driven=True),
-    ...     Joint("big_end", "revolute", ("crank", "pin"), ("rod", "big")),
-    ...     Joint("small_end", "revolute", ("rod", "small"), ("slider", "pivot")),
-    ...     Joint("guide", "prismatic", ("ground", "shaft"), ("slider", "pivot"), opened=("across",)),
-    ... )
-    >>> mechanism = Mechanism((crank, rod, slider), joints, {"shaft": (0.0, 0.0)}, (0.0, -9.81))
-    >>> kind = machine_of(mechanism, {"guide": Clearance(1e-4, 1e8, 100.0)})
-    >>> kind(speed=10.0).sides
-    ('upper', 'lower')
-    """
-    from typing import get_type_hints
-
-    from chaosgym.machines.parameters import parameters_of
-
-    if not clearances:
-        raise ParameterError("no joint has clearance: nothing rattles; allowed: clearance in at least one [[joint]]")
-    about = {"provenance": "assumed", "source": "default", **(about or {})}
-    watched = monitored or next(iter(clearances))
-    if watched not in clearances:
-        raise ParameterError(f"monitored = {watched!r} is not one of {', '.join(clearances)}, which have clearance")
-    for name in (*clearances, *(link.name for link in mechanism.links)):
-        if not name.isidentifier() or name.startswith("_"):
-            raise ParameterError(f"name {name!r} is out of range; allowed: letters, digits and _, as in big_end")
-    fields: dict[str, Any] = {"mechanism": mechanism}
-    rubs = [name for name, given in clearances.items() if given.friction is not None]
-    if len(rubs) > 1:
-        raise ParameterError(f"{len(rubs)} joints have friction ({', '.join(rubs)}); allowed: one")
-    if len({given.hertz for given in clearances.values()}) > 1:
-        hertz = ", ".join(name for name, given in clearances.items() if given.hertz)
-        raise ParameterError(f"joint {hertz} is Hertzian and others are not; allowed: one law for all joints")
-    for name, given in clearances.items():
-        for what, (value, described) in given.fields.items():
-            fields[f"{name}_{what}"] = parameter(value, **described, **about)
-    for (what, described), value in zip(MOTOR_FIELDS.items(), motor or (), strict=motor is not None):
-        fields[what] = parameter(value, **described, **about)
-    for link in mechanism.links:
-        if link.mass.any() or link.inertia.any():
-            fields[f"{link.name}_mass_factor"] = _assumed(1.0, "-", 1e-3, 1e3)
-    own = parameters_of(MechanismMachine)
-    fields["monitored"] = parameter(watched, **{**vars(own["monitored"]), **about, "choices": tuple(clearances)})
-    if definition is not None:
-        fields["definition"] = definition
-    for name, value in stated.items():
-        fields[name] = parameter(value, **{**vars(own[name]), **about})
-    usual = {"speed": (100.0, 1000.0), "clearance": (1e-5, 2e-4), **(usual_ranges or {})}
-    types: dict[str, Any] = {
-        "stations": {name: given.stations for name, given in clearances.items()},
-        "rubs": "".join(rubs),
-        "has_motor": motor is not None,
-        "hertz": any(given.hertz for given in clearances.values()),
-        "beside_matrices": ("speed", *(f"{name}_clearance" for name in clearances), *(MOTOR_FIELDS if motor else ())),
-        "usual_ranges": {"speed": usual["speed"], f"{watched}_clearance": usual["clearance"]},
-        "options": _options(watched),
-        **(namespace or {}),
-    }
-    hints = get_type_hints(MechanismMachine)
-    annotations = {name: hints.get(name, Any) for name in fields}
-    annotations |= {name: ClassVar[Any] for name in types if not name.startswith("__")}
-    body = {"__module__": __name__, "__annotations__": annotations, **fields, **types}
-    made: Any = dataclass(frozen=True, kw_only=True)(type("MechanismMachine", (MechanismMachine,), body))
-    made()  # its defaults are checked
-    return made
-
-
-def _options(watched: str) -> dict[str, Option]:
-    return {
-        "--speed-rpm": Number("speed", "rpm"),
-        "--clearance-mm": Number(f"{watched}_clearance", "mm", 1e-3),
-    }

@@ -9,7 +9,8 @@ torque T_m to its speed without load w_0, and what weight, gas and springs (T_0)
 """
 
 import math
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,14 @@ NEARLY = 0.99
 
 LEAST = 1e-9
 """Least inertia in a revolution, as a share of the largest."""
+
+
+MOTOR_FIELDS: Mapping[str, dict[str, Any]] = {
+    "motor_stall_torque": {"unit": "N m", "low": 1e-9, "high": 1e9},
+    "motor_no_load_speed": {"unit": "rpm", "low": 0.1, "high": 1e5},
+    "motor_inertia": {"unit": "kg m^2", "low": 0.0, "high": 1e9},
+}
+"""Fields of the motor: its torque at rest, its speed without load, rotor and flywheel at the crank."""
 
 
 class Motor(NamedTuple):

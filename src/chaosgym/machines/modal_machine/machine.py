@@ -27,7 +27,7 @@ from chaosgym.machines.modal_impact import (
 )
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.structure import Structure
-from chaosgym.machines.parameters import parameter, parameters_of
+from chaosgym.machines.parameters import assumed, parameter, parameters_of
 
 Array = NDArray[np.float64]
 
@@ -53,10 +53,6 @@ FEWEST_DIGITS = 1e-9
 def aliases_of(joint: str) -> dict[str, str]:
     """Fields of a machine by those of its only joint, whose name this is; see ``Machine.aliases``."""
     return {f"{joint}.{what}": field for what, field in (OF_JOINT | {"friction": "friction"}).items()}
-
-
-def _assumed(default: Any, unit: str, low: float, high: float) -> Any:
-    return parameter(default, unit=unit, low=low, high=high, provenance="assumed", source="default")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,29 +106,29 @@ class ModalMachine(ModalImpactMachine):
     modes: Structure
     joint: str
     drives: tuple[Drive, ...] = field(default=())
-    speed: float = _assumed(30.0, "Hz", 1e-3, 1e5)
+    speed: float = assumed(30.0, "Hz", 1e-3, 1e5)
     """Operating cycles a second [Hz]."""
-    clearance: float = _assumed(0.1e-3, "m", 0.0, 10.0)
+    clearance: float = assumed(0.1e-3, "m", 0.0, 10.0)
     """Half the gap; with one stop its distance from the middle [m]."""
-    offset: float = _assumed(0.0, "m", -10.0, 10.0)
+    offset: float = assumed(0.0, "m", -10.0, 10.0)
     """Middle of the gap, from where the joint rests without any load [m]."""
     stops: str = parameter("two", choices=("two", "one"), provenance="assumed", source="default")
     """"two", or "one" on the upper side."""
-    contact_stiffness: float = _assumed(1e7, "N/m", 1e-3, 1e13)
+    contact_stiffness: float = assumed(1e7, "N/m", 1e-3, 1e13)
     """Spring of the upper stop [N/m]."""
-    contact_damping: float = _assumed(20.0, "N s/m", 0.0, 1e9)
+    contact_damping: float = assumed(20.0, "N s/m", 0.0, 1e9)
     """Damper of the upper stop [N s/m]."""
-    lower_stiffness_factor: float = _assumed(1.0, "-", 1e-9, 1e9)
+    lower_stiffness_factor: float = assumed(1.0, "-", 1e-9, 1e9)
     """Spring of the lower stop over that of the upper one."""
-    lower_damping_factor: float = _assumed(1.0, "-", 0.0, 1e9)
+    lower_damping_factor: float = assumed(1.0, "-", 0.0, 1e9)
     """Damper of the lower stop over that of the upper one."""
-    preload: float = _assumed(0.0, "N", -1e9, 1e9)
+    preload: float = assumed(0.0, "N", -1e9, 1e9)
     """Constant force on the joint, towards the upper stop [N]."""
-    drive_level: float = _assumed(1.0, "-", 0.0, 1e6)
+    drive_level: float = assumed(1.0, "-", 0.0, 1e6)
     """Factor of all harmonics of the drive."""
-    damping_factor: float = _assumed(1.0, "-", 0.0, 1e6)
+    damping_factor: float = assumed(1.0, "-", 0.0, 1e6)
     """Factor of the structure's damping."""
-    frequency_factor: float = _assumed(1.0, "-", 1e-3, 1e3)
+    frequency_factor: float = assumed(1.0, "-", 1e-3, 1e3)
     """Factor of all natural frequencies."""
 
     def __post_init__(self, fidelity: str | None) -> None:

@@ -30,7 +30,7 @@ from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, m
 from chaosgym.machines.modal_machine.machine import ModalMachine, as_there, rigid_note, turning_note
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.numbers import numbers
-from chaosgym.machines.parameters import parameter
+from chaosgym.machines.parameters import assumed
 
 Array = NDArray[np.float64]
 
@@ -97,10 +97,6 @@ def means(values: Array, bins: int) -> Array:
     part = at - i
     area = whole[i] + closed[i] * part + 0.5 * (closed[i + 1] - closed[i]) * part**2
     return np.asarray(np.diff(area) * (bins / count))
-
-
-def _assumed(default: float, unit: str, low: float, high: float) -> Any:
-    return parameter(default, unit=unit, low=low, high=high, provenance="assumed", source="default")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,11 +167,11 @@ class VaryingMachine(BinnedMachine):
     drive_level: float = as_there("drive_level")
     damping_factor: float = as_there("damping_factor")
     frequency_factor: float = as_there("frequency_factor")
-    friction: float = _assumed(0.0, "-", 0.0, 10.0)
+    friction: float = assumed(0.0, "-", 0.0, 10.0)
     """Coefficient of Coulomb friction at the stops."""
-    variation: float = _assumed(1.0, "-", 0.0, 100.0)
+    variation: float = assumed(1.0, "-", 0.0, 100.0)
     """Factor of how far samples of a stiffness are from their mean."""
-    matrix_update_interval: float = _assumed(1.0, "deg", 0.1, 30.0)
+    matrix_update_interval: float = assumed(1.0, "deg", 0.1, 30.0)
     """Part of a cycle of 360 deg over which stiffness is held [deg]; divides 360."""
 
     def __post_init__(self, fidelity: str | None) -> None:

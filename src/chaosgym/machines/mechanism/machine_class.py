@@ -1,0 +1,131 @@
+"""The class of machines that are one mechanism: a field for all that may differ between two of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, get_type_hints
+
+from chaosgym.errors import ParameterError
+from chaosgym.machines.machine import Number, Option
+from chaosgym.machines.mechanism.clearance import Clearance
+from chaosgym.machines.mechanism.machine import MechanismMachine
+from chaosgym.machines.mechanism.mechanism import Mechanism
+from chaosgym.machines.mechanism.motor import MOTOR_FIELDS
+from chaosgym.machines.parameters import assumed, parameter, parameters_of
+
+
+def machine_of(
+    mechanism: Mechanism,
+    clearances: Mapping[str, Clearance],
+    *,
+    monitored: str = "",
+    motor: tuple[float, float, float] | None = None,
+    about: Mapping[str, Any] | None = None,
+    usual_ranges: Mapping[str, tuple[float, float]] | None = None,
+    namespace: Mapping[str, Any] | None = None,
+    definition: Any = None,
+    **stated: Any,
+) -> Any:
+    """Class of machines that are one mechanism, whose fields default to what is given.
+
+    Parameters
+    ----------
+    mechanism
+        Its links and joints; those with clearance are opened as ``opened_by`` says.
+    clearances
+        Of these joints, by their names.
+    monitored
+        Joint whose motion and force are recorded; the first with clearance if empty.
+    motor
+        Values of the ``MOTOR_FIELDS``; none for a speed that is held.
+    about
+        Provenance and source of what is given.
+    usual_ranges
+        Of the speed, as "speed", and of the clearance of the monitored joint, as "clearance".
+    namespace
+        More attributes of the class.
+    definition
+        Field that tells the class from others.
+    stated
+        Other fields of ``MechanismMachine``, such as ``speed``.
+
+    Raises
+    ------
+    ParameterError
+        If no joint has clearance, a name can't begin that of a field, or a value is out of range.
+
+    Examples
+    --------
+    >>> from chaosgym.machines.mechanism.clearance import Clearance
+    >>> from chaosgym.machines.mechanism.machine_class import machine_of
+    >>> from chaosgym.machines.mechanism.joints import Joint
+    >>> from chaosgym.machines.mechanism.links import Body, rigid_link
+    >>> from chaosgym.machines.mechanism.mechanism import Mechanism
+    >>> crank = rigid_link("crank", {"shaft": (0.0, 0.0), "pin": (0.05, 0.0)})
+    >>> rod = rigid_link("rod", {"big": (0.0, 0.0), "small": (0.2, 0.0)}, (Body(0.5, 1e-3, (0.1, 0.0)),))
+    >>> slider = rigid_link("slider", {"pivot": (0.0, 0.0)}, (Body(1.0, 1e-3, (0.0, 0.0)),))
+    >>> joints = (
+    ...     Joint("motor", "revolute", ("ground", "shaft"), ("crank", "shaft"), driven=True),
+    ...     Joint("big_end", "revolute", ("crank", "pin"), ("rod", "big")),
+    ...     Joint("small_end", "revolute", ("rod", "small"), ("slider", "pivot")),
+    ...     Joint("guide", "prismatic", ("ground", "shaft"), ("slider", "pivot"), opened=("across",)),
+    ... )
+    >>> mechanism = Mechanism((crank, rod, slider), joints, {"shaft": (0.0, 0.0)}, (0.0, -9.81))
+    >>> kind = machine_of(mechanism, {"guide": Clearance(1e-4, 1e8, 100.0)})
+    >>> kind(speed=10.0).sides
+    ('upper', 'lower')
+    """
+    if not clearances:
+        raise ParameterError("no joint has clearance: nothing rattles; allowed: clearance in at least one [[joint]]")
+    about = {"provenance": "assumed", "source": "default", **(about or {})}
+    watched = monitored or next(iter(clearances))
+    if watched not in clearances:
+        raise ParameterError(f"monitored = {watched!r} is not one of {', '.join(clearances)}, which have clearance")
+    for name in (*clearances, *(link.name for link in mechanism.links)):
+        if not name.isidentifier() or name.startswith("_"):
+            raise ParameterError(f"name {name!r} is out of range; allowed: letters, digits and _, as in big_end")
+    fields: dict[str, Any] = {"mechanism": mechanism}
+    rubs = [name for name, given in clearances.items() if given.friction is not None]
+    if len(rubs) > 1:
+        raise ParameterError(f"{len(rubs)} joints have friction ({', '.join(rubs)}); allowed: one")
+    if len({given.hertz for given in clearances.values()}) > 1:
+        hertz = ", ".join(name for name, given in clearances.items() if given.hertz)
+        raise ParameterError(f"joint {hertz} is Hertzian and others are not; allowed: one law for all joints")
+    for name, given in clearances.items():
+        for what, (value, described) in given.fields.items():
+            fields[f"{name}_{what}"] = parameter(value, **described, **about)
+    for (what, described), value in zip(MOTOR_FIELDS.items(), motor or (), strict=motor is not None):
+        fields[what] = parameter(value, **described, **about)
+    for link in mechanism.links:
+        if link.mass.any() or link.inertia.any():
+            fields[f"{link.name}_mass_factor"] = assumed(1.0, "-", 1e-3, 1e3)
+    own = parameters_of(MechanismMachine)
+    fields["monitored"] = parameter(watched, **{**vars(own["monitored"]), **about, "choices": tuple(clearances)})
+    if definition is not None:
+        fields["definition"] = definition
+    for name, value in stated.items():
+        fields[name] = parameter(value, **{**vars(own[name]), **about})
+    usual = {"speed": (100.0, 1000.0), "clearance": (1e-5, 2e-4), **(usual_ranges or {})}
+    types: dict[str, Any] = {
+        "stations": {name: given.stations for name, given in clearances.items()},
+        "rubs": "".join(rubs),
+        "has_motor": motor is not None,
+        "hertz": any(given.hertz for given in clearances.values()),
+        "beside_matrices": ("speed", *(f"{name}_clearance" for name in clearances), *(MOTOR_FIELDS if motor else ())),
+        "usual_ranges": {"speed": usual["speed"], f"{watched}_clearance": usual["clearance"]},
+        "options": _options(watched),
+        **(namespace or {}),
+    }
+    hints = get_type_hints(MechanismMachine)
+    annotations = {name: hints.get(name, Any) for name in fields}
+    annotations |= {name: ClassVar[Any] for name in types if not name.startswith("__")}
+    body = {"__module__": __name__, "__annotations__": annotations, **fields, **types}
+    made: Any = dataclass(frozen=True, kw_only=True)(type("MechanismMachine", (MechanismMachine,), body))
+    made()  # its defaults are checked
+    return made
+
+
+def _options(watched: str) -> dict[str, Option]:
+    return {
+        "--speed-rpm": Number("speed", "rpm"),
+        "--clearance-mm": Number(f"{watched}_clearance", "mm", 1e-3),
+    }
