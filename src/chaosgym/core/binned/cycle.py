@@ -3,7 +3,7 @@ r"""Exact motion of a mechanism whose joints rattle in their clearance.
 Coordinates p are small motions about the nominal motion of the drive. A contact channel j measures row_j . p against
 its clearance c_j on one side or on both; closed on side s = +-1 it pushes with
 
-    |N| = k (s row.p - c) + d s row.p'    while the penetration s row.p - c and |N| are positive
+    (1)  |N| = k (s row.p - c) + d s row.p'    while the penetration s row.p - c and |N| are positive
 
 so it pushes and never pulls: beyond the surface it detaches when spring and damper together would pull. The matrices
 are held over each bin of the angle of the drive, the forcing is continuous, and between two changes of contact the
@@ -276,7 +276,7 @@ def carry_expanded(motion, at, row, duration, last, h, vectors):
 
 @leaf
 def jump(motion, before, after, vectors):
-    """Saltation of deviations (k, 2n) where a surface is touched: the damper acts at once, for each at its own time.
+    """Saltation of deviations (k, 2n) where a surface is touched: the damper of (1) acts at once, each at its time.
 
     ``before`` and ``after`` are where the accelerations on either side of the event begin. Where a contact ends its
     force is zero, and nothing jumps.

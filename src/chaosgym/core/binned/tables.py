@@ -2,11 +2,11 @@ r"""Tables of the exact motion of a mechanism with held matrices while its conta
 
 Over one bin of the angle of the drive, and for one set of closed contacts, the n coordinates obey
 
-    p'' = A_p p + A_v p' + sum_k F_k x^k + sum_j s_j c_j B_j,      x = time in the bin / duration of the bin
+    (1)  p'' = A_p p + A_v p' + sum_k F_k x^k + sum_j s_j c_j B_j,      x = time in the bin / duration of the bin
 
 with constant A_p, A_v, F_k (a cubic: the inertia forces of the nominal motion) and one column B_j for each contact
 channel j, closed on side s_j = +-1 with clearance c_j. With z = (p, p', 1, x, x^2, x^3, s_1 c_1, ...) this is
-p'' = A z, and the Taylor series of p follows from A alone.
+(2) p'' = A z, and the Taylor series of p follows from A alone.
 
 A bin is cut into looks of eight intervals. The propagator of an interval is the series for all columns of z at once,
 summed to round-off; squared three times it is that of a look. Eight bins are worked on side by side.
@@ -132,7 +132,7 @@ def _fill(space, at, width, value):
 
 @leaf
 def _short_propagator(space, duration, time, order):
-    """Write the propagator ``one`` over a time for which ``order`` terms of the series suffice."""
+    """Write the propagator ``one`` of (2) over a time for which ``order`` terms of the series suffice."""
     own, n, width, one = space.own, space.n, space.width, space.one
     size, forcing = n * width, 2 * n * LANES
     _fill(space, space.terms, 2 * size, 0.0)
@@ -290,7 +290,7 @@ def _put_channels(space, row, lag, anchor, s, duration, interval, count, table, 
 
 @leaf
 def _put_acceleration(space, free, forcing, push, rate, row, s, group, groups):
-    """Sum the accelerations of eight bins at a rate of the drive, and those of the channels."""
+    """Sum the accelerations (1) of eight bins at a rate of the drive, and those of the channels."""
     m, n = row.shape
     own, width = space.own, space.width
     for i in range(n):

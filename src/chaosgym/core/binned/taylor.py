@@ -4,8 +4,8 @@ The equations of ``cycle`` between contacts, and joints for which there is no ta
 force turns with the ball; Hertzian contact; contacts too many for a table of all sets. Joint j reads
 e = (row_1 . p, row_2 . p, ...) and pushes along e / |e| with a force N of penetration x = |e| - c:
 
-    linear                     N = k x + d x'
-    Hertz with dissipation     N = K x^(3/2) (1 + chi x')          (Hunt and Crossley, 1975)
+    (1)  linear                     N = k x + d x'
+    (2)  Hertz with dissipation     N = K x^(3/2) (1 + chi x')          (Hunt and Crossley, 1975)
 
 as long as x and N are positive. Until a contact changes, p is its Taylor series: each coefficient follows from those
 before it, the force's by the recurrences of products, quotients and powers (Jorba and Zou, 2005). A series serves for
@@ -151,7 +151,7 @@ def margin(model, j, closed, depth, rate):
 
 @part
 def push(model, j, view):
-    """Force of a closed joint and its rate, continued beyond its end so that an event can be located."""
+    """Force (1) or (2) of a closed joint and its rate, continued beyond its end so that an event can be located."""
     depth, rate = view.joint[j, DEPTH], view.joint[j, RATE]
     bend = 0.0
     for r in range(model.first[j], model.first[j + 1]):
@@ -277,7 +277,7 @@ def begin_joint(model, j, series):
 
 @part
 def extend_force(model, j, k, series):
-    """Write coefficient k of the force of a closed joint; its distance is known one order further."""
+    """Write coefficient k of the force (1) or (2) of a closed joint; its distance is known one order further."""
     distance, force, power = series.distance[j], series.force[j], series.power[j]
     stiffness, damping = model.stiffness[j], model.damping[j]
     depth = distance[0] - model.gap[j]

@@ -3,9 +3,9 @@ r"""Coulomb friction of joints: a slider in series with a tangential spring, the
 While a surface presses with N, the spring of a joint whose tangential displacement is w holds with T = k_t z, and
 abs(T) never exceeds mu N:
 
-    sticks     z = w - a, the anchor a moves with the surfaces, a' = V      until  abs(T) reaches mu N
-    slides     z = s mu N / k_t on the side s = +-1                         until  s (w' - V - z') falls to zero
-    open       z = 0
+    (1)  sticks     z = w - a, the anchor a moves with the surfaces, a' = V      until  abs(T) reaches mu N
+    (2)  slides     z = s mu N / k_t on the side s = +-1                         until  s (w' - V - z') falls to zero
+    (3)  open       z = 0
 
 A touch begins with z = 0, and an anchor is set where the force goes on as it was, so that T is continuous. N is linear
 in displacement and velocity, hence a sliding joint is as linear as one that sticks. Two channels of each joint read
@@ -79,7 +79,7 @@ def _motion(run, shape):
 
 @leaf
 def _slid(run, c):
-    """Deflection of the spring of a friction that slides, or 0 of one that is open."""
+    """Deflection of the spring of a friction that slides (2), or 0 of one that is open (3)."""
     j = run.at[RADIX + run.at[JOINTS] + c]
     side, mode = known(run, j, SIDE), known(run, j, MODE)
     if side == 0.0:
@@ -95,7 +95,7 @@ def _slid(run, c):
 
 @leaf
 def _deflection(run, c):
-    """Deflection [m] of the tangential spring of a friction, in the state of the work space."""
+    """Deflection z [m] of (1) to (3), in the state of the work space."""
     j = run.at[RADIX + run.at[JOINTS] + c]
     if known(run, j, SIDE) != 0.0 and known(run, j, MODE) == STICKS:
         return _motion(run, run.at[SLIPS] + c * run.at[MODES])[0] - run.own[_anchor(run, c)]
@@ -104,7 +104,7 @@ def _deflection(run, c):
 
 @leaf
 def _hold(run, c, deflection):
-    """Let a friction stick, with a deflection of its spring."""
+    """Let a friction stick (1), with a deflection of its spring."""
     j = run.at[RADIX + run.at[JOINTS] + c]
     run.own[run.at[JOINT] + j * NUMBERS + MODE] = STICKS
     run.own[_anchor(run, c)] = _motion(run, run.at[SLIPS] + c * run.at[MODES])[0] - deflection

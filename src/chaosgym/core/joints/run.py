@@ -25,13 +25,13 @@ from chaosgym.core.joints.tables import (
     MODES,
     NOW_ROWS,
     PLACES,
+    PROPAGATORS,
     SHORTEST,
     SIZES,
     SLIDERS,
     STATES,
     TAYLOR,
     TO,
-    TURN,
     WIDTH,
     E,
     V,
@@ -464,7 +464,7 @@ def _drift(run, time, out):
 def jump(run, row, level, intervals, h):
     """Move u by 1 to 8 intervals of a level, of length h."""
     at = run.at
-    entries = row + at[TURN] + (LANES * level + intervals - 1) * 4 * at[WIDTH]
+    entries = row + at[PROPAGATORS] + (LANES * level + intervals - 1) * 4 * at[WIDTH]
     propagate(run.tables, entries, run.own, at[U], at[U], at[WIDTH])
     add_drift(run, row, intervals * h, at[U])
 

@@ -2,17 +2,18 @@ r"""Tables of a machine of a few modes and several joints, for one set of presse
 
 Between two contact events the machine is linear. Its coordinates u are those of N real 2 x 2 blocks: the n modes of the
 machine with its pressed surfaces, less their rest and their steady response, and the H harmonics of the drive, each
-of which is a block that turns at its own rate. Hence
+of which is a block that oscillates at its own rate. Hence
 
-    u' = B u,      y_j = row_j . u + constant       displacement of joint j
-                   e_j = y_j + lag_j y_j'           its reading; lag = damper / spring of a pressed surface, else 0
+    (1)  u' = B u
+    (2)  y_j = row_j . u + constant       displacement of joint j
+    (3)  e_j = y_j + lag_j y_j'           its reading; lag = damper / spring of a pressed surface, else 0
 
 and e_j at instants ahead, its Taylor series and a bound of its fourth derivative for all time to come are sums over u.
 
 A joint with friction adds a block, the displacement a of the anchor of its tangential spring, which moves at constant
 speed, and two channels that read what must stay positive while it goes on sticking or sliding (``joints.friction``):
 
-    E = alpha e_j + beta (w_j - a_j)     or E',     w_j the tangential displacement
+    (4)  E = alpha e_j + beta (w_j - a_j)     or E',     w_j the tangential displacement
 
 Friction of a sliding joint may feed energy from one mode to another: bounds then hold for the eight intervals ahead.
 """
@@ -46,7 +47,9 @@ MODES, HARMONICS, JOINTS, BLOCKS, WIDTH, STATES, LEVELS, SLIDERS, CHANNELS = ran
 """Sizes: n, H, m, N = n + H + f, L = N padded, 2n padded, lengths of an interval (shortest 2^level), f joints with
 friction, m + 2f channels."""
 
-AHEAD, TURN, FINER, GENERATOR, TAYLOR, NOW_ROWS, BOUNDS, BENDS, SIZES, FROM, TO, CONSTANTS, DRIFTS, ROW = range(9, 23)
+AHEAD, PROPAGATORS, FINER, GENERATOR, TAYLOR, NOW_ROWS, BOUNDS, BENDS, SIZES, FROM, TO, CONSTANTS, DRIFTS, ROW = range(
+    9, 23
+)
 """Where the tables of a set begin in its row of numbers, and how long the row is; see ``layout``."""
 
 SHORTEST, DRIFTING, ALWAYS_DRIFTING, LONGEST = range(4)
@@ -89,7 +92,7 @@ def layout(n, harmonics, m, sliders, levels):
 
     AHEAD (levels, c, 2, 2, N, 8)
         Reading and its rate after 1 to 8 intervals: [channel, quantity, coordinate of the block, block].
-    TURN (levels, 8, 4, L), FINER (FINE + 1, 4, L), GENERATOR (4, L)
+    PROPAGATORS (levels, 8, 4, L), FINER (FINE + 1, 4, L), GENERATOR (4, L)
         Blocks of exp(B t) after 1 to 8 intervals, within the shortest interval, and B.
     TAYLOR (c, 2, 2, N, 8)
         Taylor coefficients of the displacement, of time in seconds: [channel, half, coordinate, block].
@@ -112,8 +115,8 @@ def layout(n, harmonics, m, sliders, levels):
     at[WIDTH], at[STATES], at[LEVELS] = width, states, levels
     at[SLIDERS], at[CHANNELS] = sliders, channels
     at[AHEAD] = LANES
-    at[TURN] = at[AHEAD] + levels * channels * 4 * blocks * LANES
-    at[FINER] = at[TURN] + levels * LANES * 4 * width
+    at[PROPAGATORS] = at[AHEAD] + levels * channels * 4 * blocks * LANES
+    at[FINER] = at[PROPAGATORS] + levels * LANES * 4 * width
     at[GENERATOR] = at[FINER] + (FINE + 1) * 4 * width
     at[TAYLOR] = at[GENERATOR] + 4 * width
     at[NOW_ROWS] = at[TAYLOR] + channels * 4 * blocks * LANES
@@ -130,7 +133,7 @@ def layout(n, harmonics, m, sliders, levels):
 
 @njit(cache=True)
 def _shown(shape, from_modal):
-    """Displacement of what has a ``shape`` (k, n), a row of it after the other, per unit modal coordinate (k, 2n)."""
+    """Rows of (2): displacement of what has a ``shape`` (k, n), each after the other, per modal coordinate (k, 2n)."""
     shown = np.empty((shape.shape[0], from_modal.shape[1]))
     for j in range(shape.shape[0]):
         row = shape[j] @ from_modal[: shape.shape[1]]
@@ -296,7 +299,7 @@ def _put_forced(at, back, steady, c, group, lanes_before, columns_before, values
 
 @njit(cache=True)
 def read_at_rest(generator, from_modal, shape, lag, rubs, k, reading, strain, drift):
-    """What channel k of friction reads where its joint reads ``reading`` and its tangential spring ``strain``, at rest.
+    """What channel k reads by (4) at rest, where its joint reads ``reading`` and its tangential spring ``strain``.
 
     Modal coordinates ``drift`` (2n,) at these rates, which shows as a constant in what has a velocity in it.
     """
@@ -311,7 +314,7 @@ def read_at_rest(generator, from_modal, shape, lag, rubs, k, reading, strain, dr
 
 @leaf
 def _read(rows, lag, reading):
-    """Derivatives ``reading`` (5, 2k) of a joint's reading, of those ``rows`` of its displacement."""
+    """Derivatives ``reading`` (5, 2k) of a joint's reading (3), of those ``rows`` of its displacement."""
     for p in range(5):
         for i in range(rows.shape[1]):
             reading[p, i] = rows[p, i] + lag * rows[p + 1, i]
@@ -319,7 +322,7 @@ def _read(rows, lag, reading):
 
 @njit(cache=True)
 def _is_slow(generator, i, period):
-    """True if modal coordinate i turns and decays by less than ``SLOW`` in a cycle."""
+    """True if modal coordinate i oscillates and decays by less than ``SLOW`` in a cycle."""
     n = generator.shape[1]
     j = i % n
     rate = abs(generator[0 if i < n else 3, j])
@@ -330,7 +333,7 @@ def _is_slow(generator, i, period):
 
 @njit(cache=True)
 def _put_blocks(at, generator, shortest, first, levels, values):
-    """Fill TURN, FINER and GENERATOR of blocks (4, k) from lane ``first`` on."""
+    """Fill PROPAGATORS, FINER and GENERATOR of (1), of blocks (4, k) from lane ``first`` on."""
     width = at[WIDTH]
     for j in range(generator.shape[1]):
         lane = first + j
@@ -341,7 +344,7 @@ def _put_blocks(at, generator, shortest, first, levels, values):
                 values[at[FINER] + (4 * f + k) * width + lane] = entry
         for level in range(levels):
             for i in range(LANES):
-                place = at[TURN] + 4 * (LANES * level + i) * width + lane
+                place = at[PROPAGATORS] + 4 * (LANES * level + i) * width + lane
                 if level > 0 and i < LANES // 2:
                     # the instants of the first half are every second one of the level before
                     for k in range(4):
@@ -409,7 +412,7 @@ def _put_joint(at, generator, rows, reading, j, first_block, levels, growth, val
         first = at[AHEAD] + (level * channels + j) * 4 * blocks * LANES
         for b in range(own):
             for i in range(LANES):
-                instant = at[TURN] + 4 * (LANES * level + i) * width + first_block + b
+                instant = at[PROPAGATORS] + 4 * (LANES * level + i) * width + first_block + b
                 e11, e12 = values[instant], values[instant + width]
                 e21, e22 = values[instant + 2 * width], values[instant + 3 * width]
                 for q in range(2):
