@@ -11,8 +11,8 @@ from time import thread_time
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.diagnose import DEFAULT_BUDGET, diagnose
 from chaosgym.diagnosis.lyapunov import Deviation, average_growth, exponent_from_series
 from chaosgym.diagnosis.matrix_update import Form, depends_on_configuration, matrix_update_test
@@ -26,8 +26,6 @@ from chaosgym.errors import DiagnosisError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import CycleRecord, parallel_map
-
-Array = NDArray[np.float64]
 
 REFERENCE_CYCLES = 10_000
 """Cycles of the reference run."""

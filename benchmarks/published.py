@@ -14,12 +14,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 import chaosgym
+from chaosgym.arrays import Array
 from chaosgym.machines import Machine
-
-Array = NDArray[np.float64]
 
 PANELS = {
     "shaw-holmes-1983": "closed form: period 1 up to 2.653, where it doubles; chaos beyond",

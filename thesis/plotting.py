@@ -12,13 +12,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import ArrayLike, NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.design.statistics import Histogram
 from chaosgym.plotting.response import curve as curve
 from chaosgym.plotting.response import phase_plane as phase_plane
 from chaosgym.plotting.response import section_points as section_points
 from chaosgym.plotting.style import ACCENT, INK, MUTED, NATURE_COLOURS, TYPE_COLOURS
-
-Array = NDArray[np.float64]
 
 PRINTED_COLOUR = "#b8860b"
 """Of everything that the text of the thesis prints."""

@@ -7,11 +7,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.determinism import determinism
-
-Array = NDArray[np.float64]
 
 READINGS, RECORDS, NOISE = 500, 4, 0.05
 

@@ -9,9 +9,9 @@ import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis import default_tolerances, find_periodic_orbit
 from chaosgym.diagnosis.diagnose import diagnose_alone
 from chaosgym.diagnosis.margins import margins
@@ -19,8 +19,6 @@ from chaosgym.errors import ChaosgymError
 from chaosgym.machines import Machine
 from chaosgym.sweeps.dataset import LabelledSweep
 from chaosgym.sweeps.plan import GOLDEN
-
-Array = NDArray[np.float64]
 
 REACH = 3.0
 """Tolerances of the speed up to which a margin is followed."""

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from chaosgym.arrays import Array
 from chaosgym.control.controllers import Controller, Follow
-from chaosgym.control.controllers.controller import Array, Observations, seen
+from chaosgym.control.controllers.controller import Observations, seen
 from chaosgym.control.rollout import play
 
 

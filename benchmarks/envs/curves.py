@@ -14,13 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.control.comparison import ZERO, Scores, shipped_comparison
 from chaosgym.errors import DatasetError
 from chaosgym.files import write_atomically
-
-Array = NDArray[np.float64]
 
 COLUMNS = ("step", "return", "type_iii", "deviation", "processor_seconds")
 """Columns of ``progress.csv``."""

@@ -12,11 +12,9 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from gymnasium.utils.seeding import np_random
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.control.maps import FLEET_SEED, Maps, maps_of
-
-Array = NDArray[np.float64]
 
 WIDTHS = (0.005, 0.01, 0.02, 0.03, 0.05)
 """Widths of the kernel over clearances, as shares of their mean; the best one counts."""

@@ -8,14 +8,12 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import trange
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis import diagnose
 from chaosgym.envs.judge import ExponentJudge, RecurrenceJudge
 from chaosgym.machines.batch import VaryingBatch
-
-Array = NDArray[np.float64]
 
 SETTLING, JUDGED = 40, 40
 """Cycles at a speed that are not judged, and that are."""

@@ -26,8 +26,9 @@ import numpy as np
 import pyarrow as pa
 from scipy.linalg import LinAlgError, solve_discrete_are
 
+from chaosgym.arrays import Array
 from chaosgym.control.comparison import ONE, SAFE, ZERO, Contenders, Scores, job_rows
-from chaosgym.control.controllers.controller import THRESHOLD, Array, Controller, Observations, irregular, seen
+from chaosgym.control.controllers.controller import THRESHOLD, Controller, Observations, irregular, seen
 from chaosgym.control.rollout import play
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
 from chaosgym.envs.vector_env import native_envs

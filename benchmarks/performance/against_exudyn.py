@@ -12,19 +12,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from benchmarks.performance.exudyn_machines import ExudynSetting, load_exudyn, run_in_exudyn
 from benchmarks.performance.timing import processor_seconds
 from chaosgym import read_machine
+from chaosgym.arrays import Array
 from chaosgym.machines import ImpactBeam, Machine, SliderCrank
 from chaosgym.machines.integrators import Integrator
 from chaosgym.machines.mechanism.machine import MechanismMachine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import ExactEvents, simulate
-
-Array = NDArray[np.float64]
 
 LONGEST_PERIOD = 8
 """Longest period, in cycles, that counts as periodic."""

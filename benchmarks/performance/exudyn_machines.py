@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
 from benchmarks.performance.timing import processor_seconds
+from chaosgym.arrays import Array
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.errors import ChaosgymError
 from chaosgym.machines.impact_beam import ImpactBeam
@@ -29,8 +29,6 @@ from chaosgym.machines.machine import Machine
 from chaosgym.machines.mechanism.joints import GROUND
 from chaosgym.machines.mechanism.machine import MechanismMachine
 from chaosgym.machines.slider_crank import SliderCrank
-
-Array = NDArray[np.float64]
 
 NEWTON_TOLERANCE = 1e-6
 """Below this the Newton iteration of an elastic body that starts from rest stalls in rounding."""

@@ -12,16 +12,14 @@ from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from benchmarks.performance.exudyn_machines import ExudynSetting, run_in_exudyn
 from benchmarks.performance.rates import BEAM
 from benchmarks.performance.timing import processor_seconds
+from chaosgym.arrays import Array
 from chaosgym.machines.integrators import TIGHTEST_EVENTS
 from chaosgym.simulation import RungeKutta4, simulate
-
-Array = NDArray[np.float64]
 
 SPEEDS = (30.0, 10.0)
 """Excitation frequencies [Hz]."""

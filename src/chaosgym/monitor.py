@@ -19,13 +19,11 @@ from pathlib import Path
 from typing import Any, Literal, TextIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array, Indices
 from chaosgym.diagnosis.stroboscopic import irregularity
 from chaosgym.errors import ChaosgymError, DiagnosisError
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Event = Literal["", "change", "alarm", "all clear", "dead sensor", "missing"]
 
 LAGS, LONGEST = 8, 16

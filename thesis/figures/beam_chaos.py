@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.design.statistics import histogram
 from chaosgym.machines import ImpactBeam
 from chaosgym.plotting.style import ACCENT, NATURE_COLOURS
@@ -18,8 +18,6 @@ from thesis.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
 from thesis.figures.panels import cycles_panel, force_panel, histogram_panel
 from thesis.figures.printed import printed
 from thesis.figures.scored import agrees, scored, scored_finding
-
-Array = NDArray[np.float64]
 
 BRIEF_DAMPING, ENDLESS_DAMPING = 0.011, 0.010
 """Structural damping ratios of figure 5.4 (a) and (b)."""

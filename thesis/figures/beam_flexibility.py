@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.machines import ImpactBeam
 from chaosgym.machines.impact_beam.modes import pinned_pinned_frequency
 from chaosgym.plotting.style import ACCENT, MUTED
@@ -20,8 +20,6 @@ from thesis.figures.panels import (
 )
 from thesis.figures.printed import printed
 from thesis.figures.scored import scored, scored_finding
-
-Array = NDArray[np.float64]
 
 
 def flexibility(resolution: float) -> Mapping[str, Computation]:

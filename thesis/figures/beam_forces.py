@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chaosgym.machines import ImpactBeam
 from thesis.figures.beam import DAMPING, LARGE, LENGTH, SMALL, sweep
@@ -20,8 +19,6 @@ from thesis.figures.panels import (
 )
 from thesis.figures.printed import printed
 from thesis.figures.scored import agrees, scored, scored_finding
-
-Array = NDArray[np.float64]
 
 
 def force_against_frequency(resolution: float) -> Mapping[str, Computation]:

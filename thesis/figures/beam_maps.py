@@ -3,9 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from chaosgym.machines import ImpactBeam
 from chaosgym.machines.impact_beam.modes import static_tip_deflection
@@ -17,8 +15,6 @@ from thesis.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
 from thesis.figures.panels import FREQUENCY
 from thesis.figures.printed import printed
 from thesis.figures.scored import scored, scored_finding
-
-Array = NDArray[np.float64]
 
 
 def beam_map(resolution: float) -> Mapping[str, Computation]:

@@ -4,9 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from chaosgym.machines import ImpactBeam
 from thesis import plotting as thesis
@@ -23,8 +21,6 @@ from thesis.figures.panels import (
 )
 from thesis.figures.printed import printed, within
 from thesis.figures.scored import scored, scored_finding
-
-Array = NDArray[np.float64]
 
 
 def one_response(frequency: float, resolution: float) -> Mapping[str, Computation]:

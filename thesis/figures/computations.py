@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.design.peak_impacts import peak_impacts, worn_side
 from chaosgym.diagnosis import response_map, two_step_test
 from chaosgym.errors import SimulationError
@@ -18,8 +19,6 @@ from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import CycleRecord, parallel_map, simulate
 from thesis.scorecard.beam_runs import follow_modes
 from thesis.scorecard.observation import READING_ERROR, THOROUGH, observe, plotted_peaks, read_dots
-
-Array = NDArray[np.float64]
 
 Data = Mapping[str, NDArray[Any]]
 """Arrays by name; every computation documents its own."""

@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.machines import SliderCrank
 from chaosgym.plotting.style import ACCENT, MUTED, NATURE_COLOURS
 from thesis import plotting as thesis
@@ -17,8 +17,6 @@ from thesis.figures.figure import Finding, Panel, Parts, ThesisFigure, steps
 from thesis.figures.panels import CRANK_SPEED
 from thesis.figures.printed import printed
 from thesis.figures.scored import scored, scored_finding
-
-Array = NDArray[np.float64]
 
 SUPERHARMONIC_SLIDER_CRANK = SliderCrank(
     contact_stiffness=1.5e7,

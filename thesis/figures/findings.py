@@ -3,12 +3,10 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from thesis.figures.figure import Finding
 from thesis.figures.printed import Printed, in_scorecard, printed, within
-
-Array = NDArray[np.float64]
 
 
 def describe_forces(peaks: Array, nature: str, period: int) -> str:

@@ -6,8 +6,8 @@ from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.design.peak_impacts import PeakImpactDiagram
 from chaosgym.design.statistics import histogram
 from chaosgym.diagnosis import power_spectrum
@@ -19,8 +19,6 @@ from thesis.figures.figure import Finding, Panel, Parts
 from thesis.figures.findings import compare_nature, compare_response
 from thesis.figures.printed import printed
 from thesis.scorecard.crank_runs import ANGLE_CYCLES, revolution_angles
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.machines import ImpactBeam
 from chaosgym.machines.impact_beam.modes import modal_analysis
 from chaosgym.simulation import simulate
 from thesis.scorecard.candidates import read_candidate
-
-Array = NDArray[np.float64]
 
 CLEARANCE = 0.03175e-3
 """Of figure 3.8 a [m]."""

@@ -5,16 +5,14 @@ from typing import Any
 
 import numpy as np
 import scipy.signal
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis import two_step_test
 from chaosgym.diagnosis.stroboscopic import find_recurrence, scales
 from chaosgym.machines import ImpactBeam, Machine
 from chaosgym.machines.impact_beam.modes import modal_analysis
 from chaosgym.simulation import CycleRecord, simulate
 from thesis.scorecard.observation import DOT, READING_ERROR, initial_state, plotted_peaks
-
-Array = NDArray[np.float64]
 
 MOTION_CYCLES, MOTION_SAMPLES = 50, 4000
 """Cycles of a long history, and samples in each."""

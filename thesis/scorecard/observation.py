@@ -11,15 +11,13 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis import Diagnosis, diagnose, two_step_test
 from chaosgym.diagnosis.stroboscopic import MIN_REPEATS, class_residuals, irregularity
 from chaosgym.errors import SimulationError
 from chaosgym.machines import ImpactBeam, Machine
 from chaosgym.simulation import CycleRecord, MotionState, simulate
-
-Array = NDArray[np.float64]
 
 READING_ERROR = 0.5
 """Half the width of a dot [N]: half a per cent of a force axis of 100 N."""

@@ -7,7 +7,8 @@ conformal sets: M. Sadinle et al., J. Am. Stat. Assoc. 114 (2019).
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from chaosgym.arrays import Array
+
 Labels = NDArray[np.int64]
 
 BINS = 15

@@ -19,8 +19,8 @@ from time import thread_time
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.classifier.answer import NatureAnswer
 from chaosgym.classifier.estimator import ResponseClassifier
 from chaosgym.classifier.features import MAX_CYCLES, response_features
@@ -29,8 +29,6 @@ from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
 from chaosgym.errors import SimulationError
 from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, simulate
-
-Array = NDArray[np.float64]
 
 STAGES = (8, 16, 32, 64)
 """Cycles from rest after which the cascade judges."""

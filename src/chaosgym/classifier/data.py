@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import DatasetError
 from chaosgym.machines import MACHINES, Machine
 from chaosgym.sweeps import LabelledSweep
 from chaosgym.sweeps.dataset import WINDOW
-
-Array = NDArray[np.float64]
 
 NATURES = ("periodic", "chaotic")
 """Natures that are learned; quasiperiodic responses are too rare."""

@@ -10,13 +10,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.classifier.calibration import best_temperature, conformal_thresholds, softmax
 from chaosgym.classifier.features import as_records, response_features
 from chaosgym.classifier.parameter_features import parameter_scaling
 from chaosgym.classifier.trees import class_scores, train_forest
 from chaosgym.machines import Machine
 
-Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
 CALIBRATION = 0.15

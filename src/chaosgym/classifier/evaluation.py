@@ -6,14 +6,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.classifier.calibration import calibration_error
 from chaosgym.classifier.data import Examples
 from chaosgym.classifier.estimator import ResponseClassifier
 from chaosgym.classifier.features import least_scatter
 from chaosgym.classifier.machine_classifier import IRREGULAR, NATURE
 from chaosgym.diagnosis.stroboscopic import irregularity
-
-Array = NDArray[np.float64]
 
 RESAMPLES = 1000
 LEVEL = 0.95

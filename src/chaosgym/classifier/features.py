@@ -15,14 +15,13 @@ Figures that a record does not allow (too short, no sensor error, no section) ar
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.classifier.kernels import records as kernels
 from chaosgym.classifier.kernels.records import CLASSES, LAGS, class_scatter, fill_features, true_length
 from chaosgym.classifier.parameter_features import ParameterScaling, parameter_features
 from chaosgym.errors import DiagnosisError
-
-Array = NDArray[np.float64]
 
 MIN_CYCLES, MAX_CYCLES = 8, 64
 """Cycles that a record may have; of a longer one the last count."""

@@ -20,8 +20,9 @@ from time import thread_time
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.classifier.answer import Classification, NatureAnswer, RecordAnswer, neighbours_of, type_probabilities
 from chaosgym.classifier.cascade import CLEAR, MILLION, judge_nature
 from chaosgym.classifier.estimator import ResponseClassifier
@@ -31,8 +32,6 @@ from chaosgym.classifier.storage import read_model, write_model
 from chaosgym.errors import DiagnosisError, ModelFileError, ParameterError
 from chaosgym.machines import MACHINES, Machine
 from chaosgym.machines.parameters import parameters_of
-
-Array = NDArray[np.float64]
 
 PEAK_CYCLES = 16
 """Cycles from rest that the largest peak of a neighbourhood's point rests on at least, unless an orbit is proven."""

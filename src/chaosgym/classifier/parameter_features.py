@@ -27,11 +27,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.classifier.kernels.parameters import FREE, RINGING, fill_features
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
-
-Array = NDArray[np.float64]
 
 FIELDS = ("excitation_frequency", "clearance", "length", "damping_ratio", "contact_damping", "force_amplitude")
 """Fields that may vary; the machine gives the others."""

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.classifier.cascade import CLEAR
 from chaosgym.classifier.estimator import ResponseClassifier
 from chaosgym.classifier.features import (
@@ -15,8 +16,6 @@ from chaosgym.classifier.features import (
     repeat_period,
     response_features,
 )
-
-Array = NDArray[np.float64]
 
 
 def judge_records(

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from chaosgym.arrays import Array
 from chaosgym.classifier.cascade import STAGES
 from chaosgym.classifier.data import Examples, examples_of
 from chaosgym.classifier.estimator import ResponseClassifier
@@ -30,8 +31,6 @@ from chaosgym.errors import DatasetError
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.sweeps import LabelledSweep
 from chaosgym.version import __version__
-
-Array = NDArray[np.float64]
 
 TOLD, RELATIVE = (-1.7, 1.0), (-3.0, -1.0)
 """Decades of the told errors [N], and of those that are shares of the mean peak."""

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.classifier.kernels.trees import walk_rows
-
-Array = NDArray[np.float64]
 
 L2 = 5.0
 """Regularisation of the leaves."""

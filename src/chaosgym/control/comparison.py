@@ -20,6 +20,7 @@ import pyarrow.compute
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.classifier.machine_classifier import has_classifier
 from chaosgym.control import controllers
 from chaosgym.control.maps import FLEET, FLEET_SEED, Maps, fleet_maps, maps_of, model_keywords
@@ -32,8 +33,6 @@ from chaosgym.envs.task import Status
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import DatasetError, ParameterError
 from chaosgym.files import parquet_of, write_atomically
-
-Array = NDArray[np.float64]
 
 ZERO, ONE = "follow the demand", "own map"
 """Contenders that are worth 0 and 1."""

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from chaosgym.arrays import Array
 from chaosgym.control.controllers import BackOff
-from chaosgym.control.controllers.controller import THRESHOLD, Array, Controller, Observations, irregular, seen
+from chaosgym.control.controllers.controller import THRESHOLD, Controller, Observations, irregular, seen
 from chaosgym.control.rollout import Policy
 from chaosgym.envs.drive import BACK, MOVES
 from chaosgym.errors import ParameterError

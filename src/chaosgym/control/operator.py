@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.control.controllers import Controller
 from chaosgym.control.evaluation import policy_of
 from chaosgym.control.policies.learned_map import LearnedMap
@@ -17,8 +18,6 @@ from chaosgym.envs.drive import DEAD_BAND, MOVES, checked_actions
 from chaosgym.envs.kernels.steps import drive, observe
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ParameterError
-
-Array = NDArray[np.float64]
 
 FEWEST = 5
 """Cycles of a step at least: peaks are compared with those four cycles before."""

@@ -14,15 +14,13 @@ from importlib import import_module
 from typing import Any, Protocol, TextIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.control.operator import Operator
 from chaosgym.envs.task import demand_of
 from chaosgym.envs.variants import HELD_OUT_SEED
 from chaosgym.errors import ParameterError
 from chaosgym.files import first_line
-
-Array = NDArray[np.float64]
 
 EXTRAS = ("impacts", "bouncing")
 """What ``run`` may tell beside the peaks."""

@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import trange
 
+from chaosgym.arrays import Array
 from chaosgym.envs.observation import COMMANDED, FELT, OBSERVATION_NAMES
 from chaosgym.envs.pool import SHARE
 from chaosgym.envs.task import Status
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ParameterError
-
-Array = NDArray[np.float64]
 
 
 class Policy(Protocol):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from chaosgym.arrays import Array
 
 RESAMPLES = 10_000
 BATCH = 500

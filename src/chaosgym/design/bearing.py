@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.design.fatigue import conservative_life, equivalent_force, rating_life, required_load_rating
 from chaosgym.design.reliability import (
     Interval,
@@ -136,9 +136,6 @@ def _widened(tolerance: Tolerance, factor: int) -> Tolerance:
     if tolerance.relative:
         return Tolerance((1.0 + tolerance.value) ** factor - 1.0)
     return Tolerance(factor * tolerance.value, relative=False)
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

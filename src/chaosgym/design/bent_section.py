@@ -19,13 +19,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameter, validate
-
-Array = NDArray[np.float64]
 
 MEANS = ("goodman", "gerber", "none")
 

@@ -25,8 +25,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.guidelines import case_of
 from chaosgym.design.methodology import Assessment
@@ -36,8 +36,6 @@ from chaosgym.diagnosis.type_rule import FORCE_CHANGE
 from chaosgym.errors import SimulationError
 from chaosgym.machines import Machine
 from chaosgym.simulation import parallel_map, simulate
-
-Array = NDArray[np.float64]
 
 BASE = 64
 """Machines of the base sample of total indices; each parameter adds as many, and two base samples are drawn."""

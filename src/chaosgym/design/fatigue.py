@@ -23,13 +23,12 @@ from typing import NamedTuple
 
 import numpy as np
 import rainflow
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.design.rating_life import LIFE_EXPONENT, damage_in_a_million
 from chaosgym.design.statistics import as_forces
 from chaosgym.errors import DesignError
-
-Array = NDArray[np.float64]
 
 CUBIC_EXPONENT = 3.0
 """Exponent of figure 5.12 and of the 25 % criterion (5.5.2), point contact."""

@@ -15,9 +15,9 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
+from chaosgym.arrays import Array
 from chaosgym.design.bearing import Evaluation, evaluate
 from chaosgym.design.changes import allowed, between, change_cost, default_changes, differing, distinct, part_of
 from chaosgym.design.collective import assess_duty
@@ -28,8 +28,6 @@ from chaosgym.errors import DesignError, ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import quantity_of, with_settings
 from chaosgym.simulation import parallel_map, simulate
-
-Array = NDArray[np.float64]
 
 SCREENED_MACHINES, SCREENED_CYCLES = 8, 60
 """Machines of the tolerances, and cycles before and while peaks are taken, that screen a candidate."""

@@ -25,8 +25,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.design.bearing import Criteria, Evaluation, evaluate, hours_of, plain
 from chaosgym.design.bending import BendingLife, bending_life
 from chaosgym.design.bent_section import Bending
@@ -40,7 +40,6 @@ from chaosgym.diagnosis import Neighbour, ResponseType, Tolerance, Type, default
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
 
-Array = NDArray[np.float64]
 Verdict = Literal["meets", "fails", "undetermined"]
 
 SERIES_SIZE = 32

@@ -19,11 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.errors import DesignError
 from chaosgym.simulation import CycleRecord
-
-Array = NDArray[np.float64]
 
 SECTIONS = 5
 """Sections of the diagram in either direction."""

@@ -9,9 +9,8 @@ ISO 281:2007, Rolling bearings - Dynamic load ratings and rating life.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from chaosgym.arrays import Array
 
 LIFE_EXPONENT = 10.0 / 3.0
 """Exponent p of eq. 5.2, line contact."""

@@ -25,11 +25,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.errors import DesignError
-
-Array = NDArray[np.float64]
 
 RESAMPLES = 2000
 """Bootstrap samples of an interval."""

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.design.fatigue import equivalent_force
 from chaosgym.design.rating_life import LIFE_EXPONENT
 from chaosgym.design.statistics import convergence
@@ -14,8 +14,6 @@ from chaosgym.diagnosis import Diagnosis, Nature, Neighbour, Tolerance, diagnose
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import MotionState, parallel_map, rest_state, simulate
-
-Array = NDArray[np.float64]
 
 SERIES_CYCLES = 200
 """Cycles recorded of a machine of a series whose response does not repeat."""

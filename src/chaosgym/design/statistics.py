@@ -17,9 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import DesignError
-
-Array = NDArray[np.float64]
 
 MIN_CYCLES = 16
 """Fewest cycles of any statistic."""

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.design.fatigue import CUBIC_EXPONENT, equivalent_force, relative_life
 from chaosgym.design.peak_impacts import peak_impacts, worn_side
 from chaosgym.design.runs import SettledRun, settled_run, worse_side
@@ -21,8 +22,6 @@ from chaosgym.errors import DesignError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import quantity_of, with_settings
 from chaosgym.simulation import parallel_map, simulate
-
-Array = NDArray[np.float64]
 
 HISTORY_SAMPLES = 2880
 """Samples a cycle of a time history: an eighth of a degree, and about ten samples an impact of the beam at 30 Hz."""

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.design.runs import DIAGNOSIS_BUDGET
 from chaosgym.design.told import hours_told, life_told
 from chaosgym.design.trends import HISTORY_SAMPLES
@@ -30,8 +30,6 @@ from chaosgym.errors import DesignError, ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameter, parameters_of, validate, with_settings
 from chaosgym.simulation import MotionState, parallel_map, rest_state, simulate
-
-Array = NDArray[np.float64]
 
 STEPS = 12
 """Steps of the clearance from nominal to the limit."""

@@ -26,6 +26,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.chord import (
     NOISY,
     PLACED,
@@ -37,8 +38,6 @@ from chaosgym.diagnosis.chord import (
     closely_between,
 )
 from chaosgym.diagnosis.orbit_family import CLOSELY, NotFollowedError, OrbitFamily, OrbitPoint
-
-Array = NDArray[np.float64]
 
 Kind = Literal["grazing", "fold", "flip", "Neimark-Sacker", "symmetry breaking", "branch point"]
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.bifurcation import TESTS, Bifurcation, Found, Kind, bifurcations_between
 from chaosgym.diagnosis.orbit_family import (
     NotFollowedError,
@@ -24,8 +24,6 @@ from chaosgym.diagnosis.orbit_family import (
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
-
-Array = NDArray[np.float64]
 
 STEPS = 33
 """Values of the second parameter over its range."""

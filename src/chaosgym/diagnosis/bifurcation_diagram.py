@@ -7,12 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.bifurcation import Bifurcation, Found
 from chaosgym.diagnosis.orbit_family import OrbitFamily, OrbitPoint
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

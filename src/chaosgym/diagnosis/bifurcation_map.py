@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.bifurcation import Bifurcation
 from chaosgym.diagnosis.bifurcation_curve import BifurcationCurve, follow_bifurcation
 from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram
@@ -23,8 +24,6 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
 from chaosgym.simulation import parallel_map
-
-Array = NDArray[np.float64]
 
 COLUMNS, ROWS = 25, 13
 """Points of the sweep along the first and along the second field."""

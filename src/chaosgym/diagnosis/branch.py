@@ -15,14 +15,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.bifurcation import Bifurcation, Found, bifurcations_between, grazing
 from chaosgym.diagnosis.chord import between, interpolated
 from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily, OrbitPoint
 from chaosgym.diagnosis.section import better_section
-
-Array = NDArray[np.float64]
 
 LEAST_STEP = 1e-7
 """Shortest step, in scaled unknowns."""

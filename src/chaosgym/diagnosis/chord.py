@@ -3,11 +3,9 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.orbit_family import CLOSED, CLOSELY, NotFollowedError, OrbitFamily, OrbitPoint
-
-Array = NDArray[np.float64]
 
 NOISY = 100.0
 """What the noise of a family adds to the error of a place on a branch, in units of that noise."""

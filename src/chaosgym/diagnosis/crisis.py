@@ -18,11 +18,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
-
-Array = NDArray[np.float64]
 
 SETTLED, STEPS = 500, 4000
 """Cycles in which a motion settles, and those that are then judged."""

@@ -22,8 +22,8 @@ from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.forecast_map import (
     DIMENSIONS,
     Map,
@@ -33,8 +33,6 @@ from chaosgym.diagnosis.forecast_map import (
     pasts,
     weights_of,
 )
-
-Array = NDArray[np.float64]
 
 MOST_ORDERED = 3
 """Sensors at the most whose order within a cycle is found; of more the order is the one that is given."""

@@ -20,8 +20,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.lyapunov import BLOCKS, Deviation, LyapunovExponent, average_growth
 from chaosgym.diagnosis.matrix_update import FIELD, depends_on_configuration, matrix_update_test, neighbouring_interval
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
@@ -30,8 +31,6 @@ from chaosgym.diagnosis.two_step import CHAOTIC_STATISTIC, QUASIPERIODIC_CYCLES,
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, MotionState, simulate
-
-Array = NDArray[np.float64]
 
 EARLY = (16, 32)
 """Cycles after which a motion that repeats is tried for a proof, before any deviation travels along."""

@@ -9,9 +9,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.bifurcation import Found, direction_of
 from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram, Branch, SweepPoint
 from chaosgym.diagnosis.branch import MOST_UNSTABLE, Stretch, stretch
@@ -29,8 +29,6 @@ from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import parallel_map
-
-Array = NDArray[np.float64]
 
 SWEEP = 41
 """Points of the sweep."""

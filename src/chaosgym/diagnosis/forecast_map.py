@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from chaosgym.arrays import Array
 
 DIMENSIONS = (1, 2, 3, 4)
 """Readings from which the next is forecast."""

@@ -20,8 +20,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.stroboscopic import as_samples
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
@@ -35,8 +36,6 @@ from chaosgym.simulation import (
     simulate,
     simulate_with_deviations,
 )
-
-Array = NDArray[np.float64]
 
 DISTANCE = 1e-7
 """Distance of the second trajectory, relative to the size of the motion."""

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.bifurcation import Kind
 from chaosgym.diagnosis.branch import stretch
 from chaosgym.diagnosis.diagnose import diagnose_alone
@@ -33,8 +33,6 @@ from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.simulation import parallel_map, simulate
-
-Array = NDArray[np.float64]
 
 REACH = 1.0
 """Tolerances up to which stability is followed."""

@@ -15,8 +15,9 @@ from functools import partial
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.response import Diagnosis, Nature
 from chaosgym.diagnosis.stroboscopic import as_samples, find_decay, find_recurrence, scales
 from chaosgym.errors import DiagnosisError
@@ -24,7 +25,6 @@ from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings
 from chaosgym.simulation import MotionState, simulate
 
-Array = NDArray[np.float64]
 Form = Literal["literal", "attractors"]
 
 FIELD = "matrix_update_interval"

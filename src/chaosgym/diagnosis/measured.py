@@ -12,16 +12,15 @@ import re
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.response import Diagnosis, MeasuredVerdict, undetermined
 from chaosgym.diagnosis.scatter import judge_scatter, newton, scatter_of
 from chaosgym.diagnosis.sensors import judge_together
 from chaosgym.diagnosis.two_step import INITIAL_TRANSIENT, two_step_test
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals.noise import SensorError, find_change, quantum, repair, stated_error
-
-Array = NDArray[np.float64]
 
 FEWEST_CYCLES, SHORT_RECORD = 8, 16
 """Cycles below which a record is refused, and below which nothing is told of it."""

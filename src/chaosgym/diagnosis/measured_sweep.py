@@ -14,15 +14,14 @@ from itertools import groupby, pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.measured import SHORT_RECORD, judge_peaks
 from chaosgym.diagnosis.response import Type
 from chaosgym.diagnosis.stroboscopic import irregularity
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals.noise import stated_error
-
-Array = NDArray[np.float64]
 
 FEWEST_SPEEDS = 3
 """Speeds that a trend needs."""

@@ -9,16 +9,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.record_figures import LEAST_SCATTER, figures
 from chaosgym.diagnosis.response_type import Tolerance, default_tolerances
 from chaosgym.errors import DiagnosisError, ParameterError, SimulationError
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import field_named, parameters_of, with_settings
 from chaosgym.simulation import MotionState, simulate
-
-Array = NDArray[np.float64]
 
 TRANSIENT = 100
 """Cycles that each draw runs before those that count."""

@@ -21,8 +21,9 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.diagnose import diagnose_alone
 from chaosgym.diagnosis.measured import unsteady
 from chaosgym.diagnosis.model_draws import (
@@ -41,8 +42,6 @@ from chaosgym.diagnosis.response import MeasuredVerdict, Nature
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines.machine import Machine
 from chaosgym.signals.noise import repair, stated_error
-
-Array = NDArray[np.float64]
 
 FEWEST_CYCLES, MOST_CYCLES = 32, 200
 """Cycles below which a record is refused, and cycles that each draw is simulated for; longer records are averaged."""

@@ -15,13 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.tangent import Tangents
 from chaosgym.diagnosis.periodic_orbit import Period, period_map, run_period
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import check_parameter, field_named, parameters_of, suggestion
-
-Array = NDArray[np.float64]
 
 CLOSED, CLOSELY = 1e-10, 1e-12
 """Miss of an orbit, relative to its size, at which Newton's method stops, and at which it does at a bifurcation."""

@@ -4,15 +4,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.response import Diagnosis
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines.machine import Machine
 from chaosgym.simulation import simulate
-
-Array = NDArray[np.float64]
 
 TRANSIENT = 400
 """Cycles that the machine runs before those that are compared."""

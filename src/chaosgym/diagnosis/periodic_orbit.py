@@ -13,14 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core import status
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import SimulationError
 from chaosgym.machines import Machine
 from chaosgym.simulation import ExactEvents, MotionState
-
-Array = NDArray[np.float64]
 
 RESIDUAL = 1e-10
 """Largest miss of a certified orbit, relative to its size."""

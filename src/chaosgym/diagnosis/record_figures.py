@@ -5,11 +5,9 @@ machine's. All of them are assumed.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.signals.noise import class_residual
-
-Array = NDArray[np.float64]
 
 LEAST_SCATTER = 1e-3
 """Standard deviation, as a share of the mean, below which scatter counts as none: few draws have so little noise."""

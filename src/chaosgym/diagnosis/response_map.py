@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.response import Diagnosis
 from chaosgym.diagnosis.response_type import (
@@ -23,7 +24,6 @@ from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import parallel_map
 
-Array = NDArray[np.float64]
 Place = tuple[float, float]
 """Speed and clearance."""
 

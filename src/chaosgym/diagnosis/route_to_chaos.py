@@ -19,9 +19,9 @@ from itertools import groupby, pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.bifurcation import Bifurcation
 from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram, Branch, SweepPoint
 from chaosgym.diagnosis.crisis import Crisis, boundary_crisis, carried, interior_crisis
@@ -31,8 +31,6 @@ from chaosgym.errors import DiagnosisError, SimulationError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
-
-Array = NDArray[np.float64]
 
 Route = Literal["period doubling", "intermittency", "grazing", "torus", "crisis", "not told"]
 

@@ -13,16 +13,14 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.measured_sweep import FEWEST_SPEEDS, SweepTypes, judged_speed, sweep_types
 from chaosgym.signals.cycles import CyclePeaks, cycle_peaks
 from chaosgym.signals.noise import stated_error
 from chaosgym.signals.orders import AngleSignal, OrderLine, OrderSpectra, ringing
 from chaosgym.signals.sampling import Sampling
 from chaosgym.signals.tachometer import Turns
-
-Array = NDArray[np.float64]
 
 HIGHEST_ORDER = 20.0
 """Order up to which spectra are taken, if none is stated."""

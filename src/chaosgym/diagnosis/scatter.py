@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from itertools import repeat
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.determinism import DRIVEN, LEAST_GAIN, Determinism, beats_surrogates, determinism, drive
 from chaosgym.diagnosis.response import Diagnosis, MeasuredVerdict, undetermined
 from chaosgym.diagnosis.spectrum import without_lines
@@ -29,8 +29,6 @@ from chaosgym.signals.noise import (
     predictability,
     without_drift,
 )
-
-Array = NDArray[np.float64]
 
 SMALL_SCATTER, LARGE_SCATTER = 0.015, 0.08
 """Standard deviations, as shares of the mean force. Scatter around one level above the first is told from chaos only by

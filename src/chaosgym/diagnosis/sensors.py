@@ -9,15 +9,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.determinism import determinism
 from chaosgym.diagnosis.response import MeasuredVerdict, undetermined
 from chaosgym.diagnosis.scatter import Scatter, chaotic, is_chaotic, scatter_of
 from chaosgym.diagnosis.two_step import CHAOTIC_CYCLES
 from chaosgym.signals.noise import quantum, repair
-
-Array = NDArray[np.float64]
 
 UNSTEADY = "not a steady response"
 """How the reason of a verdict begins that no further sensor can change."""

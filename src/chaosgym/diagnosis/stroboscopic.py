@@ -10,12 +10,11 @@ A slow approach to a periodic motion does not repeat yet, but its distances |x(n
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals.noise import class_residual
-
-Array = NDArray[np.float64]
 
 MIN_CYCLES = 16
 """Fewest cycles that are judged at all."""

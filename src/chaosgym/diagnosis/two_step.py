@@ -14,8 +14,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.response import Diagnosis
 from chaosgym.diagnosis.section_shape import Shape, section_shape
 from chaosgym.diagnosis.spectrum import power_spectrum
@@ -36,8 +37,6 @@ from chaosgym.diagnosis.zero_one import zero_one_statistic
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals.noise import RANDOM, predictability
 from chaosgym.simulation import CycleRecord
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-5
 """Half range, as a share of the largest modulus, within which a noise-free motion repeats."""

@@ -15,9 +15,8 @@ G. A. Gottwald, I. Melbourne, On the implementation of the 0-1 test for chaos, S
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.stroboscopic import as_samples, subtract_bands
-
-Array = NDArray[np.float64]
 
 MAX_SAMPLES = 1000
 """Samples used at most, the last ones of the series."""

@@ -1,15 +1,12 @@
 """What the trained classifier of records tells of N jobs: how likely the motion at the present speed is irregular."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array, Indices
 from chaosgym.classifier.features import MAX_CYCLES, MIN_CYCLES
 from chaosgym.classifier.machine_classifier import default_classifier, has_classifier
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 UNKNOWN = 0.5
 """Probability where fewer cycles were measured at a speed than the classifier reads."""

@@ -14,12 +14,10 @@ from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box, Discrete
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.envs.task import Task
 from chaosgym.errors import ParameterError
-
-Array = NDArray[np.float64]
 
 MOVES = np.array([0, -1, 1, -2, 2])
 """Trim steps of the discrete actions; one more action goes back to the demand."""

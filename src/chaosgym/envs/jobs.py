@@ -7,6 +7,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array, Indices
 from chaosgym.core.compilation import call
 from chaosgym.envs.classified import RecordsAtSpeed
 from chaosgym.envs.drive import DEAD_BAND, MOVES
@@ -21,8 +22,6 @@ from chaosgym.machines.batch import Cycles, KickedBatch, VaryingBatch
 from chaosgym.machines.machine import Machine
 from chaosgym.monitor import RepeatSums
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Generators = Sequence[np.random.Generator]
 
 

@@ -19,13 +19,10 @@ judges`` measures both.
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array, Indices
 from chaosgym.core.compilation import call
 from chaosgym.envs.kernels.steps import recurrence_misses, running_exponents
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 MEMORY = 10.0
 """Cycles over which the growth is averaged."""

@@ -14,8 +14,9 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Space
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Indices
 from chaosgym.envs.drive import action_space, checked_actions
-from chaosgym.envs.jobs import Indices, Jobs
+from chaosgym.envs.jobs import Jobs
 from chaosgym.envs.kernels.steps import INFO
 from chaosgym.envs.levels import task_of, tolerances_of
 from chaosgym.envs.observation import Observation, observation_names, observation_space

@@ -17,10 +17,9 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.envs.observation import OBSERVATION_NAMES, Observation, observation_space
 from chaosgym.envs.task import Task
-
-Array = NDArray[np.float64]
 
 PAST = 3
 """Earlier observations that are kept."""

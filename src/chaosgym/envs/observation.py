@@ -6,10 +6,10 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.envs.task import Task
 from chaosgym.monitor import HIGHEST, LIMIT
 
-Array = NDArray[np.float64]
 Observation = NDArray[np.float32]
 Generators = Sequence[np.random.Generator]
 

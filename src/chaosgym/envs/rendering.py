@@ -15,6 +15,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.envs.jobs import Segment
 from chaosgym.envs.observation import OBSERVATION_NAMES
 from chaosgym.envs.task import Task
@@ -23,7 +24,6 @@ from chaosgym.machines.parameters import parameters_of
 from chaosgym.machines.picture import CALM, INK, LIMIT, PALE, STAYS, WILD, samples_of
 from chaosgym.simulation import CycleRecord, MotionState, simulate
 
-Array = NDArray[np.float64]
 Frame = NDArray[np.uint8]
 
 SIZE = (9.6, 6.4)

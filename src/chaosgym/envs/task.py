@@ -28,13 +28,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.design.rating_life import LIFE_EXPONENT, damage_in_a_million
 from chaosgym.envs.kernels import steps
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import parameter, parameters_of, validate
-
-Array = NDArray[np.float64]
 
 _number = partial(parameter, low=0.0, high=1e9, provenance="assumed")
 _count = partial(parameter, low=1, high=1e6, provenance="assumed")

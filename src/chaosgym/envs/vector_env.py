@@ -15,9 +15,9 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Indices
 from chaosgym.envs import environment
 from chaosgym.envs.drive import checked_actions
-from chaosgym.envs.jobs import Indices
 from chaosgym.envs.kernels.steps import INFO
 from chaosgym.envs.machine_env import METADATA, EnvSettings, JobSpec, refuse_pictures, start_of
 from chaosgym.envs.observation import Observation, observation_names

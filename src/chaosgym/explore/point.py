@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.classifier import classifier_for
 from chaosgym.diagnosis import Diagnosis, diagnose
 from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
@@ -17,8 +17,6 @@ from chaosgym.machines.parameters import by_field, changes_of, parameters_of, wi
 from chaosgym.monitor import Monitor
 from chaosgym.plotting.design import axis_label
 from chaosgym.simulation import simulate
-
-Array = NDArray[np.float64]
 
 BUDGET = 400
 """Cycles of the diagnosis: what is sure after some hundredths of a second."""

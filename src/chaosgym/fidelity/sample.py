@@ -1,15 +1,13 @@
 """The operating points at which rungs are compared: the same every time, a third of them chaotic."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.two_step import two_step_test
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
 from chaosgym.simulation import simulate
-
-Array = NDArray[np.float64]
 
 CHAOTIC_SHARE = 3
 """One point in so many is chaotic, if the machine has enough of them."""

@@ -22,9 +22,9 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import wasserstein_distance
 
+from chaosgym.arrays import Array
 from chaosgym.design.improve import not_dominated
 from chaosgym.diagnosis.response_type import SHARES, default_tolerances
 from chaosgym.diagnosis.two_step import two_step_test
@@ -34,8 +34,6 @@ from chaosgym.fidelity.sample import balanced_points
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, RungeKutta4, parallel_map, simulate
-
-Array = NDArray[np.float64]
 
 REFERENCE = "reference"
 """Rung that all others are measured against."""

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array, Indices
 from chaosgym.core import status
 from chaosgym.core.batch import Motions, Settings, TablesOfMany, advance_beams
 from chaosgym.core.compilation import call_side_by_side
@@ -24,9 +25,6 @@ from chaosgym.machines.integrators import ExactEvents
 
 if TYPE_CHECKING:
     from chaosgym.machines.machine import Machine
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 class Cycles(NamedTuple):

@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
+
 Matrix = NDArray[np.float64]
 
 _abscissae, _weights = np.polynomial.legendre.leggauss(4)
@@ -121,9 +123,6 @@ def graded_mesh(stations: tuple[float, ...], elements: int) -> Matrix:
     spans = np.diff(np.asarray(stations, dtype=float))
     counts = np.maximum(1, np.rint(elements * spans / spans.sum()).astype(int))
     return np.concatenate([np.full(count, span / count) for span, count in zip(spans, counts, strict=True)])
-
-
-Array = NDArray[np.float64]
 
 
 def fitted_modes(angular: Array, coupling: Array, count: int) -> tuple[Array, Array]:

@@ -4,9 +4,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from chaosgym.arrays import Array
 
 SWING = 0.01
 """Swing of the speed, as a share of it, for which a flywheel is told."""

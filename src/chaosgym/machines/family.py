@@ -8,11 +8,9 @@ are assumed.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.machines.modal_machine import Drive, ModalMachine, Structure
-
-Array = NDArray[np.float64]
 
 MODES = 4
 """Modes of each machine."""

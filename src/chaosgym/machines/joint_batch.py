@@ -4,17 +4,14 @@ import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array, Indices
 from chaosgym.core import status
 from chaosgym.core.compilation import call_side_by_side
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.joints.batch import advance_joint_machines
 from chaosgym.errors import ParameterError
 from chaosgym.machines.batch import VaryingBatch, put, stacked
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 CALL_SECONDS, MAX_GROWTH = 0.2, 8.0
 """Duration that calls of the kernel aim at, so that Ctrl-C is heard, and how much longer than the last one may be."""

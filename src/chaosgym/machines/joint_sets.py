@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core import status
 from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays
@@ -28,8 +29,6 @@ from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents
 from chaosgym.machines.modal_impact import modal_blocks, settled
-
-Array = NDArray[np.float64]
 
 MOST_SETS = 1_000_000
 """Sets of pressed surfaces that a machine may have."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
 from chaosgym.errors import ParameterError
 from chaosgym.machines.drive_torque import DriveTorque
@@ -64,8 +65,6 @@ class Choice(NamedTuple):
 
 Option = Number | Choice
 """An option of a machine on the command line: a short name in shop-floor units for some of its fields."""
-
-Array = NDArray[np.float64]
 
 
 class TaskDefaults(NamedTuple):

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.modal_model import LOAD, STOP, ModalImpactModel, Regimes, Tables, with_drive_from
 from chaosgym.errors import ParameterError
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from chaosgym.core.tangent import Tangents
     from chaosgym.machines.batch import CompiledBatch
 
-Array = NDArray[np.float64]
 
 MAX_CONDITION = 1e6
 """Condition number of a set of eigenvectors below which no better one is looked for."""

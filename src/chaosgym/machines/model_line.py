@@ -15,12 +15,10 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.modal_model import ModalImpactModel, Regimes
 from chaosgym.machines.modal_impact import with_tables
-
-Array = NDArray[np.float64]
 
 CONVERGED = 1e-9
 """Last coefficients of a polynomial, as a share of the largest number of an array."""

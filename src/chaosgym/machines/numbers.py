@@ -4,11 +4,9 @@ import reprlib
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
-
-Array = NDArray[np.float64]
 
 REAL = "iuf"
 """Kinds of arrays that hold numbers: no complex ones, no texts, no truth values, no objects."""

@@ -5,9 +5,8 @@ and its derivatives are those of the functions (Trefethen, Spectral Methods in M
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from chaosgym.arrays import Array
 
 
 def derivatives(values: Array) -> tuple[Array, Array]:

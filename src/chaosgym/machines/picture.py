@@ -6,9 +6,8 @@ A picture shows one moment of the last cycle of a step, and pale what happened i
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from chaosgym.arrays import Array
 
 INK, PALE, CALM, WILD, LIMIT = "#1f2933", "#cbd2d9", "#1f77b4", "#d1495b", "#e09f3e"
 """Colours: text and bodies, background lines, repeating steps, steps that count as Type III, force limit."""

@@ -7,12 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram, Branch
 from chaosgym.diagnosis.bifurcation_map import BifurcationMap
 from chaosgym.plotting.design import axis_label
 from chaosgym.plotting.style import ACCENT, BAD, INK, MUTED
-
-Array = NDArray[np.float64]
 
 MARKS = {
     "fold": ("s", INK),

@@ -12,8 +12,8 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.design.measured import MeasuredPeaks
 from chaosgym.design.study import DesignStudy
 from chaosgym.diagnosis import Diagnosis
@@ -28,8 +28,6 @@ from chaosgym.plotting.branches import bifurcation_map, branches
 from chaosgym.plotting.design import axis_label, cost_against_life, peak_record, series_life, type_map_around
 from chaosgym.plotting.style import ACCENT, INK, NATURE_COLOURS, STYLE, figure_of
 from chaosgym.simulation import CycleRecord, simulate
-
-Array = NDArray[np.float64]
 
 WIDTH = 4.4
 """Of a figure [in]."""

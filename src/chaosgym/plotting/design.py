@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
-from numpy.typing import NDArray
 from scipy import stats
 
+from chaosgym.arrays import Array
 from chaosgym.design.combination import Combination
 from chaosgym.design.fatigue import equivalent_force, statistical_life
 from chaosgym.design.improve import Improvement
@@ -31,8 +31,6 @@ PLACES = {
     "deg of the cycle": ("instant in the cycle, relative to the mean [deg]", 1.0, 20.0),
 }
 """By unit of a Peak Impact Diagram: label, factor, and least width shown."""
-
-Array = NDArray[np.float64]
 
 
 def axis_label(machine: Machine, name: str) -> tuple[str, float]:

@@ -16,6 +16,7 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chaosgym.arrays import Array
 from chaosgym.design.bearing import hours_of
 from chaosgym.design.fatigue import rating_life
 from chaosgym.design.measured import MeasuredPeaks
@@ -273,7 +274,7 @@ def drawn_by(draw: Callable[[Axes], object]) -> Figure:
     return figure
 
 
-def _figure_of_peaks(peaks: figures.Array, exponent: float) -> Figure:
+def _figure_of_peaks(peaks: Array, exponent: float) -> Figure:
     with matplotlib.rc_context(STYLE):
         figure = figure_of(12.6, 3.5)
         left, right = figure.subplots(1, 2, width_ratios=(3, 1))
@@ -281,7 +282,7 @@ def _figure_of_peaks(peaks: figures.Array, exponent: float) -> Figure:
     return figure
 
 
-def _figure_of_convergence(peaks: figures.Array, cycles: int) -> Figure:
+def _figure_of_convergence(peaks: Array, cycles: int) -> Figure:
     with matplotlib.rc_context(STYLE):
         figure = figure_of()
         figures.running_convergence(peaks, cycles, *figure.subplots(2, 1, sharex=True))

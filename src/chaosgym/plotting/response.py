@@ -14,13 +14,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import ArrayLike, NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis.measured_sweep import SweepTypes
 from chaosgym.errors import DatasetError
 from chaosgym.plotting.design import axis_label
 from chaosgym.plotting.style import ACCENT, INK, MUTED, NATURE_COLOURS, PALE, STYLE, TYPE_COLOURS, figure_of
 from chaosgym.sweeps import LabelledSweep, SweepPlan
-
-Array = NDArray[np.float64]
 
 
 def curve(x: ArrayLike, y: ArrayLike, ax: Axes, *, label: str | None = None, color: str = ACCENT) -> Axes:

@@ -9,13 +9,11 @@ from fnmatch import fnmatchcase
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines.units import ALTERNATIVES
 from chaosgym.signals.read import Recording
-
-Array = NDArray[np.float64]
 
 OTHER = re.compile(
     r"(time|zeit|temps|stamp|date|datum|clock|cycle|zyklus|takt|index|nr|no|count(er)?|rpm|speed|drehzahl|hz|freq\w*|"

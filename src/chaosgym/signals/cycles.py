@@ -8,15 +8,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals.columns import Signal, choose_force, named_column
 from chaosgym.signals.read import Recording
 from chaosgym.signals.sampling import Sampling, sampling
 from chaosgym.signals.tachometer import Turns, turns_of
-
-Array = NDArray[np.float64]
 
 FEWEST_SAMPLES = 8
 """Samples that a cycle must have."""

@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
-
-Array = NDArray[np.float64]
 
 LONGEST_PERIOD = 64
 """Longest period that is looked for."""

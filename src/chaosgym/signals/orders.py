@@ -16,12 +16,10 @@ J. Blough, D. Brown, H. Vold, The time variant discrete Fourier transform as an 
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals.tachometer import FEWEST_TURNS, Turns
-
-Array = NDArray[np.float64]
 
 FRAME = FEWEST_TURNS
 """Turns of one spectrum; the next begins half of that later, and lines are one over it apart."""

@@ -19,14 +19,12 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals import recorders
 from chaosgym.signals.heading import split_unit
 from chaosgym.signals.text import MOST_MISSING, read_text
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

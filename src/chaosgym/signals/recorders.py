@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
-
-Array = NDArray[np.float64]
 
 OF_RATE = re.compile(r"fs|f_s|rate|sampl\w*?[_ ]?(rate|freq\w*|frequency)|samplerate", re.IGNORECASE)
 OF_STEP = re.compile(r"wf_increment|increment|dt|dx|delta[_ ]?[tx]", re.IGNORECASE)

@@ -4,13 +4,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals.columns import choose_time
 from chaosgym.signals.read import Recording
-
-Array = NDArray[np.float64]
 
 LONGEST_GAP, UNEVEN = 1.5, 0.2
 """Steps, in mean steps, from which samples are missing, and the deviation that even sampling may have."""

@@ -11,12 +11,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import DiagnosisError
 from chaosgym.signals.heading import Heading, read_heading
-
-Array = NDArray[np.float64]
 
 DELIMITERS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": "blanks"}
 """Delimiters in the order in which they are tried."""

@@ -15,12 +15,11 @@ G. F. Franklin, J. D. Powell, M. L. Workman, Digital Control of Dynamic Systems,
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.errors import SimulationError
 from chaosgym.simulation.record import CycleRecord
-
-Array = NDArray[np.float64]
 
 
 class ModalHistory(NamedTuple):

@@ -7,11 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import suggestion
-
-Array = NDArray[np.float64]
 
 
 class MotionState(NamedTuple):

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
+from chaosgym.arrays import Array
 from chaosgym.core import status
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.tangent import Tangents
@@ -25,8 +26,6 @@ from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import field_named, parameters_of, with_settings
 from chaosgym.simulation.record import CycleRecord, MotionState, joined
-
-Array = NDArray[np.float64]
 
 FIRST_SLICE, MAX_GROWTH = 16, 8.0
 """Cycles of the first call of a kernel, and how much longer than the last one a call may be."""

@@ -6,12 +6,11 @@ from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.units import parse_option
 
-Array = NDArray[np.float64]
 Scale = Literal["lin", "log"]
 SCALES: tuple[Scale, ...] = ("lin", "log")
 

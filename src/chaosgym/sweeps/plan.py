@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from chaosgym.arrays import Array
 from chaosgym.diagnosis import default_tolerances
 from chaosgym.diagnosis.type_rule import CROSS
 from chaosgym.errors import ParameterError
@@ -26,7 +27,6 @@ from chaosgym.machines import MACHINES, Machine
 from chaosgym.machines.parameters import check_parameter, parameters_of, with_settings
 from chaosgym.sweeps.axes import AXIS_FORM, Axis
 
-Array = NDArray[np.float64]
 Sampling = Literal["grid", "random", "sobol", "crosses"]
 
 DEFAULT_COUNTS = (27, 10)

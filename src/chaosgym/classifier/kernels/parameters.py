@@ -5,9 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.kernel import njit
-
-Array = NDArray[np.float64]
 
 FREE, RINGING = 3, 2
 """Modes of a beam in flight, the rocking mode first, and modes on a sensor."""

@@ -1,11 +1,9 @@
 """Kernels that compute the features of one record, for ``classifier.features``."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.kernel import njit
-
-Array = NDArray[np.float64]
 
 LAGS = 8
 """Differences of cycles up to so many apart."""

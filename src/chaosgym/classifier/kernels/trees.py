@@ -3,9 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.kernel import njit
-
-Array = NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True)

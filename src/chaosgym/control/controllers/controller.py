@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.envs.memory import irregularity
 from chaosgym.envs.observation import OBSERVATION_NAMES
 from chaosgym.envs.task import Task
 
-Array = NDArray[np.float64]
 Observations = NDArray[np.float32]
 
 _PLACE = {name: place for place, name in enumerate(OBSERVATION_NAMES)}

@@ -7,15 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from chaosgym.control.controllers.controller import (
-    THRESHOLD,
-    Array,
-    Controller,
-    Observations,
-    irregular,
-    place_of,
-    seen,
-)
+from chaosgym.arrays import Array
+from chaosgym.control.controllers.controller import THRESHOLD, Controller, Observations, irregular, place_of, seen
 from chaosgym.control.maps import Maps
 
 

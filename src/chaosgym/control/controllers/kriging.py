@@ -31,7 +31,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.control.controllers.controller import Array, Controller, Observations, place_of, seen
+from chaosgym.arrays import Array
+from chaosgym.control.controllers.controller import Controller, Observations, place_of, seen
 from chaosgym.design.rating_life import LIFE_EXPONENT
 
 CONSTANT, POWER = 3.0, 2.0

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.control.controllers.controller import THRESHOLD, Array, Controller, Observations, irregular, seen
+from chaosgym.arrays import Array
+from chaosgym.control.controllers.controller import THRESHOLD, Controller, Observations, irregular, seen
 from chaosgym.control.maps import Maps
 from chaosgym.envs.judge import MISS, recurrence_miss
 

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import trange
 
-from chaosgym.control.controllers.controller import Array, Controller, Observations, place_of, seen
+from chaosgym.arrays import Array
+from chaosgym.control.controllers.controller import Controller, Observations, place_of, seen
 from chaosgym.design.rating_life import damage_in_a_million
 from chaosgym.envs.task import Task
 from chaosgym.envs.vector_env import native_envs

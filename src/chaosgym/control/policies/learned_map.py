@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.control.controllers.controller import Array, Controller, Observations, place_of, seen
+from chaosgym.arrays import Array
+from chaosgym.control.controllers.controller import Controller, Observations, place_of, seen
 from chaosgym.control.policies.network import Network
 from chaosgym.design.rating_life import damage_in_a_million
 from chaosgym.envs import environment

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.binned.model import LINEAR, BinnedModel, TaylorModel
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
 from chaosgym.machines.binned.model import STEP_PHASE, Contact, Held, exact_model, fastest_rate, stepped_model
@@ -18,8 +18,6 @@ from chaosgym.machines.machine import Machine
 if TYPE_CHECKING:
     from chaosgym.core.tangent import Tangents
     from chaosgym.machines.batch import CompiledBatch
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

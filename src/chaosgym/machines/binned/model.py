@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.binned.model import FORCING_TERMS, BinnedModel, TaylorModel
 from chaosgym.errors import ParameterError
 from chaosgym.machines.parameters import refuse_not_finite
@@ -25,7 +26,6 @@ from chaosgym.machines.parameters import refuse_not_finite
 if TYPE_CHECKING:
     from chaosgym.machines.binned.machine import BinnedMachine
 
-Array = NDArray[np.float64]
 
 PIECE_PHASE = 2.0
 """Longest piece of a Taylor series times largest eigenvalue without contact."""

@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array, Indices
 from chaosgym.core import status
 from chaosgym.core.binned.batch import advance_binned_machines, advance_kicked_machines, advance_taylor_machines
 from chaosgym.core.binned.cycle import advance
@@ -21,7 +21,6 @@ from chaosgym.machines.integrators import ExactEvents, Integrator
 if TYPE_CHECKING:
     from chaosgym.machines.binned.machine import BinnedMachine
 
-Array = NDArray[np.float64]
 
 STEPS_AT_ONCE = 200_000
 """Steps without events in one call of a kernel: some tenths of a second of processor time."""
@@ -61,8 +60,6 @@ def run(
             return outcome, done
     return status.OK, done
 
-
-Indices = NDArray[np.int64]
 
 SPEED_FIELDS = ("bin_duration", "steps", "order")
 """Fields of a model that change with its speed, apart from the table."""

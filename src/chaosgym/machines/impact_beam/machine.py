@@ -7,15 +7,13 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.machines.impact_beam.modes import modal_analysis, modal_curvatures, static_tip_deflection
 from chaosgym.machines.impact_beam.parameters import BeamParameters
 from chaosgym.machines.integrators import TIGHTEST_EVENTS, ExactEvents
 from chaosgym.machines.modal_impact import flexible_model
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

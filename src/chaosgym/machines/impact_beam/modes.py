@@ -4,14 +4,12 @@ import math
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.beam_element import bending_matrices, fitted_modes, graded_mesh
 from chaosgym.machines.impact_beam.parameters import BeamParameters
 from chaosgym.machines.modal_impact import Modes
-
-Array = NDArray[np.float64]
 
 MIN_ELEMENTS = 24
 """Elements of the finest default mesh; more modes take three elements a mode."""

@@ -14,12 +14,10 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.machines.beam_element import POINTS, bending_matrices, fitted_modes, interpolation
 from chaosgym.machines.mechanism.links import Body, Link, Places, together
-
-Array = NDArray[np.float64]
 
 ELEMENTS = 10
 """Finite elements, at least; more modes take two a mode."""

@@ -18,16 +18,14 @@ Derivatives by the angle are those of the Fourier series through a uniform grid.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.links import Link, inertia_of, rotation
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism, Spring
 from chaosgym.machines.mechanism.nominal import Nominal, Revolution, nominal
 from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.periodic import derivatives
-
-Array = NDArray[np.float64]
 
 TAIL = 1e-10
 """Share of the largest term of a Fourier series that its last terms may have."""

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.file_keys import needed
 from chaosgym.machines.machine import TaskDefaults
@@ -35,8 +35,6 @@ from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.numbers import number
 from chaosgym.machines.parameters import parameter
 from chaosgym.machines.stated import range_of, reduced, tolerances_of
-
-Array = NDArray[np.float64]
 
 STILL = 1e-6
 """Stroke of a piston, as a share of the mechanism's length, below which it stands still."""

@@ -3,9 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from chaosgym.arrays import Array
 
 STROKE_ANGLES = 1440
 """Crank angles at which the pressure of a cylinder is followed."""

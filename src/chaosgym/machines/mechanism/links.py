@@ -12,12 +12,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Optional
 
 import numpy as np
-from numpy.typing import NDArray
+
+from chaosgym.arrays import Array
 
 if TYPE_CHECKING:
     from chaosgym.machines.mechanism.beam import Beam
 
-Array = NDArray[np.float64]
 
 RIGID = 3
 """Coordinates of a rigid link: two places and a turn."""

@@ -7,8 +7,8 @@ from functools import lru_cache
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.binned.model import HERTZ, LINEAR
 from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.machine import BinnedMachine
@@ -23,8 +23,6 @@ from chaosgym.machines.mechanism.motor import MOTOR_FIELDS, Load, Motor, MotorRu
 from chaosgym.machines.mechanism.nominal import Revolution, places, revolution_of
 from chaosgym.machines.numbers import number
 from chaosgym.machines.parameters import assumed, parameter
-
-Array = NDArray[np.float64]
 
 SMALL = 0.02
 """Clearance as a share of a link's length beyond which motions in the gap are not small."""

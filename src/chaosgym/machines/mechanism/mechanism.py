@@ -17,11 +17,10 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.joints import ACROSS, ALONG, GROUND, TURN, Joint
 from chaosgym.machines.mechanism.links import Link, Places, fixed, quarter_after, rotation
-
-Array = NDArray[np.float64]
 
 
 class Force(NamedTuple):

@@ -13,12 +13,10 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.numbers import number
-
-Array = NDArray[np.float64]
 
 GRID = 1e-3
 """Spacing of the speeds at which cycles are run, as a share: models of a machine are kept for each."""

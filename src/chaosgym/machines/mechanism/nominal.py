@@ -8,12 +8,10 @@ start from cubics through these steps.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.mechanism import Mechanism
-
-Array = NDArray[np.float64]
 
 STEP, SHORTEST = 2.0 * np.pi / 24, 1e-4
 """Longest and shortest step of the crank [rad]."""

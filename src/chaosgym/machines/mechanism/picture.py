@@ -5,15 +5,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.collections import LineCollection
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.machines.mechanism.joints import GROUND
 from chaosgym.machines.picture import INK, PALE, STAYS, WILD, sample_at, samples_of
 
 if TYPE_CHECKING:
     from chaosgym.machines.mechanism.machine import MechanismMachine
 
-Array = NDArray[np.float64]
 
 GAP = 0.04
 """Gap as drawn, as a share of the mechanism's size."""

@@ -15,12 +15,11 @@ d x (d x R rho) / 2 to second order, wherever the link is: all derivatives are b
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.links import Link, rotation
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 RIGID = 6

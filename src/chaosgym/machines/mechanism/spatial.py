@@ -17,13 +17,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.joints import ALONG, GROUND, PITCH, PLACES, ROLL, SKEW, YAW, Joint
 from chaosgym.machines.mechanism.links import Link
 from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.space import RIGID, Lie, SpatialPlaces, axes_of, cross, skew
-
-Array = NDArray[np.float64]
 
 TURNS = {ROLL: (1, 2, 1.0), YAW: (0, 2, -1.0), PITCH: (0, 1, 1.0), SKEW: (0, 0, 1.0)}
 """Axis of the second link, that of the first and sign, whose product is a small turn; it is zero in the middle."""

@@ -5,13 +5,12 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.modal_machine.structure import BASE, Structure
 from chaosgym.machines.numbers import numbers, shown
-
-Array = NDArray[np.float64]
 
 KINDS = {"force": "N", "unbalance": "kg m", "displacement": "m", "acceleration": "m/s^2"}
 """What a drive prescribes, and its unit: a force; mass times eccentricity, whose force grows with the square of the

@@ -15,8 +15,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
@@ -41,7 +41,6 @@ from chaosgym.machines.units import TURNING
 if TYPE_CHECKING:
     from chaosgym.machines.joint_batch import JointBatch
 
-Array = NDArray[np.float64]
 
 LARGEST = "largest"
 """Word for the joint with the largest force."""

@@ -11,8 +11,8 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.joints.tables import SLOW
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.errors import ParameterError
@@ -28,8 +28,6 @@ from chaosgym.machines.modal_impact import (
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import assumed, parameter, parameters_of
-
-Array = NDArray[np.float64]
 
 ROUNDING = 2.0**-52
 """Relative distance of neighbouring numbers."""

@@ -5,13 +5,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.files import first_line
 from chaosgym.machines.numbers import numbers
-
-Array = NDArray[np.float64]
 
 RIGID = 1e-12
 """Energy of a motion of the rigid body, against the sum of its terms without their signs: what rounding leaves."""

@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
-
-Array = NDArray[np.float64]
 
 DIRECTIONS = {"x": "r1", "y": "r2", "z": "r3"}
 """Field of a data set 55 by direction."""

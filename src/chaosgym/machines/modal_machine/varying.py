@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.binned.tables import table_places
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.errors import ParameterError
@@ -31,8 +31,6 @@ from chaosgym.machines.modal_machine.machine import ModalMachine, as_there, rigi
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.numbers import numbers
 from chaosgym.machines.parameters import assumed
-
-Array = NDArray[np.float64]
 
 FEWEST, MOST = 3, 3600
 """Samples of a stiffness over the cycle."""

@@ -15,12 +15,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.machines.beam_element import bending_matrices, fitted_modes, interpolation
 from chaosgym.machines.slider_crank.parameters import CrankParameters
-
-Array = NDArray[np.float64]
 
 ELEMENTS = 10
 """Finite elements of the rod, at least: its third natural frequency is right to 0.01 %. More modes take two a mode."""

@@ -38,8 +38,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.machines.periodic import between, derivatives
 from chaosgym.machines.slider_crank.connecting_rod import ConnectingRod, elastic_constants, rods_of
 from chaosgym.machines.slider_crank.coordinates import ROD_STRETCH, degrees_of_freedom
@@ -58,8 +58,6 @@ from chaosgym.machines.slider_crank.motions import (
     slider_inertia,
 )
 from chaosgym.machines.slider_crank.parameters import CrankParameters
-
-Array = NDArray[np.float64]
 
 TERMS = 32.0
 """Terms of the Fourier series of a function that is smooth to 1 rad off the real angles; the last one is exp(-32)."""

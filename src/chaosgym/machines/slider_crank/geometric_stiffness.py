@@ -14,8 +14,8 @@ Left out are products of the slider's own turns with those of the rod: they are 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.machines.slider_crank.connecting_rod import ConnectingRod
 from chaosgym.machines.slider_crank.motions import (
     ALONG_ROD,
@@ -32,8 +32,6 @@ from chaosgym.machines.slider_crank.motions import (
     slider_offset,
 )
 from chaosgym.machines.slider_crank.parameters import CrankParameters
-
-Array = NDArray[np.float64]
 
 
 def _pair(one: Array, other: Array) -> Array:

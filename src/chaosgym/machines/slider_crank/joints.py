@@ -13,8 +13,8 @@ from functools import lru_cache
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.machines.binned import model as binned
 from chaosgym.machines.slider_crank.coordinates import (
     BALL_ACROSS,
@@ -26,8 +26,6 @@ from chaosgym.machines.slider_crank.coordinates import (
     SLIDER_YAW,
 )
 from chaosgym.machines.slider_crank.parameters import CrankParameters
-
-Array = NDArray[np.float64]
 
 
 class Contact(NamedTuple):

@@ -11,9 +11,8 @@ The crank turns at a constant rate w, so d/dt = w d/dth: everything here is give
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from chaosgym.arrays import Array
 
 
 def crank_pin(crank_angle: Array, radius: float, motor_angle: float) -> Array:

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.core.binned.model import HERTZ, LINEAR
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.machines.binned.model import MAX_SETS, Contact, Held
@@ -22,8 +22,6 @@ from chaosgym.machines.slider_crank.joints import display_of, gaps_of, joints_of
 from chaosgym.machines.slider_crank.kinematics import slider_position
 from chaosgym.machines.slider_crank.model import force_bound, held_of
 from chaosgym.machines.slider_crank.parameters import FITTED, CrankParameters
-
-Array = NDArray[np.float64]
 
 DIMENSIONS = (
     "crank_radius",

@@ -3,14 +3,12 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.machines.binned.model import Held, held, middles_and_nodes
 from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.kinematics import slider_rate
 from chaosgym.machines.slider_crank.parameters import CrankParameters
-
-Array = NDArray[np.float64]
 
 
 def held_of(machine: CrankParameters) -> Held:

@@ -25,8 +25,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.machines.slider_crank.connecting_rod import ConnectingRod
 from chaosgym.machines.slider_crank.coordinates import (
     BALL_DIRECTIONS,
@@ -38,8 +38,6 @@ from chaosgym.machines.slider_crank.coordinates import (
 )
 from chaosgym.machines.slider_crank.kinematics import crank_pin, slider_position
 from chaosgym.machines.slider_crank.parameters import CrankParameters
-
-Array = NDArray[np.float64]
 
 AXIS = np.array([0.0, 0.0, 1.0])
 """Z, the slider's pivot axis."""

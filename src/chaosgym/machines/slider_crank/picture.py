@@ -5,12 +5,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.collections import LineCollection
-from numpy.typing import NDArray
 
+from chaosgym.arrays import Array
 from chaosgym.machines.picture import INK, PALE, STAYS, sample_at, samples_of
 from chaosgym.machines.slider_crank.kinematics import crank_pin, slider_position
-
-Array = NDArray[np.float64]
 
 GHOSTS = 12
 """Other positions shown behind the crank and its rod."""
