@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from chaosgym.arrays import Array
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
 from chaosgym.errors import ParameterError
-from chaosgym.machines.drive_torque import DriveTorque
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.parameters import check_parameter, expand_fidelity, validate, with_settings
 
 if TYPE_CHECKING:
     from chaosgym.core.tangent import Tangents
     from chaosgym.machines.batch import CompiledBatch
+    from chaosgym.machines.drive_torque import DriveTorque
 
 
 class Number(NamedTuple):
@@ -353,7 +353,7 @@ class Machine(ABC):
         return np.asarray(peak_force[..., 0])
 
     @property
-    def drive_torque(self) -> DriveTorque | None:
+    def drive_torque(self) -> "DriveTorque | None":
         """Torque of its drive over a revolution while every gap stays in its middle; None if it has none to tell."""
         return None
 
