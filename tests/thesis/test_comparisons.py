@@ -70,7 +70,7 @@ def test_the_gallery_names_rows_of_the_scorecard_and_tells_the_rest(tmp_path):
     range_ = Finding("30 Hz: 30 to 85 N", "60 to 78 N", agrees=False, targets=("IBS-029",), scored=True)
     found = (valley, range_, Finding("a crest", "none", agrees=None))
     page = gallery([Drawn(FIGURES["3.8"], tmp_path / "none.png", found, 0.0)], tmp_path)
-    assert "- **differs**: IBS-025\n- not judged: IBS-029\n- a crest. Here none: nothing to decide it by.\n" in page
+    assert "- **differs**: IBS-025\n- not judged: IBS-029\n- a crest. Here none: not decided.\n" in page
     assert "24 N" not in page
     assert "| speed | 3.8 | 0 | 1 | 0 |" in page
 

@@ -89,5 +89,5 @@ def test_json_of_a_statement_is_complete():
     assert list(told) == keys.split()
     assert told["printed"] == [30.0, 85.0]
     assert told["value"] == [36.2, 70.1]
-    assert told["reason"].startswith("30 to 85 N here")
+    assert told["reason"].startswith("40 to 100 N at the same point")
     assert judge(replace(COMPARED["IBS-029"], contradictory=""), []).as_dict()["value"] is None

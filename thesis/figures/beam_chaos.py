@@ -121,7 +121,7 @@ TRANSIENT_CHAOS = ThesisFigure(
         Panel("(c) where chaos ends around these dampings; numbers: period of what it settles on", paint_settling),
     ),
     compare=transients,
-    remark="panel (c) is not in the thesis: it looks for the transient around the printed damping",
+    remark="panel (c) looks for the transient around the printed damping",
 )
 
 

@@ -61,8 +61,8 @@ def criterion(parts: Parts) -> Sequence[Finding]:
         scored_finding(parts, "IBS-031", "chaos only above 16 Hz", sensitivity="speed"),
         Finding(
             "chaos only above both",
-            f"{rate.hit_rate:.0%} of the chaotic points of this map lie there; of the points there "
-            f"{rate.precision:.0%} are chaotic, of those outside {1.0 - rate.quiet:.0%}",
+            f"{rate.hit_rate:.0%} of the chaotic points lie there; {rate.precision:.0%} of the points there are "
+            f"chaotic, {1.0 - rate.quiet:.0%} of the others",
             None,
             (),
             "clearance",
@@ -88,7 +88,7 @@ MEASURED_MAP = ThesisFigure(
     panels=(Panel("square: measured Type II/III boundary; triangles: measured Type I/II boundary", with_measured),),
     height=4.6,
     compare=criterion,
-    remark="without the measured curves, whose points are in the figure only; three of them are in the text",
+    remark="of the measured curves only the three points of the text",
 )
 
 FIGURES = (

@@ -63,7 +63,7 @@ CLEARANCE_HISTOGRAMS = ThesisFigure(
     ),
     height=2.4,
     compare=spread_modes,
-    remark="the figure of the thesis is measured; this is its simulated counterpart, contact damping 2.5 %",
+    remark="that figure is measured; contact damping 2.5 %",
 )
 
 WILD = slider(LARGE, crank_speed=190.0, contact_damping_ratio=HIGH_DAMPING)
@@ -217,7 +217,7 @@ RELATIVE_LIVES = ThesisFigure(
     panels=(Panel("", paint_lives),),
     height=3.8,
     compare=life_ranges,
-    remark="the figure of the thesis is measured; this is its simulated counterpart, contact damping 2.5 %",
+    remark="that figure is measured; contact damping 2.5 %",
 )
 
 

@@ -186,15 +186,18 @@ def friction_flips(parts: Parts) -> Sequence[Finding]:
     """Does friction change the nature where printed, and where else?"""
     found = []
     pairs = zip(parts["without"]["crank_speed"], parts["without"]["nature"], parts["with"]["nature"], strict=True)
-    changed = [f"{speed:g} rpm ({one} to {other})" for speed, one, other in pairs if one != other]
-    elsewhere = ", ".join(changed[:8]) + (f" and {len(changed) - 8} more" if len(changed) > 8 else "")
+    changed: dict[str, list[str]] = {}
+    for speed, one, other in pairs:
+        if one != other:
+            changed.setdefault(f"{one} to {other}", []).append(f"{speed:g}")
+    elsewhere = ", ".join(f"{kind} at {', '.join(speeds)} rpm" for kind, speeds in changed.items())
     for target, speed in FRICTION_SPEEDS.items():
         wanted = tuple(str(comparison(target).printed).split(" to "))
         natures = tuple(str(response_at(parts[name], CRANK_SPEED, speed)[1]) for name in ("without", "with"))
         found.append(
             Finding(
                 f"{speed:g} rpm: friction of 0.1 turns {wanted[0]} into {wanted[1]}",
-                f"{natures[0]} to {natures[1]} there; changed at {elsewhere or 'no speed'}",
+                f"{natures[0]} to {natures[1]} there" + ("" if found else f"; {elsewhere or 'no change'}"),
                 natures == wanted,
                 (target,),
                 "friction",

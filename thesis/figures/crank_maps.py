@@ -182,8 +182,8 @@ def slider_criterion(parts: Parts) -> Sequence[Finding]:
         scored_finding(parts, "SSC-118", "chaos only above 100 rpm", sensitivity="speed"),
         Finding(
             "chaos only above both",
-            f"{rate.hit_rate:.0%} of the chaotic points of this map lie there; of the points there "
-            f"{rate.precision:.0%} are chaotic, of those outside {1.0 - rate.quiet:.0%}",
+            f"{rate.hit_rate:.0%} of the chaotic points lie there; {rate.precision:.0%} of the points there are "
+            f"chaotic, {1.0 - rate.quiet:.0%} of the others",
             None,
             (),
             "clearance",

@@ -9,22 +9,20 @@ from thesis.figures.printed import contradiction
 from thesis.figures.produce import Drawn, picture_path
 from thesis.figures.registry import FIGURES
 
-_WORDS = {True: "agrees", False: "**differs**", None: "nothing to decide it by"}
+_WORDS = {True: "agrees", False: "**differs**", None: "not decided"}
 
 
 def verdict(finding: Finding) -> str:
     """Whether a statement is met, in words; one that the text contradicts is not judged."""
     against = contradiction(finding.targets)
-    return f"not judged, the text contradicts itself: {against}" if against else _WORDS[finding.agrees]
+    return f"contradictory: {against}" if against else _WORDS[finding.agrees]
 
 
 _OPENING = """# The simulated figures of the thesis, drawn again
 
 Written by `python -m thesis figures all --out FOLDER --gallery docs/development/figures.md`; `--list` tells what
-each figure shows. P. Gu, *Chaotic Vibration in Machine Systems and Its Implications for Design*, PhD thesis, MIT,
-1994. Axes and ranges follow the text, and what the text prints of a figure is drawn over it in one colour. Names of
-statements are rows of the [scorecard](scorecard.md), judged by the same runs within the same tolerances. Forces and
-natures are those of the plotted dots, one a cycle; dots within 0.5 N are one.
+each figure shows. What the text prints of a figure is drawn over it in one colour. Names of statements are rows of
+the [scorecard](scorecard.md), judged by the same runs. Dots within 0.5 N count as one.
 """
 
 
@@ -73,14 +71,17 @@ def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
             "|---|---|---|---|---|",
         ]
     lines += [_sensitivity(parameter, entries) for parameter, entries in answered.items()]
-    for one in drawn:
+    for place, one in enumerate(drawn):
         figure = one.figure
         lines += ["", f"## {figure.label}. {figure.title}"]
         if figure.remark:
             lines += ["", f"Not as in the thesis: {figure.remark}."]
         if one.error:
             lines += ["", f"Not computed: {one.error}"]
-        if one.findings:
+        same = [other.figure.id for other in drawn[:place] if one.findings and other.findings == one.findings]
+        if same:
+            lines += ["", f"Statements: those of figure {same[0]}."]
+        elif one.findings:
             lines += ["", *_statements(one.findings)]
         picture = picture_path(figure, pictures)
         if picture.exists():

@@ -11,15 +11,14 @@ from thesis.statements import read_comparisons
 HEAD = """# Scorecard: the thesis and the machines here
 
 Written by `python -m thesis scorecard --markdown`. Each statement of the thesis about a simulation is computed from
-the machine's one set of constants; nothing is tuned for a single statement. *hit*: within the tolerance; *near*:
-within twice of it; *miss*: beyond, or a wrong nature. Of several conditions the worst decides. What the text itself
-contradicts is shown and not counted. Natures and forces are read off what the thesis plots, one dot a cycle: of the
-beam on one side of the bearing, the nearer one for a single response, since a beam of equal sides has a mirror
-image of each motion; of the crank's joints the larger of both sides.
+one set of constants for each machine. *hit*: within the tolerance; *near*: within twice of it; *miss*: beyond, or a
+wrong nature. Of several conditions the worst decides. What the text contradicts is not counted. Natures and forces
+are those of one dot a cycle, as the thesis plots them: of the beam on one side of the bearing, the nearer one for a
+single response; of the crank's joints the larger of both sides.
 
 *Neighbours* are the share of machines that hit a statement with every constant that is not in print up to 1 % off,
 at speeds up to half a step of the printed grid off, from another initial state. What few neighbours hit is luck.
-What was tried, and which statements stand in each other's way: [calibration](calibration.md).
+What was tried: [calibration](calibration.md).
 """
 
 
@@ -46,21 +45,18 @@ def _section(card: Scorecard, machine: str) -> str:
 
 
 def _exclusions(hit: Set[str]) -> str:
-    """Pairs of statements that no beam of the searches hits together, and which of them the shipped beam hits."""
+    """Pairs of statements that no beam of the searches hits together, and those of which the shipped beam hits both."""
     found = known_exclusions()
     rows = "\n".join(
-        f"| {pair.one} | {pair.hits} | {pair.other} | {pair.hits_of_other} | {pair.judged} "
-        f"| {len(hit & {pair.one, pair.other})} |"
-        for pair in found.pairs
+        f"| {pair.one}, {pair.other} | {pair.hits}, {pair.hits_of_other} | {pair.judged} |" for pair in found.pairs
     )
     never = f"None hits {', '.join(found.never)}. " if found.never else ""
+    both = ", ".join(f"{pair.one} with {pair.other}" for pair in found.pairs if {pair.one, pair.other} <= hit)
     return (
         f"### Exclusions\n\nOf {found.candidates} beams of the search without walls (`python -m thesis exclusions`), "
         "most of them with a soft pivot and judged by quick runs, none hits both statements of a row, though by chance "
-        f"one or more would. {never}The last column counts which of the two the shipped beam hits, "
-        "judged by thorough runs; 2 would be an exception.\n\n"
-        "| statement | hit by | statement | hit by | judged on both | hit by the shipped beam |\n"
-        "|---|---|---|---|---|---|\n" + rows
+        f"one or more would. {never}The shipped beam, judged by thorough runs, hits both of {both or 'no row'}.\n\n"
+        "| pair | beams that hit each | judged on both |\n|---|---|---|\n" + rows
     )
 
 
@@ -75,7 +71,7 @@ def _firm(card: Scorecard, machine: str) -> str:
     if left_out["total"]:
         said.append(f"Left out of the fit by figure: {left_out['hit']} of {left_out['total']}.")
     else:
-        said.append("No search has left a figure out.")
+        said.append("No figure was left out of the fit.")
     if known.exclusive:
         pairs = ", ".join(f"{one} with {other}" for one, other in known.exclusive)
         said.append(f"Hardly any candidate of the search hits both of these: {pairs}.")
@@ -87,8 +83,9 @@ def row(card: Scorecard, one: Judged) -> str:
     comparison, share = one.comparison, card.share(one)
     notes = one.notes if one.verdict != "hit" or "diagnosis" in one.notes else ""
     found = "; ".join(part for part in (comparison.contradictory, comparison.not_computed, notes) if part)
+    what = comparison.statement.quantity.removesuffix(f": {str(comparison.printed).upper()}")
     return (
-        f"| {comparison.id} | {comparison.statement.figure} | {comparison.statement.quantity} "
+        f"| {comparison.id} | {comparison.statement.figure} | {what} "
         f"| {one.shown_printed} | {one.shown_value} | {one.verdict} "
         f"| {'-' if share is None else f'{share:.0%}'} | {found} |"
     )
