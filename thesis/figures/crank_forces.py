@@ -184,7 +184,7 @@ def friction_natures(end: int) -> tuple[tuple[float, str], ...]:
 
 def friction_flips(parts: Parts) -> Sequence[Finding]:
     """Does friction change the nature where printed, and where else?"""
-    found = []
+    found: list[Finding] = []
     pairs = zip(parts["without"]["crank_speed"], parts["without"]["nature"], parts["with"]["nature"], strict=True)
     changed: dict[str, list[str]] = {}
     for speed, one, other in pairs:
