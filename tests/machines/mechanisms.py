@@ -12,6 +12,7 @@ from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.nominal import revolution_of
 from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
 from chaosgym.machines.mechanism.spatial import SpatialMechanism
+from chaosgym.machines.mechanism.spatial_beam import spatial_beam_link
 from chaosgym.machines.slider_crank.connecting_rod import elastic_constants, rods_of
 
 BINS = 180
@@ -99,7 +100,7 @@ def four_bar(ground=3.0, crank=1.0, coupler=4.0, rocker=2.5, gravity=9.81, opene
 
 
 def thesis_crank_in_space(machine):
-    """Links and joints of a ``SliderCrank`` with a rigid rod, its motor at an angle."""
+    """Links and joints of a ``SliderCrank`` whose motor stands at an angle."""
     length, tilt, turned = machine.rod_length, math.radians(machine.motor_angle), math.radians(machine.gravity_angle)
     line = machine.density * math.pi * machine.rod_diameter**2 / 4.0 * length
     slender = line * length**2 / 12.0
@@ -112,6 +113,18 @@ def thesis_crank_in_space(machine):
         central = inertia - mass * (x**2 + y**2)
         return SpatialBody(mass, (0.0, central, central), (x, y, 0.0))
 
+    rod = spatial_link(
+        "rod",
+        {"start": (0.0, 0.0, 0.0), "end": (length, 0.0, 0.0)},
+        (SpatialBody(line, (0.0, slender, slender), (length / 2.0, 0.0, 0.0)), end("housing")),
+    )
+    if machine.rod == "flexible":
+        second = math.pi * machine.rod_diameter**4 / 64.0
+        steel = line / (machine.density * length), second, machine.youngs_modulus, machine.density
+        beam = Beam(length, *steel, machine.n_modes, fitted=machine.fitted_modes, sideways_moment=second)
+        rod = spatial_beam_link("rod", beam, {"start": (end("housing"),)}, along={"end": (end("yoke"),)})
+        damping = [elastic_constants(machine, one)[1] for one in rods_of(machine)]
+        rod = rod._replace(damping=np.diag(np.concatenate([damping[0], *(one[1:] for one in damping[1:])])))
     x, y = machine.slider_offset_along, machine.slider_offset_across
     roll = machine.slider_roll_inertia - machine.slider_mass * y**2
     pitch = machine.slider_pitch_inertia - machine.slider_mass * (x**2 + y**2)
@@ -125,11 +138,7 @@ def thesis_crank_in_space(machine):
             spatial_link(
                 "crank", {"shaft": none, "pin": (machine.crank_radius, 0.0, 0.0)}, orientation=(0.0, tilt, 0.0)
             ),
-            spatial_link(
-                "rod",
-                {"ball": none, "end": (length, 0.0, 0.0)},
-                (SpatialBody(line, (0.0, slender, slender), (length / 2.0, 0.0, 0.0)), end("housing")),
-            ),
+            rod,
             spatial_link("yoke", {"pivot": none}, (end("yoke"),)),
             spatial_link(
                 "slider", {"pivot": none}, (SpatialBody(machine.slider_mass, (roll, pitch, pitch), (x, y, 0.0)),)
@@ -149,7 +158,7 @@ def thesis_crank_in_space(machine):
                 "ball",
                 "spherical",
                 ("crank", "pin"),
-                ("rod", "ball"),
+                ("rod", "start"),
                 opened=ball,
                 first_axis=x_axis,
                 second_axis=x_axis,

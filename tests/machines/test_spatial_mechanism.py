@@ -183,7 +183,7 @@ def test_torque_of_the_drive_is_the_power_that_links_in_space_take():
     z = nominal(mechanism, revolution, np.arange(360) * 2.0 * np.pi / 360).z
     kinetic, potential = np.zeros(360), np.zeros(360)
     for link in mechanism.links:
-        places = mechanism.particles(z, link)[0]
+        places = link.masses.moved(z[:, mechanism.at[link.name]])
         kinetic += 0.5 * np.sum(link.mass * np.sum(derivatives(places)[0] ** 2, axis=-1), axis=-1)
         potential -= places @ mechanism.gravity @ link.mass
     coupler, rocker = (mechanism.point(z, (link, "ball"))[0] for link in ("coupler", "rocker"))

@@ -149,7 +149,9 @@ def test_what_can_not_be_in_space_is_refused_in_one_line(file_of):
     beam = (
         'beam = { length = "0.2 m", diameter = "6 mm", youngs_modulus = "2e11 Pa", density = "8e3 kg/m^3", modes = 2 }'
     )
-    refused("beam, which bends in the plane only", ('points = { ball = "0, 0, 0 mm", end = "235, 0, 0 mm" }', beam))
+    points = 'points = { ball = "0, 0, 0 mm", end = "235, 0, 0 mm" }'
+    refused("rod.body lacks at: a body of a beam", (points, beam))
+    refused("rod.body.at has a meaning at the ends of a beam", ('mass = "370.5 g"', 'mass = "370.5 g"\nat = "end"'))
 
 
 def test_what_belongs_to_space_is_refused_in_the_plane(tmp_path):

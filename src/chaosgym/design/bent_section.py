@@ -153,7 +153,7 @@ def stress_of_modes(machine: Machine, bending: Bending) -> Array:
 
 
 def fibres(machine: Machine, bending: Bending) -> Array:
-    """Stress (2, n) [Pa] at both outer fibres for each coordinate of a mechanism or each mode, without notch.
+    """Stress (f, n) [Pa] at the outer fibres for each coordinate of a mechanism or each mode, without notch.
 
     Raises
     ------

@@ -408,7 +408,7 @@ class Machine(ABC):
         return ()
 
     def fibre_stress(self, link: str, position: float, fibre: float) -> Array:
-        """Stress (2, n) [Pa] at both outer fibres of a link that bends, for each coordinate, pull above zero.
+        """Stress (f, n) [Pa] at the outer fibres of a link that bends, for each coordinate, pull above zero.
 
         Parameters
         ----------

@@ -47,6 +47,8 @@ class Beam(NamedTuple):
         Whether its length changes.
     fitted
         Modes that stand for all others, as inertia that the beam's end feels.
+    sideways_moment
+        Second moment [m^4] of the cross section for bending out of the plane of x and y, in space.
     """
 
     length: float
@@ -58,6 +60,90 @@ class Beam(NamedTuple):
     damping_ratio: float = 0.0
     stretches: bool = True
     fitted: int = 0
+    sideways_moment: float = 0.0
+
+
+class Bending(NamedTuple):
+    """Modes of a beam in a plane, pinned at both ends; p points of integration.
+
+    Attributes
+    ----------
+    squares : (m,)
+        Squares of their angular frequencies [rad^2/s^2]; modal masses are 1.
+    position, weight : (p,)
+        Points along the beam and the lengths [m] they stand for.
+    deflection, slope : (p, m)
+        Of the modes there.
+    end_slope : (2, m)
+        Slopes of the modes at start and end.
+    drawn : (p, m, m)
+        Integrals of products of the slopes up to each point.
+    whole : (m, m)
+        Likewise up to the end.
+    """
+
+    squares: Array
+    position: Array
+    weight: Array
+    deflection: Array
+    slope: Array
+    end_slope: Array
+    drawn: Array
+    whole: Array
+
+
+def bending_of(beam: Beam, second_moment: float, ends: tuple[tuple[float, float], ...]) -> Bending:
+    """Modes of a beam in a plane.
+
+    Parameters
+    ----------
+    beam
+        The beam.
+    second_moment
+        Of its cross section for bending in that plane [m^4].
+    ends
+        Of what turns with start and end: static moment along the beam [kg m], and moment of inertia about that end
+        [kg m^2].
+    """
+    from scipy.linalg import eigh
+
+    count = max(ELEMENTS, 2 * beam.modes)
+    lengths, line = np.full(count, beam.length / count), beam.density * beam.area
+    mass, stiffness = bending_matrices(lengths, beam.youngs_modulus * second_moment, line)
+    points, size = interpolation(lengths), 2 * count + 2
+    slopes = (1, size - 1)
+    for slope, (static, inertia) in zip(slopes, ends, strict=True):
+        mass[slope, slope] += inertia
+        # felt by fitted modes alone: the modes themselves do not move the ends
+        mass[slope, slope - 1] += static
+    inner = [i for i in range(size) if i not in (0, size - 2)]
+    at = np.ix_(inner, inner)
+    kept, modes = beam.modes, beam.modes + beam.fitted
+    squares, shapes = eigh(stiffness[at], mass[at], subset_by_index=[0, (len(inner) if beam.fitted else kept) - 1])
+    if beam.fitted:
+        straight = np.full(size, 1.0 / beam.length)
+        straight[::2] = np.linspace(0.0, 1.0, count + 1)
+        driven = shapes.T @ (mass @ straight)[inner]
+        angular, mix = fitted_modes(np.sqrt(squares[kept:]), driven[kept:], beam.fitted)
+        squares = np.concatenate([squares[:kept], angular**2])
+        shapes = np.hstack([shapes[:, :kept], shapes[:, kept:] @ mix])
+    basis = np.zeros((size, modes))
+    basis[inner] = shapes * np.where(shapes[0] < 0.0, -1.0, 1.0)
+    inside = points.slope @ basis
+    drawn, whole = _drawn_in(inside, beam.length / count)
+    return Bending(
+        squares, points.position, points.weight, points.deflection @ basis, inside, basis[list(slopes)], drawn, whole
+    )
+
+
+def elastic_of(beam: Beam, carried: float, planes: tuple[Bending, ...]) -> tuple[Array, Array]:
+    """Stiffness and damping (e,) of the stretch, with a mass [kg] at the end, and of the modes in some planes."""
+    line, spring = beam.density * beam.area, beam.youngs_modulus * beam.area / beam.length
+    squares = np.concatenate([plane.squares for plane in planes])
+    stretches = [spring] * int(beam.stretches)
+    inertia = np.concatenate([[line * beam.length / 3.0 + carried] * len(stretches), np.ones(len(squares))])
+    stiffness = np.concatenate([stretches, squares])
+    return stiffness, 2.0 * beam.damping_ratio * np.sqrt(stiffness * inertia)
 
 
 def beam_link(name: str, beam: Beam, ends: Mapping[str, tuple[Body, ...]], angle: float = 0.0) -> Link:
@@ -74,33 +160,13 @@ def beam_link(name: str, beam: Beam, ends: Mapping[str, tuple[Body, ...]], angle
     angle
         Rough turn [rad] at crank angle 0.
     """
-    from scipy.linalg import eigh
-
-    count = max(ELEMENTS, 2 * beam.modes)
-    lengths, line = np.full(count, beam.length / count), beam.density * beam.area
-    mass, stiffness = bending_matrices(lengths, beam.youngs_modulus * beam.second_moment, line)
-    points, size = interpolation(lengths), 2 * count + 2
-    slopes = {START: 1, END: size - 1}
-    for end, bodies in ends.items():
-        for body in bodies:
-            mass[slopes[end], slopes[end]] += body.inertia + body.mass * float(np.dot(body.centre, body.centre))
-            # felt by fitted modes alone: the modes themselves do not move the ends
-            mass[slopes[end], slopes[end] - 1] += body.mass * body.centre[0]
-    inner = [i for i in range(size) if i not in (0, size - 2)]
-    at = np.ix_(inner, inner)
-    kept, modes = beam.modes, beam.modes + beam.fitted
-    squares, shapes = eigh(stiffness[at], mass[at], subset_by_index=[0, (len(inner) if beam.fitted else kept) - 1])
-    if beam.fitted:
-        straight = np.full(size, 1.0 / beam.length)
-        straight[::2] = np.linspace(0.0, 1.0, count + 1)
-        driven = shapes.T @ (mass @ straight)[inner]
-        angular, mix = fitted_modes(np.sqrt(squares[kept:]), driven[kept:], beam.fitted)
-        squares = np.concatenate([squares[:kept], angular**2])
-        shapes = np.hstack([shapes[:, :kept], shapes[:, kept:] @ mix])
-    basis = np.zeros((size, modes))
-    basis[inner] = shapes * np.where(shapes[0] < 0.0, -1.0, 1.0)
-    short, whole = _drawn_in(points.slope @ basis, beam.length / count)
-    first = int(beam.stretches)
+    turning = []
+    for end in (START, END):
+        bodies = ends.get(end, ())
+        about = sum(body.inertia + body.mass * float(np.dot(body.centre, body.centre)) for body in bodies)
+        turning.append((sum(body.mass * body.centre[0] for body in bodies), about))
+    bending = bending_of(beam, beam.second_moment, tuple(turning))
+    first, modes = int(beam.stretches), beam.modes + beam.fitted
     elastic = first + modes
 
     def places(along: Array, across: Array, slope: Array, drawn: Array) -> Places:
@@ -112,19 +178,17 @@ def beam_link(name: str, beam: Beam, ends: Mapping[str, tuple[Body, ...]], angle
         full = np.concatenate([np.zeros((len(slope), first)), slope], axis=1)
         return Places(np.stack([along, np.zeros_like(along)], axis=1), shape, full, curve)
 
-    none = np.zeros((len(points.position), modes))
-    bar = places(points.position, points.deflection @ basis, none, short)
-    named, masses, weights, inertias = {}, [bar], list(line * points.weight), [0.0] * len(points.position)
-    for end, place in ((START, 0.0), (END, beam.length)):
-        slope = basis[slopes[end]][None]
-        named[end] = places(np.array([place]), np.zeros((1, modes)), slope, whole[None] * float(end == END))
+    none = np.zeros_like(bending.slope)
+    bar = places(bending.position, bending.deflection, none, bending.drawn)
+    named, masses, weights = {}, [bar], list(beam.density * beam.area * bending.weight)
+    inertias = [0.0] * len(weights)
+    for end, place, slope in ((START, 0.0, bending.end_slope[:1]), (END, beam.length, bending.end_slope[1:])):
+        named[end] = places(np.array([place]), none[:1], slope, bending.whole[None] * float(end == END))
         for body in ends.get(end, ()):
             masses.append(_offset(named[end], np.array(body.centre)))
             weights.append(body.mass)
             inertias.append(body.inertia)
-    spring = beam.youngs_modulus * beam.area / beam.length
-    carried = line * beam.length / 3.0 + sum(body.mass for body in ends.get(END, ()))
-    damping = [2.0 * beam.damping_ratio * math.sqrt(spring * carried)] * first
+    stiffness, damping = elastic_of(beam, sum(body.mass for body in ends.get(END, ())), (bending,))
     return Link(
         name,
         named,
@@ -133,8 +197,8 @@ def beam_link(name: str, beam: Beam, ends: Mapping[str, tuple[Body, ...]], angle
         np.array(inertias),
         angle,
         (STRETCH,) * first + tuple(f"mode {k + 1}" for k in range(modes)),
-        np.diag([spring] * first + squares.tolist()),
-        np.diag([*damping, *(2.0 * beam.damping_ratio * np.sqrt(squares))]),
+        np.diag(stiffness),
+        np.diag(damping),
         beam,
     )
 
@@ -155,12 +219,25 @@ def fibre_stress(link: Link, beam: Beam, position: float, fibre: float) -> Array
     fibre
         Distance [m] of the outer fibres from the neutral one.
     """
-    first, length = int(beam.stretches), beam.length
-    pull = np.zeros(len(link.elastic))
-    pull[:first] = beam.youngs_modulus / length
-    squares, line = np.diag(link.stiffness)[first:], beam.density * beam.area
+    first = int(beam.stretches)
+    slopes = np.stack([link.points[end].slope[0, first:] for end in (START, END)])
     curvature = np.zeros(len(link.elastic))
-    for k, b in enumerate((line * squares / (beam.youngs_modulus * beam.second_moment)) ** 0.25):
+    curvature[first:] = curvatures(beam, beam.second_moment, np.diag(link.stiffness)[first:], slopes, position)
+    return pull_of(beam, len(curvature)) + beam.youngs_modulus * fibre * np.outer([-1.0, 1.0], curvature)
+
+
+def pull_of(beam: Beam, elastic: int) -> Array:
+    """Stress (e,) [Pa] of the whole section for each elastic coordinate: that of the stretch."""
+    pull = np.zeros(elastic)
+    pull[: int(beam.stretches)] = beam.youngs_modulus / beam.length
+    return pull
+
+
+def curvatures(beam: Beam, second_moment: float, squares: Array, slopes: Array, position: float) -> Array:
+    """Curvature (m,) [1/m] of modes at a section [m], of their squares (m,) and slopes (2, m) at start and end."""
+    length, line = beam.length, beam.density * beam.area
+    found = np.zeros(len(squares))
+    for k, b in enumerate((line * squares / (beam.youngs_modulus * second_moment)) ** 0.25):
         cosine, sine, fade = math.cos(b * length), math.sin(b * length), math.exp(-b * length)
         ends = [
             [1.0, 0.0, 1.0, fade],
@@ -168,11 +245,10 @@ def fibre_stress(link: Link, beam: Beam, position: float, fibre: float) -> Array
             [0.0, b, -b, b * fade],
             [-b * sine, b * cosine, -b * fade, b],
         ]
-        slopes = [link.points[end].slope[0, first + k] for end in (START, END)]
-        weights = np.linalg.solve(np.array(ends), np.array([0.0, 0.0, *slopes]))
+        weights = np.linalg.solve(np.array(ends), np.array([0.0, 0.0, *slopes[:, k]]))
         shapes = [-math.cos(b * position), -math.sin(b * position), math.exp(-b * position)]
-        curvature[first + k] = b**2 * float(weights @ [*shapes, math.exp(-b * (length - position))])
-    return pull + beam.youngs_modulus * fibre * np.outer([-1.0, 1.0], curvature)
+        found[k] = b**2 * float(weights @ [*shapes, math.exp(-b * (length - position))])
+    return found
 
 
 def _drawn_in(slope: Array, length: float) -> tuple[Array, Array]:

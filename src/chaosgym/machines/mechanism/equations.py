@@ -15,7 +15,7 @@ and joints, the geometric stiffness is
 Derivatives by the angle are those of the Fourier series through a uniform grid. Where that is too coarse it is refined.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.links import Link, inertia_of, rotation
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism, Spring
 from chaosgym.machines.mechanism.nominal import Nominal, Revolution, nominal
+from chaosgym.machines.mechanism.space import spatial_inertia_of
 from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.periodic import derivatives
 
@@ -218,7 +219,7 @@ class _Sums:
     def add_link(self, link: Link) -> None:
         """Add the mass of a link, in the plane or in space."""
         if len(link.mass):
-            (self.add_particles if isinstance(self.mechanism, SpatialMechanism) else self.add_masses)(link)
+            (self.add_spatial if isinstance(self.mechanism, SpatialMechanism) else self.add_masses)(link)
 
     def add_masses(self, link: Link) -> None:
         """Add the particles of a link and what turns with them, in axes of the link."""
@@ -250,30 +251,39 @@ class _Sums:
         curved = mass @ twice + 2.0 * rate * (inertia.gyroscopic @ once)
         self.stiffness[2] += transposed @ (curved + spin * turned - rate**2 * centrifugal)
 
-    def add_particles(self, link: Link) -> None:
-        """Add the particles of a link in space."""
-        mechanism: Any = self.mechanism
-        own = self.mechanism.at[link.name]
-        places, gradient = mechanism.particles(self.found.z, link)
-        acceleration = np.stack([np.broadcast_to(-np.asarray(mechanism.gravity), places.shape), derivatives(places)[1]])
-        pushed = link.mass[:, None] * acceleration
-        powers = [0, 2]
-        self.pull[powers, ..., own] += np.einsum("pbki,bkiz->pbz", pushed, gradient)
+    def add_spatial(self, link: Link) -> None:
+        """Add the particles of a link in space, in axes of the link."""
+        own, inertia = self.mechanism.at[link.name], spatial_inertia_of(link)
+        turn, count = link.masses.lie.turn(self.found.z[:, own]), len(self.theta)
+        back = np.swapaxes(turn, -1, -2)
+        spun, swung = (back @ each for each in derivatives(turn))
+        place = self.found.z[:, own.start : own.start + 3]
+        pushed = np.zeros((2, count, 12))
+        pushed[0, :, :3] = back @ -np.asarray(self.mechanism.gravity)
+        pushed[1, :, :3] = (back @ derivatives(place)[1][:, :, None])[..., 0]
+        pushed[1, :, 3:] = swung.reshape(count, 9)
+        powers, rigid = [0, 2], (own.start, own.start + 3)
+        pull = pushed @ inertia.pull
+        for start in (0, 3):
+            pull[..., start : start + 3] = (turn @ pull[..., start : start + 3, None])[..., 0]
+        self.pull[powers, ..., own] += pull
         if not self.matrices:
             return
-        for power, forces in zip(powers, pushed, strict=True):
-            mechanism.add_particles(self.found.z, link, forces, self.bent[power])
-        motion = gradient.reshape(len(places), -1, 6) @ self.compatible[:, own]
+        motion = self.compatible[:, own].copy()
+        for start, there in zip((0, 3), rigid, strict=True):
+            motion[:, start : start + 3] = back @ self.compatible[:, there : there + 3]
         once, twice = derivatives(motion)
-        weighted = np.swapaxes(np.repeat(link.mass, 3)[:, None] * motion, -1, -2)
-        self.mass += weighted @ motion
-        self.damping[1] += 2.0 * weighted @ once
-        self.stiffness[2] += weighted @ twice
+        mass, transposed = np.einsum("iizy->zy", inertia.moments), np.swapaxes(motion, -1, -2)
+        spinning, swinging = (np.tensordot(each, inertia.moments, 2) for each in (spun, swung))
+        self.mass += transposed @ (mass @ motion)
+        self.damping[1] += 2.0 * transposed @ (mass @ once + spinning @ motion)
+        self.stiffness[2] += transposed @ (mass @ twice + 2.0 * spinning @ once + swinging @ motion)
+        self.stiffness[powers] += transposed @ np.tensordot(pushed, inertia.bent, 1) @ motion
 
     def add_elastic(self, link: Link) -> None:
         """Add stiffness and damping of the elastic coordinates of a link, which are the last of p."""
         own = self.mechanism.at[link.name]
-        part = self.compatible[:, own.start + 3 : own.stop]
+        part = self.compatible[:, own.start + link.rigid : own.stop]
         self.stiffness[0] += np.swapaxes(part, -1, -2) @ link.stiffness @ part
         self.damping[0] += np.swapaxes(part, -1, -2) @ link.damping @ part
 

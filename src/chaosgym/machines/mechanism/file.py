@@ -12,11 +12,13 @@ from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
 from chaosgym.machines.file_keys import needed
 from chaosgym.machines.machine import TaskDefaults
-from chaosgym.machines.mechanism.beam import END, START, Beam, beam_link
+from chaosgym.machines.mechanism.beam import beam_link
 from chaosgym.machines.mechanism.clearance import Clearance, opened_by, surface_fields
 from chaosgym.machines.mechanism.file_parts import (
     LONGEST,
     axes_of_joint,
+    beam_of,
+    bodies_at_ends,
     body_of,
     check_kind,
     in_space,
@@ -38,9 +40,6 @@ from chaosgym.machines.stated import range_of, reduced, tolerances_of
 
 STILL = 1e-6
 """Stroke of a piston, as a share of the mechanism's length, below which it stands still."""
-
-MOST_MODES = 12
-"""Modes that a beam may keep."""
 
 
 def tables_of(values: Mapping[str, Any], _folder: Path) -> dict[str, Any]:
@@ -100,47 +99,16 @@ def _link_table(name: str, table: Any) -> dict[str, Any]:
     return values
 
 
-def _section(where: str, row: Mapping[str, Any]) -> tuple[float, float]:
-    """Area and second moment of the cross section of a beam."""
-    if "diameter" in row:
-        if "width" in row or "height" in row:
-            raise ParameterError(f"{where} has a diameter and a width or height; allowed: one of them")
-        d = number(f"{where}.diameter", row["diameter"], 1e-5, 10.0, "m")
-        return math.pi * d**2 / 4.0, math.pi * d**4 / 64.0
-    sides = zip(("width", "height"), needed(where, row, "width", "height"), strict=True)
-    b, h = (number(f"{where}.{name}", side, 1e-5, 10.0, "m") for name, side in sides)
-    return b * h, b * h**3 / 12.0
-
-
-def _beam(where: str, row: Mapping[str, Any]) -> Beam:
-    length, modulus, density, modes = needed(where, row, "length", "youngs_modulus", "density", "modes")
-    if not 1 <= modes <= MOST_MODES:
-        raise ParameterError(f"{where}.modes = {modes} is out of range; allowed: 1 to {MOST_MODES}")
-    return Beam(
-        number(f"{where}.length", length, 1e-3, 1e3, "m"),
-        *_section(where, row),
-        number(f"{where}.youngs_modulus", modulus, 1e5, 1e13, "Pa"),
-        number(f"{where}.density", density, 1.0, 1e5, "kg/m^3"),
-        modes,
-        number(f"{where}.damping_ratio", row.get("damping_ratio", 0.0), 0.0, 10.0),
-        row.get("stretch", True),
-    )
-
-
 def _link(name: str, table: Mapping[str, Any]) -> Link:
     for key in ("orientation", "axis"):
         if key in table:
             raise ParameterError(f"link.{name}.{key} has a meaning in space only; allowed: angle, or points with a z")
     where, angle = f"link.{name}.body", math.radians(table.get("angle", 0.0))
-    bodies = [(row.get("at"), body_of(where, row)) for row in table["body"]]
-    if "beam" not in table:
-        if any(at for at, _ in bodies):
-            raise ParameterError(f"{where}.at has a meaning at the ends of a beam only; leave it out")
-        return rigid_link(name, table["points"], tuple(body for _, body in bodies), angle)
-    if not all(at for at, _ in bodies):
-        raise ParameterError(f"{where} lacks at: a body of a beam is at its 'start' or its 'end'")
-    ends = {end: tuple(body for at, body in bodies if at == end) for end in (START, END)}
-    return beam_link(name, _beam(f"link.{name}.beam", table["beam"]), ends, angle)
+    bodies = [body_of(where, row) for row in table["body"]]
+    ends = bodies_at_ends(where, table, bodies)
+    if ends is None:
+        return rigid_link(name, table["points"], tuple(bodies), angle)
+    return beam_link(name, beam_of(f"link.{name}.beam", table["beam"]), ends, angle)
 
 
 def _ends(where: str, row: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -1,20 +1,70 @@
 """Parts of a mechanism's file that differ in the plane and in space: points, bodies, links, axes of joints."""
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.file_keys import needed
+from chaosgym.machines.mechanism.beam import END, START, Beam
 from chaosgym.machines.mechanism.joints import GROUND, KINDS, SPATIAL_KINDS, Joint
 from chaosgym.machines.mechanism.links import Body, Link
 from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
+from chaosgym.machines.mechanism.spatial_beam import spatial_beam_link
 from chaosgym.machines.numbers import number
+
+T = TypeVar("T")
+
+MOST_MODES = 12
+"""Modes that a beam may keep, in each plane."""
 
 HEAVIEST, LONGEST = 1e9, 1e6
 """Most mass [kg] and distance [m] that a file may state."""
+
+
+def _section(where: str, row: Mapping[str, Any]) -> tuple[float, float, float]:
+    """Area of the cross section of a beam, and its second moments for bending along y and along z."""
+    if "diameter" in row:
+        if "width" in row or "height" in row:
+            raise ParameterError(f"{where} has a diameter and a width or height; allowed: one of them")
+        d = number(f"{where}.diameter", row["diameter"], 1e-5, 10.0, "m")
+        return math.pi * d**2 / 4.0, math.pi * d**4 / 64.0, math.pi * d**4 / 64.0
+    sides = zip(("width", "height"), needed(where, row, "width", "height"), strict=True)
+    b, h = (number(f"{where}.{name}", side, 1e-5, 10.0, "m") for name, side in sides)
+    return b * h, b * h**3 / 12.0, h * b**3 / 12.0
+
+
+def beam_of(where: str, row: Mapping[str, Any]) -> Beam:
+    """A beam."""
+    length, modulus, density, modes = needed(where, row, "length", "youngs_modulus", "density", "modes")
+    if not 1 <= modes <= MOST_MODES:
+        raise ParameterError(f"{where}.modes = {modes} is out of range; allowed: 1 to {MOST_MODES}")
+    area, second, sideways = _section(where, row)
+    return Beam(
+        number(f"{where}.length", length, 1e-3, 1e3, "m"),
+        area,
+        second,
+        number(f"{where}.youngs_modulus", modulus, 1e5, 1e13, "Pa"),
+        number(f"{where}.density", density, 1.0, 1e5, "kg/m^3"),
+        modes,
+        number(f"{where}.damping_ratio", row.get("damping_ratio", 0.0), 0.0, 10.0),
+        row.get("stretch", True),
+        sideways_moment=sideways,
+    )
+
+
+def bodies_at_ends(where: str, table: Mapping[str, Any], bodies: Sequence[T]) -> dict[str, tuple[T, ...]] | None:
+    """Bodies of a link at either end of its beam; None if it is rigid."""
+    places = [row.get("at") for row in table["body"]]
+    if "beam" not in table:
+        if any(places):
+            raise ParameterError(f"{where}.at has a meaning at the ends of a beam only; leave it out")
+        return None
+    if not all(places):
+        raise ParameterError(f"{where} lacks at: a body of a beam is at its 'start' or its 'end'")
+    return {end: tuple(body for at, body in zip(places, bodies, strict=True) if at == end) for end in (START, END)}
 
 
 def place_of(where: str, values: Any) -> tuple[float, ...]:
@@ -59,8 +109,6 @@ def in_space(place: tuple[float, ...]) -> tuple[float, float, float]:
 
 
 def _spatial_body(where: str, row: Mapping[str, Any]) -> SpatialBody:
-    if "at" in row:
-        raise ParameterError(f"{where}.at has a meaning at the ends of a beam only; leave it out")
     along, across, sideways = _inertia(where, row, 3)
     centre = in_space(place_of(f"{where}.centre", row.get("centre", np.zeros(3))))
     body = SpatialBody(_mass(where, row), (along, across, sideways), centre)
@@ -79,16 +127,18 @@ def spatial_links(tables: Mapping[str, Any], joints: list[Joint]) -> tuple[Link,
     found = []
     for name, table in tables.items():
         where = f"link.{name}"
-        if "beam" in table:
-            raise ParameterError(f"{where} has a beam, which bends in the plane only; allowed in space: rigid links")
         if "angle" in table:
             raise ParameterError(f"{where}.angle has a meaning in the plane only; allowed in space: orientation")
         turns = _three(f"{where}.orientation", table.get("orientation", np.zeros(3)))
         bodies = tuple(_spatial_body(f"{where}.body", row) for row in table["body"])
+        ends = bodies_at_ends(f"{where}.body", table, bodies)
         points = {point: in_space(place) for point, place in table["points"].items()}
         x, y, z = (math.radians(turn) for turn in turns)
         axis = _axis(f"{where}.axis", table.get("axis", axes.get(name, (0.0, 0.0, 1.0))))
-        found.append(spatial_link(name, points, bodies, (x, y, z), axis))
+        if ends is None:
+            found.append(spatial_link(name, points, bodies, (x, y, z), axis))
+        else:
+            found.append(spatial_beam_link(name, beam_of(f"{where}.beam", table["beam"]), ends, (x, y, z), axis))
     return tuple(found)
 
 

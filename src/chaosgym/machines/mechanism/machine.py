@@ -18,9 +18,11 @@ from chaosgym.machines.mechanism.beam import fibre_stress
 from chaosgym.machines.mechanism.clearance import ROUND, surface_fields
 from chaosgym.machines.mechanism.equations import SmallMotion, crank_inertia, drive_torque, loads, sliding, small_motion
 from chaosgym.machines.mechanism.joints import ACROSS, ALONG, PITCH, PLACES, SIDEWAYS, TURN, YAW, Joint
+from chaosgym.machines.mechanism.links import RIGID
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism
 from chaosgym.machines.mechanism.motor import MOTOR_FIELDS, Load, Motor, MotorRun, turn
 from chaosgym.machines.mechanism.nominal import Revolution, places, revolution_of
+from chaosgym.machines.mechanism.spatial_beam import fibre_stress_around
 from chaosgym.machines.numbers import number
 from chaosgym.machines.parameters import assumed, parameter
 
@@ -319,7 +321,7 @@ class MechanismMachine(BinnedMachine):
         return tuple(link.name for link in self.mechanism.links if link.beam is not None)
 
     def fibre_stress(self, link: str, position: float, fibre: float) -> Array:
-        """Stress (2, n) at the outer fibres of a link; see ``Machine.fibre_stress``."""
+        """Stress at the outer fibres of a link, two or in space 16 around it; see ``Machine.fibre_stress``."""
         if link not in self.bending_links:
             bend = ", ".join(self.bending_links) or "a link with a [link.NAME.beam]"
             raise ParameterError(f"link {link!r} does not bend; allowed: {bend}")
@@ -330,8 +332,9 @@ class MechanismMachine(BinnedMachine):
                 f"section at {position:g} m is outside the link {link}; allowed: 0 to {beam.length:g} m"
             )
         names = [f"{link} {name}" for name in found.elastic]
-        stress = np.zeros((2, len(self.degrees_of_freedom)))
-        stress[:, [self.degrees_of_freedom.index(name) for name in names]] = fibre_stress(found, beam, position, fibre)
+        told = (fibre_stress if found.rigid == RIGID else fibre_stress_around)(found, beam, position, fibre)
+        stress = np.zeros((len(told), len(self.degrees_of_freedom)))
+        stress[:, [self.degrees_of_freedom.index(name) for name in names]] = told
         return stress
 
     @property

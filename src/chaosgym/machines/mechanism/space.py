@@ -122,18 +122,124 @@ def _swing(first: Array, second: Array) -> Array:
 
 
 class SpatialPlaces(NamedTuple):
-    """k points (k, 3) [m] in axes of a link, and how it lies."""
+    """k points of a link with e elastic coordinates q.
+
+    A point lies at rho + N q + 1/2 q C q in axes of the link. What is fixed to it turns by exp(S q), then by 1/2 q T q
+    about x: the twist of a line that bends in two planes and carries no torque.
+
+    Attributes
+    ----------
+    place : (k, 3)
+        rho [m].
+    lie
+        How the link lies.
+    shape, slope : (k, 3, e)
+        N and S.
+    curve : (k, 3, e, e)
+        C.
+    twist : (k, e, e)
+        T.
+    """
 
     place: Array
     lie: Lie
-
-    def arms(self, z: Array) -> Array:
-        """Vectors (B, k, 3) from the origin of the link to the points, in axes of the ground."""
-        return np.asarray(self.place @ np.swapaxes(self.lie.turn(z), -1, -2))
+    shape: Array
+    slope: Array
+    curve: Array
+    twist: Array
 
     def moved(self, z: Array) -> Array:
-        """Places on the ground (B, k, 3) at coordinates z (B, 6)."""
-        return np.asarray(z[:, None, :3] + self.arms(z))
+        """Places on the ground (B, k, 3) at coordinates z (B, 6 + e), whose elastic ones are zero."""
+        return np.asarray(z[:, None, :3] + self.place @ np.swapaxes(self.lie.turn(z), -1, -2))
+
+    def turned(self, vector: Array) -> tuple[Array, Array]:
+        """First and second derivative (3, e) and (3, e, e) by q of a vector (3,) that turns with the first point."""
+        slope = self.slope[0].T
+        once = cross(slope, vector)
+        twice = cross(slope[:, None], once[None])
+        return once.T, np.moveaxis(0.5 * (twice + np.swapaxes(twice, 0, 1)), -1, 0) + np.multiply.outer(
+            np.array([0.0, -vector[2], vector[1]]), self.twist[0]
+        )
+
+    def beside(self, arm: Array) -> "SpatialPlaces":
+        """Points away by ``arm`` (k, 3) from the first one, with which they turn."""
+        parts = [self.turned(each) for each in arm]
+        return SpatialPlaces(
+            self.place + arm,
+            self.lie,
+            np.stack([self.shape[0] + once for once, _ in parts]),
+            np.repeat(self.slope, len(arm), axis=0),
+            np.stack([self.curve[0] + twice for _, twice in parts]),
+            np.repeat(self.twist, len(arm), axis=0),
+        )
+
+
+def spatially_fixed(place: Array, lie: Lie, elastic: int = 0) -> SpatialPlaces:
+    """Points (k, 3) that stand still in a link with some elastic coordinates."""
+    place = np.asarray(place, dtype=float).reshape(-1, 3)
+    shape = np.zeros((*place.shape, elastic))
+    return SpatialPlaces(
+        place, lie, shape, shape, np.zeros((*shape.shape, elastic)), np.zeros((len(place), elastic, elastic))
+    )
+
+
+def spatially_together(some: list[SpatialPlaces]) -> SpatialPlaces:
+    """Points of one link in a row."""
+    place, lie, *rest = zip(*some, strict=True)
+    return SpatialPlaces(np.concatenate(place), lie[0], *map(np.concatenate, rest))
+
+
+class SpatialInertia(NamedTuple):
+    """Inertia of a link with 6 + e coordinates in its own axes, where it does not depend on the crank angle.
+
+    In these axes a particle moves by H per unit coordinate, and is accelerated by a of twelve kinds: 1 along each axis,
+    and along each axis in proportion to each part of its place.
+
+    Attributes
+    ----------
+    moments : (3, 3, z, z)
+        Sum m H_i^T H_j of parts i and j of the motions.
+    pull : (12, z)
+        Sum m H^T a.
+    bent : (12, z, z)
+        Second derivatives of the places times m a.
+    """
+
+    moments: Array
+    pull: Array
+    bent: Array
+
+
+def spatial_inertia_of(link: Link) -> SpatialInertia:
+    """Inertia of a link in its own axes."""
+    places, mass = link.masses, link.mass
+    rho, elastic = places.place, len(link.elastic)
+    count, size = len(mass), RIGID + elastic
+    motion = np.zeros((count, 3, size))
+    motion[:, :, :3], motion[:, :, 3:6], motion[:, :, 6:] = np.eye(3), -skew(rho), places.shape
+    carried = (mass[:, None] * motion.reshape(count, -1)).T @ motion.reshape(count, -1)
+    moments = np.moveaxis(carried.reshape(3, size, 3, size), 1, 2)
+    # factors of the twelve accelerations, whose direction is the last index but one
+    weight = mass[:, None] * np.concatenate([np.ones((count, 1)), rho], axis=1)
+    pull = np.einsum("kf,kiz->fiz", weight, motion)
+    bent = np.zeros((4, 3, size, size))
+    product = np.einsum("kf,kj->fj", weight, rho)
+    for f in range(4):
+        for i in range(3):
+            pressed = np.outer(np.eye(3)[i], product[f])
+            bent[f, i, 3:6, 3:6] = 0.5 * (pressed + pressed.T) - np.trace(pressed) * np.eye(3)
+    if elastic:
+        moved = np.einsum("kf,kie->fie", weight, places.shape)
+        for i in range(3):
+            # a turn d moves what bends by d x N q
+            bent[:, i, 3:6, 6:] = np.einsum("ij,fje->fie", skew(np.eye(3)[i]).T, moved)
+            bent[:, i, 6:, 3:6] = np.swapaxes(bent[:, i, 3:6, 6:], -1, -2)
+        bent[:, :, 6:, 6:] = np.einsum("kf,kipq->fipq", weight, places.curve)
+    return SpatialInertia(
+        moments,
+        np.concatenate([pull[0], np.swapaxes(pull[1:], 0, 1).reshape(9, size)]),
+        np.concatenate([bent[0], np.swapaxes(bent[1:], 0, 1).reshape(9, size, size)]),
+    )
 
 
 class SpatialBody(NamedTuple):
@@ -162,6 +268,15 @@ class SpatialBody(NamedTuple):
         return np.array(self.centre) + arms, np.concatenate([[self.mass - outer.sum()], outer])
 
 
+def lying(orientation: Vector, axis: Vector) -> Lie:
+    """How a link lies that is turned about x, then y, then z of the ground, and may turn right round an own axis."""
+    own = axes_of(np.array(axis))
+    lies = np.eye(3)
+    for unit, angle in zip(np.eye(3), orientation, strict=True):
+        lies = turned_by(angle * unit[None])[0] @ lies
+    return Lie(lies @ own, own.T)
+
+
 def spatial_link(
     name: str,
     points: dict[str, Vector],
@@ -184,13 +299,9 @@ def spatial_link(
     axis
         Own axis about which it may turn right round.
     """
-    own = axes_of(np.array(axis))
-    lies = np.eye(3)
-    for unit, angle in zip(np.eye(3), orientation, strict=True):
-        lies = turned_by(angle * unit[None])[0] @ lies
-    lie = Lie(lies @ own, own.T)
+    lie = lying(orientation, axis)
     parts = [body.particles() for body in bodies]
     place = np.concatenate([np.zeros((0, 3)), *(part[0] for part in parts)])
     mass = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
-    named = {point: SpatialPlaces(np.array([at]), lie) for point, at in points.items()}
-    return Link(name, named, SpatialPlaces(place, lie), mass, np.zeros(len(mass)), rigid=RIGID)
+    named = {point: spatially_fixed(np.array(at), lie) for point, at in points.items()}
+    return Link(name, named, spatially_fixed(place, lie), mass, np.zeros(len(mass)), rigid=RIGID)

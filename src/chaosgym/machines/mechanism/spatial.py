@@ -6,26 +6,24 @@ them is the scalar product of two vectors,
 
     c = a . v,    v = x_2 + R_2 s - x_1 - R_1 r    of a place,    v = R_2 s    of a turn
 
-with an axis a that turns with a link, points s and r of the second and the first link, or an axis s of the second.
+with an axis a that turns with a link, points s and r of the second and the first link, or an axis s of the second. At
+the end of a beam a point moves as the beam bends, and an axis turns with the end.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
-from chaosgym.machines.mechanism.joints import ALONG, GROUND, PITCH, PLACES, ROLL, SKEW, YAW, Joint
-from chaosgym.machines.mechanism.links import Link
+from chaosgym.machines.mechanism.joints import ALONG, GROUND, PLACES, Joint
 from chaosgym.machines.mechanism.mechanism import Mechanism
-from chaosgym.machines.mechanism.space import RIGID, Lie, SpatialPlaces, axes_of, cross, skew
-
-TURNS = {ROLL: (1, 2, 1.0), YAW: (0, 2, -1.0), PITCH: (0, 1, 1.0), SKEW: (0, 0, 1.0)}
-"""Axis of the second link, that of the first and sign, whose product is a small turn; it is zero in the middle."""
+from chaosgym.machines.mechanism.space import RIGID, Lie, cross, skew, spatially_fixed
+from chaosgym.machines.mechanism.spatial_rows import TURNS, Carried, Rows, Vectors, axes_of_joint
 
 MOST_SWING = 0.97 * np.pi
 """Angle [rad] by which a link may swing about axes across its own."""
@@ -33,42 +31,9 @@ MOST_SWING = 0.97 * np.pi
 STILL = Lie(np.eye(3), np.eye(3))
 
 
-class _Rows(NamedTuple):
-    """Constants of R functions of joints.
-
-    ``frame``, ``first`` and ``second`` (R,) numbers of the links with which a, r and s turn, the ground behind all;
-    ``axis``, ``start`` and ``end`` (R, 3) these vectors in axes of their links; ``moves`` (R, 1) 1 of a place, 0 of a
-    turn.
-    """
-
-    frame: NDArray[np.int64]
-    first: NDArray[np.int64]
-    second: NDArray[np.int64]
-    axis: Array
-    start: Array
-    end: Array
-    moves: Array
-
-
-class _Vectors(NamedTuple):
-    """a, R_1 r, R_2 s and v of R functions in axes of the ground, (B, R, 3)."""
-
-    axis: Array
-    start: Array
-    end: Array
-    apart: Array
-
-
-def axes_of_joint(axis: tuple[float, ...]) -> Array:
-    """Axes (3, 3) of a joint, in columns: its own, across it as near to y as may be (else to z), and sideways."""
-    unit = np.array(axis) / np.linalg.norm(axis)
-    wanted = np.eye(3)[1] if abs(unit[1]) < 0.9 else np.eye(3)[2]
-    return np.roll(axes_of(unit, wanted), 1, axis=1)
-
-
 @dataclass(frozen=True, eq=False)
 class SpatialMechanism(Mechanism):
-    """Rigid links in space with mobility one, whose drive turns a revolute joint on the ground; see ``Mechanism``."""
+    """Links in space with mobility one, whose drive turns a revolute joint on the ground; see ``Mechanism``."""
 
     dimensions: ClassVar[int] = 3
     motions_of_a_link: ClassVar[int] = RIGID
@@ -85,7 +50,7 @@ class SpatialMechanism(Mechanism):
         return super().places(end)
 
     def _still(self, point: str) -> Any:
-        return SpatialPlaces(np.array([self.ground[point]]), STILL)
+        return spatially_fixed(np.array(self.ground[point]), STILL)
 
     def _number(self, name: str) -> int:
         """Number of a link, or of the ground behind all."""
@@ -93,7 +58,24 @@ class SpatialMechanism(Mechanism):
 
     def _spin(self, link: int) -> slice:
         """Columns of the turns of a link."""
-        return slice(RIGID * link + 3, RIGID * (link + 1))
+        start = self.at[self.links[link].name].start
+        return slice(start + 3, start + RIGID)
+
+    @cached_property
+    def _rigid(self) -> NDArray[np.int64]:
+        """Columns (links, 6) of places and turns of the links."""
+        return np.array([own.start for own in self.at.values()])[:, None] + np.arange(RIGID)
+
+    @cached_property
+    def _elastic(self) -> NDArray[np.int64]:
+        """Columns (E,) of the elastic coordinates of all links."""
+        every = [np.arange(own.start + RIGID, own.stop) for own in self.at.values()]
+        return np.concatenate(every).astype(np.int64)
+
+    def _bends(self, link: int) -> NDArray[np.bool_]:
+        """Which of the elastic coordinates (E,) are those of a link."""
+        own = self.at[self.links[link].name]
+        return np.asarray((self._elastic >= own.start) & (self._elastic < own.stop))
 
     @cached_property
     def _lies(self) -> Lie:
@@ -102,21 +84,28 @@ class SpatialMechanism(Mechanism):
         return Lie(np.stack([lie.before for lie in lies]), np.stack([lie.after for lie in lies]))
 
     def _each(self, z: Array) -> Array:
-        """Coordinates (B, links + 1, 6) of every link, and of the ground."""
-        return np.concatenate([z.reshape(len(z), -1, RIGID), np.zeros((len(z), 1, RIGID))], axis=1)
+        """Coordinates (B, links + 1, 6) of every link, and of the ground, apart from elastic ones."""
+        return np.concatenate([z[:, self._rigid], np.zeros((len(z), 1, RIGID))], axis=1)
+
+    def _all(self, each: Array, elastic: Array) -> Array:
+        """All coordinates (B, z) of those of every link and the elastic ones."""
+        z = np.empty((len(each), self.size))
+        z[:, self._rigid], z[:, self._elastic] = each[:, :-1], elastic
+        return z
 
     def moved(self, z: Array, step: Array) -> Array:
         """Coordinates after a step in which links turn about the axes of the world."""
-        return self._lies.moved(self._each(z), self._each(step))[:, :-1].reshape(z.shape)
+        bent = (z + step)[:, self._elastic]
+        return self._all(self._lies.moved(self._each(z), self._each(step)), bent)
 
     def rates(self, z: Array, rate: Array) -> Array:
         """Rates of the coordinates from those of places and angular velocities."""
-        return self._lies.rates(self._each(z), self._each(rate))[:, :-1].reshape(z.shape)
+        return self._all(self._lies.rates(self._each(z), self._each(rate)), rate[:, self._elastic])
 
     def refuse_turned_over(self, z: Array) -> None:
         """Refuse coordinates (1, z) in which a link has turned by half a turn about an axis that allows no more."""
         for name, own in self.at.items():
-            if np.linalg.norm(z[0, own.start + 4 : own.stop]) > MOST_SWING:
+            if np.linalg.norm(z[0, own.start + 4 : own.start + RIGID]) > MOST_SWING:
                 raise ParameterError(
                     f"link {name} turns by half a turn about another axis than its own; allowed: axis of "
                     f"[link.{name}], about which it turns right round"
@@ -124,95 +113,137 @@ class SpatialMechanism(Mechanism):
 
     def point(self, z: Array, end: tuple[str, str]) -> tuple[Array, Array]:
         """Place (B, 3) of a point and its derivatives (B, 3, z) by places and turns about the axes of the world."""
-        gradient, link, places = np.zeros((len(z), 3, self.size)), self._number(end[0]), self.places(end)
-        each = self._each(z)[:, link]
-        if end[0] != GROUND:
-            own = self._spin(link)
-            gradient[:, :, own.start - 3 : own.start] = np.eye(3)
-            gradient[:, :, own] = -skew(places.arms(each)[:, 0])
-        return places.moved(each)[:, 0], gradient
+        gradient, places = np.zeros((len(z), 3, self.size)), self.places(end)
+        if end[0] == GROUND:
+            return np.broadcast_to(places.place[0], (len(z), 3)), gradient
+        own, turn = self.at[end[0]], self._turn(z, end[0])
+        arm = turn @ places.place[0]
+        gradient[:, :, own.start : own.start + 3] = np.eye(3)
+        gradient[:, :, own.start + 3 : own.start + RIGID] = -skew(arm)
+        gradient[:, :, own.start + RIGID : own.stop] = turn @ places.shape[0]
+        return z[:, own.start : own.start + 3] + arm, gradient
+
+    def _turn(self, z: Array, name: str) -> Array:
+        """Turn (B, 3, 3) of a link."""
+        return np.asarray(self.link(name).masses.lie.turn(z[:, self.at[name]]))
 
     def add_bent(self, z: Array, end: tuple[str, str], force: Array, total: Array) -> None:
         """Add the second derivatives of a point times forces (..., B, 3) to ``total`` (..., B, z, z)."""
         if end[0] != GROUND:
-            arm = self.places(end).arms(z[:, self.at[end[0]]])[:, 0]
-            self._add_turned(self._number(end[0]), force[..., :, None] * arm[:, None, :], total)
+            places, link = self.places(end), self._number(end[0])
+            carried = self._carried([(link, places.place[0], places.shape[0], places.curve[0])])
+            self._add_carried(link, self._turn(z, end[0]), carried, force[..., None, :], total)
 
-    def _add_turned(self, link: int, product: Array, total: Array) -> None:
-        """Add the second derivatives of vectors w that turn with a link, times forces F: ``product`` sum F w^T."""
-        if link < len(self.links):
-            own = self._spin(link)
-            total[..., own, own] += 0.5 * (product + np.swapaxes(product, -1, -2))
-            total[..., own, own] -= np.einsum("...ii->...", product)[..., None, None] * np.eye(3)
+    def _carried(self, parts: Sequence[tuple[int, Array, Array, Array]]) -> Carried:
+        """Vectors of links, each with its derivatives by the elastic coordinates of its link."""
+        count, bends = len(parts), len(self._elastic)
+        shape, curve = np.zeros((count, 3, bends)), np.zeros((count, 3, bends, bends))
+        for k, (link, _, once, twice) in enumerate(parts):
+            if once.shape[-1]:
+                own = np.flatnonzero(self._bends(link))
+                shape[k][:, own] = once
+                curve[k][np.ix_(np.arange(3), own, own)] = twice
+        return Carried(np.array([part[0] for part in parts]), np.array([part[1] for part in parts]), shape, curve)
 
-    def add_particles(self, z: Array, link: Link, force: Array, total: Array) -> None:
-        """Add the second derivatives of the particles of a link times forces (..., B, k, 3)."""
-        arms = link.masses.arms(z[:, self.at[link.name]])
-        self._add_turned(self._number(link.name), np.einsum("...bki,bkj->...bij", force, arms), total)
-
-    def particles(self, z: Array, link: Link) -> tuple[Array, Array]:
-        """Places (B, k, 3) of the particles of a link and their derivatives (B, k, 3, 6) by its own coordinates."""
-        own = z[:, self.at[link.name]]
-        arms = link.masses.arms(own)
-        gradient = np.zeros((*arms.shape, RIGID))
-        gradient[..., :3], gradient[..., 3:] = np.eye(3), -skew(arms)
-        return own[:, None, :3] + arms, gradient
+    def _add_carried(self, link: int, turn: Array, carried: Carried, force: Array, total: Array) -> None:
+        """Add the second derivatives of vectors that a link carries, times forces (..., B, R, 3)."""
+        spin, bends = self._spin(link), self._bends(link)
+        arm = carried.vector @ np.swapaxes(turn, -1, -2)
+        product = np.swapaxes(force, -1, -2) @ arm
+        total[..., spin, spin] += 0.5 * (product + np.swapaxes(product, -1, -2))
+        total[..., spin, spin] -= np.einsum("...ii->...", product)[..., None, None] * np.eye(3)
+        if not bends.any():
+            return
+        columns, own = self._elastic[bends], force @ turn
+        count, flat = len(columns), own.reshape(*own.shape[:-2], 1, -1)
+        # a turn d moves what bends by d x N q
+        crossed = skew(np.swapaxes(carried.shape[..., bends], 1, 2)).transpose(0, 3, 2, 1)
+        mixed = turn @ (flat @ crossed.reshape(-1, 3 * count)).reshape(*own.shape[:-2], 3, count)
+        total[..., spin, columns] += mixed
+        total[..., columns, spin] += np.swapaxes(mixed, -1, -2)
+        curve = carried.curve[..., bends, :][..., bends]
+        bent = (flat @ curve.reshape(-1, count**2)).reshape(*own.shape[:-2], count, count)
+        total[..., columns[:, None], columns] += bent
 
     def _frame_of(self, joint: Joint) -> Array:
         """Axes in which the point of a joint is measured, in the link that bears them."""
         return axes_of_joint(joint.first_axis if joint.measured_in == joint.first[0] else joint.second_axis)
 
-    def _table(self, motions: Sequence[tuple[Joint, str]]) -> _Rows:
+    def _point_of(self, end: tuple[str, str]) -> tuple[int, Array, Array, Array]:
+        """Number of the link of a point, and where it is there."""
+        places = self.places(end)
+        return self._number(end[0]), places.place[0], places.shape[0], places.curve[0]
+
+    def _axis_of(self, end: tuple[str, str], axis: Array) -> tuple[int, Array, Array, Array]:
+        """Number of the link of a point, and an axis that turns with that point."""
+        return self._number(end[0]), axis, *self.places(end).turned(axis)
+
+    def _table(self, motions: Sequence[tuple[Joint, str]]) -> Rows:
         """Constants of some motions of joints."""
-        rows = []
+        axes, starts, ends, moves = [], [], [], []
         for joint, motion in motions:
-            first, second = (self._number(end[0]) for end in (joint.first, joint.second))
             if motion in PLACES:
-                axis, frame = self._frame_of(joint)[:, PLACES[motion]], self._number(joint.measured_in)
-                start, end = (self.places(each).place[0] for each in (joint.first, joint.second))
-                rows.append((frame, first, second, axis, start, end, [1.0]))
+                bears = joint.first if joint.measured_in == joint.first[0] else joint.second
+                axes.append(self._axis_of(bears, self._frame_of(joint)[:, PLACES[motion]]))
+                starts.append(self._point_of(joint.first))
+                ends.append(self._point_of(joint.second))
             else:
                 turning, fixed, sign = TURNS[motion]
                 axis, end = (axes_of_joint(each) for each in (joint.first_axis, joint.second_axis))
-                rows.append((first, first, second, sign * axis[:, fixed], np.zeros(3), end[:, turning], [0.0]))
-        return _Rows(*map(np.array, zip(*rows, strict=True)))
+                axes.append(self._axis_of(joint.first, sign * axis[:, fixed]))
+                starts.append(self._axis_of(joint.first, np.zeros(3)))
+                ends.append(self._axis_of(joint.second, end[:, turning]))
+            moves.append([float(motion in PLACES)])
+        return Rows(self._carried(axes), self._carried(starts), self._carried(ends), np.array(moves))
 
     @cached_property
-    def _rows(self) -> _Rows:
+    def _rows(self) -> Rows:
         return self._table([(row.joint, row.motion) for row in self.rows()])
 
-    def _vectors(self, z: Array, rows: _Rows) -> _Vectors:
+    def _vectors(self, z: Array, rows: Rows) -> Vectors:
         each = self._each(z)
         turn = self._lies.turn(each)
-        axis, start, end = (
-            (turn[:, link] @ vector[:, :, None])[..., 0]
-            for link, vector in ((rows.frame, rows.axis), (rows.first, rows.start), (rows.second, rows.end))
-        )
-        apart = end + rows.moves * (each[:, rows.second, :3] - each[:, rows.first, :3] - start)
-        return _Vectors(axis, start, end, apart)
+        axis, start, end = ((turn[:, one.link] @ one.vector[:, :, None])[..., 0] for one in rows.vectors)
+        apart = end + rows.moves * (each[:, rows.end.link, :3] - each[:, rows.start.link, :3] - start)
+        return Vectors(turn, axis, start, end, apart)
 
-    def _filled(self, z: Array, rows: _Rows) -> tuple[Array, Array]:
+    def _slopes(self, vectors: Vectors, rows: Rows) -> Array:
+        """Derivatives (B, R, z) of functions."""
+        turn, axis, start, end, apart = vectors
+        every, size = np.arange(len(rows.moves)), (len(axis), len(rows.moves))
+        slope = np.zeros((*size, len(self.links) + 1, RIGID))
+        slope[:, every, rows.end.link, :3] += rows.moves * axis
+        slope[:, every, rows.end.link, 3:] += cross(end, axis)
+        slope[:, every, rows.start.link, :3] -= rows.moves * axis
+        slope[:, every, rows.start.link, 3:] -= rows.moves * cross(start, axis)
+        slope[:, every, rows.axis.link, 3:] += cross(axis, apart)
+        whole = np.empty((*size, self.size))
+        whole[..., self._rigid] = slope[:, :, :-1]
+        if len(self._elastic):
+            signed = (apart, -rows.moves * axis, axis)
+            parts = zip(signed, rows.vectors, strict=True)
+            own = [((pressed[..., None, :] @ turn[:, one.link]) @ one.shape)[..., 0, :] for pressed, one in parts]
+            whole[..., self._elastic] = own[0] + own[1] + own[2]
+        return whole
+
+    def _filled(self, z: Array, rows: Rows) -> tuple[Array, Array]:
         """Values (B, R) and derivatives (B, R, z) of functions."""
-        axis, start, end, apart = self._vectors(z, rows)
-        every = np.arange(len(rows.frame))
-        slope = np.zeros((len(z), len(every), len(self.links) + 1, RIGID))
-        slope[:, every, rows.second, :3] += rows.moves * axis
-        slope[:, every, rows.second, 3:] += cross(end, axis)
-        slope[:, every, rows.first, :3] -= rows.moves * axis
-        slope[:, every, rows.first, 3:] -= rows.moves * cross(start, axis)
-        slope[:, every, rows.frame, 3:] += cross(axis, apart)
-        return np.sum(axis * apart, axis=-1), slope[:, :, :-1].reshape(len(z), len(every), -1)
+        vectors = self._vectors(z, rows)
+        return np.sum(vectors.axis * vectors.apart, axis=-1), self._slopes(vectors, rows)
 
     def functions(self, z: Array, theta: Array) -> tuple[Array, Array]:
         """Functions c (B, z) at crank angles (B,), and their derivatives by places and turns; see ``Mechanism``."""
         value, slope = np.empty_like(z), np.zeros((len(z), self.size, self.size))
-        value[:, 1:], slope[:, 1:] = self._filled(z, self._rows)
+        held = slice(1, self.size - len(self._elastic))
+        value[:, held], slope[:, held] = self._filled(z, self._rows)
         (along, across, sideways), arrow = self._drive
         crank = self.driver.second[0]
-        pointer = self.link(crank).masses.lie.turn(z[:, self.at[crank]]) @ arrow
+        pointer = self._turn(z, crank) @ arrow
         turned = np.arctan2(pointer @ sideways, pointer @ across)
         value[:, 0] = np.mod(turned - theta + np.pi, 2.0 * np.pi) - np.pi
         slope[:, 0, self._spin(self._number(crank))] = along
+        value[:, held.stop :] = z[:, self._elastic]
+        slope[:, np.arange(held.stop, self.size), self._elastic] = 1.0
         return value, slope
 
     @cached_property
@@ -234,19 +265,43 @@ class SpatialMechanism(Mechanism):
         """Add the second derivatives of the functions times forces (..., B, z) to ``total`` (..., B, z, z)."""
         rows = self._rows
         vectors = self._vectors(z, rows)
-        for k, (frame, first, second) in enumerate(zip(rows.frame, rows.first, rows.second, strict=True)):
-            axis, start, end, apart = (vector[:, k] for vector in vectors)
-            pulled, moves = forces[..., k + 1, None], rows.moves[k, 0]
-            self._add_turned(frame, (pulled * apart)[..., :, None] * axis[:, None], total)
-            self._add_turned(second, (pulled * axis)[..., :, None] * end[:, None], total)
-            self._add_turned(first, -moves * (pulled * axis)[..., :, None] * start[:, None], total)
-            if frame == len(self.links):
-                continue
-            gradient = np.zeros((len(z), 3, len(self.links) + 1, RIGID))
-            gradient[:, :, second, :3] += moves * np.eye(3)
-            gradient[:, :, second, 3:] -= skew(end)
-            gradient[:, :, first, :3] -= moves * np.eye(3)
-            gradient[:, :, first, 3:] += moves * skew(start)
-            crossed = pulled[..., None] * (skew(axis) @ gradient[:, :, :-1].reshape(len(z), 3, -1))
-            total[..., self._spin(frame), :] += crossed
-            total[..., :, self._spin(frame)] += np.swapaxes(crossed, -1, -2)
+        factor = forces[..., 1 : 1 + len(rows.moves), None]
+        pressed = (factor * vectors.apart, -rows.moves * factor * vectors.axis, factor * vectors.axis)
+        gradients = [self._gradient(vectors.turn, *part) for part in zip(rows.vectors, vectors[1:4], strict=True)]
+        apart = gradients[2] + rows.moves[:, :, None] * (
+            self._moving(rows.end.link) - self._moving(rows.start.link) - gradients[1]
+        )
+        for link, name in enumerate(self.at):
+            for carried, force in zip(rows.vectors, pressed, strict=True):
+                own = carried.link == link
+                part = Carried(*(each[own] for each in carried))
+                self._add_carried(link, vectors.turn[:, link], part, force[..., own, :], total)
+            own = rows.axis.link == link
+            if own.any():
+                columns = np.arange(self.at[name].start + 3, self.at[name].stop)
+                count = len(z), int(own.sum()) * 3
+                turning = (factor[..., own, :, None] * gradients[0][:, own][..., columns]).reshape(
+                    *factor.shape[:-3], *count, len(columns)
+                )
+                crossed = np.swapaxes(turning, -1, -2) @ apart[:, own].reshape(*count, self.size)
+                total[..., columns, :] += crossed
+                total[..., columns] += np.swapaxes(crossed, -1, -2)
+
+    def _gradient(self, turn: Array, carried: Carried, vector: Array) -> Array:
+        """Derivatives (B, R, 3, z) of vectors that links carry, (B, R, 3) on the ground, by turns and bending."""
+        every = np.arange(len(carried.link))
+        slope = np.zeros((*vector.shape, len(self.links) + 1, RIGID))
+        slope[:, every, :, carried.link, 3:] = -np.swapaxes(skew(vector), 0, 1)
+        whole = np.empty((*vector.shape, self.size))
+        whole[..., self._rigid] = slope[..., :-1, :]
+        if len(self._elastic):
+            whole[..., self._elastic] = turn[:, carried.link] @ carried.shape
+        return whole
+
+    def _moving(self, link: NDArray[np.int64]) -> Array:
+        """Derivatives (R, 3, z) of the places of links."""
+        slope = np.zeros((len(link), 3, len(self.links) + 1, RIGID))
+        slope[np.arange(len(link)), :, link, :3] = np.eye(3)
+        whole = np.zeros((len(link), 3, self.size))
+        whole[..., self._rigid] = slope[..., :-1, :]
+        return whole

@@ -1,0 +1,212 @@
+"""Links that bend in space: against the thesis' crank, an exact twin, closed forms of a shaft, and the plane."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import chaosgym
+from chaosgym import SliderCrank, simulate
+from chaosgym.errors import ParameterError
+from chaosgym.machines.mechanism.beam import Beam, bending_of, fibre_stress
+from chaosgym.machines.mechanism.equations import small_motion
+from chaosgym.machines.mechanism.joints import Joint
+from chaosgym.machines.mechanism.nominal import revolution_of
+from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
+from chaosgym.machines.mechanism.spatial import SpatialMechanism
+from chaosgym.machines.mechanism.spatial_beam import fibre_stress_around, spatial_beam_link
+from chaosgym.machines.slider_crank.equations import equations
+from tests.machines.mechanisms import ANGLES, BINS, OFFSET, assembled, assert_equal, thesis_crank_in_space
+from tests.machines.spatial_twin import BendingMechanism
+
+FILE = Path(__file__).parents[2] / "docs" / "machines" / "slider-crank-thesis-15deg.toml"
+BENDING = OFFSET | {"slider_roll_inertia": 5e-4, "rod": "flexible"}
+SETS = {
+    "guide": {},
+    "guide that turns, fitted modes": {"slider_joint": "instrumented", "n_modes": 2, "fitted_modes": 2},
+    "ball": {"slider_joint": "ideal", "ball_joint": "spherical"},
+}
+NAMES = {
+    "slider across the guide": "slider across",
+    "ball along the rod": "ball along",
+    "ball across the rod": "ball across",
+} | {f"sideways rod mode {k}": f"rod sideways mode {k}" for k in range(1, 9)}
+
+
+def in_order(mechanism, names):
+    """Coordinates of a mechanism in the order of a crank's names."""
+    order = [mechanism.coordinates.index(NAMES.get(name, name)) for name in names]
+    assert sorted(order) == list(range(len(mechanism.coordinates)))
+    return order
+
+
+@pytest.mark.parametrize("angle", [1e-9, 15.0])
+@pytest.mark.parametrize("name", SETS)
+def test_matrices_are_those_of_the_crank_that_bends(name, angle):
+    """M, C, D and f with stretch and modes in two planes equal those of the crank to 5e-11, upright and at 15 deg.
+
+    The crank takes a housing beside the rod's line to turn about that line too in the modes' shapes; so it is on it.
+    """
+    machine = SliderCrank(motor_angle=angle, **BENDING | SETS[name] | {"housing_offset_across": 0.0})
+    mechanism = thesis_crank_in_space(machine)
+    found, expected = assembled(mechanism), equations(machine, ANGLES)
+    order = in_order(mechanism, machine.degrees_of_freedom)
+    pick = np.ix_(order, order)
+    assert_equal(found.mass[:, pick[0], pick[1]], expected.mass, 5e-11)
+    for power in (0, 1):
+        assert_equal(found.damping[power][:, pick[0], pick[1]], expected.damping[power], 5e-11)
+    for power, load in zip((0, 2), expected.load, strict=True):
+        assert_equal(found.load[power][:, order], load, 5e-11)
+
+
+@pytest.mark.parametrize("degrees", [37.0, 100.0, 301.0])
+def test_stiffness_is_that_of_the_exact_rod(degrees):
+    """M, D, K and f equal those of the nonlinear crank to 1e-9, geometric stiffness included, all bodies off the line.
+
+    The twin differentiates positions of particles by central differences, and knows neither joints nor their forces.
+    What the three turns of its slider have among themselves is left out in it.
+    """
+    machine = SliderCrank(motor_angle=15.0, **BENDING | SETS["guide that turns, fitted modes"])
+    mechanism, theta = thesis_crank_in_space(machine), math.radians(degrees)
+    beam = mechanism.link("rod").beam
+    planes = []
+    for about in (True, False):
+        ends = []
+        for body in ("housing", "yoke"):
+            mass, inertia, x, y = (
+                getattr(machine, f"{body}_{what}") for what in ("mass", "inertia", "offset_along", "offset_across")
+            )
+            turning = (mass * x, inertia - (0.0 if about else mass * y**2))
+            ends.append(turning if about or body == "housing" else (0.0, 0.0))
+        planes.append(bending_of(beam, beam.second_moment, tuple(ends)))
+    twin = BendingMechanism(machine, tuple(planes))
+    found, exact = small_motion(mechanism, revolution_of(mechanism), theta, BINS), twin.linearised(theta)
+    order = [mechanism.coordinates.index(f"slider {name}") for name in ("across", "sideways", "roll", "yaw", "pitch")]
+    order += [k for k, name in enumerate(mechanism.coordinates) if name.startswith("rod ")]
+    pick = np.ix_(order, order)
+    assert_equal(found.mass[0][pick], exact.mass, 1e-9)
+    assert_equal(found.damping[1, 0][pick], exact.damping, 1e-9)
+    for power, stiffness, load in zip((0, 2), exact.stiffness, exact.load, strict=True):
+        expected = stiffness + twin.elastic * (power == 0)
+        mine = found.stiffness[power, 0][pick].copy()
+        mine[2:5, 2:5] = expected[2:5, 2:5]
+        assert_equal(mine[5:, 5:], expected[5:, 5:], 1e-9)
+        weak = np.r_[:5]
+        assert_equal(mine[weak], expected[weak], 1e-7)
+        assert_equal(mine[:, weak], expected[:, weak], 1e-7)
+        assert_equal(found.load[power, 0][order], load, 1e-9)
+
+
+LENGTH, DIAMETER = 1.2, 0.02
+AREA, SECOND = math.pi * DIAMETER**2 / 4.0, math.pi * DIAMETER**4 / 64.0
+
+
+def shaft(pull):
+    """A round shaft between a universal joint and a ball, which a weight of 1 kg pulls along it."""
+    x_axis, y_axis, z_axis, none = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+    beam = Beam(LENGTH, AREA, SECOND, 2.1e11, 7850.0, 2, stretches=False, sideways_moment=SECOND)
+    return SpatialMechanism(
+        (
+            spatial_link("hub", {"end": none}, axis=x_axis),
+            spatial_beam_link("shaft", beam, {}, axis=x_axis),
+            spatial_link("bearing", {"pin": none}, (SpatialBody(1.0, (1e-3, 1e-3, 1e-3)),)),
+        ),
+        (
+            Joint("motor", "revolute", ("ground", "hub"), ("hub", "end"), "", "", (), True, 0.0, x_axis, x_axis),
+            Joint("cross", "universal", ("hub", "end"), ("shaft", "start"), first_axis=y_axis, second_axis=z_axis),
+            Joint("ball", "spherical", ("shaft", "end"), ("bearing", "pin"), first_axis=x_axis, second_axis=x_axis),
+            Joint(
+                "guide",
+                "prismatic",
+                ("ground", "hub"),
+                ("bearing", "pin"),
+                opened=("across", "sideways"),
+                first_axis=x_axis,
+                second_axis=x_axis,
+            ),
+        ),
+        {"hub": none},
+        (pull, 0.0, 0.0),
+    )
+
+
+@pytest.mark.parametrize("pull", [0.0, 400.0])
+def test_a_shaft_turns_critical_where_its_pulled_frequency_is(pull):
+    """In axes that turn with it q'' + 2 w J q' + (w_k^2 - w^2) q = 0, in closed form, w_k under the pull of an end.
+
+    w_k^2 = (k pi / l)^4 E I / m + (k pi / l)^2 P / m with m = rho A: tension stiffens both planes, the pull of its own
+    weight in the mean by half. So it turns critical at w_k. Ten elements miss the second mode by 0.02 %.
+    """
+    mechanism = shaft(pull)
+    found = small_motion(mechanism, revolution_of(mechanism), 0.3, 12)
+    own = [mechanism.coordinates.index(f"shaft {plane}mode {k}") for k in (1, 2) for plane in ("", "sideways ")]
+    pick = np.ix_(own, own)
+    line, wave = 7850.0 * AREA, np.array([1.0, 2.0]) * math.pi / LENGTH
+    tension = pull * (1.0 + 0.5 * line * LENGTH)
+    expected = wave**4 * 2.1e11 * SECOND / line + wave**2 * tension / line
+    np.testing.assert_allclose(np.diag(found.stiffness[0, 0][pick]), np.repeat(expected, 2), rtol=3e-4)
+    np.testing.assert_allclose(found.mass[0][pick], np.eye(4), atol=1e-9)
+    np.testing.assert_allclose(found.stiffness[2, 0][pick], -np.eye(4), atol=1e-9)
+    turned = found.damping[1, 0][pick]
+    np.testing.assert_allclose(np.abs(turned), 2.0 * np.kron(np.eye(2), [[0.0, 1.0], [1.0, 0.0]]), atol=1e-9)
+    np.testing.assert_allclose(turned, -turned.T, atol=1e-9)
+
+
+BEAM = """[link.rod.beam]
+length = "235 mm"
+diameter = "6.35 mm"
+youngs_modulus = "206.8 GPa"
+density = "7833 kg/m^3"
+modes = 3
+damping_ratio = "5 %"
+[[link.rod.body]]
+at = "start"
+mass = "370.5 g"
+centre = "-5.85, 0, 0 mm"
+inertia = "0, 545.2095, 545.2095 kg mm^2"
+
+"""
+
+
+@pytest.fixture
+def bent(tmp_path):
+    """The file of the crank at 15 deg with a rod that bends, and without a yoke."""
+    before, rest = FILE.read_text().split("[link.rod]")
+    yoke = '[link.yoke]\npoints = { pivot = "0, 0, 0 mm" }\n'
+    slider = rest[rest.index("[link.slider]") :].replace("rod.ball", "rod.start")
+    path = tmp_path / "bent.toml"
+    path.write_text(before + BEAM + yoke + slider)
+    return path
+
+
+def test_a_file_bends_like_the_crank_of_the_thesis(bent):
+    """Two revolutions from rest at 15 deg with three modes in each plane strike like ``SliderCrank`` to 5e-4.
+
+    Without geometric stiffness it differs by 3e-3. The crank damps its stretch by the mass of its slider too.
+    """
+    none = {"yoke_mass": 0.0, "yoke_inertia": 0.0, "yoke_offset_along": 0.0}
+    plain = {"damping_ratio": 0.05, "damping_family": "uniform", "fitted_modes": 0, "geometric_stiffness": "on"}
+    expected = simulate(SliderCrank(motor_angle=15.0, **none, **plain), 2).peak_force
+    found = simulate(chaosgym.read_machine(bent), 2).peak_force
+    np.testing.assert_allclose(found, expected[:, ::-1], rtol=5e-4)
+
+
+def test_stress_around_a_rod_is_that_of_its_planes(bent):
+    """Above and below it is that of the same modes in the plane, at the sides that of the modes sideways."""
+    machine = chaosgym.read_machine(bent)
+    link = machine.mechanism.link("rod")
+    around = fibre_stress_around(link, link.beam, 0.1, 0.003)
+    flat = link._replace(
+        stiffness=link.stiffness[:4, :4],
+        elastic=link.elastic[:4],
+        points={name: place._replace(slope=place.slope[:, 2, :4]) for name, place in link.points.items()},
+    )
+    np.testing.assert_allclose(around[[0, 8], :4], fibre_stress(flat, link.beam, 0.1, 0.003), rtol=1e-12)
+    np.testing.assert_allclose(around[[4, 12], 4:], around[[0, 8], 1:4], rtol=1e-2)
+    assert np.abs(around[[0, 8], 4:]).max() < 1e-9 * np.abs(around).max()
+    rows = machine.fibre_stress("rod", 0.1, 0.003)
+    assert rows.shape == (16, len(machine.degrees_of_freedom))
+    bent.write_text(bent.read_text().replace('diameter = "6.35 mm"', 'width = "5 mm"\nheight = "6 mm"'))
+    with pytest.raises(ParameterError, match="link 'rod' bends in space and is not round"):
+        chaosgym.read_machine(bent).fibre_stress("rod", 0.1, 0.003)
