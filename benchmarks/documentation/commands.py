@@ -84,7 +84,7 @@ def page(name: str, outputs: list[str]) -> str:
         heading, _, more = example["what"].rstrip(".").partition(". ")
         parts += [f"## {heading}", *([f"{more}."] if more else []), f"```console\n$ {example['run']}\n{output}```"]
         pictures = [example["picture"]] if "picture" in example else [f"{name}-{file}" for file in _pictures(example)]
-        parts += [f"![{example['what']}]({picture})" for picture in pictures]
+        parts += [f"![{heading}]({picture})" for picture in pictures]
     return "\n\n".join([*parts, _last_part(name)])
 
 
