@@ -1,6 +1,7 @@
 import math
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from chaosgym.diagnosis import diagnose
+from chaosgym.diagnosis import bifurcation_curve, diagnose
 from chaosgym.diagnosis.bifurcation_curve import follow_bifurcation
 from chaosgym.diagnosis.branch import _repeats, stretch
 from chaosgym.diagnosis.diagram_search import follow
@@ -554,3 +555,29 @@ def test_branches_of_random_machines_end_in_a_named_event():
     lost = [end for end in ends if "not followed" in end]
     print(f"{len(lost)} of {len(ends)} branches ended without a name: {lost}")
     assert len(lost) <= 3
+
+
+def test_a_curve_ends_where_only_another_one_is_found(monkeypatch):
+    """Beside a straight curve runs a second one, 0.2 Hz higher; from a gap of 0.16 mm on the search finds that alone.
+
+    Further than a quarter of a step from the start it finds it too: the first step is then taken anew, and shorter.
+    """
+    own = ImpactBeam().clearance
+
+    def on_line(gap, aside=0.0):
+        return SimpleNamespace(
+            kind="fold", period=1, value=20.0 + 1e3 * (gap - own) + aside, state=np.array([1.0 + aside, gap / own])
+        )
+
+    def search(machine, last, state, field, guess):
+        gap = machine.clearance
+        wrong = gap > 1.6e-4 or (last.value == 20.0 and abs(gap - own) > 0.26 * 5e-6)
+        return SimpleNamespace(bifurcation=on_line(gap, 0.2 if wrong else 0.0))
+
+    monkeypatch.setattr(bifurcation_curve, "_near", search)
+    span = (own - 1e-5, own + 7e-5)
+    curve = follow_bifurcation(ImpactBeam(), on_line(own), "speed", "clearance", span, steps=17)
+    assert curve.along_values == pytest.approx(20.0 + 1e3 * (curve.against_values - own), abs=1e-12)
+    assert curve.against_values[0] == span[0]
+    assert 1.59e-4 < curve.against_values[-1] <= 1.6e-4
+    assert curve.ends[1].endswith("what is found beyond may belong to another curve")

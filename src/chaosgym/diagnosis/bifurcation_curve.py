@@ -2,7 +2,8 @@
 
 Step by step in the second parameter: the orbit of the last bifurcation leads to one on the new branch, on the plane
 normal to the last branch; along the new branch the bifurcation is placed as on any other. The step is halved where that
-fails, so a curve ends where it turns back in the second parameter.
+fails, and where what is found lies far from the straight line through the last two points: it may belong to another
+curve. So a curve ends where it turns back in the second parameter.
 """
 
 from collections.abc import Callable
@@ -36,6 +37,10 @@ MOST_TRIES = 3
 
 WINDOW = 0.05
 """Range of the first parameter around a bifurcation that counts as 1 in scaled unknowns, as a share of its value."""
+
+MOST_BEND, RESOLVED = 0.5, 1e-3
+"""How far a point may lie from where the last two lead, as a share of the step and beside; a curve bends less if the
+step is halved, while the way to another curve stays as long."""
 
 LOOKS = (3e-3, 1e-2, 3e-2, 0.1, 0.3)
 """Distances along a new branch at which the bifurcation is looked for where the secant method fails."""
@@ -167,15 +172,20 @@ def _part(
         guess = float(_extrapolated([place[0] for place in places], places, value))
         state = np.asarray(_extrapolated(states, places, value))
         try:
-            here = _near(with_settings(machine, {second: value, first: guess}), here, state, first, guess).bifurcation
+            found = _near(with_settings(machine, {second: value, first: guess}), here, state, first, guess).bifurcation
+            if len(places) > 1 and _bends(here, (guess, state), found):
+                raise NotFollowedError("what is found beyond may belong to another curve")
         except (NotFollowedError, ParameterError) as reason:
+            if len(places) == 2:  # nothing has confirmed the first step yet
+                share = min(share, abs(at - places[0][1]) / step)
+                places, states, here, at = places[:1], states[:1], start, places[0][1]
             share *= 0.5
             if share < SHORTEST:
                 return places[1:], f"not followed beyond {second} = {at:.6g}: {reason}"
             continue
-        places.append((here.value, value))
-        states.append(here.state)
-        at, share = value, min(1.0, 2.0 * share)
+        places.append((found.value, value))
+        states.append(found.state)
+        at, here, share = value, found, min(1.0, 2.0 * share)
     if at == end:
         return places[1:], f"end of the range at {second} = {end:.6g}"
     return places[1:], f"not followed beyond {second} = {at:.6g}: its steps became too short"
@@ -187,6 +197,16 @@ def _extrapolated(known: list[Any], places: list[tuple[float, float]], value: fl
         return known[0]
     (_, q1), (_, q2) = places[-2:]
     return known[-1] + (known[-1] - known[-2]) * (value - q2) / (q2 - q1)
+
+
+def _bends(last: Bifurcation, expected: tuple[float, Array], found: Bifurcation) -> bool:
+    """True if a bifurcation lies too far from the value and the state at which the last two lead to expect it."""
+
+    def way(value: float, state: Array) -> float:
+        aside = np.linalg.norm(found.state - state) / max(float(np.linalg.norm(found.state)), 1e-300)
+        return float(np.hypot((found.value - value) / (WINDOW * found.value), aside))
+
+    return way(*expected) > MOST_BEND * way(last.value, last.state) + RESOLVED
 
 
 def _near(machine: Machine, last: Bifurcation, state: Array, field: str, guess: float) -> Found:
