@@ -182,7 +182,7 @@ def thesis_crank_in_space(machine):
 
 def assembled(mechanism):
     """Equations at the middles of the bins."""
-    return small_motion(mechanism, revolution_of(mechanism), ANGLES[0], BINS)
+    return small_motion(mechanism, revolution_of(mechanism), ANGLES)
 
 
 def assert_equal(found, expected, tolerance):

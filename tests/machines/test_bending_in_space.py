@@ -17,7 +17,7 @@ from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
 from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.mechanism.spatial_beam import fibre_stress_around, spatial_beam_link
 from chaosgym.machines.slider_crank.equations import equations
-from tests.machines.mechanisms import ANGLES, BINS, OFFSET, assembled, assert_equal, thesis_crank_in_space
+from tests.machines.mechanisms import ANGLES, OFFSET, assembled, assert_equal, thesis_crank_in_space
 from tests.machines.spatial_twin import BendingMechanism
 
 FILE = Path(__file__).parents[2] / "docs" / "machines" / "slider-crank-thesis-15deg.toml"
@@ -81,7 +81,7 @@ def test_stiffness_is_that_of_the_exact_rod(degrees):
             ends.append(turning if about or body == "housing" else (0.0, 0.0))
         planes.append(bending_of(beam, beam.second_moment, tuple(ends)))
     twin = BendingMechanism(machine, tuple(planes))
-    found, exact = small_motion(mechanism, revolution_of(mechanism), theta, BINS), twin.linearised(theta)
+    found, exact = small_motion(mechanism, revolution_of(mechanism), np.array([theta])), twin.linearised(theta)
     order = [mechanism.coordinates.index(f"slider {name}") for name in ("across", "sideways", "roll", "yaw", "pitch")]
     order += [k for k, name in enumerate(mechanism.coordinates) if name.startswith("rod ")]
     pick = np.ix_(order, order)
@@ -139,7 +139,7 @@ def test_a_shaft_turns_critical_where_its_pulled_frequency_is(pull):
     weight in the mean by half. So it turns critical at w_k. Ten elements miss the second mode by 0.02 %.
     """
     mechanism = shaft(pull)
-    found = small_motion(mechanism, revolution_of(mechanism), 0.3, 12)
+    found = small_motion(mechanism, revolution_of(mechanism), np.array([0.3]))
     own = [mechanism.coordinates.index(f"shaft {plane}mode {k}") for k in (1, 2) for plane in ("", "sideways ")]
     pick = np.ix_(own, own)
     line, wave = 7850.0 * AREA, np.array([1.0, 2.0]) * math.pi / LENGTH

@@ -73,7 +73,7 @@ def test_matrices_are_those_of_the_flexible_crank_by_hand(name, geometric, monke
     machine = SliderCrank(**FLEXIBLE | OPTIONS[name] | {"geometric_stiffness": geometric})
     mechanism = thesis_crank(machine)
     if geometric == "off":
-        monkeypatch.setattr("chaosgym.machines.mechanism.equations._Sums.add_geometric", lambda sums: None)
+        monkeypatch.setattr("chaosgym.machines.mechanism.sums.Sums.add_geometric", lambda sums: None)
     found, expected = assembled(mechanism), equations(machine, ANGLES)
     order = [mechanism.coordinates.index(COORDINATES.get(one, one)) for one in machine.degrees_of_freedom]
     assert sorted(order) == list(range(len(mechanism.coordinates)))
@@ -155,7 +155,8 @@ def test_a_revolution_may_begin_at_any_crank_angle():
     """Equations at 40 angles from 460 deg on are those from 10 deg on, ten angles later."""
     mechanism = four_bar()
     revolution = revolution_of(mechanism)
-    here, there = (small_motion(mechanism, revolution, math.radians(first), 40) for first in (10.0, 100.0 + 360.0))
+    steps = np.arange(40) * 2.0 * np.pi / 40
+    here, there = (small_motion(mechanism, revolution, math.radians(first) + steps) for first in (10.0, 460.0))
     for one, other in zip(here, there, strict=True):
         axis = 0 if one is here.mass else 1
         assert_equal(np.roll(one, -10, axis), other, 1e-9)
@@ -174,7 +175,10 @@ def test_torque_of_the_drive_is_the_power_that_the_links_take():
     mechanism = four_bar(springs=(Spring(("ground", "shaft"), ("rocker", "end"), 300.0, 0.5, 7.0),))
     revolution = revolution_of(mechanism)
     theta = np.arange(360) * 2.0 * np.pi / 360
-    z, found = nominal(mechanism, revolution, theta).z, small_motion(mechanism, revolution, 0.0, 360)
+    z, found = (
+        nominal(mechanism, revolution, theta).z,
+        small_motion(mechanism, revolution, np.arange(360) * 2.0 * np.pi / 360),
+    )
     k, w = np.fft.rfftfreq(360, 1.0 / 360)[:, None], 3.0
     slope = np.fft.irfft(1j * k * np.fft.rfft(z - theta[:, None] * revolution.winding, axis=0), 360, axis=0)
     kinetic, potential = np.zeros(360), np.zeros(360)

@@ -115,7 +115,7 @@ def test_the_inertia_that_the_crank_feels(motored):
     given, theta = motored(), np.arange(360) * math.pi / 180.0
     from chaosgym.machines.mechanism.equations import crank_inertia
 
-    found = crank_inertia(given.mechanism, given.revolution, 0.0, 360)
+    found = crank_inertia(given.mechanism, given.revolution, np.arange(360) * 2.0 * np.pi / 360)
     np.testing.assert_allclose(found, [inertia(angle)[0] for angle in theta], rtol=1e-9)
     change = given.equations(0.0, 360).torque[2]
     np.testing.assert_allclose(change, [0.5 * inertia(angle)[1] for angle in theta], atol=1e-5 * np.abs(change).max())

@@ -15,7 +15,7 @@ from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.periodic import derivatives
 from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.machine import SliderCrank
-from tests.machines.mechanisms import ANGLES, BINS, OFFSET, assembled, assert_equal, thesis_crank, thesis_crank_in_space
+from tests.machines.mechanisms import ANGLES, OFFSET, assembled, assert_equal, thesis_crank, thesis_crank_in_space
 from tests.machines.spatial_twin import RigidMechanism
 
 LOPSIDED = OFFSET | {"slider_roll_inertia": 5e-4}
@@ -65,7 +65,7 @@ def test_what_the_crank_leaves_out_is_that_of_the_exact_mechanism(degrees):
     machine = SliderCrank(motor_angle=25.0, slider_joint="instrumented", **LOPSIDED)
     mechanism = thesis_crank_in_space(machine)
     theta = math.radians(degrees)
-    found = small_motion(mechanism, revolution_of(mechanism), theta, BINS)
+    found = small_motion(mechanism, revolution_of(mechanism), np.array([theta]))
     exact = RigidMechanism(machine, 5).linearised(theta)
     order = order_of(mechanism, machine.degrees_of_freedom)
     for power, expected in ((0, exact.stiffness[0]), (2, exact.stiffness[1])):
@@ -89,7 +89,7 @@ def test_in_the_plane_it_is_the_planar_mechanism(name):
         assert_equal(other.stiffness[power][:, pick[0], pick[1]], one.stiffness[power], 2e-11)
         assert_equal(other.load[power][:, own], one.load[power], 2e-11)
         assert_equal(other.torque[power], one.torque[power], 2e-11)
-    inertia = [crank_inertia(each, revolution_of(each), ANGLES[0], BINS) for each in (flat, spatial)]
+    inertia = [crank_inertia(each, revolution_of(each), ANGLES) for each in (flat, spatial)]
     assert_equal(inertia[1], inertia[0], 2e-11)
 
 
@@ -191,9 +191,9 @@ def test_torque_of_the_drive_is_the_power_that_links_in_space_take():
     stretch = np.linalg.norm(rocker - mechanism.ground["wall"], axis=1)
     potential += 150.0 * (stretch - 0.2) ** 2
     power = derivatives(w**2 * kinetic + potential)[0] + 7.0 * w * derivatives(stretch)[0] ** 2
-    found = small_motion(mechanism, revolution, 0.0, 360)
+    found = small_motion(mechanism, revolution, np.arange(360) * 2.0 * np.pi / 360)
     np.testing.assert_allclose([1.0, w, w**2] @ found.torque, power, atol=1e-9 * np.abs(power).max())
-    felt = crank_inertia(mechanism, revolution, 0.0, 360)
+    felt = crank_inertia(mechanism, revolution, np.arange(360) * 2.0 * np.pi / 360)
     np.testing.assert_allclose(0.5 * felt, kinetic, rtol=1e-9)
 
 

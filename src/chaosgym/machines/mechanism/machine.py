@@ -16,7 +16,7 @@ from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS, Contact, Held, 
 from chaosgym.machines.drive_torque import DriveTorque
 from chaosgym.machines.mechanism.beam import fibre_stress
 from chaosgym.machines.mechanism.clearance import ROUND, surface_fields
-from chaosgym.machines.mechanism.equations import SmallMotion, crank_inertia, drive_torque, loads, sliding, small_motion
+from chaosgym.machines.mechanism.equations import SmallMotion, assembled, crank_inertia, sliding, small_motion
 from chaosgym.machines.mechanism.joints import ACROSS, ALONG, PITCH, PLACES, SIDEWAYS, TURN, YAW, Joint
 from chaosgym.machines.mechanism.links import RIGID
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism
@@ -140,12 +140,12 @@ class MechanismMachine(BinnedMachine):
         """
         number("count", count, 1, MOST_ANGLES)
         number("first", first, -MOST_TURNED, MOST_TURNED, "rad")
-        return small_motion(self._scaled(), self.revolution, first, count)
+        return small_motion(self._scaled(), self.revolution, first + _even(count))
 
     @property
     def drive_torque(self) -> DriveTorque:
         """Torque of the drive over a revolution at the machine's speed; see ``Machine.drive_torque``."""
-        powers = drive_torque(self._scaled(), self.revolution, 0.0, TORQUE_ANGLES)
+        powers = assembled(self._scaled(), self.revolution, matrices=False).torque_at(_even(TORQUE_ANGLES))
         torque = self.crank_rate ** np.arange(3) @ powers
         return DriveTorque(torque + self._friction_torque(TORQUE_ANGLES), self.crank_rate)
 
@@ -153,10 +153,10 @@ class MechanismMachine(BinnedMachine):
         """Torque (B,) that friction takes while the joint's surfaces carry what holds its gap in the middle."""
         if not self._rub:
             return np.zeros(count)
-        angles = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)
+        angles = _even(count)
         rate, signed, driven = self._rubbing(angles)
         own = [k for k, name in enumerate(self.degrees_of_freedom) if name.startswith(f"{self.rubs} ")]
-        powers = loads(self._scaled(), self.revolution, 0.0, count)[:, :, own]
+        powers = assembled(self._scaled(), self.revolution, matrices=False).load_at(angles)[:, :, own]
         held_by = np.linalg.pinv(np.concatenate([contact.row for contact in self.contacts if contact.slides])[:, own].T)
         push = -np.tensordot(self.crank_rate ** np.arange(3), powers, 1)
         total, change = np.zeros(count), np.full(count, np.inf)
@@ -199,9 +199,9 @@ class MechanismMachine(BinnedMachine):
         motor = self.motor
         if motor is None:
             raise ParameterError(f"{self.name} has no motor; allowed: a file with [motor]")
-        scaled = self._scaled()
-        still, viscous, _ = drive_torque(scaled, self.revolution, 0.0, MOTOR_ANGLES)
-        load = Load(crank_inertia(scaled, self.revolution, 0.0, MOTOR_ANGLES), still, viscous)
+        scaled, angles = self._scaled(), _even(MOTOR_ANGLES)
+        still, viscous, _ = assembled(scaled, self.revolution, matrices=False).torque_at(angles)
+        load = Load(crank_inertia(scaled, self.revolution, angles), still, viscous)
         return turn(motor, load, self.rate_at(speed), cycles)
 
     def _scaled(self) -> Mechanism:
@@ -222,9 +222,10 @@ class MechanismMachine(BinnedMachine):
     def held(self) -> Held:
         """Return the held accelerations, whatever the speed and the clearances."""
         middles, nodes = middles_and_nodes(self.bins)
-        found = self.equations(float(middles[0]), len(middles))
-        self._refuse_massless(found.mass)
-        load = loads(self._scaled(), self.revolution, 0.0, len(nodes))
+        whole = assembled(self._scaled(), self.revolution)
+        # on the grid they are sums of squares to the last digit
+        self._refuse_massless(whole.matrices[:, 0])
+        found, load = whole.at(middles), whole.load_at(nodes)
         return held(found.mass, found.damping, found.stiffness, load, self._friction(middles))
 
     def _friction(self, theta: Array) -> Array | None:
@@ -253,14 +254,16 @@ class MechanismMachine(BinnedMachine):
         return HERTZ if self.hertz else LINEAR
 
     def _refuse_massless(self, mass: Array) -> None:
-        """Refuse mass matrices (bins, n, n) in which some motion moves no mass."""
+        """Refuse mass matrices (B, n, n) in which some motion moves no mass."""
         size = np.sqrt(np.maximum(np.einsum("bii->bi", mass), 0.0))
         scaled = mass / np.where(size > 0.0, size, 1.0)[:, :, None] / np.where(size > 0.0, size, 1.0)[:, None]
         sizes, ways = np.linalg.eigh(scaled)
         worst = int(np.argmin(sizes[:, 0]))
         if sizes[worst, 0] > LEAST_MASS:
             return
-        name = self.degrees_of_freedom[int(np.argmax(np.abs(ways[worst, :, 0])))]
+        # rounding may tie what has no mass to what has
+        share = np.abs(ways[worst, :, 0])
+        name = self.degrees_of_freedom[int(np.argmin(np.where(share > 0.5 * share.max(), size[worst], np.inf)))]
         raise ParameterError(
             f"nothing resists the motion {name!r}: the links that it moves have no mass, or no inertia where they "
             "only turn; allowed: a [[link.NAME.body]] with mass and inertia"
@@ -410,7 +413,7 @@ class MechanismMachine(BinnedMachine):
     def share_of_bound(self, states: Array, peak_force: Array) -> float:
         """Largest force, as a share of that of an impact of all masses at ten times the speed of the nominal motion."""
         mechanism = self._scaled()
-        theta: Any = np.arange(72) * (2.0 * math.pi / 72)
+        theta = _even(72)
         z, mass, fastest, load = self.nominal_places(theta), 0.0, 0.0, 0.0
         for link in mechanism.links:
             own, places = z[:, mechanism.at[link.name]], (*link.points.values(), link.masses)
@@ -445,6 +448,11 @@ class MechanismMachine(BinnedMachine):
         draw_poses(panels, self)
 
 
+def _even(count: int) -> Array:
+    """Crank angles [rad] of a revolution at equal steps from 0 on."""
+    return np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)
+
+
 class _Loaded(NamedTuple):
     """A force times a factor."""
 
@@ -464,7 +472,7 @@ def _revolution(mechanism: Mechanism) -> Revolution:
 @lru_cache(maxsize=256)
 def _heavy(machine: MechanismMachine) -> float:
     """Ten times the largest load [N] of a gap in the nominal motion."""
-    powers = loads(machine._scaled(), machine.revolution, 0.0, 72)
+    powers = assembled(machine._scaled(), machine.revolution, matrices=False).load_at(_even(72))
     across = [
         machine.degrees_of_freedom.index(f"{joint.name} {ACROSS}") for joint in machine.mechanism.joints if joint.opened
     ]

@@ -1,0 +1,185 @@
+"""What links, springs and forces of a mechanism add to its equations of small motions (``equations``)."""
+
+import numpy as np
+
+from chaosgym.arrays import Array
+from chaosgym.errors import ParameterError
+from chaosgym.machines.mechanism.links import Link, inertia_of, rotation
+from chaosgym.machines.mechanism.mechanism import Mechanism, Spring
+from chaosgym.machines.mechanism.nominal import Nominal, Revolution
+from chaosgym.machines.mechanism.space import spatial_inertia_of
+from chaosgym.machines.mechanism.spatial import SpatialMechanism
+from chaosgym.machines.periodic import derivatives
+
+
+def spring_length(mechanism: Mechanism, z: Array, spring: Spring, theta: Array) -> Array:
+    """Length (B,) [m] of a spring at coordinates z (B, z).
+
+    Raises
+    ------
+    ParameterError
+        If its ends meet; names the crank angle.
+    """
+    apart = mechanism.apart(z, spring.first, spring.second)[0]
+    length = np.linalg.norm(apart, axis=1)
+    if not np.all(length > 1e-9 * max(1.0, float(np.max(np.abs(apart))))):
+        where = np.degrees(theta[int(np.argmin(length))] % (2.0 * np.pi))
+        raise ParameterError(
+            f"the spring between {'.'.join(spring.first)} and {'.'.join(spring.second)} has no length at crank "
+            f"angle {where:.0f} deg; allowed: ends that never meet"
+        )
+    return np.asarray(length)
+
+
+class Sums:
+    """What masses, springs and forces add, at B crank angles, to the motions ``compatible`` (B, z, n).
+
+    Pulls are of k kinds: by the three powers of the crank's rate, then of unit forces. ``mass`` (B, n, n), ``damping``
+    (2, B, n, n), ``stiffness`` (k, B, n, n); ``pull`` (k, B, z) what the links resist with in their own coordinates,
+    ``bent`` (k, B, z, z) its derivative by the second derivatives of the points, ``curved`` (k, B, n, n) that part of
+    it that is summed already.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        revolution: Revolution,
+        found: Nominal,
+        theta: Array,
+        compatible: Array,
+        *,
+        kinds: int = 3,
+        matrices: bool = True,
+    ) -> None:
+        self.mechanism, self.found, self.theta, self.matrices = mechanism, found, theta, matrices
+        self.winding = revolution.winding
+        self.compatible = compatible
+        count, size, n = compatible.shape
+        self.pull = np.zeros((kinds, count, size))
+        if matrices:
+            self.mass, self.damping = np.zeros((count, n, n)), np.zeros((2, count, n, n))
+            self.stiffness, self.curved = np.zeros((2, kinds, count, n, n))
+            self.bent = np.zeros((kinds, count, size, size))
+
+    @property
+    def load(self) -> Array:
+        """What the gaps feel of all pulls, (k, B, n)."""
+        return np.asarray((self.pull[:, :, None] @ self.compatible)[:, :, 0])
+
+    @property
+    def torque(self) -> Array:
+        """What the drive feels of all pulls, (k, B)."""
+        return np.asarray(np.einsum("bz,kbz->kb", self.found.inverse[:, :, 0], self.pull))
+
+    def add_link(self, link: Link) -> None:
+        """Add the mass of a link, in the plane or in space."""
+        if len(link.mass):
+            (self.add_spatial if isinstance(self.mechanism, SpatialMechanism) else self.add_masses)(link)
+
+    def add_masses(self, link: Link) -> None:
+        """Add the particles of a link and what turns with them, in axes of the link."""
+        own, inertia = self.mechanism.at[link.name], inertia_of(link)
+        turn = rotation(self.found.z[:, own.start + 2])
+        back = np.swapaxes(turn, -1, -2)
+        places = self.found.z[:, own.start : own.start + 3] - self.theta[:, None] * self.winding[own][:3]
+        first, second = derivatives(places)
+        rate, spin = self.winding[own.start + 2] + first[:, 2], second[:, 2]
+        powers = [0, 2]
+        pushed = np.zeros((2, len(turn), 4))
+        pushed[0, :, :2] = back @ -np.asarray(self.mechanism.gravity)
+        pushed[1, :, :2] = (back @ second[:, :2, None])[..., 0]
+        pushed[1, :, 2], pushed[1, :, 3] = spin, -(rate**2)
+        pull = pushed @ inertia.pull
+        pull[1] += spin[:, None] * inertia.turning[2]
+        pull[..., :2] = np.einsum("bij,kbj->kbi", turn, pull[..., :2])
+        self.pull[powers, ..., own] += pull
+        if not self.matrices:
+            return
+        motion = self.compatible[:, own].copy()
+        motion[:, :2] = back @ motion[:, :2]
+        once, twice = derivatives(motion)
+        rate, spin = rate[:, None, None], spin[:, None, None]
+        mass, transposed = inertia.translating + inertia.turning, np.swapaxes(motion, -1, -2)
+        self.mass += transposed @ (mass @ motion)
+        turned, centrifugal = inertia.gyroscopic @ motion, inertia.translating @ motion
+        self.damping[1] += 2.0 * transposed @ (mass @ once + rate * turned)
+        curved = mass @ twice + 2.0 * rate * (inertia.gyroscopic @ once)
+        self.stiffness[2] += transposed @ (curved + spin * turned - rate**2 * centrifugal)
+        self.curved[powers] += transposed @ np.tensordot(pushed, inertia.bent, 1) @ motion
+
+    def add_spatial(self, link: Link) -> None:
+        """Add the particles of a link in space, in axes of the link."""
+        own, inertia = self.mechanism.at[link.name], spatial_inertia_of(link)
+        turn, count = link.masses.lie.turn(self.found.z[:, own]), len(self.theta)
+        back = np.swapaxes(turn, -1, -2)
+        spun, swung = (back @ each for each in derivatives(turn))
+        place = self.found.z[:, own.start : own.start + 3]
+        pushed = np.zeros((2, count, 12))
+        pushed[0, :, :3] = back @ -np.asarray(self.mechanism.gravity)
+        pushed[1, :, :3] = (back @ derivatives(place)[1][:, :, None])[..., 0]
+        pushed[1, :, 3:] = swung.reshape(count, 9)
+        powers, rigid = [0, 2], (own.start, own.start + 3)
+        pull = pushed @ inertia.pull
+        for start in (0, 3):
+            pull[..., start : start + 3] = (turn @ pull[..., start : start + 3, None])[..., 0]
+        self.pull[powers, ..., own] += pull
+        if not self.matrices:
+            return
+        motion = self.compatible[:, own].copy()
+        for start, there in zip((0, 3), rigid, strict=True):
+            motion[:, start : start + 3] = back @ self.compatible[:, there : there + 3]
+        once, twice = derivatives(motion)
+        mass, transposed = np.einsum("iizy->zy", inertia.moments), np.swapaxes(motion, -1, -2)
+        spinning, swinging = (np.tensordot(each, inertia.moments, 2) for each in (spun, swung))
+        self.mass += transposed @ (mass @ motion)
+        self.damping[1] += 2.0 * transposed @ (mass @ once + spinning @ motion)
+        self.stiffness[2] += transposed @ (mass @ twice + 2.0 * spinning @ once + swinging @ motion)
+        self.curved[powers] += transposed @ np.tensordot(pushed, inertia.bent, 1) @ motion
+
+    def add_elastic(self, link: Link) -> None:
+        """Add stiffness and damping of the elastic coordinates of a link, which are the last of p."""
+        own = self.mechanism.at[link.name]
+        part = self.compatible[:, own.start + link.rigid : own.stop]
+        self.stiffness[0] += np.swapaxes(part, -1, -2) @ link.stiffness @ part
+        self.damping[0] += np.swapaxes(part, -1, -2) @ link.damping @ part
+
+    def add_forces(self, point: tuple[str, str], first: int) -> None:
+        """Add forces of 1 N along the axes of the ground on a point, as kinds of pulls from ``first`` on."""
+        _, gradient = self.mechanism.point(self.found.z, point)
+        for axis, kind in enumerate(range(first, first + self.mechanism.dimensions)):
+            self.pull[kind] -= gradient[:, axis]
+            if self.matrices:
+                vector = np.zeros((len(self.theta), self.mechanism.dimensions))
+                vector[:, axis] = -1.0
+                self.mechanism.add_bent(self.found.z, point, vector, self.bent[kind])
+
+    def add_spring(self, spring: Spring) -> None:
+        """Add a spring and damper between two points."""
+        z, mechanism = self.found.z, self.mechanism
+        apart, gradient = mechanism.apart(z, spring.first, spring.second)
+        length = spring_length(mechanism, z, spring, self.theta)
+        unit = apart / length[:, None]
+        slope = np.einsum("bi,biz->bz", unit, gradient)
+        rate = derivatives(length)[0]
+        pulls = (spring.stiffness * (length - spring.free_length), spring.damping * rate)
+        for power, pulled in enumerate(pulls):
+            self.pull[power] += pulled[:, None] * slope
+        if not self.matrices:
+            return
+        bend = np.swapaxes(gradient, -1, -2) @ gradient - slope[:, :, None] * slope[:, None]
+        bend /= length[:, None, None]
+        mechanism.add_bent(z, spring.second, unit, bend)
+        mechanism.add_bent(z, spring.first, -unit, bend)
+        for power, pulled in enumerate(pulls):
+            self.bent[power] += pulled[:, None, None] * bend
+        motion = np.einsum("bz,bzn->bn", slope, self.compatible)
+        change = derivatives(motion)[0]
+        self.stiffness[0] += spring.stiffness * motion[:, :, None] * motion[:, None]
+        self.damping[0] += spring.damping * motion[:, :, None] * motion[:, None]
+        self.stiffness[1] += spring.damping * motion[:, :, None] * change[:, None]
+
+    def add_geometric(self) -> None:
+        """Add the geometric stiffness of all that the others have pulled."""
+        forces = np.einsum("bzc,kbz->kbc", self.found.inverse, self.pull)
+        self.mechanism.add_bent_rows(self.found.z, -forces, self.bent)
+        self.stiffness += self.curved + np.swapaxes(self.compatible, -1, -2) @ self.bent @ self.compatible
