@@ -207,7 +207,9 @@ def test_friction_that_the_motor_does_not_feel_is_told(tmp_path):
     assert with_settings(given, {"guide_friction": 0.0}).notes == ()
 
 
-@pytest.mark.parametrize(("cycles", "speed"), [(0, 0.0), (-1, 0.0), (3, -50.0), (3, math.nan), (3, math.inf)])
+@pytest.mark.parametrize(
+    ("cycles", "speed"), [(0, 0.0), (-1, 0.0), (2.5, 0.0), (3, -50.0), (3, math.nan), (3, math.inf)]
+)
 def test_a_run_out_of_range_is_refused(cycles, speed, motored):
     """Whole cycles from 1 on, and a speed at the beginning from 0 on."""
     with pytest.raises(ParameterError, match="is out of range; allowed"):

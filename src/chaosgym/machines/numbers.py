@@ -41,6 +41,14 @@ def number(name: str, given: Any, low: float, high: float, unit: str = "") -> fl
     return value
 
 
+def whole(name: str, given: Any, low: int, high: int) -> int:
+    """Return a whole number in its range; raises as ``number``, and for fractions."""
+    value = number(name, given, low, high)
+    if value != int(value):
+        raise ParameterError(f"{name} = {value:g} is out of range; allowed: whole numbers from {low} to {high:,}")
+    return int(value)
+
+
 def numbers(
     name: str, given: Any, low: float, high: float, unit: str = "", *, shape: tuple[int | None, ...] = (None,)
 ) -> Array:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -20,12 +20,14 @@ from chaosgym.machines.mechanism.equations import SmallMotion, assembled, crank_
 from chaosgym.machines.mechanism.joints import ACROSS, ALONG, PITCH, PLACES, SIDEWAYS, TURN, YAW, Joint
 from chaosgym.machines.mechanism.links import RIGID
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism
-from chaosgym.machines.mechanism.motor import MOTOR_FIELDS, Load, Motor, MotorRun, turn
+from chaosgym.machines.mechanism.motor import MOTOR_FIELDS, Load, Motor, MotorRun, crank_of, turn
 from chaosgym.machines.mechanism.nominal import Revolution, places, revolution_of
 from chaosgym.machines.mechanism.spatial_beam import fibre_stress_around
-from chaosgym.machines.numbers import number
+from chaosgym.machines.numbers import number, whole
 from chaosgym.machines.parameters import assumed, parameter
 
+if TYPE_CHECKING:
+    from chaosgym.core.motor import Crank
 SMALL = 0.02
 """Clearance as a share of a link's length beyond which motions in the gap are not small."""
 
@@ -138,7 +140,7 @@ class MechanismMachine(BinnedMachine):
         ParameterError
             If the angles are out of range.
         """
-        number("count", count, 1, MOST_ANGLES)
+        whole("count", count, 1, MOST_ANGLES)
         number("first", first, -MOST_TURNED, MOST_TURNED, "rad")
         return small_motion(self._scaled(), self.revolution, first + _even(count))
 
@@ -196,13 +198,21 @@ class MechanismMachine(BinnedMachine):
         ParameterError
             If the machine has no motor.
         """
+        return turn(*self._motor_and_load, self.rate_at(speed), cycles)
+
+    @property
+    def crank(self) -> "Crank":
+        """What turns under the motor, with every gap in its middle; raises as ``under_motor``."""
+        return crank_of(*self._motor_and_load)
+
+    @property
+    def _motor_and_load(self) -> tuple[Motor, Load]:
         motor = self.motor
         if motor is None:
             raise ParameterError(f"{self.name} has no motor; allowed: a file with [motor]")
         scaled, angles = self._scaled(), _even(MOTOR_ANGLES)
         still, viscous, _ = assembled(scaled, self.revolution, matrices=False).torque_at(angles)
-        load = Load(crank_inertia(scaled, self.revolution, angles), still, viscous)
-        return turn(motor, load, self.rate_at(speed), cycles)
+        return motor, Load(crank_inertia(scaled, self.revolution, angles), still, viscous)
 
     def _scaled(self) -> Mechanism:
         """The mechanism with the factors of this machine."""

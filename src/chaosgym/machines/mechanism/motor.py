@@ -10,16 +10,17 @@ torque T_m to its speed without load w_0, and what weight, gas and springs (T_0)
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
-from chaosgym.machines.numbers import number
+from chaosgym.machines.numbers import number, whole
 
-GRID = 1e-3
-"""Spacing of the speeds at which cycles are run, as a share: models of a machine are kept for each."""
+if TYPE_CHECKING:
+    from chaosgym.core.motor import Crank
+
 
 MOST_CYCLES = 20_000
 """Cycles after which a speed that still changes is taken as it is."""
@@ -97,7 +98,12 @@ class MotorRun(NamedTuple):
     @property
     def operation(self) -> dict[str, Array]:
         """Speeds for ``simulate``, to 0.1 %: a cycle that has a speed of before has its model."""
-        return {"speed": np.exp(np.rint(np.log(self.speed) / GRID) * GRID)}
+        from chaosgym.core.compilation import call
+        from chaosgym.core.motor import round_speeds
+
+        speeds = self.speed[None].copy()
+        call(round_speeds, speeds)
+        return {"speed": speeds[0]}
 
     @property
     def swing(self) -> float:
@@ -142,10 +148,35 @@ class MotorRun(NamedTuple):
         )
 
 
+def crank_of(motor: Motor, load: Load) -> "Crank":
+    """What turns, ready to be stepped.
+
+    Raises
+    ------
+    ParameterError
+        If nothing that turns has inertia, or the motor's line is so steep that the speed follows it within a step.
+    """
+    from chaosgym.core.motor import Crank
+
+    width = 2.0 * math.pi / len(load.still)
+    slope = motor.stall_torque / motor.no_load_rate
+    inertia = motor.inertia + load.inertia
+    if inertia.min() <= LEAST * inertia.max():
+        where = math.degrees(int(inertia.argmin()) * width)
+        raise ParameterError(
+            f"nothing that turns has inertia at crank angle {where:.0f} deg; allowed: [motor] inertia above 0"
+        )
+    if 0.5 * width * slope > inertia.min() * motor.no_load_rate:
+        least = 0.5 * width * slope / motor.no_load_rate - load.inertia.min()
+        raise ParameterError(
+            f"the motor's line is so steep that the speed follows it within {math.degrees(width):g} deg; "
+            f"allowed: [motor] inertia from {least:.2g} kg m^2 on"
+        )
+    return Crank(inertia, load.still, load.viscous, slope, motor.no_load_rate)
+
+
 def turn(motor: Motor, load: Load, rate: float = 0.0, cycles: int | None = None) -> MotorRun:
     """Turn a crank from angle 0 on.
-
-    Each step takes the trapezium of the torques; the speed at its end is the root of a quadratic.
 
     Parameters
     ----------
@@ -159,8 +190,7 @@ def turn(motor: Motor, load: Load, rate: float = 0.0, cycles: int | None = None)
     Raises
     ------
     ParameterError
-        If cycles or rate are out of range, nothing that turns has inertia, or the motor's line is so steep that the
-        speed follows it within a step.
+        If cycles or rate are out of range, or as ``crank_of``.
 
     Examples
     --------
@@ -169,43 +199,18 @@ def turn(motor: Motor, load: Load, rate: float = 0.0, cycles: int | None = None)
     >>> round(float(turn(Motor(10.0, 100.0, 0.1), free).speed[-1] * np.pi / 30.0), 2)
     100.0
     """
+    from chaosgym.core.compilation import call
+    from chaosgym.core.motor import TURNS, revolution
+
     if cycles is not None:
-        number("cycles", cycles, 1, LONGEST)
+        cycles = whole("cycles", cycles, 1, LONGEST)
     rate = number("speed", rate * 30.0 / math.pi, 0.0, FASTEST, "rpm") * math.pi / 30.0
-    steps = len(load.still)
-    width = 2.0 * math.pi / steps
-    slope = motor.stall_torque / motor.no_load_rate
-    nodes = [*range(steps), 0]
-    inertia = (motor.inertia + load.inertia)[nodes].tolist()
-    if min(inertia) <= LEAST * max(inertia):
-        where = math.degrees(inertia.index(min(inertia)) * width)
-        raise ParameterError(
-            f"nothing that turns has inertia at crank angle {where:.0f} deg; allowed: [motor] inertia above 0"
-        )
-    if 0.5 * width * slope > min(inertia) * motor.no_load_rate:
-        least = 0.5 * width * slope / motor.no_load_rate - min(load.inertia)
-        raise ParameterError(
-            f"the motor's line is so steep that the speed follows it within {math.degrees(width):g} deg; "
-            f"allowed: [motor] inertia from {least:.2g} kg m^2 on"
-        )
-    given = (motor.stall_torque - load.still)[nodes].tolist()
-    taken = (slope + load.viscous)[nodes].tolist()
+    crank = crank_of(motor, load)
     speeds: list[tuple[float, float, float, float]] = []
     while len(speeds) < (MOST_CYCLES if cycles is None else cycles):
-        time, work, low, high = 0.0, 0.0, rate, rate
-        for k in range(steps):
-            energy = 0.5 * inertia[k] * rate**2
-            half = 0.5 * width * taken[k + 1]
-            left = energy + 0.5 * width * (given[k] + given[k + 1] - taken[k] * rate)
-            square = half**2 + 2.0 * inertia[k + 1] * left
-            # a crank that does not gain from rest stands still
-            if left <= 0.0 or square <= 0.0:
-                return _run(speeds, math.degrees(k * width), False)
-            after = (math.sqrt(square) - half) / inertia[k + 1]
-            time += 2.0 * width / (rate + after)
-            work += 0.5 * width * (2.0 * motor.stall_torque - slope * (rate + after))
-            rate = after
-            low, high = min(low, rate), max(high, rate)
+        stopped, rate, time, work, low, high = call(revolution, *crank, rate)
+        if stopped != TURNS:
+            return _run(speeds, 360.0 * stopped / len(load.still), False)
         speeds.append((2.0 * math.pi / time, low, high, work / time))
         if cycles is None and _settled([each[0] for each in speeds[-3:]]):
             break
