@@ -30,5 +30,6 @@ def test_the_page_runs(tmp_path, monkeypatch):
     assert "Type" in Path("report.html").read_text(encoding="utf-8")
     assert Path("crank.png").stat().st_size > 10_000
     assert names["crank"].degrees_of_freedom == ("guide across", "guide turn")
-    assert len(names["observation"]) == 14
+    assert len(names["observation"]) == 15
+    assert 150.0 < names["info"]["speed"] < names["info"]["set_point"] + 5.0
     assert 0.1 < abs(names["drive"].torque).max() < 100.0

@@ -55,7 +55,7 @@ REWARDS = {
     "type_iii": "-w (share of the step's cycles that are irregular)",
     "damage": "-w (increase of the damage)",
     "time": "-w (duration of the step) / (duration of the job at top speed)",
-    "failure": "-w (steps left) on fracture or a failed simulation",
+    "failure": "-w (steps left) on fracture, a stall or a failed simulation",
 }
 """Terms of the reward, by the names of their weights."""
 

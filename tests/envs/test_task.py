@@ -22,11 +22,11 @@ def test_each_surface_wears_by_its_own_peaks():
 
 
 def test_a_job_stands_where_the_worst_puts_it():
-    """A failed simulation before a fracture, a fracture before the end, the end at the last step."""
-    failed = [False, False, False, True, False]
-    steps, damage = [9, 10, 10, 10, 3], [0.2, 0.99, 1.0, 2.0, 1.5]
-    expected = ["RUNNING", "JOB_DONE", "FRACTURE", "SIMULATION_FAILED", "FRACTURE"]
-    found = [status_of(TASK.steps, *given) for given in zip(failed, steps, damage, strict=True)]
+    """A failed simulation or a stall before a fracture, a fracture before the end, the end at the last step."""
+    outcome = [Status.RUNNING] * 3 + [Status.SIMULATION_FAILED, Status.STALLED, Status.RUNNING]
+    steps, damage = [9, 10, 10, 10, 10, 3], [0.2, 0.99, 1.0, 2.0, 2.0, 1.5]
+    expected = ["RUNNING", "JOB_DONE", "FRACTURE", "SIMULATION_FAILED", "STALLED", "FRACTURE"]
+    found = [status_of(TASK.steps, *given) for given in zip(outcome, steps, damage, strict=True)]
     assert [Status(value).name for value in found] == expected
 
 

@@ -16,6 +16,7 @@ from chaosgym.control.policies.learned_map import LearnedMap
 from chaosgym.core.compilation import call
 from chaosgym.envs.drive import DEAD_BAND, MOVES, checked_actions
 from chaosgym.envs.kernels.steps import drive, observe
+from chaosgym.envs.observation import OBSERVATION_NAMES, asked_of
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import ParameterError
 
@@ -63,6 +64,11 @@ class Operator:
         self.policy = policy_of(policy)
         self._envs = native_envs(env, 1, **(keywords | self.policy.keywords))
         self.task, self._job = self._envs.task, self._envs.jobs.state
+        if asked := asked_of(self.task):
+            raise ParameterError(
+                f"an operator observes the {len(OBSERVATION_NAMES)} usual entries; allowed: a policy and keywords "
+                f"without {', '.join(asked)}"
+            )
         self.demand = float("nan")
 
     @property
@@ -81,7 +87,8 @@ class Operator:
             If the policy is of another machine.
         """
         job = np.zeros(1, self._job.dtype)
-        job["speed"], job["done"] = self._within("speed", speed), BEFORE_THE_FIRST
+        job["speed"] = job["set_point"] = self._within("speed", speed)
+        job["done"] = BEFORE_THE_FIRST
         demand = self._within("demand", demand)
         self._job[:] = job
         self._ask(demand)

@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array, Indices
 from chaosgym.core.compilation import call
+from chaosgym.core.motor import round_speeds
 from chaosgym.envs.classified import RecordsAtSpeed
 from chaosgym.envs.drive import DEAD_BAND, MOVES
 from chaosgym.envs.judge import ExponentJudge, Judge, RecurrenceJudge
-from chaosgym.envs.kernels.steps import JOB, REPORT, drive, observe, settle
-from chaosgym.envs.observation import OBSERVATION_NAMES, Observation, sensed
+from chaosgym.envs.kernels.steps import INFO, JOB, MOTOR, REPORT, drive, observe, settle
+from chaosgym.envs.motors import Motors
+from chaosgym.envs.observation import Observation, observation_names, sensed
 from chaosgym.envs.pool import Pool
 from chaosgym.envs.task import Status, Task, demand_of
 from chaosgym.envs.variants import DRAWN, Variants
@@ -59,6 +61,8 @@ class Jobs:
         Of every step of the job.
     damage : (N, sides)
         Share of its life that each surface has used up.
+    told
+        Names of the columns of a report that are the info of a step.
     force, period : (N,)
         What a force of the task is a share of [N], and duration of a cycle of the last step [s].
     traced
@@ -71,6 +75,9 @@ class Jobs:
         self.judge: Judge = (ExponentJudge if isinstance(self.batch, VaryingBatch) else RecurrenceJudge)(count)
         self._monitor = RepeatSums(count) if task.monitor == "on" else None
         self._records = RecordsAtSpeed(nominal, task.sensor_error, count) if task.classifier == "on" else None
+        self._motors = Motors(nominal, count) if task.drive == "motor" else None
+        self.told = INFO if self._motors is None else (*INFO, *MOTOR)
+        self._places = {name: place for place, name in enumerate(observation_names(task))}
         self.machines: list[Machine] = [nominal] * count
         self.state = np.zeros(count, JOB)
         self.state["speed"], self.state["machine"] = task.lowest_speed, DRAWN
@@ -89,7 +96,8 @@ class Jobs:
 
     def machine_at(self, i: int) -> Machine:
         """Machine of job i at its current speed and clearance."""
-        return self.machines[i].at(self._speed_of(i), float(self.state["worn"][i]))
+        # of one that stalled, at its usual speed
+        return self.machines[i].at(self._speed_of(i) or None, float(self.state["worn"][i]))
 
     def _speed_of(self, i: int) -> float:
         """Speed of job i, in the unit of its machine."""
@@ -127,7 +135,8 @@ class Jobs:
         if task.speed_grid > 0.0:
             speeds = task.speed_grid * np.rint(speeds / task.speed_grid)
         state = self.state[which]
-        state["speed"], state["trim"], state["worn"] = speeds, 0.0, state["clearance"]
+        state["speed"] = state["set_point"] = speeds
+        state["trim"], state["worn"] = 0.0, state["clearance"]
         state["done"], state["changed"], state["machine"] = 0, 0, DRAWN if numbers is None else numbers
         self.state[which], self.damage[which] = state, 0.0
         self.judge.start(which)
@@ -137,14 +146,22 @@ class Jobs:
             self._records.forget(which)
         for i in which.tolist():
             self.batch.start(i, self.machines[i].at(self._speed_of(i)))
+            if self._motors is not None:
+                self._motors.start(i, self.machines[i], self._speed_of(i))
         count = max(task.run_in_cycles, task.cycles_per_step)
         cycles, growth, period = self._run(which, count, generators)
+        if self._motors is not None and self._motors.stalled[which].any():
+            first = int(which[int(self._motors.stalled[which].argmax())])
+            raise SimulationError(
+                f"the motor stalls at a set-point of {self.state['set_point'][first]:g} rpm; give a higher "
+                "lowest_speed, or a [motor] with more stall_torque or inertia"
+            )
         if cycles.failed.any():
             first = int(which[int(cycles.failed.argmax())])
             raise SimulationError(f"a job can't start at a speed of {self._speed_of(first):g}; {self.machines[first]}")
         self.judge.verdict(which, growth, variants.nominal.sensed(cycles.peak_force))
         info = {
-            "speed": speeds.copy(),
+            "speed": self.speed[which],
             "demand": self.demand[which, 0],
             "damage": np.zeros(len(which)),
             "status": np.full(len(which), int(Status.RUNNING)),
@@ -163,9 +180,15 @@ class Jobs:
         peaks = cycles.peak_force
         verdict = self.judge.verdict(which, growth, self.variants.nominal.sensed(peaks))
         report, reward = np.empty(len(which), REPORT), np.empty(len(which))
-        given = (task.numbers, self._job_time, which, demands, cycles.failed, peaks, task.damage(peaks), period)
+        outcome = np.where(cycles.failed, Status.SIMULATION_FAILED, Status.RUNNING)
+        if self._motors is not None:
+            outcome[self._motors.stalled[which]] = Status.STALLED
+        given = (task.numbers, self._job_time, which, demands, outcome, peaks, task.damage(peaks), period)
         call(settle, *given, *verdict, state, self.damage, report, reward)
         report["largest_force"] *= self.force[which]
+        report["set_point"] = state["set_point"][which]
+        if self._motors is not None:
+            report["motor_torque"], report["motor_power"] = self._motors.told[which, 1:].T
         return StepResult(self._observe(which, cycles, period, generators), reward, report)
 
     def _run(self, which: Indices, count: int, generators: Generators) -> tuple[Cycles, Array, Array]:
@@ -174,17 +197,28 @@ class Jobs:
         Returns cycles, their growth, which is zero where it is not known, and the period (k,) [s].
         """
         speed = self._lowest[which] + self._span[which] * self.speed[which]
-        cycles, growth = self._moved(which, speed, count, generators)
+        speeds = speed[:, None].repeat(count, axis=1)
+        if self._motors is not None:
+            speeds = self._motors.turn(which, speed, count, self.task.cycles_per_step)
+            self.state["speed"][which] = self._motors.told[which, 0]
+            speed = np.where(self._motors.stalled[which], speed, self.speed[which])
+        cycles, growth = self._moved(which, speeds, generators)
+        if self._motors is not None:
+            cycles.failed[:] |= self._motors.stalled[which]
+            for values in (*cycles[1:], growth):
+                values[cycles.failed] = 0
         cycles.peak_force[:] /= self.force[which][:, None, None]
         self.period[which] = self.variants.nominal.period_at(speed)
         return cycles, growth, self.period[which]
 
-    def _moved(self, which: Indices, speed: Array, count: int, generators: Generators) -> tuple[Cycles, Array]:
-        """Cycles of machines at speeds (k,), and their growth."""
-        task = self.task
-        speeds = speed[:, None].repeat(count, axis=1)
+    def _moved(self, which: Indices, speeds: Array, generators: Generators) -> tuple[Cycles, Array]:
+        """Cycles of machines at speeds (k, cycles), and their growth."""
+        task, count = self.task, speeds.shape[1]
+        steady = task.speed_ripple == 0.0 and self._motors is None
         if task.speed_ripple > 0.0:
             speeds *= 1.0 + task.speed_ripple * np.array([g.standard_normal(count) for g in generators])
+        if self._motors is not None:
+            call(round_speeds, speeds)
         kicks = None
         if task.kick > 0.0:
             kicks = task.kick * np.array([g.standard_normal((count, self._velocities)) for g in generators])
@@ -196,12 +230,12 @@ class Jobs:
             cycles, growth = self.batch.run_varied(which, speeds)
             growth[cycles.failed] = 0.0
             return cycles, growth
-        if kicks is None and task.speed_ripple == 0.0:
-            self.batch.set_speeds(which, speed)
+        if kicks is None and steady:
+            self.batch.set_speeds(which, speeds[:, 0])
             self._trace(which, speeds)
             return self.batch.run(which, count), np.zeros(speeds.shape)
-        if kicks is not None and task.speed_ripple == 0.0 and not self.traced and isinstance(self.batch, KickedBatch):
-            self.batch.set_speeds(which, speed)
+        if kicks is not None and steady and not self.traced and isinstance(self.batch, KickedBatch):
+            self.batch.set_speeds(which, speeds[:, 0])
             return self.batch.run_kicked(which, kicks), np.zeros(speeds.shape)
         return self._run_cycles(which, speeds, kicks)
 
@@ -244,8 +278,10 @@ class Jobs:
         if self._monitor is not None:
             for column in measured.T:
                 self._monitor.add(which, column, max(task.sensor_error, LEAST_ERROR))
-            values[:, len(OBSERVATION_NAMES)] = self._monitor.level(which)
+            values[:, self._places["monitor_level"]] = self._monitor.level(which)
+        if self._motors is not None:
+            values[:, self._places["set_point"]] = self.state["set_point"][which]
         if self._records is not None:
             self._records.add(which, self.speed[which], measured)
-            values[:, -1] = self._records.irregular_probability(which)
+            values[:, self._places["irregular_probability"]] = self._records.irregular_probability(which)
         return values

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from chaosgym.arrays import Indices
 from chaosgym.envs.drive import action_space, checked_actions
 from chaosgym.envs.jobs import Jobs
-from chaosgym.envs.kernels.steps import INFO
 from chaosgym.envs.levels import task_of, tolerances_of
+from chaosgym.envs.motors import refuse_drive
 from chaosgym.envs.observation import Observation, observation_names, observation_space
 from chaosgym.envs.pool import ANY, SHARE, Pool, pool_task
 from chaosgym.envs.task import Status, Task, UnknownKeywordError, divided
@@ -96,6 +96,7 @@ class EnvSettings:
             self._take_any(**keywords)
         else:
             self._take(machine, **keywords)
+        refuse_drive(self.task, self.variants.nominal)
         self.space = observation_space(self.task)
         self.actions = action_space(self.task)
 
@@ -269,7 +270,7 @@ class MachineEnv(JobSpec, gym.Env[Observation, Any]):
             raise gym.error.ResetNeeded("no job is running; call reset() first")
         actions = checked_actions(self.task, [action], 1)
         outcome = self._job.step(FIRST, actions, [self.np_random])
-        info = dict(zip(INFO, outcome.report.item(), strict=True))
+        info = dict(zip(self._job.told, outcome.report.item(), strict=False))
         self._runs = info["status"] == Status.RUNNING
         if self.render_mode is not None:
             self._show().add(info, outcome.observation[0])

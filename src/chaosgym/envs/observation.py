@@ -33,9 +33,17 @@ FELT = (
 OBSERVATION_NAMES = (*COMMANDED, *FELT)
 """Entries of an observation, in their order."""
 
-ASKED = {"monitor": ("monitor_level", HIGHEST / LIMIT), "classifier": ("irregular_probability", 1.0)}
-"""Entries that follow where the keyword is "on", and the most that each may be: the level of ``chaosgym.monitor``, an
-alarm above 1; and how likely the machine's trained classifier of records holds the motion at this speed irregular."""
+ASKED = {
+    "monitor": ("on", "monitor_level"),
+    "drive": ("motor", "set_point"),
+    "classifier": ("on", "irregular_probability"),
+}
+"""Entries that follow where a keyword has this value: the level of ``chaosgym.monitor``, an alarm above 1; the speed at
+which the motor gives no torque; and how likely the machine's trained classifier of records holds the motion at this
+speed irregular."""
+
+OVERSPEED = 2.0
+"""Largest speed that is observed under a motor, which a load may drive beyond its set-point, over the highest one."""
 
 MEANINGS = {
     "speed": "speed of the step",
@@ -58,23 +66,28 @@ MEANINGS = {
 
 def observation_names(task: Task) -> tuple[str, ...]:
     """Return the entries of an observation of a task."""
-    return (*OBSERVATION_NAMES, *(ASKED[keyword][0] for keyword in asked_of(task)))
+    return (*OBSERVATION_NAMES, *(ASKED[keyword][1] for keyword in asked_of(task)))
 
 
 def asked_of(task: Task) -> tuple[str, ...]:
     """Return the keywords of the entries that a task adds, in their order."""
-    return tuple(keyword for keyword in ASKED if getattr(task, keyword) == "on")
+    return tuple(keyword for keyword in ASKED if getattr(task, keyword) == ASKED[keyword][0])
 
 
 def observation_space(task: Task) -> Box:
     """Return the space of observations, (14,) and one more for each keyword of ``ASKED``, with finite bounds."""
     span, force = task.highest_speed - task.lowest_speed, FORCE_RANGE * task.load_rating
     trim = span if task.action == "speed" else task.largest_trim
-    low = [task.lowest_speed, task.lowest_demand, -trim, -span, 0.0, 0.0] + [0.0] * len(FELT)
-    high = [task.highest_speed, task.highest_demand, trim, span, 1.0, float(task.shortest_hold)]
+    slowest, fastest = task.lowest_speed, task.highest_speed
+    if task.drive == "motor":
+        slowest, fastest = 0.0, OVERSPEED * fastest
+        span = fastest
+    low = [slowest, task.lowest_demand, -trim, -span, 0.0, 0.0] + [0.0] * len(FELT)
+    high = [fastest, task.highest_demand, trim, span, 1.0, float(task.shortest_hold)]
     high += [force] * (len(FELT) - 2) + [IMPACT_RANGE, 1.0]
-    most = [ASKED[keyword][1] for keyword in asked_of(task)]
-    low, high = low + [0.0] * len(most), high + most
+    most = {"monitor": HIGHEST / LIMIT, "drive": task.highest_speed, "classifier": 1.0}
+    asked = [most[keyword] for keyword in asked_of(task)]
+    low, high = low + [0.0] * len(asked), high + asked
     return Box(np.array(low, np.float32), np.array(high, np.float32))
 
 

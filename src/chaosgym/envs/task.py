@@ -6,7 +6,7 @@ A step of a job costs
     - type_iii_weight  (share of the step's cycles that are irregular)
     - damage_weight    (increase of the damage)
     - time_weight      (duration of the step) / (duration of the whole job at top speed)
-    - failure_weight   (steps that are left)                     on fracture or a failed simulation
+    - failure_weight   (steps that are left)                     on fracture, a stall or a failed simulation
 
 The keyword ``objective`` names a set of these weights, ``OBJECTIVES``: irregular motion, the joint's life, or both.
 
@@ -46,6 +46,7 @@ class Status(IntEnum):
     JOB_DONE = steps.JOB_DONE
     FRACTURE = steps.FRACTURE
     SIMULATION_FAILED = steps.SIMULATION_FAILED
+    STALLED = steps.STALLED
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +68,12 @@ class Task:
     highest_speed: float = _number(30.0, source="highest speed of the drive")
     slew_limit: float = _number(2.0, source="largest change of speed in a step")
     speed_grid: float = _number(0.0, source="spacing of the speeds that the drive can hold, 0 for none")
+    drive: str = parameter(
+        "constant",
+        choices=("constant", "motor"),
+        provenance="assumed",
+        source="whether the machine has the speed that is set, or its motor's torque takes it there",
+    )
     trim_step: float = _number(0.25, source="smallest change of the trim")
     largest_trim: float = _number(2.0, source="largest trim")
     lowest_demand: float = _number(18.0, source="lowest demand")

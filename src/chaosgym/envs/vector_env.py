@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from chaosgym.arrays import Indices
 from chaosgym.envs import environment
 from chaosgym.envs.drive import checked_actions
-from chaosgym.envs.kernels.steps import INFO
 from chaosgym.envs.machine_env import METADATA, EnvSettings, JobSpec, refuse_pictures, start_of
 from chaosgym.envs.observation import Observation, observation_names
 from chaosgym.envs.task import Status
@@ -167,7 +166,7 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
             outcome = self.jobs.step(running, actions[running], self._generators_of(running))
             self._elapsed[running] += 1
             observations[running], rewards[running] = outcome.observation, outcome.reward
-            info = {name: outcome.report[name] for name in INFO}
+            info = {name: outcome.report[name] for name in self.jobs.told}
             terminated[running] = info["status"] != Status.RUNNING
             if self._limit is not None:
                 truncated[running] = self._elapsed[running] >= self._limit

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.envs.memory import irregularity
-from chaosgym.envs.observation import OBSERVATION_NAMES
+from chaosgym.envs.observation import OBSERVATION_NAMES, observation_names
 from chaosgym.envs.task import Task
 
 Observations = NDArray[np.float32]
@@ -45,7 +45,11 @@ class Controller:
 
     def __call__(self, observations: Observations) -> NDArray[np.float32]:
         """Return the actions (n, 1)."""
-        speeds = np.clip(self.speeds(observations), self.task.lowest_speed, self.task.highest_speed)
+        speeds = self.speeds(observations)
+        if self.task.drive == "motor":  # the set-point is ahead by what the motor slipped in the last step
+            set_point = observation_names(self.task).index("set_point")
+            speeds = speeds + observations[:, set_point] - seen(observations, "speed")
+        speeds = np.clip(speeds, self.task.lowest_speed, self.task.highest_speed)
         return speeds[:, None].astype(np.float32)
 
     def speeds(self, observations: Observations) -> Array:

@@ -70,7 +70,7 @@ class TrainedPolicy:
     squashed
         Whether continuous answers go through tanh; otherwise they are clipped.
     asked
-        Keywords of the entries that it sees beside the 14 of every observation: of "monitor" and "classifier".
+        Keywords of the entries that it sees beside the 14 of every observation: of "monitor", "drive" and "classifier".
     machine
         ``definition`` of the machine that it was trained on; by default the name in the environment's id.
 
@@ -113,7 +113,7 @@ class TrainedPolicy:
     @property
     def keywords(self) -> dict[str, Any]:
         """Keywords of the environment that it plays in."""
-        return {"action": self.action} | dict.fromkeys(self.asked, "on")
+        return {"action": self.action} | {keyword: ASKED[keyword][0] for keyword in self.asked}
 
     def start(self, envs: Any) -> None:
         """Begin the jobs of a vector environment that has been reset.

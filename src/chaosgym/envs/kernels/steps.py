@@ -8,29 +8,33 @@ import numpy as np
 
 from chaosgym.core.kernel import njit
 
-RUNNING, JOB_DONE, FRACTURE, SIMULATION_FAILED = range(4)
+RUNNING, JOB_DONE, FRACTURE, SIMULATION_FAILED, STALLED = range(5)
 
 BY_TRIM, CONTINUOUS, BY_SPEED = range(3)
 """Places of the kinds of action among the choices of a task."""
 
 JOB = np.dtype(
-    [(name, np.float64) for name in ("speed", "trim", "clearance", "worn")]
+    [(name, np.float64) for name in ("speed", "set_point", "trim", "clearance", "worn")]
     + [(name, np.int64) for name in ("done", "changed", "machine")]
 )
-"""Speed and trim of the last step, clearance when new and as ``worn``, steps ``done``, those done when the demand
-``changed``, and number of the machine."""
+"""Speed, set-point of the drive and trim of the last step, clearance when new and as ``worn``, steps ``done``, those
+done when the demand ``changed``, and number of the machine."""
 
 TERMS = tuple(f"reward_{term}" for term in ("deviation", "type_iii", "damage", "time", "failure"))
+
+MOTOR = ("set_point", "motor_torque", "motor_power")
 
 REPORT = np.dtype(
     [(name, np.float64) for name in (*TERMS, "speed", "demand", "deviation", "type_iii", "cost", "irregularity")]
     + [("largest_force", np.float64), ("damage", np.float64), ("status", np.int64), ("is_success", np.bool_)]
-    + [("machine", np.int64), ("clearance", np.float64)],
+    + [("machine", np.int64), ("clearance", np.float64)]
+    + [(name, np.float64) for name in MOTOR],
     align=True,
 )
-"""Info of a step."""
+"""Info of a step, with what a motor adds."""
 
-INFO = REPORT.names or ()
+INFO = (REPORT.names or ())[: -len(MOTOR)]
+"""Info of a step at a constant speed."""
 
 LAGS = (1, 2, 4)
 """Cycles after which measured peaks are compared with themselves."""
@@ -63,24 +67,27 @@ def trimmed(task, action, demand, trim, moves, dead_band):
 
 @njit(cache=True, nogil=True)
 def drive(tasks, actions, moves, dead_band, which, demands, jobs):
-    """Set trims and speeds by actions (k, n) as in ``envs.drive``, within the drive's range, its rate and its grid."""
+    """Set trims and set-points by actions (k, n) as in ``envs.drive``, within the drive's range, its rate and its grid.
+
+    A set-point is the speed of a drive without a motor.
+    """
     task = tasks[0]
     for k, i in enumerate(which):
         job = jobs[i]
         demand = demands[i, job["done"]]
         job["trim"] = trimmed(task, actions[k], demand, job["trim"], moves, dead_band)
-        change = limited(demand + job["trim"] - job["speed"], -task["slew_limit"], task["slew_limit"])
-        moved = job["speed"] + change
+        change = limited(demand + job["trim"] - job["set_point"], -task["slew_limit"], task["slew_limit"])
+        moved = job["set_point"] + change
         if task["speed_grid"] > 0.0:
             moved = task["speed_grid"] * np.rint(moved / task["speed_grid"])
-        job["speed"] = limited(moved, task["lowest_speed"], task["highest_speed"])
+        job["speed"] = job["set_point"] = limited(moved, task["lowest_speed"], task["highest_speed"])
 
 
 @njit(cache=True)
-def status_of(steps, failed, done, damage):
-    """Where a job stands, by whether its simulation failed, steps done, and damage of the joint."""
-    if failed:
-        return SIMULATION_FAILED
+def status_of(steps, outcome, done, damage):
+    """Where a job stands, by how its step went (``RUNNING`` if well), steps done, and damage of the joint."""
+    if outcome != RUNNING:
+        return outcome
     if damage >= 1.0:
         return FRACTURE
     return JOB_DONE if done >= steps else RUNNING
@@ -100,12 +107,12 @@ def rewards_of(task, deviation, type_iii, damage, time, failed, steps_left):
 
 @njit(cache=True, nogil=True)
 def settle(
-    tasks, job_time, which, demands, failed, peaks, wear, period, type_iii, irregularity, jobs, damage, report, rewards
+    tasks, job_time, which, demands, outcome, peaks, wear, period, type_iii, irregularity, jobs, damage, report, rewards
 ):
     """Count a step as done, and write its ``report`` (k,), records ``REPORT``, and ``rewards`` (k,).
 
-    ``failed``, ``period`` [s], ``type_iii`` and ``irregularity`` (k,), ``peaks`` (k, cycles, sides) [N]; ``wear``
-    (k, sides) adds to ``damage`` (N, sides). ``job_time`` (N,) [s] of a job at top speed.
+    ``outcome`` as for ``status_of``, ``period`` [s], ``type_iii`` and ``irregularity`` (k,), ``peaks`` (k, cycles,
+    sides) [N]; ``wear`` (k, sides) adds to ``damage`` (N, sides). ``job_time`` (N,) [s] of a job at top speed.
     """
     task = tasks[0]
     for k, i in enumerate(which):
@@ -118,9 +125,9 @@ def settle(
             job["changed"] = job["done"]
         job["worn"] = job["clearance"] * (1.0 + task["wear"] * job["done"] / task["steps"])
         row["speed"], row["demand"], row["deviation"] = job["speed"], demand, abs(job["speed"] - demand)
-        row["type_iii"] = row["cost"] = 0.0 if failed[k] else type_iii[k]
+        row["type_iii"] = row["cost"] = 0.0 if outcome[k] != RUNNING else type_iii[k]
         row["irregularity"], row["largest_force"], row["damage"] = irregularity[k], peaks[k].max(), damage[i].max()
-        row["status"] = status_of(task["steps"], failed[k], job["done"], row["damage"])
+        row["status"] = status_of(task["steps"], outcome[k], job["done"], row["damage"])
         row["is_success"] = row["status"] == JOB_DONE
         row["machine"], row["clearance"] = job["machine"], job["worn"]
         worse, time = row["damage"] - before, task["cycles_per_step"] * period[k] / job_time[i]
