@@ -292,7 +292,6 @@ RUNNING_STATISTICS = ThesisFigure(
         running_panel("(b) one standard deviation", "deviation", "STD [N]"),
     ),
     compare=converged,
-    remark="±0.254 mm by its caption; the text says the case of figure 5.13, which is ±0.127 mm",
 )
 
 FIGURES = (

@@ -47,16 +47,17 @@ def _section(card: Scorecard, machine: str) -> str:
 def _exclusions(hit: Set[str]) -> str:
     """Pairs of statements that no beam of the searches hits together, and those of which the shipped beam hits both."""
     found = known_exclusions()
-    rows = "\n".join(
-        f"| {pair.one}, {pair.other} | {pair.hits}, {pair.hits_of_other} | {pair.judged} |" for pair in found.pairs
-    )
+    partners: dict[str, list[str]] = {}
+    for pair in found.pairs:
+        partners.setdefault(pair.one, []).append(pair.other)
+    pairs = "; ".join(f"{one} with {', '.join(others)}" for one, others in partners.items())
     never = f"None hits {', '.join(found.never)}. " if found.never else ""
     both = ", ".join(f"{pair.one} with {pair.other}" for pair in found.pairs if {pair.one, pair.other} <= hit)
     return (
-        f"### Exclusions\n\nOf {found.candidates} beams of the search without walls (`python -m thesis exclusions`), "
-        "most of them with a soft pivot and judged by quick runs, none hits both statements of a row, though by chance "
-        f"one or more would. {never}The shipped beam, judged by thorough runs, hits both of {both or 'no row'}.\n\n"
-        "| pair | beams that hit each | judged on both |\n|---|---|---|\n" + rows
+        f"### Exclusions\n\nOf {found.candidates} beams of the search without walls, most of them with a soft pivot "
+        "and judged by quick runs, none hits both statements of these pairs, though by chance one or more would "
+        f"(`python -m thesis exclusions` counts them): {pairs}. {never}The shipped beam, judged by thorough runs, hits "
+        f"{both or 'no such pair'}."
     )
 
 
@@ -100,11 +101,11 @@ def _tolerances() -> str:
 def _readings() -> str:
     known = read_comparisons()
     rows = _by_reason({one.id: one.reading for one in known.compared if one.reading})
-    open_ones = "\n".join(f"| {name} | {one.value:g} | {one.reason} |" for name, one in known.unprinted.items())
+    open_ones = "; ".join(f"`{name}` is {one.value:g}, {one.reason}" for name, one in known.unprinted.items())
     return (
         "## Readings\n\nDecided from the text, whatever the verdict.\n\n"
         f"| statements | text and decision |\n|---|---|\n{rows}\n\n"
-        f"| condition that is not in print | value | why |\n|---|---|---|\n{open_ones}\n"
+        f"Not in print: {open_ones}.\n"
     )
 
 

@@ -19,7 +19,7 @@ from chaosgym.machines.machine import Number, Option, TaskDefaults
 from chaosgym.machines.modal_impact import ModalImpactMachine
 from chaosgym.machines.parameters import parameter
 
-_FIT = "fitted to the statements, see docs/development/calibration.md"
+_FIT = "docs/development/calibration.md"
 
 INTERFACES = 4
 """Deflection and slope at the pivot, deflections at shaker and tip: kept by the reduction "interfaces"."""

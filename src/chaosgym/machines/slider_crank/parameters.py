@@ -27,7 +27,7 @@ from chaosgym.machines.parameters import parameter
 from chaosgym.machines.slider_crank.scenes import EXTREMES, OPTIONS, SCENES
 from chaosgym.machines.slider_crank.task_defaults import TASK_DEFAULTS
 
-FITTED = "fitted to the statements, see docs/development/calibration.md"
+FITTED = "docs/development/calibration.md"
 """Source of what was fitted to the thesis' results."""
 
 _FREQUENCY = "first natural frequency 75.6 Hz, thesis 4.5.5"
