@@ -285,7 +285,8 @@ def train(asked: argparse.Namespace) -> None:
         raise ModelFileError(f"the task has {len(mean)} speeds; allowed: {10_000 // CHANNELS}")
     fit = Fit(rows_of(envs, jobs, mean, deviation), asked)
     fit.run(asked)
-    save_policy(LearnedMap(asked.env, fit.exported(), mean, deviation, envs.nominal.definition), asked.out)
+    told = envs.nominal.definition, envs.task.cycles_per_step
+    save_policy(LearnedMap(asked.env, fit.exported(), mean, deviation, *told), asked.out)
     print(f"policy in {asked.out}")
 
 

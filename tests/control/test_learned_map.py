@@ -92,3 +92,15 @@ def test_a_map_is_saved_and_refused_where_it_does_not_fit(tmp_path):
         LearnedMap(ENV, policy.network, policy.mean[:, :2], policy.deviation)
     with pytest.raises(ModelFileError, match="expected: float32"):
         LearnedMap(ENV, policy.network, policy.mean[1:], policy.deviation[1:])
+
+
+def test_steps_of_another_length_are_warned_of(tmp_path):
+    """A policy says from steps of how many cycles it learned; without a word, from those of the machine's own task."""
+    policy = _map_of(np.full(SPEEDS, CALM), np.full(SPEEDS, 80.0))
+    with pytest.warns(UserWarning, match=r"learned from steps of 10 cycles and plays with 1; give cycles_per_step=10"):
+        play(policy, ENV, [0], steps=2, cycles_per_step=1)
+    policy.cycles_per_step = 20
+    save_policy(policy, tmp_path)
+    play(load_policy(tmp_path), ENV, [0], steps=2, cycles_per_step=20)
+    with pytest.warns(UserWarning, match="from steps of 20 cycles and plays with 10"):
+        play(load_policy(tmp_path), ENV, [0], steps=2)

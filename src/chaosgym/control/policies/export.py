@@ -69,6 +69,7 @@ def exported(model: Any, env: str, envs: Any, *, memory: bool = False) -> Traine
         squashed=bool(model.policy.squash_output),
         machine=envs.get_attr("nominal")[0].definition,
         asked=asked_of(envs.get_attr("task")[0]),
+        cycles_per_step=envs.get_attr("task")[0].cycles_per_step,
     )
 
 

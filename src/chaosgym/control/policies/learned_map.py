@@ -5,6 +5,7 @@ them. In a job its prediction replaces the machine's own map, and the next speed
 reach. The weights of the task enter in this cost alone, so one network serves every objective.
 """
 
+import warnings
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,6 +17,7 @@ from chaosgym.control.controllers.controller import Controller, Observations, pl
 from chaosgym.control.policies.network import Network
 from chaosgym.design.rating_life import damage_in_a_million
 from chaosgym.envs import environment
+from chaosgym.envs.levels import task_of
 from chaosgym.envs.memory import irregularity
 from chaosgym.envs.task import Task
 from chaosgym.errors import ModelFileError
@@ -86,6 +88,19 @@ class FeltSpeeds:
         return np.concatenate([self._felt.reshape(len(speed), -1), left], axis=1)
 
 
+def warn_of_other_steps(learned: int, envs: Any) -> None:
+    """Warn if steps have another number of cycles than a policy learned from, 0 for the machine's own task.
+
+    The scatter of few peaks is another number than that of many, so what is usual does not hold.
+    """
+    learned, here = learned or task_of(envs.nominal, "nominal").cycles_per_step, envs.task.cycles_per_step
+    if here != learned:
+        warnings.warn(
+            f"the policy learned from steps of {learned} cycles and plays with {here}; give cycles_per_step={learned}",
+            stacklevel=2,
+        )
+
+
 @dataclass
 class LearnedMap(Controller):
     """Goes to the speed of least expected cost within the band of trims, by a network's map of this machine.
@@ -101,6 +116,8 @@ class LearnedMap(Controller):
         As for ``FeltSpeeds``.
     machine
         ``definition`` of the machine that it was trained on; by default the name in the environment's id.
+    cycles_per_step
+        Cycles of the steps that it learned from; 0 for those of the machine's own task.
 
     Raises
     ------
@@ -120,6 +137,7 @@ class LearnedMap(Controller):
     mean: Array
     deviation: Array
     machine: str = ""
+    cycles_per_step: int = 0
     knows: str = "measurements"
     _felt: FeltSpeeds = field(init=False, repr=False)
 
@@ -152,6 +170,7 @@ class LearnedMap(Controller):
             raise ModelFileError(
                 f"the policy of {self.env} knows {len(self.mean)} speeds; this task has {len(self.task.grid)}"
             )
+        warn_of_other_steps(self.cycles_per_step, envs)
         self._felt = FeltSpeeds(self.task, self.count, self.mean, self.deviation)
 
     def speeds(self, observations: Observations) -> Array:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chaosgym.control.policies.learned_map import LearnedMap
+from chaosgym.control.policies.learned_map import LearnedMap, warn_of_other_steps
 from chaosgym.control.policies.network import Dense, Lstm, Network, State
 from chaosgym.envs import environment
 from chaosgym.envs.drive import BACK
@@ -73,6 +73,8 @@ class TrainedPolicy:
         Keywords of the entries that it sees beside the 14 of every observation: of "monitor", "drive" and "classifier".
     machine
         ``definition`` of the machine that it was trained on; by default the name in the environment's id.
+    cycles_per_step
+        Cycles of the steps that it learned from; 0 for those of the machine's own task.
 
     Raises
     ------
@@ -88,6 +90,7 @@ class TrainedPolicy:
     squashed: bool = False
     machine: str = ""
     asked: tuple[str, ...] = ()
+    cycles_per_step: int = 0
     knows: str = "measurements"
     _state: State | None = field(default=None, init=False, repr=False)
     _memory: SpeedMemory | None = field(default=None, init=False, repr=False)
@@ -134,6 +137,7 @@ class TrainedPolicy:
                 f"the policy was trained on {self.env} (machine {self.machine}) with action={self.action!r}; "
                 f"this is {envs.nominal.name} (machine {here}) with action={envs.task.action!r}"
             )
+        warn_of_other_steps(self.cycles_per_step, envs)
         self.begin(envs.task, envs.num_envs)
 
     def begin(self, task: Task, count: int) -> None:
@@ -186,6 +190,8 @@ def save_policy(policy: "TrainedPolicy | LearnedMap", folder: str | Path) -> Non
     for place, layer in enumerate(network.layers):
         arrays |= {f"layer{place}.weight": layer.weight, f"layer{place}.bias": layer.bias}
     description: dict[str, Any] = {"format": FORMAT, "env": policy.env, "machine": policy.machine}
+    if policy.cycles_per_step:
+        description["cycles_per_step"] = policy.cycles_per_step
     if isinstance(policy, LearnedMap):
         arrays |= {"mean": policy.mean, "deviation": policy.deviation}
         description |= {"action": MAP}
@@ -250,8 +256,9 @@ def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPol
         for place, activation in enumerate(description["activations"])
     )
     env, machine = str(description["env"]), str(description.get("machine", ""))
+    cycles = int(description.get("cycles_per_step", 0))
     if description["action"] == MAP:
-        return LearnedMap(env, Network(None, layers), arrays["mean"], arrays["deviation"], machine)
+        return LearnedMap(env, Network(None, layers), arrays["mean"], arrays["deviation"], machine, cycles)
     limit = description["normalisation_limit"]
     lstm = Lstm(*(arrays[f"lstm.{name}"] for name in Lstm._fields)) if description["lstm"] else None
     usual = None
@@ -271,6 +278,7 @@ def _policy(description: dict[str, Any], arrays: dict[str, Array]) -> TrainedPol
         squashed=bool(description["squashed"]),
         machine=machine,
         asked=tuple(str(keyword) for keyword in description.get("asked", ())),
+        cycles_per_step=cycles,
     )
 
 
