@@ -162,6 +162,23 @@ def mismatch(machines: int, fleets: bool, as_json: bool) -> None:
 
 
 @click.command()
+@click.argument("path", metavar="FILE", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--policy", "policies", multiple=True, required=True, help="NAME=FOLDER; one name, several seeds.")
+@click.option("--again", type=click.IntRange(1, 512), default=16, show_default=True, help="Jobs that are played again.")
+@AS_JSON
+def entry(path: Path, policies: tuple[str, ...], again: int, as_json: bool) -> None:
+    """Check the FILE of a comparison before its row enters the table of results."""
+    from benchmarks.envs.entry import entry as check_entry
+    from benchmarks.envs.entry import lines
+
+    names, folders = zip(*(given.split("=", 1) if "=" in given else (given, "") for given in policies), strict=True)
+    if len(set(names)) > 1 or "" in folders:
+        raise click.UsageError("--policy takes NAME=FOLDER, with one name for all seeds")
+    found = check_entry(path, names[0], [Path(folder) for folder in folders], again)
+    emit(found, as_json, lambda: lines(found))
+
+
+@click.command()
 @click.option("--machines", type=click.IntRange(6, 128), default=64, show_default=True, help="Of the larger sets.")
 @click.option("--folder", type=click.Path(exists=True, path_type=Path), default="docs/machines", show_default=True)
 @AS_JSON
@@ -332,6 +349,7 @@ for command in (
     judges,
     audit,
     mismatch,
+    entry,
     life,
     pool,
     curves,
