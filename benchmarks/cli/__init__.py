@@ -179,6 +179,20 @@ def entry(path: Path, policies: tuple[str, ...], again: int, as_json: bool) -> N
 
 
 @click.command()
+@click.argument("env", type=click.Choice(ENVIRONMENTS))
+@click.option("--level", default="fleet", show_default=True)
+@click.option("--machines", type=click.IntRange(1, 256), default=32, show_default=True)
+@AS_JSON
+def arrivals(env: str, level: str, machines: int, as_json: bool) -> None:
+    """Tell how irregular the first steps after a change of demand are, on machines of the test split."""
+    from benchmarks.envs.arrivals import arrivals as run
+    from benchmarks.envs.arrivals import lines
+
+    found = run(env, level, machines)
+    emit({"env": env, "level": level, "players": found}, as_json, lambda: lines(found))
+
+
+@click.command()
 @click.option("--machines", type=click.IntRange(6, 128), default=64, show_default=True, help="Of the larger sets.")
 @click.option("--folder", type=click.Path(exists=True, path_type=Path), default="docs/machines", show_default=True)
 @AS_JSON
@@ -350,6 +364,7 @@ for command in (
     audit,
     mismatch,
     entry,
+    arrivals,
     life,
     pool,
     curves,
