@@ -154,6 +154,21 @@ def test_what_can_not_be_in_space_is_refused_in_one_line(file_of):
     refused("rod.body.at has a meaning at the ends of a beam", ('mass = "370.5 g"', 'mass = "370.5 g"\nat = "end"'))
 
 
+def test_a_rod_that_spins_between_two_balls_is_named_with_the_remedy(file_of):
+    """Its spin is a second mobility; a universal joint in place of one ball holds it, and the mechanism runs."""
+    text = FILE.read_text()
+    yoke = text[text.index("[link.yoke]") : text.index("[link.slider]")]
+    joints = text[text.index('[[joint]]\nname = "bearing"') : text.index('[[joint]]\nname = "guide"')]
+    ends = '[[joint]]\nname = "end"\nbetween = ["rod.end", "slider.pivot"]\nkind = {}\n\n'
+    with pytest.raises(ParameterError, match="mobility 2") as error:
+        chaosgym.read_machine(file_of((yoke, ""), (joints, ends.format('"spherical"'))))
+    remedy = 'Nothing holds the spin of rod about the line from ball to end: give one of them kind = "universal"'
+    assert str(error.value).endswith(remedy)
+    held = '"universal"\nfirst_axis = "0, 1, 0"\nsecond_axis = "0, 0, 1"'
+    machine = chaosgym.read_machine(file_of((yoke, ""), (joints, ends.format(held))))
+    assert np.all(np.isfinite(simulate(machine, 2).peak_force))
+
+
 def test_what_belongs_to_space_is_refused_in_the_plane(tmp_path):
     """Spherical joints, axes with three numbers and orientations ask for points with a z."""
     text = (FILE.parent / "slider-crank-flores-guide.toml").read_text()

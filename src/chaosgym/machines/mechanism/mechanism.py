@@ -124,8 +124,21 @@ class Mechanism:
             listed = ", ".join(f"{name} {rows}" for name, rows in held.items())
             raise ParameterError(
                 f"the mechanism has mobility {mobility}: {len(self.links)} links with {self.motions_of_a_link} "
-                f"motions each, less what the joints hold ({listed}); allowed: 1"
+                f"motions each, less what the joints hold ({listed}); allowed: 1{self._idle_spins()}"
             )
+
+    def _idle_spins(self) -> str:
+        """What to do about links that turn about the line between two spherical joints, which nothing holds."""
+        told = ""
+        for link in self.links:
+            held = [joint for joint in self.joints if link.name in (joint.first[0], joint.second[0])]
+            if [joint.kind for joint in held] == ["spherical"] * 2:
+                first, second = (joint.name for joint in held)
+                told += (
+                    f". Nothing holds the spin of {link.name} about the line from {first} to {second}: "
+                    'give one of them kind = "universal"'
+                )
+        return told
 
     @property
     def size(self) -> int:
