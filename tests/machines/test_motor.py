@@ -198,6 +198,25 @@ def test_what_a_motor_can_not_tell_is_not_told(motored):
     assert "far from it" not in with_settings(motored(), {"motor_inertia": 0.5}).under_motor().told
 
 
+def test_speeds_of_runs_that_the_motor_does_not_reach_are_told(motored):
+    """Above the settled speed, and above that without load; below, and at the settled one to 0.1 %, nothing is said."""
+    given = motored()
+    settled = given.under_motor().speed[-1]
+    assert settled < given.speed
+    assert given.notes == (f"runs are at 1450 rpm; under its load the motor settles at {settled:.4g} rpm",)
+    assert given.at(1600.0).notes == ("runs are at 1600 rpm; the motor has 1500 rpm without load",)
+    assert given.at(1.0005 * settled).notes == given.at(600.0).notes == ()
+
+
+def test_a_motor_without_losses_gives_no_power(tmp_path):
+    """What rounding leaves of the power of a mechanism that takes none is told as 0, in words and in JSON."""
+    text = template("slider-crank").replace("[operation]", MOTOR)
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+    run = chaosgym.read_machine(tmp_path / "own.toml").under_motor()
+    assert "gives 0 W" in run.told
+    assert run.as_dict()["power_W"] == 0.0
+
+
 def test_friction_that_the_motor_does_not_feel_is_told(tmp_path):
     """A guide with friction under a motor is noted, so that nobody takes the settled speed for its own."""
     text = template("slider-crank").replace("axis =", "friction = 0.1 #").replace("[operation]", MOTOR)

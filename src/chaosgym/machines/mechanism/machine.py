@@ -406,10 +406,12 @@ class MechanismMachine(BinnedMachine):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Gaps that are not small against the links that they join, and friction that a motor does not feel."""
+        """Gaps that are not small against their links, friction that a motor does not feel, speeds it can't hold."""
         told = (
             [f"the run-up under the motor leaves friction of {self.rubs} out"] if self.has_motor and self._rub else []
         )
+        if self.has_motor:
+            told += self.under_motor().notes(self.speed, getattr(self, "motor_no_load_speed"))  # noqa: B009
         for joint in self.mechanism.joints:
             if joint.opened:
                 gap, reach = getattr(self, f"{joint.name}_clearance"), _reach(self.mechanism, joint.name)

@@ -31,6 +31,9 @@ SETTLED = 1e-5
 WIDE = 0.05
 """Swing of the speed beyond which forces at a constant speed are off by more than 10 %."""
 
+ABOVE = 1e-3
+"""Share by which the speed of runs may exceed the settled one and be taken for it."""
+
 LONGEST, FASTEST = 10**6, 1e5
 """Most cycles, and highest speed [rpm] at the beginning."""
 
@@ -113,6 +116,13 @@ class MotorRun(NamedTuple):
         return float((self.highest[-1] - self.lowest[-1]) / self.speed[-1])
 
     @property
+    def settled_power(self) -> float:
+        """Mean power [W] of the last cycle; 0 where it is less than what a settled speed may still change."""
+        # stall torque times speed without load is four times the most power of the line
+        last = float(self.power[-1])
+        return last if abs(last) > 4.0 * SETTLED * np.abs(self.power).max() else 0.0
+
+    @property
     def run_up_time(self) -> float:
         """Time [s] until a cycle has 99 % of the last one's mean speed; nan without a whole cycle."""
         if not len(self.speed):
@@ -126,13 +136,21 @@ class MotorRun(NamedTuple):
             {
                 "speed_rpm": float(self.speed[-1]),
                 "swing": self.swing,
-                "power_W": float(self.power[-1]),
+                "power_W": self.settled_power,
                 "run_up_s": self.run_up_time,
             }
             if self.settled
             else dict.fromkeys(("speed_rpm", "swing", "power_W", "run_up_s"))
         )
         return {**found, "stalled_deg": self.stalled, "turns": len(self.speed)}
+
+    def notes(self, speed: float, no_load_speed: float) -> list[str]:
+        """A line for people if a motor from rest does not take the crank to the speed [rpm] of runs."""
+        if speed > no_load_speed:
+            return [f"runs are at {speed:g} rpm; the motor has {no_load_speed:g} rpm without load"]
+        if self.settled and speed > (1.0 + ABOVE) * self.speed[-1]:
+            return [f"runs are at {speed:g} rpm; under its load the motor settles at {self.speed[-1]:.4g} rpm"]
+        return []
 
     @property
     def told(self) -> str:
@@ -144,7 +162,7 @@ class MotorRun(NamedTuple):
         wide = f"; beyond {WIDE:.0%}, so that runs at a constant speed are far from it" if self.swing > WIDE else ""
         return (
             f"motor: settles at {self.speed[-1]:.4g} rpm, which swings by {100.0 * self.swing:.2g} % in a cycle; gives "
-            f"{self.power[-1]:.4g} W; from rest to {NEARLY:.0%} of that speed in {self.run_up_time:.2g} s{wide}"
+            f"{self.settled_power:.4g} W; from rest to {NEARLY:.0%} of that speed in {self.run_up_time:.2g} s{wide}"
         )
 
 
