@@ -62,12 +62,15 @@ REWARDS = {
 
 def pages() -> Iterator[tuple[str, str]]:
     """Names of the files, and the pages, in the format of Gymnasium's own (Markdown)."""
-    rows, known = [], {}
+    known: dict[str, Any] = {}
+    links: dict[str, list[str]] = {kind: [] for kind in KINDS}
     for machine, names in _by_machine().items():
         file = f"environments/{machine}.md"
         known[machine] = gym.make(names[0]).unwrapped
         yield file, page(names, known[machine])
-        rows += [f"[`{name}`]({file}) | {KINDS[kind_of(name)]}" for name in names]
+        for name in names:
+            links[kind_of(name)].append(f"[`{name}`]({file})")
+    rows = [f"{', '.join(links[kind])} | {meaning}" for kind, meaning in KINDS.items()]
     rows.append(f"[`chaosgym/AnyMachine-v0`](environments/AnyMachine.md) | {ANY_MACHINE}")
     yield "environments.md", common(rows, known)
 

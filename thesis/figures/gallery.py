@@ -67,8 +67,8 @@ def gallery(drawn: Sequence[Drawn], pictures: Path) -> str:
             "",
             "## Sensitivities",
             "",
-            "| parameter | figures | agree | differ | not judged |",
-            "|---|---|---|---|---|",
+            "| parameter | figures | agree | differ |",
+            "|---|---|---|---|",
         ]
     lines += [_sensitivity(parameter, entries) for parameter, entries in answered.items()]
     for place, one in enumerate(drawn):
@@ -106,8 +106,7 @@ def _sensitivity(parameter: str, entries: Sequence[tuple[str, Finding]]) -> str:
     """Row of a parameter: the figures that vary it, and what became of their statements about it."""
     figures = ", ".join(dict.fromkeys(number for number, _ in entries))
     judged = [finding.agrees for _, finding in entries if not contradiction(finding.targets)]
-    agree, differ = judged.count(True), judged.count(False)
-    return f"| {parameter} | {figures} | {agree} | {differ} | {len(entries) - agree - differ} |"
+    return f"| {parameter} | {figures} | {judged.count(True)} | {judged.count(False)} |"
 
 
 def write_gallery(drawn: Sequence[Drawn], path: Path) -> None:
