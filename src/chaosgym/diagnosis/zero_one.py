@@ -12,6 +12,9 @@ References
 G. A. Gottwald, I. Melbourne, On the implementation of the 0-1 test for chaos, SIAM J. Appl. Dyn. Syst. 8 (2009).
 """
 
+import math
+from functools import cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -23,6 +26,9 @@ MAX_SAMPLES = 1000
 
 FREQUENCIES = 100
 """Values of c."""
+
+AT_ONCE = 20
+"""Walks that are made at once: their arrays stay in the processor's cache."""
 
 
 def zero_one_statistic(series: ArrayLike, *, remove_bands: bool = True) -> float:
@@ -57,10 +63,10 @@ def zero_one_statistic(series: ArrayLike, *, remove_bands: bool = True) -> float
     x = x / spread
     n = len(x)
     lags = max(4, n // 10)
-    golden = (np.sqrt(5.0) - 1.0) / 2.0
-    c = np.pi * (0.2 + 0.6 * ((np.arange(FREQUENCIES) * golden) % 1.0))
-    walk = np.cumsum(x * np.exp(1j * np.outer(c, np.arange(1, n + 1))), axis=1)
-    displacement = _mean_square_displacement(walk, lags)
+    c, turns = _directions()
+    groups = (turns[i : i + AT_ONCE, :n] for i in range(0, FREQUENCIES, AT_ONCE))
+    walks = (np.cumsum(x * group, axis=1) for group in groups)
+    displacement = np.concatenate([_mean_square_displacement(walk, lags) for walk in walks])
     steps = np.arange(1, lags + 1)
     oscillation = (x.mean() ** 2) * (1.0 - np.cos(np.outer(c, steps))) / (1.0 - np.cos(c))[:, None]
     growth = displacement - oscillation
@@ -70,13 +76,25 @@ def zero_one_statistic(series: ArrayLike, *, remove_bands: bool = True) -> float
     return float(np.median(growth @ time / np.where(norms > 0.0, norms, 1.0)))
 
 
+@cache
+def _directions() -> tuple[Array, NDArray[np.complex128]]:
+    """Values of c, (walks,), and exp(i c n) for n = 1 ... ``MAX_SAMPLES``, (walks, samples)."""
+    golden = (np.sqrt(5.0) - 1.0) / 2.0
+    c = np.pi * (0.2 + 0.6 * ((np.arange(FREQUENCIES) * golden) % 1.0))
+    return c, np.exp(1j * np.outer(c, np.arange(1, MAX_SAMPLES + 1)))
+
+
 def _mean_square_displacement(walk: NDArray[np.complex128], lags: int) -> Array:
     """Mean of |z(j + n) - z(j)|^2 over j for the lags n = 1 ... lags, (walks, lags), by the convolution theorem."""
     walk = walk - walk.mean(axis=1, keepdims=True)
     total = walk.shape[1]
     kept = total - lags
-    length = 1 << int(np.ceil(np.log2(total + kept)))
-    cross = np.fft.ifft(np.fft.fft(walk, length) * np.conj(np.fft.fft(walk[:, :kept], length)))[:, 1 : lags + 1].real
-    squares = np.concatenate([np.zeros((len(walk), 1)), np.cumsum(np.abs(walk) ** 2, axis=1)], axis=1)
+    # j + n stays within the walk, so that its transform needs no zeros but for a length of small factors
+    length = min(factor << max(0, math.ceil(math.log2(total / factor))) for factor in (1, 3, 5, 15))
+    spectrum = np.fft.fft(walk, length)
+    spectrum *= np.conj(np.fft.fft(walk[:, :kept], length))
+    cross = np.fft.ifft(spectrum)[:, 1 : lags + 1].real
+    squares = np.zeros((len(walk), total + 1))
+    np.cumsum(walk.real**2 + walk.imag**2, axis=1, out=squares[:, 1:])
     later = squares[:, kept + 1 : kept + lags + 1] - squares[:, 1 : lags + 1]
     return np.asarray((later + squares[:, kept : kept + 1] - 2.0 * cross) / kept)
