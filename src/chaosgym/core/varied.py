@@ -4,8 +4,10 @@ from numba import prange
 
 from chaosgym.core.batch import beam_of
 from chaosgym.core.cycle import CycleArrays
+from chaosgym.core.joints.cycle import advance_joints, room_for
+from chaosgym.core.joints.run import JointRun
 from chaosgym.core.kernel import njit, side_by_side
-from chaosgym.core.modal_impact import advance_model
+from chaosgym.core.modal_impact import put_speed, suited_run, suits
 from chaosgym.core.tangent import Tangents
 
 
@@ -32,18 +34,30 @@ def cycle_of(arrays, k, c):
 
 @njit(cache=True)
 def _vary_beam(batch, regimes, tables, i, speeds, motions, vectors, growth, arrays, settings, k):
+    phase, resolution = settings.step_phase, settings.event_tolerance / settings.step_phase
+    batch.excitation_frequency[i] = speeds[k, 0]
+    model = beam_of(batch, regimes, tables, i)
+    suited, (values, own, at, rows, weights) = suits(model, model.tables, phase), suited_run(model, phase)
+    kept = room_for(motions.bouncing[i], Tangents(vectors[i], growth[k]))
     for c in range(speeds.shape[1]):
-        batch.excitation_frequency[i] = speeds[k, c]
-        outcome = advance_model(
-            beam_of(batch, regimes, tables, i),
-            1.0,
-            settings.step_phase,
-            settings.event_tolerance,
+        if batch.excitation_frequency[i] != speeds[k, c]:
+            batch.excitation_frequency[i] = speeds[k, c]
+            model, before = beam_of(batch, regimes, tables, i), suited
+            suited = suits(model, model.tables, phase)
+            if suited and before:
+                put_speed(model, at, values, rows, weights)
+            else:
+                values, own, at, rows, weights = suited_run(model, phase)
+        outcome = advance_joints(
+            JointRun(values, own, at, 1.0 / model.excitation_frequency, resolution),
+            rows,
+            weights,
             motions.coordinates[i],
             motions.bouncing[i],
             cycle_of(arrays, k, c),
             settings.event_budget,
             Tangents(vectors[i], growth[k, c : c + 1]),
+            kept,
         )[0]
         if outcome != 0:
             return outcome
