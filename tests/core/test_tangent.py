@@ -49,14 +49,28 @@ def test_a_beam_without_contact_has_the_exponents_of_its_modes():
     assert exponents.sum() == pytest.approx(trace, rel=1e-11)
 
 
-def test_carrying_deviations_does_not_touch_the_motion():
+@pytest.mark.parametrize("count", [1, 2])
+def test_carrying_deviations_does_not_touch_the_motion(count):
     """The run with deviations is the run without, to the last bit."""
     beam = ImpactBeam()
     plain = simulate(beam, 50)
-    record, _, _ = simulate_with_deviations(beam, 50, deviations=np.eye(beam.n_states)[:2])
+    record, _, _ = simulate_with_deviations(beam, 50, deviations=np.eye(beam.n_states)[:count])
     assert np.array_equal(plain.section, record.section)
     assert np.array_equal(plain.peak_force, record.peak_force)
     assert np.array_equal(plain.final_state.coordinates, record.final_state.coordinates)
+
+
+@pytest.mark.parametrize("frequency", [10.0, 19.0, 30.0])
+def test_one_deviation_by_tables_grows_as_the_first_of_two_by_exponentials(frequency):
+    """A deviation that moves along in the tables of the motion is the one that goes from event to event, to 1e-9."""
+    beam = ImpactBeam(excitation_frequency=frequency)
+    start = simulate(beam, 1, transient=50).final_state
+    both = np.eye(beam.n_states)[:2]
+    _, alone, growth = simulate_with_deviations(beam, 50, start, deviations=both[:1])
+    record, pair, growths = simulate_with_deviations(beam, 50, start, deviations=both)
+    assert record.impacts.sum() > 100
+    assert growth[:, 0] == pytest.approx(growths[:, 0], abs=1e-9)
+    assert alone[0] == pytest.approx(pair[0], abs=1e-9 * np.max(np.abs(pair[0])))
 
 
 def test_growth_does_not_depend_on_how_the_run_is_cut():

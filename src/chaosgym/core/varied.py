@@ -38,7 +38,7 @@ def _vary_beam(batch, regimes, tables, i, speeds, motions, vectors, growth, arra
     batch.excitation_frequency[i] = speeds[k, 0]
     model = beam_of(batch, regimes, tables, i)
     suited, (values, own, at, rows, weights) = suits(model, model.tables, phase), suited_run(model, phase)
-    kept = room_for(motions.bouncing[i], Tangents(vectors[i], growth[k]))
+    kept = room_for(at, motions.bouncing[i], Tangents(vectors[i], growth[k]))
     for c in range(speeds.shape[1]):
         if batch.excitation_frequency[i] != speeds[k, c]:
             batch.excitation_frequency[i] = speeds[k, c]

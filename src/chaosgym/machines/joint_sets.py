@@ -342,7 +342,8 @@ class JointTables:
     ) -> tuple[int, int]:
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``. ``stops`` (m, 2) are positions [m]."""
         done, cycles, made, own = 0, len(arrays.section), 0, self.space(stops)
-        weights, kept = call(displacement_weights, self._stiffness, self.frequency), room_for(bouncing, tangents)
+        weights = call(displacement_weights, self._stiffness, self.frequency)
+        kept = room_for(self._at, bouncing, tangents)
         while True:
             part = CycleArrays(*(values[done:] for values in arrays))
             along = tangents._replace(log_growth=tangents.log_growth[done:])

@@ -512,7 +512,7 @@ class ModalImpactMachine(Machine):
         tables, own, at, rows, weights = made
         period = share * (1.0 / model.excitation_frequency)
         run = JointRun(tables, own, at, period, integrator.event_tolerance / step)
-        motion = coordinates, bouncing, arrays, integrator.event_budget, along, room_for(bouncing, along)
+        motion = coordinates, bouncing, arrays, integrator.event_budget, along, room_for(at, bouncing, along)
         status, done, _ = call(advance_joints, run, rows, weights, *motion)
         return status, done
 

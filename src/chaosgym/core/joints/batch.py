@@ -9,7 +9,7 @@ import numpy as np
 from numba import carray, prange
 
 from chaosgym.core.addresses import pointer
-from chaosgym.core.joints.cycle import advance_joints
+from chaosgym.core.joints.cycle import advance_joints, room_for
 from chaosgym.core.joints.run import OWN, JointRun
 from chaosgym.core.joints.sets import put_sets, set_length
 from chaosgym.core.kernel import njit, side_by_side
@@ -70,7 +70,7 @@ def _advance(batch, i, speeds, motions, vectors, growth, arrays, settings, until
     rows = carray(pointer(batch.rows[i]), (batch.sets[i],), np.int64)
     own = carray(pointer(batch.own[i]), (at[OWN],), np.float64)
     weights = displacement_weights(batch.stiffness[i], speeds[k, done[k]])
-    kept = np.empty(motions.bouncing.shape[1] + vectors.shape[1] * vectors.shape[2])
+    kept = room_for(at, motions.bouncing[i], Tangents(vectors[i], growth[k]))
     while done[k] < until:
         frequency = speeds[k, done[k]]
         if batch.frequency[i] != frequency:

@@ -52,8 +52,10 @@ from chaosgym.core.joints.run import (
     U,
     bound_fourth,
     enter,
+    entries_of,
     expand,
     find_sides,
+    instant_beside,
     joint_motion,
     jump,
     known,
@@ -81,7 +83,7 @@ from chaosgym.core.joints.tables import (
     WIDTH,
 )
 from chaosgym.core.kernel import leaf, part
-from chaosgym.core.lanes import LANES, add_columns
+from chaosgym.core.lanes import LANES, add_columns, propagate, propagate_and_expand
 from chaosgym.core.tangent import MAX_CONTRACTION, orthonormalise
 
 STEPS_PER_EVENT = 1000
@@ -158,6 +160,43 @@ def carry(run, weights, row, elapsed, tangents, cycle):
 
 
 @leaf
+def enter_along(run, row, vectors, moving, first):
+    """Put deviations (k, 2n) into modal coordinates of a set, one after the other from ``first`` on in ``moving``."""
+    own, at, spare, width, states = run.own, run.at, run.at[SPARE], 2 * run.at[WIDTH], 2 * run.at[MODES]
+    for k in range(vectors.shape[0]):
+        for i in range(states):
+            own[spare + i] = vectors[k, i]
+        add_columns(run.tables, row + at[TO], width, states, own, spare, moving, first + k * width, LANES)
+
+
+@leaf
+def leave_along(run, row, vectors, moving, first):
+    """Put modal coordinates of ``enter_along`` back into deviations."""
+    own, at, spare, width = run.own, run.at, run.at[SPARE], 2 * run.at[WIDTH]
+    for k in range(vectors.shape[0]):
+        add_columns(run.tables, row + at[FROM], at[STATES], width, moving, first + k * width, own, spare, LANES)
+        for i in range(2 * at[MODES]):
+            vectors[k, i] = own[spare + i]
+
+
+@leaf
+def jump_along(run, row, level, intervals, count, moving, first):
+    """Move modal coordinates of some deviations by 1 to 8 intervals of a level, as ``jump`` moves u."""
+    for k in range(count):
+        u = first + k * 2 * run.at[WIDTH]
+        propagate(run.tables, entries_of(run, row, level, intervals), moving, u, u, run.at[WIDTH])
+
+
+@leaf
+def place_along(run, row, time, count, moving, first):
+    """Move them by a time within the shortest interval, as ``place`` moves u."""
+    entries, rest = instant_beside(run, row, time)
+    for k in range(count):
+        u = first + k * 2 * run.at[WIDTH]
+        propagate_and_expand(run.tables, entries, row + run.at[GENERATOR], moving, u, rest, u, run.at[WIDTH])
+
+
+@leaf
 def touch(run, j, side, vectors):
     """Saltation of deviations at the touch of a surface: its damper acts at once, for each at its own time."""
     own, n = run.own, run.at[MODES]
@@ -172,20 +211,23 @@ def touch(run, j, side, vectors):
 
 @leaf
 def end_cycle(run, weights, row, elapsed, arrays, cycle, events, tangents):
-    """Record a cycle of some events, and carry deviations the rest of the way; the state is in the work space."""
+    """Record a cycle of some events, and carry deviations the rest of the way, which may be none.
+
+    The state is in the work space.
+    """
     own, at = run.own, run.at
     note_deflections(run)
     arrays.events[cycle] = events
     for column in range(2 * at[JOINTS]):
         arrays.peak_force[cycle, column] = own[at[PEAKS] + column]
-    if tangents.vectors.shape[0] > 0:
+    if elapsed > 0.0:
         for i in range(2 * at[MODES]):
             own[at[U] + i] = own[at[STATE] + i]
         carry(run, weights, row, elapsed, tangents, cycle)
         for i in range(2 * at[MODES]):
             own[at[STATE] + i] = own[at[U] + i]
-        if tangents.log_growth.shape[1] > 0:
-            orthonormalise(weights, tangents, cycle)
+    if tangents.log_growth.shape[1] > 0:
+        orthonormalise(weights, tangents, cycle)
 
 
 @leaf
@@ -212,9 +254,9 @@ def undone(outcome, cycle, code, bouncing, vectors, kept):
 
 
 @register_jitable
-def room_for(bouncing, tangents):
-    """Return memory for what ``advance_joints`` keeps of these while it is in a cycle."""
-    return np.empty(bouncing.size + tangents.vectors.size)
+def room_for(at, bouncing, tangents):
+    """Return memory for what ``advance_joints`` keeps of these while it is in a cycle, and deviations in modal form."""
+    return np.empty(bouncing.size + tangents.vectors.size + tangents.vectors.shape[0] * 2 * at[WIDTH])
 
 
 @leaf
@@ -225,6 +267,8 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
     ``rows`` (product of the digits of all joints,) tell where in the tables the row of each set of pressed surfaces
     begins, -1 where there is none yet; ``weights`` (n + f,) are those of displacements and tangential springs in
     ``orthonormalise``. ``kept`` is from ``room_for``: as a leaf it counts no references, which doubles its speed.
+    Deviations move along by the tables of the motion, unless several are kept orthonormal or anchors of friction move:
+    these are carried from event to event.
 
     Returns
     -------
@@ -232,7 +276,9 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
     NEEDS_SET, the number of the set of pressed surfaces whose tables it needs.
     """
     own, at, m, vectors = run.own, run.at, run.at[JOINTS], tangents.vectors
-    carries = vectors.shape[0] > 0
+    deviations, first = vectors.shape[0], bouncing.shape[0] + vectors.size
+    follows = deviations > 0 and at[SLIDERS] == 0 and tangents.log_growth.shape[1] <= 1
+    carries = deviations > 0 and not follows
     for cycle in range(arrays.section.shape[0]):
         keep(bouncing, vectors, kept)
         begin_cycle(run, state, arrays, cycle)
@@ -246,6 +292,8 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
         if row < 0:
             return undone(np.int64(status.NEEDS_SET), cycle, code, bouncing, vectors, kept)
         enter(run, row)
+        if follows:
+            enter_along(run, row, vectors, kept, first)
         read_now(run, row)
         note_now(run)
         for j in range(m):
@@ -275,6 +323,8 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
                     if code > 0:
                         add_contact_time(run, count * h, contact_time)
                     jump(run, row, level, count, h)
+                    if follows:
+                        jump_along(run, row, level, count, deviations, kept, first)
                     read_after(run, count)
                     time += count * h
                 if count == whole:
@@ -306,6 +356,8 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
                 jump(run, row, 0, 1, shortest)
             else:
                 place(run, row, instant)
+            if follows:
+                place_along(run, row, instant, deviations, kept, first)
             unfinished = changed >= 0 or span < left
             time += instant
             if changed < 0:
@@ -318,6 +370,8 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
             if carries:
                 carry(run, weights, row, time - carried, tangents, cycle)
                 carried = time
+            if follows:
+                leave_along(run, row, vectors, kept, first)
             leave(run, row)
             if changed < m:
                 own[at[JOINT] + changed * NUMBERS + SIDE] = towards
@@ -333,15 +387,19 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
                 note_touch(bouncing, m, changed, towards, time, bounce_time)
                 if carries and at[SLIDERS] > 0:
                     touch_friction(run, changed, towards, touches, instant, vectors)
-                if carries and touches:
+                if touches and deviations > 0:
                     touch(run, changed, towards, vectors)
             enter(run, row)
+            if follows:
+                enter_along(run, row, vectors, kept, first)
             read_now(run, row)
             note_now(run)
         if sample < history.shape[0]:
             write_samples(run, row, time, run.period, sample, history)
+        if follows:
+            leave_along(run, row, vectors, kept, first)
         leave(run, row)
-        end_cycle(run, weights, row, time - carried, arrays, cycle, events, tangents)
+        end_cycle(run, weights, row, time - carried if carries else 0.0, arrays, cycle, events, tangents)
         for i in range(2 * at[MODES]):
             if not math.isfinite(own[at[STATE] + i]):
                 return undone(np.int64(status.DIVERGED), cycle, code, bouncing, vectors, kept)

@@ -461,11 +461,24 @@ def _drift(run, time, out):
 
 
 @part
+def entries_of(run, row, level, intervals):
+    """Where the propagator over 1 to 8 intervals of a level begins in the tables."""
+    return row + run.at[PROPAGATORS] + (LANES * level + intervals - 1) * 4 * run.at[WIDTH]
+
+
+@part
+def instant_beside(run, row, time):
+    """Where the propagator over the tabulated instant next to a time within the shortest interval begins; the rest."""
+    piece = run.tables[row + SHORTEST] / FINE
+    instant = min(max(0, int(time / piece + 0.5)), FINE)
+    return row + run.at[FINER] + instant * 4 * run.at[WIDTH], time - instant * piece
+
+
+@part
 def jump(run, row, level, intervals, h):
     """Move u by 1 to 8 intervals of a level, of length h."""
     at = run.at
-    entries = row + at[PROPAGATORS] + (LANES * level + intervals - 1) * 4 * at[WIDTH]
-    propagate(run.tables, entries, run.own, at[U], at[U], at[WIDTH])
+    propagate(run.tables, entries_of(run, row, level, intervals), run.own, at[U], at[U], at[WIDTH])
     add_drift(run, row, intervals * h, at[U])
 
 
@@ -473,10 +486,7 @@ def jump(run, row, level, intervals, h):
 def place(run, row, time):
     """Move u by a time within the shortest interval."""
     at = run.at
-    piece = run.tables[row + SHORTEST] / FINE
-    instant = min(max(0, int(time / piece + 0.5)), FINE)
-    entries = row + at[FINER] + instant * 4 * at[WIDTH]
-    rest = time - instant * piece
+    entries, rest = instant_beside(run, row, time)
     propagate_and_expand(run.tables, entries, row + at[GENERATOR], run.own, at[U], rest, at[U], at[WIDTH])
     add_drift(run, row, time, at[U])
 
