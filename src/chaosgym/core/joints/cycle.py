@@ -25,6 +25,7 @@ from chaosgym.core.joints.events import (
     note_crests,
     note_now,
     note_peaks,
+    note_rounding,
     place_of,
     quiet_intervals,
     read_series,
@@ -373,7 +374,9 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
             if follows:
                 leave_along(run, row, vectors, kept, first)
             leave(run, row)
+            side = towards
             if changed < m:
+                side += known(run, changed, SIDE)
                 own[at[JOINT] + changed * NUMBERS + SIDE] = towards
             if at[SLIDERS] > 0:
                 change_friction(run, changed)
@@ -393,6 +396,8 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
             if follows:
                 enter_along(run, row, vectors, kept, first)
             read_now(run, row)
+            if changed < m:
+                note_rounding(run, changed, side)
             note_now(run)
         if sample < history.shape[0]:
             write_samples(run, row, time, run.period, sample, history)

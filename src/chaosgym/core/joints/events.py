@@ -25,8 +25,10 @@ from chaosgym.core.events import (
 from chaosgym.core.joints.run import (
     AWAKE,
     FOURTH,
+    JOINT,
     LOWER_GAP,
     NOW,
+    NUMBERS,
     PEAKS,
     RATES,
     READING,
@@ -140,6 +142,21 @@ def note_now(run):
         if side != 0.0:
             column = 2 * j + (UPPER if side > 0.0 else LOWER)
             own[peak + column] = max(own[peak + column], force_at(run, j, NOW)[0])
+
+
+@leaf
+def note_rounding(run, j, side):
+    """Count as rounding what the pressure of joint j, changed just now on a side, shows on the wrong side of zero.
+
+    Coordinates of two sets agree by rounding alone, which grows with their number and size. A pressure that a set sees
+    as zero is a little above in the next one; without this the joint closes and opens again without end.
+    """
+    own, first, place = run.own, run.at[JOINT] + j * NUMBERS, place_of(run, j)
+    if own[first + SIDE] == 0.0:
+        wrong = side * (own[place] + lag_of(run, j, side) * own[place + RATES]) - gap_of(run, j, side)
+    else:
+        wrong = gap_of(run, j, side) - side * own[place]
+    own[first + ROUNDED] = max(own[first + ROUNDED], 2.0 * wrong)
 
 
 @leaf
