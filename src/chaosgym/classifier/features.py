@@ -21,6 +21,7 @@ from chaosgym.arrays import Array
 from chaosgym.classifier.kernels import records as kernels
 from chaosgym.classifier.kernels.records import CLASSES, LAGS, class_scatter, fill_features, true_length
 from chaosgym.classifier.parameter_features import ParameterScaling, parameter_features
+from chaosgym.core.compilation import call
 from chaosgym.errors import DiagnosisError
 
 MIN_CYCLES, MAX_CYCLES = 8, 64
@@ -150,7 +151,7 @@ def response_features(
         errors = np.full(len(peaks), np.nan) if sensor_error is None else sensor_error
         features = np.full((len(peaks), _COUNT), np.nan)
         single = (np.ascontiguousarray(part.astype(np.float32).astype(float)) for part in (peaks, states))
-        fill_features(*single, errors, features)
+        call(fill_features, *single, errors, features)
         parts.append(features)
     return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
@@ -162,9 +163,9 @@ def record_amplitude(peaks: Array) -> Array:
     """
     out = np.empty(len(peaks))
     for index, row in enumerate(peaks):
-        record = row[: true_length(row)]
+        record = row[: call(true_length, row)]
         periods = range(1, min(CLASSES, len(record) // REPEATS) + 1)
-        out[index] = np.sqrt(3.0) * min(class_scatter(record, period) for period in periods)
+        out[index] = np.sqrt(3.0) * min(call(class_scatter, record, period) for period in periods)
     return out
 
 
@@ -173,8 +174,8 @@ def least_scatter(peaks: Array) -> float:
 
     The plain rule: a response is irregular to a sensor whose largest error is smaller.
     """
-    record = peaks[: true_length(peaks)]
-    return float(kernels.least_scatter(record, min(CLASSES, len(record) // REPEATS)))
+    record = peaks[: call(true_length, peaks)]
+    return float(call(kernels.least_scatter, record, min(CLASSES, len(record) // REPEATS)))
 
 
 def repeat_period(peaks: ArrayLike) -> int:
@@ -183,7 +184,7 @@ def repeat_period(peaks: ArrayLike) -> int:
     record = record[~np.isnan(record)]
     best, period = np.inf, 1
     for candidate in range(1, min(CLASSES, len(record) // REPEATS) + 1):
-        scatter = class_scatter(record, candidate)
+        scatter = call(class_scatter, record, candidate)
         if scatter < IMPROVEMENT * best - 1e-9 * abs(record).max():
             best, period = scatter, candidate
         best = min(best, scatter)

@@ -15,7 +15,7 @@ from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
 from chaosgym.machines.parameters import by_field, changes_of, parameters_of, with_settings
 from chaosgym.monitor import Monitor
-from chaosgym.plotting.design import axis_label
+from chaosgym.plotting.labels import axis_label
 from chaosgym.simulation import simulate
 
 BUDGET = 400

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from chaosgym.arrays import Array
 from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram, Branch
 from chaosgym.diagnosis.bifurcation_map import BifurcationMap
-from chaosgym.plotting.design import axis_label
+from chaosgym.plotting.labels import axis_label
 from chaosgym.plotting.style import ACCENT, BAD, INK, MUTED
 
 MARKS = {

@@ -25,7 +25,8 @@ from chaosgym.diagnosis.run_up import RunUp
 from chaosgym.machines import Machine
 from chaosgym.plotting import response
 from chaosgym.plotting.branches import bifurcation_map, branches
-from chaosgym.plotting.design import axis_label, cost_against_life, peak_record, series_life, type_map_around
+from chaosgym.plotting.design import cost_against_life, peak_record, series_life, type_map_around
+from chaosgym.plotting.labels import axis_label
 from chaosgym.plotting.style import ACCENT, INK, NATURE_COLOURS, STYLE, figure_of
 from chaosgym.simulation import CycleRecord, simulate
 

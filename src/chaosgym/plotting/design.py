@@ -22,7 +22,7 @@ from chaosgym.design.trends import LifeTrend
 from chaosgym.diagnosis import ResponseMap
 from chaosgym.machines import Machine
 from chaosgym.machines.drive_torque import DriveTorque
-from chaosgym.machines.parameters import parameters_of
+from chaosgym.plotting.labels import axis_label
 from chaosgym.plotting.style import ACCENT, BAD, INK, MUTED, NATURE_COLOURS, TYPE_COLOURS
 
 PLACES = {
@@ -31,13 +31,6 @@ PLACES = {
     "deg of the cycle": ("instant in the cycle, relative to the mean [deg]", 1.0, 20.0),
 }
 """By unit of a Peak Impact Diagram: label, factor, and least width shown."""
-
-
-def axis_label(machine: Machine, name: str) -> tuple[str, float]:
-    """Label of a field with its unit, millimetres for metres, and the factor that goes with it."""
-    unit = parameters_of(machine)[name].unit
-    shown, factor = ("mm", 1e3) if unit == "m" else (unit, 1.0)
-    return name.replace("_", " ") + ("" if shown == "-" else f" [{shown}]"), factor
 
 
 def peak_record(peaks: Array, exponent: float, left: Axes, right: Axes) -> None:

@@ -2,12 +2,13 @@
 
 from io import BytesIO
 from pathlib import Path
-from typing import Any
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Any
 
 from chaosgym.errors import ChaosgymError
 from chaosgym.files import write_atomically
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 INK, ACCENT, BAD, MUTED, PALE = "#22303c", "#1f6f8b", "#b3392f", "#8a97a3", "#e6eaee"
 """Text, data, what is bad, what stands behind, and grids and stops."""
@@ -42,8 +43,10 @@ STYLE: Any = {
 """Settings for ``matplotlib.rc_context`` around a figure."""
 
 
-def figure_of(width: float = 6.2, height: float = 3.7) -> Figure:
+def figure_of(width: float = 6.2, height: float = 3.7) -> "Figure":
     """Empty figure of a width and height [in]."""
+    from matplotlib.figure import Figure
+
     return Figure(figsize=(width, height), layout="constrained")
 
 
@@ -79,7 +82,7 @@ def free_name(stem: str) -> Path:
     return path
 
 
-def save_picture(figure: Figure, path: Path) -> None:
+def save_picture(figure: "Figure", path: Path) -> None:
     """Write a figure; the same figure gives the same bytes."""
     kind = path.suffix.lower().removeprefix(".")
     dateless = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
