@@ -39,6 +39,9 @@ SPAN_ERROR = 1e-10
 STEP_PHASE = 0.5
 """Angle [rad] by which the fastest motion turns in half an interval of a look, by default."""
 
+PIN_ROWS = 2
+"""Directions of a pin in the plane."""
+
 MAX_SETS = 32
 """Contact sets for which propagators are made; a machine with more is left to Taylor series."""
 
@@ -102,15 +105,25 @@ class Held(NamedTuple):
         Of the forcing, a cubic in the time of a bin, by powers 0 and 2, or 0, 1 and 2.
     friction : (bins, n)
         What one newton of contact force drives along the guide.
+    tangent : (bins,)
+        Of the angle by which friction of a pin turns its contact force.
     """
 
     inverse_mass: Array
     free: Array
     forcing: Array
     friction: Array
+    tangent: Array
 
 
-def held(mass: Array, damping: Array, stiffness: Array, loads: Array, friction: Array | None = None) -> Held:
+def held(
+    mass: Array,
+    damping: Array,
+    stiffness: Array,
+    loads: Array,
+    friction: Array | None = None,
+    tangent: Array | None = None,
+) -> Held:
     """Held accelerations of M p'' + D p' + K p = -loads, of all bins.
 
     Parameters
@@ -119,7 +132,7 @@ def held(mass: Array, damping: Array, stiffness: Array, loads: Array, friction: 
         (bins, n, n), (2, bins, n, n) and (3, bins, n, n) at the middles of the bins, by powers of the rate.
     loads : (powers, 3 bins, n)
         At the nodes of the forcing, three a bin from the beginning of the first on.
-    friction : (bins, n)
+    friction, tangent : (bins, n), (bins,)
         As in ``Held``; none if omitted.
     """
     bins, n = mass.shape[:2]
@@ -128,7 +141,11 @@ def held(mass: Array, damping: Array, stiffness: Array, loads: Array, friction: 
     free[:, :, :n] = -np.swapaxes(inverse_mass @ stiffness, -1, -2)
     free[:2, :, n:] = -np.swapaxes(inverse_mass @ damping, -1, -2)
     found = Held(
-        inverse_mass, free, _forcing(inverse_mass, loads), np.zeros((bins, n)) if friction is None else friction
+        inverse_mass,
+        free,
+        _forcing(inverse_mass, loads),
+        np.zeros((bins, n)) if friction is None else friction,
+        np.zeros(bins) if tangent is None else tangent,
     )
     refuse_not_finite("the equations of a mechanism", *found)
     return found
@@ -243,13 +260,17 @@ def stepped_model(machine: "BinnedMachine", step_phase: float) -> TaylorModel:
 
     A closed contact turns by ``step_phase`` / 4 in a piece of a series; half of it leaves a sixteenth of the error.
     """
-    inverse_mass, free, forcing, friction = _kept(*_key(machine))
+    inverse_mass, free, forcing, friction, tangent = _kept(*_key(machine))
     contacts = machine.contacts
     row = np.concatenate([contact.row for contact in contacts])
     rate = machine.crank_rate
     acceleration = _free_motion(free, forcing, rate)
     first = np.cumsum([0] + [len(contact.row) for contact in contacts])
     answer = np.swapaxes(inverse_mass @ row.T, -1, -2)
+    for at, each in zip(first, contacts, strict=False):
+        if each.slides and len(each.row) == PIN_ROWS:
+            across = np.array([answer[:, at + 1], -answer[:, at]])
+            answer[:, at : at + PIN_ROWS] += np.swapaxes(tangent[:, None] * across, 0, 1)
     slide = -np.einsum("bij,bj->bi", inverse_mass, friction)
     contact = math.sqrt(machine.stiffest * np.max(np.einsum("brn,rn->br", answer, row)))
     bins = len(inverse_mass)
@@ -407,7 +428,7 @@ def _rates(free: Array, pushed: Array, row: Array) -> tuple[float, float]:
 @lru_cache(maxsize=KEPT)
 def _structure(kind: type, *structure: Any) -> _Structure:
     machine = _made(kind, structure)
-    inverse_mass, free, forcing, friction = machine.held()
+    inverse_mass, free, forcing, friction, _ = machine.held()
     n = inverse_mass.shape[-1]
     channels = channels_of(machine.contacts)
     radix = machine.radix

@@ -16,6 +16,7 @@ CLEARANCE_FIELDS: Mapping[str, dict[str, Any]] = {
     "hertz_stiffness": {"unit": "N/m^1.5", "low": 1.0, "high": 1e16},
     "hertz_damping": {"unit": "s/m", "low": 0.0, "high": 1e3},
     "friction": {"unit": "-", "low": 0.0, "high": 0.5},
+    "radius": {"unit": "m", "low": 0.0, "high": 10.0},
 }
 
 
@@ -37,9 +38,11 @@ class Clearance(NamedTuple):
     stations
         Places [m] along a guide from the joint's point at which it can touch; none where it can't tilt.
     friction
-        Coulomb coefficient along the guide or slot; None for one without.
+        Coulomb coefficient along the guide or slot, or around the pin; None for a joint without.
     hertz
         True for Hertzian surfaces, whose stiffness is K [N/m^1.5] and whose damping is chi [s/m]; see ``Contact``.
+    radius
+        Of a pin with friction [m].
     """
 
     gap: float
@@ -48,6 +51,7 @@ class Clearance(NamedTuple):
     stations: tuple[float, ...] = ()
     friction: float | None = None
     hertz: bool = False
+    radius: float | None = None
 
     @property
     def fields(self) -> Mapping[str, tuple[float, dict[str, Any]]]:
@@ -55,6 +59,8 @@ class Clearance(NamedTuple):
         named = dict(zip(surface_fields(self.hertz), (self.gap, self.stiffness, self.damping), strict=True))
         if self.friction is not None:
             named["friction"] = self.friction
+        if self.radius is not None:
+            named["radius"] = self.radius
         return {name: (value, CLEARANCE_FIELDS[name]) for name, value in named.items()}
 
 
@@ -69,8 +75,11 @@ def opened_by(kind: str, clearance: Clearance, spatial: bool = False) -> tuple[s
     if kind in ("weld", "universal"):
         allowed = "revolute, cylindrical, spherical or prismatic" if spatial else "revolute, prismatic or slot"
         raise ParameterError(f"a {kind} joint has no clearance; allowed: {allowed}")
-    if clearance.friction is not None and kind in ROUND:
-        raise ParameterError("friction of a pin in its hole is not modelled; allowed: in a prismatic joint or a slot")
+    pin = clearance.friction is not None and kind in ROUND
+    if pin and spatial:
+        raise ParameterError("friction of a pin in its hole is modelled in the plane; allowed: in a prismatic joint")
+    if pin != (clearance.radius is not None):
+        raise ParameterError("friction of a pin needs its radius, and a radius has no other meaning; allowed: both")
     if clearance.stations and kind != "prismatic":
         raise ParameterError(f"stations have no meaning in a {kind} joint; leave them out")
     if kind == "spherical":

@@ -189,9 +189,15 @@ def small_motion(mechanism: Mechanism, revolution: Revolution, theta: Array) -> 
 
 
 def sliding(mechanism: Mechanism, revolution: Revolution, theta: Array, joint: str) -> tuple[Array, Array]:
-    """Sliding of a joint along its axis: per radian of the crank, (B,), and per unit of each coordinate, (B, n)."""
+    """Sliding of a joint along its axis, or turning of a pin in its hole, in the plane.
+
+    Returns it per radian of the crank, (B,), and per unit of each coordinate, (B, n).
+    """
     found = nominal(mechanism, revolution, theta)
-    along = mechanism.along(found.z, next(each for each in mechanism.joints if each.name == joint))[1]
+    which = next(each for each in mechanism.joints if each.name == joint)
+    along = mechanism.along(found.z, which)[1]
+    if which.kind == "revolute":
+        along = mechanism.motions(found.z)[1][:, mechanism.joints.index(which), 2]
     every = np.einsum("bz,bzc->bc", along, found.inverse)
     return every[:, 0], every[:, mechanism.size - len(mechanism.coordinates) :]
 

@@ -129,7 +129,7 @@ def _clearance(name: str, kind: str, row: Mapping[str, Any], spatial: bool) -> C
     """Clearance of a joint, if it has one."""
     where = f"joint {name}"
     if "clearance" not in row:
-        for key in ("stiffness", "damping", "hertz_stiffness", "hertz_damping", "friction", "stations"):
+        for key in ("stiffness", "damping", "hertz_stiffness", "hertz_damping", "friction", "radius", "stations"):
             if key in row:
                 raise ParameterError(f"{where} has {key} and no clearance; allowed: both, or none")
         return None
@@ -143,7 +143,7 @@ def _clearance(name: str, kind: str, row: Mapping[str, Any], spatial: bool) -> C
         raise ParameterError(
             f"{where}.stations are at one place; allowed: two or more, or none for a guide without tilt"
         )
-    found = Clearance(gap, stiffness, damping, stations, row.get("friction"), hertz)
+    found = Clearance(gap, stiffness, damping, stations, row.get("friction"), hertz, row.get("radius"))
     for what, (value, about) in found.fields.items():
         number(f"{name}_{what}", value, about["low"], about["high"], about["unit"].strip("-"))
     try:

@@ -5,7 +5,7 @@ from chaosgym.machines.mechanism.beam import END, START
 from chaosgym.machines.mechanism.joints import KINDS, SPATIAL_KINDS
 
 LIMITS = {
-    "coulomb mu tangential_stiffness": "friction is Coulomb's, of a guide or slot with clearance: friction",
+    "coulomb mu tangential_stiffness": "friction is Coulomb's, of a joint with clearance: friction",
     "hertz exponent restitution law": "a surface is a linear spring and damper, or Hertzian: hertz_stiffness and "
     "hertz_damping in place of stiffness and damping",
     "gap backlash play radius": "clearance is how far the pin may leave the middle of its hole, or half a guide's gap",
@@ -80,7 +80,8 @@ KEYS = Keys(
             "damping": Key("damper of a surface", "N s/m"),
             "hertz_stiffness": Key("K of a Hertzian surface, N = K x^1.5 (1 + chi x')", "N/m^1.5"),
             "hertz_damping": Key("chi of it: 3/2 (1 - e) / v for restitution e near 1 at impact speed v", "s/m"),
-            "friction": Key("Coulomb coefficient along a guide or slot, where it touches; none by default"),
+            "friction": Key("Coulomb coefficient of a guide, a slot or a pin, where it touches; none by default"),
+            "radius": Key("of a pin with friction; the first link has the hole", "m"),
             "stations": Key("where a guide can touch, along it from the point; else it can't tilt", "m", "row"),
         },
         "force": {

@@ -164,7 +164,10 @@ class MechanismMachine(BinnedMachine):
         total, change = np.zeros(count), np.full(count, np.inf)
         # friction itself presses the surfaces, or relieves them
         for _ in range(FRICTION_ROUNDS):
-            before, total = total, np.abs((push - total[:, None] * driven[:, own]) @ held_by.T).sum(axis=1)
+            before, parts = total, np.abs((push - total[:, None] * driven[:, own]) @ held_by.T)
+            total = parts.sum(axis=1)
+            if self._lever is not None:  # friction turns the force of a pin
+                total = np.hypot(*parts.T) / np.hypot(1.0, self._rub * signed)
             change = np.abs(total - before)
             if change.max() <= 1e-9 * total.max():
                 return np.asarray(total * self._rub * signed * rate)
@@ -236,22 +239,32 @@ class MechanismMachine(BinnedMachine):
         # on the grid they are sums of squares to the last digit
         self._refuse_massless(whole.matrices[:, 0])
         found, load = whole.at(middles), whole.load_at(nodes)
-        return held(found.mass, found.damping, found.stiffness, load, self._friction(middles))
-
-    def _friction(self, theta: Array) -> Array | None:
-        """What one newton of contact force drives along the joint with friction, (B, n); it fades where that halts."""
-        return self._rubbing(theta)[2] if self._rub else None
+        if not self._rub:
+            return held(found.mass, found.damping, found.stiffness, load)
+        _, signed, driven = self._rubbing(middles)
+        tangent = self._rub * signed if self._lever is not None else None
+        return held(found.mass, found.damping, found.stiffness, load, driven, tangent)
 
     def _rubbing(self, theta: Array) -> tuple[Array, Array, Array]:
-        """Sliding per radian (B,) of the joint with friction, its ramped sign (B,), and what a newton drives (B, n)."""
+        """Sliding per radian (B,) of the joint with friction, its sign (B,), and what a newton drives (B, n).
+
+        The sign fades where the sliding halts.
+        """
         rate, row = sliding(self.mechanism, self.revolution, theta, self.rubs)
         signed = np.clip(rate / max(RAMP * float(np.abs(rate).max()), 1e-300), -1.0, 1.0)
-        return rate, signed, self._rub * signed[:, None] * row
+        lever = 1.0 if self._lever is None else self._lever
+        return lever * rate, signed, lever * self._rub * signed[:, None] * row
 
     @property
     def _rub(self) -> float:
         """Coefficient of friction, or 0."""
         return float(getattr(self, f"{self.rubs}_friction")) if self.rubs else 0.0
+
+    @property
+    def _lever(self) -> float | None:
+        """Radius [m] of a pin with friction."""
+        radius = getattr(self, f"{self.rubs}_radius", None)
+        return None if radius is None else float(radius)
 
     @property
     def radix(self) -> int:
@@ -297,7 +310,7 @@ class MechanismMachine(BinnedMachine):
                 ways = [way for way in PLACES if way in joint.opened]
                 rows = np.stack([self.row_of(joint.name, way) for way in ways])
                 reading = seen * np.eye(3)[[PLACES[way] for way in ways]]
-                found.append(Contact(rows, gap, spring, damper, True, reading))
+                found.append(Contact(rows, gap, spring, damper, True, reading, slides))
                 continue
             for place in self.stations[joint.name] or (0.0,):
                 for way in (way for way in GUIDED if way in joint.opened):

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, get_type_hints
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Number, Option
-from chaosgym.machines.mechanism.clearance import Clearance
+from chaosgym.machines.mechanism.clearance import Clearance, opened_by
 from chaosgym.machines.mechanism.machine import MechanismMachine
 from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.motor import MOTOR_FIELDS
@@ -87,6 +87,9 @@ def machine_of(
     rubs = [name for name, given in clearances.items() if given.friction is not None]
     if len(rubs) > 1:
         raise ParameterError(f"{len(rubs)} joints have friction ({', '.join(rubs)}); allowed: one")
+    for joint in mechanism.joints:
+        if joint.name in rubs:
+            opened_by(joint.kind, clearances[joint.name], spatial=mechanism.dimensions > 2)
     if len({given.hertz for given in clearances.values()}) > 1:
         hertz = ", ".join(name for name, given in clearances.items() if given.hertz)
         raise ParameterError(f"joint {hertz} is Hertzian and others are not; allowed: one law for all joints")
