@@ -48,11 +48,11 @@ FLEETS: Mapping[str, Mapping[str, Any]] = {
 
 
 def mismatch(machines: int = 64, rows: Iterable[str] = ROWS) -> list[dict[str, Any]]:
-    """Returns of following, backing off, the shipped policy and the guarded one, and who is worse than backing off."""
+    """Returns of following, backing off, and the level's shipped policy, guarded too; who is worse than backing off."""
     found = []
     for row in tqdm(list(rows), desc="rows", unit="row", leave=False):
         changed = {"env": ENV, **{**ROWS, **FLEETS}[row]}
-        agent = shipped_policy(changed["env"])
+        agent = shipped_policy(changed["env"], changed.get("level"))
         players: dict[str, Policy] = {
             "follow": Follow(),
             "back off": BackOff(),

@@ -77,7 +77,7 @@ def test_a_harmful_policy_is_kept_from_harm(monkeypatch):
     bias[0], bias[4] = 0.5, 0.75  # stay, two steps up
     weight[4, OBSERVATION_NAMES.index("trim")] = -1.0
     off = TrainedPolicy(ENV, "trim", Network(None, (Dense(weight, bias, "none"),)))
-    monkeypatch.setattr("benchmarks.envs.mismatch.shipped_policy", lambda _: off)
+    monkeypatch.setattr("benchmarks.envs.mismatch.shipped_policy", lambda *_: off)
     found = mismatch(32, ["structural damping x2"])[0]
     returns = found["returns"]
     assert returns["shipped"] < returns["follow"] - 5.0
