@@ -153,7 +153,7 @@ def judges(env: str, machines: int, speeds: int, as_json: bool) -> None:
 @click.option("--fleets", is_flag=True, help="Fleets of beams and cranks instead of beams with one thing changed.")
 @AS_JSON
 def mismatch(machines: int, fleets: bool, as_json: bool) -> None:
-    """Play the shipped policies, guarded and not, on machines that differ from those they were trained on."""
+    """Play the shipped policies, guarded and not, on machines that differ from those of their training."""
     from benchmarks.envs.mismatch import FLEETS, ROWS, lines
     from benchmarks.envs.mismatch import mismatch as run
 
@@ -190,6 +190,19 @@ def arrivals(env: str, level: str, machines: int, as_json: bool) -> None:
 
     found = run(env, level, machines)
     emit({"env": env, "level": level, "players": found}, as_json, lambda: lines(found))
+
+
+@click.command()
+@click.option("--machines", type=click.IntRange(2, 10_000), default=24, show_default=True)
+@click.option("--workers", type=click.IntRange(1), default=2, show_default=True, help="Processes.")
+@AS_JSON
+def other_simulator(machines: int, workers: int, as_json: bool) -> None:
+    """Play shipped policies on beams of the fleet in Exudyn, behind the plant interface, and on the same ones here."""
+    from benchmarks.envs.other_simulator import lines
+    from benchmarks.envs.other_simulator import other_simulator as run
+
+    found = run(machines, workers)
+    emit({"rows": found}, as_json, lambda: lines(found))
 
 
 @click.command()
@@ -363,6 +376,7 @@ for command in (
     judges,
     audit,
     mismatch,
+    other_simulator,
     entry,
     arrivals,
     life,

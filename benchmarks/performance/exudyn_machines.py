@@ -15,7 +15,7 @@ import math
 import sys
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -111,7 +111,7 @@ def run_in_exudyn(machine: Machine, cycles: int, setting: ExudynSetting, *, forc
     container = exudyn.SystemContainer()
     system = container.AddSystem()
     if isinstance(machine, ImpactBeam):
-        node, coordinate, first = *_add_beam(exudyn, system, machine, setting), 1.0
+        node, coordinate, first = add_beam(exudyn, system, machine, setting).node, 0, 1.0
         gap, stiffness, damping = machine.clearance, machine.contact_stiffness, machine.contact_damping
     else:
         assert isinstance(machine, SliderCrank)
@@ -126,7 +126,7 @@ def run_in_exudyn(machine: Machine, cycles: int, setting: ExudynSetting, *, forc
             sensors.append(system.AddSensor(sensor))
     system.Assemble()
     steps = math.ceil(machine.cycle_period / setting.step)
-    settings = _settings(exudyn, machine.cycle_period, cycles, steps, setting)
+    settings = settings_of(exudyn, machine.cycle_period, cycles, steps, setting)
     solver = getattr(exudyn.DynamicSolverType, setting.solver)
     seconds = processor_seconds(lambda: system.SolveDynamic(settings, solverType=solver))
     if not forces:
@@ -146,7 +146,7 @@ def _run_mechanism(
     sensor = _add_mechanism(exudyn, system, machine, forces)
     system.Assemble()
     steps = math.ceil(machine.cycle_period / setting.step)
-    settings = _settings(exudyn, machine.cycle_period, cycles, steps, setting)
+    settings = settings_of(exudyn, machine.cycle_period, cycles, steps, setting)
     solver = getattr(exudyn.DynamicSolverType, setting.solver)
     seconds = processor_seconds(lambda: system.SolveDynamic(settings, solverType=solver))
     if sensor is None:
@@ -155,7 +155,8 @@ def _run_mechanism(
     return seconds, force.reshape(cycles, steps).max(axis=1)
 
 
-def _settings(exudyn: Any, period: float, cycles: int, steps: int, setting: ExudynSetting) -> Any:
+def settings_of(exudyn: Any, period: float, cycles: int, steps: int, setting: ExudynSetting) -> Any:
+    """Exudyn's settings of a run of some cycles of a period [s] in equal steps."""
     settings = exudyn.SimulationSettings()
     integration = settings.timeIntegration
     integration.endTime = period * cycles
@@ -175,14 +176,14 @@ def _settings(exudyn: Any, period: float, cycles: int, steps: int, setting: Exud
 
 def _add_contact(
     exudyn: Any, system: Any, marker: int, setting: ExudynSetting, gap: float, stiffness: float, damping: float
-) -> None:
-    """Put two surfaces around the coordinate of a marker."""
+) -> Any:
+    """Put two surfaces around the coordinate of a marker; return the connector."""
     items = exudyn.itemInterface
     fixed = system.AddNode(items.NodePointGround())
     ground = system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))
     if setting.contact == "stop":
         data = system.AddNode(items.NodeGenericData(initialCoordinates=[0, 0, 0], numberOfDataCoordinates=3))
-        system.AddObject(
+        return system.AddObject(
             items.ObjectConnectorCoordinateSpringDamperExt(
                 markerNumbers=[ground, marker],
                 nodeNumber=data,
@@ -193,7 +194,6 @@ def _add_contact(
                 limitStopsDamping=damping,
             )
         )
-        return
     symbolic = exudyn.symbolic
 
     def force(mbs: Any, t: Any, item: Any, x: Any, v: Any, k: Any, d: Any, c: Any) -> Any:
@@ -209,15 +209,28 @@ def _add_contact(
     name = "springForceUserFunction"
     compiled = exudyn.utilities.CreateSymbolicUserFunction(system, force, name, spring)
     system.SetObjectParameter(spring, name, compiled)
+    return spring
 
 
-def _add_beam(exudyn: Any, system: Any, beam: ImpactBeam, setting: ExudynSetting) -> tuple[int, int]:
-    """Add an impact beam; its node and the number of the tip's coordinate."""
+class BeamItems(NamedTuple):
+    """Numbers of the parts of a beam: its ``node``, whose coordinate 0 is the tip, the ``load``, whose parameter is the
+    angular frequency, and the ``stops``; mass and stiffness matrices (n, n) of the node's coordinates."""
+
+    node: Any
+    load: Any
+    stops: Any
+    mass: Array
+    stiffness: Array
+
+
+def add_beam(exudyn: Any, system: Any, beam: ImpactBeam, setting: ExudynSetting) -> BeamItems:
+    """Add an impact beam."""
     items, model = exudyn.itemInterface, beam.reduce()
     assert isinstance(model, ModalImpactModel)
     shapes = np.vstack([model.tip_shape, beam.force_shape])
     modal = np.linalg.inv(np.vstack([shapes, scipy.linalg.null_space(shapes).T]))
     n = len(modal)
+    mass, stiffness = modal.T @ modal, modal.T @ (model.stiffness[:, None] * modal)
     node = system.AddNode(
         items.NodeGenericODE2(
             referenceCoordinates=[0.0] * n,
@@ -229,20 +242,20 @@ def _add_beam(exudyn: Any, system: Any, beam: ImpactBeam, setting: ExudynSetting
     system.AddObject(
         items.ObjectGenericODE2(
             nodeNumbers=[node],
-            massMatrix=modal.T @ modal,
-            stiffnessMatrix=modal.T @ (model.stiffness[:, None] * modal),
+            massMatrix=mass,
+            stiffnessMatrix=stiffness,
             dampingMatrix=modal.T @ model.damping @ modal,
         )
     )
     tip, shaker = (system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=i)) for i in (0, 1))
-    load = system.AddLoad(items.LoadCoordinate(markerNumber=shaker, load=beam.force_amplitude))
-    omega = 2.0 * math.pi * model.excitation_frequency
+    omega, amplitude = 2.0 * math.pi * model.excitation_frequency, beam.force_amplitude
+    load = system.AddLoad(items.LoadCoordinate(markerNumber=shaker, load=omega))
     drive = exudyn.utilities.CreateSymbolicUserFunction(
-        system, lambda mbs, t, amplitude: amplitude * exudyn.symbolic.sin(omega * t), "loadUserFunction", load
+        system, lambda mbs, t, omega: amplitude * exudyn.symbolic.sin(omega * t), "loadUserFunction", load
     )
     system.SetLoadParameter(load, "loadUserFunction", drive)
-    _add_contact(exudyn, system, tip, setting, beam.clearance, beam.contact_stiffness, beam.contact_damping)
-    return node, 0
+    stops = _add_contact(exudyn, system, tip, setting, beam.clearance, beam.contact_stiffness, beam.contact_damping)
+    return BeamItems(node, load, stops, mass, stiffness)
 
 
 def _add_mechanism(exudyn: Any, system: Any, machine: MechanismMachine, forces: bool) -> Any:

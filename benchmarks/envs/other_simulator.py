@@ -1,0 +1,172 @@
+"""Is a policy worth as much on the same beams in another simulator? Exudyn stands behind the plant interface.
+
+Each job is played twice by ``chaosgym.control.plant.work``, with the same operator, demands, ripple, wear and errors
+of the sensors: once on our beam and once on Exudyn's. Nothing was trained or tuned on these machines or in Exudyn.
+"""
+
+from collections.abc import Iterable, Mapping
+from functools import partial
+from multiprocessing import get_context
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from benchmarks.envs.exudyn_beam import ExudynBeam, Ran
+from chaosgym.control.comparison import MADE_WORSE
+from chaosgym.control.comparison_lines import difference
+from chaosgym.control.controllers import BackOff, Follow, Kriging
+from chaosgym.control.operator import Operator
+from chaosgym.control.plant import work
+from chaosgym.control.policies import shipped_policy
+from chaosgym.control.statistics import paired_difference
+from chaosgym.envs.judge import ExponentJudge
+from chaosgym.envs.task import Task
+from chaosgym.envs.vector_env import native_envs
+from chaosgym.machines.impact_beam import ImpactBeam
+
+Array = NDArray[np.float64]
+
+ENV = "chaosgym/ImpactBeamTolerance-v1"
+FLEET: Mapping[str, Any] = {"level": "fleet", "split": "test"}
+
+FIRST_SEED = 22_000_000
+"""Of the machines: neither those of a training nor those of another evaluation."""
+
+ZERO = "follow the demand"
+
+PLAYERS: Mapping[str, tuple[Any, str]] = {
+    ZERO: (Follow, "irregular"),
+    "learned map": (partial(shipped_policy, ENV, "fleet"), "irregular"),
+    "back off, with memory": (BackOff, "irregular"),
+    "kriging, life": (partial(Kriging, price=None), "life"),
+}
+"""What makes each policy, and the objective that it plays for."""
+
+ONE = np.zeros(1, np.int64)
+
+
+class Beam(Protocol):
+    """A beam in some simulator."""
+
+    def run(self, frequencies: Array, gap: float) -> Ran:
+        """Run a cycle at each of the frequencies (cycles,) [Hz], with a gap [m] on either side."""
+        ...
+
+
+class OwnBeam:
+    """A beam at rest in our simulator."""
+
+    def __init__(self, beam: ImpactBeam) -> None:
+        self._batch: Any = beam.batch(1)
+        self._batch.start(0, beam)
+
+    def run(self, frequencies: Array, gap: float) -> Ran:
+        """Run a cycle at each of the frequencies (cycles,) [Hz], with a gap [m] on either side."""
+        self._batch.set_clearances(ONE, np.array([gap]))
+        cycles, growth = self._batch.run_varied(ONE, frequencies[None])
+        return Ran(cycles.peak_force[0], cycles.impacts[0], cycles.bounce_duration[0], growth[0])
+
+
+SIMULATORS: Mapping[str, Any] = {"chaosgym": OwnBeam, "Exudyn": ExudynBeam}
+
+
+class Rig:
+    """A plant: a beam at work, whose speed ripples, whose clearance grows and whose sensors err as the task says.
+
+    Parameters
+    ----------
+    kind
+        What makes a beam at rest of an ``ImpactBeam``.
+    machine, task, seed
+        The beam, the numbers of its job, and the seed of its disturbances.
+
+    Attributes
+    ----------
+    irregular, damage
+        Share of irregular cycles of each step, and share of its life that the joint used up, by true forces.
+    """
+
+    def __init__(self, kind: Any, machine: ImpactBeam, task: Task, seed: int) -> None:
+        self._kind, self._machine, self._task, self._seed = kind, machine, task, seed
+
+    def reset(self) -> None:
+        """Bring the beam to rest."""
+        self._beam: Beam = self._kind(self._machine)
+        self._judge, self._random = ExponentJudge(1), np.random.default_rng([FIRST_SEED, self._seed])
+        self._has_run, self.irregular, self._damage = False, list[float](), np.zeros(2)
+
+    def run(self, speed: float, cycles: int) -> dict[str, Any]:
+        """Peaks, impacts and bouncing, as the sensors tell them."""
+        task, random = self._task, self._random
+        worn = 1.0 + task.wear * len(self.irregular) / task.steps
+        speeds = speed * (1.0 + task.speed_ripple * random.standard_normal(cycles))
+        ran = self._beam.run(speeds, self._machine.clearance * worn)
+        share, _ = self._judge.verdict(ONE, ran.growth[None], self._machine.sensed(ran.peaks)[None])
+        if self._has_run:
+            self.irregular.append(float(share[0]))
+            self._damage += task.damage(ran.peaks)
+        self._has_run = True
+        impacts, bounced = ran.impacts.sum(), ran.bouncing.mean() * 2.0 * speed
+        peaks = self._machine.sensed(ran.peaks) + task.sensor_error * random.uniform(-1.0, 1.0, cycles)
+        return {
+            "peaks": np.maximum(peaks, 0.0),
+            "impacts": float(random.binomial(int(impacts), 1.0 - task.missed_impacts)) / cycles,
+            "bouncing": float(np.clip(bounced + task.bouncing_error * random.uniform(-1.0, 1.0), 0.0, 1.0)),
+        }
+
+    @property
+    def damage(self) -> float:
+        """That of the worse surface."""
+        return float(self._damage.max())
+
+
+def job(given: tuple[int, str, str]) -> dict[str, float]:
+    """Play one job by its number and the names of a player and a simulator."""
+    number, player, simulator = given
+    make, objective = PLAYERS[player]
+    operator = Operator(make(), ENV, objective=objective, **FLEET)
+    task, variants = operator.task, native_envs(ENV, **FLEET).settings.variants
+    machine = variants.drawn(np.random.default_rng(FIRST_SEED + number))
+    assert isinstance(machine, ImpactBeam)
+    rig = Rig(SIMULATORS[simulator], machine, task, number)
+    done = work(rig, operator, FIRST_SEED + number, simulator)
+    deviation, irregular = float(np.abs(done.speed - done.demand).mean()), float(np.mean(rig.irregular))
+    cost = task.steps * (task.deviation_weight * deviation + task.type_iii_weight * irregular)
+    lost = cost + task.damage_weight * rig.damage
+    return {"return": -lost, "type_iii": irregular, "deviation": deviation, "damage": rig.damage}
+
+
+def other_simulator(machines: int, workers: int, players: Iterable[str] = PLAYERS) -> list[dict[str, Any]]:
+    """Jobs of each player in both simulators, its life over that of following there, and Exudyn's return less ours."""
+    names = list(dict.fromkeys([ZERO, *players]))
+    work_ = [(k, player, simulator) for player in names for simulator in SIMULATORS for k in range(machines)]
+    with get_context("spawn").Pool(workers) as pool:
+        jobs = list(tqdm(pool.imap(job, work_), total=len(work_), desc="jobs", unit="job", leave=False))
+    told = dict(zip(work_, jobs, strict=True))
+    found = []
+    for player in names:
+        row: dict[str, Any] = {"player": player, "machines": machines}
+        for simulator in SIMULATORS:
+            mine = [told[k, player, simulator] for k in range(machines)]
+            usual = [told[k, ZERO, simulator]["damage"] for k in range(machines)]
+            life = float(np.exp(np.mean([np.log(a / b["damage"]) for a, b in zip(usual, mine, strict=True)])))
+            row[simulator] = {name: [one[name] for one in mine] for name in mine[0]} | {"life": life}
+        ours, theirs = (np.array(row[simulator]["return"]) for simulator in SIMULATORS)
+        found.append(row | {"difference": paired_difference(theirs, ours, MADE_WORSE)})
+    return found
+
+
+def lines(found: Iterable[Mapping[str, Any]]) -> list[str]:
+    """A Markdown table."""
+    heads = [f"{simulator}: return, Type III, off the demand, life" for simulator in SIMULATORS]
+    told = [f"| player | machines | {' | '.join(heads)} | Exudyn less chaosgym |", "|---" * 5 + "|"]
+    for row in found:
+        means = [{name: np.mean(values) for name, values in row[simulator].items()} for simulator in SIMULATORS]
+        cells = [
+            f"{one['return']:.1f}, {one['type_iii']:.1%}, {one['deviation']:.2f} Hz, x{one['life']:.2f}"
+            for one in means
+        ]
+        told.append(f"| {row['player']} | {row['machines']} | {' | '.join(cells)} | {difference(row['difference'])} |")
+    return told
