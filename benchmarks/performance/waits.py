@@ -14,6 +14,8 @@ import numpy as np
 
 from benchmarks.performance.timing import processor_seconds
 from chaosgym.classifier import classifier_for
+from chaosgym.diagnosis import diagnose
+from chaosgym.explore.point import orbit_diagram, sliders_of, view_of
 from chaosgym.machines import ImpactBeam
 from chaosgym.simulation import simulate
 from chaosgym.sweeps import SweepPlan, run_sweep
@@ -35,9 +37,11 @@ def waits(repeats: int = 5) -> dict[str, float]:
     low, high = zip(*(beam.usual_ranges[name] for name in (beam.speed_field, beam.clearance_field)), strict=True)
     random = np.random.default_rng(1)
 
-    def classify(types: bool) -> None:
-        for point in random.uniform(low, high, (POINTS, 2)).tolist():  # others in each run: nothing is remembered
-            classifier.classify(beam.at(*point), types=types)
+    def others() -> list[ImpactBeam]:
+        return [beam.at(*point) for point in random.uniform(low, high, (POINTS, 2)).tolist()]  # nothing is remembered
+
+    def each(ask: Callable[[ImpactBeam], object]) -> float:
+        return _median(lambda: [ask(other) for other in others()], repeats) / POINTS
 
     plan = SweepPlan(beam, default_axes(beam, "random"), "random", POINTS)
 
@@ -47,8 +51,11 @@ def waits(repeats: int = 5) -> dict[str, float]:
 
     found = {
         "simulate one cycle": _median(lambda: simulate(beam, 1), 20 * repeats),
-        "classify a random beam, nature": _median(lambda: classify(types=False), repeats) / POINTS,
-        "classify a random beam, types": _median(lambda: classify(types=True), repeats) / POINTS,
+        "classify a random beam, nature": each(lambda other: classifier.classify(other, types=False)),
+        "classify a random beam, types": each(lambda other: classifier.classify(other)),
+        "diagnose a random beam": each(diagnose),
+        "move of a slider in explore": each(view_of),
+        "orbit diagram in explore": _median(lambda: list(orbit_diagram(beam, sliders_of(beam)[0])), repeats),
         "point of a sweep": _median(sweep, repeats) / POINTS,
     }
     batch: Any = beam.batch(MACHINES)
