@@ -12,8 +12,11 @@ from gymnasium.vector import AutoresetMode
 
 import chaosgym
 from chaosgym.control.controllers import Follow
+from chaosgym.control.policies import TrainedPolicy, load_policy, save_policy
+from chaosgym.control.policies.network import Dense, Network
+from chaosgym.control.rollout import play
 from chaosgym.envs.task import Status
-from chaosgym.errors import ParameterError, SimulationError
+from chaosgym.errors import ModelFileError, ParameterError, SimulationError
 from tests.envs.test_vector_env import _assert_same_episodes
 from tests.machines.test_motor import FOLDER, by_hand
 
@@ -165,6 +168,21 @@ def test_what_controllers_set_makes_up_for_the_slip(motored):
     assert len(missed) > 10
     assert max(missed) < 1.0
     assert min(slip) > 50.0
+
+
+def test_a_policy_knows_that_it_sets_a_motor(motored, tmp_path):
+    """It is kept with the set-point that it sees, plays with a motor by itself, and is refused without one."""
+    path, layer = motored(), Dense(np.zeros((6, 15), np.float32), np.eye(6, dtype=np.float32)[5], "none")
+    own = chaosgym.read_machine(path).definition
+    save_policy(TrainedPolicy(path, "trim", Network(None, (layer,)), machine=own, asked=("drive",)), tmp_path)
+    policy = load_policy(tmp_path)
+    assert policy.keywords == {"action": "trim", "drive": "motor"}
+    speeds = {name: value for name, value in EASY.items() if name != "drive"}
+    assert np.nanmin(play(policy, path, [0], **speeds, steps=3).speed) > 0.0
+    envs = gym.make_vec("chaosgym/Machine-v0", num_envs=1, machine=path, **speeds)
+    envs.reset(seed=0)
+    with pytest.raises(ModelFileError, match="sees drive beside the usual entries, the environment gives none"):
+        policy.start(envs.unwrapped)
 
 
 def test_where_there_is_no_motor_it_is_refused(motored):
