@@ -56,7 +56,7 @@ def test_the_own_map_avoids_type_iii_close_to_the_demand(own, following):
 
 def test_backing_off_learns_from_measurements():
     """It has less than 0.6 of the Type III of following, with or without a memory."""
-    many = range(128)
+    many = range(64)
     following = play(Follow(), BEAM, many)
     for remembers in (True, False):
         played = play(BackOff(remembers=remembers), BEAM, many)
