@@ -16,7 +16,7 @@ from tqdm import tqdm
 from benchmarks.envs.exudyn_beam import ExudynBeam, Ran
 from chaosgym.control.comparison import MADE_WORSE
 from chaosgym.control.comparison_lines import difference
-from chaosgym.control.controllers import BackOff, Follow, Kriging
+from chaosgym.control.controllers import Follow, Kriging
 from chaosgym.control.operator import Operator
 from chaosgym.control.plant import work
 from chaosgym.control.policies import shipped_policy
@@ -39,7 +39,6 @@ ZERO = "follow the demand"
 PLAYERS: Mapping[str, tuple[Any, str]] = {
     ZERO: (Follow, "irregular"),
     "learned map": (partial(shipped_policy, ENV, "fleet"), "irregular"),
-    "back off, with memory": (BackOff, "irregular"),
     "kriging, life": (partial(Kriging, price=None), "life"),
 }
 """What makes each policy, and the objective that it plays for."""
