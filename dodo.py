@@ -91,14 +91,24 @@ DATASETS = tuple(tomllib.loads(Path(RECIPES).read_text()))
 
 LARGE = "--units 128 --batch 1920 --rollout 120"
 FLEET = """--keywords '{"level": "fleet", "split": "train"}'"""
+
+
+def of_five_runs(env: str, steps: int, options: str, fit: str) -> list[str]:
+    """Commands of a learned map of a fleet: the jobs of five seeds, and one fit to all of them."""
+    play = f"python agents/learn_map.py {FLEET} {options}"
+    runs = [f"{RUNS}/{env}-fleet-{seed}" for seed in range(5)]
+    jobs = [f"{play} --env chaosgym/{env} --seed {k} --steps {steps} --out {run}" for k, run in enumerate(runs)]
+    return [*jobs, f"{play} --steps 0 --jobs {' '.join(runs)} {fit}"]
+
+
 POLICIES = {
     "ImpactBeamTolerance-v1": ["python agents/learn_map.py --seed 0 --steps 600000"],
     "ImpactBeamWear-v1": ["python agents/learn_map.py --seed 0 --steps 600000"],
     "SliderCrankTolerance-v1": [f"python agents/ppo.py --fidelity draft --seed 0 --steps 240000 {LARGE}"],
-    "ImpactBeamTolerance-v1-fleet": [f"python agents/learn_map.py {FLEET} --seed 0 --steps 1200000"],
-    "SliderCrankTolerance-v1-fleet": [
-        f"python agents/ppo.py {FLEET} --fidelity draft --seed 0 --steps 240000 {LARGE}",
-    ],
+    "ImpactBeamTolerance-v1-fleet": of_five_runs("ImpactBeamTolerance-v1", 368_640, "", "--units 512 --dropout 0.3"),
+    "SliderCrankTolerance-v1-fleet": of_five_runs(
+        "SliderCrankTolerance-v1", 230_400, "--fidelity draft", "--units 512 --dropout 0.4 --epochs 12"
+    ),
 }
 """Commands of the shipped policies, by id and level; the last of each writes the policy."""
 
