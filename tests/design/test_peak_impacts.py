@@ -15,9 +15,9 @@ from chaosgym.design.trends import DIAGRAM_CYCLES, HISTORY_SAMPLES, impacts_agai
 from chaosgym.errors import DesignError, ParameterError, SimulationError
 from chaosgym.machines import MACHINES, ImpactBeam
 from chaosgym.machines.parameters import with_settings
-from chaosgym.machines.slider_crank.kinematics import slider_position
 from chaosgym.plotting.design import impact_diagram
 from chaosgym.simulation import simulate
+from tests.machines.kinematics import slider_position
 from tests.plain_modes import HARD_BEAM
 
 

@@ -19,7 +19,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from chaosgym.machines.slider_crank.connecting_rod import elastic_constants, rods_of
 from chaosgym.machines.slider_crank.coordinates import (
     BALL_ACROSS,
     BALL_ALONG,
@@ -28,6 +27,7 @@ from chaosgym.machines.slider_crank.coordinates import (
     SLIDER_PITCH,
 )
 from chaosgym.machines.slider_crank.equations import Equations
+from tests.machines.connecting_rod import elastic_constants, rods_of
 
 ALONG_A, ACROSS_A, ALONG_B, ACROSS_B, MODES = 0, 1, 2, 3, 4
 
@@ -204,6 +204,7 @@ def planar_equations(machine, angle):
         ),
         load=np.einsum("bij,kbi->kbj", r, load),
         slider_along=r[:, n_rod],
+        slider_rate=np.zeros(len(r)),
     )
 
 

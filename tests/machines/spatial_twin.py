@@ -7,7 +7,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from chaosgym.machines.slider_crank.kinematics import crank_pin
+from tests.machines.kinematics import crank_pin
 
 STENCIL = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
 SECOND = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560])
@@ -55,12 +55,16 @@ class RigidMechanism:
 
     def places(self, theta, q):
         """Positions (B, k, 3) of bar points, housing, yoke, slider, and the unit vectors along rod and yoke."""
+        pin = crank_pin(theta, self.machine.crank_radius, math.radians(self.machine.motor_angle))
+        return self._placed(pin, q)
+
+    def _placed(self, pin, q):
+        """Positions for a rod that begins at ``pin`` (B, 3)."""
         machine = self.machine
-        pin = crank_pin(theta, machine.crank_radius, math.radians(machine.motor_angle))
         y, z = q[:, 0] - pin[:, 1], q[:, 1] - pin[:, 2]
         x = pin[:, 0] + np.sqrt(machine.rod_length**2 - y**2 - z**2)
         pivot = np.stack([x, q[:, 0], q[:, 1]], axis=1)
-        turn = Rotation.from_rotvec(q[:, 2:5] if self.size == 5 else np.zeros((len(theta), 3)))
+        turn = Rotation.from_rotvec(q[:, 2:5] if self.size == 5 else np.zeros((len(q), 3)))
         along = (pivot - pin) / machine.rod_length
         axis = turn.apply([0.0, 0.0, 1.0])
         yoke = along - np.sum(along * axis, axis=1)[:, None] * axis
@@ -142,6 +146,26 @@ class RigidMechanism:
             max_step=2e-4,
         )
         return run.y[:2].T
+
+
+class LooseBall(RigidMechanism):
+    """The same with a tight slider: q is where the rod begins from the crank pin, along the rod and across it."""
+
+    def __init__(self, machine):
+        super().__init__(machine, 3)
+        self.turning = np.zeros((3, 3))
+
+    def places(self, theta, q):
+        """Positions (B, k, 3) as in ``RigidMechanism``."""
+        pin = crank_pin(theta, self.machine.crank_radius, math.radians(self.machine.motor_angle))
+        start, tight = pin, np.zeros((len(q), 2))
+        # the axes in which it lies are those of the rod that begins there
+        for _ in range(20):
+            along, yoke = np.moveaxis(self._placed(start, tight)[:, -2:], 1, 0)
+            across = np.cross([0.0, 0.0, 1.0], yoke)
+            axes = np.stack([along, across, np.cross(along, across)], axis=2)
+            start = pin + np.einsum("bij,bj->bi", axes, q)
+        return self._placed(start, tight)
 
 
 def _about(vector):

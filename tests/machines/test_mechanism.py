@@ -12,9 +12,10 @@ from chaosgym.machines.mechanism.equations import small_motion
 from chaosgym.machines.mechanism.joints import Joint
 from chaosgym.machines.mechanism.mechanism import Mechanism, Spring
 from chaosgym.machines.mechanism.nominal import nominal, revolution_of
-from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.machine import SliderCrank
-from tests.machines.mechanisms import ANGLES, BINS, OFFSET, assembled, assert_equal, four_bar, thesis_crank
+from chaosgym.machines.slider_crank.mechanism import mechanism_of
+from tests.machines.mechanisms import ANGLES, BINS, OFFSET, assembled, assert_equal, four_bar
+from tests.machines.planar_twin import planar_equations
 
 NAMES = {
     "ball along": "ball along the rod",
@@ -27,10 +28,10 @@ COORDINATES = {there: here for here, there in NAMES.items()}
 
 @pytest.mark.parametrize("joint", ["clearance", "instrumented"])
 def test_matrices_are_those_of_the_crank_by_hand(joint):
-    """M, D, K and f of the rigid crank in the plane, all bodies off their axes, equal the product's to 1e-11."""
+    """M, D, K and f of the rigid crank in the plane, all bodies off their axes, equal those by hand to 1e-11."""
     machine = SliderCrank(**OFFSET, slider_joint=joint)
-    mechanism = thesis_crank(machine)
-    found, expected = assembled(mechanism), equations(machine, ANGLES)
+    mechanism = mechanism_of(machine)
+    found, expected = assembled(mechanism), planar_equations(machine, ANGLES)
     assert tuple(NAMES[name] for name in mechanism.coordinates) == machine.degrees_of_freedom
     for part, twin in zip(
         (found.mass, found.damping[1], found.stiffness[0], found.stiffness[2], found.load[0], found.load[2]),
@@ -63,18 +64,16 @@ OPTIONS = {
     ("name", "geometric"),
     [(name, on) for name in OPTIONS for on in ("on", "off") if on == "off" or name not in ("ball", "both")],
 )
-def test_matrices_are_those_of_the_flexible_crank_by_hand(name, geometric, monkeypatch):
-    """M, D, K, f and the slider's motion along the guide equal the product's to 2e-11: two codes of finite elements.
+def test_matrices_are_those_of_the_flexible_crank_by_hand(name, geometric):
+    """M, D, K, f and the slider's motion along the guide equal those by hand to 2e-11: two codes of finite elements.
 
-    Geometric stiffness, off by default, differs in two terms. The product leaves out products of stretch and rotation:
+    Geometric stiffness, off by default, differs in two terms. The hand leaves out products of stretch and rotation:
     they reach 0.03 % of K's part that grows with speed squared, beside a spring of the stretch that is nine orders of
     magnitude stiffer. And a gap at the crank pin is measured along the nominal rod there, along the moving rod here.
     """
     machine = SliderCrank(**FLEXIBLE | OPTIONS[name] | {"geometric_stiffness": geometric})
-    mechanism = thesis_crank(machine)
-    if geometric == "off":
-        monkeypatch.setattr("chaosgym.machines.mechanism.sums.Sums.add_geometric", lambda sums: None)
-    found, expected = assembled(mechanism), equations(machine, ANGLES)
+    mechanism = mechanism_of(machine)
+    found, expected = assembled(mechanism, geometric=geometric == "on"), planar_equations(machine, ANGLES)
     order = [mechanism.coordinates.index(COORDINATES.get(one, one)) for one in machine.degrees_of_freedom]
     assert sorted(order) == list(range(len(mechanism.coordinates)))
     stretch, pick = machine.degrees_of_freedom.index("rod stretch"), np.ix_(order, order)
@@ -110,8 +109,10 @@ def test_a_gap_at_the_crank_pin_is_that_by_hand_in_other_axes():
     Turned by T(theta), p = T p', the matrices are T' M T, T' (2 M w T' + D T) and T' (M w^2 T'' + D w T' + K T).
     """
     machine = SliderCrank(**OFFSET, slider_joint="instrumented", ball_joint="instrumented")
-    mechanism = thesis_crank(machine, ball_frame="crank")
-    found, expected = assembled(mechanism), equations(machine, ANGLES)
+    mechanism = mechanism_of(machine)
+    joints = tuple(joint._replace(frame="crank") if joint.name == "ball" else joint for joint in mechanism.joints)
+    mechanism = replace(mechanism, joints=joints)
+    found, expected = assembled(mechanism), planar_equations(machine, ANGLES)
     order = [machine.degrees_of_freedom.index(NAMES[name]) for name in mechanism.coordinates]
     rod = -np.arcsin(machine.crank_radius * np.sin(ANGLES) / machine.rod_length)
     # rod axes over crank axes; the ball's motion in rod axes is T times that in crank axes
@@ -143,7 +144,7 @@ def test_a_gap_at_the_crank_pin_is_that_by_hand_in_other_axes():
 def test_nominal_motion_of_a_slider_crank_is_its_closed_form():
     """Rod angle and slider place of a crank of 50 mm and a rod of 235 mm, to 1e-14."""
     machine = SliderCrank()
-    mechanism = thesis_crank(machine)
+    mechanism = mechanism_of(machine)
     z = nominal(mechanism, revolution_of(mechanism), ANGLES).z
     angle = -np.arcsin(machine.crank_radius * np.sin(ANGLES) / machine.rod_length)
     place = machine.crank_radius * np.cos(ANGLES) + machine.rod_length * np.cos(angle)
@@ -225,7 +226,7 @@ def test_what_can_not_move_as_a_mechanism_is_refused_by_name():
 
 def test_joints_that_hold_the_same_motion_are_named():
     """Two guides in line hold the rod across twice and leave its turn no room: the count is right, the rank not."""
-    crank = thesis_crank(SliderCrank())
+    crank = mechanism_of(SliderCrank())
     guides = (
         *crank.joints[:2],
         Joint("yoke", "prismatic", ("rod", "end"), ("slider", "pivot")),

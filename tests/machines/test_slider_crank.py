@@ -8,19 +8,12 @@ import pytest
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
+from chaosgym.machines.mechanism.beam import ELEMENTS, bending_of
 from chaosgym.machines.parameters import parameters_of
-from chaosgym.machines.slider_crank.connecting_rod import (
-    ELEMENTS,
-    Bar,
-    EndBody,
-    connecting_rod,
-    elastic_constants,
-    rods_of,
-)
 from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.joints import joints_of
-from chaosgym.machines.slider_crank.kinematics import slider_position
 from chaosgym.machines.slider_crank.machine import SliderCrank, frequencies_at
+from chaosgym.machines.slider_crank.mechanism import mechanism_of, pin_and_pivot
 from tests.plain_modes import PLAIN_CRANK
 from thesis.figures.crank_resonances import SUPERHARMONIC_SLIDER_CRANK
 
@@ -45,7 +38,7 @@ def test_the_slider_crank_is_a_machine():
 def test_the_stroke_is_that_of_the_thesis():
     """100 mm at 0 deg and 2 r cos 25 deg = 90.6 mm at 25 deg motor angle (printed: 90 mm)."""
     for angle, stroke in ((0.0, 0.1), (25.0, 0.0906)):
-        outer, inner = slider_position(np.array([0.0, np.pi]), 0.05, 0.235, math.radians(angle))
+        outer, inner = pin_and_pivot(SliderCrank(motor_angle=angle), np.array([0.0, np.pi]))[1][:, 0]
         assert outer - inner == pytest.approx(stroke, abs=5e-5)
 
 
@@ -98,9 +91,11 @@ def test_a_bare_rod_is_a_pinned_pinned_beam():
 
 def test_rod_frequencies_converge_with_the_mesh():
     """Twice the finite elements move the first three frequencies of the rod with its end bodies by less than 2e-4."""
-    bar = Bar(CRANK.rod_length, CRANK.rod_diameter, CRANK.youngs_modulus, CRANK.density)
-    housing, yoke = EndBody(0.36, 3.922e-4, 3e-3), EndBody(0.16, 7.059e-4, -8e-3)
-    coarse, fine = (connecting_rod(bar, housing, yoke, 3, count).mode_frequency for count in (ELEMENTS, 2 * ELEMENTS))
+    beam, ends = mechanism_of(CRANK).link("rod").beam, ((3e-3 * 0.36, 3.922e-4), (-8e-3 * 0.16, 7.059e-4))
+    coarse, fine = (
+        np.sqrt(bending_of(beam._replace(modes=modes, fitted=0), beam.second_moment, ends).squares[:3])
+        for modes in (ELEMENTS // 2, ELEMENTS)
+    )
     np.testing.assert_allclose(coarse, fine, rtol=2e-4)
     assert np.all(coarse >= fine)
 
@@ -230,10 +225,13 @@ def test_the_clearance_that_varies_is_that_of_the_monitored_joint():
 
 def test_structural_damping_grows_with_a_power_of_the_frequency():
     """An exponent of 1 is damping in proportion to stiffness, of 0 the same ratio in every mode."""
-    rod = rods_of(CRANK)[0]
+
+    def damping(**family):
+        return mechanism_of(replace(CRANK, **family)).link("rod").damping
+
     for family, exponent in (("stiffness", 1.0), ("uniform", 0.0)):
-        power = elastic_constants(replace(CRANK, damping_family="power", damping_exponent=exponent), rod)[1]
-        np.testing.assert_allclose(power, elastic_constants(replace(CRANK, damping_family=family), rod)[1], rtol=1e-12)
+        power = damping(damping_family="power", damping_exponent=exponent)
+        np.testing.assert_allclose(power, damping(damping_family=family), rtol=1e-12)
 
 
 def test_contact_damping_is_related_to_a_mass():

@@ -30,9 +30,9 @@ from chaosgym.machines.mechanism.sums import Sums, spring_length
 from chaosgym.machines.periodic import between
 
 TAIL = 1e-10
-"""Share of the largest term of a Fourier series that the upper half of its terms may have."""
+"""Share of the largest term of a Fourier series that the upper third of its terms may have."""
 
-LEAST_ANGLES, MOST_ANGLES = 48, 8192
+LEAST_ANGLES, MOST_ANGLES = 48, 6144
 """Angles of a grid, at the least and at the most."""
 
 
@@ -58,21 +58,22 @@ class SmallMotion(NamedTuple):
 
 
 def _tail(values: Array) -> float:
-    """Share of the upper half of the terms of the Fourier series of values (B, ...) in its largest one."""
+    """Share of the upper third of the terms of the Fourier series of values (B, ...) in its largest one."""
     series = np.abs(np.fft.rfft(values, axis=0))
-    return float(np.max(series[len(values) // 4 :]) / max(np.max(series), 1e-300))
+    return float(np.max(series[len(values) // 3 :]) / max(np.max(series), 1e-300))
 
 
 def _angles(count: int) -> Array:
     return np.asarray(np.arange(count) * (2.0 * np.pi / count), dtype=np.float64)
 
 
-def _smooth(mechanism: Mechanism, revolution: Revolution) -> tuple[Array, Nominal]:
+def smooth(mechanism: Mechanism, revolution: Revolution) -> tuple[Array, Nominal]:
     """Uniform grid of crank angles from 0 on whose Fourier series has all of the nominal motion, and that motion."""
     scale = np.ones(mechanism.size)
     for name, own in mechanism.at.items():
         scale[mechanism.spin(name) : own.stop] = revolution.length
-    count = LEAST_ANGLES
+    # a revolution with many steps turns sharply somewhere, or was made on such a grid
+    count = max(LEAST_ANGLES, 12 * math.ceil((len(revolution.theta) - 1) / 12.0))
     while True:
         theta = _angles(count)
         found = nominal(mechanism, revolution, theta)
@@ -99,20 +100,25 @@ class Assembled(NamedTuple):
     """Equations of small motions on a grid of G angles of a revolution, by k kinds of pulls: see ``Sums``.
 
     ``matrices`` (G, 3 + k, n, n): M, both parts of D, and K; empty if only loads are known. ``load`` (G, k, n),
-    ``torque`` (G, k). Kinds beyond the powers of the rate are those of forces of 1 N of ``mechanism``.
+    ``torque`` (G, k). Kinds beyond the powers of the rate are those of forces of 1 N of ``mechanism``. ``sliding``
+    (G, 1 + n) of a joint along its axis, or the turning of a pin in the plane, per radian of the crank and per unit of
+    each coordinate; empty without one.
     """
 
     mechanism: Mechanism
     matrices: Array
     load: Array
     torque: Array
+    sliding: Array
 
     def at(self, theta: Array) -> SmallMotion:
         """Equations at crank angles (B,) [rad]."""
+        return SmallMotion(*self.matrices_at(theta), self.load_at(theta), self.torque_at(theta))
+
+    def matrices_at(self, theta: Array) -> tuple[Array, Array, Array]:
+        """M, D and K of ``SmallMotion`` at crank angles (B,) [rad]."""
         found = np.swapaxes(between(self.matrices, theta), 0, 1)
-        return SmallMotion(
-            found[0], found[1:3], self._forced(found[3:], theta), self.load_at(theta), self.torque_at(theta)
-        )
+        return found[0], found[1:3], self._forced(found[3:], theta)
 
     def load_at(self, theta: Array) -> Array:
         """Loads (3, B, n) at crank angles (B,) [rad]."""
@@ -121,6 +127,11 @@ class Assembled(NamedTuple):
     def torque_at(self, theta: Array) -> Array:
         """Torque (3, B) of the drive at crank angles (B,) [rad]."""
         return self._forced(np.swapaxes(between(self.torque, theta), 0, 1), theta)
+
+    def sliding_at(self, theta: Array) -> tuple[Array, Array]:
+        """Sliding of the joint per radian of the crank, (B,), and per unit of each coordinate, (B, n)."""
+        found = between(self.sliding, theta)
+        return found[:, 0], found[:, 1:]
 
     def _forced(self, found: Array, theta: Array) -> Array:
         """By the three powers of the rate, (3, B, ...), of all kinds of pulls (k, B, ...)."""
@@ -133,7 +144,7 @@ class Assembled(NamedTuple):
 
 
 def assembled(
-    mechanism: Mechanism, revolution: Revolution, *, matrices: bool = True, geometric: bool = True
+    mechanism: Mechanism, revolution: Revolution, *, matrices: bool = True, geometric: bool = True, slides: str = ""
 ) -> Assembled:
     """Equations of all angles of a revolution.
 
@@ -144,17 +155,19 @@ def assembled(
     matrices
         False for loads and torques alone, in a fraction of the time.
     geometric
-        Whether the forces of the nominal motion stiffen.
+        Whether the forces of the nominal motion stiffen. Without it the axes of bodies that turn stay unit vectors.
+    slides
+        Joint whose sliding is told, if any, or whose turning if it is revolute, in the plane.
 
     Raises
     ------
     ParameterError
         If the mechanism is near a change point.
     """
-    theta, found = _smooth(mechanism, revolution)
+    theta, found = smooth(mechanism, revolution)
     gaps = found.inverse[:, :, mechanism.size - len(mechanism.coordinates) :]
     kinds = 3 + mechanism.dimensions * len(mechanism.forces)
-    sums = Sums(mechanism, revolution, found, theta, gaps, kinds=kinds, matrices=matrices)
+    sums = Sums(mechanism, revolution, found, theta, gaps, kinds=kinds, matrices=matrices, geometric=geometric)
     for link in mechanism.links:
         sums.add_link(link)
         if matrices and link.elastic:
@@ -163,10 +176,19 @@ def assembled(
         sums.add_forces(force.point, 3 + mechanism.dimensions * k)
     for spring in mechanism.springs:
         sums.add_spring(spring)
-    if matrices and geometric:
+    if matrices:
         sums.add_geometric()
+    sliding = np.empty((len(theta), 0))
+    if slides:
+        which = next(joint for joint in mechanism.joints if joint.name == slides)
+        along = mechanism.along(found.z, which)[1]
+        if which.kind == "revolute":
+            along = mechanism.motions(found.z)[1][:, mechanism.joints.index(which), 2]
+        sliding = (along[:, None] @ found.inverse)[:, 0]
+        sliding = np.delete(sliding, np.arange(1, mechanism.size - gaps.shape[-1]), axis=1)
     every = np.concatenate([sums.mass[None], sums.damping, sums.stiffness]) if matrices else np.empty((0, 0, 0, 0))
-    return Assembled(mechanism, *(np.moveaxis(part, 0, 1) for part in (every, sums.load, sums.torque)))
+    whole, load, torque = (np.moveaxis(part, 0, 1) for part in (every, sums.load, sums.torque))
+    return Assembled(mechanism, whole, load, torque, sliding)
 
 
 def small_motion(mechanism: Mechanism, revolution: Revolution, theta: Array) -> SmallMotion:
@@ -188,23 +210,9 @@ def small_motion(mechanism: Mechanism, revolution: Revolution, theta: Array) -> 
     return assembled(mechanism, revolution).at(theta)
 
 
-def sliding(mechanism: Mechanism, revolution: Revolution, theta: Array, joint: str) -> tuple[Array, Array]:
-    """Sliding of a joint along its axis, or turning of a pin in its hole, in the plane.
-
-    Returns it per radian of the crank, (B,), and per unit of each coordinate, (B, n).
-    """
-    found = nominal(mechanism, revolution, theta)
-    which = next(each for each in mechanism.joints if each.name == joint)
-    along = mechanism.along(found.z, which)[1]
-    if which.kind == "revolute":
-        along = mechanism.motions(found.z)[1][:, mechanism.joints.index(which), 2]
-    every = np.einsum("bz,bzc->bc", along, found.inverse)
-    return every[:, 0], every[:, mechanism.size - len(mechanism.coordinates) :]
-
-
 def crank_inertia(mechanism: Mechanism, revolution: Revolution, theta: Array) -> Array:
     """Inertia (B,) [kg m^2] of all links as the crank feels it in the nominal motion: twice their energy at 1 rad/s."""
-    grid, found = _smooth(mechanism, revolution)
+    grid, found = smooth(mechanism, revolution)
     sums = Sums(mechanism, revolution, found, grid, found.inverse[:, :, :1])
     for link in mechanism.links:
         sums.add_link(link)

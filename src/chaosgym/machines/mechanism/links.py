@@ -127,6 +127,8 @@ class Link(NamedTuple):
         What bends, if it is a uniform beam.
     rigid
         Coordinates of the link apart from elastic ones: in the plane or in space.
+    turning : (3, z, z)
+        In space, of bodies whose mass lies along each axis of the link: sum m du^T du of the unit vectors u there.
     """
 
     name: str
@@ -140,6 +142,7 @@ class Link(NamedTuple):
     damping: Array = np.zeros((0, 0))
     beam: Optional["Beam"] = None
     rigid: int = RIGID
+    turning: Array = np.zeros((3, 0, 0))
 
     @property
     def size(self) -> int:

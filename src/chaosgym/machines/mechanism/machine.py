@@ -16,7 +16,7 @@ from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS, Contact, Held, 
 from chaosgym.machines.drive_torque import DriveTorque
 from chaosgym.machines.mechanism.beam import fibre_stress
 from chaosgym.machines.mechanism.clearance import ROUND, surface_fields
-from chaosgym.machines.mechanism.equations import SmallMotion, assembled, crank_inertia, sliding, small_motion
+from chaosgym.machines.mechanism.equations import SmallMotion, assembled, crank_inertia, small_motion
 from chaosgym.machines.mechanism.joints import ACROSS, ALONG, PITCH, PLACES, SIDEWAYS, TURN, YAW, Joint
 from chaosgym.machines.mechanism.links import RIGID
 from chaosgym.machines.mechanism.mechanism import Force, Mechanism
@@ -238,19 +238,19 @@ class MechanismMachine(BinnedMachine):
         whole = assembled(self._scaled(), self.revolution)
         # on the grid they are sums of squares to the last digit
         self._refuse_massless(whole.matrices[:, 0])
-        found, load = whole.at(middles), whole.load_at(nodes)
+        matrices, load = whole.matrices_at(middles), whole.load_at(nodes)
         if not self._rub:
-            return held(found.mass, found.damping, found.stiffness, load)
+            return held(*matrices, load)
         _, signed, driven = self._rubbing(middles)
         tangent = self._rub * signed if self._lever is not None else None
-        return held(found.mass, found.damping, found.stiffness, load, driven, tangent)
+        return held(*matrices, load, driven, tangent)
 
     def _rubbing(self, theta: Array) -> tuple[Array, Array, Array]:
         """Sliding per radian (B,) of the joint with friction, its sign (B,), and what a newton drives (B, n).
 
         The sign fades where the sliding halts.
         """
-        rate, row = sliding(self.mechanism, self.revolution, theta, self.rubs)
+        rate, row = assembled(self.mechanism, self.revolution, matrices=False, slides=self.rubs).sliding_at(theta)
         signed = np.clip(rate / max(RAMP * float(np.abs(rate).max()), 1e-300), -1.0, 1.0)
         lever = 1.0 if self._lever is None else self._lever
         return lever * rate, signed, lever * self._rub * signed[:, None] * row

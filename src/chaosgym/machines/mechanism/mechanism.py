@@ -180,6 +180,17 @@ class Mechanism:
         gaps = [str(row) for row in self.rows() if row.opened]
         return (*gaps, *(f"{link.name} {name}" for link in self.links for name in link.elastic))
 
+    @cached_property
+    def elastic(self) -> NDArray[np.int64]:
+        """Columns (e,) of the elastic coordinates of all links."""
+        every = [np.arange(self.at[link.name].start + link.rigid, self.at[link.name].stop) for link in self.links]
+        return np.concatenate(every).astype(np.int64)
+
+    @cached_property
+    def rigid(self) -> NDArray[np.int64]:
+        """Columns of places and turns of all links."""
+        return np.delete(np.arange(self.size), self.elastic)
+
     def places(self, end: tuple[str, str]) -> Places:
         """A point of a link or of the ground.
 
@@ -272,7 +283,7 @@ class Mechanism:
         value[:, :count] = every.reshape(len(z), -1)[:, ends.picked]
         value[:, 0] -= theta
         slope[:, :count] = slopes.reshape(len(z), -1, self.size)[:, ends.picked]
-        value[:, count:], slope[:, count:] = z[:, ends.elastic], np.eye(self.size)[ends.elastic]
+        value[:, count:], slope[:, count:] = z[:, self.elastic], np.eye(self.size)[self.elastic]
         return value, slope
 
     def add_bent_rows(self, z: Array, forces: Array, total: Array) -> None:
@@ -304,7 +315,7 @@ class _Ends(NamedTuple):
     (links + 1,) column of the turn, that of the ground behind all; of first and second ends ``link`` (2, J), ``place``
     (2, J, 2) and ``shape`` (2, J, 2, z); ``shift`` (J, 2, z + 1) derivatives by places of links; ``frame`` (J,) link of
     the axes and ``axes`` (J, 2, 2) in it; ``turn`` (J,) and its derivatives ``slope`` (J, z); ``picked`` rows of all
-    motions that are functions, ``elastic`` columns of the elastic coordinates.
+    motions that are functions.
     """
 
     base: NDArray[np.int64]
@@ -319,7 +330,6 @@ class _Ends(NamedTuple):
     turn: Array
     slope: Array
     picked: NDArray[np.int64]
-    elastic: NDArray[np.int64]
 
 
 def _ends_of(mechanism: Mechanism) -> _Ends:
@@ -358,5 +368,4 @@ def _ends_of(mechanism: Mechanism) -> _Ends:
         turn=np.array([joint.turn for joint in joints]),
         slope=slope,
         picked=np.array(picked),
-        elastic=np.array([i for own in mechanism.at.values() for i in range(own.start + 3, own.stop)], dtype=np.int64),
     )

@@ -179,8 +179,9 @@ def crank_of(motor: Motor, load: Load) -> "Crank":
     width = 2.0 * math.pi / len(load.still)
     slope = motor.stall_torque / motor.no_load_rate
     inertia = motor.inertia + load.inertia
-    if inertia.min() <= LEAST * inertia.max():
-        where = math.degrees(int(inertia.argmin()) * width)
+    still = inertia <= LEAST * inertia.max()
+    if still.any():
+        where = math.degrees(int(still.argmax()) * width)
         raise ParameterError(
             f"nothing that turns has inertia at crank angle {where:.0f} deg; allowed: [motor] inertia above 0"
         )

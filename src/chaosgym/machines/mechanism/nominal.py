@@ -16,7 +16,7 @@ from chaosgym.machines.mechanism.mechanism import Mechanism
 STEP, SHORTEST = 2.0 * np.pi / 24, 1e-4
 """Longest and shortest step of the crank [rad]."""
 
-FAR = 0.25
+FAR = 0.01
 """Correction of a step, in rad or in lengths of the mechanism, beyond which it is tried anew with half the length."""
 
 CLOSED, NEARLY, LAST, ROUNDING = 1e-9, 1e-6, 1e-8, 1e-13
@@ -26,14 +26,17 @@ and that is rounding."""
 WORST = 1e9
 """Condition number of the loops' equations beyond which they are singular."""
 
+REPEATED = 1e-12
+"""Last correction so small that A is the same before and after it."""
+
 TRIES = 40
 
 
 class Nominal(NamedTuple):
     """Nominal motion at B crank angles.
 
-    ``z`` (B, size) coordinates of all links, ``inverse`` (B, size, size) of A = dc/dz, ``condition`` (B,) of A, in
-    Frobenius' norm.
+    ``z`` (B, size) coordinates of all links, ``inverse`` (B, size, size) of A = dc/dz, ``condition`` (B,) of what
+    joints hold in it, in Frobenius' norm.
     """
 
     z: Array
@@ -55,15 +58,23 @@ class _Loops:
             lengths[own.start : mechanism.spin(name)] = self.length
         self.scale = lengths
 
+    def block(self, slope: Array) -> Array:
+        """Part of A (B, z, z) of what joints hold or open by places and turns, in own lengths: the rest is 1 and 0."""
+        held = self.mechanism.rigid
+        return np.asarray(slope[:, : len(held), held] * self.scale[held])
+
     def solve(self, z: Array, theta: Array, tries: int = TRIES, enough: float = ROUNDING) -> tuple[Array, float, Array]:
-        """Coordinates (B, z) by Newton's method, the last correction, and A (B, z, z) before it in own lengths."""
-        last, slope = np.inf, np.empty(0)
+        """Coordinates (B, z) by Newton's method, the last correction, and A (B, z, z) before it.
+
+        Elastic coordinates stay zero.
+        """
+        last, slope, held = np.inf, np.empty(0), self.mechanism.rigid
+        step = np.zeros_like(z)
         for _ in range(tries):
             before = last
             value, slope = self.mechanism.functions(z, theta)
-            slope = slope * self.scale
             try:
-                step = np.linalg.solve(slope, value[..., None])[..., 0]
+                step[:, held] = np.linalg.solve(self.block(slope), value[:, : len(held), None])[..., 0]
             except np.linalg.LinAlgError:
                 return z, np.inf, slope
             last = float(np.max(np.abs(step)))
@@ -75,10 +86,26 @@ class _Loops:
         return z, last, slope
 
     def tangent(self, z: Array, slope: Array) -> Array:
-        """Derivatives (B, z) of the coordinates z by the crank angle, of A in own lengths."""
-        drive = np.zeros((len(slope), self.mechanism.size, 1))
+        """Derivatives (B, z) of the coordinates z by the crank angle, of A there."""
+        held = self.mechanism.rigid
+        drive, rate = np.zeros((len(slope), len(held), 1)), np.zeros_like(z)
         drive[:, 0] = 1.0
-        return self.mechanism.rates(z, np.asarray(self.scale * np.linalg.solve(slope, drive)[..., 0]))
+        rate[:, held] = self.scale[held] * np.linalg.solve(self.block(slope), drive)[..., 0]
+        return self.mechanism.rates(z, rate)
+
+    def inverse(self, slope: Array) -> tuple[Array, Array]:
+        """Inverse (B, z, z) of A, and the condition number (B,) of its part of ``block``, in Frobenius' norm."""
+        held, bent = self.mechanism.rigid, self.mechanism.elastic
+        block = self.block(slope)
+        own = np.linalg.inv(block)
+        condition = np.prod([np.linalg.norm(each, axis=(1, 2)) for each in (block, own)], axis=0)
+        own *= self.scale[held, None]
+        inverse, count = np.zeros_like(slope), len(held)
+        inverse[:, held, :count] = own
+        if len(bent):
+            inverse[:, held, count:] = -own @ slope[:, :count, bent]
+            inverse[:, bent, np.arange(count, len(self.scale))] = 1.0
+        return inverse, np.asarray(condition)
 
 
 def _length_of(mechanism: Mechanism) -> float:
@@ -217,20 +244,27 @@ def nominal(mechanism: Mechanism, revolution: Revolution, theta: Array) -> Nomin
         If a loop does not close to rounding, or is singular there.
     """
     loops, where = _Loops(mechanism), np.mod(theta, 2.0 * np.pi)
-    z, last = _closed(loops, revolution, where)
-    slope = mechanism.functions(z, where)[1]
+    z, last, slope = _closed(loops, revolution, where)
+    if last > REPEATED:
+        slope = mechanism.functions(z, where)[1]
     try:
-        inverse = np.linalg.inv(slope)
-        sizes = (slope * loops.scale, inverse / loops.scale[:, None])
-        condition = np.prod([np.linalg.norm(size, axis=(1, 2)) for size in sizes], axis=0)
+        inverse, condition = loops.inverse(slope)
     except np.linalg.LinAlgError:
-        condition = np.linalg.cond(slope * loops.scale)
+        condition = np.linalg.cond(loops.block(slope))
     if last > LAST or not np.all(condition < WORST):
         worst = float(where[int(np.argmax(condition))])
         raise ParameterError(
             f"the loop is singular at crank angle {_degrees(worst)}: the mechanism is at a dead centre"
         )
     return Nominal(_unwound(z, theta, where, revolution), np.asarray(inverse), np.asarray(condition))
+
+
+def refined(mechanism: Mechanism, revolution: Revolution, theta: Array) -> Revolution:
+    """A revolution with steps at crank angles (B,) from 0 on, at which its places are known to rounding."""
+    loops, ends = _Loops(mechanism), np.append(theta, 2.0 * np.pi)
+    z = _closed(loops, revolution, ends)[0]
+    z, _, slope = loops.solve(z, ends, 1)
+    return revolution._replace(theta=ends, z=z, tangent=loops.tangent(z, slope))
 
 
 def _unwound(z: Array, theta: Array, where: Array, revolution: Revolution) -> Array:
@@ -241,14 +275,14 @@ def _unwound(z: Array, theta: Array, where: Array, revolution: Revolution) -> Ar
 def places(mechanism: Mechanism, revolution: Revolution, theta: Array) -> Array:
     """``nominal(mechanism, revolution, theta).z`` alone, in half the time."""
     where = np.mod(theta, 2.0 * np.pi)
-    z, last = _closed(_Loops(mechanism), revolution, where)
+    z, last, _ = _closed(_Loops(mechanism), revolution, where)
     return _unwound(z, theta, where, revolution) if last <= LAST else nominal(mechanism, revolution, theta).z
 
 
-def _closed(loops: _Loops, revolution: Revolution, where: Array) -> tuple[Array, float]:
-    """Coordinates (B, z) at crank angles of the first revolution, and their last correction."""
+def _closed(loops: _Loops, revolution: Revolution, where: Array) -> tuple[Array, float, Array]:
+    """Coordinates (B, z) at crank angles of the first revolution, their last correction, and A before that."""
     at = np.clip(np.searchsorted(revolution.theta, where, side="right") - 1, 0, len(revolution.theta) - 2)
     begin, span = revolution.theta[at], np.diff(revolution.theta)[at]
     x, h = ((where - begin) / span)[:, None], span[:, None]
     z0, z1, d0, d1 = (part[k] for part in (revolution.z, revolution.tangent) for k in (at, at + 1))
-    return loops.solve(_between(x, h, z0, z1, d0, d1), where, 8, LAST)[:2]
+    return loops.solve(_between(x, h, z0, z1, d0, d1), where, 8, LAST)

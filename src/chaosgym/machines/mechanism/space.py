@@ -12,6 +12,7 @@ Small turns d are those of the world, exp(d) R. With them a point R rho moves by
 d x (d x R rho) / 2 to second order, wherever the link is: all derivatives are by d.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -155,6 +156,8 @@ class SpatialPlaces(NamedTuple):
     def turned(self, vector: Array) -> tuple[Array, Array]:
         """First and second derivative (3, e) and (3, e, e) by q of a vector (3,) that turns with the first point."""
         slope = self.slope[0].T
+        if not len(slope):
+            return self.shape[0], self.curve[0]
         once = cross(slope, vector)
         twice = cross(slope[:, None], once[None])
         return once.T, np.moveaxis(0.5 * (twice + np.swapaxes(twice, 0, 1)), -1, 0) + np.multiply.outer(
@@ -222,24 +225,31 @@ def spatial_inertia_of(link: Link) -> SpatialInertia:
     # factors of the twelve accelerations, whose direction is the last index but one
     weight = mass[:, None] * np.concatenate([np.ones((count, 1)), rho], axis=1)
     pull = np.einsum("kf,kiz->fiz", weight, motion)
-    bent = np.zeros((4, 3, size, size))
-    product = np.einsum("kf,kj->fj", weight, rho)
-    for f in range(4):
-        for i in range(3):
-            pressed = np.outer(np.eye(3)[i], product[f])
-            bent[f, i, 3:6, 3:6] = 0.5 * (pressed + pressed.T) - np.trace(pressed) * np.eye(3)
-    if elastic:
-        moved = np.einsum("kf,kie->fie", weight, places.shape)
-        for i in range(3):
-            # a turn d moves what bends by d x N q
-            bent[:, i, 3:6, 6:] = np.einsum("ij,fje->fie", skew(np.eye(3)[i]).T, moved)
-            bent[:, i, 6:, 3:6] = np.swapaxes(bent[:, i, 3:6, 6:], -1, -2)
-        bent[:, :, 6:, 6:] = np.einsum("kf,kipq->fipq", weight, places.curve)
     return SpatialInertia(
         moments,
         np.concatenate([pull[0], np.swapaxes(pull[1:], 0, 1).reshape(9, size)]),
-        np.concatenate([bent[0], np.swapaxes(bent[1:], 0, 1).reshape(9, size, size)]),
+        _bent(places, mass),
     )
+
+
+def _bent(places: SpatialPlaces, mass: Array) -> Array:
+    """Second derivatives (12, z, z) of places times m a, of the accelerations of ``SpatialInertia``."""
+    rho, elastic = places.place, places.shape.shape[-1]
+    size = RIGID + elastic
+    weight = mass[:, None] * np.concatenate([np.ones((len(mass), 1)), rho], axis=1)
+    bent = np.zeros((4, 3, size, size))
+    product = weight.T @ rho
+    pressed = np.einsum("ai,fb->fiab", np.eye(3), product)
+    bent[..., 3:6, 3:6] = 0.5 * (pressed + np.swapaxes(pressed, -1, -2))
+    bent[..., 3:6, 3:6] -= product[..., None, None] * np.eye(3)
+    if elastic:
+        moved = (weight.T @ places.shape.reshape(len(mass), -1)).reshape(4, 3, elastic)
+        # a turn d moves what bends by d x N q
+        bent[..., 3:6, 6:] = -skew(np.eye(3)) @ moved[:, None]
+        bent[..., 6:, 3:6] = np.swapaxes(bent[..., 3:6, 6:], -1, -2)
+        curve = weight.T @ places.curve.reshape(len(mass), -1)
+        bent[..., 6:, 6:] = curve.reshape(4, 3, elastic, elastic)
+    return np.concatenate([bent[0], np.swapaxes(bent[1:], 0, 1).reshape(9, size, size)])
 
 
 class SpatialBody(NamedTuple):
@@ -249,6 +259,19 @@ class SpatialBody(NamedTuple):
     inertia: Vector = (0.0, 0.0, 0.0)
     centre: Vector = (0.0, 0.0, 0.0)
 
+    @property
+    def squares(self) -> Array:
+        """Sum of mass times squared distance (3,) along each axis from the centre [kg m^2]."""
+        return np.asarray(0.5 * np.sum(self.inertia) - np.array(self.inertia))
+
+    def turning(self, slope: Array) -> Array:
+        """``Link.turning`` (3, 6 + e, 6 + e) of it, where elastic coordinates turn it by ``slope`` (3, e)."""
+        found = np.zeros((3, RIGID + slope.shape[1], RIGID + slope.shape[1]))
+        for axis, square in enumerate(self.squares):
+            moved = -skew(np.eye(3)[axis]) @ np.hstack([np.eye(3), slope])
+            found[axis, 3:, 3:] = square * moved.T @ moved
+        return found
+
     def particles(self) -> tuple[Array, Array]:
         """Places (7, 3) and masses (7,) that move like the body; that in the middle may be negative.
 
@@ -257,7 +280,7 @@ class SpatialBody(NamedTuple):
         ParameterError
             If no body has such moments of inertia: each is at most the sum of the others.
         """
-        squares = 0.5 * np.sum(self.inertia) - np.array(self.inertia)
+        squares = self.squares
         if np.any(squares < -1e-9 * np.sum(self.inertia)):
             raise ParameterError(
                 f"moments of inertia {', '.join(f'{one:g}' for one in self.inertia)} kg m^2 belong to no body; "
@@ -268,6 +291,7 @@ class SpatialBody(NamedTuple):
         return np.array(self.centre) + arms, np.concatenate([[self.mass - outer.sum()], outer])
 
 
+@lru_cache(maxsize=256)
 def lying(orientation: Vector, axis: Vector) -> Lie:
     """How a link lies that is turned about x, then y, then z of the ground, and may turn right round an own axis."""
     own = axes_of(np.array(axis))
@@ -304,4 +328,7 @@ def spatial_link(
     place = np.concatenate([np.zeros((0, 3)), *(part[0] for part in parts)])
     mass = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
     named = {point: spatially_fixed(np.array(at), lie) for point, at in points.items()}
-    return Link(name, named, spatially_fixed(place, lie), mass, np.zeros(len(mass)), rigid=RIGID)
+    turning = np.zeros((3, RIGID, RIGID))
+    for body in bodies:
+        turning += body.turning(np.zeros((3, 0)))
+    return Link(name, named, spatially_fixed(place, lie), mass, np.zeros(len(mass)), rigid=RIGID, turning=turning)

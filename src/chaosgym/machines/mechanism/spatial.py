@@ -66,16 +66,10 @@ class SpatialMechanism(Mechanism):
         """Columns (links, 6) of places and turns of the links."""
         return np.array([own.start for own in self.at.values()])[:, None] + np.arange(RIGID)
 
-    @cached_property
-    def _elastic(self) -> NDArray[np.int64]:
-        """Columns (E,) of the elastic coordinates of all links."""
-        every = [np.arange(own.start + RIGID, own.stop) for own in self.at.values()]
-        return np.concatenate(every).astype(np.int64)
-
     def _bends(self, link: int) -> NDArray[np.bool_]:
         """Which of the elastic coordinates (E,) are those of a link."""
         own = self.at[self.links[link].name]
-        return np.asarray((self._elastic >= own.start) & (self._elastic < own.stop))
+        return np.asarray((self.elastic >= own.start) & (self.elastic < own.stop))
 
     @cached_property
     def _lies(self) -> Lie:
@@ -90,17 +84,17 @@ class SpatialMechanism(Mechanism):
     def _all(self, each: Array, elastic: Array) -> Array:
         """All coordinates (B, z) of those of every link and the elastic ones."""
         z = np.empty((len(each), self.size))
-        z[:, self._rigid], z[:, self._elastic] = each[:, :-1], elastic
+        z[:, self._rigid], z[:, self.elastic] = each[:, :-1], elastic
         return z
 
     def moved(self, z: Array, step: Array) -> Array:
         """Coordinates after a step in which links turn about the axes of the world."""
-        bent = (z + step)[:, self._elastic]
+        bent = (z + step)[:, self.elastic]
         return self._all(self._lies.moved(self._each(z), self._each(step)), bent)
 
     def rates(self, z: Array, rate: Array) -> Array:
         """Rates of the coordinates from those of places and angular velocities."""
-        return self._all(self._lies.rates(self._each(z), self._each(rate)), rate[:, self._elastic])
+        return self._all(self._lies.rates(self._each(z), self._each(rate)), rate[:, self.elastic])
 
     def refuse_turned_over(self, z: Array) -> None:
         """Refuse coordinates (1, z) in which a link has turned by half a turn about an axis that allows no more."""
@@ -136,7 +130,7 @@ class SpatialMechanism(Mechanism):
 
     def _carried(self, parts: Sequence[tuple[int, Array, Array, Array]]) -> Carried:
         """Vectors of links, each with its derivatives by the elastic coordinates of its link."""
-        count, bends = len(parts), len(self._elastic)
+        count, bends = len(parts), len(self.elastic)
         shape, curve = np.zeros((count, 3, bends)), np.zeros((count, 3, bends, bends))
         for k, (link, _, once, twice) in enumerate(parts):
             if once.shape[-1]:
@@ -154,7 +148,7 @@ class SpatialMechanism(Mechanism):
         total[..., spin, spin] -= np.einsum("...ii->...", product)[..., None, None] * np.eye(3)
         if not bends.any():
             return
-        columns, own = self._elastic[bends], force @ turn
+        columns, own = self.elastic[bends], force @ turn
         count, flat = len(columns), own.reshape(*own.shape[:-2], 1, -1)
         # a turn d moves what bends by d x N q
         crossed = skew(np.swapaxes(carried.shape[..., bends], 1, 2)).transpose(0, 3, 2, 1)
@@ -219,11 +213,11 @@ class SpatialMechanism(Mechanism):
         slope[:, every, rows.axis.link, 3:] += cross(axis, apart)
         whole = np.empty((*size, self.size))
         whole[..., self._rigid] = slope[:, :, :-1]
-        if len(self._elastic):
+        if len(self.elastic):
             signed = (apart, -rows.moves * axis, axis)
             parts = zip(signed, rows.vectors, strict=True)
             own = [((pressed[..., None, :] @ turn[:, one.link]) @ one.shape)[..., 0, :] for pressed, one in parts]
-            whole[..., self._elastic] = own[0] + own[1] + own[2]
+            whole[..., self.elastic] = own[0] + own[1] + own[2]
         return whole
 
     def _filled(self, z: Array, rows: Rows) -> tuple[Array, Array]:
@@ -234,7 +228,7 @@ class SpatialMechanism(Mechanism):
     def functions(self, z: Array, theta: Array) -> tuple[Array, Array]:
         """Functions c (B, z) at crank angles (B,), and their derivatives by places and turns; see ``Mechanism``."""
         value, slope = np.empty_like(z), np.zeros((len(z), self.size, self.size))
-        held = slice(1, self.size - len(self._elastic))
+        held = slice(1, self.size - len(self.elastic))
         value[:, held], slope[:, held] = self._filled(z, self._rows)
         (along, across, sideways), arrow = self._drive
         crank = self.driver.second[0]
@@ -242,8 +236,8 @@ class SpatialMechanism(Mechanism):
         turned = np.arctan2(pointer @ sideways, pointer @ across)
         value[:, 0] = np.mod(turned - theta + np.pi, 2.0 * np.pi) - np.pi
         slope[:, 0, self._spin(self._number(crank))] = along
-        value[:, held.stop :] = z[:, self._elastic]
-        slope[:, np.arange(held.stop, self.size), self._elastic] = 1.0
+        value[:, held.stop :] = z[:, self.elastic]
+        slope[:, np.arange(held.stop, self.size), self.elastic] = 1.0
         return value, slope
 
     @cached_property
@@ -294,8 +288,8 @@ class SpatialMechanism(Mechanism):
         slope[:, every, :, carried.link, 3:] = -np.swapaxes(skew(vector), 0, 1)
         whole = np.empty((*vector.shape, self.size))
         whole[..., self._rigid] = slope[..., :-1, :]
-        if len(self._elastic):
-            whole[..., self._elastic] = turn[:, carried.link] @ carried.shape
+        if len(self.elastic):
+            whole[..., self.elastic] = turn[:, carried.link] @ carried.shape
         return whole
 
     def _moving(self, link: NDArray[np.int64]) -> Array:

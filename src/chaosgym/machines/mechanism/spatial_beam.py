@@ -86,11 +86,13 @@ def spatial_beam_link(
         _points(beam, planes, lie, bar.position, [plane.deflection for plane in planes], bar.drawn, planes[1].drawn)
     ]
     weights = [beam.density * beam.area * bar.weight]
+    turning = np.zeros((3, RIGID + masses[0].shape.shape[-1], RIGID + masses[0].shape.shape[-1]))
     for end, bodies in ends.items():
         for body in bodies:
             place, mass = body.particles()
             masses.append(named[end].beside(place))
             weights.append(mass)
+            turning += body.turning(named[end].slope[0])
     carried = sum(body.mass for each in (ends, beside) for body in each.get(END, ()))
     stiffness, damping = elastic_of(beam, carried, planes)
     modes = range(1, 1 + beam.modes + beam.fitted)
@@ -109,6 +111,7 @@ def spatial_beam_link(
         np.diag(damping),
         beam,
         RIGID,
+        turning,
     )
 
 

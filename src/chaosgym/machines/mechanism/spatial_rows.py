@@ -1,5 +1,6 @@
 """What the functions of joints in space are made of: vectors that links carry."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +51,7 @@ class Vectors(NamedTuple):
     apart: Array
 
 
+@lru_cache(maxsize=256)
 def axes_of_joint(axis: tuple[float, ...]) -> Array:
     """Axes (3, 3) of a joint, in columns: its own, across it as near to y as may be (else to z), and sideways."""
     unit = np.array(axis) / np.linalg.norm(axis)

@@ -50,7 +50,9 @@ class Sums:
         *,
         kinds: int = 3,
         matrices: bool = True,
+        geometric: bool = True,
     ) -> None:
+        self.geometric = geometric
         self.mechanism, self.found, self.theta, self.matrices = mechanism, found, theta, matrices
         self.winding = revolution.winding
         self.compatible = compatible
@@ -105,7 +107,8 @@ class Sums:
         self.damping[1] += 2.0 * transposed @ (mass @ once + rate * turned)
         curved = mass @ twice + 2.0 * rate * (inertia.gyroscopic @ once)
         self.stiffness[2] += transposed @ (curved + spin * turned - rate**2 * centrifugal)
-        self.curved[powers] += transposed @ np.tensordot(pushed, inertia.bent, 1) @ motion
+        if self.geometric:
+            self.curved[powers] += transposed @ np.tensordot(pushed, inertia.bent, 1) @ motion
 
     def add_spatial(self, link: Link) -> None:
         """Add the particles of a link in space, in axes of the link."""
@@ -134,7 +137,11 @@ class Sums:
         self.mass += transposed @ (mass @ motion)
         self.damping[1] += 2.0 * transposed @ (mass @ once + spinning @ motion)
         self.stiffness[2] += transposed @ (mass @ twice + 2.0 * spinning @ once + swinging @ motion)
-        self.curved[powers] += transposed @ np.tensordot(pushed, inertia.bent, 1) @ motion
+        if self.geometric:
+            self.curved[powers] += transposed @ np.tensordot(pushed, inertia.bent, 1) @ motion
+        else:
+            kept = np.tensordot(np.diagonal(swung, axis1=1, axis2=2), link.turning, 1)
+            self.curved[2] -= transposed @ kept @ motion
 
     def add_elastic(self, link: Link) -> None:
         """Add stiffness and damping of the elastic coordinates of a link, which are the last of p."""
@@ -179,7 +186,9 @@ class Sums:
         self.stiffness[1] += spring.damping * motion[:, :, None] * change[:, None]
 
     def add_geometric(self) -> None:
-        """Add the geometric stiffness of all that the others have pulled."""
-        forces = np.einsum("bzc,kbz->kbc", self.found.inverse, self.pull)
-        self.mechanism.add_bent_rows(self.found.z, -forces, self.bent)
-        self.stiffness += self.curved + np.swapaxes(self.compatible, -1, -2) @ self.bent @ self.compatible
+        """Add the geometric stiffness of all that the others have pulled, or that by which unit vectors stay so."""
+        self.stiffness += self.curved
+        if self.geometric:
+            forces = np.einsum("bzc,kbz->kbc", self.found.inverse, self.pull)
+            self.mechanism.add_bent_rows(self.found.z, -forces, self.bent)
+            self.stiffness += np.swapaxes(self.compatible, -1, -2) @ self.bent @ self.compatible

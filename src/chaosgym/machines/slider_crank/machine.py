@@ -1,7 +1,7 @@
 """The Spatial Slider Crank: its equations of motion, its contacts, and what they show.
 
-Nominal kinematics and rod (``kinematics``, ``connecting_rod``) -> equations of small motions (``equations``),
-held over bins of crank angle -> exact propagators (``core.binned.tables``) -> BinnedModel.
+Links and joints (``mechanism``) -> equations of small motions (``equations``), held over bins of crank angle -> exact
+propagators (``core.binned.tables``) -> BinnedModel.
 """
 
 import math
@@ -19,7 +19,7 @@ from chaosgym.machines.parameters import Parameter, parameters_of
 from chaosgym.machines.slider_crank.coordinates import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom
 from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.joints import display_of, gaps_of, joints_of, sensor_peaks, sensors_of
-from chaosgym.machines.slider_crank.kinematics import slider_position
+from chaosgym.machines.slider_crank.mechanism import pin_and_pivot
 from chaosgym.machines.slider_crank.model import force_bound, held_of
 from chaosgym.machines.slider_crank.parameters import FITTED, CrankParameters
 
@@ -80,8 +80,7 @@ class SliderCrank(CrankParameters):
             joint's housing, counted in the rod's plane of swing from the rod's axis, and "deg".
         """
         if self.monitored_joint == "slider":
-            tilt = math.radians(self.motor_angle)
-            return slider_position(phase, self.crank_radius, self.rod_length, tilt), "m"
+            return pin_and_pivot(self, phase)[1][:, 0], "m"
         return np.degrees(np.arctan2(force[:, 1], force[:, 0])), "deg"
 
     @property

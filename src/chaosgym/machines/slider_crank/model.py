@@ -4,10 +4,8 @@ import math
 
 import numpy as np
 
-from chaosgym.arrays import Array
 from chaosgym.machines.binned.model import Held, held, middles_and_nodes
 from chaosgym.machines.slider_crank.equations import equations
-from chaosgym.machines.slider_crank.kinematics import slider_rate
 from chaosgym.machines.slider_crank.parameters import CrankParameters
 
 
@@ -15,17 +13,10 @@ def held_of(machine: CrankParameters) -> Held:
     """Held accelerations of a crank."""
     middles, nodes = middles_and_nodes(machine.bins)
     found = equations(machine, middles, nodes)
-    friction = _friction(machine, middles)[:, None] * found.slider_along
-    return held(found.mass, found.damping, found.stiffness, found.load, friction)
-
-
-def _friction(machine: CrankParameters, crank_angle: Array) -> Array:
-    """Friction coefficient with the sign of the nominal slider velocity, ramped through zero."""
-    if machine.friction_coefficient == 0.0:
-        return np.zeros(len(crank_angle))
-    rate = slider_rate(crank_angle, machine.crank_radius, machine.rod_length, math.radians(machine.motor_angle))
-    speed = rate / (machine.friction_ramp * machine.crank_radius)
-    return np.asarray(machine.friction_coefficient * np.clip(speed, -1.0, 1.0))
+    # friction has the sign of the nominal velocity of the slider, ramped through zero
+    ramp = machine.friction_ramp * machine.crank_radius
+    friction = machine.friction_coefficient * np.clip(found.slider_rate / ramp, -1.0, 1.0)
+    return held(found.mass, found.damping, found.stiffness, found.load, friction[:, None] * found.slider_along)
 
 
 def force_bound(crank: CrankParameters) -> float:

@@ -8,7 +8,7 @@ from matplotlib.collections import LineCollection
 
 from chaosgym.arrays import Array
 from chaosgym.machines.picture import INK, PALE, STAYS, sample_at, samples_of
-from chaosgym.machines.slider_crank.kinematics import crank_pin, slider_position
+from chaosgym.machines.slider_crank.mechanism import pin_and_pivot
 
 GHOSTS = 12
 """Other positions shown behind the crank and its rod."""
@@ -41,12 +41,10 @@ FORCE_LENGTH = 45.0
 
 
 def _crank_positions(machine: Any, angle: Array, displacement: Array) -> _CrankPositions:
-    turned = math.radians(machine.motor_angle)
-    pin = 1e3 * crank_pin(angle, machine.crank_radius, turned)[:, :2]
-    along = 1e3 * slider_position(angle, machine.crank_radius, machine.rod_length, turned)
+    pin, pivot = (1e3 * place[:, :2] for place in pin_and_pivot(machine, angle))
     rattling = machine.monitored_joint == "slider"
     across = displacement / getattr(machine, machine.clearance_field) * GAP if rattling else np.zeros(len(angle))
-    return _CrankPositions(pin, np.stack([along, across], axis=1))
+    return _CrankPositions(pin, np.stack([pivot[:, 0], across], axis=1))
 
 
 def draw_crank(panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:

@@ -31,11 +31,3 @@ def slider_position(crank_angle: Array, radius: float, length: float, motor_angl
     """Position (B,) [m] of the slider pivot along the guide; ``motor_angle`` in radians."""
     pin = crank_pin(crank_angle, radius, motor_angle)
     return np.asarray(pin[..., 0] + np.sqrt(length**2 - pin[..., 1] ** 2 - pin[..., 2] ** 2))
-
-
-def slider_rate(crank_angle: Array, radius: float, length: float, motor_angle: float) -> Array:
-    """Velocity (B,) [m] of the slider pivot per unit crank rate; ``motor_angle`` in radians."""
-    pin = crank_pin(crank_angle, radius, motor_angle)
-    pin_rate = crank_pin(crank_angle + 0.5 * np.pi, radius, motor_angle)
-    along = np.sqrt(length**2 - pin[..., 1] ** 2 - pin[..., 2] ** 2)
-    return np.asarray(pin_rate[..., 0] - (pin[..., 1] * pin_rate[..., 1] + pin[..., 2] * pin_rate[..., 2]) / along)
