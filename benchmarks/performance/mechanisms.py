@@ -3,6 +3,7 @@
 Processor time of the thread counts. The crank is timed before every repetition, so that both meet the same other work.
 """
 
+import itertools
 import statistics
 import tempfile
 import time
@@ -59,6 +60,8 @@ CYCLES = {
 ASSEMBLY = {
     "crank in the plane": 15.0,
     "crank in space": 50.0,
+    "crank in the plane, lengths seen": 15.0,
+    "crank in space, lengths seen": 50.0,
     "crank from a file": 60.0,
     "crank from a file, flexible rod": 60.0,
     "crank in space from a file": 60.0,
@@ -118,9 +121,12 @@ def cycle_costs(repeats: int = 5) -> list[CycleCost]:
 
 def assembly_times(repeats: int = 5) -> dict[str, float]:
     """Milliseconds to assemble a mechanism that was never seen, reading of a file included, medians of ``repeats``."""
+    lengths = itertools.count(0.24, 1e-5)
     work: dict[str, Callable[[], Any]] = {
-        "crank in the plane": lambda: SliderCrank().held(),
-        "crank in space": lambda: SliderCrank(motor_angle=15.0).held(),
+        "crank in the plane": lambda: SliderCrank(rod_length=next(lengths)).held(),
+        "crank in space": lambda: SliderCrank(motor_angle=15.0, rod_length=next(lengths)).held(),
+        "crank in the plane, lengths seen": lambda: SliderCrank().held(),
+        "crank in space, lengths seen": lambda: SliderCrank(motor_angle=15.0).held(),
         "crank from a file": lambda: _read("slider-crank-flores-guide").reduce(),
         "crank from a file, flexible rod": lambda: _read("compressor, flexible rod").reduce(),
         "crank in space from a file": lambda: _read("slider-crank-thesis-15deg").reduce(),
