@@ -117,9 +117,13 @@ def test_a_hasty_run_reads_what_a_long_one_does():
 
 
 def test_dots_that_spread_beyond_the_reading_error_are_chaos():
-    """At 170 rpm and 2.5 % the 50 dots spread over 3 N: the nature is told from them, as the thesis told it."""
+    """At 170 rpm and 2.5 % the 50 dots spread over 3 N: the nature is told from them, as the thesis told it.
+
+    Rounding decides by how much, and may settle one of a dozen runs; so the middle of five initial states counts.
+    """
     crank = replace(PLAIN_CRANK, crank_speed=170.0, slider_clearance=0.03175e-3, contact_damping_ratio=0.025)
-    seen = observe(crank, THOROUGH["slider-crank"])
+    runs = [observe(crank, THOROUGH["slider-crank"]._replace(start=start)) for start in range(5)]
+    seen = sorted(runs, key=lambda run: run.high - run.low)[2]
     assert (seen.nature, seen.period, seen.settle_cycle) == ("chaotic", None, None)
     assert seen.high - seen.low > 3.0
 
