@@ -70,7 +70,9 @@ def call_side_by_side(kernel: SideBySide, machines: int, *arguments: Any) -> Non
 
 
 def prepare(kernel: Any, *arguments: Any) -> None:
-    """Compile or load a kernel for arguments of these types."""
+    """Compile or load a kernel for arguments of these types, unless NUMBA_DISABLE_JIT leaves kernels in Python."""
+    if numba.config.DISABLE_JIT:
+        return
     types = [numba.typeof(argument) for argument in arguments]
     missing = kernel.py_func.__code__.co_argcount - len(types)
     defaults = (kernel.py_func.__defaults__ or ())[-missing:] if missing else ()
