@@ -78,6 +78,8 @@ def opened_by(kind: str, clearance: Clearance, spatial: bool = False) -> tuple[s
     pin = clearance.friction is not None and kind in ROUND
     if pin and spatial:
         raise ParameterError("friction of a pin in its hole is modelled in the plane; allowed: in a prismatic joint")
+    if clearance.radius is not None and kind not in ROUND:
+        raise ParameterError(f"radius has no meaning in a {kind} joint; leave it out")
     if pin != (clearance.radius is not None):
         raise ParameterError("friction of a pin needs its radius, and a radius has no other meaning; allowed: both")
     if clearance.stations and kind != "prismatic":

@@ -56,6 +56,8 @@ def tables_of(values: Mapping[str, Any], _folder: Path) -> dict[str, Any]:
     data: dict[str, Any] = {"": KEYS.checked("", values)}
     for path in ("ground", "motor", "operation", "tolerances", "job"):
         data[path] = KEYS.checked(path, values.get(path, {}))
+    if "motor" not in values:
+        data["motor"] = None
     data["ground.points"] = _points("ground", values["ground"])
     if not isinstance(values["link"], dict) or not values["link"]:
         raise ParameterError("[link.NAME] is missing: each link is a table, such as [link.crank]")
@@ -256,7 +258,7 @@ def built(path: str, digest: str, data: Mapping[str, Any], _folder: Path) -> typ
     mechanism, clearances = mechanism_of(data)
     motor = (
         (*needed("motor", data["motor"], "stall_torque", "no_load_speed"), data["motor"].get("inertia", 0.0))
-        if data["motor"]
+        if data["motor"] is not None
         else None
     )
     made = machine_of(

@@ -8,7 +8,8 @@ LIMITS = {
     "coulomb mu tangential_stiffness": "friction is Coulomb's, of a joint with clearance: friction",
     "hertz exponent restitution law": "a surface is a linear spring and damper, or Hertzian: hertz_stiffness and "
     "hertz_damping in place of stiffness and damping",
-    "gap backlash play radius": "clearance is how far the pin may leave the middle of its hole, or half a guide's gap",
+    "gap backlash play": "clearance is how far the pin may leave the middle of its hole, or half a guide's gap",
+    "radius diameter": "a round beam has a diameter, a pin with friction a radius, a cylinder a bore",
     "torque": "the torque that the crank takes is a result; that of a motor is [motor] stall_torque",
     "length": "a link's length is the distance of its points",
     "speed": "the speed of the crank stands in [operation]",
