@@ -1,6 +1,7 @@
 """Links that bend in space: against an exact twin of the thesis' crank, closed forms of a shaft, and the plane."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -174,3 +175,64 @@ def test_stress_around_a_rod_is_that_of_its_planes(bent):
     bent.write_text(bent.read_text().replace('diameter = "6.35 mm"', 'width = "5 mm"\nheight = "6 mm"'))
     with pytest.raises(ParameterError, match="link 'rod' bends in space and is not round"):
         chaosgym.read_machine(bent).fibre_stress("rod", 0.1, 0.003)
+
+
+UNDAMPED = """[ground]
+points = {{ shaft = "0, 0, 0 mm" }}
+[link.crank.beam]
+length = "50 mm"
+{section}
+[link.rod.beam]
+length = "235 mm"
+{section}
+[link.slider]
+points = {{ wrist = "0, 0, 0 mm" }}
+body = [{{ mass = "0.45 kg", inertia = "2e-4, 2e-4, 2e-4 kg m^2" }}]
+[[joint]]
+name = "shaft"
+kind = "revolute"
+between = ["ground.shaft", "crank.start"]
+driven = true
+[[joint]]
+name = "pin"
+kind = "universal"
+between = ["crank.end", "rod.start"]
+first_axis = [0, 0, 1]
+second_axis = [0, 1, 0]
+[[joint]]
+name = "wrist"
+kind = "spherical"
+between = ["rod.end", "slider.wrist"]
+[[joint]]
+name = "guide"
+kind = "prismatic"
+between = ["ground.shaft", "slider.wrist"]
+clearance = "0.1 mm"
+stiffness = "8 N/um"
+damping = "500 N s/m"
+[operation]
+speed = "400 rpm"
+speed_range = "100 to 800 rpm"
+clearance_range = "0.02 to 0.3 mm"
+"""
+SECTION = """diameter = "8 mm"
+youngs_modulus = "200 GPa"
+density = "7800 kg/m^3"
+modes = 2
+damping_ratio = """
+
+
+def test_two_links_that_bend_undamped_are_told(tmp_path):
+    """Crank and rod without damping grow between updates of the matrices; 0.1 % of damping or 1 deg holds them."""
+    path = tmp_path / "undamped.toml"
+    path.write_text(UNDAMPED.format(section=f"{SECTION}0"))
+    undamped = chaosgym.read_machine(path)
+    assert "crank and rod bend without damping" in undamped.notes[0]
+    peak = simulate(undamped, 50).peak_force.max()
+    path.write_text(UNDAMPED.format(section=f"{SECTION}0.001"))
+    damped = chaosgym.read_machine(path)
+    assert damped.notes == ()
+    held = [
+        simulate(machine, 50).peak_force.max() for machine in (damped, replace(undamped, matrix_update_interval=1.0))
+    ]
+    assert max(held) < 200.0 < peak

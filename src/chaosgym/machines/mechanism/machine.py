@@ -419,12 +419,18 @@ class MechanismMachine(BinnedMachine):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Gaps that are not small against their links, friction that a motor does not feel, speeds it can't hold."""
+        """Gaps that are not small, links that bend undamped, friction a motor does not feel, speeds it can't hold."""
         told = (
             [f"the run-up under the motor leaves friction of {self.rubs} out"] if self.has_motor and self._rub else []
         )
         if self.has_motor:
             told += self.under_motor().notes(self.speed, getattr(self, "motor_no_load_speed"))  # noqa: B009
+        undamped = [link.name for link in self.mechanism.links if link.beam and not link.beam.damping_ratio]
+        if len(undamped) > 1 and self.mechanism.dimensions == 3:
+            told.append(
+                f"{' and '.join(undamped)} bend without damping: updates of the matrices may make their motion grow "
+                "without end; give each a damping_ratio, such as 0.001, or halve matrix_update_interval"
+            )
         for joint in self.mechanism.joints:
             if joint.opened:
                 gap, reach = getattr(self, f"{joint.name}_clearance"), _reach(self.mechanism, joint.name)
