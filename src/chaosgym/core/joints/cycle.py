@@ -268,8 +268,9 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
     ``rows`` (product of the digits of all joints,) tell where in the tables the row of each set of pressed surfaces
     begins, -1 where there is none yet; ``weights`` (n + f,) are those of displacements and tangential springs in
     ``orthonormalise``. ``kept`` is from ``room_for``: as a leaf it counts no references, which doubles its speed.
-    Deviations move along by the tables of the motion, unless several are kept orthonormal or anchors of friction move:
-    these are carried from event to event.
+    One deviation whose growth is asked for moves along by the tables of the motion. Others are carried from event to
+    event by exponentials: those of the matrix of a map, several that are kept orthonormal, and all where anchors of
+    friction move.
 
     Returns
     -------
@@ -278,7 +279,7 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
     """
     own, at, m, vectors = run.own, run.at, run.at[JOINTS], tangents.vectors
     deviations, first = vectors.shape[0], bouncing.shape[0] + vectors.size
-    follows = deviations > 0 and at[SLIDERS] == 0 and tangents.log_growth.shape[1] <= 1
+    follows = deviations > 0 and at[SLIDERS] == 0 and tangents.log_growth.shape[1] == 1
     carries = deviations > 0 and not follows
     for cycle in range(arrays.section.shape[0]):
         keep(bouncing, vectors, kept)
