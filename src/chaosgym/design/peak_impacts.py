@@ -168,7 +168,7 @@ def filling_cycles(diagram: PeakImpactDiagram) -> int | None:
     Examples
     --------
     >>> from chaosgym.design.peak_impacts import filling_cycles, peak_impacts
-    >>> record = chaosgym.simulate(chaosgym.SliderCrank(crank_speed=200.0), cycles=200, transient=50)
+    >>> record = chaosgym.simulate(chaosgym.SliderCrank(crank_speed=300.0), cycles=200, transient=50)
     >>> filling_cycles(peak_impacts(record))
     40
     """

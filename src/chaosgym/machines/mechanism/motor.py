@@ -173,6 +173,13 @@ def crank_of(motor: Motor, load: Load) -> "Crank":
     ------
     ParameterError
         If nothing that turns has inertia, or the motor's line is so steep that the speed follows it within a step.
+
+    Examples
+    --------
+    >>> from chaosgym.machines.mechanism.motor import Load, Motor, crank_of
+    >>> free = Load(np.zeros(90), np.zeros(90), np.zeros(90))
+    >>> crank_of(Motor(10.0, 100.0, 0.1), free).slope  # N m s
+    0.1
     """
     from chaosgym.core.motor import Crank
 
