@@ -50,9 +50,10 @@ def say_no_space(code, told):
 
 @pytest.mark.parametrize("command", ["info", "show impact-beam --json", "design --template impact-beam", "--help"])
 def test_an_output_on_a_full_disk_is_one_line(command):
-    """/dev/full takes nothing: exit code 1, one line that says so."""
-    with Path("/dev/full").open("wb") as full:
-        assert say_no_space(*ended(command, stdout=full))
+    """/dev/full takes nothing: exit code 1, one line that says so, with a buffer of Python before it and without."""
+    for unbuffered in ("", "1"):
+        with Path("/dev/full").open("wb") as full:
+            assert say_no_space(*ended(command, stdout=full, env=os.environ | {"PYTHONUNBUFFERED": unbuffered}))
 
 
 def limited():

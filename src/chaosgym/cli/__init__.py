@@ -95,6 +95,7 @@ def run_command(command: click.Command) -> None:
     except ChaosgymError as error:
         _end(error, 2)
     except OSError as error:
+        _drop_unwritten_output()
         _end(error, 1 if error.errno in BEYOND_THE_USER else 2)
 
 
@@ -104,6 +105,14 @@ def _use_one_blas_thread() -> None:
 
     threadpool_limits(1, user_api="blas")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # scipy's, which is loaded later
+
+
+def _drop_unwritten_output() -> None:
+    """Drop what a full disk did not take: Python would try again as it ends, and say so in lines of its own."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _end(message: object, code: int) -> NoReturn:
