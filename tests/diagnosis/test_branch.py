@@ -12,8 +12,9 @@ from scipy.optimize import brentq
 from chaosgym.diagnosis import bifurcation_curve, diagnose
 from chaosgym.diagnosis.bifurcation_curve import follow_bifurcation
 from chaosgym.diagnosis.branch import _repeats, stretch
+from chaosgym.diagnosis.chord import closely_between
 from chaosgym.diagnosis.diagram_search import follow
-from chaosgym.diagnosis.orbit_family import OrbitPoint, family_of, with_noise
+from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitPoint, family_of, with_noise
 from chaosgym.diagnosis.periodic_orbit import PRECISE, find_periodic_orbit, run_period
 from chaosgym.diagnosis.section import better_section
 from chaosgym.errors import ParameterError
@@ -581,3 +582,16 @@ def test_a_curve_ends_where_only_another_one_is_found(monkeypatch):
     assert curve.against_values[0] == span[0]
     assert 1.59e-4 < curve.against_values[-1] <= 1.6e-4
     assert curve.ends[1].endswith("what is found beyond may belong to another curve")
+
+
+def test_the_orbit_of_half_the_period_is_none_of_the_branch():
+    """Near where it began Newton's method may fall from a doubled branch to the other; ends of half the period stay."""
+    doubled, single = (
+        SimpleNamespace(x=np.array([place, 0.0]), tangent=np.array([1.0, 0.0]), slope=np.zeros(1), halved=halved)
+        for place, halved in ((0.0, False), (0.5, True))
+    )
+    last = SimpleNamespace(**{**vars(doubled), "x": np.array([1.0, 0.0])})
+    family = SimpleNamespace(solve=lambda *_, **__: single)
+    with pytest.raises(NotFollowedError, match="half the period"):
+        closely_between(family, doubled, last, 0.5, {0.0: doubled, 1.0: last})
+    assert closely_between(family, doubled, single, 0.5, {0.0: doubled, 1.0: single}) is single

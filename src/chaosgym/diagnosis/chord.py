@@ -38,7 +38,13 @@ def between(family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, share: float, clo
 def closely_between(
     family: OrbitFamily, a: OrbitPoint, b: OrbitPoint, share: float, known: Mapping[float, OrbitPoint]
 ) -> OrbitPoint:
-    """The orbit of ``between``, closely, sought from the nearest ones that are known by their share."""
+    """The orbit of ``between``, closely, sought from the nearest ones that are known by their share.
+
+    Raises
+    ------
+    NotFollowedError
+        If Newton's method finds none, or the orbit of half the period that the branch began at.
+    """
     chord = b.x - a.x
     unit = chord / np.linalg.norm(chord)
     low, high = max(one for one in known if one < share), min(one for one in known if one > share)
@@ -46,7 +52,11 @@ def closely_between(
     part = (share - low) / (high - low)
     guess = interpolated(before, after, part)
     guess += (share * np.linalg.norm(chord) - unit @ (guess - a.x)) * unit
-    return family.solve(guess, unit, (1.0 - part) * before.slope + part * after.slope, closed=CLOSELY, exact=False)
+    slope = (1.0 - part) * before.slope + part * after.slope
+    point = family.solve(guess, unit, slope, closed=CLOSELY, exact=False)
+    if point.halved and not (a.halved or b.halved):
+        raise NotFollowedError("Newton's method leads to the orbit of half the period")
+    return point
 
 
 def interpolated(a: OrbitPoint, b: OrbitPoint, share: float) -> Array:
