@@ -92,11 +92,14 @@ def test_a_machine_with_one_stop_has_one_surface(command):
 
 
 @pytest.mark.parametrize(
-    ("machine", "lower", "upper"),
-    [("two_masses", 74.1986, 36.5763), ("docs/machines/kahraman-singh-1990.toml", None, None)],
+    ("machine", "forces"),
+    [("two_masses", (36.5763, 74.1986)), ("docs/machines/kahraman-singh-1990.toml", None)],
 )
-def test_forces_that_are_printed_are_the_settled_motions_on_every_surface(machine, lower, upper, request):
-    """Those of a proven orbit are the forces after 3,000 more cycles, unlike those of the run that led to it."""
+def test_forces_that_are_printed_are_the_settled_motions_on_every_surface(machine, forces, request):
+    """Those of a proven orbit are the forces after 3,000 more cycles, unlike those of the run that led to it.
+
+    Two masses between equal stops have two orbits, mirror images; rounding decides which is reached.
+    """
     path = request.getfixturevalue(machine) if machine == "two_masses" else machine
     told = json.loads(CliRunner().invoke(app, ["diagnose", path, "--json"]).stdout)
     shown = CliRunner().invoke(app, ["diagnose", path]).stdout
@@ -108,8 +111,8 @@ def test_forces_that_are_printed_are_the_settled_motions_on_every_surface(machin
         assert f"{told['transient_largest_peak_force_N'][side]:.2f} N {side}" in shown.partition("transient")[2]
     assert told["peak_force_summary_N"]["max"] == pytest.approx(settled.max(), rel=1e-6)
     assert told["worst_surface"] == ("upper", "lower")[int(settled.argmax())]
-    if lower is not None:
-        assert settled.tolist() == pytest.approx([upper, lower], rel=1e-5)
+    if forces is not None:
+        assert sorted(settled.tolist()) == pytest.approx(forces, rel=1e-5)
         assert max(told["transient_largest_peak_force_N"].values()) > 90.0
 
 

@@ -221,4 +221,4 @@ def test_extreme_machines_end_in_an_answer_or_in_a_named_error(
     assert np.all(record.peak_force >= 0.0)
     pushed = record.history[..., 2] * record.history[..., 0]
     # a tip that passes the middle of no gap is there but for rounding
-    assert np.all(pushed >= -1e-14 * np.abs(pushed).max())
+    assert np.all(pushed >= -1e-13 * np.abs(pushed).max())

@@ -37,9 +37,12 @@ def test_side_by_side_growth_is_that_of_one_machine():
             assert grown[0, 0] == growth[i, k]
 
 
-@pytest.mark.parametrize("speed", [18.0, 20.0, 21.0, 22.0, 23.5, 24.0])
+@pytest.mark.parametrize("speed", [17.0, 20.0, 21.0, 22.0, 23.5, 24.0])
 def test_settled_beams_are_judged_as_they_are_diagnosed(speed):
-    """Without ripple the exponent of the running motion has the sign that the diagnosis from rest finds."""
+    """Without ripple the exponent of the running motion has the sign that the diagnosis from rest finds.
+
+    At 18 Hz chaos is transient: how long it lasts hangs on rounding.
+    """
     env, info = _env("ImpactBeam", speed)
     nature = diagnose(env.unwrapped.machine, budget=400).nature
     assert info["type_iii"] == (0.0 if nature == "periodic" else 1.0)
