@@ -16,7 +16,10 @@ from tests.diagnosis.held_out import STATEMENTS, finished, process_of
 
 DOCS = Path(__file__).parents[2] / "docs"
 
-FILES = tuple(str(path.relative_to(DOCS)) for path in sorted((DOCS / "machines").glob("*.toml")))
+# the thesis' crank in the plane is a kind of its own
+PUBLISHED = sorted(path for path in (DOCS / "machines").glob("*.toml") if path.stem != "slider-crank-thesis")
+
+FILES = tuple(str(path.relative_to(DOCS)) for path in PUBLISHED)
 
 KINDS = ("noisy beam", "noisy crank", "noisy machine file")
 

@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import gymnasium as gym
@@ -18,6 +19,7 @@ from chaosgym.machines.slider_crank.joints import hertz_constants
 from tests.machines.test_mechanism_file import answer, run
 
 FILE = Path(__file__).parents[2] / "docs" / "machines" / "slider-crank-thesis-15deg.toml"
+PLANE = FILE.with_name("slider-crank-thesis.toml")
 CRANK = SliderCrank(motor_angle=15.0, rod="rigid", geometric_stiffness="on")
 GUIDE = 'clearance = "0.254 mm"\nstiffness = "15.52 N/um"\ndamping = "1035.43 N s/m"\n'
 BALL = 'clearance = "0.127 mm"\nstiffness = "15.52 N/um"\ndamping = "272.94 N s/m"\n'
@@ -40,12 +42,15 @@ def file_of(tmp_path):
 
 
 @pytest.mark.parametrize("speed", [120.0, 190.0, 260.0])
-def test_the_file_rattles_like_the_crank_at_an_angle(speed):
-    """Peak forces of four revolutions from rest equal those of ``SliderCrank`` at 15 deg to the digits of the file.
+@pytest.mark.parametrize(
+    ("file", "crank"), [(FILE, CRANK), (PLANE, replace(CRANK, motor_angle=0.0))], ids=["15 deg", "plane"]
+)
+def test_the_file_rattles_like_the_crank(file, crank, speed):
+    """Peak forces of four revolutions from rest equal those of ``SliderCrank``, at 15 deg too, to the digits of a file.
 
     The crank tells the force on its slider, a file that on the guide: upper and lower change places.
     """
-    found, expected = (simulate(given.at(speed), 4).peak_force for given in (chaosgym.read_machine(FILE), CRANK))
+    found, expected = (simulate(given.at(speed), 4).peak_force for given in (chaosgym.read_machine(file), crank))
     np.testing.assert_allclose(found, expected[:, ::-1], rtol=2e-6)
 
 
