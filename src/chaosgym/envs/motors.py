@@ -14,10 +14,9 @@ from chaosgym.core.motor import turn_cranks
 from chaosgym.envs.task import Task
 from chaosgym.errors import ParameterError
 from chaosgym.machines.batch import put, stacked
-from chaosgym.machines.machine import Machine
 
 
-def refuse_drive(task: Task, nominal: Machine) -> None:
+def refuse_drive(task: Task, nominal: Any) -> None:
     """Refuse a motor that the machine does not have, or set-points beyond its speed without load.
 
     Raises
@@ -32,7 +31,7 @@ def refuse_drive(task: Task, nominal: Machine) -> None:
             f"drive = 'motor' needs a motor, and {nominal.name} has none; allowed: 'constant', or the file of a "
             "mechanism with [motor]: stall_torque, no_load_speed and inertia"
         )
-    fastest = float(getattr(nominal, "motor_no_load_speed"))  # noqa: B009, a field of machines with a motor
+    fastest = nominal.motor_no_load_speed
     if task.highest_speed > fastest:
         raise ParameterError(
             f"highest_speed = {task.highest_speed:g} rpm is beyond the motor's speed without load; allowed: "

@@ -278,7 +278,7 @@ def built(path: str, digest: str, data: Mapping[str, Any], _folder: Path) -> typ
     made.tolerances = tolerances_of(data["tolerances"], machine)
     made.task_defaults = TaskDefaults(task=data["job"])
     if motor is not None:
-        machine.crank  # noqa: B018, what can't turn is refused here
+        _ = machine.crank  # what can't turn is refused here
     machine.reduce()  # what can't move is refused here, by name, and the rest is kept for the first run
     kind: type[MechanismMachine] = made
     return kind

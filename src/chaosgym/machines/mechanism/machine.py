@@ -28,6 +28,7 @@ from chaosgym.machines.parameters import assumed, parameter
 
 if TYPE_CHECKING:
     from chaosgym.core.motor import Crank
+
 SMALL = 0.02
 """Clearance as a share of a link's length beyond which motions in the gap are not small."""
 
@@ -424,7 +425,8 @@ class MechanismMachine(BinnedMachine):
             [f"the run-up under the motor leaves friction of {self.rubs} out"] if self.has_motor and self._rub else []
         )
         if self.has_motor:
-            told += self.under_motor().notes(self.speed, getattr(self, "motor_no_load_speed"))  # noqa: B009
+            _, no_load_speed, _ = (getattr(self, name) for name in MOTOR_FIELDS)
+            told += self.under_motor().notes(self.speed, no_load_speed)
         undamped = [link.name for link in self.mechanism.links if link.beam and not link.beam.damping_ratio]
         if len(undamped) > 1 and self.mechanism.dimensions == 3:
             told.append(
