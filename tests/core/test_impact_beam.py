@@ -197,6 +197,8 @@ def test_a_step_too_coarse_for_contact_is_an_error():
     family=st.sampled_from(["uniform", "stiffness"]),
 )
 @example(30.243093490877083, 0.0, 1000.0, 1000.0, 1.0, 20.0, 8.9, 5, "stiffness")
+@example(2.0, 0.0, 1000.0, 1e6, 1.0, 0.0, 8.9, 2, "stiffness")
+@example(2.0, 1e-7, 1000.0, 1e6, 1.0, 0.0, 8.9, 2, "stiffness")
 def test_extreme_machines_end_in_an_answer_or_in_a_named_error(
     frequency, clearance, contact_stiffness, contact_damping, damping_ratio, shaker_damping, force, n_modes, family
 ):

@@ -7,7 +7,7 @@ from chaosgym.core import status
 from chaosgym.core.cycle import cycle_arrays
 from chaosgym.core.modal_impact import advance_model
 from chaosgym.core.tangent import no_tangents
-from chaosgym.machines.modal_impact import Modes, Stop, flexible_model
+from chaosgym.machines.modal_impact import Modes, Stop, flexible_model, largest_modulus, modal_blocks
 from tests.core.twin import twin_trajectory
 
 TWO_MODES = Modes(
@@ -78,6 +78,16 @@ def test_runs_can_be_cut(case):
     whole, cut = _run(CASES[case], 5, 7), _run(CASES[case], 5, 7, parts=(1, 4))
     for one, other in zip(whole, cut, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("damping", [6.0, 1700.0, 1800.0, 27_000.0])
+@pytest.mark.parametrize("coupling", [0.0, 2.0])
+def test_intervals_are_short_for_the_fastest_eigenvalue(damping, coupling):
+    """A mode of 900 rad/s decays at up to 30 times that beyond its critical damping, whose series need its own rate."""
+    stiffness, damper = np.diag([60.0**2, 900.0**2]), np.array([[6.0, coupling], [coupling, damping]])
+    system = np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness, -damper]])
+    generator, _ = modal_blocks(stiffness, damper, rigid=False)
+    assert largest_modulus(generator) == pytest.approx(np.abs(np.linalg.eigvals(system)).max(), rel=1e-8)
 
 
 @pytest.mark.parametrize("damping", [0.0, 30.0])

@@ -28,7 +28,7 @@ from chaosgym.core.lanes import unset
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents
-from chaosgym.machines.modal_impact import modal_blocks, settled
+from chaosgym.machines.modal_impact import largest_modulus, modal_blocks, settled
 
 MOST_SETS = 1_000_000
 """Sets of pressed surfaces that a machine may have."""
@@ -185,8 +185,6 @@ class PressedSets:
         rigid = bool(np.any(self.stiffness == 0.0))
         generator, from_modal = modal_blocks(stiffness, damping, rigid, bool(rate.any()))
         to_modal: Array = np.asarray(np.linalg.inv(from_modal), dtype=np.float64)
-        turns = generator[2] != 0.0
-        modulus = np.where(turns, np.hypot(generator[0], generator[2]), np.max(np.abs(generator[[0, 3]]), axis=0))
         rest, drift = np.zeros((m, 2 * n)), np.zeros((m, 2 * n))
         for j in pressed:
             rest[j], drift[j] = settled(generator, to_modal[:, n:] @ (springs[j] * pushes[j]))
@@ -214,8 +212,7 @@ class PressedSets:
         for k, j in itertools.product(range(2 * len(held)), pressed):
             at_rest = constants[self.sliders.joint[k // 2], j], strains[k // 2, j]
             shown[m + k, j] = call(read_at_rest, generator, from_modal, self.shape, lag, rubs, k, *at_rest, drift[j])
-        fastest = float(modulus.max())
-        return PressedSet(generator, to_modal, from_modal, fastest, rest, drift, shown, lag, rubs)
+        return PressedSet(generator, to_modal, from_modal, largest_modulus(generator), rest, drift, shown, lag, rubs)
 
     def _friction(self, digits: list[int], springs: Array, pushes: Array) -> tuple[Array, Array, Array]:
         """Tangential springs that hold (f,), and ``Rubs.weight``, ``Rubs.rate``; adds to what pressure pushes."""

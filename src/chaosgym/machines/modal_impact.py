@@ -225,17 +225,27 @@ def _add_uncoupled(
     return True
 
 
+def largest_modulus(generator: Array) -> float:
+    """Largest modulus of an eigenvalue of blocks (4, n) by ``modal_blocks``.
+
+    That of a pair is the root of its determinant; a mode damped beyond its critical damping keeps the block of a pair,
+    and has two real eigenvalues.
+    """
+    turns, half = generator[2] != 0.0, 0.5 * (generator[0] - generator[3])
+    split = half**2 + generator[1] * generator[2]
+    real = 0.5 * np.abs(generator[0] + generator[3]) + np.sqrt(np.maximum(split, 0.0))
+    pair = np.where(split > 0.0, real, np.hypot(generator[0], generator[2]))
+    return float(np.max(np.where(turns, pair, np.max(np.abs(generator[[0, 3]]), axis=0))))
+
+
 def _regimes(modes: Modes, *systems: tuple[Array, Array]) -> Regimes:
     """Regimes of several (stiffness, damping) of the same modes."""
     n, rigid = len(modes.tip_shape), bool(np.any(modes.angular_frequency == 0.0))
     parts = []
     for matrices in systems:
         generator, from_modal = modal_blocks(*matrices, rigid)
-        # the modulus of a pair is the root of its determinant, of two real eigenvalues the larger one
-        turns = generator[2] != 0.0
-        modulus = np.where(turns, np.hypot(generator[0], generator[2]), np.max(np.abs(generator[[0, 3]]), axis=0))
         output = modes.tip_shape @ from_modal[:n]
-        parts.append((generator, np.linalg.inv(from_modal), from_modal, output, modulus.max()))
+        parts.append((generator, np.linalg.inv(from_modal), from_modal, output, largest_modulus(generator)))
     return Regimes(*(np.ascontiguousarray(np.stack(part)) for part in zip(*parts, strict=True)))
 
 
