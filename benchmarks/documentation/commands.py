@@ -32,11 +32,18 @@ EXAMPLES: dict[str, list[dict[str, Any]]] = tomllib.loads(Path(__file__).with_na
 LONGEST = 40
 """Lines of an output that a page shows."""
 
+COMMON = """  --json                  Print one JSON object.
+  --plot [FILE]           Draw a picture (.png, .svg or .pdf); without FILE into a new file of the
+                          current folder.
+  --workers INTEGER       Threads; default: all processors."""
+"""Options of several commands, which the list of commands explains."""
+
 SHARED = {
     "show": ("of the machine", {"--set", "--fidelity", *(key for name in MACHINES for key in MACHINES[name].options)}),
     "diagnose": ("of what was measured", {f"--{name.replace('_', '-')}" for name in Measured._fields}),
+    "index": ("", {"--json", "--plot", "--workers"}),
 }
-"""Options that several commands have: the page that lists them, what they are, and their names."""
+"""Options that several commands have: the page that lists them, what they are if many, and their names."""
 
 PICTURES = (".png", ".gif", ".webp")
 
@@ -73,6 +80,12 @@ def index() -> str:
             "|---|---|",
             *rows,
             "",
+            "## Options",
+            "",
+            "Of several commands, whose pages name them:",
+            "",
+            f"```text\n{COMMON}\n```",
+            "",
         ]
     )
 
@@ -83,8 +96,8 @@ def page(name: str, outputs: list[str]) -> str:
     for example, output in zip(EXAMPLES.get(name, []), outputs, strict=True):
         heading, _, more = example["what"].rstrip(".").partition(". ")
         parts += [f"## {heading}", *([f"{more}."] if more else []), f"```console\n$ {example['run']}\n{output}```"]
-        pictures = [example["picture"]] if "picture" in example else [f"{name}-{file}" for file in _pictures(example)]
-        parts += [f"![{heading}]({picture})" for picture in pictures]
+        parts += [f"![{heading}]({example['picture']})"] if "picture" in example else []
+        parts += [f"![{file}]({name}-{file})" for file in _pictures(example)]
     return "\n\n".join([*parts, _last_part(name)])
 
 
@@ -135,14 +148,18 @@ def _run(line: str, folder: Path) -> str:
 def _last_part(name: str) -> str:
     text, notes = options(name), []
     text = re.sub(r"^(Usage: .*\n(?: {9,}.*\n)*)\n(?:  \S.*\n)+", r"\1", text, count=1)  # the summary heads the page
-    text = re.sub(r"\n  --help  +Show this message and exit\.", "", text).replace("Options:\n\n", "")
+    text = re.sub(r"\n  --help  +Show this message and exit\.", "", text).replace("Options:\n\n", "") + "\n"
     for home, (whose, names) in SHARED.items():
         listed = rf"^  (?:{'|'.join(sorted(names))}) .*\n(?:  {{9,}}.*\n)*"
         short = text if name == home else re.sub(listed, "", text, flags=re.MULTILINE)
         if short != text:
-            notes.append(f"Options {whose} are those of [{home}]({home}.md#options).\n\n")
+            left_out = sorted(key for key in names if re.search(rf"^  {key} ", text, re.MULTILINE))
+            told = f"those {whose}" if whose else ", ".join(f"`{key}`" for key in left_out)
+            notes.append(f"[{told}]({home}.md#options)")
         text = short
-    return f"## Options\n\n{''.join(notes)}```text\n{text}\n```\n"
+    text = re.sub(r"\n\nOptions:\n(?=\n|\Z)", "\n", text)  # where all of them are told elsewhere
+    note = f"Besides {', '.join(notes)}:\n\n" if notes else ""
+    return f"## Options\n\n{note}```text\n{text}```\n"
 
 
 def _pictures(example: dict[str, Any]) -> list[str]:
