@@ -133,7 +133,7 @@ def test_tutorials_have_pictures():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["1-recording", "2-map", "3-agent", "4-trust", "5-compressor"])
+@pytest.mark.parametrize("name", ["1-recording", "2-map", "3-agent", "4-trust", "5-compressor", "6-learned"])
 def test_tutorials_run(name):
     """A tutorial runs from its first cell to its last, and prints what its page shows, word for word."""
     import nbformat
