@@ -53,3 +53,20 @@ def test_torchrl_trains(tmp_path):
     pytest.importorskip("torchrl")
     told = run("recipes/with_torchrl.py", "--rollouts", 2, "--machines", 4)
     assert told.splitlines()[-1].startswith("2: return of a job -")
+
+
+@pytest.mark.slow
+def test_plain_torch_trains():
+    """Two rollouts of whole jobs, and a score on machines that no training draws."""
+    told = run("recipes/with_torch.py", "--rollouts", 2, "--machines", 4, "--scored", 4).splitlines()
+    assert told[1].startswith("2: return of a job -")
+    assert told[-1].endswith("on 4 machines")
+
+
+@pytest.mark.slow
+def test_skrl_trains():
+    """Two rollouts of whole jobs, and a score on machines that no training draws."""
+    pytest.importorskip("skrl")
+    told = run("recipes/with_skrl.py", "--rollouts", 2, "--machines", 4, "--scored", 4)
+    assert "240 steps on each of 4 machines" in told
+    assert "on 4 machines" in told.splitlines()[-1]
