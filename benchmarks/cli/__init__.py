@@ -195,13 +195,20 @@ def arrivals(env: str, level: str, machines: int, as_json: bool) -> None:
 @click.command()
 @click.option("--machines", type=click.IntRange(2, 10_000), default=24, show_default=True)
 @click.option("--workers", type=click.IntRange(1), default=2, show_default=True, help="Processes.")
+@click.option(
+    "--kept",
+    type=click.Path(dir_okay=False, path_type=Path),
+    default="runs/other-simulator.jsonl",
+    show_default=True,
+    help="Jobs that are done: those of the file are not played again.",
+)
 @AS_JSON
-def other_simulator(machines: int, workers: int, as_json: bool) -> None:
+def other_simulator(machines: int, workers: int, kept: Path, as_json: bool) -> None:
     """Play shipped policies on beams of the fleet in Exudyn, behind the plant interface, and on the same ones here."""
     from benchmarks.envs.other_simulator import lines
     from benchmarks.envs.other_simulator import other_simulator as run
 
-    found = run(machines, workers)
+    found = run(machines, workers, kept)
     emit({"rows": found}, as_json, lambda: lines(found))
 
 

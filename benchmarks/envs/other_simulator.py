@@ -4,9 +4,11 @@ Each job is played twice by ``chaosgym.control.plant.work``, with the same opera
 of the sensors: once on our beam and once on Exudyn's. Nothing was trained or tuned on these machines or in Exudyn.
 """
 
+import json
 from collections.abc import Iterable, Mapping
 from functools import partial
 from multiprocessing import get_context
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -121,7 +123,10 @@ class Rig:
         return float(self._damage.max())
 
 
-def job(given: tuple[int, str, str]) -> dict[str, float]:
+Given = tuple[int, str, str]
+
+
+def job(given: Given) -> dict[str, float]:
     """Play one job by its number and the names of a player and a simulator."""
     number, player, simulator = given
     make, objective = PLAYERS[player]
@@ -137,13 +142,26 @@ def job(given: tuple[int, str, str]) -> dict[str, float]:
     return {"return": -lost, "type_iii": irregular, "deviation": deviation, "damage": rig.damage}
 
 
-def other_simulator(machines: int, workers: int, players: Iterable[str] = PLAYERS) -> list[dict[str, Any]]:
+def played(work: Iterable[Given], workers: int, kept: Path) -> dict[Given, dict[str, float]]:
+    """Jobs by number, player and simulator; those of a file of lines are read, and each other is added when it ends."""
+    lines = kept.read_text(encoding="utf-8").splitlines() if kept.exists() else []
+    told = {(number, player, simulator): found for number, player, simulator, found in map(json.loads, lines)}
+    missing = [given for given in work if given not in told]
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    with get_context("spawn").Pool(workers) as pool, kept.open("a", encoding="utf-8") as file:
+        jobs = zip(missing, pool.imap(job, missing), strict=True)
+        for given, found in tqdm(jobs, total=len(missing), desc="jobs", unit="job", leave=False):
+            told[given] = found
+            print(json.dumps([*given, found]), file=file, flush=True)
+    return told
+
+
+def other_simulator(machines: int, workers: int, kept: Path, players: Iterable[str] = PLAYERS) -> list[dict[str, Any]]:
     """Jobs of each player in both simulators, its life over that of following there, and Exudyn's return less ours."""
     names = list(dict.fromkeys([ZERO, *players]))
-    work_ = [(k, player, simulator) for player in names for simulator in SIMULATORS for k in range(machines)]
-    with get_context("spawn").Pool(workers) as pool:
-        jobs = list(tqdm(pool.imap(job, work_), total=len(work_), desc="jobs", unit="job", leave=False))
-    told = dict(zip(work_, jobs, strict=True))
+    told = played(
+        [(k, name, simulator) for k in range(machines) for name in names for simulator in SIMULATORS], workers, kept
+    )
     found = []
     for player in names:
         row: dict[str, Any] = {"player": player, "machines": machines}

@@ -1,9 +1,11 @@
 """A beam behind the plant interface is the beam of an environment, in this simulator and in Exudyn."""
 
+import json
+
 import numpy as np
 import pytest
 
-from benchmarks.envs.other_simulator import OwnBeam, Rig
+from benchmarks.envs.other_simulator import PLAYERS, SIMULATORS, OwnBeam, Rig, job, lines, other_simulator
 from chaosgym.envs.vector_env import native_envs
 
 ENV = "chaosgym/ImpactBeamTolerance-v1"
@@ -41,3 +43,39 @@ def test_exudyn_moves_the_same_beam():
     assert max(ours[3].mean(), theirs[3].mean()) < -0.05
     wild = [kind(beam).run(np.full(40, 23.25), beam.clearance).growth[-25:].mean() for kind in (OwnBeam, ExudynBeam)]
     assert min(wild) > 0.5
+
+
+@pytest.fixture
+def kept(tmp_path):
+    """Jobs that cost 3 in our simulator and 1 more in Exudyn, on machine 1 twice as much."""
+    path = tmp_path / "jobs.jsonl"
+    with path.open("w") as file:
+        for k in range(2):
+            for player in PLAYERS:
+                for simulator in SIMULATORS:
+                    lost = (3.0 + (simulator == "Exudyn")) * (1 + k)
+                    told = {"return": -lost, "type_iii": 0.25, "deviation": 0.5, "damage": lost / 100.0}
+                    print(json.dumps([k, player, simulator, told]), file=file)
+    return path
+
+
+def test_jobs_of_a_file_are_not_played_again(kept):
+    """The table is that of the file: means of 4.5 and 6 lost, and a difference between 1 and 2."""
+    before = kept.read_bytes()
+    found = other_simulator(2, 1, kept)
+    assert kept.read_bytes() == before
+    assert [row["player"] for row in found] == list(PLAYERS)
+    rows = "| 2 | -4.5, 25.0%, 0.50 Hz, x1.00 | -6.0, 25.0%, 0.50 Hz, x1.00 | **-1.5 (-2.0 to -1.0)** |"
+    assert all(line.endswith(rows) for line in lines(found)[2:])
+
+
+@pytest.mark.slow
+def test_a_job_that_is_missing_is_played_and_kept(kept):
+    """The file of a run that was stopped gets what is missing, as ``job`` plays it."""
+    given = (1, "kriging, life", "chaosgym")
+    rows = kept.read_text().splitlines()
+    missing = [row for row in rows if json.loads(row)[:3] == list(given)]
+    kept.write_text("".join(f"{row}\n" for row in rows if row not in missing))
+    other_simulator(2, 1, kept)
+    *_, last = map(json.loads, kept.read_text().splitlines())
+    assert last == [*given, job(given)]
