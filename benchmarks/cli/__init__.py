@@ -281,7 +281,7 @@ def headroom(env: str, machines: int, keywords: str, as_json: bool) -> None:
 def textbook(env: str, machines: int, as_json: bool) -> None:
     """Play ENV by hill climbing, extremum seeking, force feedback, delayed feedback and OGY (takes long)."""
     from benchmarks.envs.textbook_controllers import textbook_scores
-    from chaosgym.control.comparison_lines import table_lines
+    from chaosgym.control.scores import table_lines
 
     found = textbook_scores(env, machines)
 

@@ -16,7 +16,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chaosgym.arrays import Array
-from chaosgym.control.comparison import ZERO, Scores, shipped_comparison
+from chaosgym.control.comparison import shipped_comparison
+from chaosgym.control.scores import ZERO, Scores
 from chaosgym.errors import DatasetError
 from chaosgym.files import write_atomically
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from chaosgym.control.comparison import ONE, SUBJECTS, ZERO, Scores, read_comparison
-from chaosgym.control.comparison_lines import table_lines
+from chaosgym.control.comparison import SUBJECTS, read_comparison
 from chaosgym.control.controllers import Follow
 from chaosgym.control.policies import load_policy
 from chaosgym.control.rollout import Policy, play
+from chaosgym.control.scores import ONE, ZERO, Scores, table_lines
 from chaosgym.errors import DatasetError
 
 FEWEST = 32

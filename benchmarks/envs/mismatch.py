@@ -9,12 +9,11 @@ from typing import Any
 
 from tqdm import tqdm
 
-from chaosgym.control.comparison import MADE_WORSE
-from chaosgym.control.comparison_lines import difference
 from chaosgym.control.controllers import BackOff, Follow
 from chaosgym.control.guard import GuardedPolicy
 from chaosgym.control.policies import shipped_policy
 from chaosgym.control.rollout import Policy, play
+from chaosgym.control.scores import MADE_WORSE, difference
 from chaosgym.control.statistics import paired_difference
 
 ENV, CRANK = "chaosgym/ImpactBeamTolerance-v1", "chaosgym/SliderCrankTolerance-v1"

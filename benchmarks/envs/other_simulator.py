@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from benchmarks.envs.exudyn_beam import ExudynBeam, Ran
-from chaosgym.control.comparison import MADE_WORSE
-from chaosgym.control.comparison_lines import difference
 from chaosgym.control.controllers import Follow, Kriging
 from chaosgym.control.operator import Operator
 from chaosgym.control.plant import work
 from chaosgym.control.policies import shipped_policy
+from chaosgym.control.scores import MADE_WORSE, difference
 from chaosgym.control.statistics import paired_difference
 from chaosgym.envs.judge import ExponentJudge
 from chaosgym.envs.task import Task

@@ -27,9 +27,10 @@ import pyarrow as pa
 from scipy.linalg import LinAlgError, solve_discrete_are
 
 from chaosgym.arrays import Array
-from chaosgym.control.comparison import ONE, SAFE, ZERO, Contenders, Scores, job_rows
+from chaosgym.control.comparison import Contenders, job_rows
 from chaosgym.control.controllers.controller import THRESHOLD, Controller, Observations, irregular, seen
 from chaosgym.control.rollout import play
+from chaosgym.control.scores import ONE, SAFE, ZERO, Scores
 from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import SimulationError

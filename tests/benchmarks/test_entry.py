@@ -4,8 +4,9 @@ import pyarrow as pa
 import pytest
 
 from benchmarks.envs.entry import entry, lines, task_of
-from chaosgym.control.comparison import ONE, ZERO, compare, subject_of, write_comparison
+from chaosgym.control.comparison import compare, subject_of, write_comparison
 from chaosgym.control.policies.shipped import shipped_folder, shipped_policy
+from chaosgym.control.scores import ONE, ZERO
 from chaosgym.errors import DatasetError
 
 BEAM = "chaosgym/ImpactBeamTolerance-v1"

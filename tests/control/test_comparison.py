@@ -6,13 +6,13 @@ from stable_baselines3 import PPO
 
 import chaosgym
 from chaosgym.control import comparison
-from chaosgym.control.comparison import ONE, ZERO, Scores, compare, read_comparison
-from chaosgym.control.comparison_lines import table_lines
+from chaosgym.control.comparison import compare, read_comparison
 from chaosgym.control.controllers import Follow
 from chaosgym.control.evaluation import policy_of
 from chaosgym.control.maps import model_keywords
 from chaosgym.control.policies import TrainedPolicy
 from chaosgym.control.policies.network import Dense, Network
+from chaosgym.control.scores import ONE, ZERO, Scores, table_lines
 from chaosgym.envs import SB3VecEnv
 from chaosgym.envs.vector_env import native_envs
 from chaosgym.errors import DatasetError, ModelFileError, ParameterError

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from benchmarks.envs.mismatch import ENV, lines, mismatch
-from chaosgym.control.comparison_lines import difference
 from chaosgym.control.controllers import BackOff, Follow
 from chaosgym.control.evaluation import policy_of
 from chaosgym.control.guard import GuardedPolicy
 from chaosgym.control.policies import TrainedPolicy, shipped_policy
 from chaosgym.control.policies.network import Dense, Network
 from chaosgym.control.rollout import play
+from chaosgym.control.scores import difference
 from chaosgym.control.statistics import paired_difference
 from chaosgym.envs.observation import OBSERVATION_NAMES
 from chaosgym.errors import ParameterError

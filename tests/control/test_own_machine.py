@@ -12,12 +12,13 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 import chaosgym
-from chaosgym.control.comparison import ONE, ZERO, Scores, compare
+from chaosgym.control.comparison import compare
 from chaosgym.control.controllers import Follow
 from chaosgym.control.policies import load_policy, save_policy
 from chaosgym.control.policies.checkpoint import load_checkpoint, save_checkpoint
 from chaosgym.control.policies.export import exported
 from chaosgym.control.rollout import play
+from chaosgym.control.scores import ONE, ZERO, Scores
 from chaosgym.envs import SB3VecEnv, environment
 from chaosgym.envs.sb3 import SB3VisitedSpeeds
 from chaosgym.errors import DatasetError, ModelFileError, ParameterError

@@ -8,9 +8,10 @@ from gymnasium.utils.env_checker import check_env
 
 import chaosgym
 from benchmarks.envs import pool as made
-from chaosgym.control.comparison import Scores, compare
+from chaosgym.control.comparison import compare
 from chaosgym.control.controllers import Follow, Kriging
 from chaosgym.control.rollout import play
+from chaosgym.control.scores import Scores
 from chaosgym.envs.pool import SPLITS, Pool, machine_of, read_pool
 from chaosgym.errors import ParameterError
 from chaosgym.machines.family import KINDS, MODES

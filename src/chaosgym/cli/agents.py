@@ -60,12 +60,11 @@ def compare(
     ENV is an id such as chaosgym/ImpactBeamTolerance-v1, or the file of a machine.
     0 is following the demand, 1 is the machine's own map with the demands to come unknown.
     """
-    from chaosgym.control.comparison import ONE, ZERO, Scores
     from chaosgym.control.comparison import compare as run
-    from chaosgym.control.comparison_lines import table_lines
     from chaosgym.control.guard import GuardedPolicy
     from chaosgym.control.policies import load_policy
     from chaosgym.control.rollout import Policy
+    from chaosgym.control.scores import ONE, ZERO, Scores, table_lines
 
     drawn = None if figure is None else picture_path(str(figure), "")
     trained: dict[str, list[Policy]] = {}

@@ -10,9 +10,10 @@ import pyarrow as pa
 from gymnasium.spaces import Discrete
 from numpy.typing import NDArray
 
-from chaosgym.control.comparison import ONE, ZERO, Contenders, Scores, job_rows, shipped_comparison
+from chaosgym.control.comparison import Contenders, job_rows, shipped_comparison
 from chaosgym.control.policies.policy import TrainedPolicy, load_policy
 from chaosgym.control.rollout import Played, Policy, play
+from chaosgym.control.scores import ONE, ZERO, Scores
 from chaosgym.envs.memory import SpeedMemory
 from chaosgym.errors import ModelFileError
 from chaosgym.files import first_line

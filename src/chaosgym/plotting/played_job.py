@@ -17,8 +17,8 @@ from PIL import Image
 from tqdm import tqdm
 
 from chaosgym.classifier import MachineClassifier
-from chaosgym.control.comparison import PROFILE_SCORES
 from chaosgym.control.rollout import Played
+from chaosgym.control.scores import PROFILE_SCORES
 from chaosgym.errors import ChaosgymError
 from chaosgym.files import write_atomically
 from chaosgym.machines.picture import CALM, INK, WILD
