@@ -21,8 +21,8 @@ SMALL = {
     "constrained_ppo": ("--envs", "32", "--rollout", "60", "--batch", "240"),
     "sac": ("--envs", "32", "--gradient-steps", "1"),
 }
-FEW = {"recurrent_ppo": 960}
-"""Steps of the first run: a job of each machine where the network is recurrent, which is slow; else 11,000."""
+FIRST = {"ppo": 11_000, "recurrent_ppo": 960, "constrained_ppo": 3840, "sac": 3840}
+"""Steps of the first run: more than those of a row, and of the other scripts a job of each machine."""
 
 
 def _train(script, out, steps, *options):
@@ -36,7 +36,7 @@ def _train(script, out, steps, *options):
 @pytest.mark.parametrize("script", SMALL)
 def test_a_script_trains_resumes_and_exports(script, tmp_path):
     """A row for every 10,000 steps or for fewer in all, a second run goes on, and the policy plays a job."""
-    out, steps = tmp_path / "run", FEW.get(script, 11_000)
+    out, steps = tmp_path / "run", FIRST[script]
     _train(script, out, steps, *SMALL[script])
     rows = list(csv.DictReader((out / "progress.csv").read_text().splitlines()))
     assert len(rows) == 1
