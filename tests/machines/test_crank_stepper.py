@@ -7,7 +7,7 @@ import pytest
 
 from chaosgym.core.binned.taylor import advance
 from chaosgym.core.cycle import cycle_arrays
-from chaosgym.machines.binned.model import stepped_model
+from chaosgym.machines.binned.stepped import stepped_model
 from chaosgym.simulation import ExactEvents, simulate
 from tests.machines.crank_twin import rigid_ball_twin
 from tests.plain_modes import PLAIN_CRANK

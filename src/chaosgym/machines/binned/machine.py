@@ -11,7 +11,9 @@ import numpy as np
 from chaosgym.arrays import Array
 from chaosgym.core.binned.model import LINEAR, BinnedModel, TaylorModel
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
-from chaosgym.machines.binned.model import STEP_PHASE, Contact, Held, exact_model, fastest_rate, stepped_model
+from chaosgym.machines.binned.equations import STEP_PHASE, Contact, Held
+from chaosgym.machines.binned.model import exact_model
+from chaosgym.machines.binned.stepped import fastest_rate, stepped_model
 from chaosgym.machines.integrators import Integrator
 from chaosgym.machines.machine import Machine
 

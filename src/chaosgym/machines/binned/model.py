@@ -1,17 +1,13 @@
-r"""From the equations of a mechanism to the model that the kernels integrate.
+"""The model of propagators, by which machines with few sets of contacts move exactly from bin to bin.
 
-Matrices are held at the middle of each bin of crank angle, loads follow as cubics in the time of a bin, and every set
-of closed contacts adds its stiffness and damping. Mass matrices, loads and contacts of all bins depend neither on the
-speed nor on the clearance; at a given speed they are summed and turned into propagators. Both results are kept for
-machines that differ only in speed or clearance.
+Every set of closed contacts adds its stiffness and damping to the equations, which are summed at a given speed and
+turned into propagators. Models are kept for machines that differ only in speed or clearance.
 """
 
 import math
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import fields
-from functools import cache, lru_cache
-from operator import attrgetter
+from functools import lru_cache
 from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,144 +15,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
-from chaosgym.core.binned.model import FORCING_TERMS, BinnedModel, TaylorModel
-from chaosgym.errors import ParameterError
-from chaosgym.machines.parameters import refuse_not_finite
+from chaosgym.core.binned.model import BinnedModel
+from chaosgym.machines.binned.equations import (
+    KEPT,
+    STEP_PHASE,
+    Contact,
+    even_powers,
+    machine_of,
+    structure_of,
+    whole_steps,
+)
 
 if TYPE_CHECKING:
     from chaosgym.machines.binned.machine import BinnedMachine
 
 
-PIECE_PHASE = 2.0
-"""Longest piece of a Taylor series times largest eigenvalue without contact."""
-
-SPAN_PHASE = 5.0
-"""Longest span of a Taylor series times largest eigenvalue without contact: stable for modes damped by 0.1 %."""
-
-SPAN_ERROR = 1e-10
-"""Last terms [m/s] of the Taylor series of velocities at the end of a span, by default."""
-
-STEP_PHASE = 0.5
-"""Angle [rad] by which the fastest motion turns in half an interval of a look, by default."""
-
-PIN_ROWS = 2
-"""Directions of a pin in the plane."""
-
 MAX_SETS = 32
 """Contact sets for which propagators are made; a machine with more is left to Taylor series."""
-
-KEPT = 128
-"""Machines whose assembled equations are kept, whatever their speed and clearance."""
 
 KEPT_STRUCTURES = 1024
 """Machines whose models are looked up by speed alone."""
 
-KEPT_STEPPED = 16
-"""Models for Taylor series that are kept: some hundred kB each."""
-
-MOST_STEPS = 1e9
-"""Steps of a bin; a cycle's budget ends by default long before."""
-
 KEPT_BYTES = 256_000_000
 """Memory for the propagators of machines at one speed; those used longest ago go first."""
-
-
-class Contact(NamedTuple):
-    """A surface, or two opposite ones; more than one row is a ball in a shell.
-
-    Attributes
-    ----------
-    row : (R, n)
-        Displacement in each direction per unit coordinate.
-    gap, stiffness, damping
-        Clearance [m]; k [N/m] and d [N s/m], or K [N/m^1.5] and chi [s/m] of Hertz's law.
-    two_sided
-        False if a contact with one row has a surface only where row . p is positive.
-    reading : (R, 3)
-        Recorded force (along, upward or across, sideways) per newton along each row; zero of another joint.
-    slides
-        Whether friction acts along the guide.
-    drag : (n,) or None
-        What friction drives per newton of contact force, on surfaces that slide past steadily.
-    share : (bins,) or None
-        Factor of stiffness and damping over the cycle.
-    """
-
-    row: Array
-    gap: float
-    stiffness: float
-    damping: float
-    two_sided: bool
-    reading: Array
-    slides: bool = False
-    drag: Array | None = None
-    share: Array | None = None
-
-
-class Held(NamedTuple):
-    """Accelerations of all bins by powers of the rate w of the drive, whatever the speed and the clearance.
-
-    Attributes
-    ----------
-    inverse_mass : (bins, n, n)
-    free : (3, bins, 2n, n)
-        Per unit of coordinates and velocities.
-    forcing : (powers, bins, 4, n)
-        Of the forcing, a cubic in the time of a bin, by powers 0 and 2, or 0, 1 and 2.
-    friction : (bins, n)
-        What one newton of contact force drives along the guide.
-    tangent : (bins,)
-        Of the angle by which friction of a pin turns its contact force.
-    """
-
-    inverse_mass: Array
-    free: Array
-    forcing: Array
-    friction: Array
-    tangent: Array
-
-
-def held(
-    mass: Array,
-    damping: Array,
-    stiffness: Array,
-    loads: Array,
-    friction: Array | None = None,
-    tangent: Array | None = None,
-) -> Held:
-    """Held accelerations of M p'' + D p' + K p = -loads, of all bins.
-
-    Parameters
-    ----------
-    mass, damping, stiffness
-        (bins, n, n), (2, bins, n, n) and (3, bins, n, n) at the middles of the bins, by powers of the rate.
-    loads : (powers, 3 bins, n)
-        At the nodes of the forcing, three a bin from the beginning of the first on.
-    friction, tangent : (bins, n), (bins,)
-        As in ``Held``; none if omitted.
-    """
-    bins, n = mass.shape[:2]
-    inverse_mass = np.asarray(np.linalg.inv(mass), dtype=np.float64)
-    free = np.zeros((3, bins, 2 * n, n))
-    free[:, :, :n] = -np.swapaxes(inverse_mass @ stiffness, -1, -2)
-    free[:2, :, n:] = -np.swapaxes(inverse_mass @ damping, -1, -2)
-    found = Held(
-        inverse_mass,
-        free,
-        _forcing(inverse_mass, loads),
-        np.zeros((bins, n)) if friction is None else friction,
-        np.zeros(bins) if tangent is None else tangent,
-    )
-    refuse_not_finite("the equations of a mechanism", *found)
-    return found
-
-
-def middles_and_nodes(bins: int) -> tuple[Array, Array]:
-    """Angles [rad] of the middles of the bins, and of the nodes of the forcing."""
-    width = 2.0 * math.pi / bins
-    nodes = FORCING_TERMS - 1
-    middles = (np.arange(bins, dtype=np.float64) + 0.5) * width
-    return middles, np.arange(bins * nodes, dtype=np.float64) * width / nodes
 
 
 class _RecentModels:
@@ -207,131 +88,12 @@ def _models_by_speed(step_phase: float, *structure: Any) -> ModelsBySpeed:
 
 def models_by_speed(machine: "BinnedMachine", step_phase: float = STEP_PHASE) -> ModelsBySpeed:
     """Models of a machine that ``has_propagators``; ``step_phase`` is that of ``BinnedMachine.reduce``."""
-    return _models_by_speed(step_phase, *_key(machine))
+    return _models_by_speed(step_phase, *structure_of(machine))
 
 
 def exact_model(machine: "BinnedMachine", step_phase: float) -> BinnedModel:
     """Model of a machine that ``has_propagators``; ``step_phase`` is that of ``BinnedMachine.reduce``."""
     return models_by_speed(machine, step_phase).at(machine.drive_speed)._replace(gap=machine.gaps)
-
-
-def _key(machine: "BinnedMachine") -> tuple[Any, ...]:
-    """Class and all fields that shape the matrices."""
-    kind: Any = type(machine)
-    return (kind, *_structure_values(kind)(machine))
-
-
-@cache
-def _structure_values(kind: Any) -> Callable[[Any], tuple[Any, ...]]:
-    return attrgetter(*_structure_fields(kind))
-
-
-@cache
-def _structure_fields(kind: Any) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind) if field.name not in kind.beside_matrices)
-
-
-def _made(kind: type, structure: tuple[Any, ...]) -> "BinnedMachine":
-    """Machine at the default speed and clearance."""
-    machine: BinnedMachine = kind(**dict(zip(_structure_fields(kind), structure, strict=True)))
-    return machine
-
-
-@lru_cache(maxsize=KEPT)
-def _kept(kind: type, *structure: Any) -> Held:
-    """What is held, kept for machines without a table of propagators."""
-    return _made(kind, structure).held()
-
-
-def _free_motion(free: Array, forcing: Array, rate: float) -> Array:
-    """Accelerations without contact at a crank rate, (bins, 2n + 4, n)."""
-    driven = _even_powers(forcing, rate)
-    return np.concatenate([free[0] + rate * free[1] + rate**2 * free[2], driven[0] + rate**2 * driven[1]], axis=1)
-
-
-def _even_powers(forcing: Array, rate: float) -> Array:
-    """Forcing by powers 0 and 2 of a rate, (2, ...): what grows with its first power is summed into the constant."""
-    return forcing if len(forcing) == 2 else np.stack([forcing[0] + rate * forcing[1], forcing[2]])
-
-
-@lru_cache(maxsize=KEPT_STEPPED)
-def stepped_model(machine: "BinnedMachine", step_phase: float) -> TaylorModel:
-    """Model of any machine for Taylor series; kept for the last machines, which a search asks for again and again.
-
-    A closed contact turns by ``step_phase`` / 4 in a piece of a series; half of it leaves a sixteenth of the error.
-    """
-    inverse_mass, free, forcing, friction, tangent = _kept(*_key(machine))
-    contacts = machine.contacts
-    row = np.concatenate([contact.row for contact in contacts])
-    rate = machine.crank_rate
-    acceleration = _free_motion(free, forcing, rate)
-    first = np.cumsum([0] + [len(contact.row) for contact in contacts])
-    answer = np.swapaxes(inverse_mass @ row.T, -1, -2)
-    for at, each in zip(first, contacts, strict=False):
-        if each.slides and len(each.row) == PIN_ROWS:
-            across = np.array([answer[:, at + 1], -answer[:, at]])
-            answer[:, at : at + PIN_ROWS] += np.swapaxes(tangent[:, None] * across, 0, 1)
-    slide = -np.einsum("bij,bj->bi", inverse_mass, friction)
-    contact = math.sqrt(machine.stiffest * np.max(np.einsum("brn,rn->br", answer, row)))
-    bins = len(inverse_mass)
-    duration = 2.0 * math.pi / (bins * rate)
-    n = len(row[0])
-    system = np.zeros((bins, 2 * n, 2 * n))
-    system[:, n:, :n] = np.eye(n)
-    system[:, :, n:] = acceleration[:, : 2 * n]
-    spectrum = float(np.max(np.abs(np.linalg.eigvals(system[machine.sampled_bins]))))
-    return TaylorModel(
-        bin_duration=duration,
-        steps=_whole_steps(duration * max(4.0 * contact / step_phase, spectrum / PIECE_PHASE)),
-        longest=duration / max(1.0, duration * spectrum / SPAN_PHASE),
-        tolerance=SPAN_ERROR * step_phase**4,
-        contact_rate=contact,
-        acceleration=_with_readings(np.concatenate([acceleration, -answer, slide[:, None]], axis=1), row),
-        first=first,
-        row=row,
-        gap=np.array([contact.gap for contact in contacts]),
-        stiffness=np.array([contact.stiffness for contact in contacts]),
-        damping=np.array([contact.damping for contact in contacts]),
-        law=machine.law,
-        slides=np.array([float(contact.slides) for contact in contacts]),
-        two_sided=np.array([contact.two_sided for contact in contacts]),
-        reading=np.concatenate([contact.reading for contact in contacts]),
-        monitored=np.array([bool(np.any(contact.reading)) for contact in contacts]),
-        display=machine.display,
-    )
-
-
-def _whole_steps(wanted: float) -> int:
-    """Steps of a bin, whole and at least one; refused where no kernel would ever end."""
-    if not wanted < MOST_STEPS:
-        raise ParameterError(
-            f"the fastest motion takes {wanted:.1e} steps in a bin; allowed: up to {MOST_STEPS:g}, with more mass and "
-            "inertia, less stiffness and damping, or a higher speed"
-        )
-    return max(1, math.ceil(wanted))
-
-
-def _with_readings(accelerations: Array, row: Array) -> Array:
-    """Lanes of ``TaylorModel`` of accelerations (..., n)."""
-    from chaosgym.core.lanes import padded
-
-    rows, n = row.shape
-    lanes = np.zeros((*accelerations.shape[:-1], padded(rows + n)))
-    lanes[..., :rows] = accelerations @ row.T
-    lanes[..., rows : rows + n] = accelerations
-    return lanes
-
-
-def fastest_rate(machine: "BinnedMachine", model: TaylorModel) -> float:
-    """Largest modulus [1/s] of an eigenvalue with every contact closed."""
-    rows, n = model.row.shape
-    some = model.acceleration[machine.sampled_bins, :, rows : rows + n]
-    pushes = slice(2 * n + FORCING_TERMS, 2 * n + FORCING_TERMS + rows)
-    system = np.zeros((len(some), 2 * n, 2 * n))
-    system[:, n:, :n] = np.eye(n)
-    system[:, :, n:] = some[:, : 2 * n]
-    system[:, :n, n:] += machine.stiffest * model.row.T @ some[:, pushes]
-    return float(np.max(np.abs(np.linalg.eigvals(system))))
 
 
 class Channels(NamedTuple):
@@ -384,14 +146,6 @@ class _Structure(NamedTuple):
     spectrum: float
 
 
-def _forcing(inverse_mass: Array, loads: Array) -> Array:
-    """Cubics in the time of each bin through the loads at its nodes, as accelerations: (2, bins, 4, n)."""
-    bins, nodes = len(inverse_mass), FORCING_TERMS - 1
-    at = (np.arange(bins)[:, None] * nodes + np.arange(FORCING_TERMS)) % (bins * nodes)
-    coefficients = np.linalg.inv(np.vander(np.arange(FORCING_TERMS) / nodes, increasing=True))
-    return np.asarray(-np.einsum("bij,kbcj->kbci", inverse_mass, coefficients @ loads[:, at]))
-
-
 def _push(inverse_mass: Array, channels: Channels, radix: int, friction: Array) -> Array:
     """Accelerations that the closed contacts of every set add: (sets, bins, 2n + m, n).
 
@@ -427,7 +181,7 @@ def _rates(free: Array, pushed: Array, row: Array) -> tuple[float, float]:
 
 @lru_cache(maxsize=KEPT)
 def _structure(kind: type, *structure: Any) -> _Structure:
-    machine = _made(kind, structure)
+    machine = machine_of(kind, structure)
     inverse_mass, free, forcing, friction, _ = machine.held()
     n = inverse_mass.shape[-1]
     channels = channels_of(machine.contacts)
@@ -480,9 +234,9 @@ def _at_rate(rate: float, step_phase: float, parts: _Structure) -> BinnedModel:
 
     bins = parts.bins
     duration = 2.0 * math.pi / (bins * rate)
-    steps = _whole_steps(duration * parts.spectrum / (2.0 * LANES * step_phase))
+    steps = whole_steps(duration * parts.spectrum / (2.0 * LANES * step_phase))
     order = series_order(parts.spectrum * duration / (LANES * steps))
-    accelerations = (parts.free, _even_powers(parts.forcing, rate), parts.push, bins, rate)
+    accelerations = (parts.free, even_powers(parts.forcing, rate), parts.push, bins, rate)
     return BinnedModel(
         bin_duration=duration,
         bins=bins,

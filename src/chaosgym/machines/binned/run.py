@@ -15,7 +15,9 @@ from chaosgym.core.compilation import call, call_side_by_side
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.machines.batch import CompiledBatch, Cycles, KickedBatch, put, stacked
-from chaosgym.machines.binned.model import STEP_PHASE, ModelsBySpeed, fastest_rate, models_by_speed, stepped_model
+from chaosgym.machines.binned.equations import STEP_PHASE
+from chaosgym.machines.binned.model import ModelsBySpeed, models_by_speed
+from chaosgym.machines.binned.stepped import fastest_rate, stepped_model
 from chaosgym.machines.integrators import ExactEvents, Integrator
 
 if TYPE_CHECKING:

@@ -11,8 +11,9 @@ import numpy as np
 from chaosgym.arrays import Array
 from chaosgym.core.binned.model import HERTZ, LINEAR
 from chaosgym.errors import ParameterError
+from chaosgym.machines.binned.equations import Contact, Held, held, middles_and_nodes
 from chaosgym.machines.binned.machine import BinnedMachine
-from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS, Contact, Held, held, middles_and_nodes
+from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS
 from chaosgym.machines.drive_torque import DriveTorque
 from chaosgym.machines.mechanism.beam import fibre_stress
 from chaosgym.machines.mechanism.clearance import ROUND, surface_fields

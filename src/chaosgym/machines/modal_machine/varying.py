@@ -22,8 +22,9 @@ from chaosgym.arrays import Array
 from chaosgym.core.binned.tables import table_places
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.errors import ParameterError
+from chaosgym.machines.binned.equations import Contact, Held, held, middles_and_nodes
 from chaosgym.machines.binned.machine import BinnedMachine
-from chaosgym.machines.binned.model import KEPT_BYTES, Contact, Held, held, middles_and_nodes
+from chaosgym.machines.binned.model import KEPT_BYTES
 from chaosgym.machines.machine import Option, TaskDefaults
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive

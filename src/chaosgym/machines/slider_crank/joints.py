@@ -15,7 +15,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.machines.binned import model as binned
+from chaosgym.machines.binned import equations
 from chaosgym.machines.slider_crank.coordinates import (
     BALL_ACROSS,
     BALL_DIRECTIONS,
@@ -237,7 +237,7 @@ def ball_joint_of(machine: CrankParameters) -> JointModel:
     return TightJoint()
 
 
-def joints_of(machine: CrankParameters) -> list[binned.Contact]:
+def joints_of(machine: CrankParameters) -> list[equations.Contact]:
     """All contacts of a machine: those of the slider joint, then those of the ball joint."""
     names = machine.degrees_of_freedom
     joints = []
@@ -255,7 +255,7 @@ def joints_of(machine: CrankParameters) -> list[binned.Contact]:
             share = contact.share
             damped = damper * (share * damping) if linear else damper
             joints.append(
-                binned.Contact(row, clearance, stiffness * share, damped, contact.two_sided, reading, contact.slides)
+                equations.Contact(row, clearance, stiffness * share, damped, contact.two_sided, reading, contact.slides)
             )
     return joints
 

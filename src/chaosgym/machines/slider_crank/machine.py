@@ -14,7 +14,8 @@ import numpy as np
 from chaosgym.arrays import Array
 from chaosgym.core.binned.model import HERTZ, LINEAR
 from chaosgym.core.cycle import CycleArrays
-from chaosgym.machines.binned.model import MAX_SETS, Contact, Held
+from chaosgym.machines.binned.equations import Contact, Held
+from chaosgym.machines.binned.model import MAX_SETS
 from chaosgym.machines.parameters import Parameter, parameters_of
 from chaosgym.machines.slider_crank.coordinates import SLIDER_ACROSS, SLIDER_LATERAL, degrees_of_freedom
 from chaosgym.machines.slider_crank.equations import equations

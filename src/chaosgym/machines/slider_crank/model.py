@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from chaosgym.machines.binned.model import Held, held, middles_and_nodes
+from chaosgym.machines.binned.equations import Held, held, middles_and_nodes
 from chaosgym.machines.slider_crank.equations import equations
 from chaosgym.machines.slider_crank.parameters import CrankParameters
 
