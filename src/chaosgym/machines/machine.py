@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from chaosgym.core.tangent import Tangents
     from chaosgym.machines.batch import CompiledBatch
     from chaosgym.machines.drive_torque import DriveTorque
+    from chaosgym.machines.picture import Sketch
 
 
 class Number(NamedTuple):
@@ -373,9 +374,27 @@ class Machine(ABC):
         force_limit
             Force [N] to which pictures scale.
         """
-        from chaosgym.machines.picture import draw_displacement
+        from chaosgym.machines.picture import draw_displacement, draw_sketch, sample_at
 
-        draw_displacement(panel, record, colour, moment, force_limit)
+        sketch = self.sketch(record, np.array([sample_at(record, moment)]), force_limit)
+        if sketch is None:
+            draw_displacement(panel, record, colour, moment)
+        else:
+            draw_sketch(panel, sketch, colour)
+
+    def sketch(self, record: Any, rows: NDArray[np.int64], force_limit: float) -> "Sketch | None":
+        """The machine at some moments, as shapes and words; None if it has no picture.
+
+        Parameters
+        ----------
+        record
+            ``CycleRecord`` of a run, with its time history.
+        rows : (moments,)
+            Samples of the history.
+        force_limit
+            Force [N] to which pictures scale.
+        """
+        return None
 
     def draw_poses(self, panels: Any) -> None:
         """Draw the machine at equal steps of its cycle, one in each of the panels of matplotlib.

@@ -1,9 +1,11 @@
-"""What pictures of machines share: their colours, and the motion where a machine has no picture of its own.
+"""Pictures of machines as plain shapes at some moments, and how matplotlib draws the first of them.
 
-A picture shows one moment of the last cycle of a step, and pale what happened in the rest of the step.
+A machine says what is where (``Machine.sketch``). Environments draw one moment of it, ``explore`` moves through many.
 """
 
-from typing import Any
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +16,65 @@ INK, PALE, CALM, WILD, LIMIT = "#1f2933", "#cbd2d9", "#1f77b4", "#d1495b", "#e09
 
 STAYS = "stays"
 """Mark (gid) of a text that does not change from step to step, so that it is drawn once."""
+
+EDGE = 0.3
+"""Edge of a dot, as a share of its size."""
+
+
+class Shape(NamedTuple):
+    """Something to draw.
+
+    Attributes
+    ----------
+    kind
+        "back", lines behind everything; "body", a filled outline; "line"; "dot", a mark at each point.
+    points : (moments, pieces, k, 2)
+        Places at each moment, or with a single one at all of them.
+    colour
+        Of lines and edges; none for the colour that tells how the step went.
+    width
+        Of lines, or size of dots, in points of print.
+    fill
+        Of bodies and dots; none for ``colour``.
+    alpha
+        Opacity.
+    marker
+        Of dots, as matplotlib names them.
+    """
+
+    kind: str
+    points: Array
+    colour: str | None = INK
+    width: float = 1.0
+    fill: str | None = None
+    alpha: float = 1.0
+    marker: str = "o"
+
+
+class Words(NamedTuple):
+    """A text at a place (2,), with one string for each moment or one for all; ``stays`` if no step changes it."""
+
+    place: tuple[float, float]
+    text: Sequence[str]
+    across: str = "left"
+    up: str = "top"
+    stays: bool = False
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A machine at some moments: shapes and words between two corners (2,), with equal scales in both directions."""
+
+    title: str
+    low: Array
+    high: Array
+    shapes: Sequence[Shape]
+    words: Sequence[Words] = ()
+
+
+def moving(points: Array) -> Array:
+    """One line or row of dots (moments, k, 2), as ``Shape`` has it; (k, 2) is one that stays."""
+    return np.asarray(points, dtype=np.float64).reshape(-1, 1, *np.shape(points)[-2:])
 
 
 def samples_of(record: Any) -> Array:
@@ -27,8 +88,48 @@ def sample_at(record: Any, moment: float) -> int:
     return (len(record) - 1) * per_cycle + int(moment * per_cycle)
 
 
-def draw_displacement(panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
-    """Draw the displacement in the last cycle; see ``Machine.draw``."""
+def draw_sketch(panel: Any, sketch: Sketch, colour: str) -> None:
+    """Draw the first moment of a sketch on axes of matplotlib; ``colour`` tells how the step went."""
+    frame(panel, sketch.low, sketch.high)
+    draw_shapes(panel, sketch.shapes, colour)
+    for words in sketch.words:
+        gid = STAYS if words.stays else None
+        panel.text(*words.place, words.text[0], ha=words.across, va=words.up, fontsize=8, color=INK, gid=gid)
+    panel.set_title(sketch.title, fontsize=8.5, loc="left", gid=STAYS, color=INK)
+
+
+def frame(panel: Any, low: Array, high: Array) -> None:
+    """Set equal scales that fill a panel, with two corners (2,) on it."""
+    middle, (x, y) = 0.5 * (low + high), 0.5 * (high - low)
+    box = panel.get_window_extent()
+    share = box.height / box.width
+    x, y = max(x, y / share), max(y, x * share)
+    panel.set(xlim=(middle[0] - x, middle[0] + x), ylim=(middle[1] - y, middle[1] + y))
+    panel.axis("off")
+
+
+def draw_shapes(panel: Any, shapes: Iterable[Shape], colour: str = INK) -> None:
+    """Draw shapes at their first moment."""
+    from matplotlib.collections import LineCollection
+
+    for kind, points, own, width, fill, alpha, marker in shapes:
+        edge = own or colour
+        if kind == "back":
+            lines = LineCollection(list(points[0]), color=edge, linewidth=width, alpha=alpha, capstyle="round")
+            panel.add_collection(lines, autolim=False)
+            continue
+        for piece in points[0]:
+            if kind == "body":
+                panel.fill(*piece.T, facecolor=fill or edge, edgecolor=edge, linewidth=width, alpha=alpha)
+            elif kind == "line":
+                panel.plot(*piece.T, color=edge, linewidth=width, alpha=alpha, solid_capstyle="round")
+            else:
+                looks = {"markersize": width, "markeredgecolor": edge, "markeredgewidth": EDGE * width}
+                panel.plot(*piece.T, marker, color=fill or edge, alpha=alpha, **looks)
+
+
+def draw_displacement(panel: Any, record: Any, colour: str, moment: float) -> None:
+    """Draw the displacement in the last cycle, for a machine without a picture of its own."""
     samples = samples_of(record)
     last = samples[-(len(samples) // len(record)) :, 0] * 1e3
     panel.plot(np.linspace(0.0, 1.0, len(last)), last, color=colour, linewidth=1.0)

@@ -4,9 +4,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.core.modal_model import ModalImpactModel
@@ -14,6 +15,9 @@ from chaosgym.machines.impact_beam.modes import modal_analysis, modal_curvatures
 from chaosgym.machines.impact_beam.parameters import BeamParameters
 from chaosgym.machines.integrators import TIGHTEST_EVENTS, ExactEvents
 from chaosgym.machines.modal_impact import flexible_model
+
+if TYPE_CHECKING:
+    from chaosgym.machines.picture import Sketch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,11 +63,11 @@ class ImpactBeam(BeamParameters):
         least = 0.02 + 0.02 * (self.damping_ratio - 0.01) / 0.07
         return {"clearance": (clearance, max(0.0, least)), "frequency": (self.excitation_frequency, 16.0)}
 
-    def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
-        """Draw the beam between its sensors; see ``Machine.draw``."""
-        from chaosgym.machines.impact_beam.picture import draw_beam
+    def sketch(self, record: Any, rows: NDArray[np.int64], force_limit: float) -> "Sketch":
+        """The beam between its sensors; see ``Machine.sketch``."""
+        from chaosgym.machines.impact_beam.picture import sketch_of_beam
 
-        draw_beam(panel, record, colour, moment)
+        return sketch_of_beam(record, rows)
 
     def stress_at(self, position: float) -> Array:
         """Bending stress (n,) for each mode at a position [m] from the pivot on; see ``Machine.stress_at``."""

@@ -1,54 +1,65 @@
-"""The beam in motion between its sensors, drawn on a panel, its gap exaggerated."""
+"""The beam in motion between its sensors, its gap exaggerated."""
 
 from typing import Any
 
 import numpy as np
-from matplotlib.collections import LineCollection
+from numpy.typing import NDArray
 
-from chaosgym.machines.picture import INK, PALE, STAYS, sample_at, samples_of
+from chaosgym.arrays import Array
+from chaosgym.machines.picture import PALE, Shape, Sketch, Words, moving, samples_of
 
 GHOSTS = 60
 """Other positions shown behind the beam."""
 
+GAP = 0.13
+"""Half gap as drawn, in lengths of the beam."""
 
-def draw_beam(panel: Any, record: Any, colour: str, moment: float) -> None:
-    """Draw the beam between its sensors, its other positions pale, its deflection exaggerated."""
+PUSH = 0.65
+"""Place of the shaker as drawn, in lengths of the beam."""
+
+
+def sketch_of_beam(record: Any, rows: NDArray[np.int64]) -> Sketch:
+    """The beam between its sensors, its other positions pale, its deflection exaggerated; see ``Machine.sketch``."""
     beam: Any = record.machine
-    gap = 0.13
-    tip = samples_of(record)[:, 0] / beam.clearance * gap
-    now = tip[sample_at(record, moment)]
-    along = np.linspace(0.0, 1.0, 2)
-    others = [np.column_stack([along, deflection * along]) for deflection in tip[:: max(1, len(tip) // GHOSTS)]]
-    panel.add_collection(LineCollection(others, color=PALE, linewidth=1.2, alpha=0.45, capstyle="round"), autolim=False)
-    push = 0.65
-    panel.plot([push, push], [push * now - 0.03, -0.23], color=INK, linewidth=1.2)
-    panel.plot(push, push * now - 0.03, "^", color=INK, markersize=6)
-    panel.plot(push, -0.23, "v", color=INK, markersize=6)
-    panel.text(push, -0.26, "shaker", ha="center", va="top", fontsize=8, color=INK, gid=STAYS)
-    panel.plot(along, now * along, color=INK, linewidth=6.0, solid_capstyle="round")
-    panel.fill_between([-0.09, -0.05], -0.1, 0.1, color=PALE, linewidth=0)
-    panel.plot([-0.05, 0.0], [0.0, 0.0], color=INK, linewidth=2.0)
-    panel.plot(0.0, 0.0, marker="o", color="white", markeredgecolor=INK, markeredgewidth=2.5, markersize=9)
-    panel.text(-0.09, -0.12, "flexure pivot", ha="left", va="top", fontsize=8, color=INK, gid=STAYS)
+    times = GAP * beam.length / beam.clearance if beam.clearance > 0.0 else 1.0
+    tip = samples_of(record)[:, 0] * (times / beam.length)
+    now = tip[rows]
+    shaker = _at(now, [PUSH, PUSH], np.stack([PUSH * now - 0.03, np.full(len(now), -0.23)], axis=1))
+    sensors, words = [], [Words((PUSH, -0.26), ["shaker"], "center", stays=True)]
+    words.append(Words((-0.09, -0.12), ["flexure pivot"], stays=True))
     for side, (name, sign) in enumerate(zip(beam.sides, (1.0, -1.0), strict=True)):
-        peak = float(record.peak_force[:, side].max())
-        edge = sign * (gap + 0.014)
-        panel.fill_between([0.93, 1.07], edge, edge + sign * 0.05, color=colour, linewidth=0)
-        panel.text(
-            1.0,
-            edge + sign * 0.07,
-            f"{name} sensor: {peak:.0f} N",
-            ha="center",
-            fontsize=8,
-            color=INK,
-            va="bottom" if sign > 0 else "top",
-        )
-    panel.set(xlim=(-0.1, 1.24), ylim=(-0.32, 0.32))
-    panel.set_title(
-        f"Beam in its gap of ±{beam.clearance * 1e3:.3g} mm, exaggerated; peak forces of the step",
-        fontsize=8.5,
-        loc="left",
-        gid=STAYS,
-        color=INK,
+        edge = sign * (GAP + 0.014)
+        sensors.append(_block((0.93, 1.07), (edge, edge + sign * 0.05)))
+        told = f"{name} sensor: {record.peak_force[:, side].max():.0f} N"
+        words.append(Words((1.0, edge + sign * 0.07), [told], "center", "bottom" if sign > 0 else "top"))
+    others = tip[:: max(1, len(tip) // GHOSTS)]
+    shapes = (
+        Shape(
+            "back", _at(others, [0.0, 1.0], np.outer(others, [0.0, 1.0])).reshape(1, -1, 2, 2), PALE, 1.2, alpha=0.45
+        ),
+        Shape("body", np.stack(sensors)[None], None, 0.0),
+        Shape("body", moving(_block((-0.09, -0.05), (-0.1, 0.1))), PALE, 0.0),
+        Shape("line", shaker, width=1.2),
+        Shape("dot", shaker[:, :, :1], width=6.0, marker="^"),
+        Shape("dot", shaker[:1, :, 1:], width=6.0, marker="v"),
+        Shape("line", _at(now, [0.0, 1.0], np.outer(now, [0.0, 1.0])), width=6.0),
+        Shape("line", moving(np.array([[-0.05, 0.0], [0.0, 0.0]])), width=2.0),
+        Shape("dot", moving(np.zeros((1, 2))), width=9.0, fill="white"),
     )
-    panel.axis("off")
+    return Sketch(
+        f"Gap of ±{beam.clearance * 1e3:.3g} mm, drawn {times:.0f} times; numbers: largest forces",
+        np.array([-0.1, -0.32]),
+        np.array([1.24, 0.32]),
+        shapes,
+        words,
+    )
+
+
+def _at(moments: Array, along: list[float], across: Array) -> Array:
+    """A line of two points at each moment, (n, 1, 2, 2)."""
+    return moving(np.stack([np.broadcast_to(along, (len(moments), 2)), across], axis=-1))
+
+
+def _block(across: tuple[float, float], up: tuple[float, float]) -> Array:
+    """Corners (4, 2) of a rectangle."""
+    return np.array([(across[i], up[j]) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))])

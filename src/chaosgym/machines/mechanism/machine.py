@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.core.binned.model import HERTZ, LINEAR
@@ -29,6 +30,7 @@ from chaosgym.machines.parameters import assumed, parameter
 
 if TYPE_CHECKING:
     from chaosgym.core.motor import Crank
+    from chaosgym.machines.picture import Sketch
 
 SMALL = 0.02
 """Clearance as a share of a link's length beyond which motions in the gap are not small."""
@@ -469,11 +471,11 @@ class MechanismMachine(BinnedMachine):
             largest = (1.25 * mass * speed**2) ** 0.6 * stiffness**0.4 * (1.0 + damper * speed)
         return float(peak_force.max()) / largest
 
-    def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
-        """Draw the links at a moment; see ``Machine.draw``."""
-        from chaosgym.machines.mechanism.picture import draw_mechanism
+    def sketch(self, record: Any, rows: NDArray[np.int64], force_limit: float) -> "Sketch":
+        """Links, and the motion in the gap of the monitored joint; see ``Machine.sketch``."""
+        from chaosgym.machines.mechanism.picture import sketch_of_mechanism
 
-        draw_mechanism(panel, record, colour, moment, force_limit)
+        return sketch_of_mechanism(record, rows, force_limit)
 
     def draw_poses(self, panels: Any) -> None:
         """Draw the links at equal steps of the crank angle, one in each panel."""

@@ -4,26 +4,30 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.collections import LineCollection
+from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.machines.mechanism.joints import GROUND
-from chaosgym.machines.picture import INK, PALE, STAYS, WILD, sample_at, samples_of
+from chaosgym.machines.picture import PALE, WILD, Shape, Sketch, Words, draw_shapes, frame, moving, samples_of
 
 if TYPE_CHECKING:
     from chaosgym.machines.mechanism.machine import MechanismMachine
 
 
-GAP = 0.04
-"""Gap as drawn, as a share of the mechanism's size."""
+GAP, ROOM = 0.04, 0.14
+"""Gap as drawn and space around the mechanism, as shares of its size."""
+
+AROUND, GHOSTS = 72, 12
+"""Crank angles by which the ways of all points are known, and those of them at which pale links are drawn."""
+
+CIRCLE = np.stack([np.cos(turn := np.linspace(0.0, 2.0 * math.pi, 60)), np.sin(turn)], axis=1)
 
 
-def link_lines(machine: "MechanismMachine", theta: Array) -> dict[str, Array]:
-    """Places (B, k, 2) [m] of the points of each link at crank angles (B,), joined to one line through them.
+def link_lines(machine: "MechanismMachine", z: Array) -> dict[str, Array]:
+    """Places (B, k, 2) [m] of the points of each link, of coordinates z (B, z), joined to one line through them.
 
     A mechanism in space is drawn as seen along z.
     """
-    z = machine.nominal_places(theta)
     lines = {}
     for link in machine.mechanism.links:
         points = [place.moved(z[:, machine.mechanism.at[link.name]])[:, 0] for place in link.points.values()]
@@ -31,46 +35,33 @@ def link_lines(machine: "MechanismMachine", theta: Array) -> dict[str, Array]:
     return lines
 
 
-def _joint_places(machine: "MechanismMachine", theta: Array) -> list[tuple[Any, Array]]:
+def _joint_places(machine: "MechanismMachine", z: Array) -> list[tuple[Any, Array]]:
     """Each joint and where its second point is, (B, 2)."""
-    z = machine.nominal_places(theta)
     return [(joint, machine.mechanism.point(z, joint.second)[0][:, :2]) for joint in machine.mechanism.joints]
 
 
-def _limits(machine: "MechanismMachine") -> tuple[Array, Array, float]:
-    """Lowest and highest place of all points through a revolution, and the size of it all [m]."""
-    theta = np.arange(72, dtype=np.float64) * (2.0 * math.pi / 72)
-    lines = [line.reshape(-1, 2) for line in link_lines(machine, theta).values()]
+def _limits(machine: "MechanismMachine", around: Array) -> tuple[Array, Array, float]:
+    """Corners (2,) around all points through a revolution, with some space, and the size of it all [m]."""
+    lines = [line.reshape(-1, 2) for line in link_lines(machine, around).values()]
     ground = np.array(list(machine.mechanism.ground.values()), dtype=float)
     places = np.concatenate([*lines, ground.reshape(-1, machine.mechanism.dimensions)[:, :2]])
     low, high = places.min(axis=0), places.max(axis=0)
-    return low, high, float(np.max(high - low)) or 1.0
+    size = float(np.max(high - low)) or 1.0
+    return low - ROOM * size, high + ROOM * size, size
 
 
-def _framed(panel: Any, machine: "MechanismMachine") -> float:
-    """Set equal scales that fill a panel, with room for all that moves; the size [m]."""
-    low, high, size = _limits(machine)
-    middle, (x, y) = 0.5 * (low + high), 0.5 * (high - low) + 0.14 * size
-    box = panel.get_window_extent()
-    share = box.height / box.width
-    x, y = max(x, y / share), max(y, x * share)
-    panel.set(xlim=(middle[0] - x, middle[0] + x), ylim=(middle[1] - y, middle[1] + y))
-    panel.axis("off")
-    return size
+def _turn(count: int) -> Array:
+    """Crank angles (count,) [rad] at equal steps."""
+    return np.arange(count, dtype=np.float64) * (2.0 * math.pi / count)
 
 
-def _ring(size: float) -> Array:
-    """Circle (2, 60) as large as gaps are drawn."""
-    around = np.linspace(0.0, 2.0 * math.pi, 60)
-    return np.asarray(GAP * size * np.stack([np.cos(around), np.sin(around)]))
-
-
-def _draw_guides(panel: Any, machine: "MechanismMachine", theta: Array, size: float) -> None:
-    """Draw the guide of each prismatic joint on the ground: two lines, apart by the gap as it is drawn."""
-    for joint, places in _joint_places(machine, theta):
+def _guides(machine: "MechanismMachine", around: Array, size: float) -> list[Shape]:
+    """The guide of each prismatic joint on the ground: two lines, apart by the gap as it is drawn."""
+    lines = []
+    for joint, places in _joint_places(machine, around):
         if joint.kind not in ("prismatic", "slot", "cylindrical") or joint.first[0] != GROUND:
             continue
-        along = machine.mechanism.axes(machine.nominal_places(theta[:1]), joint)[0, :2, 0]
+        along = machine.mechanism.axes(around[:1], joint)[0, :2, 0]
         if np.linalg.norm(along) < 0.1:
             continue
         along = along / np.linalg.norm(along)
@@ -79,80 +70,73 @@ def _draw_guides(panel: Any, machine: "MechanismMachine", theta: Array, size: fl
         middle = float(np.mean(places @ across))
         for side in (-1.0, 1.0):
             off = (middle + side * (GAP + 0.03) * size) * across
-            ends = np.array([(end * along + off) for end in (reach.min() - 0.1 * size, reach.max() + 0.1 * size)])
-            panel.plot(*ends.T, color=INK, alpha=0.4, linewidth=2.0)
+            ends = np.array([end * along + off for end in (reach.min() - 0.1 * size, reach.max() + 0.1 * size)])
+            lines.append(Shape("line", moving(ends), width=2.0, alpha=0.4))
+    return lines
 
 
-def _draw_links(panel: Any, machine: "MechanismMachine", lines: dict[str, Array]) -> None:
-    for name, line in lines.items():
-        points = line[0]
+def _links(machine: "MechanismMachine", z: Array) -> list[Shape]:
+    """Each link as a line through its points, which are dots; the crank is the thickest."""
+    shapes = []
+    for name, line in link_lines(machine, z).items():
         width = 5.0 if name == machine.mechanism.driver.second[0] else 2.5
-        if len(points) > 1:
-            panel.plot(*points.T, color=INK, linewidth=width, solid_capstyle="round", zorder=3)
-        panel.plot(*points.T, "o", color="white", markeredgecolor=INK, markeredgewidth=1.5, markersize=5, zorder=4)
+        shapes += [Shape("line", moving(line), width=width)] if line.shape[1] > 1 else []
+        shapes.append(Shape("dot", moving(line), width=5.0, fill="white"))
+    return shapes
 
 
-def draw_mechanism(panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
-    """Draw the links in the last cycle, and the monitored joint's displacement where it is; see ``Machine.draw``."""
-    machine = record.machine
-    samples, now = samples_of(record), sample_at(record, moment)
-    per_cycle = len(samples) // len(record)
-    angle = np.array([2.0 * math.pi * (now % per_cycle) / per_cycle])
-    ghosts = np.arange(12, dtype=np.float64) * (2.0 * math.pi / 12)
-    size = _framed(panel, machine)
-    pale = [line for link in link_lines(machine, ghosts).values() for line in link]
-    panel.add_collection(LineCollection(pale, color=PALE, linewidth=1.0, alpha=0.6), autolim=False)
-    _draw_guides(panel, machine, ghosts, size)
+def sketch_of_mechanism(record: Any, rows: NDArray[np.int64], force_limit: float) -> Sketch:
+    """The links, and the monitored joint's displacement where it is; see ``Machine.sketch``."""
+    machine, samples, per_cycle = record.machine, samples_of(record), record.history.shape[1]
+    theta = (rows % per_cycle) * (2.0 * math.pi / per_cycle)
+    around, z = machine.nominal_places(_turn(AROUND)), machine.nominal_places(theta)
+    low, high, size = _limits(machine, around)
+    pale = [line for link in link_lines(machine, around[:: AROUND // GHOSTS]).values() for line in link]
     joint = next(each for each in machine.mechanism.joints if each.name == machine.monitored)
     gap = getattr(machine, machine.clearance_field)
-    z = machine.nominal_places(angle)
-    across = machine.mechanism.axes(z, joint)[0, :2, 1]
+    across = machine.mechanism.axes(z, joint)[:, :2, 1]
+    place = machine.mechanism.point(z, joint.second)[0][:, :2]
     times = GAP * size / gap if gap > 0.0 else 1.0
-    shift = samples[now, 0] * times * across
-    lines = link_lines(machine, angle)
-    _draw_links(panel, machine, lines)
-    place = machine.mechanism.point(z, joint.second)[0][0, :2]
-    around = np.linspace(0.0, 2.0 * math.pi, 60)
-    panel.plot(
-        place[0] + GAP * size * np.cos(around),
-        place[1] + GAP * size * np.sin(around),
-        color=INK,
-        linewidth=1.0,
-        zorder=5,
+    inside = place + times * samples[rows, 0, None] * across
+    push = 0.25 * size * np.clip(samples[rows, 2, None] / force_limit, -2.0, 2.0) * across
+    shapes = (
+        *(Shape("back", line[None, None], PALE, alpha=0.6) for line in pale),
+        *_guides(machine, around, size),
+        *_links(machine, z),
+        Shape("line", moving(place[:, None] + GAP * size * CIRCLE)),
+        Shape("dot", moving(inside[:, None]), None, 7.0),
+        Shape("line", moving(np.stack([inside, inside - push], axis=1)), None, 2.0),
     )
-    panel.plot(*(place + shift), "o", color=colour, markersize=7, zorder=6)
-    force = samples[now, 2] / force_limit
-    arrow = np.stack([place + shift, place + shift - 0.25 * size * np.clip(force, -2.0, 2.0) * across])
-    panel.plot(*arrow.T, color=colour, linewidth=2.0, zorder=6)
-    panel.text(
-        0.01, 0.01, f"crank angle {math.degrees(angle[0]):.0f}°", transform=panel.transAxes, fontsize=8, color=INK
-    )
-    panel.set_title(
+    return Sketch(
         f"Gap of {gap * 1e3:.3g} mm at the {joint.name}, drawn {times:.0f} times; dot: motion across it, bar: force",
-        fontsize=8.5,
-        loc="left",
-        gid=STAYS,
-        color=INK,
+        low,
+        high,
+        shapes,
+        [Words((low[0], low[1]), [f"crank angle {math.degrees(angle):.0f}°" for angle in theta], up="bottom")],
     )
 
 
 def draw_poses(panels: Any, machine: "MechanismMachine") -> None:
     """Draw the links at equal steps of the crank angle, one in each of the panels; rings and guides show the gaps."""
-    count = len(panels)
-    theta = np.arange(count, dtype=np.float64) * (2.0 * math.pi / count)
-    every = np.arange(72, dtype=np.float64) * (2.0 * math.pi / 72)
-    paths = link_lines(machine, every)
-    for k, panel in enumerate(panels):
-        size = _framed(panel, machine)
+    theta, around = _turn(len(panels)), machine.nominal_places(_turn(AROUND))
+    low, high, size = _limits(machine, around)
+    behind = [
+        Shape("line", moving(path[:, point]), PALE, 0.8)
+        for path in link_lines(machine, around).values()
+        for point in range(path.shape[1])
+    ] + _guides(machine, around, size)
+    ground = [
+        Shape("dot", moving(np.array([place[:2]])), width=6.0, marker="^")
+        for place in machine.mechanism.ground.values()
+    ]
+    for panel, angle in zip(panels, theta, strict=True):
+        z = machine.nominal_places(np.array([angle]))
+        frame(panel, low, high)
         panel.set_aspect("equal")
-        for path in paths.values():
-            for point in range(path.shape[1]):
-                panel.plot(*path[:, point].T, color=PALE, linewidth=0.8)
-        _draw_guides(panel, machine, every, size)
-        _draw_links(panel, machine, {name: line[k : k + 1] for name, line in link_lines(machine, theta).items()})
-        for joint, places in _joint_places(machine, theta):
-            if joint.opened:
-                panel.plot(*(places[k][:, None] + _ring(size)), color=WILD, linewidth=1.2, zorder=5)
-        for place in machine.mechanism.ground.values():
-            panel.plot(*place[:2], "^", color=INK, markersize=6)
-        panel.set_title(f"{math.degrees(theta[k]):.0f}°", fontsize=8.5)
+        rings = [
+            Shape("line", moving(place + GAP * size * CIRCLE), WILD, 1.2)
+            for joint, place in _joint_places(machine, z)
+            if joint.opened
+        ]
+        draw_shapes(panel, [*behind, *_links(machine, z), *rings, *ground])
+        panel.set_title(f"{math.degrees(angle):.0f}°", fontsize=8.5)

@@ -7,9 +7,10 @@ propagators (``core.binned.tables``) -> BinnedModel.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.core.binned.model import HERTZ, LINEAR
@@ -23,6 +24,9 @@ from chaosgym.machines.slider_crank.joints import display_of, gaps_of, joints_of
 from chaosgym.machines.slider_crank.mechanism import pin_and_pivot
 from chaosgym.machines.slider_crank.model import force_bound, held_of
 from chaosgym.machines.slider_crank.parameters import FITTED, CrankParameters
+
+if TYPE_CHECKING:
+    from chaosgym.machines.picture import Sketch
 
 DIMENSIONS = (
     "crank_radius",
@@ -192,11 +196,11 @@ class SliderCrank(CrankParameters):
         gap = float(getattr(self, self.clearance_field)) * (math.sqrt(3.0) if sensors else 1.0)
         return -gap, gap
 
-    def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
-        """Draw crank, rod and slider; see ``Machine.draw``."""
-        from chaosgym.machines.slider_crank.picture import draw_crank
+    def sketch(self, record: Any, rows: NDArray[np.int64], force_limit: float) -> "Sketch":
+        """Crank, rod and slider; see ``Machine.sketch``."""
+        from chaosgym.machines.slider_crank.picture import sketch_of_crank
 
-        draw_crank(panel, record, colour, moment, force_limit)
+        return sketch_of_crank(record, rows, force_limit)
 
     def share_of_bound(self, states: Array, peak_force: Array) -> float:
         """Largest force, as a share of that of an impact of all masses at ten times the speed of the crank pin."""
