@@ -1,6 +1,7 @@
 """The page in a real browser: it opens, a slider moves, the verdict follows, and nothing leaves this computer."""
 
 import json
+import math
 import signal
 import subprocess
 import sys
@@ -121,6 +122,52 @@ def test_the_file_of_a_machine_is_dragged_too(browser, tmp_path):
         check(browser.seen())
 
 
+MODEL = "Bokeh.documents[0].get_model_by_name"
+LINK = f"(() => {{ const {{x, y}} = {MODEL}('moving line').data, i = x.length - 3; return [...x[i], ...y[i]] }})()"
+"""Ends of the last link of a mechanism, which ring and bar of the force follow: across, then up."""
+
+PICTURE = deep(
+    "(() => { const view = Bokeh.index.find_one_by_id(Bokeh.documents[0].get_model_by_name('moving').id);"
+    "return view.canvas_view.primary.canvas.toDataURL() })()"
+)
+"""What is on the canvas of the machine's picture."""
+
+BUSY = """(() => {
+const send = WebSocket.prototype.send, ask = window.requestAnimationFrame, busy = () => window.busy = performance.now()
+WebSocket.prototype.send = function(...all) { busy(); send.call(this, ...all) }
+window.requestAnimationFrame = draw => { busy(); return ask(draw) }
+busy()
+})()"""
+"""Keeps when the page last drew or sent anything; the orbit diagram draws until it is full."""
+
+
+def test_the_links_of_a_mechanism_move(browser):
+    """A link moves and stays as long as it is; paused, nothing is drawn or sent, and a slider is followed still."""
+    with served("docs/machines/quick-return.toml") as address:
+        browser.visit(address, width=1400)
+        assert browser.wait(f"{HEADLINE}.includes('periodic')")
+        browser.wait(f"{MODEL}('moving line').data.x.length > 2")
+        moved = f"(at => `${{at}}` != window.at && (window.at = `${{at}}`) && at)({LINK})"
+        lengths = [math.dist(at[::2], at[1::2]) for at in (browser.wait(moved) for _ in range(4))]
+        assert lengths == pytest.approx([0.15] * 4, rel=1e-5), "the link's length in the file"
+        browser.wait(f"{PICTURE} != '{browser.value(PICTURE)}'")
+        told = deep("all(document, 'div').map(node => node.textContent).find(text => /^Gap of/.test(text))")
+        assert browser.value(told).startswith("Gap of 0.1 mm at the slot, drawn 240 times")
+        assert "times slower" in browser.value(told)
+        browser.click(browser.value(deep("middle(all(document, 'button').find(b => b.textContent == 'Pause'))")))
+        assert browser.wait(f"!{MODEL}('pause').active")
+        browser.value(BUSY)
+        held, shown = browser.value(LINK), browser.value(PICTURE)
+        browser.wait("performance.now() - window.busy > 3000", 240.0)
+        assert browser.value(LINK) == held
+        assert browser.value(PICTURE) == shown
+        browser.drag(browser.value(deep("middle(all(document, '.noUi-handle')[1])")), 60.0)
+        browser.wait(f"{PICTURE} != '{shown}'")
+        browser.wait(f"!{told}.includes('Gap of 0.1 mm')")
+        assert browser.value(LINK) == held, "at the same moment"
+        check(browser.seen())
+
+
 def test_a_link_that_says_nonsense_is_answered_in_words(address, browser):
     """No error page: the reason."""
     browser.visit(address.partition("?")[0] + "?machine=engine")
@@ -154,9 +201,9 @@ def test_the_page_stays_alive_while_a_link_is_computed(address, browser):
         asked.close()
 
 
-@pytest.mark.parametrize(("width", "columns"), [(1280, 2), (400, 1)])
+@pytest.mark.parametrize(("width", "columns"), [(1280, 3), (400, 1)])
 def test_the_page_fits(address, browser, width, columns, tmp_path):
-    """No scrolling sideways; two pictures beside each other, or one column; every handle has a name."""
+    """No scrolling sideways; the machine and two pictures beside each other, or one column; every handle has a name."""
     browser.visit(address, width=width)
     browser.wait(f"{HEADLINE}.includes('periodic')")
     browser.wait(deep("all(document, '.noUi-handle').every(node => node.getAttribute('aria-label'))"))

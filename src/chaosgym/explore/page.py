@@ -28,6 +28,7 @@ from bokeh.server.server import Server
 
 from chaosgym.errors import ChaosgymError
 from chaosgym.explore.gate import guard
+from chaosgym.explore.moving import Moving
 from chaosgym.explore.playback import Playback
 from chaosgym.explore.point import (
     View,
@@ -129,6 +130,7 @@ class Page:
         )
         self._choice.on_change("value", lambda name, old, new: self.show(MACHINES[new]()))
         self._panel = column(width=340, max_width=340)
+        self._moving = Moving(document)
         self._playback = Playback(document, self.show)
         document.title, document.template = "chaosgym explore", TEMPLATE
         document.js_on_event("document_ready", CustomJS(code=LABEL))
@@ -180,6 +182,7 @@ class Page:
 
     def _show_view(self, view: View) -> None:
         self._draw(view)
+        self._moving.show(view)
         colour = NATURE_COLOURS[view.nature]
         lines = "".join(f'<p style="margin:0 0 8px">{escape(line)}</p>' for line in view.lines)
         self._verdict.text = f'<h2 style="color:{colour};margin:4px 0 8px">{escape(view.headline)}</h2>{lines}'
@@ -258,7 +261,8 @@ class Page:
             _row(self._python, column(self._command, self._buttons(), sizing_mode="stretch_width")),
             sizing_mode="stretch_width",
         )
-        return column(_row(self._panel, pictures), self._link, sizing_mode="stretch_width")
+        machine = column(self._moving.panel, self._panel, width=340, max_width=340)
+        return column(_row(machine, pictures), self._link, sizing_mode="stretch_width")
 
     def _buttons(self) -> Any:
         """Buttons that copy Python, command and link, and one that plays the impacts."""

@@ -14,6 +14,7 @@ from chaosgym.diagnosis import Diagnosis, diagnose
 from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
 from chaosgym.machines import FILE_ENDING, MACHINES, Machine
 from chaosgym.machines.parameters import by_field, changes_of, parameters_of, with_settings
+from chaosgym.machines.picture import Sketch
 from chaosgym.monitor import Monitor
 from chaosgym.plotting.labels import axis_label
 from chaosgym.simulation import simulate
@@ -23,6 +24,9 @@ BUDGET = 400
 
 SHOWN_CYCLES, SAMPLES = 6, 300
 """Cycles of the time history and of the phase portrait, and samples of each."""
+
+SKETCHED, FRAMES = 2, 120
+"""Last cycles in which the machine is shown moving, at most, and moments of all of them."""
 
 DIAGRAM_POINTS, DIAGRAM_CYCLES, DIAGRAM_TRANSIENT = 140, 30, 60
 """Speeds of the orbit diagram, cycles shown of each, and cycles before them."""
@@ -58,6 +62,10 @@ class View:
         Peak forces [N] of the settled cycles, first side.
     room
         Displacement [m] at the lower and the upper stop.
+    sketch
+        The machine at ``FRAMES`` moments; None if it has no picture, or could not be followed.
+    span
+        Time [s] that these moments cover.
     nature
         Of the verdict; "undetermined" where the motion could not be followed.
     headline, lines
@@ -74,6 +82,8 @@ class View:
     nature: str
     headline: str
     lines: tuple[str, ...]
+    sketch: Sketch | None = None
+    span: float = 0.0
 
 
 def sliders_of(machine: Machine) -> list[Slider]:
@@ -158,6 +168,8 @@ def view_of(machine: Machine) -> View:
     last = simulate(machine, cycles, judged.section[-cycles], samples_per_cycle=SAMPLES).of_joint(judged.joint_name)
     assert last.history is not None
     motion = last.history.reshape(-1, 3)
+    sketched = min(SKETCHED, cycles)
+    rows = len(motion) - sketched * SAMPLES + np.arange(FRAMES) * sketched * SAMPLES // FRAMES
     heard = simulate(machine, MONITORED_CYCLES, judged.section[-1]).peak_force[:, judged.worst_side]
     return View(
         time=last.time,
@@ -170,6 +182,8 @@ def view_of(machine: Machine) -> View:
         nature=verdict.nature,
         headline=f"{verdict.words} ({verdict.status})",
         lines=(verdict.reason, _votes(verdict), _classified(machine), _watched(heard)),
+        sketch=machine.sketch(last, rows, float(np.abs(motion[:, 2]).max()) or 1.0),
+        span=sketched * machine.cycle_period,
     )
 
 
