@@ -176,6 +176,7 @@ def test_the_job_ends_when_it_is_done(name: str) -> None:
 @pytest.mark.parametrize(
     ("keywords", "message"),
     [
+        ({"lowest_speed": 0.0}, "lowest_speed: "),
         ({"lowest_speed": 300.0, "highest_speed": 200.0}, "lowest_speed = 300 is out of range; allowed: up to"),
         ({"cycles_per_step": 2.5}, "cycles_per_step = 2.5 is not a whole number"),
         ({"type_iii_weight": -1.0}, "type_iii_weight = -1 is out of range"),

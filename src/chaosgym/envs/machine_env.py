@@ -142,8 +142,11 @@ class EnvSettings:
             base = {name: value for name, value in base.items() if name not in kind.fidelity_ladder.get(fidelity, {})}
             fields["fidelity"] = fidelity
         nominal: Machine = with_settings(usual, base | fields)
-        for speed in (self.task.lowest_speed, self.task.highest_speed):
-            nominal.at(speed)
+        for name in ("lowest_speed", "highest_speed"):
+            try:
+                nominal.at(getattr(self.task, name))
+            except ParameterError as error:
+                raise ParameterError(f"{name}: {error}") from None
         self.variants = Variants(nominal, widths if tolerances is None else tolerances, split, sealed=sealed)
         self.model = with_settings(nominal, defaults.model if model_fidelity is None else {"fidelity": model_fidelity})
         self.unit = parameters_of(nominal)[nominal.speed_field].unit
