@@ -196,7 +196,7 @@ def test_where_there_is_no_motor_it_is_refused(motored):
         make(motored(), highest_speed=1600.0)
     with pytest.raises(ParameterError, match="drive = 'servo' is not one of constant, motor"):
         make(motored(), drive="servo")
-    with pytest.raises(ParameterError, match="without drive"):
+    with pytest.raises(ParameterError, match="not the speed to which a motor slips; allowed: drive = 'constant'"):
         chaosgym.Operator(Follow(), motored(), **EASY)
     plain = make(motored(), drive="constant")
     plain.reset(seed=0)

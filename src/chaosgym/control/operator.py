@@ -64,6 +64,11 @@ class Operator:
         self.policy = policy_of(policy)
         self._envs = native_envs(env, 1, **(keywords | self.policy.keywords))
         self.task, self._job = self._envs.task, self._envs.jobs.state
+        if self.task.drive == "motor":
+            raise ParameterError(
+                "an operator is told peak forces, and not the speed to which a motor slips; allowed: "
+                "drive = 'constant', for a drive that holds the speed it is given"
+            )
         if asked := asked_of(self.task):
             raise ParameterError(
                 f"an operator observes the {len(OBSERVATION_NAMES)} usual entries; allowed: a policy and keywords "
