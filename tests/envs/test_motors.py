@@ -185,6 +185,23 @@ def test_a_policy_knows_that_it_sets_a_motor(motored, tmp_path):
         policy.start(envs.unwrapped)
 
 
+def test_a_machine_of_a_fleet_that_can_not_start_is_drawn_anew(motored):
+    """Of motors of 6 to 14 N m many stall at 700 rpm: jobs begin on those that do not, the same for the same seed."""
+    path = motored(MOTOR.replace(f"{STALL} N m", "10 N m"))
+    started = {"options": {"speed": 700.0}}
+    env = make(path, "", tolerances={"motor_stall_torque": 0.4})
+    jobs = []
+    for seed in (*range(8), 0):
+        _, info = env.reset(seed=seed, **started)
+        assert info["status"] == Status.RUNNING
+        jobs.append((env.unwrapped.machine.motor_stall_torque, info["speed"], info["demand"]))
+    assert jobs[0] == jobs[-1]
+    envs = gym.make_vec("chaosgym/Machine-v0", num_envs=3, machine=path, **EASY, tolerances={"motor_stall_torque": 0.4})
+    envs.reset(seed=0, **started)
+    with pytest.raises(SimulationError, match="at a set-point of 600 rpm, on 20 other machines drawn too"):
+        make(path, "", tolerances={"motor_stall_torque": 0.01}).reset(seed=0, options={"speed": 600.0})
+
+
 def test_where_there_is_no_motor_it_is_refused(motored):
     """Built-in machines, those without [motor], set-points beyond its speed without load; one line says what to do."""
     for name in ("ImpactBeam-v1", "SliderCrank-v1", "AnyMachine-v0"):

@@ -31,6 +31,10 @@ LEAST_ERROR = 1e-6
 """Error [N] that the monitor of ideal sensors reckons with."""
 
 
+DRAWS = 20
+"""Times that other machines are drawn for those whose motor stalls before the job begins."""
+
+
 class StepResult(NamedTuple):
     """What a step of k jobs gave: (k, ...) observations, (k,) rewards, and (k,) records ``REPORT``, the info."""
 
@@ -122,20 +126,11 @@ class Jobs:
             If a machine can't be simulated at its starting speed.
         """
         task, variants = self.task, self.variants
-        for k, (i, generator) in enumerate(zip(which.tolist(), generators, strict=True)):
-            drawn = variants.drawn(generator)
-            self.demand[i] = demand_of(task, generator)
-            self.machines[i] = drawn if numbers is None else variants.held_out(int(numbers[k]))
-            self.state["clearance"][i] = getattr(self.machines[i], drawn.clearance_field)
-            self._lowest[i], self._span[i], self.force[i] = units = variants.units(self.machines[i])
-            top = units.lowest + units.span * task.highest_speed
-            self._job_time[i] = task.job_cycles * float(self.machines[i].period_at(top))
-        wanted = self.demand[which, 0] - task.start_below if speed is None else np.full(len(which), speed)
-        speeds = np.clip(wanted, task.lowest_speed, task.highest_speed)
-        if task.speed_grid > 0.0:
-            speeds = task.speed_grid * np.rint(speeds / task.speed_grid)
+        count = max(task.run_in_cycles, task.cycles_per_step)
+        self._draw(which, generators, numbers, speed)
+        if self._motors is not None and numbers is None:
+            self._redraw_stalled(which, generators, speed, count)
         state = self.state[which]
-        state["speed"] = state["set_point"] = speeds
         state["trim"], state["worn"] = 0.0, state["clearance"]
         state["done"], state["changed"], state["machine"] = 0, 0, DRAWN if numbers is None else numbers
         self.state[which], self.damage[which] = state, 0.0
@@ -146,14 +141,16 @@ class Jobs:
             self._records.forget(which)
         for i in which.tolist():
             self.batch.start(i, self.machines[i].at(self._speed_of(i)))
-            if self._motors is not None:
-                self._motors.start(i, self.machines[i], self._speed_of(i))
-        count = max(task.run_in_cycles, task.cycles_per_step)
+        if self._motors is not None:
+            self._start_motors(which)
         cycles, growth, period = self._run(which, count, generators)
         if self._motors is not None and self._motors.stalled[which].any():
             first = int(which[int(self._motors.stalled[which].argmax())])
+            whose = (
+                f", on {DRAWS} other machines drawn too" if numbers is None else ", on a machine kept for evaluation"
+            )
             raise SimulationError(
-                f"the motor stalls at a set-point of {self.state['set_point'][first]:g} rpm; give a higher "
+                f"the motor stalls at a set-point of {self.state['set_point'][first]:g} rpm{whose}; give a higher "
                 "lowest_speed, or a [motor] with more stall_torque or inertia"
             )
         if cycles.failed.any():
@@ -169,6 +166,44 @@ class Jobs:
             "clearance": state["clearance"],
         }
         return self._observe(which, cycles, period, generators), info
+
+    def _draw(self, which: Indices, generators: Generators, numbers: Indices | None, speed: float | None) -> None:
+        """Give the jobs ``which`` machines, demands and speeds."""
+        task, variants = self.task, self.variants
+        for k, (i, generator) in enumerate(zip(which.tolist(), generators, strict=True)):
+            drawn = variants.drawn(generator)
+            self.demand[i] = demand_of(task, generator)
+            self.machines[i] = drawn if numbers is None else variants.held_out(int(numbers[k]))
+            self.state["clearance"][i] = getattr(self.machines[i], drawn.clearance_field)
+            self._lowest[i], self._span[i], self.force[i] = units = variants.units(self.machines[i])
+            top = units.lowest + units.span * task.highest_speed
+            self._job_time[i] = task.job_cycles * float(self.machines[i].period_at(top))
+        wanted = self.demand[which, 0] - task.start_below if speed is None else np.full(len(which), speed)
+        speeds = np.clip(wanted, task.lowest_speed, task.highest_speed)
+        if task.speed_grid > 0.0:
+            speeds = task.speed_grid * np.rint(speeds / task.speed_grid)
+        self.state["speed"][which] = self.state["set_point"][which] = speeds
+
+    def _redraw_stalled(self, which: Indices, generators: Generators, speed: float | None, count: int) -> None:
+        """Draw others for those of the jobs ``which`` whose motor would stall within ``count`` cycles."""
+        assert self._motors is not None
+        for _ in range(DRAWS):
+            set_points = self._start_motors(which)
+            self._motors.turn(which, set_points, count, self.task.cycles_per_step)
+            stalled = self._motors.stalled[which]
+            if not stalled.any():
+                return
+            generators = [each for each, again in zip(generators, stalled, strict=True) if again]
+            which = which[stalled]
+            self._draw(which, generators, None, speed)
+
+    def _start_motors(self, which: Indices) -> Array:
+        """Let cranks turn at the speeds of their jobs, which are returned in the unit of the machine."""
+        assert self._motors is not None
+        speeds = self._lowest[which] + self._span[which] * self.speed[which]
+        for i, speed in zip(which.tolist(), speeds.tolist(), strict=True):
+            self._motors.start(i, self.machines[i], speed)
+        return speeds
 
     def step(self, which: Indices, actions: Array, generators: Generators) -> StepResult:
         """Run the jobs ``which`` (k,) for a step by checked actions; a simulation that fails ends its job."""
