@@ -64,12 +64,17 @@ def browser(tmp_path_factory):
         yield opened
 
 
+SPAN = "(({start, end}) => end - start)(Bokeh.documents[0].get_model_by_name('section').x_range)"
+"""How much of the displacement [mm] the section shows."""
+
+
 def test_a_slider_is_dragged_and_the_verdict_follows(address, browser):
     """At 19 Hz the beam is periodic; dragged to the right end, 30 Hz, it is chaotic, and so says the address."""
     browser.visit(address, width=1400)
     assert browser.wait(f"{HEADLINE}.includes('periodic, period 1 (certified)')")
     frequency = "Bokeh.documents[0].get_model_by_name('excitation_frequency').value"
     assert browser.value(frequency) == 19.0
+    assert browser.value(SPAN) > 1e-3, "one dot: what rounding moves is not magnified"
     browser.drag(browser.value(deep("middle(all(document, '.noUi-handle')[0])")), 400.0)
     assert browser.wait(f"{HEADLINE}.includes('chaotic')")
     assert browser.value(frequency) == 30.0

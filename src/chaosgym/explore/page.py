@@ -18,6 +18,7 @@ from bokeh.models import (
     ColumnDataSource,
     CustomJS,
     Div,
+    Range1d,
     Select,
     Span,
     TextAreaInput,
@@ -26,6 +27,7 @@ from bokeh.models import Slider as Widget
 from bokeh.plotting import figure
 from bokeh.server.server import Server
 
+from chaosgym.arrays import Array
 from chaosgym.errors import ChaosgymError
 from chaosgym.explore.gate import guard
 from chaosgym.explore.moving import Moving
@@ -52,6 +54,9 @@ AT_ONCE = 4
 """Speeds of the orbit diagram that are computed between two looks at the sliders."""
 
 TOOLS = "pan,wheel_zoom,box_zoom,reset,save"
+
+SEEN_SCATTER = 0.01
+"""Share of the motion that the axes of the section span at the least: a periodic motion scatters by rounding alone."""
 
 NUMBERS = 400
 """Steps of a slider."""
@@ -119,6 +124,7 @@ class Page:
             "peaks": ColumnDataSource({"n": [], "peak": []}),
             "orbit": ColumnDataSource({"speed": [], "peak": []}),
         }
+        self._window = Range1d(), Range1d()
         self._stops = [BoxAnnotation(fill_color=MUTED, fill_alpha=0.25) for _ in range(4)]
         self._here = Span(dimension="height", line_color=BAD, line_width=2)
         self._verdict = Div(sizing_mode="stretch_width")
@@ -195,7 +201,10 @@ class Page:
             "v": view.velocity,
             "f": view.force,
         }
-        self._sources["section"].data = {"x": 1e3 * view.section[:, 0], "v": view.section[:, 1]}
+        across, along = 1e3 * view.section[:, 0], view.section[:, 1]
+        self._sources["section"].data = {"x": across, "v": along}
+        for shown, dots, moved in zip(self._window, (across, along), (millimetres, view.velocity), strict=True):
+            _show_around(shown, dots, float(np.ptp(moved)))
         self._sources["peaks"].data = {"n": np.arange(1, len(view.peaks) + 1), "peak": view.peaks}
         for box, (field, side) in zip(self._stops, (("bottom", 1), ("top", 0), ("left", 1), ("right", 0)), strict=True):
             place = view.room[side]
@@ -239,7 +248,10 @@ class Page:
         force.line("time", "f", source=motion, color=ACCENT)
         portrait = self._figure("Phase portrait", "displacement [mm]", "velocity [m/s]")
         portrait.line("x", "v", source=motion, color=ACCENT)
-        strobe = self._figure("Once a cycle: stroboscopic section", "displacement [mm]", "velocity [m/s]")
+        window = {"x_range": self._window[0], "y_range": self._window[1]}
+        strobe = self._figure("Once a cycle: stroboscopic section", "displacement [mm]", "velocity [m/s]", **window)
+        strobe.name = "section"
+        strobe.xaxis[0].ticker.desired_num_ticks = 4
         strobe.scatter("x", "v", source=section, size=4, color=NATURE_COLOURS["chaotic"])
         record = self._figure("Peak force of every settled cycle", "cycle", "peak force [N]")
         record.scatter("n", "peak", source=peaks, size=3, color=ACCENT)
@@ -278,6 +290,14 @@ class Page:
         listen = Button(label="Listen", width=120)
         listen.js_on_click(CustomJS(args={"motion": self._sources["motion"]}, code=LISTEN))
         return row(*buttons, listen, stylesheets=[WRAPS])
+
+
+def _show_around(window: Range1d, dots: Array, moved: float) -> None:
+    """Let a range span the dots, and at least a share of what the motion ``moved``."""
+    half = max(0.55 * float(np.ptp(dots)), 0.5 * SEEN_SCATTER * moved) or 1.0
+    middle = 0.5 * float(dots.min() + dots.max())
+    ends = middle - half, middle + half
+    window.update(start=ends[0], end=ends[1], reset_start=ends[0], reset_end=ends[1])
 
 
 def _row(*parts: Any) -> Any:
