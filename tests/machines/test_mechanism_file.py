@@ -135,6 +135,15 @@ def test_a_wide_gap_is_told(file_of):
     assert "knee_clearance is 0.032 of the 0.25 m" in note
 
 
+def test_a_pin_larger_than_its_links_is_told(file_of):
+    """A radius of 9 m in place of 9 mm is noted beside every result, with joint, radius and length."""
+    for radius, notes in (("9 mm", 0), ("9 m", 1)):
+        rubs = f'name = "wrist"\nfriction = 0.1\nradius = "{radius}"\n{LOOSE}'
+        told = chaosgym.read_machine(file_of("slider-crank", ('name = "wrist"', rubs))).notes
+        assert len(told) == notes, told
+    assert told[0].startswith("wrist_radius of 9 m is more than the 0.235 m that its links reach")
+
+
 ROD = """points = { pin = "0, 0 mm", wrist = "235, 0 mm" }
 [[link.rod.body]]               # any number of rigid bodies
 mass = "0.30 kg"
@@ -242,6 +251,10 @@ REFUSED = [
     (('stiffness = "8 N/um"', 'hertz_stiffness = "1e10 N/m"'), "unknown unit 'N/m'"),
     (('name = "wrist"', f'name = "wrist"\nfriction = 0.1\n{LOOSE}'), "friction of a pin needs its radius"),
     (('name = "wrist"', f'name = "wrist"\nradius = "9 mm"\n{LOOSE}'), "a radius has no other meaning; allowed: both"),
+    (
+        ('name = "wrist"', f'name = "wrist"\nfriction = 0.1\nradius = "0 mm"\n{LOOSE}'),
+        "wrist_radius = 0 m leaves the friction of a pin without moment; allowed: above 0",
+    ),
     (('axis = "0 deg"', 'radius = "9 mm"'), "radius has no meaning in a prismatic joint; leave it out"),
     (('axis = "0 deg"', 'friction = 0.1\nradius = "9 mm"'), "radius has no meaning in a prismatic joint; leave it out"),
     (

@@ -146,6 +146,11 @@ def _clearance(name: str, kind: str, row: Mapping[str, Any], spatial: bool) -> C
             f"{where}.stations are at one place; allowed: two or more, or none for a guide without tilt"
         )
     found = Clearance(gap, stiffness, damping, stations, row.get("friction"), hertz, row.get("radius"))
+    if found.radius == 0.0:
+        raise ParameterError(
+            f"{name}_radius = 0 m leaves the friction of a pin without moment; allowed: above 0, or neither friction "
+            "nor radius"
+        )
     for what, (value, about) in found.fields.items():
         number(f"{name}_{what}", value, about["low"], about["high"], about["unit"].strip("-"))
     try:

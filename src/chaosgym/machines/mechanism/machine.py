@@ -423,7 +423,7 @@ class MechanismMachine(BinnedMachine):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Gaps that are not small, links that bend undamped, friction a motor does not feel, speeds it can't hold."""
+        """Gaps not small, large pins, links that bend undamped, friction a motor does not feel, speeds it can't hold."""
         told = (
             [f"the run-up under the motor leaves friction of {self.rubs} out"] if self.has_motor and self._rub else []
         )
@@ -435,6 +435,12 @@ class MechanismMachine(BinnedMachine):
             told.append(
                 f"{' and '.join(undamped)} bend without damping: updates of the matrices may make their motion grow "
                 "without end; give each a damping_ratio, such as 0.001, or halve matrix_update_interval"
+            )
+        reach = _reach(self.mechanism, self.rubs) if self._lever else math.inf
+        if self._lever and self._lever > reach:
+            told.append(
+                f"{self.rubs}_radius of {self._lever:g} m is more than the {reach:.3g} m that its links reach: "
+                "right for an eccentric, else a wrong unit or a place in the radius' stead"
             )
         for joint in self.mechanism.joints:
             if joint.opened:
