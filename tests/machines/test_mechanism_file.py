@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import re
 import tomllib
 from pathlib import Path
 
@@ -15,7 +16,7 @@ import chaosgym
 from chaosgym import simulate
 from chaosgym.cli import app
 from chaosgym.design.peak_impacts import peak_impacts, worn_side
-from chaosgym.errors import ChaosgymError, ParameterError
+from chaosgym.errors import ChaosgymError, ParameterError, SimulationError
 from chaosgym.machines.machine_file import TEMPLATES, schema_text, template
 from chaosgym.machines.mechanism.clearance import Clearance
 from chaosgym.machines.mechanism.machine_class import machine_of
@@ -336,3 +337,22 @@ def test_types_and_report_of_a_mechanism(file_of, tmp_path):
     brief = tmp_path / "brief.toml"
     brief.write_text(run("design", "--template", path).stdout)
     assert answer("design", brief, "--out", tmp_path / "report.html")["machine"]
+
+
+@pytest.mark.parametrize(("force", "buckles"), [(7000.0, False), (8000.0, True)])
+def test_a_rod_pushed_beyond_its_euler_load_is_named(file_of, force, buckles):
+    """Push / cos(rod's angle) against pi^2 E I / l^2 = 7546 N: told beside results, and where the motion grows."""
+    push = f'[[force]]\nat = "slider.wrist"\ndirection = "180 deg"\nforce = "{force} N"\n\n[operation]'
+    slow = ('speed = "400 rpm"', 'speed = "120 rpm"')
+    machine = chaosgym.read_machine(file_of("slider-crank", *BENT, ("[operation]", push), slow))
+    if not buckles:
+        assert machine.notes == ()
+        simulate(machine, 3)
+        return
+    (note,) = machine.notes
+    found = re.fullmatch(r"rod is pushed beyond its Euler load, .*: (\S+) N against (\S+) N at .* (\d+) deg", note)
+    assert found
+    load, euler = force / np.cos(np.arcsin(0.05 / 0.235)), np.pi**2 * 210e9 * np.pi * 0.008**4 / 64.0 / 0.235**2
+    assert [float(value) for value in found.groups()] == pytest.approx([load, euler, 90.0], rel=3e-3, abs=5.0)
+    with pytest.raises(SimulationError, match=re.escape(note) + "; the motion grew beyond every bound"):
+        simulate(machine, 200)

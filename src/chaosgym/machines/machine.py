@@ -358,6 +358,11 @@ class Machine(ABC):
         """Torque of its drive over a revolution while every gap stays in its middle; None if it has none to tell."""
         return None
 
+    @property
+    def instabilities(self) -> tuple[str, ...]:
+        """What may make its motion grow without end, as far as its equations tell; each a sentence."""
+        return ()
+
     def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
         """Draw the machine in motion.
 

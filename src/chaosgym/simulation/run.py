@@ -293,9 +293,9 @@ def simulate_with_deviations(
 
 def _failure(machine: Machine, outcome: int, cycle: int, integrator: Integrator) -> SimulationError:
     settings = ", ".join(f"{name}={getattr(machine, name)!r}" for name in parameters_of(machine))
-    return SimulationError(
-        f"{status.MESSAGES[outcome]} in cycle {cycle} with {integrator}; {type(machine).__name__}({settings})"
-    )
+    known = machine.instabilities if outcome == status.DIVERGED else ()
+    told = f"{status.MESSAGES[outcome]} in cycle {cycle} with {integrator}"
+    return SimulationError("; ".join([*known, told, f"{type(machine).__name__}({settings})"]))
 
 
 def simulate_many(

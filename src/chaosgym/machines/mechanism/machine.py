@@ -17,6 +17,7 @@ from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS
 from chaosgym.machines.drive_torque import DriveTorque
 from chaosgym.machines.mechanism.beam import fibre_stress
+from chaosgym.machines.mechanism.buckling import buckling
 from chaosgym.machines.mechanism.clearance import ROUND, surface_fields
 from chaosgym.machines.mechanism.equations import SmallMotion, assembled, crank_inertia, small_motion
 from chaosgym.machines.mechanism.joints import ACROSS, ALONG, PITCH, PLACES, SIDEWAYS, TURN, YAW, Joint
@@ -52,6 +53,9 @@ GUIDED = {ACROSS: {TURN: 1.0, PITCH: 1.0}, SIDEWAYS: {YAW: -1.0}}
 
 FRICTION_ROUNDS = 1000
 """Most rounds in which friction and the force that presses find each other."""
+
+AROUND = 72
+"""Crank angles at which links are asked whether they buckle."""
 
 LEAST_MASS = 1e-10
 """Least eigenvalue of a mass matrix whose diagonal is one."""
@@ -422,20 +426,31 @@ class MechanismMachine(BinnedMachine):
         return np.asarray(peak_force.max(axis=-1))
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """Gaps not small, large pins, links that bend undamped, friction a motor does not feel, speeds it can't hold."""
-        told = (
-            [f"the run-up under the motor leaves friction of {self.rubs} out"] if self.has_motor and self._rub else []
-        )
-        if self.has_motor:
-            _, no_load_speed, _ = (getattr(self, name) for name in MOTOR_FIELDS)
-            told += self.under_motor().notes(self.speed, no_load_speed)
+    def instabilities(self) -> tuple[str, ...]:
+        """Links that buckle, and links in space that bend undamped."""
+        told: list[str] = []
+        bend = [link for link in self.mechanism.links if link.beam is not None]
+        if bend:
+            stiffness = np.tensordot(self.crank_rate ** np.arange(3), self.equations(0.0, AROUND).stiffness, 1)
+            told += [text for link in bend for text in buckling(link, self.degrees_of_freedom, stiffness)]
         undamped = [link.name for link in self.mechanism.links if link.beam and not link.beam.damping_ratio]
         if len(undamped) > 1 and self.mechanism.dimensions == 3:
             told.append(
                 f"{' and '.join(undamped)} bend without damping: updates of the matrices may make their motion grow "
                 "without end; give each a damping_ratio, such as 0.001, or halve matrix_update_interval"
             )
+        return tuple(told)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Gaps that are not small, pins larger than links, motion that may grow, and limits of a motor."""
+        told = (
+            [f"the run-up under the motor leaves friction of {self.rubs} out"] if self.has_motor and self._rub else []
+        )
+        if self.has_motor:
+            _, no_load_speed, _ = (getattr(self, name) for name in MOTOR_FIELDS)
+            told += self.under_motor().notes(self.speed, no_load_speed)
+        told += self.instabilities
         reach = _reach(self.mechanism, self.rubs) if self._lever else math.inf
         if self._lever and self._lever > reach:
             told.append(
