@@ -1,6 +1,7 @@
 """Links that bend in space: against an exact twin of the thesis' crank, closed forms of a shaft, and the plane."""
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import chaosgym
 from chaosgym import SliderCrank, simulate
 from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.beam import Beam, bending_of, fibre_stress
+from chaosgym.machines.mechanism.buckling import buckling
 from chaosgym.machines.mechanism.equations import small_motion
 from chaosgym.machines.mechanism.joints import Joint
 from chaosgym.machines.mechanism.nominal import revolution_of
@@ -116,6 +118,34 @@ def test_a_shaft_turns_critical_where_its_pulled_frequency_is(pull):
     turned = found.damping[1, 0][pick]
     np.testing.assert_allclose(np.abs(turned), 2.0 * np.kron(np.eye(2), [[0.0, 1.0], [1.0, 0.0]]), atol=1e-9)
     np.testing.assert_allclose(turned, -turned.T, atol=1e-9)
+
+
+def push_in_euler_loads(pull):
+    """Of the shaft's end and of its own weight, in eight half waves: EI w4 + (P w')' = 0, pinned at both ends."""
+    waves, x = np.arange(1, 9) * math.pi / LENGTH, (np.arange(4000) + 0.5) * (LENGTH / 4000)
+    pushed = -pull * (1.0 + 7850.0 * AREA * (LENGTH - x))
+    slopes = waves[:, None] * np.cos(waves[:, None] * x)
+    work = (slopes * pushed) @ slopes.T * (LENGTH / 4000)
+    own = np.sqrt(0.5 * LENGTH * 2.1e11 * SECOND) * waves**2
+    return np.linalg.eigvalsh(work / np.outer(own, own))[-1]
+
+
+@pytest.mark.parametrize(("pull", "rate", "buckles"), [(-4300.0, 1.0, False), (-4700.0, 1.0, True), (0.0, 1e3, False)])
+def test_a_shaft_buckles_where_euler_says_and_not_by_turning_fast(pull, rate, buckles):
+    """Pushed at its end and by its own weight it is told in both planes, with the load and pi^2 E I / l^2.
+
+    At 1000 rad/s it turns far beyond its critical speed: whatever that does, no load pushes it.
+    """
+    mechanism = shaft(pull)
+    told = buckling(mechanism, revolution_of(mechanism), rate)
+    share, euler = push_in_euler_loads(pull), math.pi**2 * 2.1e11 * SECOND / LENGTH**2
+    assert (share > 1.0) == buckles
+    assert abs(share - 1.0) > 0.01
+    assert len(told) == 2 * buckles
+    for text, plane in zip(told, ("", "sideways "), strict=False):
+        assert text.startswith(f"shaft is pushed {plane}beyond its Euler load")
+        found = re.search(r": (\S+) N against (\S+) N", text)
+        assert [float(value) for value in found.groups()] == pytest.approx([share * euler, euler], rel=2e-3)
 
 
 BEAM = """[link.rod.beam]

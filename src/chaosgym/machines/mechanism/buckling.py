@@ -6,50 +6,59 @@ largest eigenvalue of that pair.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.machines.mechanism.beam import Beam
+from chaosgym.machines.mechanism.equations import assembled
 from chaosgym.machines.mechanism.links import Link
+from chaosgym.machines.mechanism.mechanism import Mechanism
+from chaosgym.machines.mechanism.nominal import Revolution
+
+ANGLES = 72
+"""Crank angles at which links are asked whether they buckle."""
 
 
-def buckling(link: Link, names: tuple[str, ...], stiffness: Array) -> tuple[str, ...]:
-    """Tell of a link beyond its Euler load, in each plane in which it bends.
-
-    Parameters
-    ----------
-    link
-        Whose ``beam`` bends.
-    names
-        Of the machine's n coordinates.
-    stiffness : (B, n, n)
-        At equal steps of a revolution, with that of the forces of the nominal motion.
+def buckling(mechanism: Mechanism, revolution: Revolution, rate: float) -> tuple[str, ...]:
+    """Tell of each link beyond its Euler load, in each plane in which it bends, at a rate [rad/s] of the crank.
 
     Returns
     -------
     tuple of str
-        Load, Euler load and crank angle; empty below the Euler load.
+        Load, Euler load and crank angle of each; empty if there is none.
     """
-    beam: Any = link.beam
+    bent = [(link, link.beam) for link in mechanism.links if link.beam is not None]
+    if not bent:
+        return ()
+    theta = np.linspace(0.0, 2.0 * math.pi, ANGLES, endpoint=False)
+    with_forces, without = (
+        assembled(mechanism, revolution, geometric=geometric).matrices_at(theta)[2] for geometric in (True, False)
+    )
+    stiffening = np.tensordot(rate ** np.arange(3), with_forces - without, 1)
     told = []
-    for plane, moment in (("", beam.second_moment), ("sideways ", beam.sideways_moment)):
-        modes = [name for name in link.elastic if name.startswith(f"{plane}mode ")]
-        if not modes:
-            continue
-        at = [names.index(f"{link.name} {name}") for name in modes]
-        own = link.stiffness.diagonal()[[link.elastic.index(name) for name in modes]]
-        pushed = np.eye(len(at)) - stiffness[:, at][:, :, at] / np.sqrt(np.outer(own, own))
-        shares = np.linalg.eigvalsh(pushed)[:, -1]
-        worst = int(np.argmax(shares))
-        if shares[worst] > 1.0:
-            euler = _euler_load(beam, moment)
-            told.append(
-                f"{link.name} is pushed {plane}beyond its Euler load, where it buckles: {shares[worst] * euler:.4g} N "
-                f"against {euler:.4g} N at crank angle {360.0 * worst / len(stiffness):.0f} deg"
-            )
+    for link, beam in bent:
+        for plane, moment in (("", beam.second_moment), ("sideways ", beam.sideways_moment)):
+            shares = _shares(mechanism, link, f"{plane}mode ", stiffening)
+            worst = int(np.argmax(shares))
+            if shares[worst] > 1.0:
+                euler = _euler_load(beam, moment)
+                told.append(
+                    f"{link.name} is pushed {plane}beyond its Euler load, where it buckles: "
+                    f"{shares[worst] * euler:.4g} N against {euler:.4g} N at crank angle "
+                    f"{360.0 * worst / ANGLES:.0f} deg"
+                )
     return tuple(told)
+
+
+def _shares(mechanism: Mechanism, link: Link, modes: str, stiffening: Array) -> Array:
+    """Load at each angle (B,) in Euler loads, of the geometric stiffness (B, n, n), in a plane whose modes begin so."""
+    names = [name for name in link.elastic if name.startswith(modes)]
+    if not names:
+        return np.zeros(len(stiffening))
+    at = [mechanism.coordinates.index(f"{link.name} {name}") for name in names]
+    own = np.sqrt(link.stiffness.diagonal()[[link.elastic.index(name) for name in names]])
+    return np.asarray(np.linalg.eigvalsh(-stiffening[:, at][:, :, at] / np.outer(own, own))[:, -1])
 
 
 def _euler_load(beam: Beam, second_moment: float) -> float:

@@ -54,9 +54,6 @@ GUIDED = {ACROSS: {TURN: 1.0, PITCH: 1.0}, SIDEWAYS: {YAW: -1.0}}
 FRICTION_ROUNDS = 1000
 """Most rounds in which friction and the force that presses find each other."""
 
-AROUND = 72
-"""Crank angles at which links are asked whether they buckle."""
-
 LEAST_MASS = 1e-10
 """Least eigenvalue of a mass matrix whose diagonal is one."""
 
@@ -428,11 +425,7 @@ class MechanismMachine(BinnedMachine):
     @property
     def instabilities(self) -> tuple[str, ...]:
         """Links that buckle, and links in space that bend undamped."""
-        told: list[str] = []
-        bend = [link for link in self.mechanism.links if link.beam is not None]
-        if bend:
-            stiffness = np.tensordot(self.crank_rate ** np.arange(3), self.equations(0.0, AROUND).stiffness, 1)
-            told += [text for link in bend for text in buckling(link, self.degrees_of_freedom, stiffness)]
+        told = [*buckling(self._scaled(), self.revolution, self.crank_rate)]
         undamped = [link.name for link in self.mechanism.links if link.beam and not link.beam.damping_ratio]
         if len(undamped) > 1 and self.mechanism.dimensions == 3:
             told.append(
