@@ -101,7 +101,8 @@ def _first_use_lines(found: dict[str, Any]) -> list[str]:
     lines = [f"{seconds:8.2f} s  {command}, compiled" for command, seconds in found["warm_seconds"].items()]
     for command, cost in found["cold"].items():
         lines.append(
-            f"{cost['seconds']:8.2f} s  {command}, first ever: {len(cost['functions'])} functions, the dearest"
+            f"{cost['seconds']:8.2f} s  {command}, first ever, {cost['wall_seconds']:.0f} s on the clock: "
+            f"{len(cost['functions'])} functions, the dearest"
         )
         lines += [f"{seconds:12.2f} s  {name}" for name, seconds in cost["functions"][:SHOWN_FUNCTIONS]]
     return lines

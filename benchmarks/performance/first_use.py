@@ -1,7 +1,7 @@
 """What the first use costs: a command with and without compiled kernels, and the functions that it compiles.
 
 Each command runs in a process of its own. Kernels are compiled into a new folder, which is removed; the user's is left
-alone. All figures are processor time.
+alone. All figures are processor time, but for ``wall_seconds``.
 """
 
 import contextlib
@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from typing import Any
+from unittest.mock import patch
 
 from numba.core import event
 
@@ -46,6 +47,7 @@ os._exit(0)  # whatever the diagram is at
 """Opens the page of explore, without a browser, until the first picture is there."""
 
 _CHILD = "import sys; from benchmarks.performance.first_use import compiled; compiled(sys.argv[1:])"
+"""Prints what each function takes that a command compiles, in one process."""
 
 
 class _Spent(event.Listener):  # type: ignore[misc] # numba has no types
@@ -70,9 +72,10 @@ class _Spent(event.Listener):  # type: ignore[misc] # numba has no types
 def compiled(words: Sequence[str]) -> None:
     """Run a command of this package and print what each function took that it compiled [s], as rows of a table."""
     from chaosgym.cli import app
+    from chaosgym.core import compilation
 
-    spent = _Spent()
-    with event.install_listener("numba:compile", spent), contextlib.redirect_stdout(io.StringIO()):
+    spent, alone = _Spent(), patch.object(compilation, "compile_beside")
+    with alone, event.install_listener("numba:compile", spent), contextlib.redirect_stdout(io.StringIO()):
         app(list(words), standalone_mode=False)
     for name, seconds in spent.rows:
         print(f"{seconds:.3f} {name}")
@@ -93,17 +96,21 @@ def cold_start(commands: Sequence[Sequence[str]] = COLD) -> dict[str, Any]:
     Returns
     -------
     dict
-        By command: ``seconds`` of the process and ``functions``, a list of (name, seconds without those within), the
-        dearest first; a function that is compiled for several types is there as often.
+        By command: ``wall_seconds``, with the processes that it compiles in; ``seconds`` of processor time of one
+        process that compiles all, and its ``functions``, a list of (name, seconds without those within), the dearest
+        first; a function that is compiled for several types is there as often.
     """
     result = {}
     for words in commands:
-        with tempfile.TemporaryDirectory() as folder:
+        with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as other:
+            began = time.perf_counter()
+            _processor_seconds([sys.executable, "-m", "chaosgym", *words], {**os.environ, "NUMBA_CACHE_DIR": other})
+            wall = time.perf_counter() - began
             environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
             seconds, printed = _processor_seconds([sys.executable, "-c", _CHILD, *words], environment)
         rows = [line.split() for line in printed.splitlines()]
         functions = sorted(((name, float(spent)) for spent, name in rows), key=lambda row: -row[1])
-        result[" ".join(words)] = {"seconds": seconds, "functions": functions}
+        result[" ".join(words)] = {"wall_seconds": wall, "seconds": seconds, "functions": functions}
     return result
 
 

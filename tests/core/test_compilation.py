@@ -75,6 +75,39 @@ def test_processes_that_start_together_compile_once(tmp_path):
     assert sorted(err.decode().count("compiling fixed_step.advance_fixed_step") for _, err in ended) == [0, 1]
 
 
+BESIDE = (
+    "from chaosgym import *; from chaosgym.core import compilation;"
+    "compilation.numba.config.NUMBA_DEFAULT_NUM_THREADS = {processors};"
+    "print(simulate(ImpactBeam(n_modes=1, fitted_modes=0), 3).peak_force.max());"
+    "from chaosgym.core.joints.cycle import advance_joints as kernel" + COUNT
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("processors", "here"), [(1, 1), (2, 0)])
+def test_on_two_processors_another_process_compiles_what_moves_a_beam(tmp_path, processors, here):
+    """It compiles just what this one then loads: the peak force is that of kernels compiled here, to the last bit."""
+    out, _ = _in_a_process(BESIDE.format(processors=processors), NUMBA_CACHE_DIR=str(tmp_path)).communicate()
+    force, missed, loaded = out.decode().split()
+    assert float(force) == simulate(ImpactBeam(n_modes=1, fitted_modes=0), 3).peak_force.max()
+    assert (int(missed), int(loaded)) == (here, 1 - here)
+
+
+@pytest.mark.slow
+def test_where_another_process_compiles_nothing_this_one_does(tmp_path):
+    """A process that fails costs no answer, and leaves no folder."""
+    code = (
+        "from chaosgym.core import compilation; from chaosgym.core.motor import round_speeds as kernel;"
+        "from chaosgym.core.modal_impact import tabulate; import numpy as np;"
+        "compilation.numba.config.NUMBA_DEFAULT_NUM_THREADS = 2;"
+        "compilation.compile_beside(kernel, tabulate, 'raise SystemExit(1)');"
+        "folder = compilation._beside[kernel].folder; speeds = np.array([[1.0 + 2**-50]]);"
+        "compilation.call(kernel, speeds); import os; print(os.path.exists(folder))" + COUNT
+    )
+    out, _ = _in_a_process(code, NUMBA_CACHE_DIR=str(tmp_path)).communicate()
+    assert out.decode().split() == ["False", "1", "0"]
+
+
 def test_what_is_compiled_already_waits_for_no_one():
     """While another process holds the lock, a kernel that lies on the disk is loaded at once."""
     simulate(ImpactBeam(), 1)

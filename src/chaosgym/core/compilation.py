@@ -4,6 +4,9 @@ The first call of a kernel in a process loads its machine code from the disk, or
 keeps it there. A lock lets one process compile while others that need a kernel not there yet wait and then load it;
 what is there already is loaded without the lock. A message says what takes so long, and a bar how much is left.
 
+A kernel can be compiled by another process beside this one, into a folder of its own, whose files are moved to the
+others under the lock (``compile_beside``).
+
 The machine code has a checksum beside it: a damaged file is compiled anew. Machine code, numba's index of it and
 checksums change under the lock alone. So a reader without the lock that finds them in disagreement can have met a
 change half done, and looks again with the lock.
@@ -14,15 +17,18 @@ import hashlib
 import logging
 import os
 import shutil
+import subprocess
+import sys
 import tempfile
 import threading
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
-from filelock import FileLock
+from filelock import FileLock, Timeout
 from numba.core import event
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
@@ -85,6 +91,7 @@ def prepare(kernel: Any, *arguments: Any) -> None:
         functions = set() if cached else {one for one in _functions_of(kernel) if not is_cached(one)}
         if not cached:
             logger.warning("compiling %s: %d functions, %s", name_of(kernel), len(functions), _how_often())
+            _take_over(kernel, len(functions))
         try:
             with _shown(functions):
                 kernel.compile(signature)
@@ -96,6 +103,82 @@ def prepare(kernel: Any, *arguments: Any) -> None:
             kernel.compile(signature)
         if not cached or any(kernel.stats.cache_misses.values()):
             _keep_checksums(kernel)
+
+
+class _Beside(NamedTuple):
+    """A process that compiles a kernel into a folder of its own."""
+
+    process: subprocess.Popen[bytes]
+    folder: str
+
+    @property
+    def compiled(self) -> int:
+        """Number of functions that it has compiled so far."""
+        return len(list(Path(self.folder).rglob("*.nbi")))
+
+    def end(self) -> None:
+        """Stop it, if it still runs, and remove its folder."""
+        self.process.kill()
+        self.process.wait()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+_beside: dict[Any, _Beside | None] = {}
+"""Kernels that were asked for by ``compile_beside``; None where no process compiles them any more, or ever did."""
+
+
+def compile_beside(kernel: Any, first: Any, code: str) -> None:
+    """Let another process compile ``kernel``, by running ``code``, while this one compiles ``first``.
+
+    It does so only if neither is on the disk, there are two processors, and no process compiles already. ``prepare``
+    waits for it. Whatever it lacks, because it fails or the code prepares other types, is compiled here.
+    """
+    if kernel in _beside:
+        return
+    _beside[kernel] = None
+    alone = numba.config.NUMBA_DEFAULT_NUM_THREADS < 2 or not sys.executable
+    if numba.config.DISABLE_JIT or alone or is_cached(kernel) or is_cached(first):
+        return
+    try:
+        with FileLock(_lock_file(), timeout=0):
+            folder = tempfile.mkdtemp(prefix="chaosgym-beside-")
+            paths = os.pathsep.join(path for path in sys.path if path)
+            environment = {**os.environ, "NUMBA_CACHE_DIR": folder, "PYTHONPATH": paths}
+            silent = {name: subprocess.DEVNULL for name in ("stdin", "stdout", "stderr")}
+            _beside[kernel] = _Beside(subprocess.Popen([sys.executable, "-c", code], env=environment, **silent), folder)
+    except (OSError, Timeout) as error:
+        logger.debug("no second process compiles %s: %s", name_of(kernel), error)
+
+
+def _take_over(kernel: Any, functions: int) -> None:
+    """Wait for the process that compiles a kernel, if there is one, and keep what it made and is not there yet."""
+    beside, _beside[kernel] = _beside.get(kernel), None
+    if beside is None:
+        return
+    try:
+        with _bar(functions) as bar:
+            while beside.process.poll() is None:
+                bar.update(min(beside.compiled, functions) - bar.n)
+                time.sleep(0.05)
+        for index in Path(beside.folder).rglob("*.nbi"):
+            kept = Path(KERNEL_CACHE).parent / index.parent.relative_to(beside.folder)
+            kept.mkdir(parents=True, exist_ok=True)
+            if not (kept / index.name).exists():
+                for path in (*index.parent.glob(f"{index.stem}.*.nbc"), index):
+                    shutil.move(path, kept / path.name)
+    finally:
+        beside.end()
+
+
+def _end_all() -> None:
+    for beside in filter(None, _beside.values()):
+        beside.end()
+
+
+atexit.register(_end_all)
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_beside.clear)
 
 
 class _NotCachedError(Exception):
@@ -163,11 +246,12 @@ class _Count(event.Listener):  # type: ignore[misc] # numba has no types
 @contextmanager
 def _shown(functions: set[Any]) -> Iterator[None]:
     """Bar of the functions that are compiled meanwhile, in a terminal, after two seconds."""
-    with (
-        tqdm(total=len(functions), desc="compiling", unit="function", delay=PATIENCE, disable=None, leave=False) as bar,
-        event.install_listener("numba:compile", _Count(functions, bar)),
-    ):
+    with _bar(len(functions)) as bar, event.install_listener("numba:compile", _Count(functions, bar)):
         yield
+
+
+def _bar(functions: int) -> Any:
+    return tqdm(total=functions, desc="compiling", unit="function", delay=PATIENCE, disable=None, leave=False)
 
 
 def _functions_of(kernel: Any) -> set[Any]:

@@ -347,11 +347,26 @@ def flexible_model(
 
 def with_tables(model: ModalImpactModel, step_phase: float | None = None, rate: float = 0.0) -> ModalImpactModel:
     """Give the model tables of its own, for a drive at ``rate`` [rad/s]; by default of the ``step_phase`` it has."""
-    from chaosgym.core.compilation import call
+    from chaosgym.core.compilation import call, compile_beside
+    from chaosgym.core.joints.cycle import advance_joints
     from chaosgym.core.modal_impact import tabulate
 
+    compile_beside(advance_joints, tabulate, f"from {__name__} import prepare_motion; prepare_motion()")
     phase = model.tables.step_phase if step_phase is None else step_phase
     return model._replace(tables=Tables(phase, *call(tabulate, model, phase, rate)))
+
+
+def prepare_motion() -> None:
+    """Compile or load the kernel that moves every machine of modes, which has one signature."""
+    from chaosgym.core.compilation import prepare
+    from chaosgym.core.cycle import cycle_arrays
+    from chaosgym.core.joints.cycle import advance_joints
+    from chaosgym.core.joints.run import JointRun
+    from chaosgym.core.tangent import no_tangents
+
+    numbers, places = np.empty(0), np.empty(0, np.int64)
+    run, arrays = JointRun(numbers, numbers, places, 1.0, 1.0), cycle_arrays(0, 0)
+    prepare(advance_joints, run, places, numbers, numbers, numbers, arrays, 0, no_tangents(0, 0), numbers)
 
 
 @dataclass(frozen=True, kw_only=True)
