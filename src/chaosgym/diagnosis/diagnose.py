@@ -1,7 +1,7 @@
 """The diagnosis of a machine: it runs in stages, each twice as long, until the verdict is sure.
 
 A motion that repeats after 16 or 32 cycles already is handed to Newton's method: if that proves the orbit, it is
-periodic, certified. All others start again with a deviation that travels along. After 100, 200, 400 ... cycles:
+periodic, certified. All others go on with a deviation that travels along. After 100, 200, 400 ... cycles:
 
     it repeats, or nearly    Newton's method proves the orbit: periodic, certified. Where it can't (near grazing), a
                              largest exponent below zero confirms the recurrence: periodic, agreed
@@ -33,7 +33,7 @@ from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, MotionState, simulate
 
 EARLY = (16, 32)
-"""Cycles after which a motion that repeats is tried for a proof, before any deviation travels along."""
+"""Cycles after which a motion that repeats is tried for a proof; a second trajectory only starts afterwards, anew."""
 
 ORBIT_CYCLES = 8
 """Cycles at least that are recorded on a proven orbit."""
@@ -55,6 +55,10 @@ GROWS = 1.05
 
 NEAR = 0.05
 """How far Newton's method may move, relative to the size of the motion, to find the orbit that the motion nears."""
+
+
+_Begun = tuple[CycleRecord, Array]
+"""A run from the initial state on, and the logarithm of what its deviation grew by in each cycle, (cycles,)."""
 
 
 @dataclass(frozen=True)
@@ -140,9 +144,10 @@ def diagnose_alone(
     if budget < FIRST_STAGE:
         raise DiagnosisError(f"budget = {budget} cycles is out of range; allowed: {FIRST_STAGE} or more")
     exact = integrator is None or isinstance(integrator, ExactEvents)
-    stage = _proven_early(machine, initial_state, integrator) if exact else None
+    deviation = Deviation(machine, initial_state, integrator)
+    stage, begun = _proven_early(machine, deviation, initial_state, integrator) if exact else (None, None)
     if stage is None:
-        stage = _last_stage(machine, Deviation(machine, initial_state, integrator), budget, sensor_error)
+        stage = _last_stage(machine, deviation, begun, budget, sensor_error)
     record = stage.record
     verdict = _periodic(stage) or _periodic_within(stage, sensor_error)
     verdict = verdict or (_without_contact(stage) if stage.linear else _not_periodic(stage))
@@ -162,13 +167,28 @@ def _on_orbit(machine: Machine, orbit: PeriodicOrbit) -> CycleRecord:
     return simulate(machine, cycles, orbit.state, transient=orbit.period)
 
 
+def _run_on(deviation: Deviation, begun: _Begun | None, cycles: int) -> _Begun:
+    """Go on with a run to a number of cycles."""
+    if begun is None:
+        return deviation.run(cycles)
+    record, growth = begun
+    more, more_growth = deviation.run(cycles - len(record))
+    return record.followed_by(more), np.concatenate([growth, more_growth])
+
+
 def _proven_early(
-    machine: Machine, initial_state: MotionState | ArrayLike | None, integrator: Integrator | None
-) -> _Stage | None:
-    """The stage in which a motion that soon repeats is proven to do so, else None."""
-    record, searched = None, 0
+    machine: Machine,
+    deviation: Deviation,
+    initial_state: MotionState | ArrayLike | None,
+    integrator: Integrator | None,
+) -> tuple[_Stage | None, _Begun | None]:
+    """The stage in which a motion that soon repeats is proven to do so, or None, and the run of the deviation."""
+    record, begun, searched = None, None, 0
     for cycles in EARLY:
-        if record is None:
+        if deviation.exact:
+            begun = _run_on(deviation, begun, cycles)
+            record = begun[0]
+        elif record is None:
             record = simulate(machine, cycles, initial_state, integrator=integrator)
         else:
             more = simulate(machine, cycles - len(record), record.final_state, integrator=integrator)
@@ -181,21 +201,22 @@ def _proven_early(
         if orbit is not None:
             per_cycle = np.full(2 * BLOCKS, np.log(max(orbit.largest_multiplier, 1e-300)) / orbit.period)
             exponent = average_growth(per_cycle, machine.cycle_period)
-            return _Stage(record, per_cycle, verdict, exponent, orbit, len(record) + searched)
-    return None
+            return _Stage(record, per_cycle, verdict, exponent, orbit, len(record) + searched), begun
+    return None, begun
 
 
-def _last_stage(machine: Machine, deviation: Deviation, budget: int, sensor_error: float) -> _Stage:
+def _last_stage(
+    machine: Machine, deviation: Deviation, begun: _Begun | None, budget: int, sensor_error: float
+) -> _Stage:
     """The stage after which the motion is known to be periodic in the end, or the budget ends."""
-    record, growth = deviation.run(FIRST_STAGE)
+    record, growth = _run_on(deviation, begun, FIRST_STAGE)
     searched = 0
     while True:
         stage = _stage(machine, record, growth, searched, deviation.round_off)
         if 2 * len(record) > budget or _periodic(stage) or _periodic_within(stage, sensor_error):
             break
         searched = stage.cycles_used - len(record)
-        more, more_growth = deviation.run(len(record))
-        record, growth = record.followed_by(more), np.concatenate([growth, more_growth])
+        record, growth = _run_on(deviation, (record, growth), 2 * len(record))
     if stage.verdict.nature == "undetermined" and not stage.linear:
         return replace(stage, verdict=two_step_test(record))
     return stage

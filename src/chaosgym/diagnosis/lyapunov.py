@@ -155,16 +155,17 @@ class Deviation:
     @property
     def round_off(self) -> float:
         """Exponent per cycle that rounding alone may give: of a second trajectory, its distance holds few digits."""
-        return ROUND_OFF if self._exact else ROUNDING / DISTANCE
+        return ROUND_OFF if self.exact else ROUNDING / DISTANCE
 
     @property
-    def _exact(self) -> bool:
+    def exact(self) -> bool:
+        """True where the deviation travels in the run of the motion; else it is a second trajectory."""
         exact = self._integrator is None or isinstance(self._integrator, ExactEvents)
         return self._machine.carries_deviations and exact
 
     def run(self, cycles: int) -> tuple[CycleRecord, Array]:
         """Run on; return the record and the logarithm of the deviation's growth in each cycle, (cycles,)."""
-        if self._exact:
+        if self.exact:
             integrator = self._integrator if isinstance(self._integrator, ExactEvents) else None
             record, vectors, growth = simulate_with_deviations(
                 self._machine, cycles, self.state, deviations=self._direction, integrator=integrator
