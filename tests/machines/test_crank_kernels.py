@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numba import njit
 
 from chaosgym import SliderCrank
 from chaosgym.core.binned.cycle import advance
@@ -189,15 +190,21 @@ def test_contacts_that_change_together_do_not_change_each_other_without_end():
         simulate(machine, 3, integrator=ExactEvents(event_budget=400))
 
 
+@njit
+def judged(h, e0, d0, e1, d1, fourth):
+    """What ``judge`` says, which kernels alone call."""
+    return judge(h, e0, d0, e1, d1, fourth)
+
+
 def test_a_cubic_that_dips_between_slopes_of_one_sign_is_not_taken_for_quiet():
     """A reading that is positive and falls at both ends of a step, but negative in between, is never said to keep."""
     ends = (1.0, 0.01, -1.0, 0.05, -1.0)
     e0, d0, e1, d1 = ends[1:]
     assert min(cubic(e0, d0, e1, d1, 1.0, t)[0] for t in np.linspace(0.0, 1.0, 11)) < 0.0
-    assert judge(*ends, 0.0) == UNSURE
+    assert judged(*ends, 0.0) == UNSURE
     # nor is one that is positive all along, if its fourth derivative may bend it below zero
-    assert judge(1.0, 0.01, 0.0, 0.01, 0.0, 0.0) == KEEPS
-    assert judge(1.0, 0.01, 0.0, 0.01, 0.0, 0.01 * 385.0) == UNSURE
+    assert judged(1.0, 0.01, 0.0, 0.01, 0.0, 0.0) == KEEPS
+    assert judged(1.0, 0.01, 0.0, 0.01, 0.0, 0.01 * 385.0) == UNSURE
 
 
 @pytest.mark.parametrize(

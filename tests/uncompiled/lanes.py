@@ -194,7 +194,7 @@ def sum_series(series, at, stride, last, time, out, out_at, width):
 @operation
 def item(own, at):
     """Number at a place."""
-    return own[at]
+    return own.reshape(-1)[at]
 
 
 @operation
@@ -212,7 +212,7 @@ def power_of_two(power):
 @operation
 def put(own, at, value):
     """Number put at a place."""
-    own[at] = value
+    own.reshape(-1)[at] = value
 
 
 @operation

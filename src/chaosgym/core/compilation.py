@@ -44,12 +44,12 @@ logger = logging.getLogger("chaosgym")
 PATIENCE = 2.0
 """Seconds after which a bar appears."""
 
-_ready: set[tuple[Any, int]] = set()
+_ready: set[tuple[Any, tuple[type, ...]]] = set()
 
 
 def call(kernel: Any, *arguments: Any) -> Any:
     """Call a kernel; the first time, compile it or load it while no other process does."""
-    key = (kernel, len(arguments))
+    key = (kernel, tuple(map(type, arguments)))
     if key not in _ready:
         prepare(kernel, *arguments)
         _ready.add(key)
@@ -87,11 +87,11 @@ def prepare(kernel: Any, *arguments: Any) -> None:
         return
     with FileLock(_lock_file()):
         _discard_damaged(kernel)
-        cached = is_cached(kernel)
-        functions = set() if cached else {one for one in _functions_of(kernel) if not is_cached(one)}
-        if not cached:
-            logger.warning("compiling %s: %d functions, %s", name_of(kernel), len(functions), _how_often())
-            _take_over(kernel, len(functions))
+        if _loaded(kernel, signature):
+            return
+        functions = {kernel} | {one for one in _functions_of(kernel) if not is_cached(one)}
+        logger.warning("compiling %s: %d functions, %s", name_of(kernel), len(functions), _how_often())
+        _take_over(kernel, len(functions))
         try:
             with _shown(functions):
                 kernel.compile(signature)
@@ -101,8 +101,7 @@ def prepare(kernel: Any, *arguments: Any) -> None:
             logger.warning("machine code of %s can't be read (%s) and is made anew", name_of(kernel), error)
             _remove(_all_files(kernel))
             kernel.compile(signature)
-        if not cached or any(kernel.stats.cache_misses.values()):
-            _keep_checksums(kernel)
+        _keep_checksums(kernel)
 
 
 class _Beside(NamedTuple):
@@ -144,8 +143,10 @@ def compile_beside(kernel: Any, first: Any, code: str) -> None:
             folder = tempfile.mkdtemp(prefix="chaosgym-beside-")
             paths = os.pathsep.join(path for path in sys.path if path)
             environment = {**os.environ, "NUMBA_CACHE_DIR": folder, "PYTHONPATH": paths}
-            silent = {name: subprocess.DEVNULL for name in ("stdin", "stdout", "stderr")}
-            _beside[kernel] = _Beside(subprocess.Popen([sys.executable, "-c", code], env=environment, **silent), folder)
+            none = subprocess.DEVNULL
+            command = [sys.executable, "-c", code]
+            process = subprocess.Popen(command, env=environment, stdin=none, stdout=none, stderr=none)
+            _beside[kernel] = _Beside(process, folder)
     except (OSError, Timeout) as error:
         logger.debug("no second process compiles %s: %s", name_of(kernel), error)
 
@@ -166,16 +167,13 @@ def _take_over(kernel: Any, functions: int) -> None:
             if not (kept / index.name).exists():
                 for path in (*index.parent.glob(f"{index.stem}.*.nbc"), index):
                     shutil.move(path, kept / path.name)
+    except OSError as error:
+        logger.debug("machine code of %s from another process can't be kept: %s", name_of(kernel), error)
     finally:
         beside.end()
 
 
-def _end_all() -> None:
-    for beside in filter(None, _beside.values()):
-        beside.end()
-
-
-atexit.register(_end_all)
+atexit.register(lambda: [beside.end() for beside in _beside.values() if beside is not None])
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_beside.clear)
@@ -201,7 +199,7 @@ class _Refusal(event.Listener):  # type: ignore[misc] # numba has no types
 
 
 def _loaded(kernel: Any, signature: tuple[Any, ...]) -> bool:
-    """Load sound machine code of a kernel without the lock; False where there is none for these arguments."""
+    """Load sound machine code of a kernel, which takes no lock; False where there is none for these arguments."""
     files = _files_of(kernel)
     if not files or not all(map(_is_sound, files)):
         return False
@@ -255,7 +253,10 @@ def _bar(functions: int) -> Any:
 
 
 def _functions_of(kernel: Any) -> set[Any]:
-    """A kernel and all kernels that it calls, but for those that are written out in their callers."""
+    """A kernel and all kernels that it may call, but for those that are written out in their callers.
+
+    Friction is among them also where no joint rubs, and it is not compiled.
+    """
     found, ahead = {kernel}, [kernel]
     while ahead:
         function = ahead.pop().py_func

@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 
 from numba import njit
 from numba.core import caching
+from numba.core.registry import CPUDispatcher
 
 from chaosgym.core.kernel_cache import cache_folder
 
-__all__ = ["SideBySide", "leaf", "njit", "part", "side_by_side"]
+__all__ = ["SideBySide", "entry", "leaf", "njit", "part", "side_by_side"]
 
 # with an underscore in older versions of numba
 _Locator: Any = getattr(caching, "UserProvidedCacheLocator", None) or caching._UserProvidedCacheLocator
@@ -44,10 +45,32 @@ class _ByContent(_Locator):  # type: ignore[misc] # numba has no types
 caching.CacheImpl._locator_classes = [_ByContent, *caching.CacheImpl._locator_classes]
 
 
-def leaf(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a kernel that allocates no array and returns none, without reference counts."""
-    compiled: Callable[..., Any] = njit(cache=True, nogil=True, _nrt=False, error_model="numpy")(function)
+_LEAF = {"cache": True, "nogil": True, "_nrt": False, "error_model": "numpy", "no_cfunc_wrapper": True}
+
+
+def entry(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a ``leaf`` that Python calls."""
+    compiled: Callable[..., Any] = njit(**_LEAF)(function)
     return compiled
+
+
+def leaf(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a kernel that allocates no array and returns none, without reference counts.
+
+    Kernels alone call it: what takes arguments over from Python would be a tenth of all that is compiled.
+    """
+    compiled: Callable[..., Any] = njit(**_LEAF, no_cpython_wrapper=True)(function)
+    if isinstance(compiled, CPUDispatcher):
+        compiled.__class__ = _Inner
+    return compiled
+
+
+class _Inner(CPUDispatcher):  # type: ignore[misc] # numba has no types
+    """A kernel that Python can't call: without this the process would crash."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Refuse."""
+        raise TypeError(f"{self.__name__} is called by kernels alone; declare it with entry, not with leaf")
 
 
 def part(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -128,5 +128,5 @@ def advance_model(model, share, step_phase, event_tolerance, state, bouncing, ar
     values, own, at, rows, weights = suited_run(model, step_phase)
     run = JointRun(values, own, at, share * (1.0 / model.excitation_frequency), event_tolerance / step_phase)
     kept = room_for(at, bouncing, tangents)
-    outcome = advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, tangents, kept)
+    outcome = advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, tangents, kept, None)
     return outcome[0], outcome[1]

@@ -58,6 +58,7 @@ def _vary_beam(batch, regimes, tables, i, speeds, motions, vectors, growth, arra
             settings.event_budget,
             Tangents(vectors[i], growth[k, c : c + 1]),
             kept,
+            None,
         )[0]
         if outcome != 0:
             return outcome

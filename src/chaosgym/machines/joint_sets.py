@@ -340,7 +340,7 @@ class JointTables:
         """Run as many cycles as ``arrays`` has rows; see ``Machine.run``. ``stops`` (m, 2) are positions [m]."""
         done, cycles, made, own = 0, len(arrays.section), 0, self.space(stops)
         weights = call(displacement_weights, self._stiffness, self.frequency)
-        kept = room_for(self._at, bouncing, tangents)
+        kept, rubs = room_for(self._at, bouncing, tangents), True if len(self._sets.sliders.joint) else None
         while True:
             part = CycleArrays(*(values[done:] for values in arrays))
             along = tangents._replace(log_growth=tangents.log_growth[done:])
@@ -348,7 +348,7 @@ class JointTables:
                 tables, rows = self._tables, self._rows
             run = JointRun(tables, own, self._at, 1.0 / self.frequency, integrator.event_tolerance / self._step_phase)
             motion = (state, bouncing, part, integrator.event_budget, along)
-            outcome, finished, code = call(advance_joints, run, rows, weights, *motion, kept)
+            outcome, finished, code = call(advance_joints, run, rows, weights, *motion, kept, rubs)
             done += finished
             made = 1 if finished else made + 1
             if outcome != status.NEEDS_SET or not self.provide(code, made):

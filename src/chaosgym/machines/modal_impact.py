@@ -366,7 +366,7 @@ def prepare_motion() -> None:
 
     numbers, places = np.empty(0), np.empty(0, np.int64)
     run, arrays = JointRun(numbers, numbers, places, 1.0, 1.0), cycle_arrays(0, 0)
-    prepare(advance_joints, run, places, numbers, numbers, numbers, arrays, 0, no_tangents(0, 0), numbers)
+    prepare(advance_joints, run, places, numbers, numbers, numbers, arrays, 0, no_tangents(0, 0), numbers, None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -538,7 +538,7 @@ class ModalImpactMachine(Machine):
         period = share * (1.0 / model.excitation_frequency)
         run = JointRun(tables, own, at, period, integrator.event_tolerance / step)
         motion = coordinates, bouncing, arrays, integrator.event_budget, along, room_for(at, bouncing, along)
-        status, done, _ = call(advance_joints, run, rows, weights, *motion)
+        status, done, _ = call(advance_joints, run, rows, weights, *motion, None)
         return status, done
 
     def share_of_bound(self, states: Array, peak_force: Array) -> float:

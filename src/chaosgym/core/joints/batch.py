@@ -87,6 +87,7 @@ def _advance(batch, i, speeds, motions, vectors, growth, arrays, settings, until
             settings.event_budget,
             Tangents(vectors[i], growth[k, done[k] : done[k] + 1]),
             kept,
+            True,
         )
         if outcome != 0:
             return outcome, code

@@ -83,8 +83,8 @@ from chaosgym.core.joints.tables import (
     TO,
     WIDTH,
 )
-from chaosgym.core.kernel import leaf, part
-from chaosgym.core.lanes import LANES, add_columns, propagate, propagate_and_expand
+from chaosgym.core.kernel import entry, leaf, part
+from chaosgym.core.lanes import LANES, add_columns, item, propagate, propagate_and_expand, put
 from chaosgym.core.tangent import MAX_CONTRACTION, orthonormalise
 
 STEPS_PER_EVENT = 1000
@@ -108,7 +108,7 @@ def begin_cycle(run, state, arrays, cycle):
 
 
 @leaf
-def begin_state(run, state):
+def begin_state(run, state, rubs):
     """Write a state at phase zero of the drive, which surfaces press in it, and what friction does there."""
     own, first, states = run.own, run.at[STATE], 2 * run.at[MODES]
     for i in range(states):
@@ -118,7 +118,8 @@ def begin_state(run, state):
     for column in range(2 * run.at[JOINTS]):
         own[run.at[PEAKS] + column] = 0.0
     find_sides(run, state)
-    begin_friction(run, state)
+    if rubs is not None:
+        begin_friction(run, state)
 
 
 @part
@@ -131,11 +132,11 @@ def add_contact_time(run, span, contact_time):
 
 
 @leaf
-def carry(run, weights, row, elapsed, tangents, cycle):
+def carry(run, weights, row, elapsed, tangents, cycle, rubs):
     """Advance deviations (k, 2n + f) by ``elapsed`` seconds in a set; see ``tangent.carry``."""
     own, at, vectors = run.own, run.at, tangents.vectors
-    n, width, states, spare, rubs = at[MODES], at[WIDTH], 2 * at[MODES], at[SPARE], at[SLIDERS] > 0
-    columns = 2 * at[BLOCKS] if rubs else states
+    n, width, states, spare = at[MODES], at[WIDTH], 2 * at[MODES], at[SPARE]
+    columns = states if rubs is None else 2 * at[BLOCKS]
     several = tangents.log_growth.shape[1] > 1
     pieces, steepest = 1, 0.0
     if several:
@@ -147,14 +148,14 @@ def carry(run, weights, row, elapsed, tangents, cycle):
         for k in range(vectors.shape[0]):
             for i in range(states):
                 own[at[STATE] + i] = vectors[k, i]
-            if rubs:
+            if rubs is not None:
                 write_anchors(run, vectors, k)
             add_columns(run.tables, row + at[TO], 2 * width, columns, own, at[STATE], own, spare, LANES)
             travel(run, row, elapsed / pieces, spare, spare)
             add_columns(run.tables, row + at[FROM], at[STATES], 2 * width, own, spare, own, at[STATE], LANES)
             for i in range(states):
                 vectors[k, i] = own[at[STATE] + i]
-            if rubs:
+            if rubs is not None:
                 read_anchors(run, spare + n + at[HARMONICS], vectors, k)
         if several:
             orthonormalise(weights, tangents, cycle)
@@ -166,18 +167,18 @@ def enter_along(run, row, vectors, moving, first):
     own, at, spare, width, states = run.own, run.at, run.at[SPARE], 2 * run.at[WIDTH], 2 * run.at[MODES]
     for k in range(vectors.shape[0]):
         for i in range(states):
-            own[spare + i] = vectors[k, i]
+            put(own, spare + i, item(vectors, k * states + i))
         add_columns(run.tables, row + at[TO], width, states, own, spare, moving, first + k * width, LANES)
 
 
 @leaf
 def leave_along(run, row, vectors, moving, first):
     """Put modal coordinates of ``enter_along`` back into deviations."""
-    own, at, spare, width = run.own, run.at, run.at[SPARE], 2 * run.at[WIDTH]
+    own, at, spare, width, states = run.own, run.at, run.at[SPARE], 2 * run.at[WIDTH], 2 * run.at[MODES]
     for k in range(vectors.shape[0]):
         add_columns(run.tables, row + at[FROM], at[STATES], width, moving, first + k * width, own, spare, LANES)
-        for i in range(2 * at[MODES]):
-            vectors[k, i] = own[spare + i]
+        for i in range(states):
+            put(vectors, k * states + i, item(own, spare + i))
 
 
 @leaf
@@ -211,20 +212,21 @@ def touch(run, j, side, vectors):
 
 
 @leaf
-def end_cycle(run, weights, row, elapsed, arrays, cycle, events, tangents):
+def end_cycle(run, weights, row, elapsed, arrays, cycle, events, tangents, rubs):
     """Record a cycle of some events, and carry deviations the rest of the way, which may be none.
 
     The state is in the work space.
     """
     own, at = run.own, run.at
-    note_deflections(run)
+    if rubs is not None:
+        note_deflections(run)
     arrays.events[cycle] = events
     for column in range(2 * at[JOINTS]):
         arrays.peak_force[cycle, column] = own[at[PEAKS] + column]
     if elapsed > 0.0:
         for i in range(2 * at[MODES]):
             own[at[U] + i] = own[at[STATE] + i]
-        carry(run, weights, row, elapsed, tangents, cycle)
+        carry(run, weights, row, elapsed, tangents, cycle, rubs)
         for i in range(2 * at[MODES]):
             own[at[STATE] + i] = own[at[U] + i]
     if tangents.log_growth.shape[1] > 0:
@@ -260,14 +262,15 @@ def room_for(at, bouncing, tangents):
     return np.empty(bouncing.size + tangents.vectors.size + tangents.vectors.shape[0] * 2 * at[WIDTH])
 
 
-@leaf
-def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, tangents, kept):
+@entry
+def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, tangents, kept, rubs):
     """Advance ``state`` (2n + f,) and ``bouncing`` (3m,) in place by whole cycles, one for each row of ``arrays``.
 
     Every cycle starts at phase zero of the drive; ``tangents`` travel with the motion, and there may be none.
     ``rows`` (product of the digits of all joints,) tell where in the tables the row of each set of pressed surfaces
     begins, -1 where there is none yet; ``weights`` (n + f,) are those of displacements and tangential springs in
     ``orthonormalise``. ``kept`` is from ``room_for``: as a leaf it counts no references, which doubles its speed.
+    ``rubs`` is True, or None where no joint has friction: numba then compiles none of it.
     One deviation whose growth is asked for moves along by the tables of the motion. Others are carried from event to
     event by exponentials: those of the matrix of a map, several that are kept orthonormal, and all where anchors of
     friction move.
@@ -286,7 +289,7 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
         begin_cycle(run, state, arrays, cycle)
         for k in range(tangents.log_growth.shape[1]):
             tangents.log_growth[cycle, k] = 0.0
-        begin_state(run, state)
+        begin_state(run, state, rubs)
         history = arrays.history[cycle]
         contact_time, bounce_time = arrays.contact_time[cycle], arrays.bounce_time[cycle]
         code = pressed_set(run)
@@ -370,7 +373,7 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
                 return undone(np.int64(status.EVENT_BUDGET), cycle, code, bouncing, vectors, kept)
             touches = towards * own[place_of(run, changed) + 1 + RATES] > 0.0
             if carries:
-                carry(run, weights, row, time - carried, tangents, cycle)
+                carry(run, weights, row, time - carried, tangents, cycle, rubs)
                 carried = time
             if follows:
                 leave_along(run, row, vectors, kept, first)
@@ -379,7 +382,7 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
             if changed < m:
                 side += known(run, changed, SIDE)
                 own[at[JOINT] + changed * NUMBERS + SIDE] = towards
-            if at[SLIDERS] > 0:
+            if rubs is not None:
                 change_friction(run, changed)
             code = pressed_set(run)
             row = rows[code]
@@ -389,7 +392,7 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
                 which = UPPER if towards > 0.0 else LOWER
                 arrays.impacts[cycle, 2 * changed + which] += 1
                 note_touch(bouncing, m, changed, towards, time, bounce_time)
-                if carries and at[SLIDERS] > 0:
+                if rubs is not None and carries:
                     touch_friction(run, changed, towards, touches, instant, vectors)
                 if touches and deviations > 0:
                     touch(run, changed, towards, vectors)
@@ -405,12 +408,13 @@ def advance_joints(run, rows, weights, state, bouncing, arrays, event_budget, ta
         if follows:
             leave_along(run, row, vectors, kept, first)
         leave(run, row)
-        end_cycle(run, weights, row, time - carried if carries else 0.0, arrays, cycle, events, tangents)
+        end_cycle(run, weights, row, time - carried if carries else 0.0, arrays, cycle, events, tangents, rubs)
         for i in range(2 * at[MODES]):
             if not math.isfinite(own[at[STATE] + i]):
                 return undone(np.int64(status.DIVERGED), cycle, code, bouncing, vectors, kept)
         for i in range(2 * at[MODES]):
             state[i] = own[at[STATE] + i]
-        write_deflections(run, state)
+        if rubs is not None:
+            write_deflections(run, state)
         let_pass(bouncing, m, run.period)
     return status.OK, arrays.section.shape[0], 0
