@@ -80,6 +80,6 @@ def test_the_constraint_holds_and_is_used_up(monkeypatch):
 
 def test_a_limit_that_nothing_reaches_changes_nothing(monkeypatch):
     """The push goes to the end of its range, and the multiplier stays at zero."""
-    push, _, multiplier = _trained(2.0, 30_000, monkeypatch)
+    push, _, multiplier = _trained(2.0, 15_000, monkeypatch)
     assert push > 0.9
     assert multiplier == 0.0

@@ -74,7 +74,7 @@ def test_a_picture_on_a_full_disk_is_one_line(tmp_path):
 def test_every_command_ends_cleanly_on_a_full_disk_and_with_a_closed_output(tmp_path):
     """With /dev/full as output one line; with none at all nothing is said, and the work is done."""
     ended(f"{MAP} --out map", cwd=tmp_path, stdout=subprocess.DEVNULL)
-    for name, forms in [*QUICK.items(), *LONG.items()]:
+    for name, forms in (LONG | QUICK).items():
         words = name.replace("-", " ", 1) if name.startswith("dataset-") else name
         command = f"{words} {forms.split(';')[0]}"
         if "brief" in command or "--follow" in command:

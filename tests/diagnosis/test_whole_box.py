@@ -19,6 +19,9 @@ BUDGET = 100
 LONGEST_REVOLUTION = 20_000
 """Steps of a revolution beyond which a crank is left to the tests of budgets: a diagnosis takes hundreds."""
 
+LONGEST_CYCLE = ("damping ratio 100", "reference")
+"""Extreme and rung of a beam whose cycle takes a second; ``tests/fidelity/test_stability.py`` runs three."""
+
 SLOW = {"excitation_frequency": 0.1}
 OVERDAMPED = {"excitation_frequency": 2.0, "damping_ratio": 1.0}
 STILL = {"force_amplitude": 0.0}
@@ -138,10 +141,10 @@ def test_a_verdict_anywhere_in_the_box_of_the_crank(fields, typed):
 
 @pytest.mark.slow
 def test_every_extreme_of_the_stability_map_is_judged():
-    """All rungs of the beam at all extremes, by their default integrator: a verdict or a named error."""
+    """All rungs of the beam at all extremes but one, by their default integrator: a verdict or a named error."""
     tried = judged = 0
     for run in runs_of(PLAIN_BEAM):
-        if run.integrator is None:
+        if run.integrator is None and (run.extreme, run.model) != LONGEST_CYCLE:
             try:
                 machine = run.machine()
             except ChaosgymError:
