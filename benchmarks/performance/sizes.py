@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.performance.rates import BEAM
 from benchmarks.performance.timing import processor_seconds
 from chaosgym import Drive, Structure
-from chaosgym.machines.modal_machine.jointed import Joint, machine_with_joints
+from chaosgym.machines.modal_machine.machine_class import Joint, machine_with_joints
 from chaosgym.simulation import simulate
 
 MODES = (2, 4, 6, 8, 12, 16, 24, 32, 40)

@@ -21,7 +21,7 @@ from chaosgym.machines import joint_sets
 from chaosgym.machines.impact_beam.modes import modal_analysis
 from chaosgym.machines.integrators import TIGHTEST_EVENTS
 from chaosgym.machines.modal_machine import jointed
-from chaosgym.machines.modal_machine.jointed import Joint, machine_with_joints
+from chaosgym.machines.modal_machine.machine_class import Joint, machine_with_joints
 from chaosgym.simulation.run import simulate_with_deviations
 
 FIELDS = ("section", "peak_force", "impacts", "contact_fraction", "bounce_duration")

@@ -16,9 +16,9 @@ from chaosgym.machines.modal_machine import cycle_file
 from chaosgym.machines.modal_machine.archives import read_archive, read_matrix
 from chaosgym.machines.modal_machine.drive import KINDS, Drive
 from chaosgym.machines.modal_machine.friction import OF_FRICTION, with_friction
-from chaosgym.machines.modal_machine.jointed import Joint, machine_with_joints
 from chaosgym.machines.modal_machine.keys import KEYS
 from chaosgym.machines.modal_machine.machine import OF_JOINT, ModalMachine, aliases_of, clearance_option
+from chaosgym.machines.modal_machine.machine_class import Joint, machine_with_joints
 from chaosgym.machines.modal_machine.structure import BASE, Structure
 from chaosgym.machines.modal_machine.turning import turning_joints
 from chaosgym.machines.modal_machine.varying import Spring, VaryingMachine, checked_samples

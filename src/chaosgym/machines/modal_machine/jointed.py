@@ -1,18 +1,10 @@
-"""Your own machine with several joints: the modes of a structure, any number of joints, and a periodic drive.
-
-kind = machine_with_joints(
-    Structure.of_modes([9.0, 61.0], 0.01, {"middle": [2.1, -1.9], "end": [1.2, 0.8]}),
-    {"left": Joint("middle", 1e-4, 1e6, 20.0), "right": Joint("end", 2e-4, 1e6, 20.0)},
-    (Drive.sine("force", "end", 8.9),),
-)
-machine = kind(speed=19.0, left_clearance=2e-4)
-"""
+"""Your own machine with several joints: the modes of a structure, any number of joints, and a periodic drive."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -25,18 +17,10 @@ from chaosgym.machines.joint_sets import JointTables, PressedSets, Sliders
 from chaosgym.machines.machine import Flexible, Machine, Number, Option
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
-from chaosgym.machines.modal_machine.friction import MINDLIN, OF_FRICTION
-from chaosgym.machines.modal_machine.machine import (
-    OF_JOINT,
-    ModalMachine,
-    as_there,
-    clearance_option,
-    rigid_note,
-    turning_note,
-)
+from chaosgym.machines.modal_machine.friction import OF_FRICTION
+from chaosgym.machines.modal_machine.machine import as_there, rigid_note, turning_note
 from chaosgym.machines.modal_machine.structure import Structure
-from chaosgym.machines.parameters import parameter, parameters_of
-from chaosgym.machines.units import TURNING
+from chaosgym.machines.parameters import parameter
 
 if TYPE_CHECKING:
     from chaosgym.machines.joint_batch import JointBatch
@@ -44,40 +28,6 @@ if TYPE_CHECKING:
 
 LARGEST = "largest"
 """Word for the joint with the largest force."""
-
-
-class Joint(NamedTuple):
-    """A joint of a structure; see the fields of ``ModalMachine``.
-
-    ``at`` is the point that moves in the gap, such as "tip", "-tip" or "pinion - wheel"; ``clearance`` [m] half the
-    gap; ``stiffness`` [N/m] and ``damping`` [N s/m] of the upper stop, and factors of the lower one's; ``offset`` [m]
-    of the middle of the gap; ``stops`` "two" or "one"; ``preload`` [N] towards the upper stop. ``turns`` says that m
-    is rad and N is N m.
-
-    A joint with a ``tangent``, the point whose motion is along its surfaces, has Coulomb ``friction`` there: a slider
-    in series with a tangential spring, ``tangential_factor`` times that of the stop. The surfaces move at
-    ``sliding_speed`` [m/s], positive where the tangential displacement grows.
-
-    Examples
-    --------
-    >>> chaosgym.Joint("tip", clearance=1e-4, stiffness=1e6, damping=20.0).stops
-    'two'
-    """
-
-    at: str
-    clearance: float
-    stiffness: float
-    damping: float
-    offset: float = 0.0
-    stops: str = "two"
-    lower_stiffness_factor: float = 1.0
-    lower_damping_factor: float = 1.0
-    preload: float = 0.0
-    turns: bool = False
-    tangent: str = ""
-    friction: float = 0.0
-    tangential_factor: float = MINDLIN
-    sliding_speed: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -396,96 +346,3 @@ def _refuse_same_place(names: tuple[str, ...], places: Mapping[str, str], shapes
                     f"{name}.at = {places[name]!r} moves as {names[i]}.at = {places[names[i]]!r} does; allowed: one "
                     "joint at each place (its two stops may differ: [joint.lower])"
                 )
-
-
-def machine_with_joints(
-    structure: Structure,
-    joints: Mapping[str, Joint],
-    drives: tuple[Drive, ...] = (),
-    *,
-    about: Mapping[str, Any] | None = None,
-    usual_ranges: Mapping[str, tuple[float, float]] | None = None,
-    namespace: Mapping[str, Any] | None = None,
-    definition: Any = None,
-    **stated: Any,
-) -> Any:
-    """Class of machines with several joints, whose fields default to what is given.
-
-    Parameters
-    ----------
-    structure, drives
-        As of ``ModalMachine``.
-    joints
-        By their names, which begin the names of their fields.
-    about
-        Provenance and source of what is given.
-    usual_ranges
-        Of the speed, as "speed", and of the clearance of the first or monitored joint, as "clearance".
-    namespace
-        More attributes of the class.
-    definition
-        Field that tells the class from others.
-    stated
-        Other fields of ``JointedMachine``, such as ``speed`` or ``monitored``.
-
-    Raises
-    ------
-    ParameterError
-        If there is no joint, a name can't begin that of a field, or a value is out of range.
-
-    Examples
-    --------
-    >>> structure = chaosgym.Structure.of_modes([9.0, 61.0], 0.01, {"middle": [2.1, -1.9], "end": [1.2, 0.8]})
-    >>> joints = {name: chaosgym.Joint(name, 1e-4, 1e6, 20.0) for name in ("middle", "end")}
-    >>> kind = chaosgym.machine_with_joints(structure, joints, (chaosgym.Drive.sine("force", "end", 8.9),))
-    >>> machine = kind(speed=19.0, end_clearance=2e-4)
-    >>> machine.sides
-    ('middle upper', 'middle lower', 'end upper', 'end lower')
-    """
-    if not joints:
-        raise ParameterError("a machine has no joint; allowed: one or more")
-    about = {"provenance": "assumed", "source": "default", **(about or {})}
-    defaults: dict[str, Any] = {"modes": structure, "drives": drives}
-    known = parameters_of(ModalMachine)
-    for name, joint in joints.items():
-        if not name.isidentifier() or name.startswith("_"):
-            raise ParameterError(f"joint name {name!r} is out of range; allowed: letters, digits and _, as in left_1")
-        for what, same in OF_JOINT.items():
-            unit = known[same].unit
-            more = {**about, "unit": TURNING.get(unit, unit) if joint.turns else unit}
-            defaults[f"{name}_{what}"] = parameter(getattr(joint, what), **{**vars(known[same]), **more})
-        for what, described in OF_FRICTION.items() if joint.tangent else ():
-            more = {**about, "unit": TURNING.get(described.unit, described.unit) if joint.turns else described.unit}
-            value = getattr(joint, what)
-            if what == "tangential_factor" and value == MINDLIN:
-                more |= {"provenance": described.provenance, "source": described.source}
-            defaults[f"{name}_{what}"] = parameter(value, **{**vars(described), **more})
-    own = parameters_of(JointedMachine)
-    defaults["monitored"] = parameter(
-        stated.pop("monitored", LARGEST), **{**vars(own["monitored"]), "choices": (LARGEST, *joints)}
-    )
-    if definition is not None:
-        defaults["definition"] = definition
-    for name, value in stated.items():
-        defaults[name] = parameter(value, **{**vars(own[name]), **about})
-    usual = {"speed": (4.0, 30.0), "clearance": (2e-5, 2e-4), **(usual_ranges or {})}
-    watched = defaults["monitored"].default
-    first = next(iter(joints)) if watched == LARGEST else watched
-    types: dict[str, Any] = {
-        "places": {name: joint.at for name, joint in joints.items()},
-        "tangents": {name: joint.tangent for name, joint in joints.items() if joint.tangent},
-        "usual_ranges": {"speed": usual["speed"], f"{first}_clearance": usual["clearance"]},
-        "options": {
-            "--speed-hz": Number("speed", "Hz"),
-            **clearance_option(f"{first}_clearance", joints[first].turns),
-        },
-        "turning": tuple(name for name, joint in joints.items() if joint.turns),
-        **(namespace or {}),
-    }
-    hints = get_type_hints(JointedMachine)
-    annotations = {name: hints.get(name, Any) for name in defaults}
-    annotations |= {name: ClassVar[Any] for name in types if not name.startswith("__")}
-    body = {"__module__": __name__, "__annotations__": annotations, **defaults, **types}
-    made: Any = dataclass(frozen=True, kw_only=True)(type("JointedMachine", (JointedMachine,), body))
-    made()  # its defaults are checked
-    return made
