@@ -44,12 +44,13 @@ logger = logging.getLogger("chaosgym")
 PATIENCE = 2.0
 """Seconds after which a bar appears."""
 
-_ready: set[tuple[Any, tuple[type, ...]]] = set()
+_ready: set[tuple[Any, tuple[int, bool]]] = set()
+"""Kernels with the number of their arguments, and whether the last is None: those that differ are compiled apart."""
 
 
 def call(kernel: Any, *arguments: Any) -> Any:
     """Call a kernel; the first time, compile it or load it while no other process does."""
-    key = (kernel, tuple(map(type, arguments)))
+    key = (kernel, (len(arguments), arguments[-1] is None))
     if key not in _ready:
         prepare(kernel, *arguments)
         _ready.add(key)
@@ -138,13 +139,12 @@ def compile_beside(kernel: Any, first: Any, code: str) -> None:
     alone = numba.config.NUMBA_DEFAULT_NUM_THREADS < 2 or not sys.executable
     if numba.config.DISABLE_JIT or alone or is_cached(kernel) or is_cached(first):
         return
+    paths = os.pathsep.join(path for path in sys.path if path)
     try:
         with FileLock(_lock_file(), timeout=0):
             folder = tempfile.mkdtemp(prefix="chaosgym-beside-")
-            paths = os.pathsep.join(path for path in sys.path if path)
             environment = {**os.environ, "NUMBA_CACHE_DIR": folder, "PYTHONPATH": paths}
-            none = subprocess.DEVNULL
-            command = [sys.executable, "-c", code]
+            command, none = [sys.executable, "-c", code], subprocess.DEVNULL
             process = subprocess.Popen(command, env=environment, stdin=none, stdout=none, stderr=none)
             _beside[kernel] = _Beside(process, folder)
     except (OSError, Timeout) as error:
