@@ -2,11 +2,14 @@
 
     python agents/recipes/with_sb3.py --steps 300000 --out runs/plain
 
+Sixteen machines run side by side, so a rollout is a job of each: 1,920 steps for the default's 2,048.
+
 The folder gets a curve, progress.csv, and a policy that `chaosgym compare --policy` and `run-agent` play.
 """
 
 import argparse
 import csv
+import json
 import time
 from pathlib import Path
 from typing import Any
@@ -22,6 +25,7 @@ from chaosgym.envs import SB3VecEnv
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("--env", default="chaosgym/ImpactBeamTolerance-v1")
+parser.add_argument("--keywords", type=json.loads, default={}, help="Of the environment in training, as JSON.")
 parser.add_argument("--seed", type=int, default=0)
 parser.add_argument("--steps", type=int, default=300_000)
 parser.add_argument("--out", type=Path, default=Path("runs/plain"))
@@ -30,7 +34,7 @@ torch.set_num_threads(1)
 asked.out.mkdir(parents=True, exist_ok=True)
 
 kept: tuple[str, ...] = ("type_iii", "deviation")
-envs = VecNormalize(VecMonitor(SB3VecEnv(asked.env, num_envs=16)))
+envs = VecNormalize(VecMonitor(SB3VecEnv(asked.env, num_envs=16, **asked.keywords)))
 model = PPO("MlpPolicy", envs, n_steps=120, batch_size=64, seed=asked.seed, device="cpu")
 rows: list[list[Any]] = [["step", "return", *kept, "processor_seconds"]]
 jobs: list[float] = []

@@ -292,17 +292,22 @@ def textbook(env: str, machines: int, as_json: bool) -> None:
 @click.argument("runs", nargs=-1)
 @click.option("--table", type=click.Path(dir_okay=False, path_type=Path), required=True, help="CSV file of the curves.")
 @click.option("--figure", type=click.Path(dir_okay=False), default=None, help="Picture of the curves.")
+@click.option("--level", default=None, help="Level that RUNS were trained at, if not that of the id.")
 @AS_JSON
-def curves(runs: tuple[str, ...], table: Path, figure: str | None, as_json: bool) -> None:
-    """Write the training curves of RUNS, each NAME=FOLDER, into a table; without RUNS, show those of the table."""
-    from benchmarks.envs.curves import COLUMNS, curve_figure, curve_lines, read_curve, read_table, write_table
+def curves(runs: tuple[str, ...], table: Path, figure: str | None, level: str | None, as_json: bool) -> None:
+    """Put the training curves of RUNS, each NAME=FOLDER, into a table, in the place of other runs of that name there.
+
+    Without RUNS, show the table.
+    """
+    from benchmarks.envs.curves import COLUMNS, curve_figure, curve_lines, read_curve, read_table, replaced, write_table
 
     pairs = [run.partition("=") for run in runs]
     for run, (_, separator, folder) in zip(runs, pairs, strict=True):
         if not separator or not folder:
             raise click.UsageError(f"RUNS {run}: allowed: NAME=FOLDER")
     if runs:
-        write_table([read_curve(name, Path(folder)) for name, _, folder in pairs], table)
+        new = [read_curve(name, Path(folder), level) for name, _, folder in pairs]
+        write_table(replaced(read_table(table) if table.exists() else (), new), table)
     found = read_table(table)
     if figure is not None:
         curve_figure(found).savefig(figure, dpi=110)

@@ -1,7 +1,7 @@
 """How fast do agents learn? The training curves of run folders, as a table and a picture.
 
 A run's ``progress.csv`` tells what the policy returned while it explored, on machines drawn afresh for every job. What
-following the demand and backing off return on the machines kept for evaluation is drawn beside it, where that is known.
+others return on the machines kept for evaluation, the shipped agent too, is drawn beside it where that is known.
 """
 
 import csv
@@ -16,8 +16,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chaosgym.arrays import Array
-from chaosgym.control.comparison import shipped_comparison
-from chaosgym.control.scores import ZERO, Scores
+from chaosgym.control.comparison import shipped_comparison, subject_of
+from chaosgym.control.scores import SAFE, ZERO, Scores
 from chaosgym.errors import DatasetError
 from chaosgym.files import write_atomically
 
@@ -30,20 +30,20 @@ SHOWN_STEPS = (50_000, 100_000, 200_000, 300_000, 500_000, 700_000, 900_000)
 WINDOW = 50_000
 """Steps up to there over which a value of the table is averaged."""
 
-BESIDE = (ZERO, "back off, with memory")
-"""Controllers whose results are drawn beside the curves."""
+BESIDE = {ZERO: (ZERO, ":"), SAFE: (SAFE, "--"), "table": ("table", "-."), "map": ("shipped learned map", "-")}
+"""Contenders whose results are drawn beside the curves, with name and style of the line."""
 
 
 class Curve(NamedTuple):
-    """A training run: name of the ``agent``, id of the environment, and ``values`` (rows, 5) of ``COLUMNS``."""
+    """A training run: name of the ``agent``, ``env``, its id and level, and ``values`` (rows, 5) of ``COLUMNS``."""
 
     agent: str
     env: str
     values: Array
 
 
-def read_curve(agent: str, folder: Path) -> Curve:
-    """Curve of a run folder, or of a shipped policy's.
+def read_curve(agent: str, folder: Path, level: str | None = None) -> Curve:
+    """Curve of a run folder, or of a shipped policy's, on the machines of a level.
 
     Raises
     ------
@@ -56,7 +56,13 @@ def read_curve(agent: str, folder: Path) -> Curve:
             rows = [[float(row[name]) for name in COLUMNS] for row in csv.DictReader(file)]
     except (OSError, ValueError, KeyError) as error:
         raise DatasetError(f"{folder} is no finished training run: {error}; let the script of the agent end") from None
-    return Curve(agent, env, np.array(rows))
+    return Curve(agent, subject_of(env, level=level), np.array(rows))
+
+
+def replaced(kept: Sequence[Curve], new: Sequence[Curve]) -> list[Curve]:
+    """Curves, with those of the same agent and environment as new ones replaced by these."""
+    runs = grouped(new)
+    return [curve for curve in kept if (curve.env, curve.agent) not in runs] + list(new)
 
 
 def write_table(curves: Sequence[Curve], path: Path) -> None:
@@ -147,11 +153,12 @@ def _draw(axes: Axes, agents: Mapping[str, Sequence[Array]], column: int) -> Non
 
 
 def _draw_beside(row: Any, env: str) -> None:
-    table = shipped_comparison(env)
+    name, _, level = env.partition(", level ")
+    table = shipped_comparison(name, **({"level": level, "split": "test"} if level else {}))
     if table is None:
         return
     summary = Scores(table).summary()
-    for name, style in zip(BESIDE, (":", "--"), strict=True):
-        if name in summary:
-            for axes, key in zip(row, ("return", "type_iii"), strict=True):
-                axes.axhline(summary[name][key], color="0.4", linestyle=style, linewidth=0.9, label=name)
+    for contender in (each for each in BESIDE if each in summary):
+        label, style = BESIDE[contender]
+        for axes, key in zip(row, ("return", "type_iii"), strict=True):
+            axes.axhline(summary[contender][key], color="0.4", linestyle=style, linewidth=0.9, label=label)

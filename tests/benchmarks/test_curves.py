@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks.envs.curves import at, curve_figure, curve_lines, read_curve, read_table, write_table
+from benchmarks.envs.curves import at, curve_figure, curve_lines, read_curve, read_table, replaced, write_table
 from chaosgym.errors import DatasetError
 
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
@@ -33,6 +33,19 @@ def test_a_table_gives_back_its_curves(run, tmp_path):
         np.testing.assert_array_equal(one.values, other.values)
     assert len(curve_lines(again)) == 4
     assert len(curve_figure(again).axes) == 2
+
+
+def test_runs_take_the_place_of_those_of_the_same_agent_and_level(run):
+    """A run at another level is another curve; lines of the fleet's comparison are drawn beside it."""
+    one, fleet = read_curve("PPO", run), read_curve("PPO", run, "fleet")
+    again = replaced([one, fleet, read_curve("SAC", run)], [fleet, fleet])
+    assert [(curve.agent, curve.env) for curve in again] == [
+        ("PPO", BEAM),
+        ("SAC", BEAM),
+        *[("PPO", f"{BEAM}, level fleet")] * 2,
+    ]
+    beside = curve_figure([fleet]).axes[0].lines
+    assert {line.get_label() for line in beside} >= {"follow the demand", "table", "shipped learned map"}
 
 
 def test_a_value_is_the_mean_of_the_last_50_000_steps(run):
