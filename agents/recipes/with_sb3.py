@@ -36,7 +36,6 @@ asked.out.mkdir(parents=True, exist_ok=True)
 kept: tuple[str, ...] = ("type_iii", "deviation")
 envs = VecNormalize(VecMonitor(SB3VecEnv(asked.env, num_envs=16, **asked.keywords)))
 model = PPO("MlpPolicy", envs, n_steps=120, batch_size=64, seed=asked.seed, device="cpu")
-rows: list[list[Any]] = [["step", "return", *kept, "processor_seconds"]]
 jobs: list[float] = []
 felt: list[list[float]] = []
 
@@ -49,14 +48,16 @@ def note(local: dict[str, Any], _: Any) -> bool:
             jobs.append(info["episode"]["r"])
     if jobs and len(felt) >= 10_000:
         means = np.round([np.mean(jobs), *np.mean(felt, axis=0)], 4).tolist()
-        rows.append([model.num_timesteps, *means, round(time.process_time())])
+        table.writerow([model.num_timesteps, *means, round(time.process_time())])
+        file.flush()
         jobs.clear()
         felt.clear()
     return True
 
 
-model.learn(asked.steps, callback=note)
 with (asked.out / "progress.csv").open("w", newline="", encoding="utf-8") as file:
-    csv.writer(file, lineterminator="\n").writerows(rows)
+    table = csv.writer(file, lineterminator="\n")
+    table.writerow(["step", "return", *kept, "processor_seconds"])
+    model.learn(asked.steps, callback=note)
 save_policy(exported(model, asked.env, envs), asked.out)
 print(f"policy in {asked.out}")

@@ -136,7 +136,7 @@ def curve_figure(curves: Sequence[Curve]) -> Figure:
             axes.set_xlabel("thousand steps")
             axes.set_ylabel(name)
         _draw_beside(row, env)
-        row[0].legend(fontsize=7, loc="lower right")
+        row[0].legend(fontsize=7, loc="best")
     return figure
 
 
