@@ -221,6 +221,14 @@ def task_scores():
         yield task(name, used, [made], f"mkdir -p {RUNS}", compare, f"cp {run} {made}")
 
 
+def task_jobs():
+    """Jobs of the fleet's beams in Exudyn; the same command without ``rm`` goes on with a file of fewer."""
+    made = "docs/data/other-simulator.jsonl"
+    used = TASKS + sources("src/chaosgym/control/controllers") + [f"{SHIPPED}/ImpactBeamTolerance-v1-fleet/weights.npz"]
+    used += ["benchmarks/envs/other_simulator.py", "benchmarks/envs/exudyn_beam.py"]
+    yield task("other-simulator", used, [made], f"rm -f {made}", "python -m benchmarks other-simulator")
+
+
 def task_page():
     """Pages of the documentation that a command writes."""
     pages = [str(path) for path in Path("docs/environments").glob("*.md")]

@@ -198,9 +198,9 @@ def arrivals(env: str, level: str, machines: int, as_json: bool) -> None:
 @click.option(
     "--kept",
     type=click.Path(dir_okay=False, path_type=Path),
-    default="runs/other-simulator.jsonl",
+    default="docs/data/other-simulator.jsonl",
     show_default=True,
-    help="Jobs that are done: those of the file are not played again.",
+    help="Jobs that are done, a line each: they are not played again.",
 )
 @AS_JSON
 def other_simulator(machines: int, workers: int, kept: Path, as_json: bool) -> None:

@@ -141,6 +141,11 @@ def job(given: Given) -> dict[str, float]:
     return {"return": -lost, "type_iii": irregular, "deviation": deviation, "damage": rig.damage}
 
 
+def named_job(given: Given) -> tuple[Given, dict[str, float]]:
+    """Return what a job was, and what became of it."""
+    return given, job(given)
+
+
 def played(work: Iterable[Given], workers: int, kept: Path) -> dict[Given, dict[str, float]]:
     """Jobs by number, player and simulator; those of a file of lines are read, and each other is added when it ends."""
     lines = kept.read_text(encoding="utf-8").splitlines() if kept.exists() else []
@@ -148,7 +153,7 @@ def played(work: Iterable[Given], workers: int, kept: Path) -> dict[Given, dict[
     missing = [given for given in work if given not in told]
     kept.parent.mkdir(parents=True, exist_ok=True)
     with get_context("spawn").Pool(workers) as pool, kept.open("a", encoding="utf-8") as file:
-        jobs = zip(missing, pool.imap(job, missing), strict=True)
+        jobs = pool.imap_unordered(named_job, missing)
         for given, found in tqdm(jobs, total=len(missing), desc="jobs", unit="job", leave=False):
             told[given] = found
             print(json.dumps([*given, found]), file=file, flush=True)

@@ -1,12 +1,17 @@
 """A beam behind the plant interface is the beam of an environment, in this simulator and in Exudyn."""
 
 import json
+import re
+from pathlib import Path
+from shutil import copy
 
 import numpy as np
 import pytest
 
 from benchmarks.envs.other_simulator import PLAYERS, SIMULATORS, OwnBeam, Rig, job, lines, other_simulator
 from chaosgym.envs.vector_env import native_envs
+
+DOCS = Path(__file__).parents[2] / "docs"
 
 ENV = "chaosgym/ImpactBeamTolerance-v1"
 IDEAL = {"speed_ripple": 0.0, "sensor_error": 0.0, "bouncing_error": 0.0, "missed_impacts": 0.0, "tolerances": {}}
@@ -67,6 +72,16 @@ def test_jobs_of_a_file_are_not_played_again(kept):
     assert [row["player"] for row in found] == list(PLAYERS)
     rows = "| 2 | -4.5, 25.0%, 0.50 Hz, x1.00 | -6.0, 25.0%, 0.50 Hz, x1.00 | **-1.5 (-2.0 to -1.0)** |"
     assert all(line.endswith(rows) for line in lines(found)[2:])
+
+
+def test_the_page_has_the_table_of_the_jobs_that_are_kept(tmp_path):
+    """Of as many machines as its command says."""
+    page = (DOCS / "controllers.md").read_text()
+    machines = re.search(r"python -m benchmarks other-simulator --machines (\d+)", page)
+    assert machines is not None
+    kept = Path(copy(DOCS / "data" / "other-simulator.jsonl", tmp_path))
+    table = lines(other_simulator(int(machines[1]), 1, kept))
+    assert "\n".join(table) in page
 
 
 @pytest.mark.slow
