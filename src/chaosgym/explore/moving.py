@@ -41,7 +41,7 @@ const show = k => Object.values(sources).forEach(source => {{
 }})
 const began = performance.now() - (button.frame ?? 0) * MILLISECONDS
 const step = now => {{
-    if (!button.active) return
+    if (!button.active || !panel.visible) return
     const k = Math.max(0, Math.floor((now - began) / MILLISECONDS)) % FRAMES
     if (k != button.frame) show(button.frame = k)
     button.loop = requestAnimationFrame(step)
@@ -69,7 +69,7 @@ class Moving:
         self._button = Toggle(active=True, label="Pause", width=80, name="pause")
         self.panel = column(self._figure, self._told, self._button, visible=False, sizing_mode="stretch_width")
         self._draw()
-        play = CustomJS(args={"sources": self._sources, "button": self._button}, code=PLAY)
+        play = CustomJS(args={"sources": self._sources, "button": self._button, "panel": self.panel}, code=PLAY)
         self._button.js_on_change("active", play)
         self._sources["words"].js_on_change("data", play)
         document.js_on_event("document_ready", CustomJS(args={"button": self._button}, code=CALM), play)
