@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -116,6 +117,26 @@ def test_where_another_process_compiles_nothing_this_one_does(tmp_path):
     )
     out, _ = _in_a_process(code, NUMBA_CACHE_DIR=str(tmp_path)).communicate()
     assert out.decode().split() == ["False", "1", "0"]
+
+
+def test_a_process_that_compiles_beside_ends_with_the_one_that_started_it(tmp_path):
+    """Killed, that one can end nothing itself: no process and no folder stay."""
+    code = (
+        "from chaosgym.core import compilation; from chaosgym.core.motor import round_speeds as kernel;"
+        "from chaosgym.core.modal_impact import tabulate; import time;"
+        "compilation.numba.config.NUMBA_DEFAULT_NUM_THREADS = 2;"
+        "compilation.compile_beside(kernel, tabulate, 'import time; time.sleep(600)');"
+        "print(compilation._beside[kernel].folder, flush=True); time.sleep(600)"
+    )
+    process = _in_a_process(code, NUMBA_CACHE_DIR=str(tmp_path))
+    folder = Path(process.stdout.readline().decode().strip())
+    assert folder.exists()
+    process.kill()
+    process.communicate()
+    ends = time.monotonic() + 60.0
+    while folder.exists() and time.monotonic() < ends:
+        time.sleep(0.1)
+    assert not folder.exists()
 
 
 def test_what_is_compiled_already_waits_for_no_one():

@@ -144,11 +144,23 @@ def compile_beside(kernel: Any, first: Any, code: str) -> None:
         with FileLock(_lock_file(), timeout=0):
             folder = tempfile.mkdtemp(prefix="chaosgym-beside-")
             environment = {**os.environ, "NUMBA_CACHE_DIR": folder, "PYTHONPATH": paths}
-            command, none = [sys.executable, "-c", code], subprocess.DEVNULL
-            process = subprocess.Popen(command, env=environment, stdin=none, stdout=none, stderr=none)
+            command = [sys.executable, "-c", f"from {__name__} import end_with_starter; end_with_starter(); {code}"]
+            none, pipe = subprocess.DEVNULL, subprocess.PIPE
+            process = subprocess.Popen(command, env=environment, stdin=pipe, stdout=none, stderr=none)
             _beside[kernel] = _Beside(process, folder)
     except (OSError, Timeout) as error:
         logger.debug("no second process compiles %s: %s", name_of(kernel), error)
+
+
+def end_with_starter() -> None:
+    """Let this process end, and its cache with it, when the one that started it does: its standard input ends then."""
+
+    def watch() -> None:
+        os.read(sys.stdin.fileno(), 1)
+        shutil.rmtree(os.environ["NUMBA_CACHE_DIR"], ignore_errors=True)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _take_over(kernel: Any, functions: int) -> None:
