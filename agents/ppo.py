@@ -58,6 +58,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--gamma", type=float, default=0.95)
     parser.add_argument("--gae-lambda", type=float, default=0.9)
     parser.add_argument("--units", type=int, default=64)
+    parser.add_argument("--no-memory", dest="memory", action="store_false", help="See the last step and no other.")
     return parser.parse_args()
 
 
@@ -122,9 +123,9 @@ def main() -> None:
 
 
 def environments(env: str, asked: argparse.Namespace) -> VecNormalize:
-    """Machines side by side, with a memory of visited speeds, normalised."""
+    """Machines side by side, with a memory of visited speeds unless it is not wanted, normalised."""
     native = VecMonitor(SB3VecEnv(env, asked.envs, **{"fidelity": asked.fidelity} | asked.keywords))
-    return VecNormalize(SB3VisitedSpeeds(native), gamma=asked.gamma)
+    return VecNormalize(SB3VisitedSpeeds(native) if asked.memory else native, gamma=asked.gamma)
 
 
 def take_over(model: PPO, envs: VecNormalize, asked: argparse.Namespace) -> None:
@@ -140,7 +141,8 @@ def take_over(model: PPO, envs: VecNormalize, asked: argparse.Namespace) -> None
     if environment(env).kwargs["machine"] == environment(asked.env).kwargs["machine"]:
         before = found[0].get_env()
         envs.obs_rms, envs.ret_rms = before.obs_rms, before.ret_rms
-        envs.venv.memory.usual = before.venv.memory.usual
+        if asked.memory:
+            envs.venv.memory.usual = before.venv.memory.usual
     model.set_random_seed(asked.seed)
 
 
@@ -168,7 +170,7 @@ def train(asked: argparse.Namespace) -> None:
             take_over(model, envs, asked)
         envs.seed(1_000_000 * (asked.seed + 1))
     model.learn(asked.steps - model.num_timesteps, Progress(asked, kept), reset_num_timesteps=False)
-    save_policy(exported(model, asked.env, envs, memory=True), asked.out)
+    save_policy(exported(model, asked.env, envs, memory=asked.memory), asked.out)
     print(f"policy in {asked.out}")
 
 
