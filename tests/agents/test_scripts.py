@@ -126,9 +126,11 @@ def test_keywords_that_are_none_end_in_one_line(script, text, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("option", ["--out", "--start"])
-def test_a_run_with_other_observations_is_refused_in_one_line(option, tmp_path):
-    """What was trained with the classifier neither goes on nor begins a training without it."""
-    _train("ppo", tmp_path / "on", 40, "--keywords", '{"classifier": "on"}', *SMALL["ppo"])
+@pytest.mark.parametrize("before", [("--keywords", '{"classifier": "on"}'), ("--no-memory",)])
+def test_a_run_with_other_observations_is_refused_in_one_line(before, option, tmp_path):
+    """What was trained with the classifier, or without a memory, neither goes on nor begins another training."""
+    _train("ppo", tmp_path / "on", 40, *before, *SMALL["ppo"])
+    assert (load_policy(tmp_path / "on").usual is None) == (before == ("--no-memory",))
     where = [option, tmp_path / "on"] + ([] if option == "--out" else ["--out", tmp_path / "off"])
     command = [sys.executable, AGENTS / "ppo.py", *where, "--steps", 80, *SMALL["ppo"]]
     done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
