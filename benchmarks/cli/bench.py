@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from chaosgym.cli.output import emit
+from benchmarks.cli.stored import tell
 
 SHOWN_FUNCTIONS = 15
 """Functions of a cold start that are shown; ``--json`` has all."""
@@ -29,6 +29,11 @@ MOST_WORKERS = 4
 @click.option("--figure", type=click.Path(dir_okay=False, path_type=Path), help="With --scaling: picture of it, PNG.")
 @click.option("--first-use", "first_use", is_flag=True, help="What commands take at first, and to compile, instead.")
 @click.option("--waits", is_flag=True, help="Short questions, training and memory of a batch instead.")
+@click.option(
+    "--beside",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="What the same options printed with --json at another commit: those figures beside these.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def bench(
     repeats: int,
@@ -41,6 +46,7 @@ def bench(
     figure: Path | None,
     first_use: bool,
     waits: bool,
+    beside: Path | None,
     as_json: bool,
 ) -> None:
     """Rates on this computer: cycles, environment steps, sweep points, classifier rows; or against a peer."""
@@ -53,22 +59,23 @@ def bench(
 
         programs = peers()
         told = {"peers": [program._asdict() for program in programs]}
-        return emit(told, as_json, lambda: _peer_table(programs))
+        return tell(told, as_json, lambda: _peer_table(programs), beside)
     if against is not None:
         from benchmarks.performance.against_exudyn import against_exudyn
 
         rows = against_exudyn(repeats=repeats, progress=True)
-        return emit({"against": against, "settings": rows}, as_json, lambda: _comparison(rows))
+        return tell({"against": against, "settings": rows}, as_json, lambda: _comparison(rows), beside)
     if first_use:
         from benchmarks.performance.first_use import cold_start, warm_start
 
         spent: dict[str, Any] = {"warm_seconds": warm_start(repeats=repeats), "cold": cold_start()}
-        return emit(spent, as_json, lambda: _first_use_lines(spent))
+        return tell(spent, as_json, lambda: _first_use_lines(spent), beside)
     if waits:
         from benchmarks.performance.waits import waits as measure
 
         waited = measure(repeats)
-        return emit({"waits": waited}, as_json, lambda: [f"{value:12.1f}  {name}" for name, value in waited.items()])
+        lines = [f"{value:12.1f}  {name}" for name, value in waited.items()]
+        return tell({"waits": waited}, as_json, lambda: lines, beside)
     from benchmarks.performance import (
         assembly_times,
         benchmark,
@@ -79,22 +86,23 @@ def bench(
 
     if scenes:
         costs = scene_costs()
-        return emit({"scenes": [asdict(cost) for cost in costs]}, as_json, lambda: _scene_table(costs))
+        return tell({"scenes": [asdict(cost) for cost in costs]}, as_json, lambda: _scene_table(costs), beside)
     if set_up:
         times = set_up_times(repeats)
-        return emit(
+        return tell(
             {"set_up_microseconds": times},
             as_json,
             lambda: [f"{name:40s} {value:10.1f} us" for name, value in times.items()],
+            beside,
         )
     if mechanisms:
         cycles, times = cycle_costs(repeats), assembly_times(repeats)
         found = {"cycles": [cost._asdict() for cost in cycles], "assembly_milliseconds": times}
-        return emit(found, as_json, lambda: _mechanism_table(cycles, times))
+        return tell(found, as_json, lambda: _mechanism_table(cycles, times), beside)
     if scaling:
-        return _scaling(repeats, points, figure, as_json)
+        return _scaling(repeats, points, figure, as_json, beside)
     result = benchmark(repeats, progress=True)
-    return emit(result, as_json, lambda: _rates(result))
+    return tell(result, as_json, lambda: _rates(result), beside)
 
 
 def _first_use_lines(found: dict[str, Any]) -> list[str]:
@@ -176,7 +184,7 @@ def _mechanism_table(rows: list[Any], times: dict[str, float]) -> list[str]:
     return [f"{head}{'target':>8s}", *lines, *made]
 
 
-def _scaling(repeats: int, points: int, figure: Path | None, as_json: bool) -> None:
+def _scaling(repeats: int, points: int, figure: Path | None, as_json: bool, beside: Path | None) -> None:
     from benchmarks.performance import vector_scaling
     from benchmarks.performance.processors import powers_of_two, thread_shares, worker_shares
     from benchmarks.performance.scaling_figure import scaling_figure
@@ -192,7 +200,7 @@ def _scaling(repeats: int, points: int, figure: Path | None, as_json: bool) -> N
         "sizes": [each._asdict() for each in grown],
         "processors": [each._asdict() for each in shares],
     }
-    emit(found, as_json, lambda: [*_size_table(grown), *_share_table(shares), *_scaling_table(measured)])
+    tell(found, as_json, lambda: [*_size_table(grown), *_share_table(shares), *_scaling_table(measured)], beside)
 
 
 def _size_table(grown: list[Any]) -> list[str]:

@@ -50,6 +50,30 @@ def test_a_report_without_search_takes_less_than_twenty_seconds() -> None:
     assert 0.1 < report_seconds("impact-beam", search=False) < 20.0
 
 
+def test_figures_stand_beside_those_of_another_commit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """What one run printed as JSON is shown beside the next, by name and as a ratio; what it lacks ends in one line."""
+    stored = tmp_path / "then.json"
+    monkeypatch.setattr("benchmarks.performance.set_up_times", lambda _: {"a speed": 2.0, "a machine": 3.0})
+    then = CliRunner().invoke(app, ["bench", "--set-up", "--json"])
+    stored.write_text(json.dumps(json.loads(then.stdout) | {"commit": "abc1234"}))
+    monkeypatch.setattr("benchmarks.performance.set_up_times", lambda _: {"a speed": 5.0, "another": 1.0})
+    beside = ["bench", "--set-up", "--beside", str(stored)]
+    head, *rows = CliRunner().invoke(app, beside).stdout.splitlines()
+    assert head.split()[-2:] == ["abc1234", "ratio"]
+    assert [row.split() for row in rows] == [["set_up_microseconds,", "a", "speed", "5", "2", "2.50"]]
+    told = json.loads(CliRunner().invoke(app, [*beside, "--json"]).stdout)
+    assert told["figures"] == {"set_up_microseconds, a speed": {"now": 5.0, "then": 2.0}}
+    for text, reason in (
+        ('{"commit": "abc1234"}', "none of these figures"),
+        ("[", "can't be read"),
+        ("[1]", "no JSON"),
+    ):
+        stored.write_text(text)
+        refused = CliRunner().invoke(app, beside)
+        assert refused.exit_code == 2
+        assert reason in refused.output
+
+
 def test_every_rate_comes_out_positive(monkeypatch: pytest.MonkeyPatch) -> None:
     """The command prints one JSON object with finite rates by name, ours beside CartPole."""
     monkeypatch.setattr(rates, "SUB_ENVIRONMENTS", 2)
@@ -68,7 +92,7 @@ def test_every_rate_comes_out_positive(monkeypatch: pytest.MonkeyPatch) -> None:
     figures = [
         figure
         for quantity, named in result.items()
-        if quantity != "load_average"
+        if quantity not in ("load_average", "commit")
         for both in named.values()
         for figure in both.values()
     ]
