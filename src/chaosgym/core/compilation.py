@@ -7,6 +7,10 @@ what is there already is loaded without the lock. A message says what takes so l
 A kernel can be compiled by another process beside this one, into a folder of its own, whose files are moved to the
 others under the lock (``compile_beside``).
 
+What keeps it short: Python calls few kernels, with short chains of calls; arrays are copied in loops, since an
+assignment compiles 60 functions; constants that are handed on are integers of numpy, since numba compiles anew for each
+plain one.
+
 The machine code has a checksum beside it: a damaged file is compiled anew. Machine code, numba's index of it and
 checksums change under the lock alone. So a reader without the lock that finds them in disagreement can have met a
 change half done, and looks again with the lock.
