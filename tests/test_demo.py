@@ -20,8 +20,14 @@ def test_demo_computes_every_number_and_draws_the_figure(tmp_path, monkeypatch):
     """Three points of the printed natures, a typed sweep, a judged classifier, an agent beside two rules."""
     for name, value in SMALL.items():
         monkeypatch.setattr(demo, name, value)
-    said = []
-    result = demo.run_demo(tmp_path / "demo", say=said.append)
+    said, drawn = [], []
+
+    def say(line):
+        said.append(line)
+        drawn.append((tmp_path / "demo" / "overview.png").exists())
+
+    result = demo.run_demo(tmp_path / "demo", say=say)
+    assert drawn == [False, True, True, True, True], "the three points are drawn before the sweep"
     assert [row["nature"] for row in result["points"].values()] == ["periodic", "periodic", "chaotic"]
     assert result["points"]["III"]["type_in_sweep"] == "III"
     assert result["sweep"]["points"] == 120

@@ -19,6 +19,7 @@ from chaosgym.control.policies.export import exported
 from chaosgym.control.rollout import Played, Policy, play
 from chaosgym.diagnosis import two_step_test
 from chaosgym.errors import ChaosgymError, DatasetError
+from chaosgym.files import write_atomically
 from chaosgym.machines import ImpactBeam
 from chaosgym.simulation import CycleRecord, simulate
 from chaosgym.sweeps import Axis, LabelledSweep, SweepPlan, run_sweep
@@ -39,7 +40,7 @@ MACHINES = 32
 
 
 def run_demo(folder: str | Path, seed: int = 0, say: Callable[[str], None] = print) -> dict[str, Any]:
-    """Run everything and keep sweep, classifier, policy and figure in a new folder.
+    """Run everything and keep sweep, classifier, policy and figure in a new folder; the three points are drawn first.
 
     Parameters
     ----------
@@ -70,6 +71,7 @@ def run_demo(folder: str | Path, seed: int = 0, say: Callable[[str], None] = pri
 
     say("1/5 simulate three points")
     records = {kind: _run_point(*point) for kind, point in POINTS.items()}
+    _draw(folder, records)
     plan = SweepPlan(ImpactBeam(), AXES)
     say(f"2/5 label a sweep of {len(plan)} points")
     sweep = run_sweep(plan, folder / "sweep", progress=True)
@@ -87,14 +89,18 @@ def run_demo(folder: str | Path, seed: int = 0, say: Callable[[str], None] = pri
         "sweep": {"points": len(sweep.table), "types": _shares(sweep)},
         "classifier": trained.report,
         "agent": {name: _agent_row(played) for name, played in jobs.items()},
-        "figure": str(folder / "overview.png"),
+        "figure": str(_draw(folder, records, sweep, trained.classifier, jobs["agent"])),
     }
-    from chaosgym.plotting.played_job import overview
-
-    figure = overview(records, sweep, trained.classifier, jobs["agent"])
-    figure.savefig(folder / "overview.png", dpi=130)
     result["seconds"] = time.perf_counter() - began
     return result
+
+
+def _draw(folder: Path, *found: Any) -> Path:
+    """Write the figure of what is found so far, and return its file."""
+    from chaosgym.plotting.played_job import overview
+
+    write_atomically(folder / "overview.png", lambda path: overview(*found).savefig(path, dpi=130, format="png"))
+    return folder / "overview.png"
 
 
 def _run_point(frequency: float, clearance: float) -> CycleRecord:

@@ -199,17 +199,22 @@ def plain_ticks(ax: Axes) -> Axes:
 
 def overview(
     records: Mapping[str, CycleRecord],
-    sweep: LabelledSweep,
-    classifier: MachineClassifier,
-    job: Played,
+    sweep: LabelledSweep | None = None,
+    classifier: MachineClassifier | None = None,
+    job: Played | None = None,
 ) -> Figure:
-    """Four panels of ``chaosgym demo``."""
+    """Four panels of ``chaosgym demo``; those of what is not there yet are left out."""
     figure = Figure(figsize=(11, 8), layout="constrained")
     axes = figure.subplots(2, 2)
     peak_history(records, axes[0, 0])
-    type_map(sweep, axes[0, 1])
-    classifier_map(classifier, axes[1, 0])
-    draw_speed(job, axes[1, 1]).set(xlabel="step", title="The agent on a machine that it has never seen")
+    for panel, found in zip(axes.flat, (records, sweep, classifier, job), strict=True):
+        panel.set_visible(found is not None)
+    if sweep is not None:
+        type_map(sweep, axes[0, 1])
+    if classifier is not None:
+        classifier_map(classifier, axes[1, 0])
+    if job is not None:
+        draw_speed(job, axes[1, 1]).set(xlabel="step", title="The agent on a machine that it has never seen")
     return figure
 
 
