@@ -23,7 +23,10 @@ from chaosgym.errors import DatasetError, ParameterError
 from chaosgym.files import parquet_of, write_atomically
 
 COLUMNS = ("contender", "knows", "seed", "machine", "job_return", "type_iii", "deviation", "damage", "largest_force")
-"""Columns of a comparison's table, one row a job."""
+"""Columns of a comparison's table, one row a job. ``IN_UNITS`` are no part of files of earlier versions."""
+
+IN_UNITS = ("equivalent_force", "life")
+"""Columns of the joint: constant peak force that wears as much [N], and life [h]."""
 
 SUBJECTS = ("objective", "level", "split", "sealed")
 """Keywords that are part of what a comparison is of."""
@@ -181,7 +184,7 @@ def compare(
         player = policy or contenders.makers(missing)[name]()
         played = play(player, env, missing, progress=name if progress else None, **keywords)
         rows = job_rows(name, player.knows, seed, played, subject)
-        table = rows if table is None else pa.concat_tables([table, rows])
+        table = rows if table is None else joined(table, rows)
         write_comparison(table, out)
     assert table is not None
     return table
@@ -209,8 +212,15 @@ def job_rows(name: str, knows: str, seed: int, played: Played, env: str) -> pa.T
         "damage": played.damage,
         "largest_force": played.largest_force,
         "failed": played.status != int(Status.JOB_DONE),
+        "equivalent_force": played.equivalent_force,
+        "life": played.life,
     }
     return pa.table(columns).replace_schema_metadata({"env": env})
+
+
+def joined(*tables: pa.Table) -> pa.Table:
+    """Rows of several tables; a column that one of them lacks has nulls there."""
+    return pa.concat_tables(tables, promote_options="default")
 
 
 def write_comparison(table: pa.Table, path: Path) -> None:

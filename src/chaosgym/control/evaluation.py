@@ -10,7 +10,7 @@ import pyarrow as pa
 from gymnasium.spaces import Discrete
 from numpy.typing import NDArray
 
-from chaosgym.control.comparison import Contenders, job_rows, shipped_comparison
+from chaosgym.control.comparison import Contenders, job_rows, joined, shipped_comparison
 from chaosgym.control.policies.policy import TrainedPolicy, load_policy
 from chaosgym.control.rollout import Played, Policy, play
 from chaosgym.control.scores import ONE, ZERO, Scores
@@ -189,11 +189,14 @@ def evaluate(
     scale = shipped_comparison(env, **keywords)
     if scale is None or pa.compute.max(scale["machine"]).as_py() < machines - 1:
         makers = Contenders(env, keywords, progress).makers(range(machines))
-        scale = pa.concat_tables(
-            [job_rows(name, "", 0, play(makers[name](), env, range(machines), **keywords), env) for name in (ZERO, ONE)]
+        scale = joined(
+            *(
+                job_rows(name, "", 0, play(makers[name](), env, range(machines), **keywords), env)
+                for name in (ZERO, ONE)
+            )
         )
     kept = scale.filter(pa.compute.less(scale["machine"], machines))
-    table = pa.concat_tables([kept, job_rows(NAME, runs.knows, 0, played, env)])
+    table = joined(kept, job_rows(NAME, runs.knows, 0, played, env))
     row = Scores(table).row(NAME)
     low, high = row["score_interval"]
     return Evaluation(row["score"], (low, high), row["return"], row["type_iii"], row["deviation"], played)

@@ -80,7 +80,8 @@ class Scores:
 
         ``life`` is the geometric mean over machines of the joint's life over that of following the demand, ``load`` the
         ratio of the constant forces of equal life, and ``made_worse`` the share of the machines whose return is below
-        that of following by more than ``MADE_WORSE``. ``against_back_off`` compares with backing off; it is None
+        that of following by more than ``MADE_WORSE``. ``equivalent_force_N`` and ``life_h`` are geometric means too;
+        they are None for a file of an earlier version. ``against_back_off`` compares with backing off; it is None
         where that has not played.
         """
         mine, zero, one = self.paired(name, ZERO, ONE)
@@ -113,6 +114,8 @@ class Scores:
             "damage": float(np.mean(rows["damage"].to_numpy())),
             "life": float(life),
             "load": float(life ** (-1.0 / LIFE_EXPONENT)),
+            "life_h": _geometric_mean(rows, "life"),
+            "equivalent_force_N": _geometric_mean(rows, "equivalent_force"),
             "made_worse": float(np.mean(mine < zero - MADE_WORSE)),
             "against_back_off": self.against(name, SAFE),
             "largest_force": float(np.max(rows["largest_force"].to_numpy())),
@@ -120,6 +123,15 @@ class Scores:
             "better_than_following": float(np.mean(mine > zero)),
             "profile": performance_profile(single, PROFILE_SCORES).tolist(),
         }
+
+
+def _geometric_mean(rows: pa.Table, name: str) -> float | None:
+    """Of the positive finite values of a column; None without any, or where jobs of an earlier version lack it."""
+    if name not in rows.column_names or rows[name].null_count:
+        return None
+    values = rows[name].to_numpy(zero_copy_only=False).astype(float)
+    known = values[np.isfinite(values) & (values > 0.0)]
+    return float(np.exp(np.mean(np.log(known)))) if known.size else None
 
 
 def difference(told: Mapping[str, Any] | None) -> str:
@@ -131,19 +143,27 @@ def difference(told: Mapping[str, Any] | None) -> str:
     return f"**{text}**" if high < 0.0 else text
 
 
+def _amount(value: float | None, unit: str) -> str:
+    """A value in front of a ratio; nothing where it is not known."""
+    return "" if value is None else f"{value:.3g} {unit}, "
+
+
 def table_lines(summary: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Lines of a Markdown table."""
     lines = [
-        "| contender | knows | seeds | machines | return | score | 95 % | Type III | mean deviation | load | life "
-        "| made worse | return less that of backing off |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|---|",
+        "| contender | knows | seeds | machines | return | score | 95 % | Type III | mean deviation "
+        "| largest force [N] | load | life | worse than following, than backing off "
+        "| return less that of backing off |",
+        "|---" * 14 + "|",
     ]
     for name, row in summary.items():
         low, high = row["score_interval"]
+        worse = [row["made_worse"], *([row["against_back_off"]["made_worse"]] if row["against_back_off"] else [])]
         lines.append(
             f"| {name} | {row['knows']} | {row['seeds']} | {row['machines']} | {row['return']:.2f} "
             f"| {row['score']:.2f} | {low:.2f} to {high:.2f} | {row['type_iii']:.1%} | {row['deviation']:.2f} "
-            f"| x{row['load']:.2f} | x{row['life']:.2f} | {row['made_worse']:.0%} "
+            f"| {row['largest_force']:.1f} | {_amount(row['equivalent_force_N'], 'N')}x{row['load']:.2f} "
+            f"| {_amount(row['life_h'], 'h')}x{row['life']:.2f} | {', '.join(f'{share:.0%}' for share in worse)} "
             f"| {difference(row['against_back_off'])} |"
         )
     return lines
