@@ -1,21 +1,26 @@
-"""Write an offline dataset in Minari's format: whole jobs of one environment, by a trained policy or at random.
+"""Write offline datasets in Minari's format: whole jobs of one environment, by a trained policy or at random.
 
-    python agents/export_minari.py --env chaosgym/ImpactBeamTolerance-v1 --jobs 100 --out minari
+    python agents/export_minari.py --level nominal clearance wear fleet --split train --jobs 100 --out minari
 
-Needs the extra [offline]. With MINARI_DATASETS_PATH=minari, `minari.load_dataset(
-"chaosgym/ImpactBeamTolerance/random-v1")` loads it.
+writes one of each level. Needs the extra [offline]. With MINARI_DATASETS_PATH=minari, `minari.load_dataset(
+"chaosgym/ImpactBeamTolerance/random-fleet-train-v1")` loads the last one; without level and split the name ends in
+`random-v1`.
 """
 
 import argparse
 import os
 import shutil
+import sys
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 from tqdm import trange
 
 from chaosgym.control.policies import load_policy
 from chaosgym.envs import environment
+from chaosgym.envs.vector_env import native_envs
+from chaosgym.errors import ChaosgymError, ParameterError
 from chaosgym.files import made_whole
 
 
@@ -23,21 +28,35 @@ def main() -> None:
     """Play the jobs and write the dataset."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--env", default="chaosgym/ImpactBeamTolerance-v1", help="id, or file of a machine")
+    parser.add_argument("--level", nargs="+", default=[None], help="what differs from job to job; a dataset of each")
+    parser.add_argument("--split", default=None, help="part of the level's machines, such as train")
     parser.add_argument("--policy", type=Path, default=None, help="folder of a policy; random actions by default")
     parser.add_argument("--jobs", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, default=Path("minari"))
     asked = parser.parse_args()
+    try:
+        for level in asked.level:
+            split = None if level == "nominal" else asked.split  # which is one machine
+            _write(asked, {name: value for name, value in (("level", level), ("split", split)) if value})
+    except ChaosgymError as error:
+        print(f"Error: {error}", file=sys.stderr)
+        sys.exit(2)
+
+
+def _write(asked: argparse.Namespace, keywords: dict[str, Any]) -> None:
+    """Write the dataset of one level."""
     behaviour = asked.policy.name if asked.policy else "random"
-    name = f"chaosgym/{Path(asked.env).stem.removesuffix('-v1')}/{behaviour}-v1"
+    kind = "-".join([behaviour, *keywords.values()])
+    name = f"chaosgym/{Path(asked.env).stem.removesuffix('-v1')}/{kind}-v1"
     if (asked.out / name).exists():
-        raise SystemExit(f"{asked.out / name} exists; choose another folder with --out")
+        raise ParameterError(f"{asked.out / name} exists; choose another folder with --out")
     with made_whole(asked.out / name) as folder:
-        _export(asked, name, behaviour, folder)
+        _export(asked, name, keywords, folder)
     print(f"{name}: {asked.jobs} jobs in {asked.out}")
 
 
-def _export(asked: argparse.Namespace, name: str, behaviour: str, folder: Path) -> None:
+def _export(asked: argparse.Namespace, name: str, keywords: dict[str, Any], folder: Path) -> None:
     """Write the dataset into a folder, by way of one in which Minari keeps its datasets."""
     store = folder / "minari"
     store.mkdir()
@@ -45,13 +64,15 @@ def _export(asked: argparse.Namespace, name: str, behaviour: str, folder: Path) 
     from minari import DataCollector  # it looks for the folder when it is imported
 
     policy = load_policy(asked.policy) if asked.policy else None
-    env = gym.make(environment(asked.env), **(policy.keywords if policy else {}))
+    keywords = keywords | (policy.keywords if policy else {})
+    env = gym.make(environment(asked.env), **keywords)
+    behaviour = asked.policy.name if asked.policy else "random"
     env.action_space.seed(asked.seed)
     collector = DataCollector(env)
     for job in trange(asked.jobs, desc=name, unit="job"):
         observation, ended = collector.reset(seed=asked.seed + job)[0], False
         if policy:
-            policy.begin(env.unwrapped.task, 1)
+            policy.start(native_envs(asked.env, **keywords))
         while not ended:
             action = policy(observation[None])[0] if policy else env.action_space.sample()
             observation, _, terminated, truncated, _ = collector.step(action)
@@ -62,7 +83,7 @@ def _export(asked: argparse.Namespace, name: str, behaviour: str, folder: Path) 
         author="The chaosgym developers",
         requirements=["chaosgym"],
         code_permalink="agents/export_minari.py",
-        description=f"{asked.jobs} jobs of {asked.env} from seed {asked.seed}, {behaviour}",
+        description=f"{asked.jobs} jobs of {asked.env} ({keywords}) from seed {asked.seed}, {behaviour}",
     )
     collector.close()
     for part in (store / name).iterdir():
