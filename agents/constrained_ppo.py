@@ -52,7 +52,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--learning-rate", type=float, default=1e-3)
     parser.add_argument("--gamma", type=float, default=0.95)
     parser.add_argument("--gae-lambda", type=float, default=0.9)
-    parser.add_argument("--limit", type=float, default=0.05)
+    parser.add_argument("--limit", type=float, default=None, help="Of the mean cost; default: the task's cost_budget.")
     parser.add_argument("--units", type=int, default=64)
     return parser.parse_args()
 
@@ -228,7 +228,7 @@ def train(asked: argparse.Namespace) -> None:
         model = LagrangianPPO(
             "MlpPolicy",
             envs,
-            cost_limit=asked.limit,
+            cost_limit=envs.get_attr("task")[0].cost_budget if asked.limit is None else asked.limit,
             n_steps=asked.rollout,
             batch_size=asked.batch,
             n_epochs=asked.epochs,

@@ -6,8 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import gymnasium as gym
 import pytest
 
+import chaosgym
 from chaosgym.control.policies import load_policy
 from chaosgym.control.rollout import play
 
@@ -99,16 +101,46 @@ def test_a_map_is_learned_from_the_jobs_of_several_runs(tmp_path):
         assert told in done.stderr.splitlines()[-1]
 
 
+def test_a_constraint_is_the_budget_of_the_task(tmp_path, monkeypatch):
+    """The specification of an environment carries the budget; training without a limit of its own takes it."""
+    monkeypatch.syspath_prepend(str(AGENTS))
+    import constrained_ppo
+
+    env = gym.make(BEAM, cost_budget=0.1)
+    assert env.unwrapped.task.cost_budget == env.spec.kwargs["cost_budget"] == 0.1
+    limits = []
+
+    def stop(*_, cost_limit, **__):
+        limits.append(cost_limit)
+        raise InterruptedError
+
+    monkeypatch.setattr(constrained_ppo, "LagrangianPPO", stop)
+    for extra in ([], ["--limit", "0.2"]):
+        monkeypatch.setattr(sys, "argv", ["constrained_ppo", "--envs", "2", "--out", str(tmp_path), *extra])
+        with pytest.raises(InterruptedError):
+            constrained_ppo.train(constrained_ppo.arguments())
+    assert limits == [gym.make(BEAM).unwrapped.task.cost_budget, 0.2]
+
+
 @pytest.mark.slow
 def test_minari_export_is_read_back(tmp_path, monkeypatch):
-    """As many whole jobs as were asked for."""
+    """One dataset for each level, of as many whole jobs as were asked for, on machines of the split."""
     pytest.importorskip("minari")
-    command = [sys.executable, str(AGENTS / "export_minari.py"), "--jobs", "2", "--out", str(tmp_path / "minari")]
-    subprocess.run(command, check=True, capture_output=True)
-    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "minari"))
-    code = "import minari; d = minari.load_dataset('chaosgym/ImpactBeamTolerance/random-v1'); print(d.total_steps)"
+    out = str(tmp_path / "minari")
+    command = [sys.executable, str(AGENTS / "export_minari.py"), "--jobs", "2", "--out", out, "--split", "train"]
+    subprocess.run([*command, "--level", "clearance", "fleet"], check=True, capture_output=True)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", out)
+    code = """import minari
+for level in ("clearance", "fleet"):
+    dataset = minari.load_dataset(f"chaosgym/ImpactBeamTolerance/random-{level}-train-v1")
+    print(dataset.total_steps, dataset.env_spec.kwargs["level"], dataset.env_spec.kwargs["split"])"""
     told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert told.stdout.split()[-1] == "240"
+    assert told.stdout.splitlines()[-2:] == ["240 clearance train", "240 fleet train"]
+    map_of_fleet = Path(chaosgym.__file__).parent / "control/policies/shipped/ImpactBeamTolerance-v1-fleet"
+    subprocess.run([*command, "--level", "fleet", "--policy", map_of_fleet], check=True, capture_output=True)
+    again = subprocess.run([*command, "--level", "fleet"], capture_output=True, text=True, check=False)
+    assert again.returncode == 2
+    assert "exists; choose another folder" in again.stderr
 
 
 @pytest.mark.parametrize(

@@ -106,6 +106,9 @@ class Task:
     damage_weight: float = _number(1.0, source="cost of a life of the joint")
     time_weight: float = _number(0.0, source="cost of the time that the job takes at top speed")
     failure_weight: float = _number(2.0, source="cost of each step that is not done")
+    cost_budget: float = _number(
+        0.05, high=1.0, source="mean cost of a step that a constrained agent may have; no part of the reward"
+    )
     load_rating: float = _number(
         100.0, low=1e-6, unit="N", source="peak force under which a job uses up the life_share of a joint"
     )
