@@ -8,6 +8,7 @@ from chaosgym.control.controllers import (
     BackOff,
     Bandit,
     Belief,
+    BestFelt,
     CommonSchedule,
     ConstantTrim,
     Follow,
@@ -19,6 +20,7 @@ from chaosgym.control.controllers import (
 from chaosgym.control.controllers.planned import best_schedule
 from chaosgym.control.maps import Maps, maps_of
 from chaosgym.control.rollout import play
+from chaosgym.envs.vector_env import native_envs
 
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
 MACHINES = range(24)
@@ -62,6 +64,28 @@ def test_backing_off_learns_from_measurements():
         played = play(BackOff(remembers=remembers), BEAM, many)
         assert played.type_iii_share.mean() < 0.6 * following.type_iii_share.mean()
         assert played.returns.mean() > following.returns.mean()
+
+
+def test_the_best_felt_speed_is_one_that_was_felt():
+    """Every speed was run before in the job or is a new demand, or lies on the way to one of these."""
+    envs = native_envs(BEAM, 8, action="speed", objective="life")
+    observations, _ = envs.reset(seed=5)
+    player = BestFelt()
+    player.start(envs)
+    felt = [set() for _ in range(8)]
+    returned = 0
+    for _ in range(envs.task.steps):
+        speeds = player(observations)[:, 0]
+        for job, (wanted, row) in enumerate(zip(speeds.tolist(), observations, strict=True)):
+            demand = float(row[1])
+            felt[job].add(round(float(row[0]), 6))
+            assert wanted == demand or round(wanted, 6) in felt[job]
+            assert abs(wanted - demand) <= envs.task.largest_trim
+            returned += wanted != demand
+        observations, *_ = envs.step(speeds[:, None])
+    assert returned > 100
+    following, best = (play(one, BEAM, MACHINES, objective="life") for one in (Follow(), BestFelt()))
+    assert best.life.mean() > 1.2 * following.life.mean()
 
 
 def test_looking_ahead_stays_within_the_range_of_the_task():

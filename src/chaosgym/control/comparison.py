@@ -34,7 +34,7 @@ SUBJECTS = ("objective", "level", "split", "sealed")
 CLASSIFIED = "back off, by the classifier"
 """Contender where a classifier of records is shipped."""
 
-WITHOUT_MODELS = (ZERO, ONE, "own map, demands known", "back off", SAFE, "kriging")
+WITHOUT_MODELS = (ZERO, ONE, "own map, demands known", "back off", SAFE, "best felt", "kriging")
 """Contenders that need no model: those of a pool of machines."""
 
 WORN_LEVELS = 5
@@ -61,6 +61,7 @@ class Contenders:
             "back off": partial(controllers.BackOff, remembers=False),
             SAFE: controllers.BackOff,
             CLASSIFIED: partial(controllers.BackOff, classified=True),
+            "best felt": controllers.BestFelt,
             "kriging": lambda: controllers.Kriging(price=None),
             "bandit": lambda: controllers.Bandit(self.fleet),
             "table": lambda: controllers.Table(self._tables()),

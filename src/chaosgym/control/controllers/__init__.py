@@ -1,7 +1,7 @@
 """Rules that set speeds without learning; ``chaosgym.control.comparison`` runs them all on the same machines."""
 
 from chaosgym.control.controllers.controller import Controller
-from chaosgym.control.controllers.feedback import BackOff, Bandit
+from chaosgym.control.controllers.feedback import BackOff, Bandit, BestFelt
 from chaosgym.control.controllers.kriging import Kriging
 from chaosgym.control.controllers.planned import (
     Belief,
@@ -19,6 +19,7 @@ __all__ = [
     "BackOff",
     "Bandit",
     "Belief",
+    "BestFelt",
     "CommonSchedule",
     "ConstantTrim",
     "Controller",

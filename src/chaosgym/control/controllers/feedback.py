@@ -71,6 +71,35 @@ class BackOff(Controller):
         return np.asarray(demand + self.ladder[self._rung])
 
 
+class BestFelt(Controller):
+    """At the speed within reach that cost least when it was felt in this job; each demand is felt first."""
+
+    knows = "measurements"
+
+    def begin(self, envs: Any) -> None:
+        """Forget the last jobs."""
+        self._steps, self._share, self._peak = np.zeros((3, self.count, len(self.task.grid)))
+
+    def speeds(self, observations: Observations) -> Array:
+        """The demand if it is new, or the speed of least cost."""
+        task, grid, every = self.task, self.task.grid, np.arange(self.count)
+        demand = seen(observations, "demand")
+        self._feel(observations)
+        felt = Maps(grid, self._share, self._peak)
+        cost = self.cost(felt.share, felt.damage(task), demand, grid)
+        far = np.abs(grid - demand[:, None]) > task.largest_trim + 0.5 * task.trim_step
+        best = grid[np.where(far | (self._steps == 0.0), np.inf, cost).argmin(axis=1)]
+        return np.where(self._steps[every, place_of(demand, task)] > 0.0, best, demand)
+
+    def _feel(self, observations: Observations) -> None:
+        """Take the step into the means of its speed."""
+        here = np.arange(self.count), place_of(seen(observations, "speed"), self.task)
+        self._steps[here] += 1.0
+        wild = irregular(observations, self.task, THRESHOLD, 1e-3)
+        self._share[here] += (wild - self._share[here]) / self._steps[here]
+        self._peak[here] += (seen(observations, "mean_peak_force") - self._peak[here]) / self._steps[here]
+
+
 class Bandit(Controller):
     """Mean map of models, updated by the irregularity measured at each speed; uncertain speeds get a bonus.
 
