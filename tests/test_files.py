@@ -48,6 +48,18 @@ def test_a_failed_write_leaves_the_old_file_and_no_other(tmp_path):
     assert path.read_text() == "old"
 
 
+def test_a_file_that_another_process_writes_meanwhile_is_replaced(tmp_path):
+    """Two processes that fill one cache both end well: the last to end wins."""
+    target = tmp_path / "cached.json"
+
+    def write(temporary):
+        temporary.write_text("this")
+        target.write_text("the other's")
+
+    write_atomically(target, write)
+    assert target.read_text() == "this"
+
+
 def test_contents_reach_the_disk_before_the_name(tmp_path, monkeypatch):
     """The file is flushed before it is renamed, and the folder after: a power cut leaves no empty file."""
     order = []

@@ -44,14 +44,14 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     target = replaceable(path)
     temporary = target.with_name(f".{target.name}.{os.getpid()}.{OWN_END}")
     try:
-        if target.exists():  # never readable by more people than before, not even while it is written
+        mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
+        if mode is not None:  # never readable by more people than before, not even while it is written
             temporary.unlink(missing_ok=True)
-            mode = stat.S_IMODE(target.stat().st_mode)
             os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
             os.chmod(temporary, mode | stat.S_IWUSR)
         write(temporary)
         _flush(temporary)
-        if target.exists():
+        if mode is not None:
             os.chmod(temporary, mode)
         os.replace(temporary, target)
         if os.name == "posix":
