@@ -222,17 +222,21 @@ def predictability(values: Array, residual: Array) -> float:
     if np.ptp(residual) == 0.0:
         return 0.0
     values, residual = values[-MOST_READINGS:], residual[-MOST_READINGS:]
-    return max(_forecast(values, residual, delays) for delays in (1, 2, 3, 4))
+    apart = np.abs(values[:-1, None] - values[:-1])
+    distance, told = apart, [_forecast(apart, residual[1:])]
+    for delays in (2, 3, 4):  # the largest of the differences of their readings
+        distance = np.maximum(distance[:-1, :-1], apart[delays - 1 :, delays - 1 :])
+        told.append(_forecast(distance, residual[delays:]))
+    return max(told)
 
 
 MOST_READINGS = 600
 """Readings, the last ones, that the forecast uses."""
 
 
-def _forecast(values: Array, residual: Array, delays: int, neighbours: int = 3) -> float:
-    vectors = np.lib.stride_tricks.sliding_window_view(values[:-1], delays)
-    following = residual[delays:]
-    distance = np.max(np.abs(vectors[:, None] - vectors[None]), axis=2)
+def _forecast(distance: Array, following: Array, neighbours: int = 3) -> float:
+    """Of what follows each delay vector, by those that follow its nearest neighbours; see ``predictability``."""
+    distance = distance.copy()
     np.fill_diagonal(distance, np.inf)
     nearest = np.argpartition(distance, neighbours, axis=1)[:, :neighbours]
     told = following[nearest].mean(axis=1)
