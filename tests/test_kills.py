@@ -77,10 +77,10 @@ def _policy(out):
 
 
 def _calibration(out):
-    """With a cache of its own, so that kills meet the thorough runs too, not only the search."""
+    """With a cache of results of its own, so that kills meet the thorough runs too; kernels are the user's."""
     words = ["thesis", "calibrate", *f"impact-beam --budget 2 --workers 1 --out {out}/search".split()]
     program = (
-        f"import os, sys, chaosgym; os.environ['XDG_CACHE_HOME'] = '{out}/cache'; sys.argv = {words};"
+        f"import os, sys, chaosgym.core.kernel_cache; os.environ['XDG_CACHE_HOME'] = '{out}/cache'; sys.argv = {words};"
         "from thesis.cli import main; main()"
     )
     return ["-c", program]
