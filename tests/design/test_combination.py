@@ -184,7 +184,7 @@ def test_guidelines_say_what_the_assessment_says(calm):
     """Signs with rates, the case with its counts, the evaluation of the type and the next phase."""
     said = guidelines(calm)
     sentences = [one.sentence for one in said]
-    assert sum("of those with it" in sentence for sentence in sentences) == 4
+    assert sum("of the dataset's points with" in sentence for sentence in sentences) == 4
     assert any(sentence.startswith("Case I: ") and "16 periodic of 16 machines" in sentence for sentence in sentences)
     assert any("all are Type I" in sentence for sentence in sentences)
     assert ("prototype" in sentences[-1]) == (calm.verdict == "meets")

@@ -126,15 +126,6 @@ def measured_rates() -> Mapping[str, Mapping[str, Rate]]:
     return {machine: {name: Rate(**rate) for name, rate in signs.items()} for machine, signs in kept.items()}
 
 
-MEANT = {
-    "criteria": "chaos at such a point",
-    "period doubling": "chaos within the tolerances of speed and clearance",
-    "period three": "chaos within the tolerances of speed and clearance",
-    "long bouncing": "chaos within the tolerances of speed and clearance",
-}
-"""What each sign announces."""
-
-
 @dataclass(frozen=True)
 class Sign:
     """One sign of chaos on one response.
@@ -158,15 +149,15 @@ class Sign:
 
     @property
     def line(self) -> str:
-        """The sign in one line."""
-        section = "5.3.1" if self.name == "criteria" else "5.3.2"
-        told = f"{self.name} ({section}): {'yes' if self.present else 'no'}, {self.why}"
+        """The sign in one line, with its precision where it is there, and with its recall where it is not."""
+        printed = self.name == "criteria"
+        told = f"{self.name} ({'5.3.1' if printed else '5.3.2'}): {'yes' if self.present else 'no'}, {self.why}"
         if self.rate is None:
-            return f"{told}; how often it is right was not measured on this machine"
-        return (
-            f"{told}; {_share(self.rate.precision)} of those with it had {MEANT[self.name]}, "
-            f"and {_share(self.rate.recall)} of those with chaos had it"
-        )
+            return f"{told}; how often it is right was not measured on this machine" if self.present else told
+        chaos = "chaos" if printed else "chaos within the tolerances of speed and clearance"
+        if self.present:
+            return f"{told}; {_share(self.rate.precision)} of the dataset's points with it had {chaos}"
+        return f"{told}; {_share(self.rate.recall)} of the dataset's points with {chaos} had it"
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
