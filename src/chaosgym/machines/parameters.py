@@ -50,6 +50,11 @@ def parameter(
     return field(default=default, metadata={"parameter": described})
 
 
+def described_as(known: Parameter, default: Any, **changes: Any) -> Any:
+    """Make a field that is described as another one, but for some ``changes``."""
+    return field(default=default, metadata={"parameter": replace(known, **changes)})
+
+
 def assumed(default: Any, unit: str, low: float, high: float) -> Any:
     """Make a field of a machine of one's own, of which its file may say otherwise."""
     return parameter(default, unit=unit, low=low, high=high, provenance="assumed", source="default")

@@ -1,13 +1,37 @@
-"""What every file of a machine states alike: ranges, tolerances, and how its machines are kept."""
+"""What a file or a call states of a kind of machine: its class, ranges, tolerances, and how its machines are kept."""
 
-from collections.abc import Mapping
-from dataclasses import fields
-from typing import Any
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, get_type_hints
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import by_field, check_parameter, parameters_of, suggestion
 from chaosgym.machines.units import parse_quantity
+
+
+def class_with(base: type[Machine], defaults: Mapping[str, Any], attributes: Mapping[str, Any]) -> Any:
+    """Subclass of a class of machines with further fields or other defaults, and with other class attributes.
+
+    Raises
+    ------
+    ParameterError
+        If the machine of all defaults is not allowed.
+    """
+    hints = get_type_hints(base)
+    annotations = {name: hints.get(name, Any) for name in defaults}
+    annotations |= {name: ClassVar[Any] for name in attributes if not name.startswith("__")}
+    body = {"__module__": __name__, "__annotations__": annotations, **defaults, **attributes}
+    made: Any = dataclass(frozen=True, kw_only=True)(type(base.__name__, (base,), body))
+    made()
+    return made
+
+
+def refuse_names(what: str, names: Iterable[str], example: str) -> None:
+    """Refuse names that can't begin that of a field."""
+    for name in names:
+        if not name.isidentifier() or name.startswith("_"):
+            raise ParameterError(f"{what} {name!r} is out of range; allowed: letters, digits and _, as in {example}")
 
 
 def range_of(kind: Any, what: str, field: str, values: Any) -> tuple[float, float]:

@@ -1,16 +1,16 @@
 """The class of machines that are one mechanism: a field for all that may differ between two of them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, ClassVar, get_type_hints
+from typing import Any
 
 from chaosgym.errors import ParameterError
-from chaosgym.machines.machine import Number, Option
+from chaosgym.machines.machine import Number
 from chaosgym.machines.mechanism.clearance import Clearance, opened_by
 from chaosgym.machines.mechanism.machine import MechanismMachine
 from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.motor import MOTOR_FIELDS
-from chaosgym.machines.parameters import assumed, parameter, parameters_of
+from chaosgym.machines.parameters import assumed, described_as, parameter, parameters_of
+from chaosgym.machines.stated import class_with, refuse_names
 
 
 def machine_of(
@@ -80,9 +80,7 @@ def machine_of(
     watched = monitored or next(iter(clearances))
     if watched not in clearances:
         raise ParameterError(f"monitored = {watched!r} is not one of {', '.join(clearances)}, which have clearance")
-    for name in (*clearances, *(link.name for link in mechanism.links)):
-        if not name.isidentifier() or name.startswith("_"):
-            raise ParameterError(f"name {name!r} is out of range; allowed: letters, digits and _, as in big_end")
+    refuse_names("name", (*clearances, *(link.name for link in mechanism.links)), "big_end")
     fields: dict[str, Any] = {"mechanism": mechanism}
     rubs = [name for name, given in clearances.items() if given.friction is not None]
     if len(rubs) > 1:
@@ -102,11 +100,11 @@ def machine_of(
         if link.mass.any() or link.inertia.any():
             fields[f"{link.name}_mass_factor"] = assumed(1.0, "-", 1e-3, 1e3)
     own = parameters_of(MechanismMachine)
-    fields["monitored"] = parameter(watched, **{**vars(own["monitored"]), **about, "choices": tuple(clearances)})
+    fields["monitored"] = described_as(own["monitored"], watched, **about, choices=tuple(clearances))
     if definition is not None:
         fields["definition"] = definition
     for name, value in stated.items():
-        fields[name] = parameter(value, **{**vars(own[name]), **about})
+        fields[name] = described_as(own[name], value, **about)
     usual = {"speed": (100.0, 1000.0), "clearance": (1e-5, 2e-4), **(usual_ranges or {})}
     types: dict[str, Any] = {
         "stations": {name: given.stations for name, given in clearances.items()},
@@ -115,20 +113,10 @@ def machine_of(
         "hertz": any(given.hertz for given in clearances.values()),
         "beside_matrices": ("speed", *(f"{name}_clearance" for name in clearances), *(MOTOR_FIELDS if motor else ())),
         "usual_ranges": {"speed": usual["speed"], f"{watched}_clearance": usual["clearance"]},
-        "options": _options(watched),
+        "options": {
+            "--speed-rpm": Number("speed", "rpm"),
+            "--clearance-mm": Number(f"{watched}_clearance", "mm", 1e-3),
+        },
         **(namespace or {}),
     }
-    hints = get_type_hints(MechanismMachine)
-    annotations = {name: hints.get(name, Any) for name in fields}
-    annotations |= {name: ClassVar[Any] for name in types if not name.startswith("__")}
-    body = {"__module__": __name__, "__annotations__": annotations, **fields, **types}
-    made: Any = dataclass(frozen=True, kw_only=True)(type("MechanismMachine", (MechanismMachine,), body))
-    made()  # its defaults are checked
-    return made
-
-
-def _options(watched: str) -> dict[str, Option]:
-    return {
-        "--speed-rpm": Number("speed", "rpm"),
-        "--clearance-mm": Number(f"{watched}_clearance", "mm", 1e-3),
-    }
+    return class_with(MechanismMachine, fields, types)

@@ -2,9 +2,8 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -22,8 +21,8 @@ from chaosgym.machines.modal_machine.machine_class import Joint, machine_with_jo
 from chaosgym.machines.modal_machine.structure import BASE, Structure
 from chaosgym.machines.modal_machine.turning import turning_joints
 from chaosgym.machines.modal_machine.varying import Spring, VaryingMachine, checked_samples
-from chaosgym.machines.parameters import parameter, parameters_of, suggestion
-from chaosgym.machines.stated import range_of, reduced, tolerances_of
+from chaosgym.machines.parameters import described_as, parameter, parameters_of, suggestion
+from chaosgym.machines.stated import class_with, range_of, reduced, tolerances_of
 from chaosgym.machines.units import TURNING
 
 SAMPLED = ("drive", "joint", "spring")
@@ -235,17 +234,14 @@ def _with_one_joint(
     known = parameters_of(base)
     values = {"speed": speed, **{OF_JOINT.get(name, name): value for name, value in stated.items()}}
     for field in known:
-        about = {**vars(known[field]), **({"provenance": "stated", "source": path} if field in values else {})}
-        if turning:
-            about["unit"] = TURNING.get(about["unit"], about["unit"])
-        fields[field] = parameter(values.get(field, getattr(base, field)), **about)
+        unit = known[field].unit
+        about = {"provenance": "stated", "source": path} if field in values else {}
+        about["unit"] = TURNING.get(unit, unit) if turning else unit
+        fields[field] = described_as(known[field], values.get(field, getattr(base, field)), **about)
     options = {"--speed-hz": ModalMachine.options["--speed-hz"], **clearance_option("clearance", turning)}
     types = {**types, "usual_ranges": usual, "turning": ("joint",) if turning else (), "options": options}
     types["aliases"] = aliases_of("joint") | aliases_of(joint.get("name", "joint"))
-    annotations: dict[str, Any] = dict.fromkeys(fields, Any)
-    annotations |= {name: ClassVar[Any] for name in types if not name.startswith("__")}
-    namespace = {"__module__": __name__, "__annotations__": annotations, **fields, **types}
-    return dataclass(frozen=True, kw_only=True)(type(base.__name__, (base,), namespace))
+    return class_with(base, fields, types)
 
 
 def _drive(row: Mapping[str, Any]) -> Drive:

@@ -27,7 +27,7 @@ from chaosgym.machines.modal_impact import (
 )
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.structure import Structure
-from chaosgym.machines.parameters import assumed, parameter, parameters_of
+from chaosgym.machines.parameters import assumed, described_as, parameter, parameters_of
 
 ROUNDING = 2.0**-52
 """Relative distance of neighbouring numbers."""
@@ -212,7 +212,7 @@ class ModalMachine(ModalImpactMachine):
 
 def as_there(name: str) -> Any:
     """Field of the same name and default as that of ``ModalMachine``."""
-    return parameter(getattr(ModalMachine, name), **vars(parameters_of(ModalMachine)[name]))
+    return described_as(parameters_of(ModalMachine)[name], getattr(ModalMachine, name))
 
 
 def turning_note(joints: tuple[str, ...]) -> str:

@@ -9,8 +9,7 @@ machine = kind(speed=19.0, left_clearance=2e-4)
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, get_type_hints
+from typing import Any, NamedTuple
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Number
@@ -19,7 +18,8 @@ from chaosgym.machines.modal_machine.friction import MINDLIN, OF_FRICTION
 from chaosgym.machines.modal_machine.jointed import LARGEST, JointedMachine
 from chaosgym.machines.modal_machine.machine import OF_JOINT, ModalMachine, clearance_option
 from chaosgym.machines.modal_machine.structure import Structure
-from chaosgym.machines.parameters import parameter, parameters_of
+from chaosgym.machines.parameters import described_as, parameters_of
+from chaosgym.machines.stated import class_with, refuse_names
 from chaosgym.machines.units import TURNING
 
 
@@ -106,27 +106,20 @@ def machine_with_joints(
     about = {"provenance": "assumed", "source": "default", **(about or {})}
     defaults: dict[str, Any] = {"modes": structure, "drives": drives}
     known = parameters_of(ModalMachine)
+    refuse_names("joint name", joints, "left_1")
     for name, joint in joints.items():
-        if not name.isidentifier() or name.startswith("_"):
-            raise ParameterError(f"joint name {name!r} is out of range; allowed: letters, digits and _, as in left_1")
-        for what, same in OF_JOINT.items():
-            unit = known[same].unit
-            more = {**about, "unit": TURNING.get(unit, unit) if joint.turns else unit}
-            defaults[f"{name}_{what}"] = parameter(getattr(joint, what), **{**vars(known[same]), **more})
-        for what, described in OF_FRICTION.items() if joint.tangent else ():
-            more = {**about, "unit": TURNING.get(described.unit, described.unit) if joint.turns else described.unit}
-            value = getattr(joint, what)
-            if what == "tangential_factor" and value == MINDLIN:
-                more |= {"provenance": described.provenance, "source": described.source}
-            defaults[f"{name}_{what}"] = parameter(value, **{**vars(described), **more})
+        described = {what: known[same] for what, same in OF_JOINT.items()} | (OF_FRICTION if joint.tangent else {})
+        for what, usual_field in described.items():
+            value, unit = getattr(joint, what), usual_field.unit
+            usual_factor = what == "tangential_factor" and value == MINDLIN
+            more = {"unit": TURNING.get(unit, unit) if joint.turns else unit, **({} if usual_factor else about)}
+            defaults[f"{name}_{what}"] = described_as(usual_field, value, **more)
     own = parameters_of(JointedMachine)
-    defaults["monitored"] = parameter(
-        stated.pop("monitored", LARGEST), **{**vars(own["monitored"]), "choices": (LARGEST, *joints)}
-    )
+    defaults["monitored"] = described_as(own["monitored"], stated.pop("monitored", LARGEST), choices=(LARGEST, *joints))
     if definition is not None:
         defaults["definition"] = definition
     for name, value in stated.items():
-        defaults[name] = parameter(value, **{**vars(own[name]), **about})
+        defaults[name] = described_as(own[name], value, **about)
     usual = {"speed": (4.0, 30.0), "clearance": (2e-5, 2e-4), **(usual_ranges or {})}
     watched = defaults["monitored"].default
     first = next(iter(joints)) if watched == LARGEST else watched
@@ -141,10 +134,4 @@ def machine_with_joints(
         "turning": tuple(name for name, joint in joints.items() if joint.turns),
         **(namespace or {}),
     }
-    hints = get_type_hints(JointedMachine)
-    annotations = {name: hints.get(name, Any) for name in defaults}
-    annotations |= {name: ClassVar[Any] for name in types if not name.startswith("__")}
-    body = {"__module__": __name__, "__annotations__": annotations, **defaults, **types}
-    made: Any = dataclass(frozen=True, kw_only=True)(type("JointedMachine", (JointedMachine,), body))
-    made()  # its defaults are checked
-    return made
+    return class_with(JointedMachine, defaults, types)
