@@ -227,7 +227,7 @@ def add_beam(exudyn: Any, system: Any, beam: ImpactBeam, setting: ExudynSetting)
     """Add an impact beam."""
     items, model = exudyn.itemInterface, beam.reduce()
     assert isinstance(model, ModalImpactModel)
-    shapes = np.vstack([model.tip_shape, beam.force_shape])
+    shapes = np.vstack([model.tip_shape, beam.structure.drive[0, 0, 1]])
     modal = np.linalg.inv(np.vstack([shapes, scipy.linalg.null_space(shapes).T]))
     n = len(modal)
     mass, stiffness = modal.T @ modal, modal.T @ (model.stiffness[:, None] * modal)

@@ -23,7 +23,7 @@ def _linear_response(beam, phase):
     model = beam.reduce()
     omega = 2 * np.pi * beam.excitation_frequency
     dynamic = np.diag(model.stiffness - omega**2) + 1j * omega * model.damping
-    amplitude = model.tip_shape @ np.linalg.solve(dynamic, beam.force_shape * beam.force_amplitude)
+    amplitude = model.tip_shape @ np.linalg.solve(dynamic, beam.structure.drive[0, 0, 1] * beam.force_amplitude)
     return (amplitude * np.exp(1j * phase)).imag, abs(amplitude)
 
 
@@ -83,7 +83,7 @@ def test_a_closed_gap_carries_the_quasi_static_force(clearance):
     """With no gap to speak of, at 0.1 Hz, the larger surface force is what a pinned tip needs: no impact adds to it."""
     beam = ImpactBeam(n_modes=1, fitted_modes=0, clearance=clearance, excitation_frequency=0.1, contact_damping=1e3)
     model = beam.reduce()
-    held = beam.force_amplitude * beam.force_shape[0] / model.tip_shape[0]
+    held = beam.force_amplitude * beam.structure.drive[0, 0, 1][0] / model.tip_shape[0]
     pinned = held / (1 + model.stiffness[0] / model.tip_shape[0] ** 2 / beam.contact_stiffness)
     record = simulate(beam, 2)
     np.testing.assert_allclose(record.peak_force, pinned, rtol=2e-3)

@@ -238,8 +238,6 @@ def lyapunov_spectrum(
 ) -> tuple[Array, float]:
     """All exponents of a machine of modes per cycle, descending, (n_states,), and the sum that its damping demands.
 
-    Where impacts take no time, rest on a surface forgets, which no sum shows.
-
     Examples
     --------
     >>> beam = chaosgym.ImpactBeam(excitation_frequency=12.0)
@@ -251,8 +249,7 @@ def lyapunov_spectrum(
     first, vectors, _ = simulate_with_deviations(machine, max(1, transient), initial_state, deviations=np.eye(states))
     record, _, growth = simulate_with_deviations(machine, cycles, first.final_state, deviations=vectors)
     contact_time = record.contact_fraction.mean(axis=0) * machine.cycle_period
-    trace = machine.contraction(contact_time, float(record.impacts.sum(axis=1).mean()))
-    return np.asarray(growth.mean(axis=0)), trace
+    return np.asarray(growth.mean(axis=0)), machine.contraction(contact_time)
 
 
 def exponent_from_series(

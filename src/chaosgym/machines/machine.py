@@ -166,9 +166,9 @@ class Machine(ABC):
         """Field that holds the clearance of the monitored joint; a class attribute serves too."""
 
     @staticmethod
-    @abstractmethod
     def period_at(speed: Any) -> Any:
-        """Duration of one operating cycle [s] at a speed, in the unit of the speed field, or at many."""
+        """Duration of one operating cycle [s] at a speed, in the unit of the speed field (here Hz), or at many."""
+        return 1.0 / speed
 
     @property
     @abstractmethod

@@ -356,6 +356,36 @@ def with_tables(model: ModalImpactModel, step_phase: float | None = None, rate: 
     return model._replace(tables=Tables(phase, *call(tabulate, model, phase, rate)))
 
 
+def passive_share(
+    parts: Flexible, springs: Array, dampers: Array, stops: Array, period: float, states: Array, peak_force: Array
+) -> float:
+    """Largest ratio of energy and force of a run from rest to their bounds, as ``Machine.share_of_bound``.
+
+    Neither structure nor contact gives energy; only the drive does, and what preloads or offsets have stored. So the
+    root of twice the energy grows by at most the norm of the modal forces a second.
+
+    Parameters
+    ----------
+    parts
+        Equations of the machine between contacts.
+    springs, dampers, stops : (m, 2)
+        Of the upper and the lower surface of each joint [N/m], [N s/m]; their positions [m].
+    period
+        Of a cycle [s].
+    """
+    n = len(parts.stiffness)
+    energy = np.sum(states[:, n : 2 * n] ** 2 + parts.stiffness * states[:, :n] ** 2, axis=1)
+    load = float(np.sum(np.linalg.norm(parts.drive, axis=(1, 2)))) + float(np.linalg.norm(parts.static))
+    inside = np.maximum(np.stack([-stops[:, 0], stops[:, 1]], axis=1), 0.0)
+    stored = math.sqrt(float(np.sum(springs * inside**2)))
+    speed = stored + load * np.arange(1, len(states)) * period
+    if not speed.any():
+        return 0.0 if not energy.any() and not peak_force.any() else math.inf
+    surface = np.sqrt(springs) + dampers * np.linalg.norm(parts.joints, axis=1)[:, None]
+    forces = peak_force / (surface.ravel() * speed[:, None])
+    return max(float(np.max(np.sqrt(energy[1:]) / speed)), float(np.max(forces)))
+
+
 def prepare_motion() -> None:
     """Compile or load the kernel that moves every machine of modes, which has one signature."""
     from chaosgym.core.compilation import prepare
@@ -423,16 +453,6 @@ class ModalImpactMachine(Machine):
 
         return at
 
-    @staticmethod
-    def period_at(speed: Any) -> Any:
-        """Duration of one operating cycle [s] at a speed [Hz], or at many."""
-        return 1.0 / speed
-
-    @property
-    def force_shape(self) -> Array:
-        """Mass-normalised mode shapes where the force acts, (n,) [kg^-1/2]."""
-        return np.asarray(self.structure.drive[0, 0, 1])
-
     @property
     def operating_fields(self) -> tuple[str, ...]:
         """Fields that may change from cycle to cycle."""
@@ -484,11 +504,10 @@ class ModalImpactMachine(Machine):
         rates = np.sqrt(self.structure.stiffness)
         return np.concatenate([np.where(rates > 0.0, rates, 2.0 * math.pi / self.cycle_period), np.ones(len(rates))])
 
-    def contraction(self, contact_time: Array, impacts: float) -> float:
-        """Sum of all Lyapunov exponents of a cycle with so much contact on each side [s] and so many impacts.
+    def contraction(self, contact_time: Array) -> float:
+        """Sum of all Lyapunov exponents of a cycle with so much contact on each side [s].
 
-        It is -tr(D) T - d |phi_t|^2 t_contact: damping of the structure, and of the contact while it lasts. Where
-        impacts take no time, 2 log(e) each stands for the contact.
+        It is -tr(D) T - d |phi_t|^2 t_contact: damping of the structure, and of the contact while it lasts.
         """
         model = self.reduce()
         structure = -float(np.trace(model.damping)) * self.cycle_period
@@ -542,19 +561,10 @@ class ModalImpactMachine(Machine):
         return status, done
 
     def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Share of the bound of passivity: neither structure nor contact gives energy away.
-
-        The energy E of the modes grows by the work of the force alone, so sqrt(2 E) by at most F |phi_f| a second.
-        """
-        model, n = self.reduce(), len(self.structure.stiffness)
-        energy = np.sum(states[:, n:] ** 2 + model.stiffness * states[:, :n] ** 2, axis=1)
-        if self.force_amplitude == 0.0:
-            return 0.0 if not energy.any() and not peak_force.any() else math.inf
-        instants = np.arange(1, len(states)) * self.cycle_period
-        speed = self.force_amplitude * float(np.linalg.norm(self.force_shape)) * instants
-        surface = math.sqrt(self.contact_stiffness) + self.contact_damping * float(np.linalg.norm(model.tip_shape))
-        force = surface * speed
-        return max(float(np.max(np.sqrt(energy[1:]) / speed)), float(np.max(peak_force.max(axis=1) / force)))
+        """Share of the bound of passivity; see ``passive_share``."""
+        model = self.reduce()
+        surfaces = model.contact_stiffness[None], model.contact_damping[None], model.stops[None]
+        return passive_share(self.flexible, *surfaces, self.cycle_period, states, peak_force)
 
     def batch(self, count: int) -> "CompiledBatch":
         """Return ``count`` variants that move in one compiled call."""

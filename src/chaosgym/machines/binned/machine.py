@@ -11,11 +11,13 @@ import numpy as np
 from chaosgym.arrays import Array
 from chaosgym.core.binned.model import LINEAR, BinnedModel, TaylorModel
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
+from chaosgym.errors import ParameterError
 from chaosgym.machines.binned.equations import STEP_PHASE, Contact, Held
 from chaosgym.machines.binned.model import exact_model
 from chaosgym.machines.binned.stepped import fastest_rate, stepped_model
 from chaosgym.machines.integrators import Integrator
 from chaosgym.machines.machine import Machine
+from chaosgym.machines.parameters import parameters_of
 
 if TYPE_CHECKING:
     from chaosgym.core.tangent import Tangents
@@ -29,10 +31,23 @@ class BinnedMachine(Machine):
     beside_matrices: ClassVar[tuple[str, ...]] = ()
     """Fields that change neither the matrices nor the contacts but for their gaps: speed and clearances."""
 
+    if TYPE_CHECKING:
+        matrix_update_interval: float
+        """Angle of the drive over which matrices are held [deg]; divides 360."""
+
+    def __post_init__(self, fidelity: str | None) -> None:
+        super().__post_init__(fidelity)
+        if abs(360.0 / self.matrix_update_interval - self.bins) > 1e-9:
+            known = parameters_of(self)["matrix_update_interval"]
+            raise ParameterError(
+                f"matrix_update_interval = {self.matrix_update_interval:g} deg is out of range; "
+                f"allowed: {known.low:g} to {known.high:g} deg that divide 360 deg"
+            )
+
     @property
-    @abstractmethod
     def bins(self) -> int:
         """Bins of the drive's angle over which matrices are held."""
+        return round(360.0 / self.matrix_update_interval)
 
     @abstractmethod
     def held(self) -> Held:

@@ -104,24 +104,10 @@ class MechanismMachine(BinnedMachine):
     monitored: str = parameter("", choices=("",), provenance="assumed", source="default")
     """Joint whose motion and force are recorded."""
 
-    def __post_init__(self, fidelity: str | None) -> None:
-        super().__post_init__(fidelity)
-        bins = 360.0 / self.matrix_update_interval
-        if abs(bins - round(bins)) > 1e-9:
-            raise ParameterError(
-                f"matrix_update_interval = {self.matrix_update_interval:g} deg is out of range; "
-                "allowed: 0.25 to 30 deg that divide 360 deg"
-            )
-
     @property
     def clearance_field(self) -> str:
         """Field of the clearance of the monitored joint."""
         return f"{self.monitored}_clearance"
-
-    @property
-    def bins(self) -> int:
-        """Bins of crank angle over which matrices are held."""
-        return round(360.0 / self.matrix_update_interval)
 
     @property
     def degrees_of_freedom(self) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.joint_sets import JointTables, PressedSets, Sliders
 from chaosgym.machines.machine import Flexible, Machine, Number, Option
-from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
+from chaosgym.machines.modal_impact import Modes, passive_share, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.friction import OF_FRICTION
 from chaosgym.machines.modal_machine.machine import as_there, rigid_note, turning_note
@@ -106,11 +106,6 @@ class JointedMachine(Machine):
         gaps = (f"{name}_{what}" for name in self.joints for what in ("clearance", "offset"))
         return self.speed_field, "drive_level", *gaps
 
-    @staticmethod
-    def period_at(speed: Any) -> Any:
-        """Duration of one operating cycle [s] at a speed [Hz], or at many."""
-        return 1.0 / speed
-
     def of_joints(self, what: str) -> Array:
         """Values of a field of all joints, such as "clearance", (m,)."""
         return np.array([getattr(self, f"{name}_{what}") for name in self.joints])
@@ -174,8 +169,11 @@ class JointedMachine(Machine):
     @property
     def flexible(self) -> Flexible | None:
         """Its equations between contacts; None with friction, which acts beside the forces of the joints."""
-        if self.rubbing:
-            return None
+        return None if self.rubbing else self._equations
+
+    @property
+    def _equations(self) -> Flexible:
+        """The structure's equations between contacts, without friction."""
         return Flexible(self.sets.stiffness, self.sets.damping, self.sets.shape, *self._drive())
 
     def shape_of(self, place: str) -> Array:
@@ -212,7 +210,7 @@ class JointedMachine(Machine):
         rates = self.frequency_factor * self.modes.angular_frequency
         return np.concatenate([rates, np.ones(len(rates)), np.sqrt(self.sets.sliders.springs[:, 0])])
 
-    def contraction(self, contact_time: Array, impacts: float) -> float:
+    def contraction(self, contact_time: Array) -> float:
         """Sum of all Lyapunov exponents of a cycle with so much contact on each surface [s], (2m,).
 
         It is -tr(D) T - sum of d |phi|^2 t_contact: damping of the structure, and of each contact while it lasts. With
@@ -277,25 +275,15 @@ class JointedMachine(Machine):
         return np.asarray(peak_force[..., first : first + 2].max(axis=-1))
 
     def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Share of the bound of passivity: only the drive gives energy, and what preloads or offsets have stored.
+        """Share of the bound of passivity; see ``passive_share``.
 
         Surfaces that move may give any power: then nothing bounds a run, and the share is 0.
         """
-        sets, n = self.sets, self.n_velocities
+        sets = self.sets
         if sets.sliders.speed.any():
             return 0.0
-        energy = np.sum(states[:, n : 2 * n] ** 2 + sets.stiffness * states[:, :n] ** 2, axis=1)
-        force, static = self._drive()
-        load = float(np.sum(np.linalg.norm(force, axis=(1, 2)))) + float(np.linalg.norm(static))
-        stops = self.stops
-        inside = np.maximum(np.stack([-stops[:, 0], stops[:, 1]], axis=1), 0.0)
-        stored = math.sqrt(float(np.sum(sets.springs * inside**2)))
-        speed = stored + load * np.arange(1, len(states)) * self.cycle_period
-        if not speed.any():
-            return 0.0 if not energy.any() and not peak_force.any() else math.inf
-        surface = np.sqrt(sets.springs) + sets.dampers * np.linalg.norm(sets.shape, axis=1)[:, None]
-        forces = peak_force / (surface.ravel() * speed[:, None])
-        return max(float(np.max(np.sqrt(energy[1:]) / speed)), float(np.max(forces)))
+        surfaces = sets.springs, sets.dampers, self.stops
+        return passive_share(self._equations, *surfaces, self.cycle_period, states, peak_force)
 
 
 @lru_cache(maxsize=64)

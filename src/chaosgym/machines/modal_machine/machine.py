@@ -193,22 +193,6 @@ class ModalMachine(ModalImpactMachine):
         of_drives = drive_notes(self.drives)
         return tuple(note for note in (turning_note(self.turning), rigid_note(hertz), far, *of_drives) if note)
 
-    def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Share of the bound of passivity: only the drive gives energy, and what a preload or offset has stored."""
-        model, n = self.reduce(), self.n_states // 2
-        energy = np.sum(states[:, n:] ** 2 + model.stiffness * states[:, :n] ** 2, axis=1)
-        omega = 2.0 * math.pi * self.speed
-        amplitudes = model.drive[0] + omega**2 * model.drive[1]
-        load = float(np.sum(np.linalg.norm(amplitudes, axis=(1, 2)))) + float(np.linalg.norm(model.static_force))
-        inside = np.maximum([-model.stops[0], model.stops[1]], 0.0)
-        stored = math.sqrt(float(model.contact_stiffness @ inside**2))
-        speed = stored + load * np.arange(1, len(states)) * self.cycle_period
-        if not speed.any():
-            return 0.0 if not energy.any() and not peak_force.any() else math.inf
-        stiffest, damper = float(np.max(model.contact_stiffness)), float(np.max(model.contact_damping))
-        force = (math.sqrt(stiffest) + damper * float(np.linalg.norm(model.tip_shape))) * speed
-        return max(float(np.max(np.sqrt(energy[1:]) / speed)), float(np.max(peak_force.max(axis=1) / force)))
-
 
 def as_there(name: str) -> Any:
     """Field of the same name and default as that of ``ModalMachine``."""

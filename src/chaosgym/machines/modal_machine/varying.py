@@ -175,11 +175,6 @@ class VaryingMachine(BinnedMachine):
 
     def __post_init__(self, fidelity: str | None) -> None:
         super().__post_init__(fidelity)
-        if abs(360.0 / self.matrix_update_interval - self.bins) > 1e-9:
-            raise ParameterError(
-                f"matrix_update_interval = {self.matrix_update_interval:g} deg is out of range; allowed: 0.1 to 30 deg "
-                "that divide 360 deg"
-            )
         if not self.modes.shape(self.joint).any():
             raise ParameterError(f"joint = {self.joint!r} never moves: every shape is 0 there")
         if self.slides and not self.modes.shape(self.slides).any():
@@ -226,11 +221,6 @@ class VaryingMachine(BinnedMachine):
     def rate_at(speed: float) -> float:
         """Angular velocity [rad/s] of the drive at a speed [Hz]."""
         return 2.0 * math.pi * speed
-
-    @property
-    def bins(self) -> int:
-        """Parts of a cycle over which stiffness is held."""
-        return round(360.0 / self.matrix_update_interval)
 
     @property
     def n_states(self) -> int:

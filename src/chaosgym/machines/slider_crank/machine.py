@@ -133,11 +133,6 @@ class SliderCrank(CrankParameters):
         """Names of the coordinates that are integrated: only those that the scene requires."""
         return degrees_of_freedom(self)
 
-    @property
-    def bins(self) -> int:
-        """Bins of crank angle over which matrices are held."""
-        return round(360.0 / self.matrix_update_interval)
-
     def held(self) -> Held:
         """Return the held accelerations, whatever the speed and the clearances."""
         return held_of(self)

@@ -247,11 +247,6 @@ class CrankParameters(BinnedMachine):
                 f"rod_length = {self.rod_length:g} m is out of range; "
                 f"allowed: above the crank radius of {self.crank_radius:g} m by 0.1 % or more"
             )
-        if abs(360.0 / self.matrix_update_interval - round(360.0 / self.matrix_update_interval)) > 1e-9:
-            raise ParameterError(
-                f"matrix_update_interval = {self.matrix_update_interval:g} deg is out of range; "
-                "allowed: 0.1 to 30 deg that divide 360 deg"
-            )
         if self.slider_joint == "ideal" and self.ball_joint == "ideal":
             raise ParameterError(
                 "slider_joint = 'ideal' and ball_joint = 'ideal' leave nothing that rattles; "
