@@ -160,8 +160,12 @@ def test_editing_a_kernel_source_changes_the_digest(tmp_path):
 
 
 @pytest.mark.slow
-def test_wheel_alone_classifies_and_simulates(tmp_path):
-    """Wheel and source pass ``twine check``; the wheel alone, in a fresh environment, classifies and simulates."""
+def test_the_wheel_alone_classifies_simulates_and_plays(folder, tmp_path, monkeypatch):
+    """Wheel and source pass ``twine check``; in a fresh environment, without torch, the wheel's commands work.
+
+    Policies, a made-up one and the shipped one, are played, and a job is drawn.
+    """
+    monkeypatch.delenv("PYTHONPATH", raising=False)
     subprocess.run([sys.executable, "-m", "build", "--outdir", str(tmp_path), str(ROOT)], check=True)
     (wheel,), (source,) = tmp_path.glob("chaosgym-*.whl"), tmp_path.glob("chaosgym-*.tar.gz")
     subprocess.run([sys.executable, "-m", "twine", "check", "--strict", str(wheel), str(source)], check=True)
@@ -172,15 +176,20 @@ def test_wheel_alone_classifies_and_simulates(tmp_path):
     venv.create(tmp_path / "env", with_pip=True)
     tools = tmp_path / "env" / "bin"
     subprocess.run([tools / "pip", "install", "--quiet", str(wheel)], check=True)
-    for command, key in (("classify", "response_type"), ("simulate", "peak_force_N")):
-        done = subprocess.run(
-            [tools / "chaosgym", command, "impact-beam", "--frequency-hz", "30", "--clearance-mm", "0.127", "--json"],
-            capture_output=True,
-            text=True,
-            check=True,
-            cwd=tmp_path,
-        )
-        assert json.loads(done.stdout)[key]
+    assert list((tmp_path / "env").rglob("site-packages/numba"))
+    assert not list((tmp_path / "env").rglob("site-packages/torch"))
+
+    def told(*words):
+        command = [str(tools / "chaosgym"), *map(str, words), "--json"]
+        return json.loads(subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path).stdout)
+
+    beam = ("impact-beam", "--frequency-hz", "30", "--clearance-mm", "0.127")
+    assert told("classify", *beam)["response_type"]
+    assert told("simulate", *beam)["peak_force_N"]
+    played = told("run-agent", "chaosgym/ImpactBeam-v1", "--policy", folder, "--out", "job.gif")
+    assert played["status"] == "job_done"
+    assert (tmp_path / "job.gif").stat().st_size > 10_000
+    assert told("run-agent", "chaosgym/ImpactBeamTolerance-v1")["status"] == "job_done"
 
 
 def test_version_is_said_once():
