@@ -185,22 +185,17 @@ def _mechanism_table(rows: list[Any], times: dict[str, float]) -> list[str]:
 
 
 def _scaling(repeats: int, points: int, figure: Path | None, as_json: bool, beside: Path | None) -> None:
-    from benchmarks.performance import vector_scaling
     from benchmarks.performance.processors import powers_of_two, thread_shares, worker_shares
     from benchmarks.performance.scaling_figure import scaling_figure
     from benchmarks.performance.sizes import sizes
 
-    grown, shares, measured = sizes(repeats), thread_shares(repeats), vector_scaling(repeats)
+    grown, shares = sizes(repeats), thread_shares(repeats)
     if points:
         shares += worker_shares(points, [count for count in powers_of_two(cpu_count() or 1) if count <= MOST_WORKERS])
     if figure is not None:
         scaling_figure(grown, shares, figure)
-    found = {
-        "scaling": [asdict(each) for each in measured],
-        "sizes": [each._asdict() for each in grown],
-        "processors": [each._asdict() for each in shares],
-    }
-    tell(found, as_json, lambda: [*_size_table(grown), *_share_table(shares), *_scaling_table(measured)], beside)
+    found = {"sizes": [each._asdict() for each in grown], "processors": [each._asdict() for each in shares]}
+    tell(found, as_json, lambda: [*_size_table(grown), *_share_table(shares)], beside)
 
 
 def _size_table(grown: list[Any]) -> list[str]:
@@ -219,13 +214,3 @@ def _share_table(shares: list[Any]) -> list[str]:
         + ", ".join(f"{1e-6 * size:.0f}" for size in each.memory)
         for each in shares
     ]
-
-
-def _scaling_table(measured: list[Any]) -> list[str]:
-    title = f"{'us a step of a machine':42s}{'one thread':>12s}{'all':>8s}{'of ideal':>11s}{'wrapper':>9s}"
-    rows = [
-        f"{f'{each.environment}, {each.machines} on {each.threads} threads':42s}{1e6 * each.one_thread:12.1f}"
-        f"{1e6 * each.all_threads:8.1f}{100.0 * each.efficiency:9.1f} %{1e6 * each.wrapper:9.2f}"
-        for each in measured
-    ]
-    return [title, *rows]

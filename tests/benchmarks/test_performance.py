@@ -16,11 +16,10 @@ import pytest
 from click.testing import CliRunner
 
 from benchmarks.cli import app
-from benchmarks.performance import mechanisms, rates, scaling, sizes
+from benchmarks.performance import mechanisms, rates, sizes
 from benchmarks.performance.against_exudyn import FOUR_BAR, Contest, against_exudyn, period_of
 from benchmarks.performance.exudyn_machines import ExudynSetting, load_exudyn, run_in_exudyn
 from benchmarks.performance.peers import peers
-from benchmarks.performance.reports import report_seconds
 from benchmarks.performance.timing import processor_seconds, rate
 from benchmarks.performance.waits import waits
 from chaosgym import read_machine
@@ -42,12 +41,6 @@ def test_a_rate_counts_units_of_work() -> None:
     assert 50.0 < measured.per_second <= 500.0
     assert measured.per_processor_second > 2.0 * measured.per_second
     assert processor_seconds(lambda: time.sleep(0.05)) < 0.04
-
-
-@pytest.mark.slow
-def test_a_report_without_search_takes_less_than_twenty_seconds() -> None:
-    """Processor time of the study of the beam's template and its page, warm; a search takes more than none."""
-    assert 0.1 < report_seconds("impact-beam", search=False) < 20.0
 
 
 def test_figures_stand_beside_those_of_another_commit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -103,13 +96,7 @@ def test_every_rate_comes_out_positive(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_what_grows_is_measured_and_drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Time inside and outside the kernels makes up a step on one thread, and the ideal is one thread's over theirs.
-
-    Of two gaps there are more tables than of one, and every size has a cost and a memory.
-    """
-    monkeypatch.setattr(scaling, "SUB_ENVIRONMENTS", 3)
-    monkeypatch.setattr(scaling, "WARM_UP_STEPS", 1)
-    monkeypatch.setattr(scaling, "TIMED_STEPS", 2)
+    """Every size has a cost and a memory, and of two gaps there are more tables than of one."""
     threads = numba.get_num_threads()
     for name, fewer in (("MODES", (2,)), ("STIFFNESS", (1e6,)), ("GAPS", (1, 2)), ("CYCLES", (9,)), ("MACHINES", (2,))):
         monkeypatch.setattr(sizes, name, fewer)
@@ -118,12 +105,6 @@ def test_what_grows_is_measured_and_drawn(monkeypatch: pytest.MonkeyPatch, tmp_p
     assert run.exit_code == 0, run.output
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert numba.get_num_threads() == threads
-    measured = json.loads(run.stdout)["scaling"]
-    assert [each["environment"] for each in measured] == ["chaosgym/ImpactBeam-v1", "chaosgym/SliderCrank-v1"]
-    for each in measured:
-        assert each["wrapper"] > 0.0
-        assert each["physics"] + each["wrapper"] <= 1.01 * each["one_thread"]
-        assert each["efficiency"] == pytest.approx(each["one_thread"] / each["all_threads"] / each["threads"])
     grown = json.loads(run.stdout)["sizes"]
     assert all(size["microseconds"] > 0.0 and size["kept"] > 0.0 for size in grown)
     one, two = (size["kept"] for size in grown if size["grows"] == "gaps")
