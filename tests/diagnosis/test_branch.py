@@ -14,7 +14,9 @@ from chaosgym.diagnosis.bifurcation_curve import follow_bifurcation
 from chaosgym.diagnosis.branch import _repeats, stretch
 from chaosgym.diagnosis.chord import closely_between
 from chaosgym.diagnosis.diagram_search import follow
-from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitPoint, family_of, with_noise
+from chaosgym.diagnosis.family_along import family_of, with_noise
+from chaosgym.diagnosis.orbit_family import NotFollowedError
+from chaosgym.diagnosis.orbit_point import OrbitPoint
 from chaosgym.diagnosis.periodic_orbit import PRECISE, find_periodic_orbit, run_period
 from chaosgym.diagnosis.section import better_section
 from chaosgym.errors import ParameterError

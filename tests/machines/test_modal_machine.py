@@ -19,8 +19,8 @@ from chaosgym.cli import app
 from chaosgym.design import variation_region
 from chaosgym.design.brief import brief_from
 from chaosgym.diagnosis import Tolerance
+from chaosgym.diagnosis.family_along import continuous_field
 from chaosgym.diagnosis.model_draws import fields_to_estimate
-from chaosgym.diagnosis.orbit_family import continuous_field
 from chaosgym.envs.variants import Variants
 from chaosgym.errors import ChaosgymError, ParameterError
 from chaosgym.machines.beam_element import bending_matrices

@@ -2,7 +2,8 @@
 
 from chaosgym.classifier.answer import Classification, NatureAnswer, RecordAnswer
 from chaosgym.classifier.estimator import ResponseClassifier
-from chaosgym.classifier.machine_classifier import MachineClassifier, classifier_for, default_classifier
+from chaosgym.classifier.machine_classifier import MachineClassifier
+from chaosgym.classifier.shipped import classifier_for, default_classifier
 
 __all__ = [
     "Classification",

@@ -12,9 +12,7 @@ A question outside the trained ranges, in wrong units, or too close to call is n
 import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from importlib import resources
-from importlib.resources.abc import Traversable
+from functools import cached_property
 from pathlib import Path
 from time import thread_time
 from typing import Any
@@ -35,9 +33,6 @@ from chaosgym.machines.parameters import parameters_of
 
 PEAK_CYCLES = 16
 """Cycles from rest that the largest peak of a neighbourhood's point rests on at least, unless an orbit is proven."""
-
-GENERAL_CYCLES = 128
-"""Cycles from rest after which a machine without a classifier is judged by its record."""
 
 NATURE, IRREGULAR = "record-nature", "record-irregular"
 """Names of the classifiers of records."""
@@ -314,52 +309,3 @@ def _restored(inputs: Any, state: Mapping[str, Any]) -> ResponseClassifier:
     for name, value in state.items():
         setattr(classifier, name, value)
     return classifier
-
-
-@lru_cache
-def default_classifier(machine_name: str) -> MachineClassifier:
-    """Return the classifier that is shipped for a machine.
-
-    Raises
-    ------
-    ModelFileError
-        If none is shipped for it.
-
-    Examples
-    --------
-    >>> chaosgym.default_classifier("slider-crank").machine.name
-    'slider-crank'
-    """
-    if not has_classifier(machine_name):
-        raise ModelFileError(f"no classifier is shipped for {machine_name}; train one with `chaosgym train-classifier`")
-    with resources.as_file(_shipped(machine_name)) as file:
-        return MachineClassifier.load(file)
-
-
-def has_classifier(machine_name: str) -> bool:
-    """Whether a classifier is shipped for a machine."""
-    return _shipped(machine_name).is_file()
-
-
-def _shipped(machine_name: str) -> Traversable:
-    return resources.files("chaosgym") / "weights" / f"{machine_name}.npz"
-
-
-def classifier_for(machine: Machine) -> MachineClassifier:
-    """Return the classifier that is shipped for a machine, or else one for any machine with a gap.
-
-    The general one takes proofs of periodic orbits, and reads peak forces as the classifier of ``MACHINES.general``
-    does. It has no guess from parameters, and takes no measured records.
-
-    Examples
-    --------
-    >>> beam = chaosgym.ImpactBeam(excitation_frequency=10.0)
-    >>> chaosgym.classifier_for(beam).classify(beam).response_type
-    'I'
-    """
-    try:
-        return default_classifier(machine.name)
-    except ModelFileError:
-        pass
-    nature = default_classifier(MACHINES.general).records[NATURE]
-    return MachineClassifier(machine, {GENERAL_CYCLES: nature}, {}, {"fields": ()})

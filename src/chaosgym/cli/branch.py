@@ -110,7 +110,7 @@ def branch(
 
 def _axis(machine: Any, text: str) -> Any:
     """Field and range of "FIELD=LOW:HIGH[:COUNT]"."""
-    from chaosgym.diagnosis.orbit_family import continuous_field
+    from chaosgym.diagnosis.family_along import continuous_field
     from chaosgym.machines.parameters import parameters_of
     from chaosgym.sweeps import Axis
 

@@ -78,7 +78,7 @@ def sweep(
     if routes and (kind != "grid" or len(chosen) != 1):
         raise click.UsageError("--routes needs a grid of one axis: --axis FIELD=LOW:HIGH:COUNT once")
     if routes:
-        from chaosgym.diagnosis.orbit_family import continuous_field
+        from chaosgym.diagnosis.family_along import continuous_field
 
         continuous_field(machine, chosen[0].field)  # refused before the sweep, not after
     for text in axes:

@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.compute
 import pyarrow.parquet as pq
 
-from chaosgym.classifier.machine_classifier import has_classifier
+from chaosgym.classifier.shipped import has_classifier
 from chaosgym.control import controllers
 from chaosgym.control.maps import FLEET, FLEET_SEED, Maps, fleet_maps, maps_of, model_keywords
 from chaosgym.control.policies.shipped import shipped_name

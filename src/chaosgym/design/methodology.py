@@ -19,14 +19,12 @@ Together is not one by one: in a region of Type III some machines live much long
 machines must meet the criteria by their own statistics too, whatever the type.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from chaosgym.arrays import Array
 from chaosgym.design.bearing import Criteria, Evaluation, evaluate, hours_of, plain
 from chaosgym.design.bending import BendingLife, bending_life
 from chaosgym.design.bent_section import Bending
@@ -35,6 +33,7 @@ from chaosgym.design.reliability import time_blocks
 from chaosgym.design.runs import DIAGNOSIS_BUDGET, NOMINAL_BUDGET, Series, SettledRun, build_series, settled_run
 from chaosgym.design.statistics import Convergence, convergence
 from chaosgym.design.told import CRITERIA
+from chaosgym.design.trend import Trend, fit_trend
 from chaosgym.design.wear import Wear, WearLife, wear_life
 from chaosgym.diagnosis import Neighbour, ResponseType, Tolerance, Type, default_tolerances, diagnose, response_type
 from chaosgym.machines import Machine
@@ -44,52 +43,6 @@ Verdict = Literal["meets", "fails", "undetermined"]
 
 SERIES_SIZE = 32
 """Machines of the series that represents the region."""
-
-
-@dataclass(frozen=True)
-class Trend:
-    """How the equivalent peak force follows the tolerances.
-
-    Attributes
-    ----------
-    parameters
-        Names of the toleranced fields.
-    slopes : (parameters,)
-        Change of log force for one tolerance.
-    unexplained
-        Standard deviation of log force over the series that the trend leaves.
-    """
-
-    parameters: tuple[str, ...]
-    slopes: Array
-    unexplained: float
-
-    @property
-    def worst_factor(self) -> float:
-        """Force in the unfavourable corner of the region, relative to nominal."""
-        return math.exp(float(np.sum(np.abs(self.slopes))))
-
-
-def fit_trend(parameters: tuple[str, ...], shares: Array, forces: Array, nominal: float) -> Trend:
-    """Fit the trend through the nominal force by least squares.
-
-    Parameters
-    ----------
-    parameters
-        Names of the columns of ``shares``.
-    shares : (machines, parameters)
-        Deviations from nominal in tolerances.
-    forces : (machines,)
-        Equivalent peak forces [N]; machines without contact are left out.
-    nominal
-        Force of the nominal machine [N].
-    """
-    touching = forces > 0.0
-    if nominal == 0.0 or touching.sum() <= len(parameters):
-        return Trend(parameters, np.zeros(len(parameters)), 0.0)
-    logs = np.log(forces[touching] / nominal)
-    slopes = np.asarray(np.linalg.lstsq(shares[touching], logs)[0], dtype=float)
-    return Trend(parameters, slopes, float(np.std(logs - shares[touching] @ slopes)))
 
 
 @dataclass(frozen=True)

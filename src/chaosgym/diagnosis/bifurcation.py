@@ -37,7 +37,8 @@ from chaosgym.diagnosis.chord import (
     change_of_contacts,
     closely_between,
 )
-from chaosgym.diagnosis.orbit_family import CLOSELY, NotFollowedError, OrbitFamily, OrbitPoint
+from chaosgym.diagnosis.orbit_family import CLOSELY, NotFollowedError, OrbitFamily
+from chaosgym.diagnosis.orbit_point import OrbitPoint
 
 Kind = Literal["grazing", "fold", "flip", "Neimark-Sacker", "symmetry breaking", "branch point"]
 

@@ -14,14 +14,9 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.diagnosis.bifurcation import TESTS, Bifurcation, Found, Kind, bifurcations_between
-from chaosgym.diagnosis.orbit_family import (
-    NotFollowedError,
-    OrbitFamily,
-    OrbitPoint,
-    continuous_field,
-    family_of,
-    with_noise,
-)
+from chaosgym.diagnosis.family_along import continuous_field, family_of, with_noise
+from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily
+from chaosgym.diagnosis.orbit_point import OrbitPoint
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import with_settings

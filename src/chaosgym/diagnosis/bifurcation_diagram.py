@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.diagnosis.bifurcation import Bifurcation, Found
-from chaosgym.diagnosis.orbit_family import OrbitFamily, OrbitPoint
+from chaosgym.diagnosis.orbit_family import OrbitFamily
+from chaosgym.diagnosis.orbit_point import OrbitPoint
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of
 

@@ -19,7 +19,7 @@ from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram
 from chaosgym.diagnosis.branch import MOST_UNSTABLE
 from chaosgym.diagnosis.diagnose import diagnose
 from chaosgym.diagnosis.diagram_search import PATIENCE, SWEEP_BUDGET, follow
-from chaosgym.diagnosis.orbit_family import continuous_field
+from chaosgym.diagnosis.family_along import continuous_field
 from chaosgym.errors import ParameterError
 from chaosgym.machines import Machine
 from chaosgym.machines.parameters import parameters_of, with_settings

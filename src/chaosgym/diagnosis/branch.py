@@ -19,7 +19,8 @@ import numpy as np
 from chaosgym.arrays import Array
 from chaosgym.diagnosis.bifurcation import Bifurcation, Found, bifurcations_between, grazing
 from chaosgym.diagnosis.chord import between, interpolated
-from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily, OrbitPoint
+from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily
+from chaosgym.diagnosis.orbit_point import OrbitPoint
 from chaosgym.diagnosis.section import better_section
 
 LEAST_STEP = 1e-7

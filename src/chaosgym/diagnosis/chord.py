@@ -5,7 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from chaosgym.arrays import Array
-from chaosgym.diagnosis.orbit_family import CLOSED, CLOSELY, NotFollowedError, OrbitFamily, OrbitPoint
+from chaosgym.diagnosis.orbit_family import CLOSED, CLOSELY, NotFollowedError, OrbitFamily
+from chaosgym.diagnosis.orbit_point import OrbitPoint
 
 NOISY = 100.0
 """What the noise of a family adds to the error of a place on a branch, in units of that noise."""

@@ -1,7 +1,8 @@
 """The diagnosis of a machine: it runs in stages, each twice as long, until the verdict is sure.
 
 A motion that repeats after 16 or 32 cycles already is handed to Newton's method: if that proves the orbit, it is
-periodic, certified. All others go on with a deviation that travels along. After 100, 200, 400 ... cycles:
+periodic, certified. All others go on with a small deviation, whose growth gives the exponent. After 100, 200, 400 ...
+cycles:
 
     it repeats, or nearly    Newton's method proves the orbit: periodic, certified. Where it can't (near grazing), a
                              largest exponent below zero confirms the recurrence: periodic, agreed
@@ -16,24 +17,28 @@ test, at the end of the last stage where the motion does not repeat, and the Mat
 horizon counts as chaotic (thesis 5.2.3), with the status "transient".
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chaosgym.arrays import Array
-from chaosgym.diagnosis.lyapunov import BLOCKS, Deviation, LyapunovExponent, average_growth
+from chaosgym.diagnosis.lyapunov import BLOCKS, Deviation, average_growth
 from chaosgym.diagnosis.matrix_update import FIELD, depends_on_configuration, matrix_update_test, neighbouring_interval
-from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit, find_periodic_orbit
-from chaosgym.diagnosis.response import Diagnosis, Nature, Status
-from chaosgym.diagnosis.two_step import CHAOTIC_STATISTIC, QUASIPERIODIC_CYCLES, REGULAR_STATISTIC, two_step_test
+from chaosgym.diagnosis.periodic_orbit import PeriodicOrbit
+from chaosgym.diagnosis.proof import proven_orbit, returning_period
+from chaosgym.diagnosis.response import Diagnosis, Status
+from chaosgym.diagnosis.stage import Stage, not_periodic, periodic, periodic_within, votes, without_contact
+from chaosgym.diagnosis.two_step import two_step_test
 from chaosgym.errors import DiagnosisError
 from chaosgym.machines import Machine
 from chaosgym.simulation import CycleRecord, ExactEvents, Integrator, MotionState, simulate
 
 EARLY = (16, 32)
-"""Cycles after which a motion that repeats is tried for a proof; a second trajectory only starts afterwards, anew."""
+"""Cycles after which a motion that repeats is handed to Newton's method, before the first stage.
+
+Where the exponent needs a second trajectory, the first stage starts anew with both."""
 
 ORBIT_CYCLES = 8
 """Cycles at least that are recorded on a proven orbit."""
@@ -50,32 +55,8 @@ UPDATE_CYCLES = 50
 MAX_SEARCHED_PERIOD = 128
 """Longest period that Newton's method is tried on where the motion contracts but does not repeat."""
 
-GROWS = 1.05
-"""Ratio of the largest displacements of the last quarter and of the one before it, above which a motion grows."""
-
-NEAR = 0.05
-"""How far Newton's method may move, relative to the size of the motion, to find the orbit that the motion nears."""
-
-
 _Begun = tuple[CycleRecord, Array]
 """A run from the initial state on, and the logarithm of what its deviation grew by in each cycle, (cycles,)."""
-
-
-@dataclass(frozen=True)
-class _Stage:
-    """What is known after a stage."""
-
-    record: CycleRecord
-    growth: Array
-    verdict: Diagnosis
-    exponent: LyapunovExponent
-    orbit: PeriodicOrbit | None
-    cycles_used: int
-
-    @property
-    def linear(self) -> bool:
-        """True if nothing touches in the last half of the run, so that the machine was linear there."""
-        return not self.record.peak_force[len(self.record) // 2 :].any()
 
 
 def diagnose(
@@ -149,15 +130,15 @@ def diagnose_alone(
     if stage is None:
         stage = _last_stage(machine, deviation, begun, budget, sensor_error)
     record = stage.record
-    verdict = _periodic(stage) or _periodic_within(stage, sensor_error)
-    verdict = verdict or (_without_contact(stage) if stage.linear else _not_periodic(stage))
+    verdict = periodic(stage) or periodic_within(stage, sensor_error)
+    verdict = verdict or (without_contact(stage) if stage.linear else not_periodic(stage))
     evidence = _evidence(stage, verdict, initial_state)
     settled = None
     if stage.orbit is not None and verdict.status == "certified":
         settled = _on_orbit(machine, stage.orbit)
         evidence["largest_peak"] = float(np.max(settled.peak_force))
     return replace(
-        verdict, votes=_votes(stage), horizon=len(record), evidence=evidence, record=record, orbit_record=settled
+        verdict, votes=votes(stage), horizon=len(record), evidence=evidence, record=record, orbit_record=settled
     )
 
 
@@ -181,7 +162,7 @@ def _proven_early(
     deviation: Deviation,
     initial_state: MotionState | ArrayLike | None,
     integrator: Integrator | None,
-) -> tuple[_Stage | None, _Begun | None]:
+) -> tuple[Stage | None, _Begun | None]:
     """The stage in which a motion that soon repeats is proven to do so, or None, and the run of the deviation."""
     record, begun, searched = None, None, 0
     for cycles in EARLY:
@@ -201,19 +182,19 @@ def _proven_early(
         if orbit is not None:
             per_cycle = np.full(2 * BLOCKS, np.log(max(orbit.largest_multiplier, 1e-300)) / orbit.period)
             exponent = average_growth(per_cycle, machine.cycle_period)
-            return _Stage(record, per_cycle, verdict, exponent, orbit, len(record) + searched), begun
+            return Stage(record, per_cycle, verdict, exponent, orbit, len(record) + searched), begun
     return None, begun
 
 
 def _last_stage(
     machine: Machine, deviation: Deviation, begun: _Begun | None, budget: int, sensor_error: float
-) -> _Stage:
+) -> Stage:
     """The stage after which the motion is known to be periodic in the end, or the budget ends."""
     record, growth = _run_on(deviation, begun, FIRST_STAGE)
     searched = 0
     while True:
         stage = _stage(machine, record, growth, searched, deviation.round_off)
-        if 2 * len(record) > budget or _periodic(stage) or _periodic_within(stage, sensor_error):
+        if 2 * len(record) > budget or periodic(stage) or periodic_within(stage, sensor_error):
             break
         searched = stage.cycles_used - len(record)
         record, growth = _run_on(deviation, (record, growth), 2 * len(record))
@@ -238,159 +219,17 @@ def _with_update_test(machine: Machine, verdict: Diagnosis) -> Diagnosis:
     return replace(verdict, status=status, votes={**verdict.votes, "matrix_update": update.nature}, evidence=evidence)
 
 
-def _stage(machine: Machine, record: CycleRecord, growth: Array, searched: int, round_off: float) -> _Stage:
+def _stage(machine: Machine, record: CycleRecord, growth: Array, searched: int, round_off: float) -> Stage:
     verdict = two_step_test(record, repeats_only=True)
     exponent = average_growth(growth[len(growth) // 2 :], machine.cycle_period, round_off)
     orbit, spent = None, 0
     if verdict.period is not None or exponent.sign < 0:
         period = verdict.period or returning_period(record.section, MAX_SEARCHED_PERIOD)
         orbit, spent = proven_orbit(machine, record, period)
-    return _Stage(record, growth, verdict, exponent, orbit, len(record) + searched + spent)
+    return Stage(record, growth, verdict, exponent, orbit, len(record) + searched + spent)
 
 
-def proven_orbit(machine: Machine, record: CycleRecord, period: int) -> tuple[PeriodicOrbit | None, int]:
-    """The orbit that a motion approaches, if Newton's method proves one of this period, and the cycles that took."""
-    found = find_periodic_orbit(machine, record.final_state, period)
-    if found is None or not found.certified or not _approaches(machine, record, found):
-        return None, 8 * period
-    return _primitive(machine, found), 14 * period
-
-
-def returning_period(section: Array, longest: int, seen: int = 4, back: float = 0.0) -> int:
-    """Period, at most ``longest``, after which the last ``seen`` states of a section (cycles, n_states) come back best.
-
-    A state that is nearer than ``back``, relative to the size of the motion, has come back.
-    """
-    states = section / np.ptp(section, axis=0).clip(1e-300)
-    last = states[-seen:]
-    periods = range(1, min(longest, len(states) // 2) + 1)
-    gaps = np.array([np.linalg.norm(last - states[-seen - k : -k]) for k in periods])
-    return int(np.argmax(gaps <= max(1.5 * float(gaps.min()), back))) + 1
-
-
-def _primitive(machine: Machine, orbit: PeriodicOrbit) -> PeriodicOrbit:
-    """The orbit with its smallest period: a multiple of it closes too."""
-    if orbit.period == 1:
-        return orbit
-    states = simulate(machine, orbit.period, orbit.state).section
-    size = np.maximum(np.abs(orbit.state), 1e-9 * np.max(np.abs(orbit.state)))
-    for divisor in (d for d in range(1, orbit.period) if orbit.period % d == 0):
-        if np.max(np.abs(states[divisor] - orbit.state) / size) < 1e-4:
-            shorter = find_periodic_orbit(machine, orbit.state, divisor)
-            if shorter is not None and shorter.certified:
-                return replace(shorter, distance=orbit.distance)
-    return orbit
-
-
-def _approaches(machine: Machine, record: CycleRecord, orbit: PeriodicOrbit) -> bool:
-    """True if the motion is near the orbit, and nearer four periods later unless it is there already."""
-    if orbit.distance > NEAR:
-        return False
-    if orbit.distance < 1e-6:
-        return True
-    later = simulate(machine, 4 * orbit.period, record.final_state).final_state.coordinates
-    now = record.final_state.coordinates - orbit.state
-    size = np.maximum(np.abs(orbit.state), 1e-9 * np.max(np.abs(orbit.state)))
-    return bool(np.linalg.norm((later - orbit.state) / size) < np.linalg.norm(now / size))
-
-
-def _periodic(stage: _Stage) -> Diagnosis | None:
-    """The verdict if the motion is known to be periodic in the end, else None."""
-    verdict, orbit = stage.verdict, stage.orbit
-    if orbit is not None:
-        reason = f"period {orbit.period} proven: miss {orbit.residual:.0e}, multiplier {orbit.largest_multiplier:.3g}"
-        margin = 1.0 - orbit.largest_multiplier
-        status: Status = "certified"
-    elif verdict.settle_cycle is not None and stage.exponent.sign < 0:
-        reason = f"{verdict.reason}; exponent {stage.exponent.per_cycle:.3g} a cycle"
-        margin, status = verdict.margin, "agreed"
-    else:
-        return None
-    if stage.linear:
-        reason = f"no contact: the machine is linear, and its response periodic; {reason}"
-    transient = _was_chaotic(stage)
-    if transient:
-        reason = f"transient chaos for {verdict.evidence['irregular_cycles']} cycles; then {reason}"
-    return Diagnosis(
-        nature="chaotic" if transient else "periodic",
-        period=orbit.period if orbit else verdict.period,
-        margin=margin,
-        transient=transient,
-        status="transient" if transient else status,
-        settle_cycle=verdict.settle_cycle if verdict.settle_cycle is not None else len(stage.record),
-        reason=reason,
-    )
-
-
-def _periodic_within(stage: _Stage, sensor_error: float) -> Diagnosis | None:
-    """The verdict if the peak forces of the last half repeat within a sensor error, else None."""
-    settled = stage.record.after(len(stage.record) // 2)
-    if sensor_error == 0.0 or not np.any(settled.peak_force):
-        return None
-    coarse = two_step_test(settled, sensor_error=sensor_error)
-    if coarse.nature != "periodic":
-        return None
-    return replace(
-        coarse, status="agreed", reason=f"{coarse.reason} and {sensor_error:g} N; exactly, {stage.verdict.reason}"
-    )
-
-
-def _was_chaotic(stage: _Stage) -> bool:
-    """True if the irregular cycles before a recurrence were chaotic by the exponent too."""
-    irregular = stage.verdict.evidence.get("irregular_cycles", 0)
-    return stage.verdict.transient and float(np.mean(stage.growth[:irregular])) > 0.0
-
-
-def _without_contact(stage: _Stage) -> Diagnosis:
-    """Verdict on a run that does not repeat and whose last half has no contact: never chaotic, as it is linear."""
-    exponent, record = stage.exponent, stage.record
-    lead = "no contact: the machine is linear"
-    last, before = (
-        float(np.max(np.abs(part))) for part in np.split(record.displacement[-4 * (len(record) // 4) :], 4)[:1:-1]
-    )
-    if last > GROWS * before or exponent.sign > 0:
-        reason = f"{lead}, but its motion still grows after {len(record)} cycles, so that contact may come later"
-        return Diagnosis(nature="undetermined", margin=0.0, status="unresolved", reason=reason)
-    if exponent.sign < 0:
-        reason = f"{lead}, and its response nears the period of the drive; exponent {exponent.per_cycle:.3g} a cycle"
-        return Diagnosis(nature="periodic", period=1, margin=0.0, status="agreed", reason=reason)
-    reason = f"{lead}, and its response a sum of lines: those of the drive and of undamped modes"
-    return Diagnosis(nature="quasiperiodic", margin=1.0, status="agreed", reason=reason)
-
-
-def _not_periodic(stage: _Stage) -> Diagnosis:
-    verdict, exponent = stage.verdict, stage.exponent
-    reason = f"exponent {exponent.per_cycle:.3g} +- {exponent.standard_error:.2g} a cycle; {verdict.reason}"
-    if exponent.sign > 0 and verdict.settle_cycle is None:
-        margin = float(np.clip(exponent.per_cycle / (3.0 * exponent.standard_error) - 1.0, 0.0, 1.0))
-        status: Status = "agreed" if verdict.nature in ("chaotic", "undetermined") else "disputed"
-        return Diagnosis(nature="chaotic", margin=margin, status=status, reason=reason)
-    settled = len(stage.record) - len(stage.record) // 2
-    if exponent.sign == 0 and verdict.nature == "quasiperiodic" and settled >= QUASIPERIODIC_CYCLES:
-        return Diagnosis(nature="quasiperiodic", margin=verdict.margin, status="agreed", reason=reason)
-    if exponent.sign < 0 and verdict.nature == "periodic":
-        return Diagnosis(nature="periodic", period=verdict.period, margin=0.0, status="agreed", reason=reason)
-    reason = f"not settled after {len(stage.record)} cycles: {reason}"
-    return Diagnosis(nature="undetermined", margin=0.0, status="unresolved", reason=reason)
-
-
-def _votes(stage: _Stage) -> dict[str, Nature]:
-    """What each test says by itself of what the motion does in the end."""
-    by_sign: dict[int, Nature] = {1: "chaotic", -1: "periodic", 0: "undetermined"}
-    repeats = stage.verdict.settle_cycle is not None
-    votes: dict[str, Nature] = {
-        "two_step": "periodic" if repeats else stage.verdict.nature,
-        "lyapunov": by_sign[stage.exponent.sign],
-    }
-    statistic = stage.verdict.evidence.get("zero_one")
-    if statistic is not None:
-        otherwise: Nature = "quasiperiodic" if statistic < REGULAR_STATISTIC else "undetermined"
-        votes["zero_one"] = "chaotic" if statistic > CHAOTIC_STATISTIC else otherwise
-    votes["newton"] = "periodic" if stage.orbit is not None else "undetermined"
-    return votes
-
-
-def _evidence(stage: _Stage, verdict: Diagnosis, initial_state: MotionState | ArrayLike | None) -> dict[str, Any]:
+def _evidence(stage: Stage, verdict: Diagnosis, initial_state: MotionState | ArrayLike | None) -> dict[str, Any]:
     record = stage.record
     settled = max(len(record) // 2, verdict.settle_cycle if verdict.settle_cycle is not None else 0)
     settled = min(settled, len(record) - 1)

@@ -16,14 +16,9 @@ from chaosgym.diagnosis.bifurcation import Found, direction_of
 from chaosgym.diagnosis.bifurcation_diagram import BifurcationDiagram, Branch, SweepPoint
 from chaosgym.diagnosis.branch import MOST_UNSTABLE, Stretch, stretch
 from chaosgym.diagnosis.diagnose import diagnose
-from chaosgym.diagnosis.orbit_family import (
-    NotFollowedError,
-    OrbitFamily,
-    OrbitPoint,
-    continuous_field,
-    family_of,
-    with_noise,
-)
+from chaosgym.diagnosis.family_along import continuous_field, family_of, with_noise
+from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily
+from chaosgym.diagnosis.orbit_point import OrbitPoint
 from chaosgym.diagnosis.periodic_orbit import find_periodic_orbit
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine

@@ -8,19 +8,15 @@ offer is its stroboscopic map with its derivative (``periodic_orbit.period_map``
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.core.tangent import Tangents
+from chaosgym.diagnosis.orbit_point import OrbitPoint
 from chaosgym.diagnosis.periodic_orbit import Period, period_map, run_period
 from chaosgym.errors import ParameterError, SimulationError
 from chaosgym.machines import Machine
-from chaosgym.machines.parameters import check_parameter, field_named, parameters_of, suggestion
 
 CLOSED, CLOSELY = 1e-10, 1e-12
 """Miss of an orbit, relative to its size, at which Newton's method stops, and at which it does at a bifurcation."""
@@ -39,9 +35,6 @@ no multiplier."""
 BENT = 0.01
 """Share of such a difference by which its two halves may differ."""
 
-UNMOVED = 1e-13
-"""Change of s that changes nothing but the rounding of a model."""
-
 ALIKE, ALIKE_TIME = 1e-7, 1e-4
 """Differences of peak forces and of contact times of both sides that count as none, as shares of the largest.
 
@@ -52,59 +45,6 @@ HALVED = 1e-6
 
 NOISE = 1e-12
 """Change of s that tells nothing of dP/ds."""
-
-
-@dataclass(frozen=True, eq=False)
-class OrbitPoint:
-    """One periodic orbit of a family.
-
-    Attributes
-    ----------
-    x : (n + 1,)
-        Scaled state z on the section, and s.
-    matrix : (n, n)
-        Derivative of the map of one period in scaled coordinates; its eigenvalues are the Floquet multipliers.
-    slope : (n,)
-        dP/ds.
-    tangent : (n + 1,)
-        Unit tangent of the branch, turned the way that it is followed.
-    impacts : (sides,) of int
-        Contacts that begin in one period, of each side: the contact sequence as far as it is told apart.
-    peaks : (sides,)
-        Largest contact force of the period [N].
-    symmetric
-        True if both sides do the same, and something.
-    halved
-        True if the orbit closes after half the period too: it is one of half the period.
-    phase
-        Of the section, in cycles.
-    """
-
-    x: Array
-    matrix: Array
-    slope: Array
-    tangent: Array
-    impacts: tuple[int, ...]
-    peaks: Array
-    symmetric: bool
-    halved: bool
-    phase: float
-
-    @cached_property
-    def multipliers(self) -> NDArray[np.complex128]:
-        """Floquet multipliers (n,), largest modulus first."""
-        values = np.asarray(np.linalg.eigvals(self.matrix), dtype=complex)
-        return values[np.argsort(-np.abs(values))]
-
-    @property
-    def largest_multiplier(self) -> float:
-        """Largest modulus of the multipliers."""
-        return float(np.abs(self.multipliers[0]))
-
-    @property
-    def unstable(self) -> int:
-        """How many multipliers lie outside the unit circle."""
-        return int(np.sum(np.abs(self.multipliers) > 1.0))
 
 
 class NotFollowedError(Exception):
@@ -376,56 +316,3 @@ def _on_section(machine: Machine, phase: float, share: float = 1.0) -> Machine:
 def contacts_of(run: Period) -> tuple[int, ...]:
     """Contacts that begin in a period, of each side."""
     return tuple(run.arrays.impacts.sum(axis=0).tolist())
-
-
-def family_of(machine: Machine, field: str, low: float, high: float, state: Array, period: int) -> OrbitFamily:
-    """Family of the orbit through a state, along a field between two values; its noise is not measured.
-
-    Raises
-    ------
-    ParameterError
-        If the field is unknown, is no number that varies continuously, or does not reach so far.
-    """
-    for value in (low, high):
-        check_parameter(machine, field, value)
-    weight = machine.state_weights(state)
-    size = float(np.linalg.norm(weight * state)) or 1.0
-    machines = machine.along(field, low, high)
-    return OrbitFamily(machine, field, low, high, period, np.asarray(weight / size), machines)
-
-
-def with_noise(family: OrbitFamily, state: Array) -> OrbitFamily:
-    """The family with its noise measured near a state at the machine's own value."""
-    if family.field in (family.machine.speed_field, family.machine.clearance_field):
-        return family  # these reach the model without computing it anew
-    s = float(np.clip((getattr(family.machine, family.field) - family.low) / (family.high - family.low), 0.01, 0.99))
-    x = np.append(family.weight * state, s)
-    try:
-        ends = [family.end(x, s + k * UNMOVED) for k in range(4)]
-    except SimulationError:
-        return family
-    jumps = [float(np.linalg.norm(b - a)) for a, b in pairwise(ends)]
-    return replace(family, noise=max(max(jumps) - CLOSELY, 0.0))
-
-
-def continuous_field(machine: Machine, name: str) -> str:
-    """Field of a machine by its name, or by "speed" or "clearance".
-
-    Raises
-    ------
-    ParameterError
-        If there is none, or none that varies continuously.
-    """
-    usual = {"speed": machine.speed_field, "clearance": machine.clearance_field}
-    known = parameters_of(machine)
-    name = field_named(machine, name)
-    field = name if name in known else usual.get(name, name)
-    numbers: list[str] = [key for key, about in known.items() if not about.choices and _continuous(machine, key)]
-    if field not in numbers:
-        hint = suggestion(name, [*usual, *numbers])
-        raise ParameterError(f"{type(machine).__name__} has no field {name!r} that varies continuously{hint}")
-    return field
-
-
-def _continuous(machine: Any, name: str) -> bool:
-    return not isinstance(getattr(machine, name), int | str)

@@ -8,7 +8,8 @@ each other, and steps along it are short. The section then moves to the middle o
 import numpy as np
 
 from chaosgym.core import status
-from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily, OrbitPoint
+from chaosgym.diagnosis.orbit_family import NotFollowedError, OrbitFamily
+from chaosgym.diagnosis.orbit_point import OrbitPoint
 from chaosgym.diagnosis.periodic_orbit import PRECISE
 from chaosgym.errors import ParameterError, SimulationError
 

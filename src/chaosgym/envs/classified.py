@@ -4,7 +4,7 @@ import numpy as np
 
 from chaosgym.arrays import Array, Indices
 from chaosgym.classifier.features import MAX_CYCLES, MIN_CYCLES
-from chaosgym.classifier.machine_classifier import default_classifier, has_classifier
+from chaosgym.classifier.shipped import default_classifier, has_classifier
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
 
