@@ -62,8 +62,9 @@ class Played:
         What the sensors reported, in the order of ``FELT``.
     damage, largest_force : (n,)
         Share of its life that the joint used up, and largest true force [N].
-    equivalent_force, hours : (n,)
-        Constant peak force [N] that wears as much in each cycle, and how long the job took [h].
+    equivalent_force, life : (n,)
+        Constant peak force [N] that wears as much in each cycle, and hours after which such jobs have used up the
+        joint's life; infinite without wear.
     status : (n,)
         How the jobs ended.
     cycles_per_step
@@ -82,7 +83,7 @@ class Played:
     damage: Array
     largest_force: Array
     equivalent_force: Array
-    hours: Array
+    life: Array
     status: NDArray[np.int64]
     cycles_per_step: int
 
@@ -105,12 +106,6 @@ class Played:
     def felt_unit(self) -> str:
         """Unit of the measured forces: newtons, or shares of a rated force that each machine has."""
         return "of the rated one" if self.unit == SHARE else "N"
-
-    @property
-    def life(self) -> Array:
-        """Hours (n,) after which such jobs have used up the joint's life; infinite without wear."""
-        endless = np.full(len(self.hours), np.inf)
-        return np.asarray(np.divide(self.hours, self.damage, out=endless, where=self.damage > 0.0))
 
     def column(self, name: str) -> Array:
         """One entry of ``FELT`` at every step, (steps, n)."""
@@ -183,11 +178,11 @@ def play(
     options = {} if numbers is None else {"machine": numbers}
     observations, info = envs.reset(seed=given.tolist(), options=options)
     policy.start(envs)
-    steps, count, task = envs.task.steps, len(given), envs.task
+    steps, count = envs.task.steps, len(given)
     kept = {name: np.full((steps, count), np.nan) for name in ("speed", "demand", "type_iii", "reward")}
     felt = np.full((steps, count, len(FELT)), np.nan)
-    damage, force, status = np.zeros(count), np.zeros(count), np.zeros(count, np.int64)
-    seconds, done = np.zeros(count), np.zeros(count)
+    last = {name: np.zeros(count) for name in ("damage", "job_largest_force", "job_equivalent_force", "job_life")}
+    status = np.zeros(count, np.int64)
     runs = np.ones(count, np.bool_)
     for step in trange(steps, desc=progress, unit="step", disable=progress is None, leave=False):
         observations, rewards, ended, _, info = envs.step(policy(observations))
@@ -195,10 +190,9 @@ def play(
         for name in ("speed", "demand", "type_iii"):
             kept[name][step, runs] = info[name][runs]
         felt[step, runs] = observations[runs, len(COMMANDED) : len(OBSERVATION_NAMES)]
-        damage[runs], status[runs] = info["damage"][runs], info["status"][runs]
-        force[runs] = np.maximum(force[runs], info["largest_force"][runs])
-        seconds[runs] += task.cycles_per_step * envs.jobs.period[runs]
-        done += runs
+        status[runs] = info["status"][runs]
+        for name, values in last.items():
+            values[runs] = info[name][runs]
         runs &= ~ended
         if not runs.any():
             break
@@ -208,11 +202,11 @@ def play(
         machines=np.full(count, -1) if numbers is None else numbers,
         seeds=given,
         felt=felt,
-        damage=damage,
-        largest_force=force,
-        equivalent_force=envs.jobs.force * task.force_of(damage * steps / np.maximum(done, 1.0)),
-        hours=seconds / 3600.0,
+        damage=last["damage"],
+        largest_force=last["job_largest_force"],
+        equivalent_force=last["job_equivalent_force"],
+        life=last["job_life"],
         status=status,
-        cycles_per_step=task.cycles_per_step,
+        cycles_per_step=envs.task.cycles_per_step,
         **kept,
     )

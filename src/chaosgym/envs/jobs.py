@@ -67,8 +67,8 @@ class Jobs:
         Share of its life that each surface has used up.
     told
         Names of the columns of a report that are the info of a step.
-    force, period : (N,)
-        What a force of the task is a share of [N], and duration of a cycle of the last step [s].
+    force : (N,)
+        What a force of the task is a share of [N].
     traced
         Number of the first jobs of which ``segments`` keeps where the last step began, for pictures; a list each.
     """
@@ -88,7 +88,7 @@ class Jobs:
         self.demand = np.zeros((count, task.steps + 1))
         self.damage = np.zeros((count, len(nominal.sides)))
         self._lowest, self._span, self.force = np.zeros(count), np.ones(count), np.ones(count)
-        self._job_time, self.period = np.ones((2, count))
+        self._job_time = np.ones(count)
         self._velocities = nominal.n_velocities
         self.traced = 0
         self.segments: list[list[Segment]] = [[] for _ in range(count)]
@@ -132,7 +132,9 @@ class Jobs:
             self._redraw_stalled(which, generators, speed, count)
         state = self.state[which]
         state["trim"], state["worn"] = 0.0, state["clearance"]
-        state["done"], state["changed"], state["machine"] = 0, 0, DRAWN if numbers is None else numbers
+        state["machine"] = DRAWN if numbers is None else numbers
+        for name in ("done", "changed", "off", "irregular", "seconds", "largest_force"):
+            state[name] = 0
         self.state[which], self.damage[which] = state, 0.0
         self.judge.start(which)
         if self._monitor is not None:
@@ -218,9 +220,8 @@ class Jobs:
         outcome = np.where(cycles.failed, Status.SIMULATION_FAILED, Status.RUNNING)
         if self._motors is not None:
             outcome[self._motors.stalled[which]] = Status.STALLED
-        given = (task.numbers, self._job_time, which, demands, outcome, peaks, task.damage(peaks), period)
+        given = (task.numbers, self._job_time, self.force, which, demands, outcome, peaks, task.damage(peaks), period)
         call(settle, *given, *verdict, state, self.damage, report, reward)
-        report["largest_force"] *= self.force[which]
         report["set_point"] = state["set_point"][which]
         if self._motors is not None:
             report["motor_torque"], report["motor_power"] = self._motors.told[which, 1:].T
@@ -243,8 +244,7 @@ class Jobs:
             for values in (*cycles[1:], growth):
                 values[cycles.failed] = 0
         cycles.peak_force[:] /= self.force[which][:, None, None]
-        self.period[which] = self.variants.nominal.period_at(speed)
-        return cycles, growth, self.period[which]
+        return cycles, growth, self.variants.nominal.period_at(speed)
 
     def _moved(self, which: Indices, speeds: Array, generators: Generators) -> tuple[Cycles, Array]:
         """Cycles of machines at speeds (k, cycles), and their growth."""

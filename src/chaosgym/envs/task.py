@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
-from chaosgym.design.rating_life import LIFE_EXPONENT, damage_in_a_million
+from chaosgym.design.rating_life import damage_in_a_million
 from chaosgym.envs.kernels import steps
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Machine
@@ -146,10 +146,6 @@ class Task:
         """Share of its life that each surface uses up, (..., sides), by peak forces (..., cycles, sides) [N]."""
         shares: Array = damage_in_a_million(peak_force, self.load_rating).sum(axis=-2)
         return shares * (self.life_share / self.job_cycles)
-
-    def force_of(self, damage: Array) -> Array:
-        """Constant peak force [N] under which a job uses up a share of the joint's life."""
-        return np.asarray(self.load_rating * (damage / self.life_share) ** (1.0 / LIFE_EXPONENT))
 
     @cached_property
     def numbers(self) -> NDArray[np.void]:

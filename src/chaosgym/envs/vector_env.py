@@ -252,10 +252,12 @@ class MachineVectorEnv(JobSpec, gym.vector.VectorEnv[Observation, Actions, NDArr
 
     def _add(self, infos: dict[str, Any], which: Indices, named: Mapping[str, Any]) -> None:
         """Write values (k,) of some sub-environments into arrays by name, each with a mask of who has one."""
+        if len(which) == self.num_envs:
+            everyone = np.ones(self.num_envs, np.bool_)
+            for name, values in named.items():
+                infos[name], infos[f"_{name}"] = values, everyone
+            return
         for name, values in named.items():
-            if len(which) == self.num_envs:
-                infos[name], infos[f"_{name}"] = values, np.ones(self.num_envs, np.bool_)
-                continue
             if name not in infos:
                 infos[name], infos[f"_{name}"] = np.zeros(self.num_envs, values.dtype), np.zeros(self.num_envs, bool)
             infos[name][which] = values

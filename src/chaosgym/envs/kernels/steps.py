@@ -7,6 +7,7 @@ are asked for, and ``which`` (k,) the jobs of the step.
 import numpy as np
 
 from chaosgym.core.kernel import njit
+from chaosgym.design.rating_life import LIFE_EXPONENT
 
 RUNNING, JOB_DONE, FRACTURE, SIMULATION_FAILED, STALLED = range(5)
 
@@ -16,19 +17,24 @@ BY_TRIM, CONTINUOUS, BY_SPEED = range(3)
 JOB = np.dtype(
     [(name, np.float64) for name in ("speed", "set_point", "trim", "clearance", "worn")]
     + [(name, np.int64) for name in ("done", "changed", "machine")]
+    + [(name, np.float64) for name in ("off", "irregular", "seconds", "largest_force")]
 )
 """Speed, set-point of the drive and trim of the last step, clearance when new and as ``worn``, steps ``done``, those
-done when the demand ``changed``, and number of the machine."""
+done when the demand ``changed``, and number of the machine; sums so far of deviation, irregular share and time [s], and
+largest force [N]."""
 
 TERMS = tuple(f"reward_{term}" for term in ("deviation", "type_iii", "damage", "time", "failure"))
 
 MOTOR = ("set_point", "motor_torque", "motor_power")
 
+SO_FAR = tuple(f"job_{name}" for name in ("deviation", "type_iii", "largest_force", "equivalent_force", "life"))
+"""What the job has come to: means, largest force [N], the constant one that wears as much [N], and life [h]."""
+
 REPORT = np.dtype(
     [(name, np.float64) for name in (*TERMS, "speed", "demand", "deviation", "type_iii", "cost", "irregularity")]
     + [("largest_force", np.float64), ("damage", np.float64), ("status", np.int64), ("is_success", np.bool_)]
     + [("machine", np.int64), ("clearance", np.float64)]
-    + [(name, np.float64) for name in MOTOR],
+    + [(name, np.float64) for name in (*SO_FAR, *MOTOR)],
     align=True,
 )
 """Info of a step, with what a motor adds."""
@@ -105,14 +111,44 @@ def rewards_of(task, deviation, type_iii, damage, time, failed, steps_left):
     )
 
 
+@njit(cache=True)
+def sum_up(task, job, force, damage, row):
+    """Write ``SO_FAR`` of a ``job`` into its ``row``, by the ``damage`` of its joint; forces are shares of ``force``.
+
+    Life is the time over the damage, infinite without wear; under the equivalent force in every cycle it is the same.
+    That force is not a number where no force wears the joint, with a ``life_share`` of 0.
+    """
+    done, share = job["done"], task["life_share"]
+    row["job_deviation"], row["job_type_iii"] = job["off"] / done, job["irregular"] / done
+    row["job_largest_force"] = job["largest_force"] * force
+    steady = (damage * task["steps"] / done / share) ** (1.0 / LIFE_EXPONENT) if share > 0.0 else np.nan
+    row["job_equivalent_force"] = force * task["load_rating"] * steady
+    row["job_life"] = job["seconds"] / 3600.0 / damage if damage > 0.0 else np.inf
+
+
 @njit(cache=True, nogil=True)
 def settle(
-    tasks, job_time, which, demands, outcome, peaks, wear, period, type_iii, irregularity, jobs, damage, report, rewards
+    tasks,
+    job_time,
+    forces,
+    which,
+    demands,
+    outcome,
+    peaks,
+    wear,
+    period,
+    type_iii,
+    irregularity,
+    jobs,
+    damage,
+    report,
+    rewards,
 ):
     """Count a step as done, and write its ``report`` (k,), records ``REPORT``, and ``rewards`` (k,).
 
     ``outcome`` as for ``status_of``, ``period`` [s], ``type_iii`` and ``irregularity`` (k,), ``peaks`` (k, cycles,
-    sides) [N]; ``wear`` (k, sides) adds to ``damage`` (N, sides). ``job_time`` (N,) [s] of a job at top speed.
+    sides) as shares of ``forces`` (N,) [N]; ``wear`` (k, sides) adds to ``damage`` (N, sides). ``job_time`` (N,) [s]
+    of a job at top speed.
     """
     task = tasks[0]
     for k, i in enumerate(which):
@@ -126,11 +162,18 @@ def settle(
         job["worn"] = job["clearance"] * (1.0 + task["wear"] * job["done"] / task["steps"])
         row["speed"], row["demand"], row["deviation"] = job["speed"], demand, abs(job["speed"] - demand)
         row["type_iii"] = row["cost"] = 0.0 if outcome[k] != RUNNING else type_iii[k]
-        row["irregularity"], row["largest_force"], row["damage"] = irregularity[k], peaks[k].max(), damage[i].max()
+        largest, worn = peaks[k].max(), damage[i].max()
+        row["irregularity"], row["largest_force"], row["damage"] = irregularity[k], largest * forces[i], worn
         row["status"] = status_of(task["steps"], outcome[k], job["done"], row["damage"])
         row["is_success"] = row["status"] == JOB_DONE
         row["machine"], row["clearance"] = job["machine"], job["worn"]
-        worse, time = row["damage"] - before, task["cycles_per_step"] * period[k] / job_time[i]
+        duration = task["cycles_per_step"] * period[k]
+        job["off"] += row["deviation"]
+        job["irregular"] += row["type_iii"]
+        job["seconds"] += duration
+        job["largest_force"] = max(job["largest_force"], largest)
+        sum_up(task, job, forces[i], worn, row)
+        worse, time = worn - before, duration / job_time[i]
         gone = row["status"] >= FRACTURE
         terms = rewards_of(task, row["deviation"], row["type_iii"], worse, time, gone, steps_left)
         row["reward_deviation"], row["reward_type_iii"], row["reward_damage"] = terms[:3]
