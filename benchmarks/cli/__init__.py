@@ -9,8 +9,8 @@ from benchmarks.cli.bench import bench
 from benchmarks.cli.environments import COMMANDS
 from chaosgym.cli import run_command
 from chaosgym.cli.machine_options import machine_command
-from chaosgym.cli.output import emit
-from chaosgym.cli.sweep import AS_JSON, FOLDER
+from chaosgym.cli.output import AS_JSON, emit
+from chaosgym.cli.sweep import FOLDER
 
 
 @machine_command

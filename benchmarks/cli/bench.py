@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from benchmarks.cli.stored import tell
+from chaosgym.cli.output import AS_JSON
 
 SHOWN_FUNCTIONS = 15
 """Functions of a cold start that are shown; ``--json`` has all."""
@@ -34,7 +35,7 @@ MOST_WORKERS = 4
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="What the same options printed with --json at another commit: those figures beside these.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@AS_JSON
 def bench(
     repeats: int,
     against: str | None,

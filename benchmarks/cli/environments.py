@@ -5,8 +5,7 @@ from pathlib import Path
 
 import click
 
-from chaosgym.cli.output import emit
-from chaosgym.cli.sweep import AS_JSON
+from chaosgym.cli.output import AS_JSON, emit
 from chaosgym.envs import ENVIRONMENTS
 
 

@@ -4,6 +4,5 @@ from benchmarks.performance.mechanisms import assembly_times, cycle_costs
 from benchmarks.performance.rates import benchmark
 from benchmarks.performance.scenes import scene_costs
 from benchmarks.performance.set_up import set_up_times
-from benchmarks.performance.timing import timed_run
 
-__all__ = ["assembly_times", "benchmark", "cycle_costs", "scene_costs", "set_up_times", "timed_run"]
+__all__ = ["assembly_times", "benchmark", "cycle_costs", "scene_costs", "set_up_times"]

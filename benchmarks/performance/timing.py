@@ -7,41 +7,9 @@ from contextlib import ExitStack, contextmanager
 from typing import Any, NamedTuple
 from unittest.mock import patch
 
-import numpy as np
-
 from chaosgym.core.compilation import call, call_side_by_side
-from chaosgym.machines import Machine, batch
+from chaosgym.machines import batch
 from chaosgym.machines.binned import run
-from chaosgym.simulation import CycleRecord, Integrator, simulate
-
-BLOCKS = 5
-"""A timed run is cut into this many blocks, whose median counts."""
-
-
-def timed_run(
-    machine: Machine, cycles: int, *, transient: int = 0, integrator: Integrator | None = None
-) -> tuple[CycleRecord, float]:
-    """Simulate from rest and time it.
-
-    Returns
-    -------
-    record : CycleRecord
-        Equal to that of ``simulate(machine, cycles, transient=transient)``.
-    seconds_per_cycle : float
-        Median processor time over blocks of the run; loading the compiled kernels is not counted.
-    """
-    simulate(machine, 1, integrator=integrator)
-    state = simulate(machine, transient, integrator=integrator).final_state if transient else None
-    record: CycleRecord | None = None
-    seconds = []
-    for block in np.array_split(np.arange(cycles), min(BLOCKS, cycles)):
-        start = time.thread_time()
-        part = simulate(machine, len(block), state, integrator=integrator)
-        seconds.append((time.thread_time() - start) / len(block))
-        record = part if record is None else record.followed_by(part)
-        state = part.final_state
-    assert record is not None
-    return record, statistics.median(seconds)
 
 
 class Rate(NamedTuple):

@@ -86,6 +86,6 @@ print(f"{found.runs} machines were run")
 # `chaosgym sweep` labels thousands of points, resumes after a stop, and writes Parquet:
 #
 # ```bash
-# chaosgym sweep impact-beam --axis excitation_frequency=15:25:11 --axis clearance=0.12mm:0.13mm:3 --out map
+# chaosgym sweep impact-beam --axis excitation_frequency=15:25:36 --axis clearance=0.12mm:0.13mm:3 --out map
 # chaosgym dataset map map --out map.png
 # ```

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from chaosgym.cli.output import emit
+from chaosgym.cli.output import AS_JSON, WORKERS, emit
 
 UNFINISHED = 3
 """Exit code of a search that leaves statements out of reach while a bound is active; see ``scorecard.walls``."""
@@ -30,8 +30,8 @@ UNFINISHED = 3
     help="Candidates drawn over all ranges of each structure, and judged by few runs; the best is where it begins.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
-@click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@WORKERS
+@AS_JSON
 def calibrate(
     machine: str,
     budget: str,

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import click
 
-from chaosgym.cli.output import emit
+from chaosgym.cli.output import AS_JSON, emit
 
 
 @click.command()
 @click.argument("journals", nargs=-1, type=click.Path(dir_okay=False, exists=True, path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@AS_JSON
 def exclusions(journals: tuple[Path, ...], as_json: bool) -> None:
     """Tell pairs of statements that no beam hits together: of the kept search, and of JOURNALS (journal.jsonl)."""
     from thesis.scorecard.exclusions import known_exclusions

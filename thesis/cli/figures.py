@@ -2,7 +2,7 @@
 
 import click
 
-from chaosgym.cli.output import emit
+from chaosgym.cli.output import AS_JSON, WORKERS, emit
 
 
 @click.command()
@@ -13,8 +13,8 @@ from chaosgym.cli.output import emit
 @click.option("--results", type=click.Path(file_okay=False), help="Folder that keeps results; default: OUT/results.")
 @click.option("--gallery", type=click.Path(dir_okay=False), help="Markdown page to write: what agrees, what does not.")
 @click.option("--overwrite", is_flag=True, help="Replace pictures and page that exist.")
-@click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@WORKERS
+@AS_JSON
 def figures(
     ids: tuple[str, ...],
     out: str | None,

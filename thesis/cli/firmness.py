@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from chaosgym.cli.output import emit
+from chaosgym.cli.output import AS_JSON, WORKERS, emit
 
 
 @click.command()
@@ -16,8 +16,8 @@ from chaosgym.cli.output import emit
     "--left-out", type=click.Path(file_okay=False, exists=True), multiple=True, help="Search with a figure left out."
 )
 @click.option("--joint", type=click.Choice(["slider", "ball"]), help="Only the crank's statements about one joint.")
-@click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@WORKERS
+@AS_JSON
 def firmness(
     machine: str,
     neighbours: int,

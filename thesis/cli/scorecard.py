@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from chaosgym.cli.output import emit
+from chaosgym.cli.output import AS_JSON, WORKERS, emit
 
 
 @click.command()
@@ -16,9 +16,9 @@ from chaosgym.cli.output import emit
     help="Judge this machine instead: a candidate of thesis/scorecard/candidates.json, or result.json of a search.",
 )
 @click.option("--basin", metavar="NAME", help="Judge where this structure of the search begins instead; one --machine.")
-@click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
+@WORKERS
 @click.option("--markdown", is_flag=True, help="Print the page of the documentation.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@AS_JSON
 def scorecard(
     machine: tuple[str, ...],
     candidate: str | None,

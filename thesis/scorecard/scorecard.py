@@ -76,11 +76,6 @@ class Scorecard:
         counted = [one for one in self.judged if one.comparison.machine == machine and one.verdict != "contradictory"]
         return sum(one.verdict == "hit" for one in counted), len(counted)
 
-    def measured_rate(self, machine: str) -> tuple[int, int]:
-        """Hits, and number of the measured statements about a machine."""
-        told = [one for one in self.measured if one.comparison.machine == machine]
-        return sum(one.verdict == "hit" for one in told), len(told)
-
     def as_dict(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         return {

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from chaosgym.cli.output import emit, patience, picture_path, plot_option
+from chaosgym.cli.output import AS_JSON, emit, patience, picture_path, plot_option
 
 if TYPE_CHECKING:
     from chaosgym.control.rollout import Played
@@ -40,7 +40,7 @@ NO_POLICY = (
 @click.option("--policy", "policies", multiple=True, help="NAME=FOLDER of a trained policy; one name, several seeds.")
 @click.option("--guard", is_flag=True, help="Let each policy play behind a guard too.")
 @click.option("--figure", type=click.Path(dir_okay=False, path_type=Path), default=None, help="Scores as a picture.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@AS_JSON
 def compare(
     env: str,
     out: Path,
@@ -107,7 +107,7 @@ def compare(
 @click.option("--level", type=click.Choice(LEVELS), default=None, help="What differs from job to job.")
 @click.option("--plant", default=None, metavar="MODULE:CLASS", help="Your machine instead; - for lines of text.")
 @plot_option("--out", formats="figure .png, .svg, .pdf or animation .gif, .mp4")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@AS_JSON
 def run_agent(
     env: str,
     policy: Path | None,

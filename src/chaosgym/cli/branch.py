@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from chaosgym.cli.machine_options import FloatRange, machine_command
-from chaosgym.cli.output import draw, emit, picture_path, plot_option
+from chaosgym.cli.output import WORKERS, draw, emit, picture_path, plot_option
 
 SHOWN = 30
 """Branches, and bifurcations, that the table shows; all are in --out and --json."""
@@ -40,7 +40,7 @@ SHOWN = 30
     show_default=True,
     help="Largest multiplier up to which unstable orbits are followed.",
 )
-@click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
+@WORKERS
 @click.option("--out", type=click.Path(dir_okay=False), help="Table to write (.csv or .parquet), a row an orbit.")
 @click.option("--overwrite", is_flag=True, help="Replace the table if it exists.")
 @plot_option()

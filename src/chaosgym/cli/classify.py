@@ -10,7 +10,7 @@ import click
 
 from chaosgym.cli.machine_options import FloatRange, Quantity, machine_command
 from chaosgym.cli.measured_options import Measured, measured_options, measured_runs, run_as_dict, run_lines
-from chaosgym.cli.output import draw, emit, patience, picture_path, plot_option
+from chaosgym.cli.output import AS_JSON, draw, emit, patience, picture_path, plot_option
 from chaosgym.machines import MACHINES
 
 KERNELS = ("--follow", "--batch")
@@ -250,7 +250,7 @@ def _follow(
 )
 @click.option("--out", type=click.Path(), required=True, help="New folder: classifier, report and card; one a machine.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@AS_JSON
 def train_classifier(data: tuple[str, ...], out: str, seed: int, as_json: bool) -> None:
     """Train the classifier on a sweep and judge it on machines held out (needs the extra [learn])."""
     from chaosgym.classifier.train import report_table

@@ -5,13 +5,13 @@ from typing import Any
 import click
 
 from chaosgym.cli.machine_options import machine_command
-from chaosgym.cli.output import emit
+from chaosgym.cli.output import AS_JSON, emit
 
 
 @click.command()
 @click.option("--out", type=click.Path(file_okay=False), default="chaosgym-demo", show_default=True, help="New folder.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@AS_JSON
 def demo(out: str, seed: int, as_json: bool) -> None:
     """Simulate, label, train, and compare an agent with plain rules: a few minutes (needs the extra [learn])."""
     from chaosgym.demo import demo_table, run_demo

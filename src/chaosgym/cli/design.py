@@ -7,7 +7,7 @@ import click
 
 from chaosgym.cli.machine_options import Quantity
 from chaosgym.cli.measured_options import Measured, Run, measured_options, measured_run
-from chaosgym.cli.output import draw, emit, note_machine, picture_path, plot_option
+from chaosgym.cli.output import AS_JSON, WORKERS, draw, emit, note_machine, picture_path, plot_option
 
 if TYPE_CHECKING:
     from chaosgym.design.bearing import Criteria
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 @click.option("--overwrite", is_flag=True, help="Replace the report if it exists.")
 @plot_option()
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the machines in tolerance.")
-@click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@WORKERS
+@AS_JSON
 def design(
     briefs_given: tuple[str, ...],
     template: str | None,

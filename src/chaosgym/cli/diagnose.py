@@ -9,6 +9,7 @@ from chaosgym.cli.machine_options import FloatRange, machine_command
 from chaosgym.cli.measured_model import compared
 from chaosgym.cli.measured_options import (
     Measured,
+    Run,
     measured_options,
     measured_run,
     measured_runs,
@@ -106,7 +107,10 @@ def diagnose(
     elif measured:
         if types or margins or step_check or test != "adaptive":
             raise click.UsageError("--peaks and --series go without --test, --types, --margins and --step-check")
-        result, lines = _compared(machine, measured, estimate, picture) if machine else _measured(measured, picture)
+        if machine:
+            result, lines = _drawn(*compared(machine, measured, estimate), picture)
+        else:
+            result, lines = _measured(measured, picture)
     elif machine is None:
         raise click.UsageError(f"give a machine ({', '.join(MACHINES)}), --peaks FILE, --series FILE or --sweep FILE")
     elif test == "two-step":
@@ -133,31 +137,25 @@ def _measured(measured: Measured, picture: Path | None) -> tuple[dict[str, Any],
     sources = sources_of(measured)
     runs = [] if sources else measured_runs(measured)
     if len(runs) == 1:
-        run = runs[0]
-        result, lines = run_as_dict(run), run_lines(run.source, run)
-        name = f"{Path(run.source).name}, {run.name}"
-        draw(
-            picture,
-            lambda plots: plots.measured_figure(run.peaks, run.verdict.diagnosis, name, run.unit),
-            result,
-            lines,
-        )
-        return result, lines
+        return _drawn(runs[0], run_as_dict(runs[0]), run_lines(runs[0].source, runs[0]), picture)
     found = [judged(runs[0].source, runs)] if runs else judged_files(measured, sources)
     result, lines = table_as_dict(found), table_lines(found)
-    shown = [(f"{Path(run.source).name}, {run.name}", run.peaks, run.verdict.diagnosis) for run in all_runs(found)]
+    shown = [(_title(run), run.peaks, run.verdict.diagnosis) for run in all_runs(found)]
     draw(picture, lambda plots: plots.thumbnails(shown), result, lines)
     return result, lines
 
 
-def _compared(
-    machine: Any, measured: Measured, estimate: tuple[str, ...], picture: Path | None
+def _drawn(
+    run: Run, result: dict[str, Any], lines: list[str], picture: Path | None
 ) -> tuple[dict[str, Any], list[str]]:
-    """A measured run beside a machine, with the picture of the run."""
-    run, result, lines = compared(machine, measured, estimate)
-    name = f"{Path(run.source).name}, {run.name}"
-    draw(picture, lambda plots: plots.measured_figure(run.peaks, run.verdict.diagnosis, name, run.unit), result, lines)
+    """What is told of a measured run, with its picture."""
+    title = _title(run)
+    draw(picture, lambda plots: plots.measured_figure(run.peaks, run.verdict.diagnosis, title, run.unit), result, lines)
     return result, lines
+
+
+def _title(run: Run) -> str:
+    return f"{Path(run.source).name}, {run.name}"
 
 
 def _sweep_lines(told: dict[str, Any], found: Any) -> list[str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from chaosgym.cli.machine_options import FloatRange, machine_command
-from chaosgym.cli.output import emit
+from chaosgym.cli.output import WORKERS, emit
 
 if TYPE_CHECKING:
     from chaosgym.fidelity.stability import StabilityMap
@@ -27,7 +27,7 @@ _FOLDER = click.Path(file_okay=False, path_type=Path)
     show_default=True,
     help="Processor time of each fixed step [s].",
 )
-@click.option("--workers", type=click.IntRange(1), default=None, help="Threads; all processors by default.")
+@WORKERS
 @click.option("--out", type=_FOLDER, default=None, help="Write tradeoff.json and tradeoff.png there.")
 def tradeoff(
     machine: Any,
@@ -84,7 +84,7 @@ def _tradeoff_line(row: "TradeoffRow") -> str:
 
 
 @machine_command
-@click.option("--workers", type=click.IntRange(1), default=None, help="Threads; all processors by default.")
+@WORKERS
 @click.option("--out", type=_FOLDER, default=None, help="Write stability.json and stability.png there.")
 def stability(machine: Any, workers: int | None, out: Path | None, as_json: bool) -> None:
     """Run a machine at every extreme on every rung: an answer within physical bounds, or an error with a name."""

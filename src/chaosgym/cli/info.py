@@ -2,13 +2,13 @@
 
 import click
 
-from chaosgym.cli.output import emit
+from chaosgym.cli.output import AS_JSON, emit
 from chaosgym.machines import MACHINES
 from chaosgym.version import __version__
 
 
 @click.command()
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@AS_JSON
 def info(as_json: bool) -> None:
     """Print versions and folders, for a bug report."""
     import platform

@@ -12,7 +12,7 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from chaosgym.cli.output import note_machine
+from chaosgym.cli.output import AS_JSON, note_machine
 from chaosgym.errors import ParameterError
 from chaosgym.machines import FILE_ENDING, MACHINES
 from chaosgym.machines.machine import Choice, Number, Option
@@ -176,7 +176,7 @@ def machine_command(
         metavar="FIELD=VALUE",
         help="Any field of the machine, in SI or with its unit ('clearance=0.1 mm'); repeatable.",
     )(wrapped)
-    wrapped = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")(wrapped)
+    wrapped = AS_JSON(wrapped)
     wrapped = click.argument("machine", type=MachineName(), required=required)(wrapped)
     return click.command(cls=MachineCommand, before=before)(wrapped)
 

@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from chaosgym.cli.machine_options import machine_command
-from chaosgym.cli.output import draw, emit, picture_path, plot_option
+from chaosgym.cli.output import AS_JSON, draw, emit, picture_path, plot_option
 
 
 @machine_command
@@ -157,7 +157,7 @@ def show(machine: Any, markdown: bool, plot: str | None, as_json: bool) -> None:
 @click.argument("kind", default="modes", metavar="[modes|four-bar|slider-crank|compressor]")
 @click.option("--out", type=click.Path(dir_okay=False, path_type=Path), help="New file; standard output by default.")
 @click.option("--schema", is_flag=True, help="The JSON schema of such files instead, for editors.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@AS_JSON
 def new_machine(kind: str, out: Path | None, schema: bool, as_json: bool) -> None:
     """Print the commented file of a machine: of modes or matrices with gaps, or a mechanism of links and joints."""
     from chaosgym.files import write_atomically

@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from chaosgym.cli.machine_options import machine_command, millimetres_meant
-from chaosgym.cli.output import draw, emit, picture_path, plot_option
+from chaosgym.cli.output import AS_JSON, WORKERS, draw, emit, picture_path, plot_option
 
 
 @machine_command
@@ -33,7 +33,7 @@ from chaosgym.cli.output import draw, emit, picture_path, plot_option
 )
 @click.option("--signals", type=float, default=0.0, help="Share of the points whose signals are kept, 0 to 1.")
 @click.option("--full-types", type=float, default=0.0, help="Share of the points typed over all tolerances, 0 to 1.")
-@click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
+@WORKERS
 @click.option("--scheduler", metavar="tcp://HOST:PORT", help="Compute on a Dask cluster (extra [cluster]).")
 @click.option("--repair", is_flag=True, help="Compute damaged chunks again.")
 @click.option("--routes", is_flag=True, help="Of one axis: also name how chaos begins, and its sudden changes.")
@@ -155,7 +155,6 @@ def _warnings(plan: Any, labelled: Any) -> list[str]:
 
 
 FOLDER = click.argument("folder", type=click.Path(exists=True, file_okay=False))
-AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
 
 @click.group()
@@ -173,7 +172,7 @@ def dataset() -> None:
     help="Sample to compare with; default: datasets/MACHINE/sample if that is there.",
 )
 @click.option("--no-check", is_flag=True, help="Compare with no sample.")
-@click.option("--workers", type=click.IntRange(1, 4096), default=None, help="Threads; default: all processors.")
+@WORKERS
 @click.option("--scheduler", metavar="tcp://HOST:PORT", help="Compute on a Dask cluster (extra [cluster]).")
 @click.option("--repair", is_flag=True, help="Compute damaged chunks again.")
 @AS_JSON

@@ -43,6 +43,10 @@ SAMPLES = 500, 4000
 """Least and most samples of a time history in a cycle."""
 
 
+TITLE: dict[str, Any] = {"x": 0.02, "ha": "left", "fontsize": 10.5, "fontweight": "bold", "color": INK}
+"""Style of the title of a picture."""
+
+
 def _styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
     @wraps(draw)
     def drawn(*arguments: Any, **keywords: Any) -> Figure:
@@ -83,9 +87,7 @@ def machine_figure(machine: Machine) -> Figure:
     """Draw a mechanism at eight crank angles, with the paths of its points and its gaps larger than they are."""
     figure = figure_of(1.6 * WIDTH, 4.2)
     machine.draw_poses(figure.subplots(2, POSES // 2).ravel())
-    figure.suptitle(
-        f"{point_of(machine)}\nCrank angles; rings: joints with clearance", x=0.02, ha="left", fontsize=10.5, color=INK
-    )
+    figure.suptitle(f"{point_of(machine)}\nCrank angles; rings: joints with clearance", **TITLE)
     return figure
 
 
@@ -114,7 +116,7 @@ def simulation_figure(record: CycleRecord, transient: int = 0) -> Figure:
     shown = f"the last {len(last)} cycles" if len(last) > 1 else "the last cycle"
     upward = machine.sides[0] if last.joint_name is None else "upper"
     force.set(xlabel=f"time over {shown} [{unit}]", ylabel=f"force, {upward} + [N]")
-    figure.suptitle(point_of(machine, last.joint_name), x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    figure.suptitle(point_of(machine, last.joint_name), **TITLE)
     figure.align_ylabels()
     return figure
 
@@ -138,14 +140,7 @@ def diagnosis_figure(verdict: Diagnosis) -> Figure:
     worst = judged.worst_side
     response.cycle_points(judged.peak_force[:, worst], peaks, first=first, color=colour)
     peaks.set_ylabel(f"peak force, {machine.sides[worst]} [N]")
-    figure.suptitle(
-        f"{point_of(machine, judged.joint_name)}\n{_told(verdict)}",
-        x=0.02,
-        ha="left",
-        fontsize=10.5,
-        fontweight="bold",
-        color=INK,
-    )
+    figure.suptitle(f"{point_of(machine, judged.joint_name)}\n{_told(verdict)}", **TITLE)
     return figure
 
 
@@ -174,7 +169,7 @@ def measured_figure(peaks: Array, verdict: Diagnosis, title: str, unit: str = "N
         over.set_ylabel(f"reading [{unit}]")
         mapped.set_xlabel(f"reading of a cycle [{unit}]")
         mapped.set_ylabel(f"of the next [{unit}]")
-    figure.suptitle(f"{title}\n{_told(verdict)}", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    figure.suptitle(f"{title}\n{_told(verdict)}", **TITLE)
     return figure
 
 
@@ -198,7 +193,7 @@ def thumbnails(shown: list[tuple[str, Array, Diagnosis]]) -> Figure:
     for ax in figure.axes[len(told) :]:
         ax.remove()
     left_out = f", the first {len(told)} of {len(shown)}" if len(told) < len(shown) else ""
-    figure.suptitle(f"Readings over the cycles{left_out}", x=0.02, ha="left", fontsize=10.5, fontweight="bold")
+    figure.suptitle(f"Readings over the cycles{left_out}", **TITLE)
     return figure
 
 
@@ -213,7 +208,7 @@ def sweep_figure(speeds: Array, peaks: Array, types: SweepTypes, label: str, tit
     figure = figure_of(1.45 * WIDTH, 3.0)
     ax = response.types_over_speed(speeds, peaks, types, figure.subplots())
     ax.set(xlabel=label, ylabel="peak force [N]")
-    figure.suptitle(title, x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    figure.suptitle(title, **TITLE)
     return figure
 
 
@@ -243,7 +238,7 @@ def run_up_figure(found: RunUp, title: str, unit: str) -> Figure:
     else:
         response.types_over_speed(found.judged[0], found.judged[1], found.types, peaks)
     peaks.set(xlabel="speed [rpm]", ylabel=f"peak of a turn [{unit}]")
-    figure.suptitle(title, x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    figure.suptitle(title, **TITLE)
     return figure
 
 
@@ -275,9 +270,7 @@ def peaks_figure(measured: MeasuredPeaks) -> Figure:
         f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"
         for value in (found.life, found.life_interval.low, found.life_interval.high)
     )
-    figure.suptitle(
-        f"Life {life} million cycles ({low} to {high})", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK
-    )
+    figure.suptitle(f"Life {life} million cycles ({low} to {high})", **TITLE)
     left.set_title("")
     return figure
 
@@ -296,7 +289,7 @@ def study_figure(study: DesignStudy) -> Figure:
         panel(ax)
     name = Path(found.machine.name).stem
     title = f"{name}: Type {found.type}, {found.verdict}"
-    figure.suptitle(title, x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    figure.suptitle(title, **TITLE)
     return figure
 
 
@@ -307,7 +300,7 @@ def branch_figure(diagram: BifurcationDiagram) -> Figure:
     ax = branches(diagram, figure.subplots())
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8)
     name = Path(diagram.machine.name).stem
-    figure.suptitle(f"{name}: periodic orbits", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    figure.suptitle(f"{name}: periodic orbits", **TITLE)
     return figure
 
 
@@ -318,7 +311,7 @@ def bifurcation_map_figure(found: BifurcationMap) -> Figure:
     ax = bifurcation_map(found, figure.subplots())
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
     name = Path(found.machine.name).stem
-    figure.suptitle(f"{name}: where motions change", x=0.02, ha="left", fontsize=10.5, fontweight="bold", color=INK)
+    figure.suptitle(f"{name}: where motions change", **TITLE)
     return figure
 
 
