@@ -1,4 +1,5 @@
 import math
+import os
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -28,6 +29,9 @@ from chaosgym.simulation import simulate
 from tests.plain_modes import HARD_BEAM
 
 from .oscillators import RigidImpact
+
+MACHINES = int(os.environ.get("CHAOSGYM_BRANCHES", "100"))
+"""Random machines whose branches are followed."""
 
 
 def oscillator(*, damping, stiffness, contact_damping=0.0, stops="two", gap=1.0, angle=0.0, speed=1.0, force=1.0):
@@ -539,10 +543,10 @@ def random_machine(random):
 
 @pytest.mark.slow
 def test_branches_of_random_machines_end_in_a_named_event():
-    """300 machines: speed, clearance or force from 0.8 to 1.25 of its value; 99 % end so, none in an exception."""
+    """Speed, clearance or force from 0.8 to 1.25 of its value; 99 % end so, none in an exception."""
     ends = []
-    for number in range(1000):
-        if len(ends) == 300:
+    for number in range(10 * MACHINES):
+        if len(ends) == MACHINES:
             break
         random = np.random.default_rng([0, number])
         machine = random_machine(random)
@@ -554,10 +558,10 @@ def test_branches_of_random_machines_end_in_a_named_event():
             sign = random.choice([-1.0, 1.0])
             _, found = branch_from(machine, field, 0.8 * value, 1.25 * value, state, verdict.period, sign)
             ends.append(found.end)
-    assert len(ends) == 300
+    assert len(ends) == MACHINES
     lost = [end for end in ends if "not followed" in end]
     print(f"{len(lost)} of {len(ends)} branches ended without a name: {lost}")
-    assert len(lost) <= 3
+    assert len(lost) <= 0.01 * MACHINES
 
 
 def test_a_curve_ends_where_only_another_one_is_found(monkeypatch):
