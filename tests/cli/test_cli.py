@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,19 +13,7 @@ from chaosgym.cli import app
 from chaosgym.machines import ImpactBeam
 from chaosgym.machines.parameters import parameters_of
 from chaosgym.simulation import simulate
-
-
-def run(*arguments, module="chaosgym"):
-    """Run a command of a package in a process of its own: (exit code, standard output, standard error)."""
-    done = subprocess.run([sys.executable, "-m", module, *arguments], capture_output=True, text=True, check=False)
-    return done.returncode, done.stdout, done.stderr
-
-
-def run_json(*arguments, module="chaosgym"):
-    """Run with --json and return the object, which must be all of standard output."""
-    code, out, err = run(*arguments, "--json", module=module)
-    assert code == 0, err
-    return json.loads(out)
+from tests.cli.run import run, run_json
 
 
 def test_simulate_prints_the_peaks_of_simulate():

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.test_cli import run, run_json
+from tests.cli.run import run, run_json
 
 SWEEP = (
     "sweep",

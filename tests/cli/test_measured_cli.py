@@ -1,37 +1,21 @@
 """Measured signals on the command line: three commands, one reader, one answer; units and files for the next tool."""
 
-import io
 import json
 import re
 import shlex
-import sys
 import time
-from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from chaosgym.cli import main
 from chaosgym.simulation import simulate
+from tests.cli.run import run
 from tests.diagnosis.records import KINDS, make
 from tests.plain_modes import HARD_BEAM
 
 COMMANDS = (("diagnose",), ("classify", "impact-beam"), ("design", "--load-rating", "0.5 kN"))
-
-
-def run(*arguments, stdin=""):
-    """Exit code, standard output and standard error of ``chaosgym``, run in this process."""
-    out, err, code = io.StringIO(), io.StringIO(), 0
-    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
-        patch.setattr(sys, "argv", ["chaosgym", *map(str, arguments)])
-        patch.setattr(sys, "stdin", io.StringIO(stdin))
-        try:
-            main()
-        except SystemExit as end:
-            code = end.code
-    return code, out.getvalue(), err.getvalue()
 
 
 def written(record, path, style):

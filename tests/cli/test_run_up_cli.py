@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
+from tests.cli.run import run
 from tests.cli.test_answers import check
-from tests.cli.test_measured_cli import run
 
 TIME = np.arange(0.0, 30.0, 1.0 / 4_000.0)
 ANGLE = 6.0 * TIME + 0.3 * TIME**2

@@ -5,7 +5,7 @@ import pytest
 from chaosgym.machines import SliderCrank
 from chaosgym.simulation import simulate
 
-from .test_cli import run, run_json
+from .run import run, run_json
 
 CRANK = ("slider-crank", "--speed-rpm", "190", "--clearance-mm", "0.254")
 

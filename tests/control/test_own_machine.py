@@ -23,7 +23,7 @@ from chaosgym.envs import SB3VecEnv, environment
 from chaosgym.envs.sb3 import SB3VisitedSpeeds
 from chaosgym.errors import DatasetError, ModelFileError, ParameterError
 from chaosgym.machines.machine_file import template
-from tests.cli.test_cli import run, run_json
+from tests.cli.run import run, run_json
 
 AGENTS = Path(__file__).parent.parent.parent / "agents"
 

@@ -13,7 +13,7 @@ from chaosgym.control.controllers import Follow, Kriging
 from chaosgym.control.plant import plant_of, work
 from chaosgym.control.policies import shipped_policy
 from chaosgym.errors import ParameterError
-from tests.cli.test_cli import run
+from tests.cli.run import run
 
 BEAM = "chaosgym/ImpactBeamTolerance-v1"
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from chaosgym.machines.machine_file import template
-from tests.cli.test_cli import run, run_json
+from tests.cli.run import run, run_json
 from tests.control.made_up import ENV
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from chaosgym.errors import DatasetError, ParameterError
 from chaosgym.machines.impact_beam.modes import static_tip_deflection
-from tests.cli.test_cli import run
+from tests.cli.run import run
 from thesis.scorecard.candidates import candidates, read_candidate
 from thesis.scorecard.search_space import STATIC_TIP_DEFLECTION
 from thesis.statements import read_comparisons, read_measured

@@ -4,7 +4,7 @@ import pytest
 
 from chaosgym.machines import ImpactBeam
 from chaosgym.machines.parameters import markdown_table
-from tests.cli.test_cli import run
+from tests.cli.run import run
 
 
 @pytest.mark.parametrize(
