@@ -12,9 +12,8 @@ from chaosgym.core.binned.cycle import advance
 from chaosgym.core.binned.model import FORCING_TERMS
 from chaosgym.core.binned.series import series_order
 from chaosgym.core.binned.tables import table_places, tables
-from chaosgym.core.cubic import cubic
 from chaosgym.core.cycle import cycle_arrays
-from chaosgym.core.events import KEEPS, UNSURE, judge
+from chaosgym.core.events import KEEPS, UNSURE, cubic, judge
 from chaosgym.core.lanes import LANES, padded
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import SimulationError

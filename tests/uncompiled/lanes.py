@@ -1,14 +1,21 @@
-"""The operations of ``chaosgym.core.lanes`` in numpy, without care for the order of sums.
+"""The operations of ``core.lanes`` and ``core.binned.lanes`` in numpy, without care for the order of sums.
 
 Arguments are those of the compiled operations, which the library documents.
 """
 
 import numpy as np
 
+import chaosgym.core.binned.lanes
+import chaosgym.core.lanes
 from chaosgym.core.lanes import LANES, TAYLOR_TERMS
 
 OPERATIONS = {}
 """All operations by name."""
+
+
+def compiled(name):
+    """The operation of the library."""
+    return getattr(chaosgym.core.lanes, name, None) or getattr(chaosgym.core.binned.lanes, name)
 
 
 def operation(function):

@@ -10,13 +10,12 @@ import chaosgym
 import chaosgym.core.batch
 import chaosgym.core.binned.batch
 import chaosgym.core.compilation
-import chaosgym.core.lanes
 from chaosgym import ImpactBeam, SliderCrank
 from chaosgym.classifier import classifier_for
 from chaosgym.simulation import simulate_with_deviations
 from tests.classifier.made_up import record_features
 from tests.golden.scenes import RECORDED, scenes
-from tests.uncompiled.lanes import OPERATIONS
+from tests.uncompiled.lanes import OPERATIONS, compiled
 
 TASKS = {"chaosgym/ImpactBeamTolerance-v1": {}, "chaosgym/SliderCrankTolerance-v1": {"contact_damping_ratio": 0.3}}
 """Keywords of tasks that are calm: chaos would magnify rounding in the 20 cycles before the first step."""
@@ -24,7 +23,7 @@ TASKS = {"chaosgym/ImpactBeamTolerance-v1": {}, "chaosgym/SliderCrankTolerance-v
 
 def install():
     """Let every kernel call the operations of numpy: vectors of LLVM exist compiled only."""
-    plain = {id(getattr(chaosgym.core.lanes, name)): operation for name, operation in OPERATIONS.items()}
+    plain = {id(compiled(name)): operation for name, operation in OPERATIONS.items()}
     for module in [module for name, module in sys.modules.items() if name.startswith("chaosgym.")]:
         for name, value in list(vars(module).items()):
             if id(value) in plain:

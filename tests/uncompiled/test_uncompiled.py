@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from chaosgym.core import lanes
-from tests.uncompiled.lanes import OPERATIONS
+from tests.uncompiled.lanes import OPERATIONS, compiled
 from tests.uncompiled.run import results
 
 CALLS = {
@@ -42,7 +41,7 @@ CALLS = {
 """One call of each operation on two arrays."""
 
 
-def _compiled(operation):
+def _called(operation):
     @njit
     def call(*arguments):
         return operation(*arguments)
@@ -54,7 +53,7 @@ def _compiled(operation):
 def test_a_vector_operation_is_its_sentence_in_numpy(name):
     """What it returns and all that it writes, but for the order of sums."""
     found = []
-    for operation in (_compiled(getattr(lanes, name)), OPERATIONS[name]):
+    for operation in (_called(compiled(name)), OPERATIONS[name]):
         generator = np.random.default_rng(3)
         table, own = generator.normal(size=1024), generator.normal(size=1024)
         returned = CALLS[name](operation, table, own)

@@ -16,8 +16,8 @@ G. Birkhoff, A. Priver, Hermite interpolation errors for derivatives, J. Math. a
 
 import math
 
-from chaosgym.core.cubic import cubic
-from chaosgym.core.kernel import leaf, part
+from chaosgym.core.cycle import LOWER, UPPER
+from chaosgym.core.kernel import leaf, njit, part
 from chaosgym.core.lanes import fma, item
 
 VALUE_DOUBT, SLOPE_DOUBT = 1.0 / 384.0, math.sqrt(3.0) / 216.0
@@ -34,6 +34,31 @@ POLISH = 60
 
 KEEPS, CROSSES, UNSURE = range(3)
 """What a reading does between two instants: not reach zero, cross it once, or what can't be told."""
+
+
+@njit(cache=True, inline="always")
+def cubic(e0, d0, e1, d1, h, t):
+    """Value and slope at t of the cubic with values e0, e1 and slopes d0, d1 at 0 and h."""
+    s = t / h
+    b = 3.0 * (e1 - e0) - h * (2.0 * d0 + d1)
+    c = 2.0 * (e0 - e1) + h * (d0 + d1)
+    return e0 + s * (h * d0 + s * (b + s * c)), d0 + s * (2.0 * b + 3.0 * s * c) / h
+
+
+@leaf
+def cubic_extremum(e0, d0, e1, d1, h, sign):
+    """Instant in (0, h) of the cubic's minimum (sign +1) or maximum (sign -1), or -1 if it has none there."""
+    b = sign * (3.0 * (e1 - e0) - h * (2.0 * d0 + d1))
+    c = sign * (2.0 * (e0 - e1) + h * (d0 + d1))
+    d = sign * h * d0
+    discriminant = b * b - 3.0 * c * d
+    if discriminant < 0.0:
+        return -1.0
+    denominator = b + math.sqrt(discriminant)
+    if denominator <= 0.0:
+        return -1.0
+    s = -d / denominator
+    return s * h if 0.0 < s < 1.0 else -1.0
 
 
 @leaf
@@ -216,3 +241,27 @@ def closing(own, series, lanes, last, side, gap, lag, least, h, tolerance):
         length *= 2.0
         low, p0, q0, e0, d0 = high, p1, q1, e1, d1
     return math.inf
+
+
+@leaf
+def note_touch(bouncing, joints, j, side, time, bounce_time):
+    """Go on bouncing at joint j, or end it and begin anew when the other surface is touched.
+
+    ``bouncing`` (3m,): of all m joints the surface, +1, -1, or 0 before the first touch; then of each the instants of
+    the first and the last touch of it [s], counted from the start of the coming cycle.
+    """
+    first = joints + 2 * j
+    if bouncing[j] != side:
+        if bouncing[j] != 0.0:
+            column = 2 * j + (UPPER if bouncing[j] > 0.0 else LOWER)
+            bounce_time[column] = max(bounce_time[column], bouncing[first + 1] - bouncing[first])
+        bouncing[j] = side
+        bouncing[first] = time
+    bouncing[first + 1] = time
+
+
+@leaf
+def let_pass(bouncing, joints, period):
+    """Count the instants of touches from the start of the next cycle."""
+    for i in range(joints, bouncing.shape[0]):
+        bouncing[i] -= period

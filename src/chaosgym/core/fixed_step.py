@@ -10,8 +10,8 @@ import math
 import numpy as np
 
 from chaosgym.core import status
-from chaosgym.core.contact import contact_force, let_pass, note_touch
 from chaosgym.core.cycle import LOWER, UPPER
+from chaosgym.core.events import let_pass, note_touch
 from chaosgym.core.kernel import njit
 
 STABILITY_LIMIT = 2.7
@@ -19,6 +19,24 @@ STABILITY_LIMIT = 2.7
 
 RUNAWAY = 1e9
 """Tip displacement [m] that counts as divergence."""
+
+
+@njit(cache=True, inline="always")
+def pressing_force(penetration, penetration_rate, stiffness, damping):
+    """Force [N] of spring and damper of a surface in contact, positive away from it; negative where they would pull.
+
+    ``penetration`` [m] is how far the tip lies beyond the surface, ``penetration_rate`` [m/s] its rate. The law is
+    linear, so the rates of both give the rate of the force [N/s].
+    """
+    return stiffness * penetration + damping * penetration_rate
+
+
+@njit(cache=True, inline="always")
+def contact_force(penetration, penetration_rate, stiffness, damping):
+    """Force [N] of a surface on the tip: zero inside the gap, and beyond it as soon as spring and damper would pull."""
+    if penetration <= 0.0:
+        return 0.0
+    return max(0.0, pressing_force(penetration, penetration_rate, stiffness, damping))
 
 
 @njit(cache=True, inline="always")

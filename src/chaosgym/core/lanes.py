@@ -22,7 +22,7 @@ from numba.extending import intrinsic, register_jitable
 LANES = 8
 """Doubles of one vector."""
 
-_DOUBLE, _INT, _INDEX = ir.DoubleType(), ir.IntType(32), ir.IntType(64)
+DOUBLE, INT, INDEX = ir.DoubleType(), ir.IntType(32), ir.IntType(64)
 _OVERSHOOT = 4.0 / 27.0
 
 
@@ -51,7 +51,7 @@ def aligned(size: int) -> Any:
 class _Emitter:
     """Instructions of vectors."""
 
-    kind = ir.VectorType(_DOUBLE, LANES)
+    kind = ir.VectorType(DOUBLE, LANES)
 
     def __init__(self, builder: Any) -> None:
         self.builder = builder
@@ -68,7 +68,7 @@ class _Emitter:
         return ir.Constant(self.kind, [value] * LANES)
 
     def index(self, value: int) -> Any:
-        return ir.Constant(_INDEX, value)
+        return ir.Constant(INDEX, value)
 
     def times(self, value: Any, factor: int) -> Any:
         return self.builder.mul(value, self.index(factor))
@@ -89,27 +89,27 @@ class _Emitter:
 
     def store_some(self, vector: Any, pointer: Any, at: Any, count: Any) -> None:
         name, flags = f"llvm.masked.store.v{LANES}f64.p0v{LANES}f64", ir.VectorType(ir.IntType(1), LANES)
-        kinds = [self.kind, self.kind.as_pointer(), _INT, flags]
+        kinds = [self.kind, self.kind.as_pointer(), INT, flags]
         store = cgutils.get_or_insert_function(self.builder.module, ir.FunctionType(ir.VoidType(), kinds), name)
-        operands = [vector, self.address(pointer, at), ir.Constant(_INT, 8), self.lanes_below(count)]
+        operands = [vector, self.address(pointer, at), ir.Constant(INT, 8), self.lanes_below(count)]
         self.builder.call(store, operands)
 
     def spread(self, scalar: Any) -> Any:
         kind = ir.VectorType(scalar.type, LANES)
         nothing = ir.Constant(kind, ir.Undefined)
-        first = self.builder.insert_element(nothing, scalar, ir.Constant(_INT, 0))
-        zeros = ir.Constant(ir.VectorType(_INT, LANES), [0] * LANES)
+        first = self.builder.insert_element(nothing, scalar, ir.Constant(INT, 0))
+        zeros = ir.Constant(ir.VectorType(INT, LANES), [0] * LANES)
         return self.builder.shuffle_vector(first, nothing, zeros)
 
     def each(self, vector: Any, count: int) -> list[Any]:
         """The first lanes of a vector, each spread."""
         nothing = ir.Constant(self.kind, ir.Undefined)
-        masks = [ir.Constant(ir.VectorType(_INT, LANES), [i] * LANES) for i in range(count)]
+        masks = [ir.Constant(ir.VectorType(INT, LANES), [i] * LANES) for i in range(count)]
         return [self.builder.shuffle_vector(vector, nothing, mask) for mask in masks]
 
     def shifted(self, vector: Any, first: Any) -> Any:
         """A number and all lanes but the last: a load across what was just stored would wait for it."""
-        mask = ir.Constant(ir.VectorType(_INT, LANES), [LANES, *range(LANES - 1)])
+        mask = ir.Constant(ir.VectorType(INT, LANES), [LANES, *range(LANES - 1)])
         return self.builder.shuffle_vector(vector, self.spread(first), mask)
 
     def larger(self, a: Any, b: Any) -> Any:
@@ -123,10 +123,10 @@ class _Emitter:
         shift = LANES // 2
         while shift:
             lanes = [(i + shift) % LANES for i in range(LANES)]
-            mask = ir.Constant(ir.VectorType(_INT, LANES), lanes)
+            mask = ir.Constant(ir.VectorType(INT, LANES), lanes)
             vector = combine(vector, self.builder.shuffle_vector(vector, ir.Constant(self.kind, ir.Undefined), mask))
             shift //= 2
-        return self.builder.extract_element(vector, ir.Constant(_INT, 0))
+        return self.builder.extract_element(vector, ir.Constant(INT, 0))
 
     def accumulator(self, start: Any) -> Any:
         return cgutils.alloca_once_value(self.builder, start)
@@ -143,7 +143,7 @@ class _Emitter:
 
     def lanes_below(self, count: Any) -> Any:
         """Mask of the lanes whose number is below a count."""
-        numbers = ir.Constant(ir.VectorType(_INDEX, LANES), list(range(LANES)))
+        numbers = ir.Constant(ir.VectorType(INDEX, LANES), list(range(LANES)))
         return self.builder.icmp_signed("<", numbers, self.spread(count))
 
 
@@ -151,7 +151,7 @@ def _argument_type(kind: Any) -> Any:
     return kind if isinstance(kind, types.Array) else types.int64 if isinstance(kind, types.Integer) else types.float64
 
 
-def _operation(returns: Any = types.void) -> Callable[[Callable[..., Any]], Any]:
+def operation(returns: Any = types.void) -> Callable[[Callable[..., Any]], Any]:
     """Intrinsic whose instructions a function of an emitter and the arguments writes; an array comes as a pointer."""
 
     def decorate(write: Callable[..., Any]) -> Any:
@@ -173,7 +173,18 @@ def _operation(returns: Any = types.void) -> Callable[[Callable[..., Any]], Any]
     return decorate
 
 
-@_operation()
+def some_at_once(e, total, at_once, write):
+    """Call a function of a number of things and the first of them, for some at once, then for single ones."""
+    b = e.builder
+    several = b.udiv(total, e.index(at_once))
+    with cgutils.for_range(b, several) as loop:
+        write(at_once, e.times(loop.index, at_once))
+    done = e.times(several, at_once)
+    with cgutils.for_range(b, b.sub(total, done)) as loop:
+        write(1, b.add(done, loop.index))
+
+
+@operation()
 def sample(e, table, at, own, u_at, blocks, lanes, first_at, second_at):
     """Two quantities of u at eight instants: into ``own`` from ``first_at`` and ``second_at`` on.
 
@@ -194,7 +205,7 @@ def sample(e, table, at, own, u_at, blocks, lanes, first_at, second_at):
         e.store(e.total(*sums[2 * q : 2 * q + 2]), own, target)
 
 
-@_operation(types.int64)
+@operation(types.int64)
 def first_doubt(e, own, values_at, slopes_at, h, low, high, doubt, start):
     """Number of the first interval, from ``start`` on, in which a quantity may leave (low, high); 8 if in none.
 
@@ -212,7 +223,7 @@ def first_doubt(e, own, values_at, slopes_at, h, low, high, doubt, start):
     lower = b.fsub(e.smaller(left, right), e.fma(reach, fall, errors))
     within = b.and_(b.fcmp_ordered("<", upper, e.spread(high)), b.fcmp_ordered(">", lower, e.spread(low)))
     within = b.or_(within, e.lanes_below(start))
-    bits = b.zext(b.bitcast(b.not_(within), ir.IntType(LANES)), _INDEX)
+    bits = b.zext(b.bitcast(b.not_(within), ir.IntType(LANES)), INDEX)
     return b.cttz(b.or_(bits, e.index(1 << LANES)), ir.Constant(ir.IntType(1), 1))
 
 
@@ -225,7 +236,7 @@ def _propagated(e, entries, at, own, u_at, lanes, offset):
     return e.fma(e11, first, b.fmul(e12, second)), e.fma(e22, second, b.fmul(e21, first)), places
 
 
-@_operation()
+@operation()
 def propagate(e, entries, at, own, u_at, out_at, lanes):
     """Blocks ``entries`` (4, lanes) times u, into ``own`` from ``out_at`` on, which may be where u is."""
     with e.vectors(lanes) as loop:
@@ -238,7 +249,7 @@ TAYLOR_TERMS = 6
 """Terms by which ``propagate_and_expand`` goes on from the instant of a table."""
 
 
-@_operation()
+@operation()
 def propagate_and_expand(e, entries, at, generator_at, own, u_at, time, out_at, lanes):
     """As ``propagate``, then times exp(B time) by a Taylor series in time; B (4, lanes) is in ``entries`` too."""
     b = e.builder
@@ -256,7 +267,7 @@ def propagate_and_expand(e, entries, at, generator_at, own, u_at, time, out_at, 
         e.store(y, own, b.add(out_at, places[1]))
 
 
-def _dot(e, table, at, width, other):
+def dot_with(e, table, at, width, other):
     """Scalar product of a part of an array, (width,), and of vectors that a function of their beginning gives."""
     b = e.builder
     total = e.accumulator(e.constant(0.0))
@@ -266,50 +277,19 @@ def _dot(e, table, at, width, other):
     return e.folded(b.load(total), b.fadd)
 
 
-@_operation(types.float64)
+@operation(types.float64)
 def dot(e, table, at, own, u_at, width):
     """Scalar product of parts of two arrays, (width,), a multiple of 8."""
-    return _dot(e, table, at, width, lambda offset: e.load(own, e.builder.add(u_at, offset)))
+    return dot_with(e, table, at, width, lambda offset: e.load(own, e.builder.add(u_at, offset)))
 
 
-@_operation(types.float64)
+@operation(types.float64)
 def dot_of_sizes(e, table, at, own, u_at, width):
     """Scalar product of a part of one array and the absolute values of another, (width,), a multiple of 8."""
-    return _dot(e, table, at, width, lambda offset: e.intrinsic("fabs", [e.load(own, e.builder.add(u_at, offset))]))
+    return dot_with(e, table, at, width, lambda offset: e.intrinsic("fabs", [e.load(own, e.builder.add(u_at, offset))]))
 
 
-@_operation(types.float64)
-def dot_of_distances(e, table, at, own, u_at, v_at, width):
-    """As ``dot_of_sizes``, of the differences of two parts of an array."""
-
-    def other(offset):
-        u, v = (e.load(own, e.builder.add(at, offset)) for at in (u_at, v_at))
-        return e.intrinsic("fabs", [e.builder.fsub(u, v)])
-
-    return _dot(e, table, at, width, other)
-
-
-@_operation()
-def copy(e, own, at, out_at, count):
-    """Copy numbers within an array without overlap; unlike numba's indexing it tests no sign of the index."""
-    b = e.builder
-    with e.vectors(b.add(count, e.index(LANES - 1))) as loop:
-        first = e.times(loop.index, LANES)
-        e.store_some(e.load(own, b.add(at, first)), own, b.add(out_at, first), b.sub(count, first))
-
-
-def _some_at_once(e, total, at_once, write):
-    """Call a function of a number of things and the first of them, for some at once, then for single ones."""
-    b = e.builder
-    several = b.udiv(total, e.index(at_once))
-    with cgutils.for_range(b, several) as loop:
-        write(at_once, e.times(loop.index, at_once))
-    done = e.times(several, at_once)
-    with cgutils.for_range(b, b.sub(total, done)) as loop:
-        write(1, b.add(done, loop.index))
-
-
-def _columns(e, table, places, width, counts, factors, factors_at):
+def sums_of_columns(e, table, places, width, counts, factors, factors_at):
     """Sums over c of factor c times column c, whose lanes begin at each of some places + c ``width``; pairs alternate.
 
     Columns are ``counts``: (how many, how many are left out after them), an even number of both, and how many more.
@@ -337,205 +317,32 @@ def _columns(e, table, places, width, counts, factors, factors_at):
     return [e.total(*pair) for pair in sums]
 
 
-def _write_columns(e, table, at, width, counts, factors, factors_at, out, out_at, stride):
+def write_columns(e, table, at, width, counts, factors, factors_at, out, out_at, stride):
     """Write sums over columns, two vectors at once."""
     b = e.builder
 
     def write(vectors, first):
         numbers = [b.add(first, e.index(k)) for k in range(vectors)]
         places = [b.add(at, e.times(number, LANES)) for number in numbers]
-        for number, answer in zip(numbers, _columns(e, table, places, width, counts, factors, factors_at), strict=True):
+        for number, answer in zip(
+            numbers, sums_of_columns(e, table, places, width, counts, factors, factors_at), strict=True
+        ):
             e.store(answer, out, b.add(out_at, b.mul(number, stride)))
 
-    _some_at_once(e, b.udiv(b.add(width, e.index(LANES - 1)), e.index(LANES)), 2, write)
+    some_at_once(e, b.udiv(b.add(width, e.index(LANES - 1)), e.index(LANES)), 2, write)
 
 
-@_operation()
+@operation()
 def add_columns(e, table, at, width, count, factors, factors_at, out, out_at, stride):
     """Write the sum over c < ``count`` of factor c times column c of a table (columns, width).
 
     Each eight numbers begin ``stride`` after the eight before them. Whole vectors are written: what comes after the
     width means nothing.
     """
-    _write_columns(e, table, at, width, (count, None, None), factors, factors_at, out, out_at, stride)
+    write_columns(e, table, at, width, (count, None, None), factors, factors_at, out, out_at, stride)
 
 
-@_operation()
-def add_some_columns(e, table, at, width, count, left_out, more, factors, factors_at, out, out_at, stride):
-    """As ``add_columns`` of ``count`` + ``left_out`` + ``more`` columns, the middle ones of which have the factor 0.
-
-    The first two are an even number together.
-    """
-    _write_columns(e, table, at, width, (count, left_out, more), factors, factors_at, out, out_at, stride)
-
-
-@_operation()
-def next_term(e, table, older, old, width, count, factors, by_older, by_old, more_at, weight, share, out_at):
-    """Write ``share`` times all of: ``count`` columns from ``older`` on times their factors, ``weight`` times those
-    from ``old`` on times theirs, and what lies at ``more_at``, in the array of the factors and of the answer."""
-    b = e.builder
-    shares, weights = e.spread(share), e.spread(b.fmul(weight, share))
-    with e.vectors(width) as rows:
-        first = e.times(rows.index, LANES)
-        (known,) = _columns(e, table, [b.add(older, first)], width, (count, None, None), factors, by_older)
-        known = b.fmul(shares, b.fadd(e.load(factors, b.add(more_at, first)), known))
-        # what is old was written last: as little as possible waits for it
-        (new,) = _columns(e, table, [b.add(old, first)], width, (count, None, None), factors, by_old)
-        e.store(e.fma(weights, new, known), factors, b.add(out_at, first))
-
-
-@_operation()
-def next_terms(e, table, older, old, count, own, first, more_at, most, shares, terms):
-    """As ``next_term`` for several terms of a series of eight lanes and ``count`` of them, up to 7, with a column each.
-
-    The first two terms lie at ``first``, the others are written behind them. Term k is weighted by k + 1 and number k
-    of ``shares``; what is added to it lies at ``more_at``, eight numbers for each k up to ``most``. Columns and the
-    last term stay in registers.
-    """
-    b = e.builder
-
-    def sum_of(columns, factors):
-        sums = [e.constant(0.0)] * 2
-        for i, (column, factor) in enumerate(zip(columns, factors, strict=True)):
-            sums[i % 2] = e.fma(column, factor, sums[i % 2])
-        return b.fadd(*sums)
-
-    def known_of(k, older_columns, factors):
-        row = b.select(b.icmp_signed("<", k, most), k, most)
-        more = e.load(own, b.add(more_at, e.times(row, LANES)))
-        return b.fmul(e.spread(e.number(shares, k)), b.fadd(more, sum_of(older_columns, factors)))
-
-    for size in range(1, LANES):
-        with b.if_then(b.icmp_signed("==", count, e.index(size))):
-            columns = [[e.load(table, b.add(at, e.index(i * LANES))) for i in range(size)] for at in (older, old)]
-            known = e.accumulator(known_of(e.index(0), columns[0], e.each(e.load(own, first), size)))
-            last = e.accumulator(e.load(own, b.add(first, e.index(LANES))))
-            with cgutils.for_range(b, terms) as loop:
-                k, after = loop.index, b.add(loop.index, e.index(1))
-                weight = b.fmul(b.sitofp(after, _DOUBLE), e.number(shares, k))
-                factors = e.each(b.load(last), size)
-                term = e.fma(e.spread(weight), sum_of(columns[1], factors), b.load(known))
-                e.store(term, own, b.add(first, e.times(b.add(after, e.index(1)), LANES)))
-                b.store(term, last)
-                b.store(known_of(after, columns[0], factors), known)
-
-
-@_operation()
-def add_rows(e, own, at, factor, sum_at, width):
-    """Add a part of an array, (width,), a multiple of 8, times a factor to another part."""
-    b = e.builder
-    with e.vectors(width) as loop:
-        offset = e.times(loop.index, LANES)
-        total = b.add(sum_at, offset)
-        product = e.fma(e.spread(factor), e.load(own, b.add(at, offset)), e.load(own, total))
-        e.store(product, own, total)
-
-
-def _products(e, own, rows, matrix, width, count, columns):
-    """Sums over k < ``count`` of vector k of each row times those of adjacent columns of a matrix (count, width)."""
-    b = e.builder
-    totals = [[e.accumulator(e.constant(0.0)) for _ in range(columns)] for _ in rows]
-    with cgutils.for_range(b, count) as loop:
-        place, begin = e.times(loop.index, LANES), b.add(matrix, b.mul(loop.index, width))
-        factors = [e.load(own, b.add(row, place)) for row in rows]
-        for k in range(columns):
-            value = e.load(own, b.add(begin, e.index(k * LANES)))
-            for factor, sums in zip(factors, totals, strict=True):
-                e.add_product(sums[k], factor, value)
-    return [[b.load(total) for total in sums] for sums in totals]
-
-
-def _in_blocks(e, rows, width, answer_at, own, out_at):
-    """Write rows (rows, width) of vectors that a function gives, in blocks of two rows and five columns.
-
-    The function takes the numbers of adjacent rows, where the first column begins and how many there are.
-    """
-    b = e.builder
-
-    def write_rows(tall, row):
-        numbers = [b.add(row, e.index(k)) for k in range(tall)]
-
-        def write(wide, column):
-            begin = e.times(column, LANES)
-            for number, answers in zip(numbers, answer_at(numbers, begin, wide), strict=True):
-                place = b.add(b.add(out_at, b.mul(number, width)), begin)
-                for k, answer in enumerate(answers):
-                    e.store(answer, own, b.add(place, e.index(k * LANES)))
-
-        _some_at_once(e, b.udiv(width, e.index(LANES)), 5, write)
-
-    _some_at_once(e, rows, 2, write_rows)
-
-
-@_operation()
-def multiply_eight(e, own, at, rows, matrix, width, count, out_at):
-    """Write rows, ``width`` apart, times a matrix (count, width) / 8, for eight pairs: every number is a vector."""
-    b = e.builder
-
-    def answers(numbers, begin, columns):
-        places = [b.add(at, b.mul(number, width)) for number in numbers]
-        return _products(e, own, places, b.add(matrix, begin), width, count, columns)
-
-    _in_blocks(e, rows, width, answers, own, out_at)
-
-
-@_operation()
-def next_terms_of_eight(e, own, at, older, old, width, count, weight, share, out_at):
-    """As ``next_term`` for eight series at once: rows (count, width) hold factors of ``older`` and ``old``."""
-    b = e.builder
-    shares, weights = e.spread(share), e.spread(b.fmul(weight, share))
-    second = e.times(count, LANES)
-
-    def answers(numbers, begin, columns):
-        first = [b.add(at, b.mul(number, width)) for number in numbers]
-        known = _products(e, own, first, b.add(older, begin), width, count, columns)
-        places = [b.add(place, second) for place in first]
-        new = _products(e, own, places, b.add(old, begin), width, count, columns)
-        pairs = (zip(*both, strict=True) for both in zip(known, new, strict=True))
-        return [[e.fma(weights, one, b.fmul(shares, other)) for other, one in row] for row in pairs]
-
-    _in_blocks(e, count, width, answers, own, out_at)
-
-
-@_operation()
-def deal(e, own, at, stride, count, out, out_at, length, places, written):
-    """Write lane q of ``count`` vectors, ``stride`` apart, at q ``length``, for q < ``places``.
-
-    Of the eight numbers of a lane the first ``written`` are, and those beyond the count are zero.
-    """
-    b, nothing = e.builder, e.constant(0.0)
-    last, vectors = b.sub(count, e.index(1)), []
-    for k in range(LANES):
-        inside = b.icmp_signed("<", e.index(k), count)
-        value = e.load(own, b.add(at, b.mul(b.select(inside, e.index(k), last), stride)))
-        vectors.append(b.select(inside, value, nothing))
-    span = LANES // 2
-    while span:
-        # halves of ``span`` lanes change places between vectors that lie as far apart
-        low = [i if i & span == 0 else LANES + i - span for i in range(LANES)]
-        high = [i + span if i & span == 0 else LANES + i for i in range(LANES)]
-        for k in (k for k in range(LANES) if k & span == 0):
-            pair = vectors[k], vectors[k + span]
-            for place, lanes in ((k, low), (k + span, high)):
-                vectors[place] = b.shuffle_vector(*pair, ir.Constant(ir.VectorType(_INT, LANES), lanes))
-        span //= 2
-    for q, vector in enumerate(vectors):
-        with b.if_then(b.icmp_signed("<", e.index(q), places)):
-            e.store_some(vector, out, b.add(out_at, b.mul(e.index(q), length)), written)
-
-
-@_operation()
-def keep_largest(e, own, at, largest_at, width):
-    """Raise a part of an array, (width,), a multiple of 8, to the absolute values of another."""
-    b = e.builder
-    with e.vectors(width) as loop:
-        offset = e.times(loop.index, LANES)
-        place = b.add(largest_at, offset)
-        size = e.intrinsic("fabs", [e.load(own, b.add(at, offset))])
-        e.store(e.larger(e.load(own, place), size), own, place)
-
-
-@_operation()
+@operation()
 def add_tops(e, own, values_at, slopes_at, h, sign, weight, more, totals_at):
     """Add to eight totals what ``sign`` times a quantity is at most in each interval, times ``weight``, + ``more``.
 
@@ -552,64 +359,41 @@ def add_tops(e, own, values_at, slopes_at, h, sign, weight, more, totals_at):
     e.store(e.fma(e.spread(weight), top, total), own, totals_at)
 
 
-@_operation(types.int64)
+@operation(types.int64)
 def first_above(e, own, at, limit, start):
     """Number of the first of eight values, from ``start`` on, that is not below a limit; 8 if all are."""
     b = e.builder
     below = b.or_(b.fcmp_ordered("<", e.load(own, at), e.spread(limit)), e.lanes_below(start))
-    bits = b.zext(b.bitcast(b.not_(below), ir.IntType(LANES)), _INDEX)
+    bits = b.zext(b.bitcast(b.not_(below), ir.IntType(LANES)), INDEX)
     return b.cttz(b.or_(bits, e.index(1 << LANES)), ir.Constant(ir.IntType(1), 1))
 
 
-@_operation()
-def sum_series(e, series, at, stride, last, time, out, out_at, width):
-    """Write value and first two derivatives at ``time`` of ``width`` columns, a multiple of 8, into ``out`` (3, width).
-
-    The series has a row of ``stride`` coefficients for each power of time up to ``last``.
-    """
-    b, times = e.builder, e.spread(time)
-    sums = [e.accumulator(e.constant(0.0)) for _ in range(3)]
-    with e.vectors(width) as columns:
-        first = e.times(columns.index, LANES)
-        begin = b.add(at, first)
-        for one in sums:
-            b.store(e.constant(0.0), one)
-        with cgutils.for_range(b, b.add(last, e.index(1))) as terms:
-            coefficient = e.load(series, b.add(begin, b.mul(b.sub(last, terms.index), stride)))
-            value, slope, bend = (b.load(one) for one in sums)
-            for one, sum_so_far, new in zip(sums, (value, slope, bend), (coefficient, value, slope), strict=True):
-                b.store(e.fma(sum_so_far, times, new), one)
-        for q, factor in enumerate((1.0, 1.0, 2.0)):
-            place = b.add(b.add(out_at, first), b.mul(e.index(q), width))
-            e.store(b.fmul(b.load(sums[q]), e.constant(factor)), out, place)
-
-
-@_operation(types.float64)
+@operation(types.float64)
 def item(e, own, at):
     """Number at an index that is not negative; unlike numba's indexing it does not test for that."""
     return e.number(own, at)
 
 
-@_operation(types.int64)
+@operation(types.int64)
 def exponent(e, value):
     """Exponent of two of a number above 0: the largest k with 2^k not above it; 1024 of infinity."""
-    bits = e.builder.lshr(e.builder.bitcast(value, _INDEX), e.index(52))
+    bits = e.builder.lshr(e.builder.bitcast(value, INDEX), e.index(52))
     return e.builder.sub(bits, e.index(1023))
 
 
-@_operation(types.float64)
+@operation(types.float64)
 def power_of_two(e, power):
     """Two to the power of an integer from -1022 to 1023."""
-    return e.builder.bitcast(e.builder.shl(e.builder.add(power, e.index(1023)), e.index(52)), _DOUBLE)
+    return e.builder.bitcast(e.builder.shl(e.builder.add(power, e.index(1023)), e.index(52)), DOUBLE)
 
 
-@_operation()
+@operation()
 def put(e, own, at, value):
     """Write a number at a place that is not negative."""
     e.builder.store(value, e.builder.gep(own, [at]))
 
 
-@_operation(types.float64)
+@operation(types.float64)
 def fma(e, a, b, c):
     """Product of the first two plus the third, with one rounding."""
     return e.builder.fma(a, b, c)

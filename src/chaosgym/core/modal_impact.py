@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from chaosgym.core.joints.cycle import advance_joints, room_for
-from chaosgym.core.joints.run import JointRun, new_space, work_space
+from chaosgym.core.joints.space import JointRun, new_space, work_space
 from chaosgym.core.joints.tables import MOST_LEVELS, ROW, layout, put_drive, put_structure
 from chaosgym.core.kernel import njit
 from chaosgym.core.lanes import aligned, unset

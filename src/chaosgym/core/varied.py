@@ -5,7 +5,7 @@ from numba import prange
 from chaosgym.core.batch import beam_of
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.joints.cycle import advance_joints, room_for
-from chaosgym.core.joints.run import JointRun
+from chaosgym.core.joints.space import JointRun
 from chaosgym.core.kernel import njit, side_by_side
 from chaosgym.core.modal_impact import put_speed, suited_run, suits
 from chaosgym.core.tangent import Tangents

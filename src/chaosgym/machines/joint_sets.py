@@ -21,8 +21,8 @@ from chaosgym.core.compilation import call
 from chaosgym.core.cycle import CycleArrays
 from chaosgym.core.joints.batch import JointModel, displacement_weights
 from chaosgym.core.joints.cycle import advance_joints, room_for
-from chaosgym.core.joints.run import JointRun, new_space, work_space
 from chaosgym.core.joints.sets import put_sets, set_length
+from chaosgym.core.joints.space import JointRun, new_space, work_space
 from chaosgym.core.joints.tables import MOST_LEVELS, Rubs, layout, read_at_rest
 from chaosgym.core.lanes import unset
 from chaosgym.core.tangent import Tangents

@@ -391,7 +391,7 @@ def prepare_motion() -> None:
     from chaosgym.core.compilation import prepare
     from chaosgym.core.cycle import cycle_arrays
     from chaosgym.core.joints.cycle import advance_joints
-    from chaosgym.core.joints.run import JointRun
+    from chaosgym.core.joints.space import JointRun
     from chaosgym.core.tangent import no_tangents
 
     numbers, places = np.empty(0), np.empty(0, np.int64)
@@ -537,7 +537,7 @@ class ModalImpactMachine(Machine):
         from chaosgym.core.compilation import call
         from chaosgym.core.fixed_step import advance_fixed_step
         from chaosgym.core.joints.cycle import advance_joints, room_for
-        from chaosgym.core.joints.run import JointRun
+        from chaosgym.core.joints.space import JointRun
         from chaosgym.core.modal_impact import make_run
         from chaosgym.core.tangent import no_tangents
 

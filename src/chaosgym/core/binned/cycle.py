@@ -63,9 +63,8 @@ from chaosgym.core.binned.record import (
 )
 from chaosgym.core.binned.series import order_for, put_time
 from chaosgym.core.binned.tables import table_places
-from chaosgym.core.contact import let_pass, note_touch
 from chaosgym.core.cycle import LOWER, UPPER
-from chaosgym.core.events import CROSSES, KEEPS, closing, crossing, opening, settled
+from chaosgym.core.events import CROSSES, KEEPS, closing, crossing, let_pass, note_touch, opening, settled
 from chaosgym.core.kernel import leaf, njit, part
 from chaosgym.core.lanes import LANES, add_columns
 from chaosgym.core.tangent import orthonormalise

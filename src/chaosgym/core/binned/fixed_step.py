@@ -10,18 +10,11 @@ import numpy as np
 from chaosgym.core import status
 from chaosgym.core.binned.cycle import RUNAWAY, STEP_BUDGET
 from chaosgym.core.binned.record import begin_cycle, note_peak, note_share, write_peaks, write_sample
-from chaosgym.core.binned.taylor import (
-    FORCE,
-    begin,
-    expand,
-    judge,
-    look_first,
-    new_series,
-    new_view,
-    note_touch_of,
-)
-from chaosgym.core.contact import let_pass
+from chaosgym.core.binned.taylor import judge, note_touch_of
+from chaosgym.core.binned.taylor_series import begin, expand, new_series
+from chaosgym.core.binned.taylor_view import FORCE, look_first, new_view
 from chaosgym.core.cycle import LOWER, UPPER
+from chaosgym.core.events import let_pass
 from chaosgym.core.fixed_step import STABILITY_LIMIT
 from chaosgym.core.kernel import leaf, njit
 

@@ -4,21 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from chaosgym.core.binned.lanes import add_some_columns, copy, dot_of_distances, sum_series
 from chaosgym.core.binned.model import FORCING_TERMS
 from chaosgym.core.binned.series import expand, put_time
 from chaosgym.core.binned.tables import table_places
 from chaosgym.core.kernel import leaf, njit, part
-from chaosgym.core.lanes import (
-    LANES,
-    add_columns,
-    add_some_columns,
-    aligned,
-    copy,
-    dot,
-    dot_of_distances,
-    padded,
-    sum_series,
-)
+from chaosgym.core.lanes import LANES, add_columns, aligned, dot, padded
 
 READINGS = 4 * LANES
 """Numbers kept of a channel: eight readings that serve as work space and for now, eight ahead, and as many slopes."""

@@ -5,8 +5,8 @@ The resultant of the monitored joint is a tuple (upward part, size, rate of the 
 
 import math
 
-from chaosgym.core.cubic import cubic, cubic_extremum
 from chaosgym.core.cycle import LOWER, UPPER
+from chaosgym.core.events import cubic, cubic_extremum
 from chaosgym.core.kernel import leaf
 
 

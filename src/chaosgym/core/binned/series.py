@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 
+from chaosgym.core.binned.lanes import copy, next_term, next_terms
 from chaosgym.core.binned.model import FORCING_TERMS
 from chaosgym.core.kernel import leaf, part
-from chaosgym.core.lanes import LANES, add_columns, copy, next_term, next_terms
+from chaosgym.core.lanes import LANES, add_columns
 
 SERIES_PHASE = np.array(
     [0.0] * 3 + [math.exp((math.lgamma(order) + math.log(1e-17)) / (order - 1)) for order in range(3, 65)]

@@ -17,23 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
+from chaosgym.core.binned.lanes import add_rows, copy, deal, keep_largest, multiply_eight, next_terms_of_eight
 from chaosgym.core.binned.model import FORCING_TERMS
 from chaosgym.core.binned.series import SHARES
 from chaosgym.core.kernel import leaf, njit, part
-from chaosgym.core.lanes import (
-    LANES,
-    add_rows,
-    aligned,
-    copy,
-    deal,
-    item,
-    keep_largest,
-    multiply_eight,
-    next_terms_of_eight,
-    padded,
-    put,
-    unset,
-)
+from chaosgym.core.lanes import LANES, aligned, item, padded, put, unset
 
 BOUND_TERMS = 16
 """Terms of the series that bounds a propagator over half an interval."""

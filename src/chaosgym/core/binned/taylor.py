@@ -1,51 +1,44 @@
 r"""Motion of a mechanism without a table of propagators, by its Taylor series.
 
 The equations of ``cycle`` between contacts, and joints for which there is no table: a ball in a spherical shell, whose
-force turns with the ball; Hertzian contact; contacts too many for a table of all sets. Joint j reads
-e = (row_1 . p, row_2 . p, ...) and pushes along e / |e| with a force N of penetration x = |e| - c:
-
-    (1)  linear                     N = k x + d x'
-    (2)  Hertz with dissipation     N = K x^(3/2) (1 + chi x')          (Hunt and Crossley, 1975)
-
-as long as x and N are positive. Until a contact changes, p is its Taylor series: each coefficient follows from those
-before it, the force's by the recurrences of products, quotients and powers (Jorba and Zou, 2005). A series serves for
-a span, whose length its last coefficients tell. Contacts and forces are read from it piece by piece, and the instant
-of a change is found on it. Matrices are held over each bin of the angle, the forcing is continuous.
-
-References
-----------
-A. Jorba, M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods,
-Experimental Mathematics 14 (2005) 99-117.
+force turns with the ball; Hertzian contact; contacts too many for a table of all sets (forces (1) and (2) of
+``taylor_view``). Until a contact changes, p is its Taylor series. Contacts and forces are read from it piece by piece,
+and the instant of a change is found on it. Matrices are held over each bin of the angle, the forcing is continuous.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 
 from chaosgym.core import status
 from chaosgym.core.binned.cycle import RUNAWAY, STEP_BUDGET
-from chaosgym.core.binned.model import FORCING_TERMS, LINEAR
 from chaosgym.core.binned.record import (
     begin_cycle,
     channel_crest,
     crest_instant,
     note_peak,
     note_share,
-    resultant,
     write_peaks,
     write_sample,
 )
-from chaosgym.core.binned.series import SHARES, shift_forcing
-from chaosgym.core.contact import let_pass, note_touch
-from chaosgym.core.cubic import cubic, cubic_extremum
+from chaosgym.core.binned.taylor_series import ORDER, begin, expand, new_series, span
+from chaosgym.core.binned.taylor_view import (
+    CHANGE,
+    DEPTH,
+    FORCE,
+    MARGIN,
+    RATE,
+    look_at,
+    look_first,
+    lowest_margin,
+    new_view,
+    read,
+    read_state,
+)
 from chaosgym.core.cycle import LOWER, UPPER
+from chaosgym.core.events import cubic, cubic_extremum, let_pass, note_touch
 from chaosgym.core.kernel import leaf, njit, part
-from chaosgym.core.lanes import LANES, add_columns, next_term, padded, sum_series
-
-ORDER = 16
-"""Last power of time in a series: fewer cost more spans, more cost more than they save."""
+from chaosgym.core.lanes import padded
 
 POLISH = 50
 """Instants tried to locate one event; the secant method needs three to six."""
@@ -61,306 +54,6 @@ SHORTEST = 1e-9
 
 LEAST_SHARE = 0.1
 """Share of a contact force that a bound must leave: its series is cut off."""
-
-LEAST_DEPTH = 1e-12
-"""Least penetration [m] of the series of a Hertzian force, which has none at the surface; a force of some nN."""
-
-DEPTH, RATE, MARGIN, FORCE, CHANGE = range(5)
-"""Columns of ``View.joint``."""
-
-
-class Series(NamedTuple):
-    """Taylor coefficients of a motion, in seconds.
-
-    ``lanes`` (ORDER + 1, lanes) of readings and coordinates; (J, ORDER + 1) of each closed joint: ``distance`` |e|,
-    ``power`` x^(3/2), ``force`` N and ``weight`` N / |e|. ``side`` (J,) is the sign of e where the force does not turn,
-    else 0; ``factors`` (4 + R + 1,) of the columns of ``acceleration`` after those of the state; ``powers`` (4,) of x.
-    """
-
-    lanes: np.ndarray
-    distance: np.ndarray
-    power: np.ndarray
-    force: np.ndarray
-    weight: np.ndarray
-    side: np.ndarray
-    factors: np.ndarray
-    powers: np.ndarray
-
-
-class View(NamedTuple):
-    """What the joints do at an instant.
-
-    ``lanes`` (3, all or those of the readings): values and their first two derivatives; ``direction`` (R,): unit
-    vector of each joint's force on its surface; ``joint`` (J, 5): penetration and its rate, ``margin``, and of closed
-    joints the force and its rate.
-    """
-
-    lanes: np.ndarray
-    direction: np.ndarray
-    joint: np.ndarray
-
-
-@register_jitable
-def new_series(model):
-    """Return a series that begins at rest."""
-    joints, rows = model.gap.shape[0], model.row.shape[0]
-    lanes = np.zeros((ORDER + 1, model.acceleration.shape[2]))
-    distance, power, force, weight = np.zeros((4, joints, ORDER + 1))
-    factors, powers = np.zeros(FORCING_TERMS + rows + 1), np.ones(FORCING_TERMS)
-    return Series(lanes, distance, power, force, weight, np.zeros(joints), factors, powers)
-
-
-@register_jitable
-def new_view(model, width):
-    """Return a view of some lanes."""
-    return View(np.zeros((3, width)), np.zeros(model.row.shape[0]), np.zeros((model.gap.shape[0], 5)))
-
-
-@part
-def measure(model, j, view):
-    """Penetration and its rate of joint j; writes the direction of its force."""
-    lanes, direction = view.lanes, view.direction
-    low, high = model.first[j], model.first[j + 1]
-    if not model.two_sided[j]:
-        # one row: e counts with its sign
-        direction[low] = 1.0
-        return lanes[0, low] - model.gap[j], lanes[1, low]
-    size, along = 0.0, 0.0
-    for r in range(low, high):
-        size += lanes[0, r] * lanes[0, r]
-        along += lanes[0, r] * lanes[1, r]
-    size = math.sqrt(size)
-    if size == 0.0:
-        for r in range(low, high):
-            direction[r] = 1.0 if r == low else 0.0
-        return -model.gap[j], 0.0
-    for r in range(low, high):
-        direction[r] = lanes[0, r] / size
-    return size - model.gap[j], along / size
-
-
-@part
-def margin(model, j, closed, depth, rate):
-    """What is positive as long as joint j keeps its contact state; its sign is that of the force, or of the gap."""
-    if model.law == LINEAR:
-        force = depth + model.damping[j] / model.stiffness[j] * rate
-    else:
-        force = depth * (1.0 + model.damping[j] * rate)
-    return force if closed else -min(depth, force)
-
-
-@part
-def push(model, j, view):
-    """Force (1) or (2) of a closed joint and its rate, continued beyond its end so that an event can be located."""
-    depth, rate = view.joint[j, DEPTH], view.joint[j, RATE]
-    bend = 0.0
-    for r in range(model.first[j], model.first[j + 1]):
-        bend += view.direction[r] * view.lanes[2, r]
-    stiffness, damping = model.stiffness[j], model.damping[j]
-    if model.law == LINEAR:
-        return stiffness * depth + damping * rate, stiffness * rate + damping * bend
-    root = math.sqrt(abs(depth))
-    growth = 1.5 * rate * (1.0 + damping * rate) + max(depth, 0.0) * damping * bend
-    return stiffness * depth * root * (1.0 + damping * rate), stiffness * root * growth
-
-
-@part
-def look(model, closed, view):
-    """Write directions and joints of a view from its readings; returns the ``resultant`` of the monitored joint."""
-    fx, fy, fz, rx, ry, rz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(closed.shape[0]):
-        depth, rate = measure(model, j, view)
-        view.joint[j, DEPTH], view.joint[j, RATE] = depth, rate
-        view.joint[j, MARGIN] = margin(model, j, closed[j], depth, rate)
-        if not closed[j]:
-            continue
-        force, change = push(model, j, view)
-        view.joint[j, FORCE], view.joint[j, CHANGE] = force, change
-        if model.monitored[j]:
-            for r in range(model.first[j], model.first[j + 1]):
-                direction = view.direction[r]
-                fx += model.reading[r, 0] * direction * force
-                fy += model.reading[r, 1] * direction * force
-                fz += model.reading[r, 2] * direction * force
-                rx += model.reading[r, 0] * direction * change
-                ry += model.reading[r, 1] * direction * change
-                rz += model.reading[r, 2] * direction * change
-    return resultant(fx, fy, fz, rx, ry, rz)
-
-
-@part
-def read(series, time, view):
-    """Write the lanes of a view at a time in the span of a series."""
-    sum_series(series.lanes, 0, series.lanes.shape[1], ORDER, time, view.lanes, 0, view.lanes.shape[1])
-
-
-@part
-def look_at(model, series, time, closed, view):
-    """As ``look``, at a time in the span of a series."""
-    read(series, time, view)
-    return look(model, closed, view)
-
-
-@part
-def look_first(model, series, closed, view):
-    """As ``look_at``, at the beginning of a series."""
-    for k in range(3):
-        for i in range(view.lanes.shape[1]):
-            view.lanes[k, i] = series.lanes[k, i] if k < 2 else 2.0 * series.lanes[k, i]
-    return look(model, closed, view)
-
-
-@leaf
-def begin(model, z, series):
-    """Write the state z (2n,) into the first two terms of a series."""
-    rows, n = model.row.shape
-    for order in range(2):
-        lanes = series.lanes[order]
-        for i in range(n):
-            lanes[rows + i] = z[order * n + i]
-        for r in range(rows):
-            total = 0.0
-            for i in range(n):
-                total += model.row[r, i] * z[order * n + i]
-            lanes[r] = total
-
-
-@part
-def square(a, k, first):
-    """Coefficient k of the square of a series, of its coefficients from ``first`` on."""
-    total = 0.0
-    for i in range(first, (k + 1) // 2):
-        total += a[i] * a[k - i]
-    total *= 2.0
-    if k % 2 == 0:
-        total += a[k // 2] * a[k // 2]
-    return total
-
-
-@part
-def product(a, b, k, first):
-    """Coefficient k of the product of two series, of the coefficients of the first from ``first`` on."""
-    total = 0.0
-    for i in range(first, k + 1):
-        total += a[i] * b[k - i]
-    return total
-
-
-@part
-def extend_distance(model, j, k, series):
-    """Write coefficient k > 0 of the distance of a closed joint from the middle of its gap."""
-    low, high = model.first[j], model.first[j + 1]
-    lanes, distance = series.lanes, series.distance[j]
-    if series.side[j] != 0.0:
-        distance[k] = series.side[j] * lanes[k, low]
-        return
-    total = -square(distance, k, 1)
-    for r in range(low, high):
-        total += square(lanes[:, r], k, 0)
-    distance[k] = total * (0.5 / distance[0])
-
-
-@part
-def begin_joint(model, j, series):
-    """Write the first coefficient of the distance of a closed joint, and its side."""
-    low, high = model.first[j], model.first[j + 1]
-    size = 0.0
-    for r in range(low, high):
-        size += series.lanes[0, r] * series.lanes[0, r]
-    if high - low > 1 and size > 0.0:
-        series.side[j] = 0.0
-        series.distance[j, 0] = math.sqrt(size)
-    else:
-        series.side[j] = -1.0 if model.two_sided[j] and series.lanes[0, low] < 0.0 else 1.0
-        series.distance[j, 0] = series.side[j] * series.lanes[0, low]
-
-
-@part
-def extend_force(model, j, k, series):
-    """Write coefficient k of the force (1) or (2) of a closed joint; its distance is known one order further."""
-    distance, force, power = series.distance[j], series.force[j], series.power[j]
-    stiffness, damping = model.stiffness[j], model.damping[j]
-    depth = distance[0] - model.gap[j]
-    if model.law == LINEAR:
-        force[k] = stiffness * (depth if k == 0 else distance[k]) + damping * (k + 1.0) * distance[k + 1]
-        return
-    depth = max(depth, LEAST_DEPTH)
-    if k == 0:
-        power[0] = depth * math.sqrt(depth)
-    else:
-        total = 0.0
-        for i in range(1, k + 1):
-            total += (2.5 * i - k) * distance[i] * power[k - i]
-        power[k] = total / (k * depth)
-    total = power[k]
-    for i in range(k + 1):
-        total += damping * power[i] * (k - i + 1.0) * distance[k - i + 1]
-    force[k] = stiffness * total
-
-
-@part
-def extend_joint(model, j, k, series):
-    """Write coefficient k of what a closed joint pushes into ``factors``."""
-    low, high = model.first[j], model.first[j + 1]
-    extend_distance(model, j, k + 1, series)
-    extend_force(model, j, k, series)
-    distance, force, weight = series.distance[j], series.force[j], series.weight[j]
-    along = series.factors[FORCING_TERMS:]
-    along[model.row.shape[0]] += model.slides[j] * force[k]
-    if series.side[j] != 0.0:
-        along[low] = series.side[j] * force[k]
-        return
-    weight[k] = (force[k] - product(distance, weight, k, 1)) * (1.0 / distance[0])
-    for r in range(low, high):
-        along[r] = product(weight, series.lanes[:, r], k, 0)
-
-
-@leaf
-def expand(model, b, time, closed, last, series):
-    """Continue a series about ``time`` in bin b from its first two terms up to the order ``last``."""
-    lanes, a, factors = series.lanes, model.acceleration[b], series.factors
-    rows, n = model.row.shape
-    width, driven = lanes.shape[1], a[2 * n :]
-    for k in range(1, FORCING_TERMS):
-        series.powers[k] = series.powers[k - 1] * time / model.bin_duration
-    for i in range(factors.shape[0]):
-        factors[i] = 0.0
-    for j in range(closed.shape[0]):
-        if closed[j]:
-            begin_joint(model, j, series)
-    scale = 1.0
-    for k in range(last - 1):
-        skipped = min(k, FORCING_TERMS)
-        shift_forcing(series.powers, 0, k, scale, factors, 0)
-        scale /= model.bin_duration
-        factors[FORCING_TERMS + rows] = 0.0
-        for j in range(closed.shape[0]):
-            if closed[j]:
-                extend_joint(model, j, k, series)
-        older, new = k * width + rows, (k + 2) * width
-        add_columns(driven, skipped * width, width, driven.shape[0] - skipped, factors, skipped, lanes, new, LANES)
-        next_term(a, 0, n * width, width, n, lanes, older, older + width, new, k + 1.0, SHARES[k], new)
-
-
-@part
-def span(series, tolerance, longest):
-    """Time [s] at which the last two terms of the velocity reach the tolerance, at most ``longest``."""
-    for k in range(ORDER - 1, ORDER + 1):
-        largest = 0.0
-        for i in range(series.lanes.shape[1]):
-            largest = max(largest, k * abs(series.lanes[k, i]))
-        if largest > 0.0:
-            longest = min(longest, (tolerance / largest) ** (1.0 / (k - 1)))
-    return longest
-
-
-@part
-def lowest_margin(view):
-    """Smallest margin of all joints: positive as long as none changes its contact state."""
-    lowest = math.inf
-    for j in range(view.joint.shape[0]):
-        lowest = min(lowest, view.joint[j, MARGIN])
-    return lowest
 
 
 @leaf
@@ -531,14 +224,6 @@ def take_sample(model, series, time, closed, view, z, sample):
     force = look_at(model, series, time, closed, view)
     read_state(model, view, z)
     write_sample(model.display, z, force, sample)
-
-
-@part
-def read_state(model, view, z):
-    """Write the state of a view of all lanes into z (2n,)."""
-    rows, n = model.row.shape
-    for i in range(n):
-        z[i], z[n + i] = view.lanes[0, rows + i], view.lanes[1, rows + i]
 
 
 @leaf

@@ -10,8 +10,8 @@ from numba import carray, prange
 
 from chaosgym.core.addresses import pointer
 from chaosgym.core.joints.cycle import advance_joints, room_for
-from chaosgym.core.joints.run import OWN, JointRun
 from chaosgym.core.joints.sets import put_sets, set_length
+from chaosgym.core.joints.space import OWN, JointRun
 from chaosgym.core.kernel import njit, side_by_side
 from chaosgym.core.tangent import Tangents
 from chaosgym.core.varied import cycle_of

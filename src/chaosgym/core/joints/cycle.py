@@ -17,8 +17,8 @@ import numpy as np
 from numba.extending import register_jitable
 
 from chaosgym.core import status
-from chaosgym.core.contact import let_pass, note_touch
 from chaosgym.core.cycle import LOWER, UPPER
+from chaosgym.core.events import let_pass, note_touch
 from chaosgym.core.joints.events import (
     choose_level,
     first_change,
@@ -40,6 +40,22 @@ from chaosgym.core.joints.friction import (
     write_deflections,
 )
 from chaosgym.core.joints.run import (
+    bound_fourth,
+    enter,
+    entries_of,
+    expand,
+    instant_beside,
+    jump,
+    leave,
+    look,
+    place,
+    read_after,
+    read_next,
+    read_now,
+    travel,
+    write_samples,
+)
+from chaosgym.core.joints.space import (
     JOINT,
     LOWER_DAMPER,
     NUMBERS,
@@ -51,24 +67,10 @@ from chaosgym.core.joints.run import (
     STATE,
     UPPER_DAMPER,
     U,
-    bound_fourth,
-    enter,
-    entries_of,
-    expand,
     find_sides,
-    instant_beside,
     joint_motion,
-    jump,
     known,
-    leave,
-    look,
-    place,
     pressed_set,
-    read_after,
-    read_next,
-    read_now,
-    travel,
-    write_samples,
 )
 from chaosgym.core.joints.tables import (
     BLOCKS,

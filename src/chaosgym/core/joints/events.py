@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 
-from chaosgym.core.cubic import cubic, cubic_extremum
 from chaosgym.core.cycle import LOWER, UPPER
 from chaosgym.core.events import (
     CROSSES,
@@ -17,12 +16,15 @@ from chaosgym.core.events import (
     VALUE_DOUBT,
     closing,
     crossing,
+    cubic,
+    cubic_extremum,
     judge,
     opening,
     reading_at,
     trend,
 )
-from chaosgym.core.joints.run import (
+from chaosgym.core.joints.run import bound_second, expand
+from chaosgym.core.joints.space import (
     AWAKE,
     FOURTH,
     JOINT,
@@ -38,8 +40,6 @@ from chaosgym.core.joints.run import (
     SIDE,
     TOTALS,
     UPPER_GAP,
-    bound_second,
-    expand,
     gap_of,
     known,
     lag_of,

@@ -21,7 +21,7 @@ J. H. Griffin, Friction damping of resonant stresses in gas turbine engine airfo
 """
 
 from chaosgym.core.events import reading_at
-from chaosgym.core.joints.run import (
+from chaosgym.core.joints.space import (
     DEFLECTION,
     FRICTION,
     JOINT,
