@@ -28,7 +28,7 @@ from chaosgym.core.lanes import unset
 from chaosgym.core.tangent import Tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.integrators import ExactEvents
-from chaosgym.machines.modal_impact import largest_modulus, modal_blocks, settled
+from chaosgym.machines.modal_blocks import largest_modulus, modal_blocks, settled
 
 MOST_SETS = 1_000_000
 """Sets of pressed surfaces that a machine may have."""

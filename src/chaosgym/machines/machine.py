@@ -7,19 +7,16 @@ from dataclasses import InitVar, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
-from chaosgym.errors import ParameterError
+from chaosgym.machines.abilities import Abilities
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.parameters import check_parameter, expand_fidelity, validate, with_settings
 
 if TYPE_CHECKING:
     from chaosgym.core.tangent import Tangents
     from chaosgym.machines.batch import CompiledBatch
-    from chaosgym.machines.drive_torque import DriveTorque
-    from chaosgym.machines.picture import Sketch
 
 
 class Number(NamedTuple):
@@ -32,28 +29,6 @@ class Number(NamedTuple):
     unit: str
     factor: float = 1.0
     only: Mapping[str, tuple[str, ...]] = {}
-
-
-class Flexible(NamedTuple):
-    """Equations of n mass-normalised modes q between contacts, q'' + D q' + diag(w^2) q = f(t) - sum phi_j F_j.
-
-    Attributes
-    ----------
-    stiffness, damping : (n,), (n, n)
-        w^2 [1/s^2] and D [1/s].
-    joints : (m, n)
-        phi_j, what each joint moves for a mode [kg^-1/2]; F_j is the force of its upper stop less that of its lower.
-    drive : (H, 2, n)
-        Modal forces of cosine and sine of each harmonic of the speed, from the first on [N kg^-1/2].
-    static : (n,)
-        The constant one [N kg^-1/2].
-    """
-
-    stiffness: NDArray[np.float64]
-    damping: NDArray[np.float64]
-    joints: NDArray[np.float64]
-    drive: NDArray[np.float64]
-    static: NDArray[np.float64]
 
 
 class Choice(NamedTuple):
@@ -93,7 +68,7 @@ class TaskDefaults(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Machine(ABC):
+class Machine(Abilities, ABC):
     """A frozen dataclass of parameters in SI units, and how the machine runs.
 
     A subclass declares its fields with ``parameter`` and defines what is abstract here. The rest has a default.
@@ -270,25 +245,10 @@ class Machine(ABC):
         """Integrator where none is given."""
         return ExactEvents()
 
-    @property
-    def chaos_thresholds(self) -> Mapping[str, tuple[float, float]]:
-        """Quantities that chaos needs above a printed threshold: (value, threshold) by name; empty if unknown."""
-        return {}
-
-    @property
-    def carries_deviations(self) -> bool:
-        """True if ``run`` takes ``tangents``, so that Lyapunov exponents and derivatives of orbits are exact."""
-        return False
-
     def state_weights(self, state: Array) -> Array:
         """Weights (n_states,) by which deviations of a state are measured; by default each coordinate counts alike."""
         size = np.abs(state)
         return np.asarray(1.0 / np.where(size > 1e-6 * size.max(), size, max(size.max(), 1e-300)))
-
-    @property
-    def runs_fixed_steps(self) -> bool:
-        """True if ``run`` takes ``RungeKutta4``."""
-        return True
 
     def at(self, speed: float | None = None, clearance: float | None = None) -> Self:
         """Return the machine at another operating point: what else it is was checked when it was made.
@@ -316,23 +276,6 @@ class Machine(ABC):
             return lambda value: self.at(clearance=value)
         return lambda value: with_settings(self, {field: value})
 
-    @property
-    def mirrors(self) -> bool:
-        """True if the mirror image of a motion, half a cycle later, is a motion too, and ``section_at`` serves."""
-        return False
-
-    def section_at(self, phase: float, share: float = 1.0) -> "Self | None":
-        """Return the machine whose cycles begin at a phase of the drive, for exact runs; None if it has none.
-
-        Parameters
-        ----------
-        phase
-            As a share of the cycle.
-        share
-            Of a cycle that each row of ``run`` lasts.
-        """
-        return None
-
     def _with_unchecked(self, **fields: Any) -> Self:
         """Return the machine with some fields replaced by values that are known to be allowed."""
         other = object.__new__(type(self))
@@ -352,125 +295,6 @@ class Machine(ABC):
     def sensed(self, peak_force: Array) -> Array:
         """Peak forces [N] that the sensor of the monitored joint shows, (..., cycles), of those of all ``sides``."""
         return np.asarray(peak_force[..., 0])
-
-    @property
-    def drive_torque(self) -> "DriveTorque | None":
-        """Torque of its drive over a revolution while every gap stays in its middle; None if it has none to tell."""
-        return None
-
-    @property
-    def instabilities(self) -> tuple[str, ...]:
-        """What may make its motion grow without end, as far as its equations tell; each a sentence."""
-        return ()
-
-    def draw(self, panel: Any, record: Any, colour: str, moment: float, force_limit: float) -> None:
-        """Draw the machine in motion.
-
-        Parameters
-        ----------
-        panel
-            Axes of matplotlib.
-        record
-            ``CycleRecord`` of a run, with its time history.
-        colour
-            Of what tells how the step went: calm, or of Type III.
-        moment
-            Of the last cycle, from 0 to 1.
-        force_limit
-            Force [N] to which pictures scale.
-        """
-        from chaosgym.machines.picture import draw_displacement, draw_sketch, sample_at
-
-        sketch = self.sketch(record, np.array([sample_at(record, moment)]), force_limit)
-        if sketch is None:
-            draw_displacement(panel, record, colour, moment)
-        else:
-            draw_sketch(panel, sketch, colour)
-
-    def sketch(self, record: Any, rows: NDArray[np.int64], force_limit: float) -> "Sketch | None":
-        """The machine at some moments, as shapes and words; None if it has no picture.
-
-        Parameters
-        ----------
-        record
-            ``CycleRecord`` of a run, with its time history.
-        rows : (moments,)
-            Samples of the history.
-        force_limit
-            Force [N] to which pictures scale.
-        """
-        return None
-
-    def draw_poses(self, panels: Any) -> None:
-        """Draw the machine at equal steps of its cycle, one in each of the panels of matplotlib.
-
-        Raises
-        ------
-        ParameterError
-            If it has no such picture.
-        """
-        raise ParameterError(f"{self.name} has no picture of its links; allowed: the file of a mechanism")
-
-    @property
-    def flexible(self) -> Flexible | None:
-        """Its equations between contacts, if it is one of a few modes; its states are then q and q'."""
-        return None
-
-    def shape_of(self, place: str) -> Array:
-        """Mode shapes (n,) at a named point, or of a motion between two, such as ``pinion - wheel``.
-
-        Raises
-        ------
-        ParameterError
-            If the machine has no such point.
-        """
-        raise ParameterError(f"{self.name} has no named points; allowed: the file of a machine of modes or matrices")
-
-    @property
-    def bending_links(self) -> tuple[str, ...]:
-        """Names of the links whose sections may be asked for by ``fibre_stress``."""
-        return ()
-
-    def fibre_stress(self, link: str, position: float, fibre: float) -> Array:
-        """Stress (f, n) [Pa] at the outer fibres of a link that bends, for each coordinate, pull above zero.
-
-        Parameters
-        ----------
-        link
-            Its name.
-        position
-            Of the section [m] from the link's beginning on.
-        fibre
-            Distance [m] of the outer fibres from the neutral one.
-
-        Raises
-        ------
-        ParameterError
-            If the machine has no such link, or the position is outside it.
-        """
-        raise ParameterError(f"{self.name} has no links that bend; allowed: the file of a mechanism with a beam")
-
-    def showing(self, row: Array) -> Self:
-        """The machine whose time histories show a row (n,) of its coordinates in place of the joint's displacement.
-
-        Raises
-        ------
-        ParameterError
-            If the machine has no ``bending_links``.
-        """
-        raise ParameterError(f"{self.name} has no links that bend; allowed: the file of a mechanism with a beam")
-
-    def stress_at(self, position: float) -> Array:
-        """Bending stress (n,) at the outer fibre of its beam for each mode, at a position [m] from its beginning on.
-
-        It is E c phi'' [Pa kg^-1/2 m^-1], positive where the upper fibre is pulled.
-
-        Raises
-        ------
-        ParameterError
-            If the machine has no beam of its own, or the position is outside it.
-        """
-        raise ParameterError(f"{self.name} has no beam of its own; allowed: impact-beam, or a link that bends")
 
     def arrays(self, cycles: int, samples: int = 0) -> CycleArrays:
         """Return the arrays into which ``run`` writes what happens in some cycles, with samples of the history."""

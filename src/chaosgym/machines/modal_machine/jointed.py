@@ -12,10 +12,11 @@ from chaosgym.arrays import Array
 from chaosgym.core.cycle import CycleArrays, cycle_arrays
 from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
+from chaosgym.machines.abilities import Flexible
 from chaosgym.machines.integrators import ExactEvents, Integrator
 from chaosgym.machines.joint_sets import JointTables, PressedSets, Sliders
-from chaosgym.machines.machine import Flexible, Machine, Number, Option
-from chaosgym.machines.modal_impact import Modes, passive_share, with_rigid_bodies
+from chaosgym.machines.machine import Machine, Number, Option
+from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.friction import OF_FRICTION
 from chaosgym.machines.modal_machine.machine import as_there, rigid_note, turning_note
@@ -275,7 +276,7 @@ class JointedMachine(Machine):
         return np.asarray(peak_force[..., first : first + 2].max(axis=-1))
 
     def share_of_bound(self, states: Array, peak_force: Array) -> float:
-        """Share of the bound of passivity; see ``passive_share``.
+        """Share of the bound of passivity; see ``Flexible.passive_share``.
 
         Surfaces that move may give any power: then nothing bounds a run, and the share is 0.
         """
@@ -283,7 +284,7 @@ class JointedMachine(Machine):
         if sets.sliders.speed.any():
             return 0.0
         surfaces = sets.springs, sets.dampers, self.stops
-        return passive_share(self._equations, *surfaces, self.cycle_period, states, peak_force)
+        return self._equations.passive_share(*surfaces, self.cycle_period, states, peak_force)
 
 
 @lru_cache(maxsize=64)

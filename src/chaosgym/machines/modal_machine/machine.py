@@ -17,14 +17,8 @@ from chaosgym.core.joints.tables import SLOW
 from chaosgym.core.modal_model import ModalImpactModel
 from chaosgym.errors import ParameterError
 from chaosgym.machines.machine import Number, Option
-from chaosgym.machines.modal_impact import (
-    RIGID_SHARE,
-    ModalImpactMachine,
-    Modes,
-    Stop,
-    flexible_model,
-    nearly_rigid,
-)
+from chaosgym.machines.modal_blocks import RIGID_SHARE, nearly_rigid
+from chaosgym.machines.modal_impact import ModalImpactMachine, Modes, Stop, flexible_model
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
 from chaosgym.machines.modal_machine.structure import Structure
 from chaosgym.machines.parameters import assumed, described_as, parameter, parameters_of
