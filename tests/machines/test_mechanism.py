@@ -9,8 +9,9 @@ import pytest
 from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.beam import Beam, beam_link
 from chaosgym.machines.mechanism.equations import small_motion
+from chaosgym.machines.mechanism.forces import Spring
 from chaosgym.machines.mechanism.joints import Joint
-from chaosgym.machines.mechanism.mechanism import Mechanism, Spring
+from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.nominal import nominal, revolution_of
 from chaosgym.machines.slider_crank.machine import SliderCrank
 from chaosgym.machines.slider_crank.mechanism import mechanism_of

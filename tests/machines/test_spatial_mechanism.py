@@ -8,8 +8,8 @@ import pytest
 
 from chaosgym.errors import ParameterError
 from chaosgym.machines.mechanism.equations import crank_inertia, small_motion
+from chaosgym.machines.mechanism.forces import Spring
 from chaosgym.machines.mechanism.joints import Joint
-from chaosgym.machines.mechanism.mechanism import Spring
 from chaosgym.machines.mechanism.nominal import nominal, revolution_of
 from chaosgym.machines.mechanism.space import SpatialBody, spatial_link
 from chaosgym.machines.mechanism.spatial import SpatialMechanism

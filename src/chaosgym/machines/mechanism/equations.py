@@ -35,6 +35,9 @@ TAIL = 1e-10
 LEAST_ANGLES, MOST_ANGLES = 48, 6144
 """Angles of a grid, at the least and at the most."""
 
+LEAST_MASS = 1e-10
+"""Least eigenvalue of a mass matrix whose diagonal is one."""
+
 
 class SmallMotion(NamedTuple):
     """Equations of small motions at B crank angles, by powers of the crank rate w; n coordinates.
@@ -217,3 +220,20 @@ def crank_inertia(mechanism: Mechanism, revolution: Revolution, theta: Array) ->
     for link in mechanism.links:
         sums.add_link(link)
     return between(sums.mass[:, 0, 0], theta)
+
+
+def refuse_massless(mass: Array, names: tuple[str, ...]) -> None:
+    """Refuse mass matrices (B, n, n) in which some motion moves no mass."""
+    size = np.sqrt(np.maximum(np.einsum("bii->bi", mass), 0.0))
+    scaled = mass / np.where(size > 0.0, size, 1.0)[:, :, None] / np.where(size > 0.0, size, 1.0)[:, None]
+    sizes, ways = np.linalg.eigh(scaled)
+    worst = int(np.argmin(sizes[:, 0]))
+    if sizes[worst, 0] > LEAST_MASS:
+        return
+    # rounding may tie what has no mass to what has
+    share = np.abs(ways[worst, :, 0])
+    name = names[int(np.argmin(np.where(share > 0.5 * share.max(), size[worst], np.inf)))]
+    raise ParameterError(
+        f"nothing resists the motion {name!r}: the links that it moves have no mass, or no inertia where they "
+        "only turn; allowed: a [[link.NAME.body]] with mass and inertia"
+    )

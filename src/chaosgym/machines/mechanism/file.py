@@ -25,13 +25,13 @@ from chaosgym.machines.mechanism.file_parts import (
     place_of,
     spatial_links,
 )
-from chaosgym.machines.mechanism.forces import STROKE_ANGLES, Gas, Sampled
+from chaosgym.machines.mechanism.forces import STROKE_ANGLES, Force, Gas, Sampled, Spring
 from chaosgym.machines.mechanism.joints import Joint
 from chaosgym.machines.mechanism.keys import KEYS
 from chaosgym.machines.mechanism.links import Link, rigid_link
 from chaosgym.machines.mechanism.machine import MechanismMachine
 from chaosgym.machines.mechanism.machine_class import machine_of
-from chaosgym.machines.mechanism.mechanism import Force, Mechanism, Spring
+from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.nominal import places, revolution_of
 from chaosgym.machines.mechanism.spatial import SpatialMechanism
 from chaosgym.machines.numbers import number

@@ -1,5 +1,6 @@
-"""Forces over the crank angle: samples of a revolution, and the gas of a reciprocating compressor."""
+"""What pulls at a mechanism: forces over the crank angle, as samples or of a gas, and springs."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +9,27 @@ from chaosgym.arrays import Array
 
 STROKE_ANGLES = 1440
 """Crank angles at which the pressure of a cylinder is followed."""
+
+
+class Force(NamedTuple):
+    """A force on a point of a link: ``at`` gives it in ground axes, (B, 2) [N], at crank angles (B,) [rad]."""
+
+    point: tuple[str, str]
+    at: Callable[[Array], Array]
+
+    def times(self, factor: float) -> "Force":
+        """The force times a factor."""
+        return Force(self.point, lambda theta: factor * self.at(theta))
+
+
+class Spring(NamedTuple):
+    """A spring and damper between two points: stiffness [N/m], free length [m], damping [N s/m]."""
+
+    first: tuple[str, str]
+    second: tuple[str, str]
+    stiffness: float
+    free_length: float
+    damping: float = 0.0
 
 
 class Sampled(NamedTuple):

@@ -80,3 +80,18 @@ class Joint(NamedTuple):
     def measured_in(self) -> str:
         """Link in whose axes along and across are measured."""
         return self.frame or (self.second[0] if self.kind in ("revolute", "spherical") else self.first[0])
+
+
+class Row(NamedTuple):
+    """A motion that a joint holds, or opens to a gap."""
+
+    joint: Joint
+    motion: str
+
+    @property
+    def opened(self) -> bool:
+        """True for a gap."""
+        return self.motion in self.joint.opened
+
+    def __str__(self) -> str:
+        return f"{self.joint.name} {self.motion}"

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +17,17 @@ from chaosgym.machines.binned.machine import BinnedMachine
 from chaosgym.machines.binned.model import KEPT_BYTES, MAX_SETS
 from chaosgym.machines.drive_torque import DriveTorque
 from chaosgym.machines.mechanism.beam import fibre_stress
-from chaosgym.machines.mechanism.buckling import buckling
-from chaosgym.machines.mechanism.clearance import ROUND, surface_fields
-from chaosgym.machines.mechanism.equations import SmallMotion, assembled, crank_inertia, small_motion
-from chaosgym.machines.mechanism.joints import ACROSS, ALONG, PITCH, PLACES, SIDEWAYS, TURN, YAW, Joint
+from chaosgym.machines.mechanism.bound import heaviest_load, largest_force
+from chaosgym.machines.mechanism.clearance import ROUND
+from chaosgym.machines.mechanism.contacts import contacts_of
+from chaosgym.machines.mechanism.equations import SmallMotion, assembled, crank_inertia, refuse_massless, small_motion
+from chaosgym.machines.mechanism.friction import friction_torque, rubbing
+from chaosgym.machines.mechanism.joints import ACROSS, ALONG, Joint
 from chaosgym.machines.mechanism.links import RIGID
-from chaosgym.machines.mechanism.mechanism import Force, Mechanism
+from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.motor import MOTOR_FIELDS, Load, Motor, MotorRun, crank_of, turn
-from chaosgym.machines.mechanism.nominal import Revolution, places, revolution_of
+from chaosgym.machines.mechanism.nominal import Revolution, even_angles, places, revolution_of
+from chaosgym.machines.mechanism.notes import instabilities_of, notes_of
 from chaosgym.machines.mechanism.spatial_beam import fibre_stress_around
 from chaosgym.machines.numbers import number, whole
 from chaosgym.machines.parameters import assumed, parameter
@@ -32,9 +35,6 @@ from chaosgym.machines.parameters import assumed, parameter
 if TYPE_CHECKING:
     from chaosgym.core.motor import Crank
     from chaosgym.machines.picture import Sketch
-
-SMALL = 0.02
-"""Clearance as a share of a link's length beyond which motions in the gap are not small."""
 
 MOTOR_ANGLES = 90
 """Steps of a revolution under the motor."""
@@ -44,18 +44,6 @@ TORQUE_ANGLES = 720
 
 MOST_ANGLES, MOST_TURNED = 20_000, 1e6
 """Crank angles at which equations are given at once, and where they may begin [rad]."""
-
-RAMP = 0.02
-"""Sliding speed below which friction fades, as a share of the largest in a revolution."""
-
-GUIDED = {ACROSS: {TURN: 1.0, PITCH: 1.0}, SIDEWAYS: {YAW: -1.0}}
-"""Turns in a guide, in the plane or in space, that move its stations in either direction per metre of their place."""
-
-FRICTION_ROUNDS = 1000
-"""Most rounds in which friction and the force that presses find each other."""
-
-LEAST_MASS = 1e-10
-"""Least eigenvalue of a mass matrix whose diagonal is one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,41 +121,14 @@ class MechanismMachine(BinnedMachine):
         """
         whole("count", count, 1, MOST_ANGLES)
         number("first", first, -MOST_TURNED, MOST_TURNED, "rad")
-        return small_motion(self._scaled(), self.revolution, first + _even(count))
+        return small_motion(self.scaled(), self.revolution, first + even_angles(count))
 
     @property
     def drive_torque(self) -> DriveTorque:
         """Torque of the drive over a revolution at the machine's speed; see ``Machine.drive_torque``."""
-        powers = assembled(self._scaled(), self.revolution, matrices=False).torque_at(_even(TORQUE_ANGLES))
+        powers = assembled(self.scaled(), self.revolution, matrices=False).torque_at(even_angles(TORQUE_ANGLES))
         torque = self.crank_rate ** np.arange(3) @ powers
-        return DriveTorque(torque + self._friction_torque(TORQUE_ANGLES), self.crank_rate)
-
-    def _friction_torque(self, count: int) -> Array:
-        """Torque (B,) that friction takes while the joint's surfaces carry what holds its gap in the middle."""
-        if not self._rub:
-            return np.zeros(count)
-        angles = _even(count)
-        rate, signed, driven = self._rubbing(angles)
-        own = [k for k, name in enumerate(self.degrees_of_freedom) if name.startswith(f"{self.rubs} ")]
-        powers = assembled(self._scaled(), self.revolution, matrices=False).load_at(angles)[:, :, own]
-        held_by = np.linalg.pinv(np.concatenate([contact.row for contact in self.contacts if contact.slides])[:, own].T)
-        push = -np.tensordot(self.crank_rate ** np.arange(3), powers, 1)
-        total, change = np.zeros(count), np.full(count, np.inf)
-        # friction itself presses the surfaces, or relieves them
-        for _ in range(FRICTION_ROUNDS):
-            before, parts = total, np.abs((push - total[:, None] * driven[:, own]) @ held_by.T)
-            total = parts.sum(axis=1)
-            if self._lever is not None:  # friction turns the force of a pin
-                total = np.hypot(*parts.T) / np.hypot(1.0, self._rub * signed)
-            change = np.abs(total - before)
-            if change.max() <= 1e-9 * total.max():
-                return np.asarray(total * self._rub * signed * rate)
-            if not total.max() < 1e15 * np.abs(push).max():
-                break
-        where = math.degrees(angles[change.argmax()])
-        raise ParameterError(
-            f"{self.rubs}_friction = {self._rub:g} locks the mechanism at crank angle {where:.0f} deg; allowed: less"
-        )
+        return DriveTorque(torque + friction_torque(self, even_angles(TORQUE_ANGLES)), self.crank_rate)
 
     @property
     def motor(self) -> Motor | None:
@@ -204,55 +165,40 @@ class MechanismMachine(BinnedMachine):
         motor = self.motor
         if motor is None:
             raise ParameterError(f"{self.name} has no motor; allowed: a file with [motor]")
-        scaled, angles = self._scaled(), _even(MOTOR_ANGLES)
+        scaled, angles = self.scaled(), even_angles(MOTOR_ANGLES)
         still, viscous, _ = assembled(scaled, self.revolution, matrices=False).torque_at(angles)
         return motor, Load(crank_inertia(scaled, self.revolution, angles), still, viscous)
 
-    def _scaled(self) -> Mechanism:
+    def scaled(self) -> Mechanism:
         """The mechanism with the factors of this machine."""
         links = []
         for link in self.mechanism.links:
             factor = getattr(self, f"{link.name}_mass_factor", 1.0)
             links.append(link._replace(mass=factor * link.mass, inertia=factor * link.inertia))
         gravity = tuple(self.gravity_factor * part for part in self.mechanism.gravity)
-        forces = tuple(_Loaded(force, self.load_factor).force for force in self.mechanism.forces)
-        return replace(
-            self.mechanism,
-            links=tuple(links),
-            gravity=gravity,
-            forces=forces,
-        )
+        forces = tuple(force.times(self.load_factor) for force in self.mechanism.forces)
+        return replace(self.mechanism, links=tuple(links), gravity=gravity, forces=forces)
 
     def held(self) -> Held:
         """Return the held accelerations, whatever the speed and the clearances."""
         middles, nodes = middles_and_nodes(self.bins)
-        whole = assembled(self._scaled(), self.revolution)
+        whole = assembled(self.scaled(), self.revolution)
         # on the grid they are sums of squares to the last digit
-        self._refuse_massless(whole.matrices[:, 0])
+        refuse_massless(whole.matrices[:, 0], self.degrees_of_freedom)
         matrices, load = whole.matrices_at(middles), whole.load_at(nodes)
-        if not self._rub:
+        if not self.rub:
             return held(*matrices, load)
-        _, signed, driven = self._rubbing(middles)
-        tangent = self._rub * signed if self._lever is not None else None
+        _, signed, driven = rubbing(self, middles)
+        tangent = self.rub * signed if self.lever is not None else None
         return held(*matrices, load, driven, tangent)
 
-    def _rubbing(self, theta: Array) -> tuple[Array, Array, Array]:
-        """Sliding per radian (B,) of the joint with friction, its sign (B,), and what a newton drives (B, n).
-
-        The sign fades where the sliding halts.
-        """
-        rate, row = assembled(self.mechanism, self.revolution, matrices=False, slides=self.rubs).sliding_at(theta)
-        signed = np.clip(rate / max(RAMP * float(np.abs(rate).max()), 1e-300), -1.0, 1.0)
-        lever = 1.0 if self._lever is None else self._lever
-        return lever * rate, signed, lever * self._rub * signed[:, None] * row
-
     @property
-    def _rub(self) -> float:
+    def rub(self) -> float:
         """Coefficient of friction, or 0."""
         return float(getattr(self, f"{self.rubs}_friction")) if self.rubs else 0.0
 
     @property
-    def _lever(self) -> float | None:
+    def lever(self) -> float | None:
         """Radius [m] of a pin with friction."""
         radius = getattr(self, f"{self.rubs}_radius", None)
         return None if radius is None else float(radius)
@@ -260,28 +206,12 @@ class MechanismMachine(BinnedMachine):
     @property
     def radix(self) -> int:
         """Contact states of a channel that differ in their matrices: friction tells one side from the other."""
-        return 3 if self._rub else 2
+        return 3 if self.rub else 2
 
     @property
     def law(self) -> int:
         """Law of all contacts."""
         return HERTZ if self.hertz else LINEAR
-
-    def _refuse_massless(self, mass: Array) -> None:
-        """Refuse mass matrices (B, n, n) in which some motion moves no mass."""
-        size = np.sqrt(np.maximum(np.einsum("bii->bi", mass), 0.0))
-        scaled = mass / np.where(size > 0.0, size, 1.0)[:, :, None] / np.where(size > 0.0, size, 1.0)[:, None]
-        sizes, ways = np.linalg.eigh(scaled)
-        worst = int(np.argmin(sizes[:, 0]))
-        if sizes[worst, 0] > LEAST_MASS:
-            return
-        # rounding may tie what has no mass to what has
-        share = np.abs(ways[worst, :, 0])
-        name = self.degrees_of_freedom[int(np.argmin(np.where(share > 0.5 * share.max(), size[worst], np.inf)))]
-        raise ParameterError(
-            f"nothing resists the motion {name!r}: the links that it moves have no mass, or no inertia where they "
-            "only turn; allowed: a [[link.NAME.body]] with mass and inertia"
-        )
 
     def row_of(self, joint: str, motion: str) -> Array:
         """The coordinate (n,) that is a motion of a joint."""
@@ -290,26 +220,7 @@ class MechanismMachine(BinnedMachine):
     @property
     def contacts(self) -> list[Contact]:
         """Contacts of all joints with clearance, in their order."""
-        found = []
-        for joint in self.mechanism.joints:
-            if not joint.opened:
-                continue
-            gap, spring, damper = (getattr(self, f"{joint.name}_{what}") for what in surface_fields(self.hertz))
-            slides = joint.name == self.rubs and self._rub > 0.0
-            seen = float(joint.name == self.monitored)
-            if joint.kind in ROUND:
-                ways = [way for way in PLACES if way in joint.opened]
-                rows = np.stack([self.row_of(joint.name, way) for way in ways])
-                reading = seen * np.eye(3)[[PLACES[way] for way in ways]]
-                found.append(Contact(rows, gap, spring, damper, True, reading, slides))
-                continue
-            for place in self.stations[joint.name] or (0.0,):
-                for way in (way for way in GUIDED if way in joint.opened):
-                    row = self.row_of(joint.name, way)
-                    row = row + sum(place * sign * self.row_of(joint.name, turn) for turn, sign in GUIDED[way].items())
-                    reading = seen * np.eye(3)[[PLACES[way]]]
-                    found.append(Contact(row[None], gap, spring, damper, True, reading, slides))
-        return found
+        return contacts_of(self)
 
     @property
     def has_propagators(self) -> bool:
@@ -364,20 +275,9 @@ class MechanismMachine(BinnedMachine):
         return self._watched.kind in ROUND
 
     def bearing_place(self, phase: Array, force: Array) -> tuple[Array, str]:
-        """Where on its bearing the monitored joint carries a force, and the unit of that place.
+        """Where on its bearing the monitored joint carries a force, and the unit; see ``SliderCrank.bearing_place``.
 
-        Parameters
-        ----------
-        phase : (n,)
-            Phases [rad] of the cycle.
-        force : (n, 3)
-            Components of the force, as in ``CycleRecord.peak_vector``.
-
-        Returns
-        -------
-        (place, unit)
-            How far the point lies along the guide or slot, and "m"; or the polar angle around a pin, counted from the
-            axis of the link that bears, and "deg".
+        How far along the guide or slot [m]; or the polar angle around a pin [deg], from the axis of the bearing link.
         """
         joint = self._watched
         if self.round_bearing:
@@ -389,7 +289,7 @@ class MechanismMachine(BinnedMachine):
     def stiffest(self) -> float:
         """Stiffness [N/m] of the stiffest contact; of a Hertzian one, at ten times the largest nominal load."""
         stiffest = max(contact.stiffness for contact in self.contacts)
-        return 1.5 * stiffest ** (2.0 / 3.0) * _heavy(self) ** (1.0 / 3.0) if self.hertz else stiffest
+        return 1.5 * stiffest ** (2.0 / 3.0) * heaviest_load(self) ** (1.0 / 3.0) if self.hertz else stiffest
 
     @property
     def natural_frequencies(self) -> Array:
@@ -411,65 +311,16 @@ class MechanismMachine(BinnedMachine):
     @property
     def instabilities(self) -> tuple[str, ...]:
         """Links that buckle, and links in space that bend undamped."""
-        told = [*buckling(self._scaled(), self.revolution, self.crank_rate)]
-        undamped = [link.name for link in self.mechanism.links if link.beam and not link.beam.damping_ratio]
-        if len(undamped) > 1 and self.mechanism.dimensions == 3:
-            told.append(
-                f"{' and '.join(undamped)} bend without damping: updates of the matrices may make their motion grow "
-                "without end; give each a damping_ratio, such as 0.001, or halve matrix_update_interval"
-            )
-        return tuple(told)
+        return instabilities_of(self)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Gaps that are not small, pins larger than links, motion that may grow, and limits of a motor."""
-        told = (
-            [f"the run-up under the motor leaves friction of {self.rubs} out"] if self.has_motor and self._rub else []
-        )
-        if self.has_motor:
-            _, no_load_speed, _ = (getattr(self, name) for name in MOTOR_FIELDS)
-            told += self.under_motor().notes(self.speed, no_load_speed)
-        told += self.instabilities
-        reach = _reach(self.mechanism, self.rubs) if self._lever else math.inf
-        if self._lever and self._lever > reach:
-            told.append(
-                f"{self.rubs}_radius of {self._lever:g} m is more than the {reach:.3g} m that its links reach: "
-                "right for an eccentric, else a wrong unit or a place in the radius' stead"
-            )
-        for joint in self.mechanism.joints:
-            if joint.opened:
-                gap, reach = getattr(self, f"{joint.name}_clearance"), _reach(self.mechanism, joint.name)
-                if gap > SMALL * reach:
-                    told.append(
-                        f"{joint.name}_clearance is {gap / reach:.2g} of the {reach:.3g} m that its links reach: "
-                        f"motions are taken as small, and are good to some 2 % only up to {SMALL:g}"
-                    )
-        return tuple(told)
+        return notes_of(self)
 
     def share_of_bound(self, states: Array, peak_force: Array) -> float:
         """Largest force, as a share of that of an impact of all masses at ten times the speed of the nominal motion."""
-        mechanism = self._scaled()
-        theta = _even(72)
-        z, mass, fastest, load = self.nominal_places(theta), 0.0, 0.0, 0.0
-        for link in mechanism.links:
-            own, places = z[:, mechanism.at[link.name]], (*link.points.values(), link.masses)
-            moved = np.concatenate([each.moved(own) for each in places], axis=1)
-            fastest = max(fastest, float(np.ptp(moved, axis=0).max(initial=0.0)))
-            mass += float(link.mass.sum() + link.inertia.sum() / max(self.revolution.length, 1e-9) ** 2)
-        for force in mechanism.forces:
-            load += float(np.abs(force.at(theta)).max())
-        for spring in mechanism.springs:
-            apart = mechanism.apart(z, spring.first, spring.second)[0]
-            load += spring.stiffness * float(np.abs(np.linalg.norm(apart, axis=1) - spring.free_length).max())
-        gravity = math.hypot(*mechanism.gravity)
-        speed = 10.0 * (fastest * self.crank_rate + math.sqrt(gravity * self.revolution.length))
-        speed += 10.0 * load * self.cycle_period / mass
-        damper = max(contact.damping for contact in self.contacts)
-        largest = (math.sqrt(self.stiffest * mass) + damper) * speed
-        if self.hertz:
-            stiffness = max(contact.stiffness for contact in self.contacts)
-            largest = (1.25 * mass * speed**2) ** 0.6 * stiffness**0.4 * (1.0 + damper * speed)
-        return float(peak_force.max()) / largest
+        return float(peak_force.max()) / largest_force(self)
 
     def sketch(self, record: Any, rows: NDArray[np.int64], force_limit: float) -> "Sketch":
         """Links, and the motion in the gap of the monitored joint; see ``Machine.sketch``."""
@@ -484,47 +335,6 @@ class MechanismMachine(BinnedMachine):
         draw_poses(panels, self)
 
 
-def _even(count: int) -> Array:
-    """Crank angles [rad] of a revolution at equal steps from 0 on."""
-    return np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)
-
-
-class _Loaded(NamedTuple):
-    """A force times a factor."""
-
-    given: Force
-    factor: float
-
-    @property
-    def force(self) -> Force:
-        return Force(self.given.point, lambda theta: self.factor * self.given.at(theta))
-
-
 @lru_cache(maxsize=256)
 def _revolution(mechanism: Mechanism) -> Revolution:
     return revolution_of(mechanism)
-
-
-@lru_cache(maxsize=256)
-def _heavy(machine: MechanismMachine) -> float:
-    """Ten times the largest load [N] of a gap in the nominal motion."""
-    powers = assembled(machine._scaled(), machine.revolution, matrices=False).load_at(_even(72))
-    across = [
-        machine.degrees_of_freedom.index(f"{joint.name} {ACROSS}") for joint in machine.mechanism.joints if joint.opened
-    ]
-    return 10.0 * max(
-        1.0, float(np.abs(np.einsum("k,kbn->bn", machine.crank_rate ** np.arange(3), powers)[:, across]).max())
-    )
-
-
-@lru_cache(maxsize=1024)
-def _reach(mechanism: Mechanism, joint: str) -> float:
-    """Shortest distance [m] between two points of the moving links that a joint joins; infinite if they have one."""
-    found = next(each for each in mechanism.joints if each.name == joint)
-    shortest = math.inf
-    for name, _ in (found.first, found.second):
-        if name in mechanism.at:
-            places = np.array([point.place[0] for point in mechanism.link(name).points.values()])
-            apart = np.linalg.norm(places[:, None] - places, axis=-1)
-            shortest = min(shortest, float(np.min(apart[apart > 0.0], initial=math.inf)))
-    return shortest

@@ -9,7 +9,7 @@ There are as many functions as coordinates z, so that A = dc/dz is square. The c
 are the compatibility matrix of the thesis (2.3): dz = B dp.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, NamedTuple
@@ -19,40 +19,9 @@ from numpy.typing import NDArray
 
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
-from chaosgym.machines.mechanism.joints import ACROSS, ALONG, GROUND, TURN, Joint
+from chaosgym.machines.mechanism.forces import Force, Spring
+from chaosgym.machines.mechanism.joints import ACROSS, ALONG, GROUND, TURN, Joint, Row
 from chaosgym.machines.mechanism.links import Link, Places, fixed, quarter_after, rotation
-
-
-class Force(NamedTuple):
-    """A force on a point of a link: ``at`` gives it in ground axes, (B, 2) [N], at crank angles (B,) [rad]."""
-
-    point: tuple[str, str]
-    at: Callable[[Array], Array]
-
-
-class Spring(NamedTuple):
-    """A spring and damper between two points: stiffness [N/m], free length [m], damping [N s/m]."""
-
-    first: tuple[str, str]
-    second: tuple[str, str]
-    stiffness: float
-    free_length: float
-    damping: float = 0.0
-
-
-class Row(NamedTuple):
-    """A motion that a joint holds, or opens to a gap."""
-
-    joint: Joint
-    motion: str
-
-    @property
-    def opened(self) -> bool:
-        """True for a gap."""
-        return self.motion in self.joint.opened
-
-    def __str__(self) -> str:
-        return f"{self.joint.name} {self.motion}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -286,3 +286,8 @@ def _closed(loops: _Loops, revolution: Revolution, where: Array) -> tuple[Array,
     x, h = ((where - begin) / span)[:, None], span[:, None]
     z0, z1, d0, d1 = (part[k] for part in (revolution.z, revolution.tangent) for k in (at, at + 1))
     return loops.solve(_between(x, h, z0, z1, d0, d1), where, 8, LAST)
+
+
+def even_angles(count: int) -> Array:
+    """Crank angles [rad] of a revolution at equal steps from 0 on."""
+    return np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)

@@ -4,8 +4,9 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.errors import ParameterError
+from chaosgym.machines.mechanism.forces import Spring
 from chaosgym.machines.mechanism.links import Link, inertia_of, rotation
-from chaosgym.machines.mechanism.mechanism import Mechanism, Spring
+from chaosgym.machines.mechanism.mechanism import Mechanism
 from chaosgym.machines.mechanism.nominal import Nominal, Revolution
 from chaosgym.machines.mechanism.space import spatial_inertia_of
 from chaosgym.machines.mechanism.spatial import SpatialMechanism
