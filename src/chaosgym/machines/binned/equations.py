@@ -122,6 +122,15 @@ def held(
     return found
 
 
+def largest_rate(accelerations: Array) -> float:
+    """Largest modulus [1/s] of an eigenvalue of p'' = (p, p') A, for accelerations A (b, 2n, n) of some bins."""
+    n = accelerations.shape[-1]
+    system = np.zeros((len(accelerations), 2 * n, 2 * n))
+    system[:, n:, :n] = np.eye(n)
+    system[:, :, n:] = accelerations
+    return float(np.max(np.abs(np.linalg.eigvals(system))))
+
+
 def middles_and_nodes(bins: int) -> tuple[Array, Array]:
     """Angles [rad] of the middles of the bins, and of the nodes of the forcing."""
     width = 2.0 * math.pi / bins

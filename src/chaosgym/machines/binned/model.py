@@ -21,6 +21,7 @@ from chaosgym.machines.binned.equations import (
     STEP_PHASE,
     Contact,
     even_powers,
+    largest_rate,
     machine_of,
     structure_of,
     whole_steps,
@@ -173,10 +174,7 @@ def _rates(free: Array, pushed: Array, row: Array) -> tuple[float, float]:
     n = free.shape[-1]
     local = -row @ pushed[:, :n] @ np.linalg.pinv(row)
     contact = math.sqrt(float(np.max(np.abs(np.linalg.eigvals(local)))))
-    system = np.zeros((len(free), 2 * n, 2 * n))
-    system[:, n:, :n] = np.eye(n)
-    system[:, :, n:] = free + pushed
-    return contact, float(np.max(np.abs(np.linalg.eigvals(system))))
+    return contact, largest_rate(free + pushed)
 
 
 @lru_cache(maxsize=KEPT)

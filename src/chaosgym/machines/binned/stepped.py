@@ -8,7 +8,7 @@ import numpy as np
 
 from chaosgym.arrays import Array
 from chaosgym.core.binned.model import FORCING_TERMS, TaylorModel
-from chaosgym.machines.binned.equations import even_powers, kept_held, structure_of, whole_steps
+from chaosgym.machines.binned.equations import even_powers, kept_held, largest_rate, structure_of, whole_steps
 
 if TYPE_CHECKING:
     from chaosgym.machines.binned.machine import BinnedMachine
@@ -51,11 +51,7 @@ def stepped_model(machine: "BinnedMachine", step_phase: float) -> TaylorModel:
     contact = math.sqrt(machine.stiffest * np.max(np.einsum("brn,rn->br", answer, row)))
     bins = len(inverse_mass)
     duration = 2.0 * math.pi / (bins * rate)
-    n = len(row[0])
-    system = np.zeros((bins, 2 * n, 2 * n))
-    system[:, n:, :n] = np.eye(n)
-    system[:, :, n:] = acceleration[:, : 2 * n]
-    spectrum = float(np.max(np.abs(np.linalg.eigvals(system[machine.sampled_bins]))))
+    spectrum = largest_rate(acceleration[machine.sampled_bins, : 2 * len(row[0])])
     return TaylorModel(
         bin_duration=duration,
         steps=whole_steps(duration * max(4.0 * contact / step_phase, spectrum / PIECE_PHASE)),
@@ -99,8 +95,6 @@ def fastest_rate(machine: "BinnedMachine", model: TaylorModel) -> float:
     rows, n = model.row.shape
     some = model.acceleration[machine.sampled_bins, :, rows : rows + n]
     pushes = slice(2 * n + FORCING_TERMS, 2 * n + FORCING_TERMS + rows)
-    system = np.zeros((len(some), 2 * n, 2 * n))
-    system[:, n:, :n] = np.eye(n)
-    system[:, :, n:] = some[:, : 2 * n]
-    system[:, :n, n:] += machine.stiffest * model.row.T @ some[:, pushes]
-    return float(np.max(np.abs(np.linalg.eigvals(system))))
+    accelerations = some[:, : 2 * n].copy()
+    accelerations[:, :n] += machine.stiffest * model.row.T @ some[:, pushes]
+    return largest_rate(accelerations)

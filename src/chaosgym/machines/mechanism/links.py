@@ -84,11 +84,11 @@ class Places(NamedTuple):
         return bent
 
 
-def fixed(place: Array, elastic: int = 0) -> Places:
-    """Points (k, 2) that stand still in a link with some elastic coordinates."""
+def fixed(place: Array) -> Places:
+    """Points (k, 2) of a link without elastic coordinates."""
     place = np.asarray(place, dtype=float).reshape(-1, 2)
-    shape = np.zeros((len(place), 2, elastic))
-    return Places(place, shape, np.zeros((len(place), elastic)), np.zeros((*shape.shape, elastic)))
+    count = len(place)
+    return Places(place, np.zeros((count, 2, 0)), np.zeros((count, 0)), np.zeros((count, 2, 0, 0)))
 
 
 def together(some: list[Places]) -> Places:

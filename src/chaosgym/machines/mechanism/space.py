@@ -177,13 +177,11 @@ class SpatialPlaces(NamedTuple):
         )
 
 
-def spatially_fixed(place: Array, lie: Lie, elastic: int = 0) -> SpatialPlaces:
-    """Points (k, 3) that stand still in a link with some elastic coordinates."""
+def spatially_fixed(place: Array, lie: Lie) -> SpatialPlaces:
+    """Points (k, 3) of a link without elastic coordinates."""
     place = np.asarray(place, dtype=float).reshape(-1, 3)
-    shape = np.zeros((*place.shape, elastic))
-    return SpatialPlaces(
-        place, lie, shape, shape, np.zeros((*shape.shape, elastic)), np.zeros((len(place), elastic, elastic))
-    )
+    count, shape = len(place), np.zeros((len(place), 3, 0))
+    return SpatialPlaces(place, lie, shape, shape, np.zeros((count, 3, 0, 0)), np.zeros((count, 0, 0)))
 
 
 def spatially_together(some: list[SpatialPlaces]) -> SpatialPlaces:
