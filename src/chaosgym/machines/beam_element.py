@@ -1,4 +1,4 @@
-"""Cubic finite elements of a slender beam after Euler and Bernoulli, and few modes that answer like its many.
+"""Cubic finite elements of a slender beam after Euler and Bernoulli, and few modes fitted to the response of all.
 
 Degrees of freedom run node by node: deflection [m], slope [rad]. What the closed-form matrices leave out (geometric
 stiffness, gyroscopic coupling, distributed loads) is integrated with the shape functions of ``interpolation``.

@@ -14,7 +14,7 @@ from chaosgym.errors import ParameterError
 from chaosgym.machines.batch import VaryingBatch, put, stacked
 
 CALL_SECONDS, MAX_GROWTH = 0.2, 8.0
-"""Duration that calls of the kernel aim at, so that Ctrl-C is heard, and how much longer than the last one may be."""
+"""Duration [s] that calls of the kernel aim at, since Ctrl-C waits for their end; largest growth from call to call."""
 
 
 class JointBatch(VaryingBatch):

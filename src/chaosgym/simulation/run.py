@@ -76,7 +76,7 @@ def _in_slices(
     tangents: Tangents | None,
     bar: Any,
 ) -> tuple[int, int]:
-    """Run a machine by calls of its kernel that are short enough for Ctrl-C to be heard; see ``Machine.run``."""
+    """Run a machine by short calls of its kernel, between which Ctrl-C takes effect; see ``Machine.run``."""
     cycles, done, count, outcome = len(arrays.section), 0, FIRST_SLICE, status.OK
     while done < cycles and outcome == status.OK:
         part = slice(done, done + count)

@@ -1,4 +1,4 @@
-"""What the functions of joints in space are made of: vectors that links carry."""
+"""Vectors fixed to links in space, from which the functions of their joints are made."""
 
 from functools import lru_cache
 from typing import NamedTuple

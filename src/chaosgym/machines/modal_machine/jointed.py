@@ -215,7 +215,7 @@ class JointedMachine(Machine):
         """Sum of all Lyapunov exponents of a cycle with so much contact on each surface [s], (2m,).
 
         It is -tr(D) T - sum of d |phi|^2 t_contact: damping of the structure, and of each contact while it lasts. With
-        friction it is -inf, as what slides forgets where it stuck.
+        friction it is -inf: while a joint slides, its spring's deflection follows from the force alone.
         """
         if self.rubbing:
             return -math.inf

@@ -1,4 +1,4 @@
-"""What people look for in a machine's file and does not fit, or has another name: the word, and what to do."""
+"""Keys that a machine's file does not have: words that people write instead of the right key, and what to do."""
 
 from chaosgym.machines.parameters import suggestion
 

@@ -1,4 +1,4 @@
-"""What turns and what slides in a machine's file: the units of joints, drives and shapes say it, and have to agree."""
+"""Which joints, drives and shapes of a machine's file are rotations: their units tell, and have to agree."""
 
 from collections.abc import Mapping
 from typing import Any
