@@ -22,7 +22,7 @@ from chaosgym.diagnosis.periodic_orbit import PRECISE, find_periodic_orbit, run_
 from chaosgym.diagnosis.section import better_section
 from chaosgym.errors import ParameterError
 from chaosgym.machines import ImpactBeam
-from chaosgym.machines.linear_impact import linear_impact
+from chaosgym.machines.linear_impact import damping_for
 from chaosgym.machines.modal_machine import Drive, ModalMachine, Structure
 from chaosgym.machines.parameters import with_settings
 from chaosgym.simulation import simulate
@@ -49,15 +49,6 @@ def oscillator(*, damping, stiffness, contact_damping=0.0, stops="two", gap=1.0,
         speed=speed,
         drive_level=force,
     )
-
-
-def damper_of(restitution, stiffness):
-    """Damper of a stop on which 1 kg keeps a share of its speed."""
-
-    def miss(ratio):
-        return linear_impact(1.0, stiffness, 2.0 * ratio * math.sqrt(stiffness)).restitution - restitution
-
-    return 2.0 * math.sqrt(stiffness) * brentq(miss, 1e-6, 0.49)
 
 
 def branch_from(machine, field, low, high, state, period, sign, **how):
@@ -126,7 +117,7 @@ def test_published_bifurcations_of_an_impact_oscillator(kind, omega, start, span
         machine = oscillator(
             damping=0.02,
             stiffness=stiffness,
-            contact_damping=damper_of(0.9, stiffness),
+            contact_damping=damping_for(0.9, 1.0, stiffness),
             stops="one",
             angle=-math.pi / 2.0,
             speed=omega / (2.0 * math.pi),
@@ -174,7 +165,7 @@ def test_a_published_diagram_over_force_and_speed(kind, omega, start, span, publ
         machine = oscillator(
             damping=0.02,
             stiffness=stiffness,
-            contact_damping=damper_of(0.9, stiffness),
+            contact_damping=damping_for(0.9, 1.0, stiffness),
             stops="one",
             angle=-math.pi / 2.0,
             speed=omega / (2.0 * math.pi),
@@ -207,7 +198,7 @@ def test_the_flip_of_shaw_and_holmes_in_the_limit_of_stiff_stops():
         machine = oscillator(
             damping=0.0,
             stiffness=stiffness,
-            contact_damping=damper_of(0.8, stiffness),
+            contact_damping=damping_for(0.8, 1.0, stiffness),
             stops="one",
             gap=0.0,
             angle=math.pi / 2.0,
@@ -236,7 +227,7 @@ def test_grazing_maps_have_the_powers_of_theory(restitution, low, high, power):
     machine = oscillator(
         damping=damping,
         stiffness=stiffness,
-        contact_damping=damper_of(restitution, stiffness) if restitution < 1.0 else 0.0,
+        contact_damping=damping_for(restitution, 1.0, stiffness) if restitution < 1.0 else 0.0,
         gap=abs(response),
         speed=0.11,
         stops="one",
