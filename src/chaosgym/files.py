@@ -1,7 +1,7 @@
 """Files that are either whole or not there, also after a crash, and folders that one process at a time writes into.
 
 What comes from outside is read here: files of a bounded size, no devices; arrays without pickle, and only as large as
-their bytes and a bound on the unpacked size allow. Tables are CSV or Parquet by the end of the name.
+their bytes and a bound on the unpacked size allow.
 """
 
 import io
@@ -11,14 +11,13 @@ import shutil
 import stat
 import tomllib
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from filelock import FileLock, Timeout
-from numpy.typing import ArrayLike
 
 from chaosgym.errors import ChaosgymError, DatasetError, UnfinishedError
 
@@ -328,35 +327,3 @@ def array_of(content: bytes) -> Any:
         raise
     except Exception as error:  # numpy reads the head with Python's own parser
         raise ValueError(f"an array is damaged: {first_line(error)}") from None
-
-
-def check_target(path: str | Path, overwrite: bool) -> None:
-    """Check that a table may be written before it is computed.
-
-    Raises
-    ------
-    DatasetError
-        If the name ends in neither .csv nor .parquet, the folder is missing, or the file exists.
-    """
-    target = Path(path)
-    if target.suffix not in (".csv", ".parquet"):
-        raise DatasetError(f"{path} ends in {target.suffix or 'nothing'}; allowed: .csv, .parquet")
-    if not target.absolute().parent.is_dir():
-        raise DatasetError(f"{target.absolute().parent} is no folder; choose another file")
-    if os.path.lexists(target) and not overwrite:
-        raise DatasetError(f"{path} exists; use --overwrite or another name")
-    replaceable(target)
-
-
-def write_table(columns: Mapping[str, ArrayLike], path: str | Path) -> None:
-    """Write columns by name as CSV or Parquet."""
-    import pyarrow as pa
-    import pyarrow.csv
-    import pyarrow.parquet as pq
-
-    table = pa.table({name: pa.array(values) for name, values in columns.items()})
-    if Path(path).suffix == ".csv":
-        options = pyarrow.csv.WriteOptions(quoting_style="none")
-        write_atomically(Path(path), lambda target: pyarrow.csv.write_csv(table, target, write_options=options))
-    else:
-        write_atomically(Path(path), lambda target: pq.write_table(table, target))

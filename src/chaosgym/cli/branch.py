@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from chaosgym.cli.machine_options import FloatRange, machine_command
-from chaosgym.cli.output import WORKERS, draw, emit, picture_path, plot_option
+from chaosgym.cli.output import WORKERS, check_target, draw, emit, picture_path, plot_option, write_table
 
 SHOWN = 30
 """Branches, and bifurcations, that the table shows; all are in --out and --json."""
@@ -57,8 +57,6 @@ def branch(
     as_json: bool,
 ) -> None:
     """Follow periodic orbits along a field: where they fold, flip and graze, stable or not; over a second one too."""
-    from chaosgym.files import check_target, write_table
-
     picture = picture_path(plot, f"branch-{Path(machine.name).stem}")
     if out:
         check_target(out, overwrite)

@@ -1,4 +1,4 @@
-"""Output of a command: a table for people or one JSON object, a picture, and progress meanwhile."""
+"""Output of a command: a table for people or one JSON object, a picture, a table in a file, and progress meanwhile."""
 
 import json
 import os
@@ -14,6 +14,7 @@ import click
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
@@ -147,3 +148,40 @@ def draw(path: Path | None, figure: Callable[[Any], "Figure"], result: dict[str,
     save_picture(figure(commands), path)
     result["plot"] = str(path)
     lines.append(f"picture: {path}")
+
+
+def check_target(path: str | Path, overwrite: bool) -> None:
+    """Check that a table may be written before it is computed.
+
+    Raises
+    ------
+    DatasetError
+        If the name ends in neither .csv nor .parquet, the folder is missing, or the file exists.
+    """
+    from chaosgym.errors import DatasetError
+    from chaosgym.files import replaceable
+
+    target = Path(path)
+    if target.suffix not in (".csv", ".parquet"):
+        raise DatasetError(f"{path} ends in {target.suffix or 'nothing'}; allowed: .csv, .parquet")
+    if not target.absolute().parent.is_dir():
+        raise DatasetError(f"{target.absolute().parent} is no folder; choose another file")
+    if os.path.lexists(target) and not overwrite:
+        raise DatasetError(f"{path} exists; use --overwrite or another name")
+    replaceable(target)
+
+
+def write_table(columns: "Mapping[str, ArrayLike]", path: str | Path) -> None:
+    """Write columns by name as CSV or Parquet."""
+    import pyarrow as pa
+    import pyarrow.csv
+    import pyarrow.parquet as pq
+
+    from chaosgym.files import write_atomically
+
+    table = pa.table({name: pa.array(values) for name, values in columns.items()})
+    if Path(path).suffix == ".csv":
+        options = pyarrow.csv.WriteOptions(quoting_style="none")
+        write_atomically(Path(path), lambda target: pyarrow.csv.write_csv(table, target, write_options=options))
+    else:
+        write_atomically(Path(path), lambda target: pq.write_table(table, target))

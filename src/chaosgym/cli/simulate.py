@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from chaosgym.cli.machine_options import machine_command
-from chaosgym.cli.output import AS_JSON, draw, emit, picture_path, plot_option
+from chaosgym.cli.output import AS_JSON, check_target, draw, emit, picture_path, plot_option, write_table
 
 
 @machine_command
@@ -35,8 +35,6 @@ def simulate(
 
     picture = picture_path(plot, f"simulate-{machine.name}")
     if out or series_out:
-        from chaosgym.files import check_target, write_table
-
         for path in filter(None, (out, series_out)):
             check_target(path, overwrite)
     run(machine, 1)  # compiles, or loads what is compiled
