@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from chaosgym.envs import ENVIRONMENTS
+
 WORKERS = """
 import sys
 import gymnasium as gym, numpy as np
@@ -71,3 +73,22 @@ def test_a_worker_that_imports_nothing_needs_an_id_that_does(name, found):
     done = _run("-c", code)
     assert (done.stdout == "(2, 14)\n") == found, done.stderr
     assert ("NamespaceNotFound" in done.stderr) != found
+
+
+def test_human_mode_runs_without_a_screen():
+    """On a headless computer human mode draws every environment without opening a window and without a warning."""
+    code = (
+        "import chaosgym, gymnasium, matplotlib.pyplot\n"
+        f"for name in {sorted(ENVIRONMENTS)}:\n"
+        "    env = gymnasium.make(name, render_mode='human')\n"
+        "    env.reset(seed=0)\n"
+        "    env.step(env.action_space.sample())\n"
+        "    drawn = env.render()\n"
+        "    env.close()\n"
+        "    print(drawn, matplotlib.pyplot.get_fignums())"
+    )
+    known = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], env={**known, "MPLBACKEND": "agg"}, capture_output=True, text=True
+    )
+    assert done.stdout.splitlines() == ["None []"] * len(ENVIRONMENTS), done.stderr
