@@ -1,4 +1,4 @@
-"""Long runs of the native vector environment; ``CHAOSGYM_SOAK=2`` makes them twice as long."""
+"""Long runs of the native vector environment; ``CHAOSGYM_SOAK=5`` makes them five times as long."""
 
 import os
 import resource
@@ -25,7 +25,7 @@ def _peak_memory() -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "machine_steps"),
-    [("chaosgym/ImpactBeamTolerance-v1", 1_000_000), ("chaosgym/SliderCrankTolerance-v1", 100_000)],
+    [("chaosgym/ImpactBeamTolerance-v1", 400_000), ("chaosgym/SliderCrankTolerance-v1", 100_000)],
 )
 def test_no_step_is_invalid_and_memory_stays(name: str, machine_steps: int) -> None:
     """Steps of one cycle at random speeds, with random resets, on machines drawn anew, leave no invalid value."""
@@ -53,4 +53,4 @@ def test_no_step_is_invalid_and_memory_stays(name: str, machine_steps: int) -> N
     memory.append(_peak_memory())
     curve = ", ".join(f"{each:.1f}" for each in memory)
     print(f"{name}: {steps * COUNT} steps, {jobs} jobs; MB at each tenth of them: {curve}")
-    assert memory[-1] - memory[WARM_UP] < 10.0
+    assert memory[-1] - memory[WARM_UP] < 4.0
