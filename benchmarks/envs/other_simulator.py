@@ -9,13 +9,12 @@ from collections.abc import Iterable, Mapping
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from benchmarks.envs.exudyn_beam import ExudynBeam, Ran
 from chaosgym.control.controllers import Follow, Kriging
 from chaosgym.control.operator import Operator
 from chaosgym.control.plant import work
@@ -47,29 +46,8 @@ PLAYERS: Mapping[str, tuple[Any, str]] = {
 ONE = np.zeros(1, np.int64)
 
 
-class Beam(Protocol):
-    """A beam in some simulator."""
-
-    def run(self, frequencies: Array, gap: float) -> Ran:
-        """Run a cycle at each of the frequencies (cycles,) [Hz], with a gap [m] on either side."""
-        ...
-
-
-class OwnBeam:
-    """A beam at rest in our simulator."""
-
-    def __init__(self, beam: ImpactBeam) -> None:
-        self._batch: Any = beam.batch(1)
-        self._batch.start(0, beam)
-
-    def run(self, frequencies: Array, gap: float) -> Ran:
-        """Run a cycle at each of the frequencies (cycles,) [Hz], with a gap [m] on either side."""
-        self._batch.set_clearances(ONE, np.array([gap]))
-        cycles, growth = self._batch.run_varied(ONE, frequencies[None])
-        return Ran(cycles.peak_force[0], cycles.impacts[0], cycles.bounce_duration[0], growth[0])
-
-
-SIMULATORS: Mapping[str, Any] = {"chaosgym": OwnBeam, "Exudyn": ExudynBeam}
+SIMULATORS: Mapping[str, Any] = {"chaosgym": ImpactBeam.batch, "Exudyn": ImpactBeam.exudyn_batch}
+"""What makes beams in each."""
 
 
 class Rig:
@@ -78,7 +56,7 @@ class Rig:
     Parameters
     ----------
     kind
-        What makes a beam at rest of an ``ImpactBeam``.
+        What makes beams, of ``SIMULATORS``.
     machine, task, seed
         The beam, the numbers of its job, and the seed of its disturbances.
 
@@ -93,7 +71,8 @@ class Rig:
 
     def reset(self) -> None:
         """Bring the beam to rest."""
-        self._beam: Beam = self._kind(self._machine)
+        self._beam = self._kind(self._machine, 1)
+        self._beam.start(0, self._machine)
         self._judge, self._random = ExponentJudge(1), np.random.default_rng([FIRST_SEED, self._seed])
         self._has_run, self.irregular, self._damage = False, list[float](), np.zeros(2)
 
@@ -102,14 +81,15 @@ class Rig:
         task, random = self._task, self._random
         worn = 1.0 + task.wear * len(self.irregular) / task.steps
         speeds = speed * (1.0 + task.speed_ripple * random.standard_normal(cycles))
-        ran = self._beam.run(speeds, self._machine.clearance * worn)
-        share, _ = self._judge.verdict(ONE, ran.growth[None], self._machine.sensed(ran.peaks)[None])
+        self._beam.set_clearances(ONE, np.array([self._machine.clearance * worn]))
+        ran, growth = self._beam.run_varied(ONE, speeds[None])
+        share, _ = self._judge.verdict(ONE, growth, self._machine.sensed(ran.peak_force))
         if self._has_run:
             self.irregular.append(float(share[0]))
-            self._damage += task.damage(ran.peaks)
+            self._damage += task.damage(ran.peak_force[0])
         self._has_run = True
-        impacts, bounced = ran.impacts.sum(), ran.bouncing.mean() * 2.0 * speed
-        peaks = self._machine.sensed(ran.peaks) + task.sensor_error * random.uniform(-1.0, 1.0, cycles)
+        impacts, bounced = ran.impacts.sum(), ran.bounce_duration.mean() * 2.0 * speed
+        peaks = self._machine.sensed(ran.peak_force[0]) + task.sensor_error * random.uniform(-1.0, 1.0, cycles)
         return {
             "peaks": np.maximum(peaks, 0.0),
             "impacts": float(random.binomial(int(impacts), 1.0 - task.missed_impacts)) / cycles,

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from benchmarks.performance.exudyn_machines import ExudynSetting, load_exudyn, run_in_exudyn
+from benchmarks.performance.exudyn_machines import ExudynSetting, run_in_exudyn
 from benchmarks.performance.timing import processor_seconds
 from chaosgym import read_machine
 from chaosgym.arrays import Array
 from chaosgym.machines import ImpactBeam, Machine, SliderCrank
+from chaosgym.machines.impact_beam.exudyn_beam import load_exudyn
 from chaosgym.machines.integrators import Integrator
 from chaosgym.machines.mechanism.machine import MechanismMachine
 from chaosgym.machines.parameters import with_settings

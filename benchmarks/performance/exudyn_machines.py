@@ -1,30 +1,24 @@
 """The same machines in Exudyn, the best general simulator for them, driven as its manual advises.
 
-The impact beam is a body with mass, stiffness and damping matrices (``ObjectGenericODE2``): those of our modes, turned
-into coordinates of which the first is the tip and the second the point of the force. So both simulators integrate
-the same equations. A mechanism of rigid links has the same bodies, joints and contact law, and turns by any angle: its
-equations are Exudyn's own. The slider crank is what an Exudyn user would build of the same parts: geometrically exact
-beam elements whose end nodes carry housing and yoke, a flywheel so heavy that it turns at constant speed, a slider.
+The impact beam is that of ``chaosgym.machines.impact_beam.exudyn_beam``: both integrate the same equations. A mechanism
+of rigid links has the same bodies, joints and contact law, and turns by any angle: its equations are Exudyn's own. The
+slider crank is what an Exudyn user would build of the same parts: geometrically exact beam elements whose end nodes
+carry housing and yoke, a flywheel so heavy that it turns at constant speed, a slider.
 
 Sources: exudyn.readthedocs.io, reference manual of the items used; Exudyn is written by J. Gerstmayr.
 """
 
-import contextlib
-import io
 import math
-import sys
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-import scipy.linalg
 
 from benchmarks.performance.timing import processor_seconds
 from chaosgym.arrays import Array
-from chaosgym.core.modal_model import ModalImpactModel
-from chaosgym.errors import ChaosgymError
 from chaosgym.machines.impact_beam import ImpactBeam
+from chaosgym.machines.impact_beam.exudyn_beam import add_beam, add_stops, load_exudyn, settings_of
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.mechanism.joints import GROUND
 from chaosgym.machines.mechanism.machine import MechanismMachine
@@ -67,25 +61,6 @@ class ExudynSetting:
         return f"{self.solver}, {contact}{switched}, step {self.step:g} s"
 
 
-def load_exudyn() -> Any:
-    """Import Exudyn, the build without range checks where there is one.
-
-    Raises
-    ------
-    ChaosgymError
-        If it is not installed.
-    """
-    vars(sys).setdefault("exudynFast", True)
-    try:
-        with contextlib.redirect_stdout(io.StringIO()):
-            import exudyn
-            import exudyn.itemInterface
-            import exudyn.utilities
-    except ImportError as error:
-        raise ChaosgymError("exudyn is not installed; install it with: pip install 'chaosgym[peers]'") from error
-    return exudyn
-
-
 def run_in_exudyn(machine: Machine, cycles: int, setting: ExudynSetting, *, forces: bool) -> tuple[float, Array | None]:
     """Run a machine from rest in Exudyn.
 
@@ -111,8 +86,10 @@ def run_in_exudyn(machine: Machine, cycles: int, setting: ExudynSetting, *, forc
     container = exudyn.SystemContainer()
     system = container.AddSystem()
     if isinstance(machine, ImpactBeam):
-        node, coordinate, first = add_beam(exudyn, system, machine, setting).node, 0, 1.0
+        parts = add_beam(exudyn, system, machine)
+        node, coordinate, first = parts.node, 0, 1.0
         gap, stiffness, damping = machine.clearance, machine.contact_stiffness, machine.contact_damping
+        _add_contact(exudyn, system, parts.tip, setting, gap, stiffness, damping)
     else:
         assert isinstance(machine, SliderCrank)
         # the first surface of the guide pushes upward, so it lies below the slider
@@ -126,7 +103,7 @@ def run_in_exudyn(machine: Machine, cycles: int, setting: ExudynSetting, *, forc
             sensors.append(system.AddSensor(sensor))
     system.Assemble()
     steps = math.ceil(machine.cycle_period / setting.step)
-    settings = settings_of(exudyn, machine.cycle_period, cycles, steps, setting)
+    settings = _settings(exudyn, machine.cycle_period, cycles, steps, setting)
     solver = getattr(exudyn.DynamicSolverType, setting.solver)
     seconds = processor_seconds(lambda: system.SolveDynamic(settings, solverType=solver))
     if not forces:
@@ -146,7 +123,7 @@ def _run_mechanism(
     sensor = _add_mechanism(exudyn, system, machine, forces)
     system.Assemble()
     steps = math.ceil(machine.cycle_period / setting.step)
-    settings = settings_of(exudyn, machine.cycle_period, cycles, steps, setting)
+    settings = _settings(exudyn, machine.cycle_period, cycles, steps, setting)
     solver = getattr(exudyn.DynamicSolverType, setting.solver)
     seconds = processor_seconds(lambda: system.SolveDynamic(settings, solverType=solver))
     if sensor is None:
@@ -155,107 +132,39 @@ def _run_mechanism(
     return seconds, force.reshape(cycles, steps).max(axis=1)
 
 
-def settings_of(exudyn: Any, period: float, cycles: int, steps: int, setting: ExudynSetting) -> Any:
-    """Exudyn's settings of a run of some cycles of a period [s] in equal steps."""
-    settings = exudyn.SimulationSettings()
-    integration = settings.timeIntegration
-    integration.endTime = period * cycles
-    integration.numberOfSteps = steps * cycles
-    integration.verboseMode = 0
-    integration.generalizedAlpha.spectralRadius = 1.0
-    integration.newton.useModifiedNewton = True
-    integration.newton.absoluteTolerance = NEWTON_TOLERANCE
+def _settings(exudyn: Any, period: float, cycles: int, steps: int, setting: ExudynSetting) -> Any:
+    """``settings_of``, with those of implicit solvers and the tolerance of limit stops."""
+    settings = settings_of(exudyn, period, cycles, steps)
+    settings.timeIntegration.generalizedAlpha.spectralRadius = 1.0
+    settings.timeIntegration.newton.useModifiedNewton = True
+    settings.timeIntegration.newton.absoluteTolerance = NEWTON_TOLERANCE
     if setting.switch_tolerance is not None:
-        integration.discontinuous.iterationTolerance = setting.switch_tolerance
-    settings.solution.file.write = False
-    settings.solution.sensors.writePeriod = period / steps
-    settings.linearSolver.solverType = exudyn.LinearSolverType.EXUdense
-    settings.parallel.numberOfThreads = 1
+        settings.timeIntegration.discontinuous.iterationTolerance = setting.switch_tolerance
     return settings
 
 
 def _add_contact(
     exudyn: Any, system: Any, marker: int, setting: ExudynSetting, gap: float, stiffness: float, damping: float
-) -> Any:
-    """Put two surfaces around the coordinate of a marker; return the connector."""
+) -> None:
+    """Put two surfaces around the coordinate of a marker."""
+    if setting.contact == "law":
+        add_stops(exudyn, system, marker, gap, stiffness, damping)
+        return
     items = exudyn.itemInterface
     fixed = system.AddNode(items.NodePointGround())
     ground = system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))
-    if setting.contact == "stop":
-        data = system.AddNode(items.NodeGenericData(initialCoordinates=[0, 0, 0], numberOfDataCoordinates=3))
-        return system.AddObject(
-            items.ObjectConnectorCoordinateSpringDamperExt(
-                markerNumbers=[ground, marker],
-                nodeNumber=data,
-                useLimitStops=True,
-                limitStopsUpper=gap,
-                limitStopsLower=-gap,
-                limitStopsStiffness=stiffness,
-                limitStopsDamping=damping,
-            )
-        )
-    symbolic = exudyn.symbolic
-
-    def force(mbs: Any, t: Any, item: Any, x: Any, v: Any, k: Any, d: Any, c: Any) -> Any:
-        upper = symbolic.max(0.0, k * (x - c) + d * v) * (0.5 * symbolic.sign(x - c) + 0.5)
-        lower = symbolic.max(0.0, k * (-x - c) - d * v) * (0.5 * symbolic.sign(-x - c) + 0.5)
-        return upper - lower
-
-    spring = system.AddObject(
-        items.ObjectConnectorCoordinateSpringDamper(
-            markerNumbers=[ground, marker], stiffness=stiffness, damping=damping, offset=gap
-        )
-    )
-    name = "springForceUserFunction"
-    compiled = exudyn.utilities.CreateSymbolicUserFunction(system, force, name, spring)
-    system.SetObjectParameter(spring, name, compiled)
-    return spring
-
-
-class BeamItems(NamedTuple):
-    """Numbers of the parts of a beam: its ``node``, whose coordinate 0 is the tip, the ``load``, whose parameter is the
-    angular frequency, and the ``stops``; mass and stiffness matrices (n, n) of the node's coordinates."""
-
-    node: Any
-    load: Any
-    stops: Any
-    mass: Array
-    stiffness: Array
-
-
-def add_beam(exudyn: Any, system: Any, beam: ImpactBeam, setting: ExudynSetting) -> BeamItems:
-    """Add an impact beam."""
-    items, model = exudyn.itemInterface, beam.reduce()
-    assert isinstance(model, ModalImpactModel)
-    shapes = np.vstack([model.tip_shape, beam.structure.drive[0, 0, 1]])
-    modal = np.linalg.inv(np.vstack([shapes, scipy.linalg.null_space(shapes).T]))
-    n = len(modal)
-    mass, stiffness = modal.T @ modal, modal.T @ (model.stiffness[:, None] * modal)
-    node = system.AddNode(
-        items.NodeGenericODE2(
-            referenceCoordinates=[0.0] * n,
-            initialCoordinates=[0.0] * n,
-            initialCoordinates_t=[0.0] * n,
-            numberOfODE2Coordinates=n,
-        )
-    )
+    data = system.AddNode(items.NodeGenericData(initialCoordinates=[0, 0, 0], numberOfDataCoordinates=3))
     system.AddObject(
-        items.ObjectGenericODE2(
-            nodeNumbers=[node],
-            massMatrix=mass,
-            stiffnessMatrix=stiffness,
-            dampingMatrix=modal.T @ model.damping @ modal,
+        items.ObjectConnectorCoordinateSpringDamperExt(
+            markerNumbers=[ground, marker],
+            nodeNumber=data,
+            useLimitStops=True,
+            limitStopsUpper=gap,
+            limitStopsLower=-gap,
+            limitStopsStiffness=stiffness,
+            limitStopsDamping=damping,
         )
     )
-    tip, shaker = (system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=i)) for i in (0, 1))
-    omega, amplitude = 2.0 * math.pi * model.excitation_frequency, beam.force_amplitude
-    load = system.AddLoad(items.LoadCoordinate(markerNumber=shaker, load=omega))
-    drive = exudyn.utilities.CreateSymbolicUserFunction(
-        system, lambda mbs, t, omega: amplitude * exudyn.symbolic.sin(omega * t), "loadUserFunction", load
-    )
-    system.SetLoadParameter(load, "loadUserFunction", drive)
-    stops = _add_contact(exudyn, system, tip, setting, beam.clearance, beam.contact_stiffness, beam.contact_damping)
-    return BeamItems(node, load, stops, mass, stiffness)
 
 
 def _add_mechanism(exudyn: Any, system: Any, machine: MechanismMachine, forces: bool) -> Any:

@@ -63,7 +63,7 @@ def test_splits_share_no_machine(seed, machine, level):
             assert beyond.sum() == (split == "outside")
             cells = sum(int((share + 1.0) // 0.25) for share in shares)
             if split != "outside":
-                assert (cells % 4 == 1) == (split == "test")
+                assert (cells % 4 == 1) == (split != "train")
 
 
 def test_outside_goes_field_by_field():
@@ -105,6 +105,7 @@ def test_who_plays_meets_the_machines_of_the_split():
     [
         ({"level": "hard"}, "level = 'hard' is not one of nominal, clearance, wear, fleet"),
         ({"split": "other"}, "split = 'other' is not one of train, test, outside"),
+        ({"split": "other_machines"}, "chaosgym/AnyMachine-v0 has it, and `chaosgym compare FILE` plays"),
         ({"split": "test", "level": "nominal"}, "split = 'test' needs machines that differ"),
         ({"spilt": "test"}, "did you mean split"),
     ],

@@ -45,15 +45,19 @@ def _section(card: Scorecard, machine: str) -> str:
 
 
 def _exclusions(hit: Set[str]) -> str:
-    """How many pairs of statements no beam of the searches hits together, and of which the shipped beam hits both."""
+    """Pairs of statements that no beam of the searches hits together, and those of which the shipped beam hits both."""
     found = known_exclusions()
+    partners: dict[str, list[str]] = {}
+    for pair in found.pairs:
+        partners.setdefault(pair.one, []).append(pair.other)
+    pairs = "; ".join(f"{one} with {', '.join(others)}" for one, others in partners.items())
     never = f"None hits {', '.join(found.never)}. " if found.never else ""
     both = ", ".join(f"{pair.one} with {pair.other}" for pair in found.pairs if {pair.one, pair.other} <= hit)
     return (
         f"### Exclusions\n\nOf {found.candidates} beams of the search without walls, most of them with a soft pivot "
-        f"and judged by quick runs, none hits both statements of {len(found.pairs)} pairs, though by chance one or "
-        f"more would (`python -m thesis exclusions` lists them). {never}The shipped beam, judged by thorough runs, "
-        f"hits {both or 'no such pair'}."
+        "and judged by quick runs, none hits both statements of these pairs, though by chance one or more would "
+        f"(`python -m thesis exclusions` counts them): {pairs}. {never}The shipped beam, judged by thorough runs, hits "
+        f"{both or 'no such pair'}."
     )
 
 

@@ -75,7 +75,7 @@ class Jobs:
 
     def __init__(self, task: Task, variants: Variants | Pool, space: Box, count: int) -> None:
         nominal = variants.nominal
-        self.task, self.variants, self.space, self.batch = task, variants, space, nominal.batch(count)
+        self.task, self.variants, self.space, self.batch = task, variants, space, variants.batch(count)
         self.judge: Judge = (ExponentJudge if isinstance(self.batch, VaryingBatch) else RecurrenceJudge)(count)
         self._monitor = RepeatSums(count) if task.monitor == "on" else None
         self._records = RecordsAtSpeed(nominal, task.sensor_error, count) if task.classifier == "on" else None

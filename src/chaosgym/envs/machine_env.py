@@ -22,7 +22,7 @@ from chaosgym.envs.motors import refuse_drive
 from chaosgym.envs.observation import Observation, observation_names, observation_space
 from chaosgym.envs.pool import ANY, SHARE, Pool, pool_task
 from chaosgym.envs.task import Status, Task, UnknownKeywordError, divided
-from chaosgym.envs.variants import Variants
+from chaosgym.envs.variants import OTHER_SIMULATOR, Variants
 from chaosgym.errors import ParameterError
 from chaosgym.machines import MACHINES
 from chaosgym.machines.machine import Machine
@@ -71,8 +71,9 @@ class EnvSettings:
     level
         What differs from job to job: "nominal", "clearance", "wear" or "fleet".
     split
-        Part of the level's machines: "train", "test" or "outside"; None for all within its tolerances. Of any machine:
-        "train", "test" or "other_machines"; None trains on the first and keeps the second for evaluation.
+        Part of the level's machines: "train", "test", "outside" or, of the beam, "other_simulator"; None for all within
+        its tolerances. Of any machine: "train", "test" or "other_machines"; None trains on the first and keeps the
+        second for evaluation.
     sealed
         Whether the machines kept for evaluation are the 512 of this release instead of the 256 of development.
     tolerances
@@ -158,9 +159,11 @@ def first_of(info: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
 
 
 def refuse_pictures(settings: EnvSettings, render_mode: str | None) -> None:
-    """Raise ``ParameterError`` if pictures are requested of a pool of machines, whose motion has no unit."""
-    if render_mode is not None and isinstance(settings.variants, Pool):
-        raise ParameterError(f"render_mode = {render_mode!r} is not possible with any machine; allowed: None")
+    """Raise ``ParameterError`` if pictures are requested of motion that has no unit, or that is not ours."""
+    split = settings.variants.split
+    whose = "any machine" if isinstance(settings.variants, Pool) else f"split = {split!r}"
+    if render_mode is not None and (isinstance(settings.variants, Pool) or split == OTHER_SIMULATOR):
+        raise ParameterError(f"render_mode = {render_mode!r} is not possible with {whose}; allowed: None")
 
 
 class JobSpec:

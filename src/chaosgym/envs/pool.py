@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.envs.task import Task
-from chaosgym.envs.variants import HELD_OUT_SEED, Units, numbers_of
-from chaosgym.errors import ParameterError
+from chaosgym.envs.variants import HELD_OUT_SEED, Units, check_split, numbers_of
+from chaosgym.machines.batch import CompiledBatch
 from chaosgym.machines.family import KINDS, Ranged, drawn_machine
 from chaosgym.machines.machine import Machine
 
@@ -74,8 +74,7 @@ class Pool:
     """
 
     def __init__(self, split: str | None = None) -> None:
-        if split is not None and split not in SPLITS:
-            raise ParameterError(f"split = {split!r} is not one of {', '.join(SPLITS)}")
+        check_split(split, SPLITS)
         self.split, self.seed = split, HELD_OUT_SEED
         self.tolerances: dict[str, float] = {}
         kept = read_pool()
@@ -93,6 +92,10 @@ class Pool:
     def drawn(self, generator: np.random.Generator) -> Machine:
         """Draw a machine."""
         return self._made(self._drawn[int(generator.integers(len(self._drawn)))])
+
+    def batch(self, count: int) -> CompiledBatch:
+        """As ``Variants.batch``."""
+        return self.nominal.batch(count)
 
     def held_out(self, number: int) -> Machine:
         """Return machine ``number`` of the evaluation."""

@@ -6,9 +6,11 @@ that cube, or what lies around it, so that no two splits share a machine:
     train       three of four cells of a checkerboard with eight cells to a side
     test        the fourth of them
     outside     one field, in turn, at one to two half widths from the nominal value, the others within
+
+``other_simulator`` has the machines of the test, simulated by Exudyn.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from typing import Any, NamedTuple
 
@@ -16,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chaosgym.errors import ParameterError
+from chaosgym.machines.batch import CompiledBatch
 from chaosgym.machines.machine import Machine
 from chaosgym.machines.parameters import by_field, with_settings
 from chaosgym.version import __version__
@@ -29,7 +32,15 @@ HELD_OUT_SEED = 34_000_000
 DRAWN = -1
 """Number of a machine that was drawn for its job."""
 
-SPLITS = ("train", "test", "outside")
+OTHER_SIMULATOR = "other_simulator"
+
+SPLITS = ("train", "test", "outside", OTHER_SIMULATOR)
+
+ELSEWHERE = {
+    "other_machines": "chaosgym/AnyMachine-v0 has it, and `chaosgym compare FILE` plays a machine's file",
+    OTHER_SIMULATOR: "the impact beam alone has it, such as chaosgym/ImpactBeamTolerance-v1",
+}
+"""Which environment has a split that not all have."""
 
 CELLS, EVERY = 8, 4
 """Cells along a side of the checkerboard, and of how many neighbours one is the test's."""
@@ -50,7 +61,7 @@ class Variants:
     tolerances
         Half width of each field that varies, as a share of its nominal value; uniform within.
     split
-        "train", "test" or "outside"; None for all that lies within the tolerances.
+        One of ``SPLITS``; None for all that lies within the tolerances.
     sealed
         Whether the machines kept for evaluation are those of the release.
 
@@ -68,8 +79,7 @@ class Variants:
                 raise ParameterError(f"tolerances[{name!r}] = {width!r} is out of range; allowed: 0 to 0.9")
         tolerances = by_field(nominal, tolerances)
         with_settings(nominal, {name: getattr(nominal, name, None) for name in tolerances})
-        if split is not None and split not in SPLITS:
-            raise ParameterError(f"split = {split!r} is not one of {', '.join(SPLITS)}")
+        check_split(split, SPLITS if nominal.runs_in_exudyn else SPLITS[:-1])
         if split is not None and not any(tolerances.values()):
             raise ParameterError(f"split = {split!r} needs machines that differ; there is one without tolerances")
         self.nominal, self.split = nominal, split
@@ -90,9 +100,19 @@ class Variants:
             row = int(generator.integers(2 * len(shares))) if number is None else number % (2 * len(shares))
             shares[row // 2] = (1.0 + generator.random()) * (1.0, -1.0)[row % 2]
         elif self.split is not None:
-            while in_test(shares) != (self.split == "test"):
+            while in_test(shares) != (self.split != "train"):
                 shares = generator.uniform(-1.0, 1.0, len(shares))
         return np.asarray(shares)
+
+    def batch(self, count: int) -> CompiledBatch:
+        """Return ``count`` machines that move side by side, in the simulator of the split.
+
+        Raises
+        ------
+        ChaosgymError
+            If Exudyn is needed and not installed.
+        """
+        return self.nominal.exudyn_batch(count) if self.split == OTHER_SIMULATOR else self.nominal.batch(count)
 
     def held_out(self, number: int) -> Machine:
         """Return machine ``number`` of the evaluation."""
@@ -135,6 +155,13 @@ def numbers_of(given: Any, count: int, kept: int) -> NDArray[np.int64]:
             + (f", or {count} of them" if count > 1 else "")
         )
     return np.broadcast_to(numbers, count).astype(np.int64)
+
+
+def check_split(split: str | None, allowed: Sequence[str]) -> None:
+    """Raise ``ParameterError`` if there is no such split, with who has it."""
+    if split is not None and split not in allowed:
+        elsewhere = f"; {ELSEWHERE[split]}" if split in ELSEWHERE else ""
+        raise ParameterError(f"split = {split!r} is not one of {', '.join(allowed)}{elsewhere}")
 
 
 def in_test(shares: NDArray[np.float64]) -> bool:
