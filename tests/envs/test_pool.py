@@ -95,7 +95,7 @@ def test_a_comparison_plays_all_but_who_needs_a_model(tmp_path):
     scores = Scores(compare(ANY, tmp_path / "any.parquet", machines=6))
     assert set(scores.summary()) == {
         *("follow the demand", "own map", "own map, demands known"),
-        *("back off", "back off, with memory", "kriging"),
+        *("back off", "back off, with memory", "kriging", "best felt"),
     }
     assert scores.row("kriging")["score"] > 0.0
     assert chaosgym.evaluate(Kriging(), ANY, machines=2, split="other_machines").deviation <= 1.0 / 7.0
