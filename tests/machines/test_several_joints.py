@@ -17,7 +17,7 @@ from chaosgym import Drive, ImpactBeam, RungeKutta4, Structure, simulate
 from chaosgym.cli import app
 from chaosgym.diagnosis.lyapunov import lyapunov_spectrum
 from chaosgym.errors import ChaosgymError, ParameterError
-from chaosgym.machines import joint_sets
+from chaosgym.machines import joint_tables
 from chaosgym.machines.impact_beam.modes import modal_analysis
 from chaosgym.machines.integrators import TIGHTEST_EVENTS
 from chaosgym.machines.modal_machine import jointed
@@ -243,7 +243,7 @@ def test_machines_that_fail_are_told_and_the_others_move_on(monkeypatch):
     """Too little memory for one machine's sets, and a state that is no number: both by their places, at once."""
     machines = variants()
     batch, which = started(machines), np.arange(5)
-    monkeypatch.setattr(joint_sets, "MOST_BYTES", 1)
+    monkeypatch.setattr(joint_tables, "MOST_BYTES", 1)
     batch.start(1, machines[1])
     monkeypatch.undo()
     batch.kick(np.array([4]), np.full((1, 3), math.nan))
@@ -293,7 +293,7 @@ def test_little_memory_changes_no_byte(monkeypatch):
     """Where sets are forgotten and made anew a run is the same; where a cycle needs more than fit, one line says so."""
     expected = simulate(three_modes(UNEVEN), 12)
     for speed, bytes_ in ((14.0, 800_000), (13.0, 1)):
-        monkeypatch.setattr(joint_sets, "MOST_BYTES", bytes_)
+        monkeypatch.setattr(joint_tables, "MOST_BYTES", bytes_)
         jointed._tables.cache_clear()
         if bytes_ > 1:
             np.testing.assert_array_equal(simulate(three_modes(UNEVEN), 12).section, expected.section)

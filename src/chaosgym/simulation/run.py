@@ -8,8 +8,9 @@ import os
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -122,11 +123,6 @@ def _count(name: str, value: int, low: int) -> int:
     return int(value)
 
 
-def _bar(cycles: int, progress: bool) -> AbstractContextManager[Any]:
-    """Progress bar or None. Even a bar that is never shown takes as long as a cycle."""
-    return tqdm(total=cycles, desc="simulate", unit="cycle", delay=PATIENCE) if progress else nullcontext()
-
-
 def simulate(
     machine: Machine,
     cycles: int,
@@ -189,12 +185,13 @@ def simulate(
     transient = _count("transient", transient, 0)
     samples_per_cycle = _count("samples_per_cycle", samples_per_cycle, 0)
     integrator = integrator or machine.default_integrator
-    state = _initial(machine, initial_state)
+    state, first = _initial(machine, initial_state), 0
     table = _operation(machine, operation, cycles) if operation else None
     stretches = [(machine, cycles)] if table is None else _stretches(machine, table)
     records: list[CycleRecord] = []
-    first = 0
-    with _bar(transient + cycles, progress) as bar:
+    # even a bar that is never shown takes as long as a cycle
+    shown = tqdm(total=transient + cycles, desc="simulate", unit="cycle", delay=PATIENCE) if progress else nullcontext()
+    with shown as bar:
         for number, (each, count, samples) in enumerate(
             [(stretches[0][0], transient, 0), *((*stretch, samples_per_cycle) for stretch in stretches)]
         ):
@@ -330,10 +327,7 @@ def simulate_many(
     >>> [float(record.peak_force.max().round(1)) for record in chaosgym.simulate_many(beams, 20, transient=200)]
     [32.4, 28.3]
     """
-
-    def one(machine: Machine) -> CycleRecord:
-        return simulate(machine, cycles, transient=transient, integrator=integrator)
-
+    one = partial(simulate, cycles=cycles, transient=transient, integrator=integrator)
     return parallel_map(one, machines, workers=workers, progress="simulate" if progress else None)
 
 

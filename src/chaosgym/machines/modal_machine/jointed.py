@@ -14,7 +14,8 @@ from chaosgym.core.tangent import Tangents, no_tangents
 from chaosgym.errors import ParameterError
 from chaosgym.machines.abilities import Flexible
 from chaosgym.machines.integrators import ExactEvents, Integrator
-from chaosgym.machines.joint_sets import JointTables, PressedSets, Sliders
+from chaosgym.machines.joint_sets import PressedSets, Sliders
+from chaosgym.machines.joint_tables import JointTables
 from chaosgym.machines.machine import Machine, Number, Option
 from chaosgym.machines.modal_impact import Modes, with_rigid_bodies
 from chaosgym.machines.modal_machine.drive import Drive, checked, drive_notes, modal_drive
