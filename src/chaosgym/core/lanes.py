@@ -137,9 +137,9 @@ class _Emitter:
     def total(self, first: Any, second: Any) -> Any:
         return self.builder.fadd(self.builder.load(first), self.builder.load(second))
 
-    def vectors(self, width: Any, at_once: int = 1) -> Any:
-        """Loop over the vectors of a width, some at once; its index times their lanes is where each begins."""
-        return cgutils.for_range(self.builder, self.builder.udiv(width, self.index(at_once * LANES)))
+    def vectors(self, width: Any) -> Any:
+        """Loop over the vectors of a width; its index times their lanes is where each begins."""
+        return cgutils.for_range(self.builder, self.builder.udiv(width, self.index(LANES)))
 
     def lanes_below(self, count: Any) -> Any:
         """Mask of the lanes whose number is below a count."""

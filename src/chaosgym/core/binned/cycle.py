@@ -18,29 +18,18 @@ change the motion by a bit.
 import numpy as np
 
 from chaosgym.core import status
-from chaosgym.core.binned.look import (
-    force_at,
-    joint_force,
-    note_channels,
-    note_joint,
-    quiet_intervals,
-)
+from chaosgym.core.binned.deviations import carry, carry_expanded, jump
+from chaosgym.core.binned.look import joint_force, note_channels, note_joint, quiet_intervals
 from chaosgym.core.binned.motion import (
-    GAP,
-    LAG,
     NOW,
-    REACH,
     READINGS,
     SLOPES,
     SPARE,
-    TWO_SIDED,
-    UP,
     bound_fourth,
     contact_set,
     evaluate,
     expand_from,
     find_sides,
-    known,
     look_ahead,
     motion_of,
     move,
@@ -50,23 +39,14 @@ from chaosgym.core.binned.motion import (
     put_stiffness,
     read_after,
     read_now,
-    side_of,
 )
-from chaosgym.core.binned.record import (
-    begin_cycle,
-    channel_crest,
-    crest_instant,
-    note_peak,
-    note_share,
-    write_peaks,
-    write_sample,
-)
+from chaosgym.core.binned.record import begin_cycle, note_peak, write_peaks, write_sample
 from chaosgym.core.binned.series import order_for, put_time
+from chaosgym.core.binned.step import careful_step, change_side
 from chaosgym.core.binned.tables import table_places
-from chaosgym.core.cycle import LOWER, UPPER
-from chaosgym.core.events import CROSSES, KEEPS, closing, crossing, let_pass, note_touch, opening, settled
-from chaosgym.core.kernel import leaf, njit, part
-from chaosgym.core.lanes import LANES, add_columns
+from chaosgym.core.events import let_pass
+from chaosgym.core.kernel import leaf, njit
+from chaosgym.core.lanes import LANES
 from chaosgym.core.tangent import orthonormalise
 
 RUNAWAY = 1e3
@@ -77,131 +57,6 @@ STEP_BUDGET = 5_000_000
 
 NOTHING = 1e-12
 """Share of an interval that is too short to be a step."""
-
-CREST_SEARCHES = 2
-"""Times that a crest is placed on a cubic; each leaves the fourth power of the error before."""
-
-NEAR_PEAK = 0.99
-"""Share of the peak so far that the cubic must reach for a crest to be worth a search."""
-
-
-@part
-def first_change(motion, last, h, tolerance):
-    """(Channel or -1, its new side, instant) of the first change of contact within h, which is expanded.
-
-    ``NOW`` and the reading after it are those at both ends.
-    """
-    own, here = motion.own, places(motion.n, motion.m)
-    lanes = here.lanes
-    first, towards, instant = -1, 0.0, h
-    for j in range(motion.m):
-        place, side = here.readings + j * READINGS + NOW, side_of(motion, j)
-        gap, lag, two_sided = known(motion, j, GAP), known(motion, j, LAG), known(motion, j, TWO_SIDED)
-        e0, d0, e1, d1 = own[place], own[place + SLOPES], own[place + 1], own[place + SLOPES + 1]
-        verdict, to = settled(side, gap, two_sided, e0, d0, e1, d1, h, own[here.fourth + j])
-        series = here.series + motion.n + j
-        if verdict == KEEPS:
-            continue
-        if verdict == CROSSES:
-            to_lag, facing = own[here.lags + j], side if side != 0.0 else to
-            e0, d0, e1, d1 = facing * e0 - gap, facing * d0, facing * e1 - gap, facing * d1
-            found = crossing(own, series, lanes, last, facing, gap, to_lag, 0.0, h, e0, d0, e1, d1, tolerance)
-            if found <= instant:
-                first, towards, instant = j, to, found
-        elif side != 0.0:
-            found = opening(own, series, lanes, last, side, gap, lag, 0.0, instant, tolerance, 1.0)
-            if found <= instant:
-                first, towards, instant = j, 0.0, found
-        else:
-            found = closing(own, series, lanes, last, 1.0, gap, lag, 0.0, instant, tolerance)
-            if found <= instant:
-                first, towards, instant = j, 1.0, found
-            if two_sided != 0.0:
-                found = closing(own, series, lanes, last, -1.0, gap, lag, 0.0, instant, tolerance)
-                if found <= instant:
-                    first, towards, instant = j, -1.0, found
-    return first, towards, instant
-
-
-@leaf
-def note_crest(motion, last, now, h, before, after, peak):
-    """Raise the peaks (2, 5) to the crest of the resultant within h, which is expanded: ``before`` to ``after``."""
-    since, length = 0.0, h
-    for _ in range(CREST_SEARCHES):
-        crest, size = crest_instant(length, before, after)
-        if size <= NEAR_PEAK * peak[UPPER if after[0] > 0.0 else LOWER, 0]:
-            return
-        evaluate(motion, last, since + crest, SPARE)
-        there = joint_force(motion, SPARE)
-        note_peak(peak, now + since + crest, there)
-        if there[2] > 0.0:
-            before, since, length = there, since + crest, length - crest
-        else:
-            after, length = there, crest
-
-
-@leaf
-def note_channel_crests(motion, last, h, channel_peak):
-    """Raise the peaks (m, 2) of the closed channels to their crests within h, which is expanded, and at its ends."""
-    for j in range(channel_peak.shape[0]):
-        side = side_of(motion, j)
-        column = 0 if side > 0.0 else 1
-        if side == 0.0:
-            continue
-        f0, r0 = force_at(motion, j, NOW)
-        f1, r1 = force_at(motion, j, NOW + 1)
-        channel_peak[j, column] = max(channel_peak[j, column], max(f0, f1))
-        since, length = 0.0, h
-        for _ in range(CREST_SEARCHES):
-            crest, top = channel_crest(length, f0, r0, f1, r1)
-            if crest <= 0.0 or top <= NEAR_PEAK * channel_peak[j, column]:
-                break
-            evaluate(motion, last, since + crest, SPARE)
-            force, rate = force_at(motion, j, SPARE)
-            channel_peak[j, column] = max(channel_peak[j, column], force)
-            if rate > 0.0:
-                f0, r0, since, length = force, rate, since + crest, length - crest
-            else:
-                f1, r1, length = force, rate, crest
-
-
-@part
-def careful_step(motion, at, closed, row, duration, last, now, h, tolerance, peak, channel_peak, contact_time):
-    """Follow the motion for at most h, up to the first change of contact, and record what happens.
-
-    ``closed`` tells if a contact is; ``now`` is the time in the revolution. Moves the state, puts the readings at its
-    end after those of ``NOW``, and leaves the series.
-
-    Returns
-    -------
-    (changed, towards, h) : the channel whose contact changes or -1, its new side, and how long the step was.
-    """
-    z = places(motion.n, motion.m).z
-    expand_from(motion, at, row, z, duration, last)
-    evaluate(motion, last, h, NOW + 1)
-    changed, towards, h = first_change(motion, last, h, tolerance)
-    if changed >= 0:
-        evaluate(motion, last, h, NOW + 1)
-    put_evaluated(motion, z)
-    if closed:
-        before, after = joint_force(motion, NOW), joint_force(motion, NOW + 1)
-        note_share(before, after, h, contact_time)
-        note_peak(peak, now + h, after)
-        if before[2] > 0.0 and after[2] < 0.0:
-            note_crest(motion, last, now, h, before, after, peak)
-        if channel_peak.shape[0] > 0:
-            note_channel_crests(motion, last, h, channel_peak)
-    return changed, towards, h
-
-
-@part
-def change_side(motion, changed, towards, now, bouncing, impacts, bounce_time):
-    """Close a channel on the side ``towards`` or open it at ``now`` in the revolution, and record a touch."""
-    motion.own[places(motion.n, motion.m).sides + changed] = towards
-    if towards != 0.0 and known(motion, changed, REACH) > 0.0:
-        up = known(motion, changed, UP) * towards > 0.0
-        impacts[UPPER if up else LOWER] += 1
-        note_touch(bouncing, 1, 0, 1.0 if up else -1.0, now, bounce_time)
 
 
 @leaf
@@ -240,52 +95,6 @@ def write_samples(model, motion, at, begin, done, count, spacing, sample, histor
             expand_from(motion, at, model.row, z, duration, model.order)
             sample = write_expanded(motion, model.display, model.order, since, interval, spacing, sample, history)
     return sample
-
-
-@leaf
-def carry(motion, propagator, intervals, vectors):
-    """Advance deviations (k, 2n) by some steps whose propagator begins at a place in the table."""
-    own, here, states = motion.own, places(motion.n, motion.m), 2 * motion.n
-    z = here.sampled
-    for k in range(vectors.shape[0]):
-        for i in range(states):
-            own[z + i] = vectors[k, i]
-        for _ in range(intervals):
-            add_columns(motion.table, propagator, states, states, own, z, own, here.moved, LANES)
-            for i in range(states):
-                own[z + i] = own[here.moved + i]
-        for i in range(states):
-            vectors[k, i] = own[z + i]
-
-
-@leaf
-def carry_expanded(motion, at, row, duration, last, h, vectors):
-    """Advance deviations (k, 2n) by h, of which they are expanded as the motion was."""
-    own, here, states = motion.own, places(motion.n, motion.m), 2 * motion.n
-    z = here.sampled
-    for k in range(vectors.shape[0]):
-        for c in range(here.width):
-            own[z + c] = vectors[k, c] if c < states else 0.0
-        expand_from(motion, at, row, z, duration, last)
-        evaluate(motion, last, h, SPARE)
-        put_evaluated(motion, z)
-        for i in range(states):
-            vectors[k, i] = own[z + i]
-
-
-@leaf
-def jump(motion, before, after, vectors):
-    """Saltation of deviations (k, 2n) where a surface is touched: the damper of (1) acts at once, each at its time.
-
-    ``before`` and ``after`` are where the accelerations on either side of the event begin. Where a contact ends its
-    force is zero, and nothing jumps.
-    """
-    n, lanes, table = motion.n, places(motion.n, motion.m).lanes, motion.table
-    for k in range(vectors.shape[0]):
-        for i in range(n):
-            for j in range(n):
-                column = (n + j) * lanes + i
-                vectors[k, n + i] += (table[after + column] - table[before + column]) * vectors[k, j]
 
 
 @leaf
@@ -351,18 +160,7 @@ def turn(model, motion, peak, bouncing, arrays, cycle, tolerance, budget, vector
                 last = order_for(model.spectrum * h, model.order)
             time = begin + done * interval + since
             changed, towards, h = careful_step(
-                motion,
-                at,
-                chosen > 0,
-                row,
-                duration,
-                last,
-                time,
-                h,
-                tolerance,
-                peak,
-                channel_peak,
-                contact_time,
+                motion, at, chosen > 0, row, duration, last, time, h, tolerance, peak, channel_peak, contact_time
             )
             if sample < history.shape[0]:
                 sample = write_expanded(motion, model.display, last, time, h, spacing, sample, history)
@@ -420,15 +218,7 @@ def advance(model, state, bouncing, arrays, event_tolerance, event_budget, tange
                 return status.DIVERGED, cycle
         find_sides(motion, model.row)
         arrays.events[cycle] = turn(
-            model,
-            motion,
-            peak,
-            bouncing,
-            arrays,
-            cycle,
-            event_tolerance,
-            event_budget,
-            tangents.vectors,
+            model, motion, peak, bouncing, arrays, cycle, event_tolerance, event_budget, tangents.vectors
         )
         if arrays.events[cycle] > event_budget:
             return status.EVENT_BUDGET, cycle
