@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -56,7 +57,7 @@ def test_predictive_criteria_of_the_beam():
 
 
 def test_signs_of_a_periodic_response_say_how_often_they_are_right():
-    """At 12 Hz criteria and precursors are silent, each in one line with its rates on the dataset (5.3)."""
+    """Silent criteria and precursors tell their recall in one line, present ones their precision (5.3)."""
     signs = signs_of_chaos(diagnose(ImpactBeam(excitation_frequency=12.0)))
     assert [(sign.name, sign.present) for sign in signs] == [
         ("criteria", False),
@@ -64,7 +65,11 @@ def test_signs_of_a_periodic_response_say_how_often_they_are_right():
         ("period three", False),
         ("long bouncing", False),
     ]
-    assert all(sign.line.count("\n") == 0 and "% of those" in sign.line for sign in signs)
+    assert all(sign.line.count("\n") == 0 and sign.line.endswith(" had it") for sign in signs)
+    assert replace(signs[1], present=True, why="period 2").line.endswith(
+        "79% of the dataset's points with it had chaos within the tolerances of speed and clearance"
+    )
+    assert replace(signs[1], rate=None).line == "period doubling (5.3.2): no, period 1"
     assert json.loads(json.dumps(signs[0].as_dict()))["rate"]["points"] > 10_000
 
 
