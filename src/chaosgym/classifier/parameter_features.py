@@ -81,7 +81,7 @@ def _modes(machine: Any, length: float) -> Array:
         [
             np.sqrt(none.stiffness[:FREE]),
             np.sqrt(squares[:RINGING]),
-            [none.damping[0, 0], none.tip_shape[0], undamped.force_shape[0]],
+            [none.damping[0, 0], none.tip_shape[0], undamped.structure.drive[0, 0, 1, 0]],
             *(0.5 * np.einsum("ik,ij,jk->k", shapes, part, shapes) for part in (none.damping, slope)),
             0.5 * (shapes.T @ none.tip_shape) ** 2,
             0.5 * np.diag(none.damping)[bending],
