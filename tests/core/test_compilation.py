@@ -15,10 +15,9 @@ import chaosgym
 from chaosgym.core import compilation
 from chaosgym.core.compilation import is_cached
 from chaosgym.core.events import judge
-from chaosgym.core.fixed_step import advance_fixed_step
 from chaosgym.core.joints.cycle import advance_joints
 from chaosgym.machines import ImpactBeam, SliderCrank
-from chaosgym.simulation import RungeKutta4, simulate, simulate_with_deviations
+from chaosgym.simulation import RungeKutta4, simulate
 
 COUNT = "; print(sum(kernel.stats.cache_misses.values()), sum(kernel.stats.cache_hits.values()))"
 REVOLUTION = (
@@ -38,11 +37,16 @@ ACCELERATION = (
 
 def test_a_call_adds_no_version_of_a_kernel():
     """Preparing a kernel compiles just what the call needs: one version, with deviations or without."""
-    simulate(ImpactBeam(), 1)
-    simulate_with_deviations(ImpactBeam(), 1, deviations=[[1.0] * 12])
-    simulate(ImpactBeam(), 1, integrator=RungeKutta4(4000))
-    assert len(advance_joints.signatures) == 1
-    assert len(advance_fixed_step.signatures) == 1
+    code = (
+        "from chaosgym.core.fixed_step import advance_fixed_step;"
+        "from chaosgym.core.joints.cycle import advance_joints;"
+        "from chaosgym.machines import ImpactBeam; from chaosgym.simulation import *; simulate(ImpactBeam(), 1);"
+        "simulate_with_deviations(ImpactBeam(), 1, deviations=[[1.0] * 12]);"
+        "simulate(ImpactBeam(), 1, integrator=RungeKutta4(4000));"
+        "print(len(advance_joints.signatures), len(advance_fixed_step.signatures))"
+    )
+    out, err = _in_a_process(code).communicate()
+    assert out.decode().split() == ["1", "1"], err.decode()
     assert is_cached(advance_joints)
 
 
