@@ -197,7 +197,7 @@ def test_installations_with_equal_sources_share_their_kernels(tmp_path):
 
     for name in ("one", "other", "edited"):
         shutil.copytree(source, tmp_path / name / "chaosgym", ignore=ignored, copy_function=shutil.copyfile)
-    edited = tmp_path / "edited" / "chaosgym" / "core" / "contact.py"
+    edited = tmp_path / "edited" / "chaosgym" / "core" / "events.py"
     edited.write_text(edited.read_text() + "\nNOTHING = 0\n")
     (compiled, loaded), said = counts("one")
     assert (compiled, loaded) == ("1", "0")
