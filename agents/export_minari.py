@@ -42,6 +42,9 @@ def main() -> None:
     except ChaosgymError as error:
         print(f"Error: {error}", file=sys.stderr)
         sys.exit(2)
+    except ModuleNotFoundError as error:
+        print(f"Error: {error}; install it with: pip install '.[offline,learn]'", file=sys.stderr)
+        sys.exit(2)
 
 
 def _write(asked: argparse.Namespace, keywords: dict[str, Any]) -> None:

@@ -1,6 +1,7 @@
 """Every script trains, goes on where it stopped, and leaves a policy that numpy plays."""
 
 import csv
+import os
 import runpy
 import shutil
 import subprocess
@@ -121,6 +122,18 @@ def test_a_constraint_is_the_budget_of_the_task(tmp_path, monkeypatch):
         with pytest.raises(InterruptedError):
             constrained_ppo.train(constrained_ppo.arguments())
     assert limits == [gym.make(BEAM).unwrapped.task.cost_budget, 0.2]
+
+
+def test_what_an_export_needs_is_named(tmp_path):
+    """Without Minari: exit code 2, one line that says what to install, and no folder."""
+    (tmp_path / "minari.py").write_text("raise ModuleNotFoundError(\"No module named 'minari'\")")
+    command = [sys.executable, str(AGENTS / "export_minari.py"), "--jobs", "1", "--out", str(tmp_path / "out")]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 2
+    assert "pip install '.[offline,learn]'" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list((tmp_path / "out").rglob("*.json"))
 
 
 @pytest.mark.slow

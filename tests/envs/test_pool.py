@@ -1,13 +1,17 @@
 """Any machine: each job draws one of a pool, and speeds and forces are shares of its own range and rated force."""
 
+import json
+
 import gymnasium as gym
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from gymnasium.utils.env_checker import check_env
 
 import chaosgym
 from benchmarks.envs import pool as made
+from chaosgym.cli import app
 from chaosgym.control.comparison import compare
 from chaosgym.control.controllers import Follow, Kriging
 from chaosgym.control.rollout import play
@@ -123,3 +127,14 @@ def test_a_picture_of_a_job_names_the_units_of_what_is_felt():
         played = play(Follow(), env, [0], steps=2)
         assert f"peak force [{unit}]" in draw_forces(played, plt.figure().add_subplot()).get_ylabel()
     plt.close("all")
+
+
+def test_other_machines_are_compared_by_command(tmp_path):
+    """``chaosgym compare --split`` plays the kinds on which nothing was tuned; a split that is not there is named."""
+    given = ["compare", ANY, "--machines", "2", "--only", "follow the demand", "--out", str(tmp_path / "any.parquet")]
+    done = CliRunner().invoke(app, [*given, "--split", "other_machines", "--json"])
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["contenders"]["follow the demand"]["machines"] == 2
+    refused = CliRunner().invoke(app, [*given, "--split", "outside"])
+    assert isinstance(refused.exception, ParameterError)
+    assert "other_machines" in str(refused.exception)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 OBJECTIVES = ("irregular", "life", "both")
-LEVELS, SPLITS = ("nominal", "clearance", "wear", "fleet"), ("train", "test", "outside")
+LEVELS, SPLITS = ("nominal", "clearance", "wear", "fleet"), ("train", "test", "outside", "other_machines")
 """Of a task; the names are repeated here so that help needs no environment."""
 
 KRIGING = "kriging"
@@ -34,7 +34,7 @@ NO_POLICY = (
     "--objective", type=click.Choice(OBJECTIVES), default=OBJECTIVES[0], show_default=True, help="What costs."
 )
 @click.option("--level", type=click.Choice(LEVELS), default=None, help="What differs from job to job.")
-@click.option("--split", type=click.Choice(SPLITS), default=None, help="Part of the level's machines.")
+@click.option("--split", type=click.Choice(SPLITS), default=None, help="Part of the machines.")
 @click.option("--sealed", is_flag=True, help="The 512 machines of this release; played once for each.")
 @click.option("--only", multiple=True, help="Name of a controller to run; all by default; may be repeated.")
 @click.option("--policy", "policies", multiple=True, help="NAME=FOLDER of a trained policy; one name, several seeds.")

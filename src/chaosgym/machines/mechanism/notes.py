@@ -8,6 +8,7 @@ import numpy as np
 
 from chaosgym.machines.mechanism.buckling import buckling
 from chaosgym.machines.mechanism.mechanism import Mechanism
+from chaosgym.machines.mechanism.motor import MOTOR_FIELDS
 
 if TYPE_CHECKING:
     from chaosgym.machines.mechanism.machine import MechanismMachine
@@ -34,7 +35,7 @@ def notes_of(machine: "MechanismMachine") -> tuple[str, ...]:
     if machine.has_motor and machine.rub:
         told.append(f"the run-up under the motor leaves friction of {machine.rubs} out")
     if machine.has_motor:
-        no_load_speed = machine.motor_no_load_speed  # type: ignore[attr-defined]
+        _, no_load_speed, _ = (getattr(machine, name) for name in MOTOR_FIELDS)
         told += machine.under_motor().notes(machine.speed, no_load_speed)
     told += instabilities_of(machine)
     reach = _reach(machine.mechanism, machine.rubs) if machine.lever else math.inf
